@@ -1,0 +1,52 @@
+# `make serve` and `make test` do all their own set-up; only Python 3.11 or newer, make and (for some tests) node are needed.
+PYTHON ?= python3
+SERVE  := .venv-serve
+DEV    := .venv
+HOST   ?= 127.0.0.1
+PORT   ?= 8000
+
+.PHONY: serve test lint unit model constraints clean
+
+serve: $(SERVE)/.ready
+	$(SERVE)/bin/pns serve --host $(HOST) --port $(PORT)
+
+test: lint unit
+
+lint: $(DEV)/.ready
+	$(DEV)/bin/ruff check .
+	$(DEV)/bin/ruff format --check .
+	$(DEV)/bin/pyright
+	$(DEV)/bin/lint-imports
+
+unit: $(DEV)/.ready
+	$(DEV)/bin/python -m pytest -n 2
+
+# Train and export the bundled model again; the same machine gives the same bytes.
+model: $(DEV)/.ready
+	$(DEV)/bin/python train/run.py
+	$(DEV)/bin/python export/run.py
+
+# Inference only: no torch.
+$(SERVE)/.ready: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(SERVE)
+	$(SERVE)/bin/python -m pip install --quiet --constraint constraints.txt --editable .
+	touch $@
+
+$(DEV)/.ready: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(DEV)
+	$(DEV)/bin/python -m pip install --quiet --constraint constraints.txt torch==2.13.0
+	$(DEV)/bin/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+# Resolve every dependency anew within pyproject's ranges and write the pins.
+constraints:
+	rm -rf .venv-constraints
+	$(PYTHON) -m venv .venv-constraints
+	.venv-constraints/bin/python -m pip install --quiet torch==2.13.0
+	.venv-constraints/bin/python -m pip install --quiet --editable '.[dev]'
+	.venv-constraints/bin/python -m pip freeze --exclude-editable --all | grep -vE '^pip==' | sed 's/+[a-z0-9.]*$$//' > constraints.txt.new
+	mv constraints.txt.new constraints.txt
+	rm -rf .venv-constraints
+
+clean:
+	rm -rf $(SERVE) $(DEV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis results/cache

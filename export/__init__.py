@@ -1,0 +1,1 @@
+"""Checkpoint to ONNX model file: the only package that imports train."""

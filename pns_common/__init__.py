@@ -1,0 +1,1 @@
+"""The operator: kernels over arrays, with no knowledge of torch, HTTP or glTF."""

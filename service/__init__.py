@@ -1,0 +1,1 @@
+"""The product: HTTP service, command line, glTF reader and writer."""

@@ -1,0 +1,1 @@
+"""The laboratory: networks, analytic surfaces, losses, trainer and metrics (torch)."""
