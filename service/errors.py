@@ -1,0 +1,161 @@
+"""The service's error tree: what may go wrong with a request, and the HTTP status each kind means.
+
+Every error carries data, not a sentence to parse: `code` is a stable slug that a client may branch on,
+`detail` says what was found in this request, `pointer` is the JSON pointer of the offending value in the
+upload where there is one. An exception outside this tree is our own fault and is never dressed up as one of these.
+"""
+
+from __future__ import annotations
+
+
+class ServiceError(Exception):
+    """Base of everything that the service answers with a problem document."""
+
+    status = 500
+    code = "service-error"
+    title = "The request could not be answered"
+
+    def __init__(self, detail: str, *, pointer: str | None = None, code: str | None = None) -> None:
+        super().__init__(detail)
+        self.detail = detail
+        self.pointer = pointer
+        if code is not None:
+            self.code = code
+
+    def __str__(self) -> str:
+        return self.detail if self.pointer is None else f"{self.detail} (at {self.pointer})"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Errors cross from worker processes: the default reduction would drop pointer and code.
+        return (type(self), (self.detail,), dict(self.__dict__))
+
+
+class UnreadableError(ServiceError):
+    """The bytes are not the format that they claim to be."""
+
+    status = 400
+    code = "unreadable"
+    title = "The upload cannot be read"
+
+
+class LimitError(ServiceError):
+    """A limit was exceeded: body size, predicted faces, predicted memory, JSON size."""
+
+    status = 413
+    code = "limit-exceeded"
+    title = "The request is over a limit"
+
+    def __init__(
+        self,
+        detail: str,
+        *,
+        limit: str,
+        allowed: int | float,
+        found: int | float,
+        pointer: str | None = None,
+        code: str | None = None,
+    ) -> None:
+        super().__init__(detail, pointer=pointer, code=code)
+        self.limit = limit
+        self.allowed = allowed
+        self.found = found
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (_restore_limit_error, (type(self), dict(self.__dict__)))
+
+
+class MediaTypeError(ServiceError):
+    """The content type is none that this service takes."""
+
+    status = 415
+    code = "unsupported-media-type"
+    title = "The content type is not supported"
+
+
+class GltfError(ServiceError):
+    """The file reads, but breaks its own promises: an accessor, an index, a node tree, a NaN."""
+
+    status = 422
+    code = "invalid-gltf"
+    title = "The glTF breaks its own promises"
+
+
+class UnsupportedFeature(ServiceError):
+    """A correct file that uses something which is not refined yet; `feature` names it."""
+
+    status = 422
+    code = "unsupported-feature"
+    title = "The file uses a feature that is not supported"
+
+    def __init__(self, feature: str, *, pointer: str | None = None) -> None:
+        super().__init__(f"{feature} cannot be refined yet", pointer=pointer)
+        self.feature = feature
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (type(self), (self.feature,), dict(self.__dict__))
+
+
+class UnrefinableError(ServiceError):
+    """A mesh that cannot be refined: no triangles, or no face left after cleaning."""
+
+    status = 422
+    code = "unrefinable-mesh"
+    title = "The mesh cannot be refined"
+
+
+class InvalidParameter(ServiceError):
+    """A query parameter outside its range; `name` says which."""
+
+    status = 422
+    code = "invalid-parameter"
+    title = "A parameter is out of range"
+
+    def __init__(self, name: str, detail: str) -> None:
+        super().__init__(detail)
+        self.name = name
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (type(self), (self.name, self.detail), dict(self.__dict__))
+
+
+class BusyError(ServiceError):
+    """Every worker is taken; `retry_after` is in whole seconds."""
+
+    status = 503
+    code = "busy"
+    title = "The service is busy"
+
+    def __init__(self, detail: str = "every worker is taken", *, retry_after: int = 1) -> None:
+        super().__init__(detail)
+        self.retry_after = retry_after
+
+
+class NoModelError(ServiceError):
+    """The PNS scheme was asked for and no model is loaded."""
+
+    status = 503
+    code = "no-model"
+    title = "No model is loaded"
+
+
+class JobTimeout(ServiceError):
+    """The job ran longer than a job may."""
+
+    status = 504
+    code = "job-timeout"
+    title = "The job took too long"
+
+
+class WorkerDied(ServiceError):
+    """The worker that held this job ended before it answered (memory, a signal)."""
+
+    status = 500
+    code = "worker-died"
+    title = "The worker process ended unexpectedly"
+
+
+def _restore_limit_error(kind: type[LimitError], state: dict[str, object]) -> LimitError:
+    error = kind.__new__(kind)
+    Exception.__init__(error, state["detail"])
+    error.__dict__.update(state)
+    return error
