@@ -30,7 +30,9 @@ class Options:
 
     def __post_init__(self) -> None:
         if not 1 <= self.levels <= MAX_LEVELS:
-            raise InvalidParameter("levels", f"levels is {self.levels}; it must be 1 to {MAX_LEVELS}")
+            raise InvalidParameter(
+                "levels", f"levels is {self.levels}; it must be 1 to {MAX_LEVELS}"
+            )
         if self.scheme not in SCHEMES:
             raise InvalidParameter("scheme", f"scheme must be one of {', '.join(SCHEMES)}")
         if self.diagnostics not in DIAGNOSTICS:
@@ -51,12 +53,11 @@ class Options:
 class Limits:
     """What one job may cost; checked against predictions, before the memory is allocated.
 
-    Bytes for `max_memory_bytes`; counts for the others. `max_json_items` bounds the structural characters
-    (brackets, braces, commas, colons) of the JSON text, `max_json_depth` how deep it nests.
+    Bytes for `max_memory_bytes`; counts for the others. `max_json_items` bounds the characters that open or
+    separate values in the JSON text, `max_json_depth` how deep it nests.
     """
 
     max_faces: int = 5_000_000
     max_memory_bytes: int = 4 * 1024**3
     max_json_items: int = 2_000_000
-    max_json_depth: int = 64
-    max_instanced_nodes: int = 100_000
+    max_json_depth: int = 128

@@ -1,0 +1,97 @@
+"""Weld: join by position what a file format splits at its seams.
+
+Formats store one vertex for each distinct set of attributes, so a UV seam or a hard edge looks like a
+boundary. Refining that mesh would crack it. Every format is therefore welded by exact float32 position
+first; attributes stay with the corners.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
+
+@dataclass(frozen=True, eq=False)
+class Weld:
+    """A welded mesh.
+
+    Attributes:
+        points: (V, 3) positions of the welded vertices.
+        faces: (F, 3) welded vertices of each face; V is numbered by first appearance over these corners.
+        vertex_of: (N,) the welded vertex of each file vertex; −1 where no face uses it.
+    """
+
+    points: Float[np.ndarray, "V 3"]
+    faces: Int[np.ndarray, "F 3"]
+    vertex_of: Int[np.ndarray, " N"]
+
+
+def weld(positions: Float[np.ndarray, "N 3"], faces: Int[np.ndarray, "F 3"]) -> Weld:
+    """Join the vertices whose float32 positions are equal (−0 = 0), whatever lies near them."""
+    single = canonical_zero(positions.astype(np.float32))
+    group = number_by_first_appearance(distinct_rows(single)[faces.reshape(-1)])
+    # Any corner of a group has the group's position.
+    points = np.empty((group.max(initial=-1) + 1, 3))
+    points[group] = single[faces.reshape(-1)]
+    vertex_of = np.full(len(positions), -1, dtype=np.int64)
+    vertex_of[faces.reshape(-1)] = group
+    # A file vertex that no face uses stays −1 even where it lies on one that is used.
+    return Weld(points=points, faces=group.reshape(-1, 3), vertex_of=vertex_of)
+
+
+def canonical_zero(values: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """The same numbers with −0 written as 0, so that equal numbers have equal bits."""
+    return values + values.dtype.type(0)
+
+
+def distinct_rows(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
+    """For each row a number that equal rows, and only they, share; rows are compared bit by bit."""
+    words = as_words(rows)
+    mixed = _hash(words)
+    order = np.argsort(mixed)
+    opens = np.empty(len(order), dtype=bool)
+    opens[:1] = True
+    ordered = mixed[order]
+    np.not_equal(ordered[1:], ordered[:-1], out=opens[1:])
+    number = np.cumsum(opens) - 1
+    leader = order[np.flatnonzero(opens)]
+    ids = np.empty(len(rows), dtype=np.int64)
+    ids[order] = number
+    if (words == words[leader[ids]]).all():
+        return ids
+    # Two different rows share a hash: rare unless a file is made for it, so exactness may cost a slow sort.
+    whole = np.ascontiguousarray(words).view(np.dtype((np.void, words.strides[0]))).reshape(-1)
+    return np.unique(whole, return_inverse=True)[1].reshape(-1)
+
+
+def number_by_first_appearance(labels: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+    """Rename non-negative labels 0, 1, 2, … in the order in which they first occur."""
+    if not len(labels):
+        return labels
+    first = np.full(int(labels.max()) + 1, -1, dtype=np.int64)
+    # Written backwards, so that the earliest occurrence is the one that remains.
+    first[labels[::-1]] = np.arange(len(labels) - 1, -1, -1)
+    is_first = np.zeros(len(labels), dtype=bool)
+    is_first[first[first >= 0]] = True
+    return (np.cumsum(is_first) - 1)[first[labels]]
+
+
+def as_words(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, "N W"]:
+    """The rows' bits as unsigned 32-bit words, padded with zeros."""
+    narrow = np.ascontiguousarray(rows)
+    width = narrow.itemsize * narrow.shape[1]
+    octets = narrow.view(np.uint8).reshape(len(narrow), width)
+    if width % 4:
+        octets = np.pad(octets, ((0, 0), (0, -width % 4)))
+    return np.ascontiguousarray(octets).view(np.uint32)
+
+
+def _hash(words: Int[np.ndarray, "N W"]) -> Int[np.ndarray, " N"]:
+    """A 64-bit mix of each row."""
+    mixed = np.full(len(words), 0x9E3779B97F4A7C15, dtype=np.uint64)
+    for word in words.T:
+        mixed = (mixed ^ word) * np.uint64(0xD6E8FEB86659FD93)
+        mixed ^= mixed >> np.uint64(32)
+    return mixed
