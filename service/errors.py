@@ -1,8 +1,9 @@
 """The service's error tree: what may go wrong with a request, and the HTTP status each kind means.
 
-Every error carries data, not a sentence to parse: `code` is a stable slug that a client may branch on,
-`detail` says what was found in this request, `pointer` is the JSON pointer of the offending value in the
-upload where there is one. An exception outside this tree is our own fault and is never dressed up as one of these.
+Every error carries data, not a sentence to parse: `code` is a stable slug that a client may branch
+on, `detail` says what was found in this request, `pointer` is the JSON pointer of the offending
+value in the upload where there is one. An exception outside this tree is our own fault and is never
+dressed up as one of these.
 """
 
 from __future__ import annotations
@@ -80,7 +81,7 @@ class GltfError(ServiceError):
     title = "The glTF breaks its own promises"
 
 
-class UnsupportedFeature(ServiceError):
+class UnsupportedFeature(ServiceError):  # noqa: N818
     """A correct file that uses something which is not refined yet; `feature` names it."""
 
     status = 422
@@ -103,7 +104,7 @@ class UnrefinableError(ServiceError):
     title = "The mesh cannot be refined"
 
 
-class InvalidParameter(ServiceError):
+class InvalidParameter(ServiceError):  # noqa: N818
     """A query parameter outside its range; `name` says which."""
 
     status = 422
@@ -138,7 +139,7 @@ class NoModelError(ServiceError):
     title = "No model is loaded"
 
 
-class JobTimeout(ServiceError):
+class JobTimeout(ServiceError):  # noqa: N818
     """The job ran longer than a job may."""
 
     status = 504
@@ -146,7 +147,7 @@ class JobTimeout(ServiceError):
     title = "The job took too long"
 
 
-class WorkerDied(ServiceError):
+class WorkerDied(ServiceError):  # noqa: N818
     """The worker that held this job ended before it answered (memory, a signal)."""
 
     status = 500

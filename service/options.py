@@ -18,8 +18,8 @@ DIAGNOSTICS = ("summary", "full", "none")
 class Options:
     """One request's parameters, valid once constructed.
 
-    `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the mesh's local
-    coordinates, or "auto". Raises InvalidParameter.
+    `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
+    mesh's local coordinates, or "auto". Raises InvalidParameter.
     """
 
     levels: int = 1
@@ -53,8 +53,8 @@ class Options:
 class Limits:
     """What one job may cost; checked against predictions, before the memory is allocated.
 
-    Bytes for `max_memory_bytes`; counts for the others. `max_json_items` bounds the characters that open or
-    separate values in the JSON text, `max_json_depth` how deep it nests.
+    Bytes for `max_memory_bytes`; counts for the others. `max_json_items` bounds the characters that
+    open or separate values in the JSON text, `max_json_depth` how deep it nests.
     """
 
     max_faces: int = 5_000_000

@@ -1,8 +1,8 @@
 """Weld: join by position what a file format splits at its seams.
 
-Formats store one vertex for each distinct set of attributes, so a UV seam or a hard edge looks like a
-boundary. Refining that mesh would crack it. Every format is therefore welded by exact float32 position
-first; attributes stay with the corners.
+Formats store one vertex for each distinct set of attributes, so a UV seam or a hard edge looks like
+a boundary, and refining that mesh would crack it. Every format is therefore welded by exact float32
+position first; attributes stay with the corners.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class Weld:
 
     Attributes:
         points: (V, 3) positions of the welded vertices.
-        faces: (F, 3) welded vertices of each face; V is numbered by first appearance over these corners.
+        faces: (F, 3) welded vertices, numbered by first appearance over these corners.
         vertex_of: (N,) the welded vertex of each file vertex; −1 where no face uses it.
     """
 
@@ -37,7 +37,6 @@ def weld(positions: Float[np.ndarray, "N 3"], faces: Int[np.ndarray, "F 3"]) -> 
     points[group] = single[faces.reshape(-1)]
     vertex_of = np.full(len(positions), -1, dtype=np.int64)
     vertex_of[faces.reshape(-1)] = group
-    # A file vertex that no face uses stays −1 even where it lies on one that is used.
     return Weld(points=points, faces=group.reshape(-1, 3), vertex_of=vertex_of)
 
 
@@ -61,7 +60,7 @@ def distinct_rows(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
     ids[order] = number
     if (words == words[leader[ids]]).all():
         return ids
-    # Two different rows share a hash: rare unless a file is made for it, so exactness may cost a slow sort.
+    # Two different rows share a hash: rare, unless a file is made for it, so this may be slow.
     whole = np.ascontiguousarray(words).view(np.dtype((np.void, words.strides[0]))).reshape(-1)
     return np.unique(whole, return_inverse=True)[1].reshape(-1)
 

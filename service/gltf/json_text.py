@@ -1,0 +1,71 @@
+"""JSON text in and out: strict, and bounded before anything is decoded.
+
+A decoder's cost is in the values it makes, not in the bytes it reads: 64 MiB of `{},` make tens of
+millions of objects. So the characters that open or separate values are counted in the raw bytes
+first (those inside strings too: the count may only err upwards), and so is the depth.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from service.errors import GltfError, LimitError, UnreadableError
+from service.options import Limits
+
+_STRING = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
+
+
+def decode_object(text: bytes, limits: Limits) -> dict[str, Any]:
+    """The JSON object that `text` holds.
+
+    Raises:
+        LimitError: too many values or too deep.
+        UnreadableError: not JSON (RFC 8259; so no NaN or Infinity), or not UTF-8.
+        GltfError: JSON, but not an object.
+    """
+    _check_size(text, limits)
+    try:
+        value = msgspec.json.decode(text)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise UnreadableError(f"the JSON cannot be decoded: {error}") from error
+    if not isinstance(value, dict):
+        raise GltfError("the JSON's top level must be an object", pointer="")
+    return value
+
+
+def encode(value: Any) -> bytes:
+    """Compact UTF-8 JSON, keys in the order that they have."""
+    return msgspec.json.encode(value)
+
+
+def _check_size(text: bytes, limits: Limits) -> None:
+    items = sum(text.count(mark) for mark in b'{[,:"')
+    if items > limits.max_json_items:
+        raise LimitError(
+            f"the JSON holds {items} separators, more than {limits.max_json_items}",
+            limit="json-items",
+            allowed=limits.max_json_items,
+            found=items,
+        )
+    depth = _depth(text)
+    if depth > limits.max_json_depth:
+        raise LimitError(
+            f"the JSON nests {depth} deep, more than {limits.max_json_depth}",
+            limit="json-depth",
+            allowed=limits.max_json_depth,
+            found=depth,
+        )
+
+
+def _depth(text: bytes) -> int:
+    """How deep brackets and braces nest outside strings."""
+    bare = np.frombuffer(_STRING.sub(b"", text), dtype=np.uint8)
+    steps = np.zeros(256, dtype=np.int64)
+    steps[[ord("{"), ord("[")]] = 1
+    steps[[ord("}"), ord("]")]] = -1
+    change = steps[bare]
+    return int(np.cumsum(change[change != 0]).max(initial=0))
