@@ -1,0 +1,79 @@
+"""The job of a request, as a worker runs it: unpack the body, refine, leave the answer in a memory file.
+
+The heavy imports (the runtime, the pipeline) are made inside the functions: the server process imports this
+module to name its jobs, and never runs them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from service import media, memory_file, multipart
+from service.errors import NoModelError
+from service.options import Limits, Options
+
+if TYPE_CHECKING:
+    from pns_common.schemes import Model
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """One request, small enough for a pipe: body and answer are the paths of memory files.
+
+    `model` is a model, or the name or file of one, or None for the bundled model.
+    """
+
+    body: str
+    answer: str
+    content_type: str
+    report_only: bool
+    options: Options
+    limits: Limits
+    model: Model | str | None
+
+
+def subdivide(work: Work) -> dict[str, float]:
+    """Write the GLB (or the report as JSON) to `work.answer`; the seconds of each stage. Raises ServiceError."""
+    import msgspec
+
+    from service.subdivide import subdivide_gltf
+
+    data, media_type = _file_of(Path(work.body).read_bytes(), work.content_type)
+    model = _model(work.model) if work.options.scheme == "pns" else None
+    done = subdivide_gltf(data, media_type, work.options, model, work.limits)
+    memory_file.write(
+        work.answer, msgspec.json.encode(done.report) if work.report_only else done.glb
+    )
+    return done.timings
+
+
+def warm_up(model: Model | str | None) -> None:
+    """Import and load what the first request would otherwise wait for. Raises NoModelError."""
+    import service.subdivide  # noqa: F401
+
+    _model(model)
+
+
+def _file_of(body: bytes, content_type: str) -> tuple[bytes, str]:
+    media_type = media.of_request(content_type)
+    if media_type != media.MULTIPART:
+        return body, media_type
+    data = multipart.only_file(body, content_type)
+    return data, media.sniff(data)
+
+
+def _model(source: Model | str | None) -> Model:
+    return _load(source) if source is None or isinstance(source, str) else source
+
+
+@lru_cache(maxsize=1)
+def _load(source: str | None) -> Model:
+    from pns_common import ModelError, load_model
+
+    try:
+        return load_model(source)
+    except ModelError as error:
+        raise NoModelError(str(error)) from error

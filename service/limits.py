@@ -1,0 +1,84 @@
+"""The outermost layer: a body over its limit is refused before anything reads, parses or keeps it."""
+
+from __future__ import annotations
+
+import asyncio
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service import problems
+from service.errors import LimitError, ServiceError, UnreadableError
+
+
+class UploadTimeout(ServiceError):
+    """The body took longer to arrive than an upload may."""
+
+    status = 408
+    code = "upload-timeout"
+    title = "The upload took too long"
+
+
+class BodyLimit:
+    """ASGI layer that counts a request's body while it arrives, in bytes and in seconds.
+
+    A Content-Length over the limit is answered at once with 413. A body without one is counted: the read that
+    passes the limit raises LimitError inside the application, the read that comes too late UploadTimeout.
+    """
+
+    def __init__(self, app: ASGIApp, *, max_bytes: int, seconds: float) -> None:
+        self.app = app
+        self.max_bytes = max_bytes
+        self.seconds = seconds
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one connection."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        try:
+            self._check_announced(scope)
+        except ServiceError as error:
+            await problems.of_service_error(error)(scope, receive, send)
+            return
+        await self.app(scope, self._counted(receive), send)
+
+    def _check_announced(self, scope: Scope) -> None:
+        for name, value in scope["headers"]:
+            if name == b"content-length":
+                if not value.isdigit():
+                    raise UnreadableError("Content-Length is not a number")
+                self._check(int(value))
+
+    def _check(self, size: int) -> None:
+        if size > self.max_bytes:
+            raise LimitError(
+                f"the body is larger than {self.max_bytes} bytes",
+                limit="body",
+                allowed=self.max_bytes,
+                found=size,
+            )
+
+    def _counted(self, receive: Receive) -> Receive:
+        size = 0
+        complete = False
+        deadline = asyncio.get_running_loop().time() + self.seconds
+
+        async def counted() -> Message:
+            nonlocal size, complete
+            if complete:
+                # Only a disconnect can follow, and that may be waited for without a limit.
+                return await receive()
+            try:
+                async with asyncio.timeout_at(deadline):
+                    message = await receive()
+            except TimeoutError as error:
+                raise UploadTimeout(
+                    f"the body did not arrive within {self.seconds:g} seconds"
+                ) from error
+            if message["type"] == "http.request":
+                size += len(message.get("body", b""))
+                complete = not message.get("more_body", False)
+                self._check(size)
+            return message
+
+        return counted

@@ -1,0 +1,44 @@
+"""The query parameters of POST /subdivide."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from service.options import MAX_LEVELS, Options
+
+Finite = Field(allow_inf_nan=False)
+
+
+def _empty_is_absent(value: Any) -> Any:
+    """`budget=` in a URL means the same as no budget at all."""
+    return None if value == "" else value
+
+
+class Parameters(BaseModel):
+    """What a client may ask for; a name that is not here is an error, since a misspelt one would be lost."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    levels: int = Field(
+        default=1, ge=1, le=MAX_LEVELS, description="depth: each level makes four faces of one"
+    )
+    scheme: Literal["pns", "loop"] = Field(
+        default="pns", description="`loop` is the same path without the learned correction"
+    )
+    budget: Annotated[
+        Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,
+        BeforeValidator(_empty_is_absent),
+    ] = Field(default=None, description="C, dimensionless; empty: the model's own")
+    reference_length: Literal["auto"] | Annotated[float, Field(gt=0, allow_inf_nan=False)] = Field(
+        default="auto", description="R, the unit of length of the budget; `auto` measures each mesh"
+    )
+    diagnostics: Literal["summary", "full", "none"] = Field(
+        default="summary",
+        description="`full` adds the vertex attributes `_PNS_RATIO` and `_PNS_GATE`",
+    )
+
+    def options(self) -> Options:
+        """The same as the pipeline takes them."""
+        return Options(**self.model_dump())

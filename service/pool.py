@@ -1,0 +1,126 @@
+"""Worker processes: jobs run where they can be killed, and where no upload holds the server's interpreter."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import multiprocessing
+from collections.abc import Callable, Coroutine
+from concurrent.futures.process import BrokenProcessPool
+from typing import TypeVar
+
+from pebble import ProcessExpired, ProcessPool
+
+from service import worker
+from service.errors import JobTimeout, ServiceError, WorkerDied
+
+T = TypeVar("T")
+
+# Where a fresh process cannot even warm up, the next one is not started at once.
+RESTART_SECONDS = 1.0
+
+log = logging.getLogger("pns.service")
+
+
+class Workers:
+    """`count` worker processes, each with one job at a time.
+
+    Every process has a pebble pool of its own, so that a worker that dies or is killed breaks nothing which
+    another request waits on. A pool whose job did not come back is thrown away and replaced.
+    `warm_up` is called in each new process before it takes jobs.
+    """
+
+    def __init__(self, count: int, seconds: float, warm_up: Callable[[], object]) -> None:
+        self._count = count
+        self._seconds = seconds
+        self._warm_up = warm_up
+        self._free: asyncio.Queue[ProcessPool] = asyncio.Queue()
+        self._pools: set[ProcessPool] = set()
+        self._background: set[asyncio.Task[None]] = set()
+        self.ready = False
+        """Whether a worker has warmed up."""
+
+    def start(self) -> None:
+        """Start the processes; they warm up in the background."""
+        for _ in range(self._count):
+            self._in_background(self._add())
+
+    async def stop(self) -> None:
+        """End every process, whatever it is doing."""
+        for task in self._background:
+            task.cancel()
+        await asyncio.gather(*self._background, return_exceptions=True)
+        await asyncio.gather(*(asyncio.to_thread(_end, pool) for pool in self._pools))
+        self._pools.clear()
+
+    async def run(self, function: Callable[..., T], *arguments: object) -> T:
+        """The value of `function(*arguments)`, called in a worker once one is free.
+
+        Cancelling this call kills the worker. Raises what the function raises (ServiceError as it is, anything
+        else as worker.JobFault), JobTimeout past the deadline, WorkerDied where the process ended.
+        """
+        pool = await self._take()
+        try:
+            value = await self._call(pool, function, *arguments)
+        except (JobTimeout, WorkerDied, asyncio.CancelledError):
+            self._in_background(self._replace(pool))
+            raise
+        except BaseException:
+            self._free.put_nowait(pool)
+            raise
+        self._free.put_nowait(pool)
+        return value
+
+    async def _take(self) -> ProcessPool:
+        """A free pool; those whose idle process has died meanwhile are replaced."""
+        while not (pool := await self._free.get()).active:
+            self._in_background(self._replace(pool))
+        return pool
+
+    async def _call(self, pool: ProcessPool, function: Callable[..., T], *arguments: object) -> T:
+        future = pool.schedule(worker.call, args=(function, *arguments), timeout=self._seconds)
+        try:
+            return await asyncio.wrap_future(future)
+        except TimeoutError as error:
+            raise JobTimeout(f"the job ran longer than {self._seconds:g} seconds") from error
+        except (ProcessExpired, BrokenProcessPool) as error:
+            raise WorkerDied(
+                "the worker process ended before it answered; it may have run out of memory"
+            ) from error
+
+    async def _add(self) -> None:
+        pool = ProcessPool(
+            max_workers=1,
+            initializer=worker.prepare,
+            # Spawn, not fork: the server has threads, and a fork of them may deadlock.
+            context=multiprocessing.get_context("spawn"),
+        )
+        self._pools.add(pool)
+        try:
+            await self._call(pool, self._warm_up)
+        except (JobTimeout, WorkerDied) as error:
+            log.error("a worker did not start: %s", error)
+            await asyncio.sleep(RESTART_SECONDS)
+            self._in_background(self._replace(pool))
+            return
+        except (ServiceError, worker.JobFault) as error:
+            # The process lives: it may still serve what does not need the thing that failed.
+            log.error("a worker did not warm up: %s", error)
+        else:
+            self.ready = True
+        self._free.put_nowait(pool)
+
+    async def _replace(self, pool: ProcessPool) -> None:
+        self._pools.discard(pool)
+        await asyncio.to_thread(_end, pool)
+        await self._add()
+
+    def _in_background(self, work: Coroutine[object, object, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
+        self._background.add(task)
+        task.add_done_callback(self._background.discard)
+
+
+def _end(pool: ProcessPool) -> None:
+    pool.stop()
+    pool.join()

@@ -1,0 +1,114 @@
+"""Errors as RFC 9457 problem documents: one shape for every status, and never a stack trace."""
+
+from __future__ import annotations
+
+import logging
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+
+from service.errors import BusyError, InvalidParameter, LimitError, ServiceError
+
+MEDIA_TYPE = "application/problem+json"
+
+log = logging.getLogger("pns.service")
+
+
+class Problem(BaseModel):
+    """The problem document, as the API's description shows it."""
+
+    type: str = Field(examples=["urn:pns:problem:invalid-parameter"])
+    title: str
+    status: int
+    detail: str
+    code: str = Field(description="stable slug to branch on")
+    pointer: str | None = Field(default=None, description="JSON pointer of the offending value")
+    parameter: str | None = Field(default=None, description="name of the offending parameter")
+    limit: str | None = Field(default=None, description="name of the limit that was exceeded")
+    allowed: float | None = Field(default=None, description="the limit's value")
+    found: float | None = Field(default=None, description="what this request would have taken")
+
+
+def problem(
+    status: int,
+    code: str,
+    title: str,
+    detail: str,
+    *,
+    headers: dict[str, str] | None = None,
+    **members: Any,
+) -> JSONResponse:
+    """One problem document; members that are None are left out."""
+    body = {
+        "type": f"urn:pns:problem:{code}",
+        "title": title,
+        "status": status,
+        "detail": detail,
+        "code": code,
+    }
+    body |= {name: value for name, value in members.items() if value is not None}
+    return JSONResponse(body, status, headers=headers, media_type=MEDIA_TYPE)
+
+
+def of_service_error(error: ServiceError) -> JSONResponse:
+    """The document of an error that the service foresees."""
+    members: dict[str, Any] = {"pointer": error.pointer}
+    headers: dict[str, str] = {}
+    match error:
+        case LimitError():
+            members |= {"limit": error.limit, "allowed": error.allowed, "found": error.found}
+        case InvalidParameter():
+            members["parameter"] = error.name
+        case BusyError():
+            headers["Retry-After"] = str(error.retry_after)
+    if error.status in (408, 413):
+        # What is left of the body is not read, so the connection cannot serve another request.
+        headers["Connection"] = "close"
+    return problem(error.status, error.code, error.title, error.detail, headers=headers, **members)
+
+
+def _of_validation_error(error: RequestValidationError) -> JSONResponse:
+    first = error.errors()[0]
+    name = next((str(part) for part in first["loc"][1:]), "")
+    kind = InvalidParameter(name, f"{name}: {first['msg']}")
+    return of_service_error(kind)
+
+
+def _of_http_exception(error: HTTPException) -> JSONResponse:
+    title = HTTPStatus(error.status_code).phrase
+    code = title.lower().replace(" ", "-")
+    headers = dict(error.headers or {})
+    return problem(error.status_code, code, title, str(error.detail), headers=headers)
+
+
+def internal_error() -> JSONResponse:
+    """A fault of ours: plain, because its details belong in the log."""
+    return problem(500, "internal-error", "Internal error", "The service failed; it is logged.")
+
+
+def install(app: FastAPI) -> None:
+    """Make every error of `app` a problem document."""
+
+    @app.exception_handler(ServiceError)
+    async def service_error(request: Request, error: ServiceError) -> JSONResponse:
+        if error.status >= 500:
+            log.warning("%s: %s", error.code, error)
+        return of_service_error(error)
+
+    @app.exception_handler(RequestValidationError)
+    async def validation_error(request: Request, error: RequestValidationError) -> JSONResponse:
+        return _of_validation_error(error)
+
+    @app.exception_handler(HTTPException)
+    async def http_exception(request: Request, error: HTTPException) -> JSONResponse:
+        return _of_http_exception(error)
+
+    # Starlette answers with this and raises the error again, so that the server logs it.
+    @app.exception_handler(Exception)
+    async def fault(request: Request, error: Exception) -> JSONResponse:
+        return internal_error()

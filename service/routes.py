@@ -1,0 +1,140 @@
+"""The routes: a refined file, and two probes for whoever runs the service."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+from fastapi import APIRouter, Query, Request
+from starlette.requests import ClientDisconnect
+from starlette.responses import JSONResponse, Response
+from starlette.types import Receive
+
+from service import documentation, media
+from service.answer import FileAnswer
+from service.errors import BusyError, LimitError, MediaTypeError, NoModelError
+from service.gate import Gate
+from service.jobs import Work
+from service.memory_file import MemoryFile
+from service.parameters import Parameters
+from service.pool import Workers
+from service.settings import Settings
+
+if TYPE_CHECKING:
+    from pns_common.schemes import Model
+
+T = TypeVar("T")
+Job = Callable[[Work], dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Service:
+    """What the routes share."""
+
+    settings: Settings
+    model: Model | str | None
+    job: Job
+    workers: Workers
+    gate: Gate
+
+
+def router(service: Service) -> APIRouter:
+    """The routes, bound to one service."""
+    routes = APIRouter()
+
+    @routes.post("/subdivide", response_class=Response, **documentation.SUBDIVIDE)
+    async def subdivide(request: Request, parameters: Annotated[Parameters, Query()]) -> Response:
+        return await _subdivide(service, request, parameters)
+
+    @routes.get("/healthz", **documentation.HEALTHZ)
+    async def healthz() -> dict[str, str]:
+        return {"status": "ok"}
+
+    @routes.get("/readyz", **documentation.READYZ)
+    async def readyz() -> JSONResponse:
+        if service.gate.draining:
+            raise BusyError("the service is shutting down", code="draining", retry_after=5)
+        if not service.workers.ready:
+            raise NoModelError("no worker has loaded the model")
+        return JSONResponse({"status": "ready"})
+
+    return routes
+
+
+async def _subdivide(service: Service, request: Request, parameters: Parameters) -> Response:
+    settings = service.settings
+    options = parameters.options()
+    if options.levels > settings.levels:
+        raise LimitError(
+            f"levels is {options.levels}; this service refines {settings.levels} at most",
+            limit="levels",
+            allowed=settings.levels,
+            found=options.levels,
+        )
+    content_type = request.headers.get("content-type", "")
+    media.of_request(content_type)
+    if request.headers.get("content-encoding", "identity").lower() != "identity":
+        raise MediaTypeError("a compressed body (Content-Encoding) is not supported")
+    report_only = _wants_report(request.headers.get("accept", ""))
+
+    with ExitStack() as held:
+        held.enter_context(service.gate.admit())
+        # The body's memory is given back before the answer is sent; the answer's, after.
+        with MemoryFile() as body:
+            answer = held.enter_context(MemoryFile())
+            began = time.perf_counter()
+            async for piece in request.stream():
+                body.append(piece)
+            uploaded = time.perf_counter()
+            work = Work(
+                body=body.path,
+                answer=answer.path,
+                content_type=content_type,
+                report_only=report_only,
+                options=options,
+                limits=settings.job_limits(),
+                model=service.model,
+            )
+            stages = await _unless_gone(request.receive, service.workers.run(service.job, work))
+            finished = time.perf_counter()
+        timing = {"upload": uploaded - began, **stages, "total": finished - began}
+        return FileAnswer(
+            answer,
+            held.pop_all(),
+            media_type="application/json" if report_only else media.GLB,
+            headers={"Server-Timing": _server_timing(timing), "Vary": "Accept"},
+            stall_seconds=settings.stall_seconds,
+        )
+
+
+def _wants_report(accept: str) -> bool:
+    wanted = {entry.partition(";")[0].strip().lower() for entry in accept.split(",")}
+    return "application/json" in wanted and media.GLB not in wanted
+
+
+def _server_timing(seconds: dict[str, float]) -> str:
+    return ", ".join(f"{stage};dur={1000 * value:.1f}" for stage, value in seconds.items())
+
+
+async def _unless_gone(receive: Receive, work: Coroutine[Any, Any, T]) -> T:
+    """The value of `work`, which is cancelled when the client disconnects. Raises ClientDisconnect."""
+    job = asyncio.create_task(work)
+    gone = asyncio.create_task(_disconnected(receive))
+    try:
+        await asyncio.wait({job, gone}, return_when=asyncio.FIRST_COMPLETED)
+        if not job.done():
+            raise ClientDisconnect
+        return job.result()
+    finally:
+        job.cancel()
+        gone.cancel()
+        await asyncio.gather(job, gone, return_exceptions=True)
+
+
+async def _disconnected(receive: Receive) -> None:
+    while (await receive())["type"] != "http.disconnect":
+        pass

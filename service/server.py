@@ -1,0 +1,54 @@
+"""`pns serve`: uvicorn, with a shutdown that lets requests finish and tells the load balancer first."""
+
+from __future__ import annotations
+
+import asyncio
+from types import FrameType
+
+import uvicorn
+
+from service.app import create_app
+from service.gate import Gate
+from service.settings import Settings
+
+
+class DrainingServer(uvicorn.Server):
+    """On the first SIGTERM or SIGINT it closes the gate; it exits once no request is under way.
+
+    Until then it still answers: /readyz and new requests with 503. uvicorn's own shutdown would close the socket
+    at once. A second signal ends it without waiting.
+    """
+
+    def __init__(self, config: uvicorn.Config, gate: Gate, drain_seconds: float) -> None:
+        super().__init__(config)
+        self._gate = gate
+        self._drain_seconds = drain_seconds
+        self._deadline: float | None = None
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Close the gate; uvicorn calls this as the signal handler."""
+        if self._gate.draining:
+            self.should_exit = self.force_exit = True
+        self._gate.draining = True
+
+    async def on_tick(self, counter: int) -> bool:
+        """Decide, ten times a second, whether to exit."""
+        if self._gate.draining:
+            now = asyncio.get_running_loop().time()
+            self._deadline = self._deadline or now + self._drain_seconds
+            if self._gate.admitted == 0 or now >= self._deadline:
+                self.should_exit = True
+        return await super().on_tick(counter)
+
+
+def serve(settings: Settings) -> None:
+    """Serve until a signal comes."""
+    app = create_app(settings)
+    config = uvicorn.Config(
+        app,
+        host=settings.host,
+        port=settings.port,
+        server_header=False,
+        timeout_graceful_shutdown=max(1, round(settings.drain_seconds)),
+    )
+    DrainingServer(config, app.state.gate, settings.drain_seconds).run()

@@ -1,0 +1,88 @@
+"""Jobs for the service's tests: each does one thing that a real job may do to its worker.
+
+The request's body says what to do, so that one pool of workers serves all tests.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import time
+from pathlib import Path
+
+from service import memory_file
+from service.errors import GltfError, LimitError, UnreadableError
+from service.jobs import Work
+
+
+def no_warm_up(model: object) -> None:
+    pass
+
+
+def fails_to_warm_up(model: object) -> None:
+    raise RuntimeError("no such thing")
+
+
+def obey(work: Work) -> dict[str, float]:
+    """`sleep 2`, `die`, `hold`, … as the body says; anything else is echoed."""
+    body = Path(work.body).read_bytes()
+    word, _, argument = body[:100].decode(errors="replace").partition(" ")
+    match word:
+        case "sleep":
+            time.sleep(float(argument))
+        case "die":
+            os.kill(os.getpid(), signal.SIGKILL)
+        case "hold":
+            # One long match in C: the interpreter lock is not released, and no signal handler runs.
+            re.match(r"(a+)+$", "a" * 40 + "b")
+        case "fault":
+            raise ZeroDivisionError("secret detail")
+        case "unpicklable":
+            raise Unpicklable(lambda: None)
+        case "unreadable":
+            raise UnreadableError("not a GLB")
+        case "broken":
+            raise GltfError("accessor 3 is too short", pointer="/accessors/3/count")
+        case "faces":
+            raise LimitError("too many faces", limit="faces", allowed=5, found=20)
+        case "large":
+            memory_file.write(work.answer, bytes(int(argument)))
+            return {}
+        case "pid":
+            body = str(os.getpid()).encode()
+    memory_file.write(work.answer, body)
+    return {"read": 0.001, "refine": 0.002}
+
+
+class Unpicklable(Exception):
+    pass
+
+
+def sleep(seconds: float) -> str:
+    time.sleep(seconds)
+    return "slept"
+
+
+def pid() -> int:
+    return os.getpid()
+
+
+def die() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def hold() -> None:
+    re.match(r"(a+)+$", "a" * 40 + "b")
+
+
+def fault() -> None:
+    raise Unpicklable(lambda: None)
+
+
+def refuse() -> None:
+    raise GltfError("no", pointer="/meshes/0")
+
+
+def nothing() -> None:
+    pass
