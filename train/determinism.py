@@ -1,0 +1,47 @@
+"""Bit-reproducible torch on one machine, and a fingerprint that says whether it is the same one."""
+
+import hashlib
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import torch
+
+THREADS = 1
+"""The matrices are small: one thread is as fast as two, and the order of sums is fixed."""
+
+
+@contextmanager
+def deterministic() -> Iterator[None]:
+    """Run torch with deterministic algorithms on a fixed number of threads; then restore both."""
+    algorithms, threads = torch.are_deterministic_algorithms_enabled(), torch.get_num_threads()
+    torch.use_deterministic_algorithms(True)
+    torch.set_num_threads(THREADS)
+    try:
+        yield
+    finally:
+        torch.use_deterministic_algorithms(algorithms)
+        torch.set_num_threads(threads)
+
+
+def machine_fingerprint() -> str:
+    """Return a short hash of what may change the last bits: processor, vector units, libraries."""
+    facts = [
+        platform.machine(),
+        _processor_model(),
+        torch.backends.cpu.get_cpu_capability(),
+        torch.__version__,
+        np.__version__,
+    ]
+    return hashlib.sha256("\n".join(facts).encode()).hexdigest()[:16]
+
+
+def _processor_model() -> str:
+    # platform.processor() is empty on most Linux systems.
+    cpu_info = Path("/proc/cpuinfo")
+    if not cpu_info.exists():
+        return platform.processor()
+    lines = cpu_info.read_text(encoding="utf-8").splitlines()
+    return next((line for line in lines if line.startswith("model name")), platform.processor())

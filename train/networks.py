@@ -1,0 +1,75 @@
+"""The correction network: edge features to a vector in the ball of radius C."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+ACTIVATIONS: Mapping[str, Callable[[], nn.Module]] = MappingProxyType(
+    # nn.GELU is the exact one, x Φ(x) with erf, unless told otherwise.
+    {"gelu": nn.GELU, "tanh": nn.Tanh}
+)
+
+
+class BoundedNet(nn.Module):
+    """A small perceptron whose output never leaves the ball: η = C z / max(1, ‖z‖).
+
+    The bound holds for any weights. Its layers are `net.0`, `net.2`, …, as in the published state
+    dictionaries. Source: paper, PNS operator and algorithm.
+    """
+
+    def __init__(
+        self,
+        feature_count: int,
+        hidden: tuple[int, ...],
+        activation: str,
+        generator: torch.Generator,
+    ):
+        super().__init__()
+        self.activation = activation
+        widths = (feature_count, *hidden, 3)
+        layers: list[nn.Module] = []
+        for fan_in, fan_out in zip(widths, widths[1:], strict=False):
+            layers += [_seeded_linear(fan_in, fan_out, generator), ACTIVATIONS[activation]()]
+        self.net = nn.Sequential(*layers[:-1])
+
+    def forward(
+        self, features: Float[Tensor, "E K"], budget: float | Float[Tensor, ""]
+    ) -> Float[Tensor, "E 3"]:
+        """Return η with ‖η‖ ≤ budget."""
+        z = self.net(features)
+        return budget * z / torch.linalg.vector_norm(z, dim=-1, keepdim=True).clamp(min=1)
+
+    @property
+    def linear_layers(self) -> list[nn.Linear]:
+        """The layers that hold weights, from features to z."""
+        return [layer for layer in self.net if isinstance(layer, nn.Linear)]
+
+
+def unit_correction(network: BoundedNet) -> Callable[[Tensor], Tensor]:
+    """Return the network at budget 1 as the operator's callable: float64 in and out.
+
+    The geometry is float64, the network keeps its own precision, as in the product.
+    """
+
+    def correction(features: Float[Tensor, "E K"]) -> Float[Tensor, "E 3"]:
+        own = network.linear_layers[0].weight.dtype
+        return network(features.to(own), 1.0).to(features.dtype)
+
+    return correction
+
+
+def _seeded_linear(fan_in: int, fan_out: int, generator: torch.Generator) -> nn.Linear:
+    """Return a linear layer with torch's default distribution, drawn from our own generator.
+
+    Weights and biases are uniform in ± 1/√fan_in; nn.Linear itself would draw them from the
+    process-wide generator.
+    """
+    layer = nn.utils.skip_init(nn.Linear, fan_in, fan_out)
+    bound = fan_in**-0.5
+    with torch.no_grad():
+        layer.weight.uniform_(-bound, bound, generator=generator)
+        layer.bias.uniform_(-bound, bound, generator=generator)
+    return layer

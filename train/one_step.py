@@ -1,0 +1,61 @@
+"""One differentiable step of the operator: the kernels of pns_common on torch tensors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from pns_common.arrays import cross, gather, segment_sum, unit
+from pns_common.correction import Gate, Network, correct, proximity_ratio
+from pns_common.features import FeatureSet
+from pns_common.frames import edge_stencil, face_normals
+from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
+from pns_common.topology import Topology
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The refined points, old vertices first, and how far interior edge vertices left Loop's.
+
+    Attributes:
+        ratio: ‖q − q0‖ / (C h²) of each interior edge, in [0, 1].
+    """
+
+    points: Float[Tensor, "N 3"]
+    ratio: Float[Tensor, " I"]
+
+
+def refine_once(
+    points: Float[Tensor, "V 3"],
+    topology: Topology,
+    features: FeatureSet,
+    network: Network,
+    gate: Gate,
+    budget: float,
+) -> Step:
+    """Refine by one step at reference length 1 (the paper's absolute units).
+
+    `network` gives corrections at budget 1. Gradients flow to it, and to the points if they ask.
+    """
+    interior = topology.interior
+    normals = face_normals(points, topology.faces)
+    at = edge_stencil(points, normals, topology.stencil[interior], topology.edge_faces[interior])
+    correction = correct(at, features, network, gate, budget)
+    edge_vertices = loop_edge_vertices(points, topology).index_add(
+        0, torch.from_numpy(interior), correction.displacement
+    )
+    return Step(
+        points=torch.cat([loop_vertex_vertices(points, topology), edge_vertices]),
+        ratio=proximity_ratio(correction),
+    )
+
+
+def vertex_normals(
+    points: Float[Tensor, "V 3"], faces: Int[np.ndarray, "F 3"]
+) -> Float[Tensor, "V 3"]:
+    """Return unit vertex normals, incident faces weighted by area."""
+    a, b, c = (gather(points, corner) for corner in faces.T)
+    area_vectors = cross(b - a, c - a).repeat(3, 1)
+    return unit(segment_sum(area_vectors, faces.T.reshape(-1), len(points)))

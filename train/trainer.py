@@ -1,0 +1,95 @@
+"""Training: a recipe in, weights out; the same bits every time on one machine."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from pns_common.arrays import gather
+from pns_common.correction import curvature_gate
+from pns_common.features import FEATURE_COUNT, FEATURE_SETS
+from train.batch import Batch, disjoint_union
+from train.datasets import DATASETS, Instance
+from train.determinism import deterministic
+from train.losses import weighted_loss
+from train.networks import BoundedNet, unit_correction
+from train.one_step import refine_once, vertex_normals
+from train.recipes import Recipe
+from train.surfaces import signed_distance, unit_normal
+
+OnStep = Callable[[int, float], None]
+"""Called after each step with the number of steps done and the loss."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A trained float32 network and the loss before each step."""
+
+    network: BoundedNet
+    losses: tuple[float, ...]
+
+
+def initial_network(recipe: Recipe) -> BoundedNet:
+    """Return the untrained network of a recipe."""
+    generator = torch.Generator().manual_seed(recipe.seed)
+    count = FEATURE_COUNT[recipe.features]
+    return BoundedNet(count, recipe.hidden, recipe.activation, generator)
+
+
+def fit(recipe: Recipe, on_step: OnStep) -> Fit:
+    """Train with Adam on the recipe's data set."""
+    instances = DATASETS[recipe.dataset]().instances
+    with deterministic():
+        network = initial_network(recipe)
+        optimiser = torch.optim.Adam(network.parameters(), lr=recipe.learning_rate)
+        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
+            optimiser, T_max=recipe.steps, eta_min=recipe.final_learning_rate
+        )
+        losses: list[float] = []
+        for batch in _batches(recipe, instances):
+            optimiser.zero_grad()
+            loss = batch_loss(recipe, network, batch)
+            loss.backward()
+            optimiser.step()
+            schedule.step()
+            losses.append(loss.item())
+            on_step(len(losses), losses[-1])
+    return Fit(network, tuple(losses))
+
+
+def batch_loss(recipe: Recipe, network: BoundedNet, batch: Batch) -> Float[Tensor, ""]:
+    """Refine a batch by one step and weigh its four loss terms."""
+    step = refine_once(
+        batch.points,
+        batch.topology,
+        FEATURE_SETS[recipe.features],
+        unit_correction(network),
+        curvature_gate(recipe.gate_sharpness),
+        recipe.budget,
+    )
+    inserted = gather(step.points, batch.inserted)
+    normals = gather(vertex_normals(step.points, batch.children), batch.inserted)
+    return weighted_loss(
+        recipe.weights,
+        distance=signed_distance(batch.surface, inserted),
+        normals=normals,
+        surface_normals=unit_normal(batch.surface, inserted),
+        ratio=step.ratio,
+        pairs=batch.face_pairs,
+    )
+
+
+def _batches(recipe: Recipe, instances: Sequence[Instance]) -> Iterator[Batch]:
+    """Yield one batch a step, each drawn without replacement from the whole set."""
+    if recipe.batch_size >= len(instances):
+        whole = disjoint_union(instances)
+        for _ in range(recipe.steps):
+            yield whole
+        return
+    rng = np.random.default_rng(recipe.seed)
+    for _ in range(recipe.steps):
+        drawn = rng.choice(len(instances), recipe.batch_size, replace=False)
+        yield disjoint_union([instances[index] for index in drawn])
