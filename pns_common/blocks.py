@@ -1,0 +1,39 @@
+"""Work over rows in cache-sized blocks, on several threads, with the same bits for any number."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+# Rows a block: a dozen (rows, 3) float64 temporaries stay in the second-level cache.
+ROWS = 8192
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """How to run row-wise work: ``threads`` workers over blocks of ``rows`` rows."""
+
+    threads: int
+    rows: int = ROWS
+
+    def run(self, count: int, work: Callable[[slice], None]) -> None:
+        """Call ``work`` once for each block of range(count); each writes its own rows."""
+        slices = list(self._slices(count))
+        if self.threads == 1 or len(slices) < 2:
+            for rows in slices:
+                work(rows)
+            return
+        with ThreadPoolExecutor(self.threads) as pool:
+            # list() so that an error in a worker is raised here.
+            list(pool.map(work, slices))
+
+    def _slices(self, count: int) -> Iterator[slice]:
+        for start in range(0, count, self.rows):
+            yield slice(start, min(start + self.rows, count))
+
+
+def available_threads() -> int:
+    """The processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,107 @@
+"""What an interior edge sees: its four points, its two face normals, its frame F = [T, N, B]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.arrays import Array, cross, dot, gather, namespace, norm, unit
+
+# Faces are antiparallel where n1 · n2 ≤ −1 + ANTIPARALLEL (the paper's ε, section 3.2).
+ANTIPARALLEL = 1e-6
+# A face has no area where twice its area is below this fraction of its squared edge lengths:
+# there the direction of its normal would be rounding noise.
+NO_AREA = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeStencil:
+    """The points a, b, c, d of N interior edges and the unit normals n1, n2 of their two faces."""
+
+    a: Float[Array, "N 3"]
+    b: Float[Array, "N 3"]
+    c: Float[Array, "N 3"]
+    d: Float[Array, "N 3"]
+    n1: Float[Array, "N 3"]
+    n2: Float[Array, "N 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeFrames:
+    """Frames of N interior edges.
+
+    Attributes:
+        tangent, normal, binormal: the columns T, N, B of F ∈ SO(3).
+        length: h = ‖b − a‖.
+        curvature: x = 1 − n1 · n2 ∈ [0, 2]; 0 where a normal is undefined.
+        degenerate: zero length, a face of zero area, or antiparallel faces: F is the fallback.
+    """
+
+    tangent: Float[Array, "N 3"]
+    normal: Float[Array, "N 3"]
+    binormal: Float[Array, "N 3"]
+    length: Float[Array, " N"]
+    curvature: Float[Array, " N"]
+    degenerate: Bool[Array, " N"]
+
+
+def face_normals(points: Float[Array, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Float[Array, "F 3"]:
+    """Unit normals (b − a) × (c − a), anticlockwise faces seen from outside; 0 without area."""
+    xp = namespace(points)
+    a, b, c = (gather(points, faces[:, corner]) for corner in range(3))
+    u, v = b - a, c - a
+    area_vector = cross(u, v)
+    size = dot(u, u) + dot(v, v)
+    has_area = norm(area_vector) > NO_AREA * size
+    return unit(xp.where(has_area[:, None], area_vector, 0.0))
+
+
+def edge_stencil(
+    points: Float[Array, "V 3"],
+    normals: Float[Array, "F 3"],
+    stencil: Int[np.ndarray, "N 4"],
+    edge_faces: Int[np.ndarray, "N 2"],
+) -> EdgeStencil:
+    """Gather the points and face normals of interior edges (rows of the topology's tables)."""
+    a, b, c, d = (gather(points, stencil[:, column]) for column in range(4))
+    n1, n2 = (gather(normals, edge_faces[:, column]) for column in range(2))
+    return EdgeStencil(a, b, c, d, n1, n2)
+
+
+def edge_frames(at: EdgeStencil) -> EdgeFrames:
+    """F = [T, N, B]: T along the edge, N the mean face normal across it, B = T × N (section 3.2).
+
+    Degenerate edges take a fixed world triad, so that F is a rotation for every input; there, and
+    only there, F does not turn with the mesh.
+    """
+    xp = namespace(at.a)
+    edge = at.b - at.a
+    length = norm(edge)
+    cosine = dot(at.n1, at.n2)
+    undefined = (length == 0) | (dot(at.n1, at.n1) == 0) | (dot(at.n2, at.n2) == 0)
+    degenerate = undefined | (cosine <= -1 + ANTIPARALLEL)
+    triad = xp.asarray(np.eye(3), dtype=at.a.dtype)
+
+    tangent = unit(edge)
+    mean_normal = xp.where(degenerate[:, None], triad[1], at.n1 + at.n2)
+    tangent = xp.where(degenerate[:, None], triad[0], tangent)
+    normal = unit(mean_normal - dot(mean_normal, tangent)[:, None] * tangent)
+    return EdgeFrames(
+        tangent=tangent,
+        normal=normal,
+        binormal=cross(tangent, normal),
+        length=length,
+        curvature=xp.where(undefined, 0.0, 1 - cosine),
+        degenerate=degenerate,
+    )
+
+
+def rotate(frames: EdgeFrames, local: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
+    """F η: local coordinates (along T, N, B) to world coordinates."""
+    return (
+        local[:, :1] * frames.tangent
+        + local[:, 1:2] * frames.normal
+        + local[:, 2:] * frames.binormal
+    )

@@ -1,0 +1,129 @@
+"""The control mesh: vertices and faces, validated once so that every kernel may trust them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.errors import MeshError
+
+# Fourth powers of lengths (squared cross products) must stay finite in float64.
+LARGEST_COORDINATE = 1e75
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A triangle mesh: ``vertices`` (V, 3) float64 and ``faces`` (F, 3) int64, both read-only.
+
+    No mesh is refused for its topology: boundaries, irregular edges, several components, bow-ties
+    and isolated vertices are all allowed.
+
+    Raises:
+        MeshError: wrong shapes or types, no faces, a NaN, infinite or huge coordinate, or an index
+            out of range; the error names the element.
+    """
+
+    vertices: Float[np.ndarray, "V 3"]
+    faces: Int[np.ndarray, "F 3"]
+
+    def __post_init__(self) -> None:
+        vertices, faces = np.asarray(self.vertices), np.asarray(self.faces)
+        if vertices.ndim != 2 or vertices.shape[1] != 3:
+            raise MeshError(f"shape {vertices.shape}, expected (V, 3)", element="vertices")
+        if vertices.dtype.kind not in "fiu":
+            raise MeshError(f"type {vertices.dtype}, expected real numbers", element="vertices")
+        if faces.ndim != 2 or faces.shape[1] != 3:
+            raise MeshError(f"shape {faces.shape}, expected (F, 3)", element="faces")
+        if faces.shape[0] == 0:
+            raise MeshError("no faces to refine", element="faces")
+        if faces.dtype.kind not in "iu":
+            raise MeshError(f"type {faces.dtype}, expected integers", element="faces")
+        # Written so that NaN fails it too.
+        fits = (np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1)
+        if not fits.all():
+            worst = int(np.argmin(fits))
+            found = vertices[worst].tolist()
+            raise MeshError(
+                f"coordinates {found}, expected finite numbers up to {LARGEST_COORDINATE:g}",
+                element="vertex",
+                index=worst,
+            )
+        inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
+        if not inside.all():
+            worst = int(np.argmin(inside))
+            raise MeshError(
+                f"indices {faces[worst].tolist()}, expected 0 … {len(vertices) - 1}",
+                element="face",
+                index=worst,
+            )
+        object.__setattr__(self, "vertices", _frozen(vertices, np.float64))
+        object.__setattr__(self, "faces", _frozen(faces, np.int64))
+
+
+@dataclass(frozen=True, eq=False)
+class Cleaned:
+    """A cleaned mesh and how it came about. −1 in a map means dropped."""
+
+    mesh: Mesh
+    vertex_map: Int[np.ndarray, " V"]
+    face_map: Int[np.ndarray, " F"]
+    # For each old face the new face with the same three vertices, or −1 if it was degenerate:
+    # what a dropped duplicate should follow.
+    representative: Int[np.ndarray, " F"]
+    dropped_degenerate: int
+    dropped_duplicate: int
+    dropped_vertices: int
+
+
+def clean(mesh: Mesh) -> Cleaned:
+    """Drop degenerate faces (a repeated vertex), duplicates and unreferenced vertices.
+
+    Faces are duplicates when they have the same three vertices in any order; the first stays.
+    What stays keeps its order.
+
+    Raises:
+        MeshError: every face is degenerate.
+    """
+    degenerate = repeated_vertex(mesh.faces)
+    if degenerate.all():
+        raise MeshError("every face is degenerate", element="faces")
+    proper = np.flatnonzero(~degenerate)
+    corners = np.sort(mesh.faces[proper], axis=1)
+    _, first, group = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+    leader = first[group.reshape(-1)]
+    is_leader = leader == np.arange(len(proper))
+    number = np.cumsum(is_leader) - 1
+
+    representative = np.full(len(mesh.faces), -1, dtype=np.int64)
+    representative[proper] = number[leader]
+    face_map = np.full(len(mesh.faces), -1, dtype=np.int64)
+    face_map[proper[is_leader]] = number[is_leader]
+
+    kept = mesh.faces[proper[is_leader]]
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[kept] = True
+    vertex_map = np.where(used, np.cumsum(used) - 1, -1)
+    return Cleaned(
+        mesh=Mesh(mesh.vertices[used], vertex_map[kept]),
+        vertex_map=vertex_map,
+        face_map=face_map,
+        representative=representative,
+        dropped_degenerate=int(degenerate.sum()),
+        dropped_duplicate=int(len(proper) - is_leader.sum()),
+        dropped_vertices=int(len(used) - used.sum()),
+    )
+
+
+def repeated_vertex(faces: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
+    """Whether a face names a vertex twice."""
+    a, b, c = faces.T
+    return (a == b) | (b == c) | (c == a)
+
+
+def _frozen(values: np.ndarray, dtype: type) -> np.ndarray:
+    """A read-only C-contiguous array that no caller can change behind the mesh's back."""
+    copy = np.array(values, dtype=dtype, order="C")
+    copy.flags.writeable = False
+    return copy

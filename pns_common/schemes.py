@@ -1,0 +1,181 @@
+"""Schemes: a scheme is a vertex rule and an edge rule.
+
+A rule takes a control level and places its new vertices; both rules of a scheme are functions, so a
+new scheme is two functions and no change here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from pns_common.arrays import Array
+from pns_common.blocks import Blocks
+from pns_common.correction import correct, curvature_gate, proximity_ratio
+from pns_common.errors import ParameterError
+from pns_common.features import FEATURE_SETS
+from pns_common.frames import edge_stencil
+from pns_common.model_card import ModelCard
+from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
+from pns_common.topology import Topology
+
+
+class Model(Protocol):
+    """A per-edge network with its card; ``model(features, budget)`` has norm ≤ budget."""
+
+    @property
+    def card(self) -> ModelCard:
+        """What the model says of itself."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """How reports call it."""
+        ...
+
+    @property
+    def hash(self) -> str:
+        """The sha256 of the model file."""
+        ...
+
+    def __call__(self, features: Array, budget: float) -> Array:
+        """Corrections (N, 3) in the edge frame for features (N, K)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ControlLevel:
+    """What a rule may look at: one level's mesh, before refinement.
+
+    ``reference_length`` is R, the unit of length of the budget, fixed at level 0; 0 switches
+    corrections off.
+    """
+
+    points: Float[np.ndarray, "V 3"]
+    topology: Topology
+    normals: Float[np.ndarray, "F 3"]
+    reference_length: float
+    blocks: Blocks
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where a rule puts its N vertices: Loop's position plus a displacement.
+
+    Attributes:
+        loop: Loop's positions q0.
+        displacement: what is added to them; None where the rule is Loop's.
+        ratio: proximity ratio ‖δ‖ / (C h²), 0 for Loop.
+        gate: γ, 0 where there is no correction.
+        degenerate: vertices whose frame was the fallback.
+    """
+
+    loop: Float[np.ndarray, "N 3"]
+    displacement: Float[np.ndarray, "N 3"] | None
+    ratio: Float[np.ndarray, " N"]
+    gate: Float[np.ndarray, " N"]
+    degenerate: Bool[np.ndarray, " N"]
+
+    @property
+    def positions(self) -> Float[np.ndarray, "N 3"]:
+        """q = q0 + δ."""
+        return self.loop if self.displacement is None else self.loop + self.displacement
+
+
+Rule = Callable[[ControlLevel], Placement]
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """A refinement rule for triangle meshes.
+
+    ``budget`` (C), ``model`` and ``model_hash`` are for reports and None where there is none.
+    """
+
+    name: str
+    vertex_rule: Rule
+    edge_rule: Rule
+    budget: float | None = None
+    model: str | None = None
+    model_hash: str | None = None
+
+
+def loop() -> Scheme:
+    """Loop subdivision (Loop 1987)."""
+    return Scheme("loop", loop_vertex_rule, loop_edge_rule)
+
+
+def pns(model: Model, budget: float | None = None) -> Scheme:
+    """Proximity-Preserving Neural Subdivision with a model.
+
+    Args:
+        model: from ``load_model``, or anything that keeps the protocol.
+        budget: C ≥ 0, dimensionless; None takes the one that the model was trained at.
+
+    Raises:
+        ParameterError: the budget is negative or not finite.
+    """
+    budget = model.card.budget if budget is None else budget
+    if not (math.isfinite(budget) and budget >= 0):
+        raise ParameterError("budget", budget, expected="a finite number ≥ 0")
+    return Scheme(
+        "pns",
+        loop_vertex_rule,
+        _learned_edge_rule(model, budget),
+        budget=float(budget),
+        model=model.name,
+        model_hash=model.hash,
+    )
+
+
+def loop_vertex_rule(level: ControlLevel) -> Placement:
+    """Loop's rule for old vertices."""
+    return without_correction(loop_vertex_vertices(level.points, level.topology))
+
+
+def loop_edge_rule(level: ControlLevel) -> Placement:
+    """Loop's rule for edge vertices."""
+    return without_correction(loop_edge_vertices(level.points, level.topology))
+
+
+def without_correction(positions: Float[np.ndarray, "N 3"]) -> Placement:
+    """A placement that is Loop's."""
+    nothing = np.zeros(len(positions))
+    return Placement(positions, None, nothing, nothing, np.zeros(len(positions), dtype=bool))
+
+
+def _learned_edge_rule(model: Model, budget: float) -> Rule:
+    """q = q0 + h² γ F η(φ) on interior edges, the midpoint on all others."""
+    features = FEATURE_SETS[model.card.features]
+    gate = curvature_gate(model.card.gate_sharpness)
+
+    def network(rows: Array) -> Array:
+        # The unit budget, scaled in float64 afterwards: one file serves every C / R exactly.
+        return model(rows, 1.0)
+
+    def edge_rule(level: ControlLevel) -> Placement:
+        base = loop_edge_rule(level)
+        if level.reference_length == 0:
+            return base
+        topology, count = level.topology, len(level.topology.edges)
+        displacement, ratio = np.zeros((count, 3)), np.zeros(count)
+        gamma, degenerate = np.zeros(count), np.zeros(count, dtype=bool)
+
+        def correct_block(rows: slice) -> None:
+            edges = topology.interior[rows]
+            stencil, faces = topology.stencil[edges], topology.edge_faces[edges]
+            at = edge_stencil(level.points, level.normals, stencil, faces)
+            result = correct(at, features, network, gate, budget / level.reference_length)
+            displacement[edges] = result.displacement
+            ratio[edges] = proximity_ratio(result)
+            gamma[edges], degenerate[edges] = result.gate, result.degenerate
+
+        level.blocks.run(len(topology.interior), correct_block)
+        return Placement(base.loop, displacement, ratio, gamma, degenerate)
+
+    return edge_rule

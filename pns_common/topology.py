@@ -1,0 +1,199 @@
+"""Connectivity of a triangle mesh: edges, edge stencils, edge classes and the 1-to-4 split.
+
+Everything here is int64 numpy and knows no positions. The orders are part of the result: edges are
+numbered by first appearance over the faces' (a, b), (b, c), (c, a).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from pns_common.mesh import repeated_vertex
+
+
+class EdgeClass(IntEnum):
+    """What an edge is to the rules."""
+
+    INTERIOR = 0  # exactly two incident faces, of opposite direction
+    BOUNDARY = 1  # one incident face
+    IRREGULAR = 2  # anything else
+
+
+@dataclass(frozen=True, eq=False)
+class Topology:
+    """Edges of a face list. −1 stands where an edge has no such face or vertex.
+
+    Attributes:
+        vertex_count: number of vertices, isolated ones included.
+        faces: (F, 3) vertices of each face.
+        edges: (E, 2) endpoints a < b.
+        face_edges: (F, 3) edges (a, b), (b, c), (c, a) of each face.
+        edge_faces: (E, 2) of an interior edge its faces, lower index first; else −1.
+        stencil: (E, 4) a, b, c, d; c is opposite in the face of lower index, d in the other.
+        edge_class: (E,) EdgeClass values.
+        interior: (I,) indices of the interior edges.
+    """
+
+    vertex_count: int
+    faces: Int[np.ndarray, "F 3"]
+    edges: Int[np.ndarray, "E 2"]
+    face_edges: Int[np.ndarray, "F 3"]
+    edge_faces: Int[np.ndarray, "E 2"]
+    stencil: Int[np.ndarray, "E 4"]
+    edge_class: Int[np.ndarray, " E"]
+    interior: Int[np.ndarray, " I"]
+
+
+def build_topology(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Topology:
+    """Pair the half-edges of ``faces`` into edges and classify them.
+
+    Half-edge h = 3 f + i runs from corner i of face f to the next corner.
+    """
+    start = faces.reshape(-1)
+    end = faces[:, [1, 2, 0]].reshape(-1)
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    key = low * np.int64(vertex_count) + high
+    order = stable_order(key)
+
+    # Runs of equal keys are edges; within a run half-edges ascend, so the first is the earliest.
+    ordered = key[order]
+    opens = np.empty(len(order), dtype=bool)
+    opens[:1] = True
+    np.not_equal(ordered[1:], ordered[:-1], out=opens[1:])
+    run_start = np.flatnonzero(opens)
+    count = np.diff(run_start, append=len(order))
+    first = order[run_start]
+
+    # Number the edges by their first half-edge.
+    is_first = np.zeros(len(order), dtype=bool)
+    is_first[first] = True
+    number = (np.cumsum(is_first) - 1)[first]
+    edge_of = np.empty(len(order), dtype=np.int64)
+    edge_of[order] = np.repeat(number, count)
+    edges = np.stack([low[is_first], high[is_first]], axis=1)
+
+    # An interior edge has two half-edges that run against each other.
+    second = order[np.minimum(run_start + 1, len(order) - 1)]
+    proper = ~repeated_vertex(faces)
+    opposed = (count == 2) & (start[first] == end[second]) & (start[first] != end[first])
+    opposed &= proper[first // 3] & proper[second // 3]
+    edge_class = np.empty(len(edges), dtype=np.int8)
+    edge_class[number] = np.where(
+        opposed,
+        EdgeClass.INTERIOR,
+        np.where((count == 1) & proper[first // 3], EdgeClass.BOUNDARY, EdgeClass.IRREGULAR),
+    )
+
+    edge_faces = np.full((len(edges), 2), -1, dtype=np.int64)
+    stencil = np.full((len(edges), 4), -1, dtype=np.int64)
+    stencil[:, :2] = edges
+    one, two, pair = first[opposed], second[opposed], number[opposed]
+    edge_faces[pair, 0], edge_faces[pair, 1] = one // 3, two // 3
+    stencil[pair, 2], stencil[pair, 3] = start[opposite_corner(one)], start[opposite_corner(two)]
+    return Topology(
+        vertex_count=vertex_count,
+        faces=faces,
+        edges=edges,
+        face_edges=edge_of.reshape(-1, 3),
+        edge_faces=edge_faces,
+        stencil=stencil,
+        edge_class=edge_class,
+        interior=np.flatnonzero(edge_class == EdgeClass.INTERIOR),
+    )
+
+
+def split(topology: Topology) -> Int[np.ndarray, "4F 3"]:
+    """Split 1-to-4: face f becomes (a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca).
+
+    The vertex of edge e is V + e; old vertices keep their numbers.
+    """
+    a, b, c = topology.faces.T
+    ab, bc, ca = (topology.face_edges + topology.vertex_count).T
+    children = np.empty((len(topology.faces), 4, 3), dtype=np.int64)
+    for child, corners in enumerate([(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]):
+        for corner, vertex in enumerate(corners):
+            children[:, child, corner] = vertex
+    return children.reshape(-1, 3)
+
+
+def child_face_pairs(topology: Topology) -> Int[np.ndarray, "P 2"]:
+    """Pairs of faces of the split mesh that share an interior edge, without building its edges.
+
+    Each face's centre child meets its three corner children; across an interior edge the children
+    at either end meet.
+    """
+    centre = 4 * np.arange(len(topology.faces), dtype=np.int64)[:, None] + 3
+    inside = np.stack([np.broadcast_to(centre, (len(centre), 3)), centre - [3, 2, 1]], axis=-1)
+    faces = topology.edge_faces[topology.interior]
+    ends = topology.edges[topology.interior]
+    across = [
+        np.stack([_corner_child(topology, faces[:, side], end) for side in (0, 1)], axis=-1)
+        for end in (ends[:, 0], ends[:, 1])
+    ]
+    return np.concatenate([inside.reshape(-1, 2), *across])
+
+
+def sharp_edge_count(topology: Topology) -> Int[np.ndarray, " V"]:
+    """For each vertex the number of boundary or irregular edges at it."""
+    sharp = topology.edges[topology.edge_class != EdgeClass.INTERIOR]
+    return np.bincount(sharp.reshape(-1), minlength=topology.vertex_count)
+
+
+def multi_fan_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
+    """Vertices whose faces form more than one fan (bow-ties among them).
+
+    A fan is a run of corners joined across interior edges: an open fan has one join fewer than
+    corners, a closed one as many. Closed fans are told apart by pointer doubling.
+    """
+    corner_count = np.bincount(topology.faces.reshape(-1), minlength=topology.vertex_count)
+    following = _next_corner_around_vertex(topology)
+    corners = np.arange(len(following))
+    label, hop = corners.copy(), following.copy()
+    for _ in range(int(corner_count.max()).bit_length()):
+        reach = np.where(hop >= 0, hop, corners)
+        label = np.minimum(label, label[reach])
+        hop = np.where(hop >= 0, hop[reach], -1)
+    leaders = ((hop >= 0) & (label == corners)) | (following < 0)
+    fans = np.bincount(topology.faces.reshape(-1)[leaders], minlength=topology.vertex_count)
+    return fans > 1
+
+
+def stable_order(key: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+    """The stable argsort of non-negative keys.
+
+    Packing (key, position) into one integer and sorting values is several times faster than
+    argsort; where the pack would overflow, argsort serves.
+    """
+    count = len(key)
+    if count and int(key.max()) < (2**63 - 1) // count - 1:
+        return np.sort(key * np.int64(count) + np.arange(count)) % count
+    return np.argsort(key, kind="stable")
+
+
+def opposite_corner(half_edge: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+    """The corner 3 f + i that faces a half-edge across its triangle."""
+    return half_edge - half_edge % 3 + (half_edge + 2) % 3
+
+
+def _corner_child(
+    topology: Topology, face: Int[np.ndarray, " N"], vertex: Int[np.ndarray, " N"]
+) -> Int[np.ndarray, " N"]:
+    """The child of ``face`` that keeps its corner ``vertex``."""
+    corners = np.take(topology.faces, face, axis=0)
+    return 4 * face + (corners[:, 1] == vertex) + 2 * (corners[:, 2] == vertex)
+
+
+def _next_corner_around_vertex(topology: Topology) -> Int[np.ndarray, " C"]:
+    """For each corner the next one around its vertex, across the half-edge that leaves it; or −1."""
+    start = topology.faces.reshape(-1)
+    edge_of = topology.face_edges.reshape(-1)
+    face = np.arange(len(start)) // 3
+    pair = topology.edge_faces[edge_of]
+    neighbour = np.where(pair[:, 0] == face, pair[:, 1], pair[:, 0])
+    corners = topology.faces[np.maximum(neighbour, 0)]
+    place = (corners[:, 1] == start) + 2 * (corners[:, 2] == start)
+    return np.where(neighbour >= 0, 3 * neighbour + place, -1)
