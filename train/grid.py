@@ -22,10 +22,10 @@ def grid_faces() -> Int[np.ndarray, "F 3"]:
 
 
 def jittered_grid(seed: int, jitter: float) -> Float[torch.Tensor, "81 2"]:
-    """Return the patch's (x, y) in float32, interior vertices moved by up to ± jitter · spacing / 2.
+    """Return the patch's (x, y) in float32, interior vertices moved by (u − ½) · jitter · 2/9.
 
-    The published draws come from torch's float32 generator, so nothing else reproduces them:
-    (u − ½) · jitter · 2/9 with u from `torch.rand(81, 2)`.
+    u is `torch.rand(81, 2)`: the published draws come from torch's float32 generator, so nothing
+    else reproduces them.
     """
     axis = torch.linspace(-1, 1, SIDE)
     points = torch.cartesian_prod(axis, axis)

@@ -3,7 +3,8 @@
 All errors are taken at the inserted interior edge vertices and nowhere else.
 """
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 import torch
@@ -120,3 +121,11 @@ def _distance_gradient(
 
 def _root_mean_square(values: Float[np.ndarray, " N"]) -> float:
     return float(np.sqrt((values**2).mean())) if len(values) else float("nan")
+
+
+def improvements_as_data(improvements: Mapping[str, Improvement]) -> dict[str, dict[str, float]]:
+    """Return improvements as plain numbers for a model card, rounded beyond what they can mean."""
+    return {
+        metric: {name: round(value, 6) for name, value in asdict(row).items()}
+        for metric, row in improvements.items()
+    }

@@ -1,6 +1,7 @@
 """The correction network: edge features to a vector in the ball of radius C."""
 
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from types import MappingProxyType
 
 import torch
@@ -31,7 +32,7 @@ class BoundedNet(nn.Module):
         self.activation = activation
         widths = (feature_count, *hidden, 3)
         layers: list[nn.Module] = []
-        for fan_in, fan_out in zip(widths, widths[1:], strict=False):
+        for fan_in, fan_out in pairwise(widths):
             layers += [_seeded_linear(fan_in, fan_out, generator), ACTIVATIONS[activation]()]
         self.net = nn.Sequential(*layers[:-1])
 

@@ -1,0 +1,73 @@
+"""Does the file say what the trained network says? Checked before anything is written."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from pns_common.errors import PnsError
+from pns_common.schemes import Model
+from train.networks import BoundedNet
+
+TOLERANCE = 1e-6
+"""Largest difference allowed, as a fraction of the budget."""
+
+ROWS = 10_000
+BUDGETS = (1e-6, 0.1, 0.5, 1.0, 1e3)
+
+
+@dataclass(frozen=True, slots=True)
+class Parity:
+    """The largest difference and the largest length found, as fractions of the budget."""
+
+    difference: float
+    length: float
+
+
+class ParityError(PnsError):
+    """The model file and the network differ; nothing is written."""
+
+    def __init__(self, *, budget: float, difference: float):
+        self.budget = budget
+        self.difference = difference
+        super().__init__(
+            f"the model file and the network differ by {difference:.2e} of the budget {budget:g}, "
+            f"more than {TOLERANCE:g}"
+        )
+
+
+def check_parity(model: Model, network: BoundedNet) -> Parity:
+    """Compare the file, run by onnxruntime, with the torch network.
+
+    Raises:
+        ParityError: they differ by more than 1e-6 of a budget.
+    """
+    features = sample_features(network.linear_layers[0].in_features)
+    largest, longest = 0.0, 0.0
+    for budget in BUDGETS:
+        with torch.no_grad():
+            expected = network(torch.from_numpy(features), budget).numpy()
+        found = np.asarray(model(features, budget))
+        difference = float(np.abs(found - expected).max()) / budget
+        # Written so that NaN fails it too.
+        if not difference <= TOLERANCE:
+            raise ParityError(budget=budget, difference=difference)
+        largest = max(largest, difference)
+        longest = max(longest, float(np.linalg.norm(found, axis=1).max()) / budget)
+    return Parity(largest, longest)
+
+
+def sample_features(count: int) -> Float[np.ndarray, "N K"]:
+    """Return 10,000 seeded feature rows: common ones, then wide ones, then the extremes.
+
+    The first feature is a curvature in [0, 2], the others are logarithms of length ratios; the
+    extremes hold slivers with ratios of e^±30 and folded or exactly planar edges.
+    """
+    rng = np.random.default_rng(0)
+    scale = np.repeat([0.3, 3.0, 30.0], [ROWS // 2, ROWS // 4, ROWS - ROWS // 2 - ROWS // 4])
+    rows = rng.uniform(-1, 1, size=(ROWS, count)) * scale[:, None]
+    rows[:, 0] = rng.uniform(0, 2, size=ROWS) ** 2 / 2
+    rows[-3:, 0] = [0.0, 1.0, 2.0]
+    rows[-3:, 1:] = [[0.0] * (count - 1), [30.0] * (count - 1), [-30.0] * (count - 1)]
+    return rows.astype(np.float32)

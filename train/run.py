@@ -1,0 +1,79 @@
+"""The laboratory's entry: `python train/run.py` trains the default recipe.
+
+It writes a checkpoint and prints the held-out table.
+"""
+
+import time
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from pns_common.schemes import pns
+from train.checkpoint import Checkpoint, save_checkpoint
+from train.datasets import Dataset, ridge_held_out
+from train.determinism import machine_fingerprint
+from train.evaluation import compare_with_loop
+from train.metrics import improvements_as_data
+from train.recipes import RECIPES, Recipe
+from train.tables import improvement_table
+from train.torch_model import recipe_model
+from train.trainer import Fit, fit
+
+CHECKPOINTS = Path("checkpoints")
+
+RecipeName = StrEnum("RecipeName", {name: name for name in RECIPES})
+DEFAULT_RECIPE = RecipeName("ridge")
+
+app = typer.Typer(help="Train, measure and certify the operator.", pretty_exceptions_enable=False)
+
+
+@app.callback(invoke_without_command=True)
+def main(context: typer.Context) -> None:
+    """Train the default recipe where no command is named."""
+    if context.invoked_subcommand is None:
+        train()
+
+
+@app.command()
+def train(
+    recipe: Annotated[RecipeName, typer.Option(help="What to train.")] = DEFAULT_RECIPE,
+    seed: Annotated[int, typer.Option(min=0, help="Of the weights and batches.")] = 0,
+    output: Annotated[
+        Path | None,
+        typer.Option(help="Checkpoint to write; checkpoints/RECIPE.safetensors if not given."),
+    ] = None,
+) -> None:
+    """Train a recipe, write its checkpoint and print the held-out table."""
+    console = Console()
+    chosen = RECIPES[recipe](seed)
+    path = output or CHECKPOINTS / f"{chosen.name}.safetensors"
+    began = time.perf_counter()
+    trained = _fit_with_progress(chosen, console)
+    held_out: Dataset = ridge_held_out()
+    scheme = pns(recipe_model(chosen, trained.network), chosen.budget)
+    improvements = compare_with_loop(scheme, held_out)
+    metrics = {held_out.name: improvements_as_data(improvements)}
+    save_checkpoint(path, Checkpoint(chosen, trained.network, metrics, machine_fingerprint()))
+    console.print(improvement_table(f"{held_out.name}, recipe {chosen.name}", improvements))
+    console.print(f"{path} written in {time.perf_counter() - began:.1f} s")
+
+
+def _fit_with_progress(recipe: Recipe, console: Console) -> Fit:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("loss {task.fields[loss]:.6f}"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task(f"training {recipe.name}", total=recipe.steps, loss=float("nan"))
+        return fit(recipe, lambda done, loss: progress.update(task, completed=done, loss=loss))
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,33 @@
+"""Result tables for the terminal."""
+
+from collections.abc import Mapping
+
+from rich.table import Table
+
+from train.metrics import Improvement
+
+METRIC_TITLES: Mapping[str, str] = {
+    "distance_near": "Signed distance RMSE, near feature",
+    "distance": "Signed distance RMSE, global",
+    "hausdorff_near": "Hausdorff distance, near feature",
+    "hausdorff": "Hausdorff distance, global",
+    "normal_near": "Normal error, near feature",
+    "normal": "Normal error, global",
+}
+
+
+def improvement_table(title: str, improvements: Mapping[str, Improvement]) -> Table:
+    """Return one row a metric: Loop's mean, the method's, and the improvement in per cent."""
+    table = Table(title=title, title_justify="left")
+    table.add_column("Metric")
+    for heading in ("Loop", "PNS", "Improvement", "95 % interval"):
+        table.add_column(heading, justify="right")
+    for metric, row in improvements.items():
+        table.add_row(
+            METRIC_TITLES[metric],
+            f"{row.reference_mean:.6f}",
+            f"{row.method_mean:.6f}",
+            f"{row.percent:+.2f} %",
+            f"{row.low:+.2f} … {row.high:+.2f}",
+        )
+    return table
