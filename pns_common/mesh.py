@@ -40,6 +40,7 @@ class Mesh:
             raise MeshError("no faces to refine", element="faces")
         if faces.dtype.kind not in "iu":
             raise MeshError(f"type {faces.dtype}, expected integers", element="faces")
+        vertices, faces = _frozen(vertices, np.float64), _frozen(faces, np.int64)
         # Written so that NaN fails it too.
         fits = (np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1)
         if not fits.all():
@@ -58,8 +59,8 @@ class Mesh:
                 element="face",
                 index=worst,
             )
-        object.__setattr__(self, "vertices", _frozen(vertices, np.float64))
-        object.__setattr__(self, "faces", _frozen(faces, np.int64))
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,108 @@
+"""Model files made in the tests, by a builder of their own: nothing here comes from export."""
+
+import math
+
+import numpy as np
+from onnx import TensorProto, helper, numpy_helper
+
+from pns_common.model_card import CARD_KEY, ModelCard
+from pns_common.onnx_model import model_from_bytes
+
+PUBLISHED_BUDGET, PUBLISHED_SHARPNESS = 0.5, 10.0
+
+CARD = ModelCard(1, "paper-5", PUBLISHED_SHARPNESS, PUBLISHED_BUDGET, "first-face", {}, {})
+
+
+def model_bytes(nodes, weights, *, card=CARD, width=5, inputs=None, outputs=None, domains=()):
+    """An ONNX file with the given nodes; ``weights`` maps names to arrays."""
+    inputs = inputs or [("features", ["edges", width]), ("budget", [])]
+    outputs = outputs or [("correction", ["edges", 3])]
+    graph = helper.make_graph(
+        nodes,
+        "test",
+        [helper.make_tensor_value_info(n, TensorProto.FLOAT, s) for n, s in inputs],
+        [helper.make_tensor_value_info(n, TensorProto.FLOAT, s) for n, s in outputs],
+        [numpy_helper.from_array(_tensor(w), n) for n, w in weights.items()],
+    )
+    opsets = [helper.make_opsetid("", 20), *(helper.make_opsetid(d, 1) for d in domains)]
+    model = helper.make_model(graph, opset_imports=opsets, ir_version=10)
+    if card is not None:
+        entry = model.metadata_props.add()
+        entry.key, entry.value = CARD_KEY, card if isinstance(card, str) else card.to_json()
+    return model.SerializeToString()
+
+
+def _tensor(values):
+    values = np.asarray(values)
+    return values if values.dtype.kind == "i" else values.astype(np.float32)
+
+
+def perceptron_bytes(layers, *, project=True, card=CARD):
+    """A GELU perceptron from (weight (in, out), bias) pairs, projected onto the ball or not."""
+    nodes, weights, name = [], {}, "features"
+    for number, (weight, bias) in enumerate(layers):
+        weights |= {f"w{number}": weight, f"b{number}": bias}
+        nodes.append(helper.make_node("Gemm", [name, f"w{number}", f"b{number}"], [f"z{number}"]))
+        name = f"z{number}"
+        if number < len(layers) - 1:
+            nodes.append(helper.make_node("Gelu", [name], [f"g{number}"]))
+            name = f"g{number}"
+    if project:
+        weights |= {"one": 1.0}
+        nodes += [
+            helper.make_node("ReduceL2", [name, "last"], ["length"], keepdims=1),
+            helper.make_node("Max", ["length", "one"], ["divisor"]),
+            helper.make_node("Div", [name, "divisor"], ["in_ball"]),
+        ]
+        name = "in_ball"
+        weights |= {"last": np.array([1])}
+    nodes.append(helper.make_node("Mul", [name, "budget"], ["correction"]))
+    return model_bytes(nodes, weights, card=card, width=len(layers[0][0]))
+
+
+def random_layers(seed, widths=(5, 32, 32, 3), scale=1.0):
+    """Random weights of a perceptron."""
+    rng = np.random.default_rng(seed)
+    return [
+        (scale * rng.standard_normal((i, o)) / math.sqrt(i), scale * rng.standard_normal(o))
+        for i, o in zip(widths[:-1], widths[1:], strict=True)
+    ]
+
+
+def random_model(seed, scale=1.0):
+    """A model with random weights."""
+    return model_from_bytes(perceptron_bytes(random_layers(seed, scale=scale)), "random")
+
+
+def huge_model(seed):
+    """A hostile model: its file lies, its corrections have norms of about 10⁶ budgets."""
+    layers = random_layers(seed)
+    layers[-1] = (layers[-1][0] * 1e6, layers[-1][1] * 1e6)
+    return model_from_bytes(perceptron_bytes(layers, project=False), "huge")
+
+
+def published_layers(weights, checkpoint):
+    """The published state dictionary as (weight (in, out), bias) pairs."""
+    keys = sorted(k for k in weights if k.startswith(f"{checkpoint}/") and k.endswith("weight"))
+    return [(weights[k].T, weights[k.removesuffix("weight") + "bias"]) for k in keys]
+
+
+def published_model(weights, checkpoint):
+    """A published network as a model file."""
+    return model_from_bytes(perceptron_bytes(published_layers(weights, checkpoint)), checkpoint)
+
+
+def float64_network(weights, checkpoint):
+    """A published network in float64 numpy, for a budget of 1."""
+    layers = published_layers(weights, checkpoint)
+    erf = np.vectorize(math.erf)
+
+    def network(features):
+        z = features
+        for number, (weight, bias) in enumerate(layers):
+            z = z @ weight.astype(np.float64) + bias
+            if number < len(layers) - 1:
+                z = 0.5 * z * (1 + erf(z / math.sqrt(2)))
+        return z / np.maximum(1, np.linalg.norm(z, axis=1, keepdims=True))
+
+    return network
