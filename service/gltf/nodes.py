@@ -31,10 +31,8 @@ def check_nodes(document: Document) -> None:
     refer(document.scene, document.scenes, "/scene")
     for number, scene in enumerate(document.scenes):
         for place, root in enumerate(scene.nodes):
-            pointer = f"/scenes/{number}/nodes/{place}"
-            refer(root, document.nodes, pointer)
-            if root in parent:
-                raise GltfError(f"node {root} is no root: it has a parent", pointer=pointer)
+            # Some exporters list a child as a root too. It draws the child twice and no more.
+            refer(root, document.nodes, f"/scenes/{number}/nodes/{place}")
 
 
 def mesh_instances(document: Document) -> list[int]:

@@ -1,0 +1,105 @@
+"""What a document asks to be refined, and what that will cost, before anything is allocated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from service.errors import GltfError, LimitError, UnrefinableError
+from service.gltf.accessors import element_size
+from service.gltf.refusals import TRIANGLES
+from service.gltf.schema import Document, Primitive
+from service.options import Limits
+
+# Peak bytes for each refined face, measured by benchmarks over assets and generated meshes: the
+# operator's and the reader's work arrays, and for each byte of a vertex its share in the answer.
+BYTES_PER_FACE = 640
+COPIES_PER_VERTEX_BYTE = 6
+# The decoded JSON, the upload and the answer's copy of the bytes that stay.
+BYTES_PER_INPUT_BYTE = 4
+
+
+@dataclass(frozen=True)
+class MeshPlan:
+    """A mesh with triangles: its index, its triangle primitives, their faces before refinement."""
+
+    mesh: int
+    primitives: tuple[int, ...]
+    faces: int
+
+
+def plan(document: Document) -> list[MeshPlan]:
+    """The meshes to refine; others have only points or lines and stay as they are.
+
+    Raises:
+        GltfError: a triangle primitive whose number of corners is no multiple of three.
+        UnrefinableError: no mesh has triangles.
+    """
+    plans: list[MeshPlan] = []
+    for number, mesh in enumerate(document.meshes):
+        triangles = [
+            p for p, primitive in enumerate(mesh.primitives) if primitive.mode == TRIANGLES
+        ]
+        faces = [
+            _face_count(document, mesh.primitives[p], f"/meshes/{number}/primitives/{p}")
+            for p in triangles
+        ]
+        if triangles:
+            plans.append(MeshPlan(number, tuple(triangles), sum(faces)))
+    if not plans:
+        raise UnrefinableError("the file has no triangles", pointer="/meshes")
+    return plans
+
+
+def check_cost(
+    document: Document, plans: Sequence[MeshPlan], size: int, levels: int, limits: Limits
+) -> None:
+    """Check the refined faces and the memory that they will take against the limits.
+
+    `size` is the upload's, in bytes.
+
+    Raises:
+        LimitError: over `max_faces` or `max_memory_bytes`.
+    """
+    faces = sum(mesh.faces for mesh in plans) * 4**levels
+    if faces > limits.max_faces:
+        raise LimitError(
+            f"the refined file would have {faces} faces, more than {limits.max_faces}",
+            limit="faces",
+            allowed=limits.max_faces,
+            found=faces,
+        )
+    memory = predicted_memory(document, plans, size, levels)
+    if memory > limits.max_memory_bytes:
+        raise LimitError(
+            f"the work would take {memory} bytes, more than {limits.max_memory_bytes}",
+            limit="memory",
+            allowed=limits.max_memory_bytes,
+            found=memory,
+        )
+
+
+def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, levels: int) -> int:
+    """Bytes at the peak, erring upwards."""
+    total = BYTES_PER_INPUT_BYTE * size
+    for mesh in plans:
+        for number in mesh.primitives:
+            primitive = document.meshes[mesh.mesh].primitives[number]
+            width = sum(element_size(document.accessors[i]) for i in primitive.attributes.values())
+            faces = _corner_count(document, primitive) // 3 * 4**levels
+            total += faces * (BYTES_PER_FACE + COPIES_PER_VERTEX_BYTE * width)
+    return total
+
+
+def _face_count(document: Document, primitive: Primitive, pointer: str) -> int:
+    corners = _corner_count(document, primitive)
+    if corners % 3:
+        raise GltfError(f"{corners} corners are no whole triangles", pointer=pointer)
+    return corners // 3
+
+
+def _corner_count(document: Document, primitive: Primitive) -> int:
+    index = primitive.indices
+    if index is None:
+        index = primitive.attributes["POSITION"]
+    return document.accessors[index].count

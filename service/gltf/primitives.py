@@ -1,0 +1,102 @@
+"""Triangle primitives as arrays: corners, and the attributes of the vertices that they use."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int, Shaped
+
+from service.errors import GltfError
+from service.gltf.accessors import FLOAT, read
+from service.gltf.schema import Accessor, Document
+from service.weld import as_words, distinct_rows, number_by_first_appearance
+
+
+@dataclass(frozen=True, eq=False)
+class TrianglePrimitive:
+    """A primitive, reduced to the vertices that its faces use.
+
+    Attributes:
+        number: its place in the mesh.
+        corners: (F, 3) rows of `attributes`.
+        attributes: by name (N, K) arrays in the file's component type.
+        accessors: by name the accessor that an attribute came from.
+    """
+
+    number: int
+    corners: Int[np.ndarray, "F 3"]
+    attributes: dict[str, Shaped[np.ndarray, "N K"]]
+    accessors: dict[str, Accessor]
+
+
+def read_primitive(
+    document: Document, buffers: Sequence[memoryview], mesh: int, number: int
+) -> TrianglePrimitive:
+    """Read a primitive whose references have been checked.
+
+    Raises:
+        GltfError: an index beyond the vertices, or a NaN or infinity, with the accessor's pointer.
+    """
+    primitive = document.meshes[mesh].primitives[number]
+    count = document.accessors[primitive.attributes["POSITION"]].count
+    if primitive.indices is None:
+        flat = np.arange(count, dtype=np.int64)
+    else:
+        flat = read(document, buffers, document.accessors[primitive.indices])[:, 0].astype(np.int64)
+        if flat.max() >= count:
+            raise GltfError(
+                f"index {flat.max()}, but there are {count} vertices",
+                pointer=f"/accessors/{primitive.indices}",
+            )
+    used, corners = compact(flat, count)
+    attributes: dict[str, Shaped[np.ndarray, "N K"]] = {}
+    for name, index in primitive.attributes.items():
+        accessor = document.accessors[index]
+        values = read(document, buffers, accessor)[used]
+        if accessor.component_type == FLOAT and not np.isfinite(values).all():
+            raise GltfError(f"{name} holds NaN or infinity", pointer=f"/accessors/{index}")
+        attributes[name] = values
+    return TrianglePrimitive(
+        number=number,
+        corners=corners.reshape(-1, 3),
+        attributes=attributes,
+        accessors={n: document.accessors[i] for n, i in primitive.attributes.items()},
+    )
+
+
+def compact(
+    indices: Int[np.ndarray, " C"], count: int
+) -> tuple[Int[np.ndarray, " U"], Int[np.ndarray, " C"]]:
+    """The used indices in ascending order, and each index's place among them.
+
+    Costs in proportion to the indices, however many vertices the accessor has: many primitives may
+    share one.
+    """
+    if count > 8 * len(indices):
+        used = np.unique(indices)
+        return used, np.searchsorted(used, indices)
+    flags = np.zeros(count, dtype=bool)
+    flags[indices] = True
+    return np.flatnonzero(flags), (np.cumsum(flags) - 1)[indices]
+
+
+def distinct_corners(
+    primitive: TrianglePrimitive,
+    corners: Int[np.ndarray, "F 3"],
+    welded: Int[np.ndarray, " N"],
+) -> tuple[Int[np.ndarray, "F 3"], Int[np.ndarray, " C"]]:
+    """Join vertices that agree in position and in all attributes.
+
+    `welded` is the welded vertex of each row. Gives the distinct corners of each face, numbered by
+    first appearance, and for each of them a row of the primitive's attributes.
+    """
+    others = [values for name, values in primitive.attributes.items() if name != "POSITION"]
+    words = np.hstack([welded.astype(np.uint32)[:, None], *(as_words(o) for o in others)])
+    flat = corners.reshape(-1)
+    distinct = number_by_first_appearance(distinct_rows(words)[flat])
+    row = np.empty(distinct.max(initial=-1) + 1, dtype=np.int64)
+    # Backwards, so that the earliest row stands for its equals.
+    row[distinct[::-1]] = flat[::-1]
+    return distinct.reshape(-1, 3), row

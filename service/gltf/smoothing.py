@@ -1,0 +1,80 @@
+"""Which corners share a normal: those that shared a position and a normal before.
+
+The groups run over all primitives of a mesh, so that a change of material in a smooth surface does
+not become an edge in its shading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.blocks import Blocks, available_threads
+from service.gltf.control_mesh import ControlMesh, slices
+from service.gltf.lattice import Lattice
+from service.gltf.normals import angle_weighted_normals
+from service.gltf.spread import Spread, spread
+from service.weld import as_words, canonical_zero, distinct_rows, number_by_first_appearance
+
+
+@dataclass(frozen=True, eq=False)
+class NormalGroups:
+    """New normals of G groups, and by primitive the groups of its faces' lattice points."""
+
+    values: Float[np.ndarray, "G 3"]
+    ids: dict[int, Int[np.ndarray, "F T"]]
+
+
+def recompute_normals(
+    control: ControlMesh,
+    ids: Sequence[Int[np.ndarray, "F T"]],
+    grid: Lattice,
+    points: Float[np.ndarray, "V 3"],
+) -> NormalGroups:
+    """The normals of the primitives that have normals.
+
+    `ids` are, for each primitive, the refined vertices at the lattice points of its faces.
+    """
+    chosen = [
+        number
+        for number, primitive in enumerate(control.primitives)
+        if "NORMAL" in primitive.attributes and len(ids[number])
+    ]
+    if not chosen:
+        return NormalGroups(np.zeros((0, 3)), {})
+    groups, before = _split_groups(control, chosen, grid)
+    used = np.concatenate([ids[number] for number in chosen])
+    values = angle_weighted_normals(
+        points,
+        used[:, grid.faces.reshape(-1)].reshape(-1, 3),
+        groups.refined_faces,
+        fallback=groups.linear(before),
+        blocks=Blocks(threads=available_threads()),
+    )
+    shares = slices([len(ids[number]) for number in chosen])
+    return NormalGroups(
+        values, {number: groups.ids[at] for number, at in zip(chosen, shares, strict=True)}
+    )
+
+
+def _split_groups(
+    control: ControlMesh, chosen: Sequence[int], grid: Lattice
+) -> tuple[Spread, Float[np.ndarray, "C 3"]]:
+    """The split connectivity of (welded vertex, old normal) pairs, and the pairs' normals."""
+    old = [canonical_zero(control.primitives[number].attributes["NORMAL"]) for number in chosen]
+    welded = [control.weld.vertex_of[control.rows[number]] for number in chosen]
+    starts = slices([len(normals) for normals in old])
+    rows = [
+        control.primitives[number].corners[control.kept[number]] + at.start
+        for number, at in zip(chosen, starts, strict=True)
+    ]
+    normals, flat = np.concatenate(old), np.concatenate(rows).reshape(-1)
+    vertex = np.concatenate(welded).astype(np.uint32)[:, None]
+    pairs = distinct_rows(np.hstack([vertex, as_words(normals)]))
+    corners = number_by_first_appearance(pairs[flat])
+    before = np.empty((corners.max() + 1, 3))
+    before[corners] = normals[flat]
+    return spread(corners.reshape(-1, 3), len(before), grid), before

@@ -1,0 +1,112 @@
+"""Put refined primitives into a document: new accessors at the end, the rest where it was."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Shaped
+
+from service.gltf.accessors import COMPONENT_TYPES
+from service.gltf.share import RefinedPrimitive
+
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+# The largest value of an index type restarts primitives, so it may not be used as an index.
+LARGEST_UINT16_INDEX = 65534
+
+_COMPONENT_TYPE_OF = {dtype: number for number, dtype in COMPONENT_TYPES.items()}
+_VECTORS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+
+
+@dataclass
+class Writer:
+    """A document being edited: the JSON tree, and the pieces of its one buffer to be."""
+
+    tree: dict[str, Any]
+    pieces: list[bytes | memoryview] = field(default_factory=list)
+    length: int = 0
+
+    @staticmethod
+    def start(tree: dict[str, Any], buffers: Sequence[memoryview]) -> Writer:
+        """Take over the tree, with all its buffers one after the other as the first."""
+        writer = Writer(tree)
+        starts = [writer._append(buffer) for buffer in buffers]
+        for view in tree.get("bufferViews", []):
+            if starts[view["buffer"]]:
+                view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
+                view["buffer"] = 0
+        return writer
+
+    def replace(self, mesh: int, refined: RefinedPrimitive) -> None:
+        """Point a primitive of the tree at its refined geometry."""
+        primitive = self.tree["meshes"][mesh]["primitives"][refined.source.number]
+        primitive["attributes"] = {
+            name: self._attribute(refined, name, values)
+            for name, values in refined.attributes.items()
+        }
+        small = refined.faces.max() <= LARGEST_UINT16_INDEX
+        indices = refined.faces.astype(np.uint16 if small else np.uint32)
+        primitive["indices"] = self._accessor(indices.reshape(-1, 1), ELEMENT_ARRAY_BUFFER)
+
+    def finish(self) -> list[bytes | memoryview]:
+        """Write the buffer's length into the tree; the pieces of BIN."""
+        if not self.pieces:
+            return []
+        first = self.tree.get("buffers", [{}])[0]
+        rest = {key: value for key, value in first.items() if key not in ("uri", "byteLength")}
+        self.tree["buffers"] = [{"byteLength": self.length, **rest}]
+        return self.pieces
+
+    def _attribute(
+        self, refined: RefinedPrimitive, name: str, values: Shaped[np.ndarray, "N K"]
+    ) -> int:
+        index = self._accessor(values, ARRAY_BUFFER)
+        accessor = self.tree["accessors"][index]
+        before = refined.source.accessors.get(name)
+        if before is not None:
+            accessor["type"] = before.type
+            if before.normalized:
+                accessor["normalized"] = True
+        if name == "POSITION":
+            accessor["min"] = values.min(axis=0).tolist()
+            accessor["max"] = values.max(axis=0).tolist()
+        return index
+
+    def _accessor(self, values: Shaped[np.ndarray, "N K"], target: int) -> int:
+        """Append the rows, each padded to whole words where they are vertices; its accessor."""
+        width = values.shape[1] * values.itemsize
+        padded = target == ARRAY_BUFFER and width % 4 != 0
+        if padded:
+            octets = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), width)
+            content = np.pad(octets, ((0, 0), (0, -width % 4)))
+        else:
+            content = np.ascontiguousarray(values)
+        data = memoryview(content).cast("B")
+        view: dict[str, Any] = {"buffer": 0, "byteOffset": self._append(data)}
+        view["byteLength"] = len(data)
+        if padded:
+            view["byteStride"] = content.shape[1]
+        view["target"] = target
+        self.tree.setdefault("bufferViews", []).append(view)
+        accessors = self.tree.setdefault("accessors", [])
+        accessors.append(
+            {
+                "bufferView": len(self.tree["bufferViews"]) - 1,
+                "componentType": _COMPONENT_TYPE_OF[values.dtype],
+                "count": len(values),
+                "type": _VECTORS.get(values.shape[1], "SCALAR"),
+            }
+        )
+        return len(accessors) - 1
+
+    def _append(self, data: memoryview) -> int:
+        """Add bytes at the next multiple of four; where they begin."""
+        padding = -self.length % 4
+        if padding:
+            self.pieces.append(b"\0" * padding)
+        start = self.length + padding
+        self.pieces.append(data)
+        self.length = start + len(data)
+        return start

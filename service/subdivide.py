@@ -1,0 +1,204 @@
+"""A glTF file in, a refined GLB and its report out: a function of bytes and options alone."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from pns_common.errors import MeshError
+from pns_common.mesh import Mesh
+from pns_common.refine import Refinement, refine
+from pns_common.schemes import Model, Scheme, loop, pns
+from service.errors import NoModelError, UnrefinableError
+from service.gltf.container import write_glb
+from service.gltf.control_mesh import control_mesh
+from service.gltf.extras import put_report, replaces_extras
+from service.gltf.json_text import encode
+from service.gltf.nodes import mesh_instances
+from service.gltf.plan import MeshPlan
+from service.gltf.primitives import read_primitive
+from service.gltf.report import Change, MeshResult, build_report
+from service.gltf.share import RefinedPrimitive, share
+from service.gltf.upload import Media, Upload, read_upload
+from service.gltf.writer import Writer
+from service.options import Limits, Options
+
+RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Subdivided:
+    """A refined file.
+
+    Attributes:
+        glb: the file, with the report in it unless diagnostics were not wanted.
+        report: the report.
+        timings: seconds by stage (read, weld, refine, attributes, write).
+    """
+
+    glb: bytes
+    report: dict[str, Any]
+    timings: dict[str, float]
+
+
+def subdivide_gltf(
+    data: bytes,
+    media: Media,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    progress: Progress | None = None,
+) -> Subdivided:
+    """Refine every triangle mesh of a glTF file.
+
+    `progress` is called with (faces made so far, faces made in the end).
+
+    Raises:
+        ServiceError: the upload is unreadable, wrong, over a limit, or cannot be refined yet.
+        pns_common.errors.ModelError: the model answered with something that is no correction.
+    """
+    clock = _Clock()
+    scheme = make_scheme(options, model)
+    upload = read_upload(data, media, options.levels, limits)
+    instances = mesh_instances(upload.document)
+    changes = _changes_of_container(upload, options)
+    writer = Writer.start(upload.tree, upload.buffers)
+    clock.lap("read")
+
+    results: list[MeshResult] = []
+    for mesh, mesh_progress in zip(upload.plans, _by_mesh(upload.plans, progress), strict=True):
+        primitives = [
+            read_primitive(upload.document, upload.buffers, mesh.mesh, number)
+            for number in mesh.primitives
+        ]
+        clock.lap("read")
+        control = control_mesh(primitives)
+        clock.lap("weld")
+        refined: list[RefinedPrimitive] = []
+        refinement: Refinement | None = None
+        if control.cleaned is not None:
+            pointer = f"/meshes/{mesh.mesh}"
+            refinement = refine_within_float32(
+                control.cleaned.mesh, scheme, options, pointer, mesh_progress
+            )
+            clock.lap("refine")
+            scalars = {RATIO: refinement.ratio, GATE: refinement.gate}
+            refined = share(
+                control,
+                control.cleaned,
+                refinement,
+                options.levels,
+                scalars if options.diagnostics == "full" else {},
+            )
+            clock.lap("attributes")
+        for primitive in refined:
+            writer.replace(mesh.mesh, primitive)
+        clock.lap("write")
+        changes += [
+            Change(
+                f"/meshes/{mesh.mesh}/primitives/{primitive.number}",
+                "degenerate faces dropped" if keep.any() else "left as it was: no area",
+                int((~keep).sum()),
+            )
+            for primitive, keep in zip(primitives, control.kept, strict=True)
+            if not keep.all()
+        ]
+        results.append(
+            MeshResult(
+                index=mesh.mesh,
+                instances=instances[mesh.mesh],
+                primitives=len(refined),
+                vertices=sum(len(p.attributes["POSITION"]) for p in refined),
+                faces=sum(len(p.faces) for p in refined),
+                degenerate=control.degenerate,
+                copies=control.copies,
+                report=None if refinement is None else refinement.report,
+            )
+        )
+
+    report = build_report(scheme, options.levels, results, changes)
+    if options.diagnostics != "none":
+        put_report(upload.tree, report)
+    pieces = writer.finish()
+    glb = write_glb(encode(upload.tree), pieces, upload.container.others)
+    clock.lap("write")
+    return Subdivided(glb=glb, report=report, timings=clock.seconds)
+
+
+def make_scheme(options: Options, model: Model | None) -> Scheme:
+    """The scheme that the options name.
+
+    Raises:
+        NoModelError: the learned scheme without a model.
+    """
+    if options.scheme == "loop":
+        return loop()
+    if model is None:
+        raise NoModelError("no model is loaded; scheme=loop needs none")
+    return pns(model, options.budget)
+
+
+def refine_within_float32(
+    mesh: Mesh, scheme: Scheme, options: Options, pointer: str, progress: Progress | None
+) -> Refinement:
+    """Refine a mesh whose positions will be written as float32.
+
+    Raises:
+        UnrefinableError: a position leaves the range of float32.
+    """
+    try:
+        refinement = refine(
+            mesh, scheme, options.levels, options.reference_length, progress=progress
+        )
+    except MeshError as error:
+        raise UnrefinableError(str(error), pointer=pointer) from error
+    if np.abs(refinement.mesh.vertices).max() > np.finfo(np.float32).max:
+        raise UnrefinableError("refined positions leave the range of float32", pointer=pointer)
+    return refinement
+
+
+def _changes_of_container(upload: Upload, options: Options) -> list[Change]:
+    changes: list[Change] = []
+    if len(upload.buffers) > 1:
+        changes.append(Change("/buffers", "joined into one", len(upload.buffers)))
+    if options.diagnostics != "none" and replaces_extras(upload.tree):
+        changes.append(Change("/asset/extras", "moved to /asset/extras/extras", 1))
+    return changes
+
+
+def _by_mesh(plans: list[MeshPlan], progress: Progress | None) -> list[Progress | None]:
+    """One callback for each mesh, that adds what the meshes before it have made."""
+    if progress is None:
+        return [None] * len(plans)
+    faces = [mesh.faces for mesh in plans]
+    return [
+        partial(_report_progress, progress, sum(faces[:number]) / sum(faces), count / sum(faces))
+        for number, count in enumerate(faces)
+    ]
+
+
+def _report_progress(
+    progress: Progress, before: float, share_of_all: float, done: int, total: int
+) -> None:
+    progress(round(total * (before / share_of_all) + done), round(total / share_of_all))
+
+
+@dataclass
+class _Clock:
+    """Adds up the seconds between laps under the lap's name."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    last: float = field(default_factory=time.perf_counter)
+
+    def lap(self, stage: str) -> None:
+        """Book the time since the last lap."""
+        now = time.perf_counter()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self.last
+        self.last = now
