@@ -39,15 +39,21 @@ class FileAnswer(Response):
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send the answer."""
         with self._held:
-            await send(
-                {
-                    "type": "http.response.start",
-                    "status": self.status_code,
-                    "headers": self.raw_headers,
-                }
-            )
-            for piece in self._content.pieces():
-                message = {"type": "http.response.body", "body": piece, "more_body": True}
-                async with asyncio.timeout(self._stall_seconds):
-                    await send(message)
-            await send({"type": "http.response.body", "body": b""})
+            try:
+                await self._send_pieces(send)
+            except TimeoutError:
+                log.warning("a client took too long to read its answer")
+
+    async def _send_pieces(self, send: Send) -> None:
+        await send(
+            {
+                "type": "http.response.start",
+                "status": self.status_code,
+                "headers": self.raw_headers,
+            }
+        )
+        for piece in self._content.pieces():
+            message = {"type": "http.response.body", "body": piece, "more_body": True}
+            async with asyncio.timeout(self._stall_seconds):
+                await send(message)
+        await send({"type": "http.response.body", "body": b""})

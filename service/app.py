@@ -30,8 +30,9 @@ def create_app(
 ) -> FastAPI:
     """The application, with worker processes that live as long as its lifespan.
 
-    `settings` None reads the environment; `model` None loads `settings.model`. `job` is what a worker calls for
-    each request, `warm_up` what it calls once, before. A model that does not load leaves the service up: /readyz says 503, scheme=loop works.
+    `settings` None reads the environment; `model` None loads `settings.model`. `job` is what a
+    worker calls for each request, `warm_up` what it calls once, before. A model that does not load
+    leaves the service up: /readyz says 503, scheme=loop works.
     """
     settings = settings or Settings()
     source = model if model is not None else settings.model

@@ -32,8 +32,7 @@ def _problems(**reasons: str) -> dict[int | str, dict[str, Any]]:
     return {
         int(status.removeprefix("_")): {
             "description": reason,
-            "model": Problem,
-            "content": {problems.MEDIA_TYPE: {}},
+            "content": {problems.MEDIA_TYPE: {"schema": Problem.model_json_schema()}},
         }
         for status, reason in reasons.items()
     }
@@ -43,7 +42,8 @@ SUBDIVIDE: dict[str, Any] = {
     "summary": "Refine every triangle mesh of a glTF",
     "description": (
         "Answers with the refined GLB, whose `asset.extras.pns` holds the report; with "
-        "`Accept: application/json`, with the report alone. Materials, textures, nodes and names stay."
+        "`Accept: application/json`, with the report alone. "
+        "Materials, textures, nodes and names stay."
     ),
     "openapi_extra": {"requestBody": _BODY},
     "responses": {
@@ -62,7 +62,7 @@ SUBDIVIDE: dict[str, Any] = {
             _408="The body took too long to arrive",
             _413="Over a limit: body, predicted faces, levels or memory",
             _415="A content type that is not taken",
-            _422="A bad parameter, a file that breaks its own promises, or a mesh that cannot be refined",
+            _422="A bad parameter, a file that breaks its promises, or a mesh not to be refined",
             _500="A fault of the service, or a worker that died",
             _503="Busy (see Retry-After), shutting down, or without a model",
             _504="The job took too long",

@@ -8,6 +8,13 @@ from contextlib import contextmanager
 from service.errors import BusyError
 
 
+class DrainingError(BusyError):
+    """The service shuts down: it finishes what it has and takes nothing new."""
+
+    code = "draining"
+    title = "The service is shutting down"
+
+
 class Gate:
     """Counts the requests under way, from before their body is read until their answer is sent."""
 
@@ -20,7 +27,7 @@ class Gate:
     def admit(self) -> Iterator[None]:
         """Hold one place. Raises BusyError where none is free, or where the service shuts down."""
         if self.draining:
-            raise BusyError("the service is shutting down", code="draining", retry_after=5)
+            raise DrainingError("no new request is taken", retry_after=5)
         if self.admitted >= self.capacity:
             raise BusyError(f"{self.admitted} requests are under way; no more fit")
         self.admitted += 1

@@ -1,7 +1,7 @@
-"""The job of a request, as a worker runs it: unpack the body, refine, leave the answer in a memory file.
+"""The job of a request, as a worker runs it: unpack the body, refine, leave the answer.
 
-The heavy imports (the runtime, the pipeline) are made inside the functions: the server process imports this
-module to name its jobs, and never runs them.
+The heavy imports (the runtime, the pipeline) are made inside the functions: the server process
+imports this module to name its jobs, and never runs them.
 """
 
 from __future__ import annotations
@@ -36,14 +36,17 @@ class Work:
 
 
 def subdivide(work: Work) -> dict[str, float]:
-    """Write the GLB (or the report as JSON) to `work.answer`; the seconds of each stage. Raises ServiceError."""
+    """Write the GLB, or the report as JSON, to `work.answer`; returns the seconds of each stage.
+
+    Raises ServiceError.
+    """
     import msgspec
 
     from service.subdivide import subdivide_gltf
 
     data, media_type = _file_of(Path(work.body).read_bytes(), work.content_type)
     model = _model(work.model) if work.options.scheme == "pns" else None
-    done = subdivide_gltf(data, media_type, work.options, model, work.limits)
+    done = subdivide_gltf(data, media.FORMATS[media_type], work.options, model, work.limits)
     memory_file.write(
         work.answer, msgspec.json.encode(done.report) if work.report_only else done.glb
     )

@@ -1,4 +1,4 @@
-"""The outermost layer: a body over its limit is refused before anything reads, parses or keeps it."""
+"""The outermost layer: a body over its limit is refused before anything parses or keeps it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from service import problems
 from service.errors import LimitError, ServiceError, UnreadableError
 
 
-class UploadTimeout(ServiceError):
+class UploadTimeoutError(ServiceError):
     """The body took longer to arrive than an upload may."""
 
     status = 408
@@ -21,8 +21,9 @@ class UploadTimeout(ServiceError):
 class BodyLimit:
     """ASGI layer that counts a request's body while it arrives, in bytes and in seconds.
 
-    A Content-Length over the limit is answered at once with 413. A body without one is counted: the read that
-    passes the limit raises LimitError inside the application, the read that comes too late UploadTimeout.
+    A Content-Length over the limit is answered at once with 413. A body without one is counted: the
+    read that passes the limit raises LimitError inside the application, the read that comes too
+    late UploadTimeoutError.
     """
 
     def __init__(self, app: ASGIApp, *, max_bytes: int, seconds: float) -> None:
@@ -72,7 +73,7 @@ class BodyLimit:
                 async with asyncio.timeout_at(deadline):
                     message = await receive()
             except TimeoutError as error:
-                raise UploadTimeout(
+                raise UploadTimeoutError(
                     f"the body did not arrive within {self.seconds:g} seconds"
                 ) from error
             if message["type"] == "http.request":

@@ -9,6 +9,9 @@ GLTF = "model/gltf+json"
 MULTIPART = "multipart/form-data"
 ACCEPTED = (GLB, GLTF, MULTIPART)
 
+FORMATS = {GLB: "glb", GLTF: "gltf"}
+"""The pipeline's name of each file type."""
+
 GLB_MAGIC = b"glTF"
 BLANK = b" \t\r\n"
 
@@ -23,7 +26,10 @@ def of_request(content_type: str) -> str:
 
 
 def sniff(data: bytes) -> str:
-    """GLB or glTF JSON by the first bytes: form clients send application/octet-stream. Raises MediaTypeError."""
+    """GLB or glTF JSON, by the first bytes: form clients send application/octet-stream.
+
+    Raises MediaTypeError.
+    """
     if data.startswith(GLB_MAGIC):
         return GLB
     # A slice: a file of nothing but blanks is not to be copied to find that out.

@@ -1,8 +1,9 @@
 """Request bodies and answers, kept in files without a name that a worker process opens by path.
 
-Bodies go to the worker this way, not through a pipe: the server process copies them in small pieces, parses
-nothing and pickles nothing, so no upload can hold its event loop; and a worker killed in the middle leaves no
-half-read pipe behind. On Linux the file is memory (no disk, no tmpfs quota); elsewhere a temporary file.
+Bodies go to the worker this way, not through a pipe: the server process copies them in small
+pieces, parses nothing and pickles nothing, so no upload can hold its event loop; and a worker
+killed in the middle leaves no half-read pipe behind. On Linux the file is memory (no disk, no tmpfs
+quota); elsewhere a temporary file.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ PIECE = 256 * 1024
 
 
 class MemoryFile:
-    """A file that only this process and those that it tells of `path` can reach; gone once closed."""
+    """A file that others open by its `path`, if they are told; gone once closed."""
 
     def __init__(self) -> None:
         if hasattr(os, "memfd_create"):

@@ -1,4 +1,4 @@
-"""The one file of a multipart body. It runs in a worker, on a body that was counted while it arrived."""
+"""The one file of a multipart body, unpacked in a worker once all of the body is there."""
 
 from __future__ import annotations
 
@@ -73,7 +73,8 @@ class _OnePart:
 def only_file(body: bytes, content_type: str) -> bytes:
     """The content of the one part named `file`.
 
-    Raises UnreadableError where the body is no multipart body, MultipartError where it holds something else.
+    Raises UnreadableError where the body is no multipart body, MultipartError where it holds
+    something else.
     """
     boundary = parse_options_header(content_type)[1].get(b"boundary")
     if not boundary:

@@ -17,7 +17,7 @@ def _empty_is_absent(value: Any) -> Any:
 
 
 class Parameters(BaseModel):
-    """What a client may ask for; a name that is not here is an error, since a misspelt one would be lost."""
+    """What a client may ask for; another name is an error, since a misspelt one would be lost."""
 
     model_config = ConfigDict(extra="forbid")
 

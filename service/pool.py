@@ -1,4 +1,4 @@
-"""Worker processes: jobs run where they can be killed, and where no upload holds the server's interpreter."""
+"""Worker processes: jobs run where they can be killed and cannot hold the server's interpreter."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TypeVar
 from pebble import ProcessExpired, ProcessPool
 
 from service import worker
-from service.errors import JobTimeout, ServiceError, WorkerDied
+from service.errors import BusyError, JobTimeout, ServiceError, WorkerDied
 
 T = TypeVar("T")
 
@@ -25,9 +25,9 @@ log = logging.getLogger("pns.service")
 class Workers:
     """`count` worker processes, each with one job at a time.
 
-    Every process has a pebble pool of its own, so that a worker that dies or is killed breaks nothing which
-    another request waits on. A pool whose job did not come back is thrown away and replaced.
-    `warm_up` is called in each new process before it takes jobs.
+    Every process has a pebble pool of its own, so that a worker that dies or is killed breaks
+    nothing which another request waits on. A pool whose job did not come back is thrown away and
+    replaced. `warm_up` is called in each new process before it takes jobs.
     """
 
     def __init__(self, count: int, seconds: float, warm_up: Callable[[], object]) -> None:
@@ -56,8 +56,9 @@ class Workers:
     async def run(self, function: Callable[..., T], *arguments: object) -> T:
         """The value of `function(*arguments)`, called in a worker once one is free.
 
-        Cancelling this call kills the worker. Raises what the function raises (ServiceError as it is, anything
-        else as worker.JobFault), JobTimeout past the deadline, WorkerDied where the process ended.
+        Cancelling this call kills the worker. Raises what the function raises (ServiceError as it
+        is, anything else as worker.JobFaultError), BusyError where no worker becomes free,
+        JobTimeout past the deadline, WorkerDied where the process ended.
         """
         pool = await self._take()
         try:
@@ -73,9 +74,13 @@ class Workers:
 
     async def _take(self) -> ProcessPool:
         """A free pool; those whose idle process has died meanwhile are replaced."""
-        while not (pool := await self._free.get()).active:
-            self._in_background(self._replace(pool))
-        return pool
+        try:
+            async with asyncio.timeout(self._seconds):
+                while not (pool := await self._free.get()).active:
+                    self._in_background(self._replace(pool))
+                return pool
+        except TimeoutError as error:
+            raise BusyError(f"no worker became free in {self._seconds:g} seconds") from error
 
     async def _call(self, pool: ProcessPool, function: Callable[..., T], *arguments: object) -> T:
         future = pool.schedule(worker.call, args=(function, *arguments), timeout=self._seconds)
@@ -99,13 +104,13 @@ class Workers:
         try:
             await self._call(pool, self._warm_up)
         except (JobTimeout, WorkerDied) as error:
-            log.error("a worker did not start: %s", error)
+            log.warning("a worker did not start: %s", error)
             await asyncio.sleep(RESTART_SECONDS)
             self._in_background(self._replace(pool))
             return
-        except (ServiceError, worker.JobFault) as error:
+        except (ServiceError, worker.JobFaultError) as error:
             # The process lives: it may still serve what does not need the thing that failed.
-            log.error("a worker did not warm up: %s", error)
+            log.warning("a worker did not warm up: %s", error)
         else:
             self.ready = True
         self._free.put_nowait(pool)

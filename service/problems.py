@@ -11,8 +11,11 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.responses import Response
 
 from service.errors import BusyError, InvalidParameter, LimitError, ServiceError
+from service.worker import JobFaultError
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -107,6 +110,16 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(HTTPException)
     async def http_exception(request: Request, error: HTTPException) -> JSONResponse:
         return _of_http_exception(error)
+
+    @app.exception_handler(JobFaultError)
+    async def job_fault(request: Request, error: JobFaultError) -> JSONResponse:
+        log.error("a job failed in its worker:\n%s", error)
+        return internal_error()
+
+    @app.exception_handler(ClientDisconnect)
+    async def client_disconnect(request: Request, error: ClientDisconnect) -> Response:
+        # Nobody reads it; the number is the one that proxies log for this.
+        return Response(status_code=499)
 
     # Starlette answers with this and raises the error again, so that the server logs it.
     @app.exception_handler(Exception)

@@ -16,8 +16,8 @@ from starlette.types import Receive
 
 from service import documentation, media
 from service.answer import FileAnswer
-from service.errors import BusyError, LimitError, MediaTypeError, NoModelError
-from service.gate import Gate
+from service.errors import LimitError, MediaTypeError, NoModelError
+from service.gate import DrainingError, Gate
 from service.jobs import Work
 from service.memory_file import MemoryFile
 from service.parameters import Parameters
@@ -57,7 +57,7 @@ def router(service: Service) -> APIRouter:
     @routes.get("/readyz", **documentation.READYZ)
     async def readyz() -> JSONResponse:
         if service.gate.draining:
-            raise BusyError("the service is shutting down", code="draining", retry_after=5)
+            raise DrainingError("no new request is taken", retry_after=5)
         if not service.workers.ready:
             raise NoModelError("no worker has loaded the model")
         return JSONResponse({"status": "ready"})
@@ -121,7 +121,7 @@ def _server_timing(seconds: dict[str, float]) -> str:
 
 
 async def _unless_gone(receive: Receive, work: Coroutine[Any, Any, T]) -> T:
-    """The value of `work`, which is cancelled when the client disconnects. Raises ClientDisconnect."""
+    """The value of `work`, cancelled when the client disconnects. Raises ClientDisconnect."""
     job = asyncio.create_task(work)
     gone = asyncio.create_task(_disconnected(receive))
     try:

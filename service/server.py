@@ -1,4 +1,4 @@
-"""`pns serve`: uvicorn, with a shutdown that lets requests finish and tells the load balancer first."""
+"""`pns serve`: uvicorn with a shutdown that lets requests finish and says so beforehand."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from service.settings import Settings
 class DrainingServer(uvicorn.Server):
     """On the first SIGTERM or SIGINT it closes the gate; it exits once no request is under way.
 
-    Until then it still answers: /readyz and new requests with 503. uvicorn's own shutdown would close the socket
-    at once. A second signal ends it without waiting.
+    Until then it still answers: /readyz and new requests with 503. uvicorn's own shutdown would
+    close the socket at once. A second signal ends it without waiting.
     """
 
     def __init__(self, config: uvicorn.Config, gate: Gate, drain_seconds: float) -> None:

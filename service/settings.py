@@ -1,4 +1,4 @@
-"""What a deployment may set: every value comes from the environment (`PNS_…`) or from the constructor."""
+"""What a deployment may set, by environment (`PNS_…`) or by the constructor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What runs inside a worker process: preparation, and the one door through which jobs are called."""
+"""What runs inside a worker process: its preparation, and the one door for jobs."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from service.errors import ServiceError
 
 T = TypeVar("T")
 
-# Of 1000. Out of memory, the kernel should take a worker (one request) before the server (all of them).
+# Of 1000. Out of memory, the kernel should take a worker (one request) before the server (all of
+# them).
 OOM_PREFERENCE = 500
 
 
-class JobFault(Exception):
+class JobFaultError(Exception):
     """A fault of ours inside a job; the text is the worker's traceback, for the log only."""
 
 
@@ -25,7 +26,8 @@ def prepare() -> None:
     """Set up a fresh worker process."""
     # A Python handler would wait for the next bytecode, and one numpy call may take seconds.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    # A signal to the server's process group (a terminal, a supervisor) must not end requests that run.
+    # A signal to the server's process group (a terminal, a supervisor) must not end requests that
+    # run.
     os.setsid()
     preference = Path("/proc/self/oom_score_adj")
     if preference.exists():
@@ -33,7 +35,7 @@ def prepare() -> None:
 
 
 def call(function: Callable[..., T], *arguments: object) -> T:
-    """Run a job; a foreseen error crosses to the server as it is, any other as JobFault.
+    """Run a job; a foreseen error crosses to the server as it is, any other as JobFaultError.
 
     Not every exception survives pickling, and one that does not would take the pool with it.
     """
@@ -42,4 +44,4 @@ def call(function: Callable[..., T], *arguments: object) -> T:
     except ServiceError:
         raise
     except Exception as error:
-        raise JobFault("".join(traceback.format_exception(error))) from None
+        raise JobFaultError("".join(traceback.format_exception(error))) from None

@@ -39,7 +39,7 @@ def obey(work: Work) -> dict[str, float]:
         case "fault":
             raise ZeroDivisionError("secret detail")
         case "unpicklable":
-            raise Unpicklable(lambda: None)
+            raise UnpicklableError(lambda: None)
         case "unreadable":
             raise UnreadableError("not a GLB")
         case "broken":
@@ -55,7 +55,7 @@ def obey(work: Work) -> dict[str, float]:
     return {"read": 0.001, "refine": 0.002}
 
 
-class Unpicklable(Exception):
+class UnpicklableError(Exception):
     pass
 
 
@@ -77,7 +77,7 @@ def hold() -> None:
 
 
 def fault() -> None:
-    raise Unpicklable(lambda: None)
+    raise UnpicklableError(lambda: None)
 
 
 def refuse() -> None:

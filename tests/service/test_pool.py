@@ -11,9 +11,9 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from service.errors import GltfError, JobTimeout, WorkerDied
+from service.errors import BusyError, GltfError, JobTimeout, WorkerDied
 from service.pool import Workers
-from service.worker import JobFault
+from service.worker import JobFaultError
 from tests.service import stand_in_jobs as jobs
 
 
@@ -50,7 +50,7 @@ def test_errors_cross_the_process_boundary_and_the_worker_lives_on() -> None:
             with pytest.raises(GltfError) as caught:
                 await pool.run(jobs.refuse)
             assert caught.value.pointer == "/meshes/0"
-            with pytest.raises(JobFault, match="Unpicklable"):
+            with pytest.raises(JobFaultError, match="UnpicklableError"):
                 await pool.run(jobs.fault)
             assert await pool.run(jobs.pid) == first
             assert first != os.getpid()
@@ -153,9 +153,9 @@ def test_ready_once_a_worker_has_warmed_up() -> None:
 
 def test_a_worker_whose_warm_up_kills_it_is_tried_again_without_haste() -> None:
     async def scenario() -> None:
-        async with workers(warm_up=jobs.die) as pool:
-            with pytest.raises(TimeoutError):
-                await asyncio.wait_for(pool.run(jobs.nothing), 2)
+        async with workers(warm_up=jobs.die, seconds=2) as pool:
+            with pytest.raises(BusyError):
+                await pool.run(jobs.nothing)
             assert not pool.ready
 
     run(scenario)
