@@ -1,9 +1,9 @@
 """Proximity-Preserving Neural Subdivision: the operator, in numpy.
 
-    from pns_common import Mesh, load_model, pns, refine
+from pns_common import Mesh, load_model, pns, refine
 
-    refined = refine(Mesh(vertices, faces), pns(load_model()), levels=2)
-    refined.mesh.vertices, refined.mesh.faces, refined.report
+refined = refine(Mesh(vertices, faces), pns(load_model()), levels=2)
+refined.mesh.vertices, refined.mesh.faces, refined.report
 """
 
 from pns_common.errors import MeshError, ModelError, ParameterError, PnsError

@@ -1,4 +1,4 @@
-"""Measured numbers of one refinement step: proximity ratio, gate use, flipped faces, normal jump."""
+"""Measured numbers of one step: proximity ratio, gate use, flipped faces, normal jump."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class LevelReport(TypedDict):
 
 @dataclass(frozen=True, eq=False)
 class ChildFaces:
-    """The faces that a step made: their unit normals, and how many oppose their Loop counterpart."""
+    """The faces that a step made: unit normals, and how many oppose their Loop counterpart."""
 
     normals: Float[np.ndarray, "F 3"]
     flipped: int

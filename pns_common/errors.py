@@ -19,7 +19,7 @@ class MeshError(PnsError):
 
 
 class ModelError(PnsError):
-    """A model file that is not what the contract asks, with what was expected and what was found."""
+    """A model file that breaks the contract: what was expected and what was found."""
 
     def __init__(self, path: str, *, expected: str, found: str):
         self.path = path

@@ -123,8 +123,8 @@ def repeated_vertex(faces: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
     return (a == b) | (b == c) | (c == a)
 
 
-def _frozen(values: np.ndarray, dtype: type) -> np.ndarray:
-    """A read-only C-contiguous array that no caller can change behind the mesh's back."""
-    copy = np.array(values, dtype=dtype, order="C")
+def _frozen(values: np.ndarray, dtype: np.typing.DTypeLike) -> np.ndarray:
+    """A read-only C-contiguous copy that no caller can change behind the mesh's back."""
+    copy = np.array(values, dtype=np.dtype(dtype), order="C")
     copy.flags.writeable = False
     return copy

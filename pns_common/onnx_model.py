@@ -28,16 +28,23 @@ LARGEST_FILE = 64 * 2**20
 
 # Row-wise arithmetic and the shape bookkeeping around it. No control flow, no operator that can
 # make a large tensor out of a small file, none that reads anything but its inputs.
-ALLOWED_OPERATORS = frozenset(
-    "Abs Add Cast Clip Concat Constant Cos Div Elu Erf Exp Gather Gelu Gemm Identity LeakyRelu Log "
-    "MatMul Max Min Mul Neg Pow Reciprocal ReduceL2 ReduceMax ReduceMean ReduceSum "
-    "ReduceSumSquare Relu Reshape Selu Sigmoid Sin Slice Softplus Split Sqrt Squeeze Sub Sum Tanh "
-    "Transpose Unsqueeze Where Greater Less".split()
-)
+# fmt: off
+ALLOWED_OPERATORS = frozenset({
+    "Abs", "Add", "Cast", "Clip", "Concat", "Constant", "Cos", "Div", "Elu", "Erf", "Exp",
+    "Gather", "Gelu", "Gemm", "Greater", "Identity", "LeakyRelu", "Less", "Log", "MatMul",
+    "Max", "Min", "Mul", "Neg", "Pow", "Reciprocal", "ReduceL2", "ReduceMax", "ReduceMean",
+    "ReduceSum", "ReduceSumSquare", "Relu", "Reshape", "Selu", "Sigmoid", "Sin", "Slice",
+    "Softplus", "Split", "Sqrt", "Squeeze", "Sub", "Sum", "Tanh", "Transpose", "Unsqueeze",
+    "Where",
+})
+# fmt: on
 
 # Rows that one call of the runtime sees. Always the same shape, so that a row's bits depend neither
 # on how many rows there are nor on how they are divided.
 ROWS = 1024
+
+# (name, element type, shape) with "*" for a free dimension.
+Signature = tuple[str, str, list[str | int]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +62,7 @@ class OnnxModel:
     card: ModelCard
     hash: str
     size: int
-    _session: onnxruntime.InferenceSession = field(repr=False)
+    _session: Any = field(repr=False)  # onnxruntime ships no types
 
     def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
         """Corrections (N, 3) float32, for features (N, K) and a dimensionless budget."""
@@ -122,23 +129,27 @@ def model_from_bytes(data: bytes, name: str) -> OnnxModel:
     card = _read_card(proto, name)
     _check_graph(proto.graph, name)
     _check_interface(proto.graph, card, name)
-    options = onnxruntime.SessionOptions()
+    runtime: Any = onnxruntime
+    options = runtime.SessionOptions()
     # The caller divides the work; one thread here keeps the bits the same everywhere.
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
     options.log_severity_level = 4
     try:
-        session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+        session = runtime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime's errors share no base below Exception
-        raise ModelError(name, expected="a graph that onnxruntime runs", found=str(error)) from error
+        raise ModelError(
+            name, expected="a graph that onnxruntime runs", found=str(error)
+        ) from error
     digest = hashlib.sha256(data).hexdigest()
     return OnnxModel(name=name, card=card, hash=digest, size=len(data), _session=session)
 
 
 def _parse(data: bytes, name: str) -> onnx.ModelProto:
+    checker: Any = onnx.checker
     try:
         proto = onnx.load_from_string(data)
-        onnx.checker.check_model(proto)
+        checker.check_model(proto)
     except (ValueError, onnx.checker.ValidationError) as error:
         found = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ModelError(name, expected="a valid ONNX model", found=found) from error
@@ -172,15 +183,16 @@ def _check_interface(graph: onnx.GraphProto, card: ModelCard, name: str) -> None
     inputs = [_signature(value) for value in graph.input if value.name not in weights]
     outputs = [_signature(value) for value in graph.output]
     features = FEATURE_COUNT[card.features]
-    wanted_in = [("features", "FLOAT", ["*", features]), ("budget", "FLOAT", [])]
-    wanted_out = [("correction", "FLOAT", ["*", 3])]
+    wanted_in: list[Signature] = [("features", "FLOAT", ["*", features]), ("budget", "FLOAT", [])]
+    wanted_out: list[Signature] = [("correction", "FLOAT", ["*", 3])]
     for what, wanted, found in [("inputs", wanted_in, inputs), ("outputs", wanted_out, outputs)]:
         if sorted(wanted, key=str) != sorted(found, key=str):
             raise ModelError(name, expected=f"{what} {wanted}", found=f"{found}")
 
 
-def _signature(value: onnx.ValueInfoProto) -> tuple[str, str, list[Any]]:
-    """(name, element type, shape) with "*" for a free dimension."""
+def _signature(value: onnx.ValueInfoProto) -> Signature:
     tensor = value.type.tensor_type
-    shape = [dim.dim_value if dim.HasField("dim_value") else "*" for dim in tensor.shape.dim]
+    shape: list[str | int] = [
+        dim.dim_value if dim.HasField("dim_value") else "*" for dim in tensor.shape.dim
+    ]
     return value.name, onnx.TensorProto.DataType.Name(tensor.elem_type), shape

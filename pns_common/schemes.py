@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -25,6 +25,7 @@ from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
 from pns_common.topology import Topology
 
 
+@runtime_checkable
 class Model(Protocol):
     """A per-edge network with its card; ``model(features, budget)`` has norm ≤ budget."""
 
@@ -168,7 +169,7 @@ def _learned_edge_rule(model: Model, budget: float) -> Rule:
 
         def correct_block(rows: slice) -> None:
             edges = topology.interior[rows]
-            stencil, faces = topology.stencil[edges], topology.edge_faces[edges]
+            stencil, faces = topology.stencil[edges], topology.half_edges[edges] // 3
             at = edge_stencil(level.points, level.normals, stencil, faces)
             result = correct(at, features, network, gate, budget / level.reference_length)
             displacement[edges] = result.displacement

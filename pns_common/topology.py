@@ -32,7 +32,8 @@ class Topology:
         faces: (F, 3) vertices of each face.
         edges: (E, 2) endpoints a < b.
         face_edges: (F, 3) edges (a, b), (b, c), (c, a) of each face.
-        edge_faces: (E, 2) of an interior edge its faces, lower index first; else −1.
+        half_edges: (E, 2) of an interior edge its half-edges, lower face first; else −1.
+            Half-edge h = 3 f + i runs from corner i of face f to the next corner.
         stencil: (E, 4) a, b, c, d; c is opposite in the face of lower index, d in the other.
         edge_class: (E,) EdgeClass values.
         interior: (I,) indices of the interior edges.
@@ -42,17 +43,19 @@ class Topology:
     faces: Int[np.ndarray, "F 3"]
     edges: Int[np.ndarray, "E 2"]
     face_edges: Int[np.ndarray, "F 3"]
-    edge_faces: Int[np.ndarray, "E 2"]
+    half_edges: Int[np.ndarray, "E 2"]
     stencil: Int[np.ndarray, "E 4"]
     edge_class: Int[np.ndarray, " E"]
     interior: Int[np.ndarray, " I"]
 
+    @property
+    def edge_faces(self) -> Int[np.ndarray, "E 2"]:
+        """The two faces of each interior edge, lower index first; −1 at other edges."""
+        return self.half_edges // 3
+
 
 def build_topology(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Topology:
-    """Pair the half-edges of ``faces`` into edges and classify them.
-
-    Half-edge h = 3 f + i runs from corner i of face f to the next corner.
-    """
+    """Pair the half-edges of ``faces`` into edges and classify them."""
     start = faces.reshape(-1)
     end = faces[:, [1, 2, 0]].reshape(-1)
     low, high = np.minimum(start, end), np.maximum(start, end)
@@ -88,25 +91,25 @@ def build_topology(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Topology
         np.where((count == 1) & proper[first // 3], EdgeClass.BOUNDARY, EdgeClass.IRREGULAR),
     )
 
-    edge_faces = np.full((len(edges), 2), -1, dtype=np.int64)
+    half_edges = np.full((len(edges), 2), -1, dtype=np.int64)
+    half_edges[number[opposed]] = np.stack([first[opposed], second[opposed]], axis=1)
+    interior = np.flatnonzero(edge_class == EdgeClass.INTERIOR)
     stencil = np.full((len(edges), 4), -1, dtype=np.int64)
     stencil[:, :2] = edges
-    one, two, pair = first[opposed], second[opposed], number[opposed]
-    edge_faces[pair, 0], edge_faces[pair, 1] = one // 3, two // 3
-    stencil[pair, 2], stencil[pair, 3] = start[opposite_corner(one)], start[opposite_corner(two)]
+    stencil[interior, 2:] = np.take(start, next_corner(next_corner(half_edges[interior])))
     return Topology(
         vertex_count=vertex_count,
         faces=faces,
         edges=edges,
         face_edges=edge_of.reshape(-1, 3),
-        edge_faces=edge_faces,
+        half_edges=half_edges,
         stencil=stencil,
         edge_class=edge_class,
-        interior=np.flatnonzero(edge_class == EdgeClass.INTERIOR),
+        interior=interior,
     )
 
 
-def split(topology: Topology) -> Int[np.ndarray, "4F 3"]:
+def split(topology: Topology) -> Int[np.ndarray, "4*F 3"]:
     """Split 1-to-4: face f becomes (a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca).
 
     The vertex of edge e is V + e; old vertices keep their numbers.
@@ -128,13 +131,10 @@ def child_face_pairs(topology: Topology) -> Int[np.ndarray, "P 2"]:
     """
     centre = 4 * np.arange(len(topology.faces), dtype=np.int64)[:, None] + 3
     inside = np.stack([np.broadcast_to(centre, (len(centre), 3)), centre - [3, 2, 1]], axis=-1)
-    faces = topology.edge_faces[topology.interior]
-    ends = topology.edges[topology.interior]
-    across = [
-        np.stack([_corner_child(topology, faces[:, side], end) for side in (0, 1)], axis=-1)
-        for end in (ends[:, 0], ends[:, 1])
-    ]
-    return np.concatenate([inside.reshape(-1, 2), *across])
+    there, back = topology.half_edges[topology.interior].T
+    at_start = np.stack([_corner_child(there), _corner_child(next_corner(back))], axis=-1)
+    at_end = np.stack([_corner_child(next_corner(there)), _corner_child(back)], axis=-1)
+    return np.concatenate([inside.reshape(-1, 2), at_start, at_end])
 
 
 def sharp_edge_count(topology: Topology) -> Int[np.ndarray, " V"]:
@@ -150,7 +150,7 @@ def multi_fan_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
     corners, a closed one as many. Closed fans are told apart by pointer doubling.
     """
     corner_count = np.bincount(topology.faces.reshape(-1), minlength=topology.vertex_count)
-    following = _next_corner_around_vertex(topology)
+    following = _next_around_vertex(topology)
     corners = np.arange(len(following))
     label, hop = corners.copy(), following.copy()
     for _ in range(int(corner_count.max()).bit_length()):
@@ -174,26 +174,19 @@ def stable_order(key: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
     return np.argsort(key, kind="stable")
 
 
-def opposite_corner(half_edge: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    """The corner 3 f + i that faces a half-edge across its triangle."""
-    return half_edge - half_edge % 3 + (half_edge + 2) % 3
+def next_corner(corner: Int[np.ndarray, "..."]) -> Int[np.ndarray, "..."]:
+    """The corner 3 f + (i + 1) mod 3 after corner 3 f + i of the same face."""
+    return corner + 1 - 3 * (corner % 3 == 2)
 
 
-def _corner_child(
-    topology: Topology, face: Int[np.ndarray, " N"], vertex: Int[np.ndarray, " N"]
-) -> Int[np.ndarray, " N"]:
-    """The child of ``face`` that keeps its corner ``vertex``."""
-    corners = np.take(topology.faces, face, axis=0)
-    return 4 * face + (corners[:, 1] == vertex) + 2 * (corners[:, 2] == vertex)
+def _corner_child(corner: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+    """The child 4 f + i of face f that keeps corner 3 f + i."""
+    return corner + corner // 3
 
 
-def _next_corner_around_vertex(topology: Topology) -> Int[np.ndarray, " C"]:
-    """For each corner the next one around its vertex, across the half-edge that leaves it; or −1."""
-    start = topology.faces.reshape(-1)
-    edge_of = topology.face_edges.reshape(-1)
-    face = np.arange(len(start)) // 3
-    pair = topology.edge_faces[edge_of]
-    neighbour = np.where(pair[:, 0] == face, pair[:, 1], pair[:, 0])
-    corners = topology.faces[np.maximum(neighbour, 0)]
-    place = (corners[:, 1] == start) + 2 * (corners[:, 2] == start)
-    return np.where(neighbour >= 0, 3 * neighbour + place, -1)
+def _next_around_vertex(topology: Topology) -> Int[np.ndarray, " K"]:
+    """For each corner the next one around its vertex, across the half-edge that leaves it."""
+    there, back = topology.half_edges[topology.interior].T
+    following = np.full(topology.faces.size, -1, dtype=np.int64)
+    following[there], following[back] = next_corner(back), next_corner(there)
+    return following

