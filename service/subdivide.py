@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from pns_common.errors import MeshError
-from pns_common.mesh import Mesh
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Model, Scheme, loop, pns
 from service.errors import NoModelError, UnrefinableError
 from service.gltf.container import write_glb
-from service.gltf.control_mesh import control_mesh
+from service.gltf.control_mesh import ControlMesh, control_mesh
 from service.gltf.extras import put_report, replaces_extras
 from service.gltf.json_text import encode
 from service.gltf.nodes import mesh_instances
@@ -81,35 +80,14 @@ def subdivide_gltf(
         clock.lap("read")
         control = control_mesh(primitives)
         clock.lap("weld")
-        refined: list[RefinedPrimitive] = []
-        refinement: Refinement | None = None
-        if control.cleaned is not None:
-            pointer = f"/meshes/{mesh.mesh}"
-            refinement = refine_within_float32(
-                control.cleaned.mesh, scheme, options, pointer, mesh_progress
-            )
-            clock.lap("refine")
-            scalars = {RATIO: refinement.ratio, GATE: refinement.gate}
-            refined = share(
-                control,
-                control.cleaned,
-                refinement,
-                options.levels,
-                scalars if options.diagnostics == "full" else {},
-            )
-            clock.lap("attributes")
+        refinement = _refine(control, scheme, options, f"/meshes/{mesh.mesh}", mesh_progress)
+        clock.lap("refine")
+        refined = _share(control, refinement, options)
+        clock.lap("attributes")
         for primitive in refined:
             writer.replace(mesh.mesh, primitive)
         clock.lap("write")
-        changes += [
-            Change(
-                f"/meshes/{mesh.mesh}/primitives/{primitive.number}",
-                "degenerate faces dropped" if keep.any() else "left as it was: no area",
-                int((~keep).sum()),
-            )
-            for primitive, keep in zip(primitives, control.kept, strict=True)
-            if not keep.all()
-        ]
+        changes += _changes_of_mesh(mesh.mesh, control)
         results.append(
             MeshResult(
                 index=mesh.mesh,
@@ -145,23 +123,46 @@ def make_scheme(options: Options, model: Model | None) -> Scheme:
     return pns(model, options.budget)
 
 
-def refine_within_float32(
-    mesh: Mesh, scheme: Scheme, options: Options, pointer: str, progress: Progress | None
-) -> Refinement:
-    """Refine a mesh whose positions will be written as float32.
-
-    Raises:
-        UnrefinableError: a position leaves the range of float32.
-    """
+def _refine(
+    control: ControlMesh,
+    scheme: Scheme,
+    options: Options,
+    pointer: str,
+    progress: Progress | None,
+) -> Refinement | None:
+    """Refine a control mesh whose positions will be written as float32; None if it has no face."""
+    if control.cleaned is None:
+        return None
+    mesh, length = control.cleaned.mesh, options.reference_length
     try:
-        refinement = refine(
-            mesh, scheme, options.levels, options.reference_length, progress=progress
-        )
+        refinement = refine(mesh, scheme, options.levels, length, progress=progress)
     except MeshError as error:
         raise UnrefinableError(str(error), pointer=pointer) from error
     if np.abs(refinement.mesh.vertices).max() > np.finfo(np.float32).max:
         raise UnrefinableError("refined positions leave the range of float32", pointer=pointer)
     return refinement
+
+
+def _share(
+    control: ControlMesh, refinement: Refinement | None, options: Options
+) -> list[RefinedPrimitive]:
+    if control.cleaned is None or refinement is None:
+        return []
+    scalars = {RATIO: refinement.ratio, GATE: refinement.gate}
+    wanted = scalars if options.diagnostics == "full" else {}
+    return share(control, control.cleaned, refinement, options.levels, wanted)
+
+
+def _changes_of_mesh(mesh: int, control: ControlMesh) -> list[Change]:
+    return [
+        Change(
+            f"/meshes/{mesh}/primitives/{primitive.number}",
+            "degenerate faces dropped" if keep.any() else "left as it was: no face has an area",
+            int((~keep).sum()),
+        )
+        for primitive, keep in zip(control.primitives, control.kept, strict=True)
+        if not keep.all()
+    ]
 
 
 def _changes_of_container(upload: Upload, options: Options) -> list[Change]:
