@@ -28,7 +28,7 @@ class Batch:
 
     points: Float[Tensor, "V 3"]
     topology: Topology
-    children: Int[np.ndarray, "4F 3"]
+    children: Int[np.ndarray, "N 3"]
     inserted: Int[np.ndarray, " I"]
     surface: Surface
     face_pairs: Int[np.ndarray, "P 2"]

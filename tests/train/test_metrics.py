@@ -1,0 +1,148 @@
+import numpy as np
+import pytest
+import torch
+
+from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule, pns
+from tests.networks import published_model
+from tests.shared import published
+from train.datasets import ridge_held_out, saddle_held_out
+from train.evaluation import compare_with_loop, one_step_table
+from train.metrics import (
+    METRICS,
+    improvement,
+    improvements_as_data,
+    normal_error,
+    one_step_errors,
+)
+from train.surfaces import Ridge, SphereRidge
+
+# The printed columns of the published table: near-feature and global distance, near-feature and
+# global Hausdorff, near-feature and global normal error, in per cent.
+PUBLISHED_PNS = (21.01, 13.29, 9.25, 9.25, 0.42, 0.07)
+PUBLISHED_UNCONSTRAINED = (56.21, 54.34, 49.83, 49.83, 38.80, -4.16)
+PUBLISHED_PNS_INTERVAL = {"distance_near": (13.67, 31.02), "hausdorff": (1.88, 21.19)}
+PUBLISHED_LOOP_MEANS = (0.033072, 0.022010, 0.059961, 0.059961, 0.123859, 0.063560)
+POINTS = 0.02
+
+
+def percents(improvements):
+    return [improvements[metric].percent for metric in METRICS]
+
+
+def test_published_weights_give_the_published_table():
+    model = published_model(published("weights.npz"), "pns_headline_C0.5")
+    found = compare_with_loop(pns(model, budget=0.5), ridge_held_out())
+    np.testing.assert_allclose(percents(found), PUBLISHED_PNS, rtol=0, atol=POINTS)
+    means = [found[metric].reference_mean for metric in METRICS]
+    np.testing.assert_allclose(means, PUBLISHED_LOOP_MEANS, rtol=0, atol=2e-6)
+    for metric, interval in PUBLISHED_PNS_INTERVAL.items():
+        row = found[metric]
+        np.testing.assert_allclose((row.low, row.high), interval, rtol=0, atol=POINTS)
+
+
+def test_published_unconstrained_network_gives_its_published_column():
+    weights = published("weights.npz")
+    found = compare_with_loop(unconstrained_scheme(weights), ridge_held_out())
+    np.testing.assert_allclose(percents(found), PUBLISHED_UNCONSTRAINED, rtol=0, atol=POINTS)
+
+
+def test_published_saddle_network_gains_nothing():
+    model = published_model(published("weights.npz"), "pns_saddle")
+    found = compare_with_loop(pns(model, budget=0.5), saddle_held_out())
+    assert found["distance_near"].reference_mean == pytest.approx(1.792123e-4, abs=1e-8)
+    assert found["distance_near"].percent == pytest.approx(0.0215, abs=POINTS)
+    assert found["distance"].percent == pytest.approx(0.0188, abs=POINTS)
+
+
+def unconstrained_scheme(weights):
+    """Raw coordinates of a, b, c, d in, an offset from Loop's edge vertex out."""
+    network = torch.nn.Sequential(
+        *(
+            module
+            for width in (12, 32, 32)
+            for module in (torch.nn.Linear(width, 32), torch.nn.GELU())
+        ),
+        torch.nn.Linear(32, 3),
+    )
+    prefix = "unconstrained_foil/net."
+    network.load_state_dict(
+        {
+            key.removeprefix(prefix): torch.tensor(weights[key])
+            for key in weights
+            if key.startswith(prefix)
+        }
+    )
+
+    def edge_rule(level):
+        base, interior = loop_edge_rule(level), level.topology.interior
+        corners = level.points[level.topology.stencil[interior]].reshape(-1, 12)
+        offsets = np.zeros_like(base.loop)
+        with torch.no_grad():
+            offsets[interior] = network(torch.from_numpy(corners).float()).numpy()
+        return Placement(base.loop, offsets, base.ratio, base.gate, base.degenerate)
+
+    return Scheme("unconstrained", loop_vertex_rule, edge_rule)
+
+
+def test_exact_points_have_no_distance_error():
+    sphere = SphereRidge(1.0, 0.0, 1.0, 0.0)
+    rng = np.random.default_rng(0)
+    coarse = rng.normal(size=(20, 3))
+    stencil = rng.permuted(np.tile(np.arange(20), (30, 1)), axis=1)[:, :4]
+    inserted = rng.normal(size=(30, 3))
+    inserted /= np.linalg.norm(inserted, axis=1, keepdims=True)
+    errors = one_step_errors(sphere, coarse, stencil, inserted)
+    assert errors.distance < 1e-15
+    assert errors.hausdorff < 1e-15
+    shifted = one_step_errors(sphere, coarse, stencil, 1.25 * inserted)
+    assert shifted.distance == pytest.approx(0.25)
+    assert shifted.hausdorff == pytest.approx(0.25)
+
+
+def test_near_errors_are_absent_without_a_near_vertex():
+    ridge = Ridge(0.5, 5.0, 0.0, 0.0, 0.0)
+    far = np.array([[0.0, 0.9, 0.1], [0.5, -0.8, 0.2]])
+    coarse = np.array([[0, 0, 0], [1, 0, 0], [0.5, -1, 0], [0.5, 1, 0]], dtype=float)
+    errors = one_step_errors(ridge, coarse, np.array([[0, 1, 2, 3]] * 2), far)
+    assert np.isnan([errors.distance_near, errors.hausdorff_near, errors.normal_near]).all()
+    assert errors.distance > 0
+
+
+def test_published_normal_error_compares_with_the_cross_product_of_the_diagonals():
+    rng = np.random.default_rng(3)
+    coarse, inserted = rng.normal(size=(4, 3)), rng.normal(size=(1, 3))
+    sphere = SphereRidge(1.0, 0.0, 1.0, 0.0)
+    a, b, c, d = coarse
+    fan = np.cross(b - a, c - d)
+    cosine = abs(fan @ inserted[0]) / (np.linalg.norm(fan) * np.linalg.norm(inserted))
+    found = normal_error(sphere, coarse, np.array([[0, 1, 2, 3]]), inserted)
+    np.testing.assert_allclose(found, np.arccos(cosine), atol=1e-12)
+
+
+def test_bootstrap_is_the_one_written_out():
+    rng = np.random.default_rng(8)
+    reference, method = rng.uniform(1, 2, size=7), rng.uniform(0.5, 1.5, size=7)
+    resampler = np.random.default_rng(0)
+    resamples = []
+    for _ in range(2000):
+        drawn = resampler.integers(0, 7, size=7)
+        resamples.append(100 * (1 - method[drawn].mean() / reference[drawn].mean()))
+    found = improvement(reference, method)
+    assert found.percent == pytest.approx(np.mean(resamples), abs=1e-12)
+    assert found.low == pytest.approx(np.quantile(resamples, 0.025), abs=1e-12)
+    assert found.high == pytest.approx(np.quantile(resamples, 0.975), abs=1e-12)
+    assert (found.reference_mean, found.method_mean) == (reference.mean(), method.mean())
+
+
+def test_a_constant_ratio_has_an_interval_of_no_width():
+    reference = np.array([1.0, 2.0, 5.0])
+    found = improvement(reference, 0.75 * reference)
+    np.testing.assert_allclose([found.percent, found.low, found.high], 25, rtol=1e-12)
+    assert improvements_as_data({"distance": found})["distance"]["percent"] == 25
+
+
+def test_loop_against_itself_gains_nothing():
+    scheme = Scheme("loop", loop_vertex_rule, loop_edge_rule)
+    found = compare_with_loop(scheme, ridge_held_out())
+    assert percents(found) == [0] * len(METRICS)
+    assert {len(column) for column in one_step_table(scheme, ridge_held_out()).values()} == {10}

@@ -1,0 +1,49 @@
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+import train.run
+from train.checkpoint import load_checkpoint
+from train.recipes import ridge
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def quick_ridge(seed=0):
+    return replace(ridge(seed), steps=2)
+
+
+def test_no_command_trains_the_default_recipe(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(train.run, "RECIPES", {"ridge": quick_ridge})
+    outcome = CliRunner().invoke(train.run.app, [], catch_exceptions=False)
+    assert outcome.exit_code == 0
+    for shown in ("2/2", "Signed distance", "Hausdorff", "Normal error", "95 % interval"):
+        assert shown in outcome.output
+    checkpoint = load_checkpoint(tmp_path / "checkpoints" / "ridge.safetensors")
+    assert checkpoint.recipe == quick_ridge()
+    assert set(checkpoint.metrics) == {"ridge-held-out"}
+
+
+def test_seed_and_output_can_be_chosen(tmp_path, monkeypatch):
+    monkeypatch.setattr(train.run, "RECIPES", {"ridge": quick_ridge})
+    path = tmp_path / "other.safetensors"
+    arguments = ["train", "--recipe", "ridge", "--seed", "5", "--output", str(path)]
+    assert CliRunner().invoke(train.run.app, arguments, catch_exceptions=False).exit_code == 0
+    assert load_checkpoint(path).recipe.seed == 5
+
+
+def test_scripts_run_from_the_repository_root():
+    for script in ("train/run.py", "export/run.py"):
+        done = subprocess.run(
+            [sys.executable, "-W", "error", script, "--help"],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        assert "Usage" in done.stdout
