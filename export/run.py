@@ -27,10 +27,10 @@ def main(
     try:
         exported = export_model(load_checkpoint(checkpoint), output)
     except PnsError as error:
-        console.print(str(error), style="red")
+        console.print(str(error), style="red", soft_wrap=True)
         raise typer.Exit(1) from error
     console.print(f"parity with torch: {exported.parity.difference:.1e} of the budget")
-    console.print(f"{output} written, sha256 {exported.sha256}")
+    console.print(f"{output} written, sha256 {exported.sha256}", soft_wrap=True)
 
 
 if __name__ == "__main__":

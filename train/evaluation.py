@@ -34,6 +34,6 @@ def _instance_errors(scheme: Scheme, instance: Instance) -> Errors:
     return one_step_errors(
         instance.surface,
         mesh.vertices,
-        topology.stencil[topology.interior],
+        topology,
         refined.vertices[topology.vertex_count + topology.interior],
     )

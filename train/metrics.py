@@ -8,9 +8,11 @@ from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from pns_common.arrays import cross, dot, norm, unit
+from pns_common.frames import edge_stencil, face_normals
+from pns_common.topology import Topology
 from train.surfaces import Surface, signed_distance
 
 NEAR_FEATURE = 0.3
@@ -51,12 +53,12 @@ class Improvement:
 def one_step_errors(
     surface: Surface,
     coarse: Float[np.ndarray, "V 3"],
-    stencil: Int[np.ndarray, "I 4"],
+    topology: Topology,
     inserted: Float[np.ndarray, "I 3"],
 ) -> Errors:
-    """Measure inserted interior edge vertices against their surface."""
+    """Measure the inserted vertices of a topology's interior edges against their surface."""
     distance = np.abs(signed_distance(surface, inserted))
-    angle = normal_error(surface, coarse, stencil, inserted)
+    angle = normal_error(surface, coarse, topology, inserted)
     near = surface.feature_distance(inserted) < NEAR_FEATURE
     return Errors(
         distance_near=_root_mean_square(distance[near]),
@@ -71,24 +73,38 @@ def one_step_errors(
 def normal_error(
     surface: Surface,
     coarse: Float[np.ndarray, "V 3"],
-    stencil: Int[np.ndarray, "I 4"],
+    topology: Topology,
     inserted: Float[np.ndarray, "I 3"],
 ) -> Float[np.ndarray, " I"]:
     """Return the published normal error: the angle (radians) between two directions at each q.
 
-    One is the sum of the area vectors of (q, a, c), (q, c, b), (q, b, d), (q, d, a). The sum is
-    (b − a) × (c − d) whatever q is, so this metric sees a correction only through the other
-    direction, ∇(f / ‖∇f‖) at q: read it as a column of the published table, not as shading
-    quality.
+    One is ∇(f / ‖∇f‖) at q; the other is `fan_normal`, which hardly depends on q. So this metric
+    sees a correction almost only through the first: read it as a column of the published table,
+    not as shading quality.
     """
-    a, b, c, d = (coarse[column] for column in stencil.T)
-    fan = sum(
-        cross(first - inserted, second - inserted)
-        for first, second in [(a, c), (c, b), (b, d), (d, a)]
-    )
+    fan = unit(fan_normal(coarse, topology, inserted))
     target = unit(_distance_gradient(surface, inserted))
-    direction = unit(fan)
-    return np.arctan2(norm(cross(direction, target)), np.abs(dot(direction, target)))
+    return np.arctan2(norm(cross(fan, target)), dot(fan, target))
+
+
+def fan_normal(
+    coarse: Float[np.ndarray, "V 3"], topology: Topology, inserted: Float[np.ndarray, "I 3"]
+) -> Float[np.ndarray, "I 3"]:
+    """Return the sum of the area vectors of (q, a, c), (q, c, b), (q, b, d), (q, d, a).
+
+    Each is first turned to the side of the coarse face that it lies in; the published numbers
+    need that where q folds a triangle over. Where none is folded the sum is ± (b − a) × (c − d),
+    whatever q is.
+    """
+    interior = topology.interior
+    normals = face_normals(coarse, topology.faces)
+    at = edge_stencil(coarse, normals, topology.stencil[interior], topology.edge_faces[interior])
+    triangles = [(at.a, at.c, at.n1), (at.c, at.b, at.n1), (at.b, at.d, at.n2), (at.d, at.a, at.n2)]
+    fan = np.zeros_like(inserted)
+    for first, second, outward in triangles:
+        area = cross(first - inserted, second - inserted)
+        fan += np.where(dot(area, outward)[:, None] < 0, -area, area)
+    return fan
 
 
 def improvement(reference: Float[np.ndarray, " N"], method: Float[np.ndarray, " N"]) -> Improvement:

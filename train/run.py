@@ -59,7 +59,7 @@ def train(
     metrics = {held_out.name: improvements_as_data(improvements)}
     save_checkpoint(path, Checkpoint(chosen, trained.network, metrics, machine_fingerprint()))
     console.print(improvement_table(f"{held_out.name}, recipe {chosen.name}", improvements))
-    console.print(f"{path} written in {time.perf_counter() - began:.1f} s")
+    console.print(f"{path} written in {time.perf_counter() - began:.1f} s", soft_wrap=True)
 
 
 def _fit_with_progress(recipe: Recipe, console: Console) -> Fit:

@@ -7,17 +7,20 @@ from rich.table import Table
 from train.metrics import Improvement
 
 METRIC_TITLES: Mapping[str, str] = {
-    "distance_near": "Signed distance RMSE, near feature",
-    "distance": "Signed distance RMSE, global",
-    "hausdorff_near": "Hausdorff distance, near feature",
-    "hausdorff": "Hausdorff distance, global",
-    "normal_near": "Normal error, near feature",
-    "normal": "Normal error, global",
+    "distance_near": "Distance RMSE, near",
+    "distance": "Distance RMSE, all",
+    "hausdorff_near": "Hausdorff, near",
+    "hausdorff": "Hausdorff, all",
+    "normal_near": "Normal error, near",
+    "normal": "Normal error, all",
 }
 
 
 def improvement_table(title: str, improvements: Mapping[str, Improvement]) -> Table:
-    """Return one row a metric: Loop's mean, the method's, and the improvement in per cent."""
+    """Return one row a metric: Loop's mean, the method's, and the improvement in per cent.
+
+    Fits a terminal of 80 columns.
+    """
     table = Table(title=title, title_justify="left")
     table.add_column("Metric")
     for heading in ("Loop", "PNS", "Improvement", "95 % interval"):

@@ -1,20 +1,24 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule, pns
+from pns_common.topology import build_topology
 from tests.networks import published_model
 from tests.shared import published
-from train.datasets import ridge_held_out, saddle_held_out
+from train.datasets import ridge_held_out, saddle_held_out, sphere_ridge_held_out
 from train.evaluation import compare_with_loop, one_step_table
 from train.metrics import (
     METRICS,
+    fan_normal,
     improvement,
     improvements_as_data,
     normal_error,
     one_step_errors,
 )
-from train.surfaces import Ridge, SphereRidge
+from train.surfaces import SphereRidge
 
 # The printed columns of the published table: near-feature and global distance, near-feature and
 # global Hausdorff, near-feature and global normal error, in per cent.
@@ -84,39 +88,68 @@ def unconstrained_scheme(weights):
     return Scheme("unconstrained", loop_vertex_rule, edge_rule)
 
 
-def test_exact_points_have_no_distance_error():
+def test_points_on_a_sphere_have_no_distance_error():
     sphere = SphereRidge(1.0, 0.0, 1.0, 0.0)
-    rng = np.random.default_rng(0)
-    coarse = rng.normal(size=(20, 3))
-    stencil = rng.permuted(np.tile(np.arange(20), (30, 1)), axis=1)[:, :4]
-    inserted = rng.normal(size=(30, 3))
+    mesh = sphere_ridge_held_out().instances[0].mesh
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    inserted = mesh.vertices[topology.edges[topology.interior]].mean(axis=1)
     inserted /= np.linalg.norm(inserted, axis=1, keepdims=True)
-    errors = one_step_errors(sphere, coarse, stencil, inserted)
+    errors = one_step_errors(sphere, mesh.vertices, topology, inserted)
     assert errors.distance < 1e-15
     assert errors.hausdorff < 1e-15
-    shifted = one_step_errors(sphere, coarse, stencil, 1.25 * inserted)
+    shifted = one_step_errors(sphere, mesh.vertices, topology, 1.25 * inserted)
     assert shifted.distance == pytest.approx(0.25)
     assert shifted.hausdorff == pytest.approx(0.25)
 
 
 def test_near_errors_are_absent_without_a_near_vertex():
-    ridge = Ridge(0.5, 5.0, 0.0, 0.0, 0.0)
-    far = np.array([[0.0, 0.9, 0.1], [0.5, -0.8, 0.2]])
-    coarse = np.array([[0, 0, 0], [1, 0, 0], [0.5, -1, 0], [0.5, 1, 0]], dtype=float)
-    errors = one_step_errors(ridge, coarse, np.array([[0, 1, 2, 3]] * 2), far)
+    instance = ridge_held_out().instances[0]
+    mesh = instance.mesh
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    inserted = mesh.vertices[topology.edges[topology.interior]].mean(axis=1)
+    far_away = replace(instance.surface, centre_x=50.0)
+    errors = one_step_errors(far_away, mesh.vertices, topology, inserted)
     assert np.isnan([errors.distance_near, errors.hausdorff_near, errors.normal_near]).all()
     assert errors.distance > 0
 
 
-def test_published_normal_error_compares_with_the_cross_product_of_the_diagonals():
-    rng = np.random.default_rng(3)
-    coarse, inserted = rng.normal(size=(4, 3)), rng.normal(size=(1, 3))
-    sphere = SphereRidge(1.0, 0.0, 1.0, 0.0)
+def two_triangles():
+    """Edge (0, 1) with c = 2 on its left and d = 3 on its right, in space."""
+    coarse = np.array([[0, 0, 0], [1, 0, 0.2], [0.4, 0.9, 0.3], [0.6, -0.8, 0.1]])
+    return coarse, build_topology(np.array([[0, 1, 2], [1, 0, 3]]), 4)
+
+
+def test_fan_normal_does_not_depend_on_an_inserted_vertex_that_folds_nothing():
+    coarse, topology = two_triangles()
     a, b, c, d = coarse
-    fan = np.cross(b - a, c - d)
-    cosine = abs(fan @ inserted[0]) / (np.linalg.norm(fan) * np.linalg.norm(inserted))
-    found = normal_error(sphere, coarse, np.array([[0, 1, 2, 3]]), inserted)
-    np.testing.assert_allclose(found, np.arccos(cosine), atol=1e-12)
+    expected = np.cross(b - a, c - d)
+    for offset in (0.0, 0.05, -0.05):
+        inserted = np.array([[0.5, 0.0, 0.1 + offset]])
+        found = fan_normal(coarse, topology, inserted)
+        np.testing.assert_allclose(found, expected[None], rtol=0, atol=1e-15)
+
+
+def test_fan_normal_turns_a_folded_triangle_back():
+    coarse, topology = two_triangles()
+    a, b, c, d = coarse
+    inserted = np.array([[-0.5, 0.6, 0.1]])
+    q = inserted[0]
+    n1, n2 = np.cross(b - a, c - a), np.cross(a - b, d - b)
+    sides = [(a, c, n1), (c, b, n1), (b, d, n2), (d, a, n2)]
+    areas = [np.cross(u - q, v - q) for u, v, _ in sides]
+    turned = [area * np.sign(area @ n) for area, (_, _, n) in zip(areas, sides, strict=True)]
+    assert np.abs(sum(turned)).sum() > np.abs(sum(areas)).sum() + 0.1
+    # The four run a → c → b → d round q: against the faces, so that all are turned.
+    np.testing.assert_allclose(fan_normal(coarse, topology, inserted)[0], sum(turned), atol=1e-15)
+
+
+def test_normal_error_of_a_flat_fan_against_a_sphere_is_its_angle():
+    coarse = np.array([[0.0, 0, 1], [1, 0, 1], [0.5, 1, 1], [0.5, -1, 1]])
+    topology = build_topology(np.array([[0, 1, 2], [1, 0, 3]]), 4)
+    inserted = np.array([[0.5, 0.0, 1.0]])
+    sphere = SphereRidge(1.0, 0.0, 1.0, 0.0)
+    found = normal_error(sphere, coarse, topology, inserted)
+    np.testing.assert_allclose(found, np.arctan(0.5), atol=1e-12)
 
 
 def test_bootstrap_is_the_one_written_out():

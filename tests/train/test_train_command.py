@@ -21,7 +21,7 @@ def test_no_command_trains_the_default_recipe(tmp_path, monkeypatch):
     monkeypatch.setattr(train.run, "RECIPES", {"ridge": quick_ridge})
     outcome = CliRunner().invoke(train.run.app, [], catch_exceptions=False)
     assert outcome.exit_code == 0
-    for shown in ("2/2", "Signed distance", "Hausdorff", "Normal error", "95 % interval"):
+    for shown in ("2/2", "Distance RMSE", "Hausdorff", "Normal error", "95 % interval"):
         assert shown in outcome.output
     checkpoint = load_checkpoint(tmp_path / "checkpoints" / "ridge.safetensors")
     assert checkpoint.recipe == quick_ridge()
