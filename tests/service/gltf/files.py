@@ -47,7 +47,8 @@ def document(*meshes):
                     entry["attributes"][name] = add_accessor(tree, binary, values)
             primitives.append(entry)
         tree["meshes"].append({"primitives": primitives})
-    tree["buffers"] = [{"byteLength": len(binary)}]
+    if binary:
+        tree["buffers"] = [{"byteLength": len(binary)}]
     return tree, binary
 
 

@@ -1,0 +1,174 @@
+"""Every glTF asset of the shared collection, with the outcome that is expected of it."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from pns_common.topology import EdgeClass, build_topology
+from service.errors import ServiceError
+from service.options import Limits, Options
+from service.subdivide import subdivide_gltf
+from service.weld import weld
+from tests.networks import random_model
+from tests.service.gltf import files, validator
+from tests.shared import shared_path
+
+# Faces of all meshes before refinement, and of these the degenerate ones.
+REFINED = {
+    "alien.glb": (292, 0),
+    "barrel_large_decorated.glb": (1047, 0),
+    "cakeBirthday.glb": (1332, 0),
+    "cow.glb": (5856, 0),
+    "low-poly-tree.glb": (1126, 0),
+    "fixtures/BoxInterleaved.glb": (12, 0),
+    "fixtures/BoxVertexColors.glb": (12, 0),
+    "fixtures/gltf_extras.glb": (12, 0),
+    "fixtures/gltf_primitives.glb": (12, 0),
+    "fixtures/simple-instancing.glb": (12, 0),
+}
+REFUSED = {
+    "AnimatedMorphSphere.glb": "a mesh with morph targets",
+    "Fox.glb": "a skinned mesh",
+    "Knight.glb": "a skinned mesh",
+    "MorphStressTest.glb": "a mesh with morph targets",
+    "RiggedFigure.glb": "a skinned mesh",
+    "frostAxe.glb": "a mesh with morph targets",
+    "fixtures/10_custom_normals/10_custom_normals.gltf": "a buffer in an external file",
+    "fixtures/18_variants/18_variants.gltf": "a buffer in an external file",
+    "fixtures/BoxDraco/BoxDraco.gltf": "KHR_draco_mesh_compression",
+    "fixtures/BoxMeshopt.glb": "EXT_meshopt_compression",
+    "fixtures/IndexOutOfRange/IndexOutOfRange.gltf": "a buffer in an external file",
+    "fixtures/MultiUVTest/MultiUVTest.gltf": "a buffer in an external file",
+    "fixtures/SimpleSparseAccessor.gltf": "a sparse accessor",
+    "fixtures/mode5_strip.gltf": "a triangle strip",
+    "fixtures/simple_skin.gltf": "a skinned mesh",
+    "fixtures/singleBlendshapeCube_sparse.glb": "a mesh with morph targets",
+}
+WRONG = {
+    "fixtures/BoxWithInfinites.glb": ("invalid-gltf", "/accessors/2"),
+    "fixtures/empty_nodes.glb": ("unrefinable-mesh", "/meshes"),
+}
+
+
+def refine_asset(name, **options):
+    data = shared_path(f"assets/{name}").read_bytes()
+    media = "glb" if name.endswith(".glb") else "gltf"
+    return subdivide_gltf(data, media, Options(**options), random_model(0), Limits())
+
+
+def test_every_asset_has_an_expected_outcome():
+    folder = shared_path("assets")
+    found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.suffix in (".glb", ".gltf")}
+    assert found == {*REFINED, *REFUSED, *WRONG}
+
+
+@pytest.mark.parametrize("name", REFINED)
+@pytest.mark.parametrize("levels", [1, 2])
+def test_faces_are_four_a_level(name, levels):
+    faces, degenerate = REFINED[name]
+    report = refine_asset(name, levels=levels).report
+    assert report["totals"]["faces"] == (faces - degenerate) * 4**levels
+    assert report["dropped"]["degenerate_faces"] == degenerate
+    assert [level["faces"] for level in report["levels"]] == [
+        (faces - degenerate - report["totals"]["copied_faces"]) * 4**level
+        for level in range(1, levels + 1)
+    ]
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_not_refined_yet_is_refused_by_name(name):
+    with pytest.raises(ServiceError) as refusal:
+        refine_asset(name)
+    assert refusal.value.status == 422
+    assert refusal.value.code == "unsupported-feature"
+    assert refusal.value.feature == REFUSED[name]
+    assert refusal.value.pointer
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_wrong_is_refused_with_a_pointer(name):
+    with pytest.raises(ServiceError) as refusal:
+        refine_asset(name)
+    assert (refusal.value.code, refusal.value.pointer) == WRONG[name]
+
+
+@pytest.mark.parametrize("diagnostics", ["summary", "full", "none"])
+def test_validator_finds_no_new_error(tmp_path, diagnostics):
+    paths = []
+    for name in REFINED:
+        paths.append(tmp_path / f"{len(paths)}.glb")
+        paths[-1].write_bytes(refine_asset(name, levels=1, diagnostics=diagnostics).glb)
+    before = validator.errors([shared_path(f"assets/{name}") for name in REFINED])
+    after = validator.errors(paths)
+    for name, old, new in zip(REFINED, before, after, strict=True):
+        assert set(new) <= set(old), name
+
+
+def welded_meshes(data):
+    """For each mesh of a GLB its triangles, joined by position."""
+    tree, binary = files.unpack(data)
+    for mesh in tree["meshes"]:
+        points, faces = [], []
+        for primitive in mesh["primitives"]:
+            position = files.values_of(tree, binary, primitive["attributes"]["POSITION"])
+            indices = files.values_of(tree, binary, primitive["indices"]).astype(np.int64)
+            faces.append(indices.reshape(-1, 3) + sum(map(len, points)))
+            points.append(position)
+        yield weld(np.concatenate(points), np.concatenate(faces))
+
+
+def open_edges(data):
+    """For each mesh of a GLB the number of edges that are not interior."""
+    counts = []
+    for mesh in welded_meshes(data):
+        topology = build_topology(mesh.faces, len(mesh.points))
+        counts.append(int((topology.edge_class == EdgeClass.BOUNDARY).sum()))
+    return counts
+
+
+@pytest.mark.parametrize("name", REFINED)
+def test_seams_do_not_crack(name):
+    # Watertight meshes stay watertight, and open ones get nothing but their own rims halved.
+    before = open_edges(shared_path(f"assets/{name}").read_bytes())
+    after = open_edges(refine_asset(name).glb)
+    assert after == [2 * count for count in before]
+
+
+@pytest.mark.parametrize("name", ["cow.glb", "low-poly-tree.glb", "fixtures/BoxInterleaved.glb"])
+def test_loop_equals_another_implementation_on_closed_assets(name):
+    (control,) = welded_meshes(shared_path(f"assets/{name}").read_bytes())
+    (refined,) = welded_meshes(refine_asset(name, scheme="loop", levels=1).glb)
+    points, faces = trimesh.remesh.subdivide_loop(control.points, control.faces, iterations=1)
+    expected = points.astype(np.float32)[faces.reshape(-1)]
+    # The orders of faces differ: compare the faces' centres as sorted lists.
+    assert len(expected) == refined.faces.size
+    ours, theirs = (
+        np.sort(p.reshape(-1, 3, 3).mean(axis=1), axis=0)
+        for p in (refined.points[refined.faces], points[faces])
+    )
+    np.testing.assert_allclose(ours, theirs, atol=1e-6 * np.abs(points).max())
+
+
+@pytest.mark.parametrize("name", REFINED)
+def test_every_json_value_that_is_no_geometry_stays(name):
+    before, old_binary = files.unpack(shared_path(f"assets/{name}").read_bytes())
+    after, new_binary = files.unpack(refine_asset(name).glb)
+    assert new_binary[: len(old_binary)] == old_binary
+    for key in ("accessors", "bufferViews"):
+        assert after[key][: len(before[key])] == before[key]
+    for old, new in zip(before["meshes"], after["meshes"], strict=True):
+        for old_primitive, new_primitive in zip(old["primitives"], new["primitives"], strict=True):
+            assert list(old_primitive["attributes"]) == list(new_primitive.pop("attributes"))
+            del old_primitive["attributes"], new_primitive["indices"]
+            old_primitive.pop("indices", None)
+    assert set(after["asset"]["extras"]) - set(before["asset"].get("extras", {})) == {"pns"}
+    del after["asset"]["extras"]["pns"]
+    before["asset"].setdefault("extras", {})
+    for key in ("accessors", "bufferViews", "buffers"):
+        del before[key], after[key]
+    assert after == before
+
+
+@pytest.mark.parametrize("name", ["alien.glb", "cow.glb"])
+def test_the_same_input_gives_the_same_bytes(name):
+    assert refine_asset(name, diagnostics="full").glb == refine_asset(name, diagnostics="full").glb
