@@ -1,0 +1,121 @@
+"""`pns subdivide`: from one file to another, by way of what both formats can hold."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from rich.console import Console
+from rich.progress import Progress
+
+from pns_common import load_model
+from service import formats
+from service.errors import InvalidParameter
+from service.files import replace_file
+from service.flatten import flatten
+from service.gltf.extras import REPORT_KEY
+from service.gltf.report import Change
+from service.options import Limits, Options
+from service.refine_soup import refine_soup
+from service.soup_glb import as_gltf_json, soup_glb
+from service.subdivide import make_scheme, subdivide_gltf
+
+KINDS = (*formats.GLTF_KINDS, *formats.MESH_KINDS)
+
+
+def convert(
+    source: Path,
+    output: Path,
+    options: Options,
+    model: str | None,
+    report_file: Path | None,
+    limits: Limits,
+) -> None:
+    """Refine `source` into `output`; what was changed or lost goes to stderr and the report.
+
+    Raises:
+        ServiceError, PnsError: the file, the model or a parameter cannot be used.
+        OSError: a file cannot be read or written.
+    """
+    kind, target = _kind("IN", source), _kind("OUT", output)
+    began = time.perf_counter()
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    data = source.read_bytes()
+    loaded = load_model(model) if options.scheme == "pns" else None
+    with _progress(console) as advance:
+        if kind in formats.GLTF_KINDS:
+            done = subdivide_gltf(data, kind, options, loaded, limits, advance)
+            content, report = _of_gltf(done.glb, done.report, target, limits)
+        else:
+            soup = formats.read(data, kind)
+            refined, report = refine_soup(
+                soup, make_scheme(options, loaded), options, limits, advance
+            )
+            content, report = _of_soup(refined, report, target, options)
+    replace_file(output, content)
+    if report_file is not None:
+        replace_file(report_file, msgspec.json.format(msgspec.json.encode(report), indent=2))
+    for change in report["changes"]:
+        where = f" ({change['pointer']})" if change["pointer"] else ""
+        console.print(f"{change['count']} × {change['what']}{where}", markup=False)
+    seconds = time.perf_counter() - began
+    totals = report["totals"]
+    console.print(
+        f"{output}: {totals['faces']:,} faces, {totals['vertices']:,} vertices in {seconds:.1f} s",
+        markup=False,
+    )
+
+
+def _kind(name: str, path: Path) -> str:
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in KINDS:
+        raise InvalidParameter(name, f"{path}: the extension must be one of {', '.join(KINDS)}")
+    return kind
+
+
+def _of_gltf(
+    glb: bytes, report: dict[str, Any], target: str, limits: Limits
+) -> tuple[bytes, dict[str, Any]]:
+    if target == "glb":
+        return glb, report
+    if target == "gltf":
+        return as_gltf_json(glb, limits), report
+    soup, changes = flatten(glb, target, limits)
+    return formats.write(soup, target), _with_changes(report, changes)
+
+
+def _of_soup(
+    refined: formats.TriangleSoup, report: dict[str, Any], target: str, options: Options
+) -> tuple[bytes, dict[str, Any]]:
+    changes = []
+    if refined.uv is not None and target not in formats.HOLDS_UV:
+        changes.append(Change("", "texture coordinates dropped: the format cannot hold them", 1))
+    if options.diagnostics == "full":
+        changes.append(Change("", "values at vertices dropped: only a glTF's are kept", 1))
+    report = _with_changes(report, changes)
+    if target not in formats.GLTF_KINDS:
+        return formats.write(refined, target), report
+    extras = {} if options.diagnostics == "none" else {REPORT_KEY: report}
+    glb = soup_glb(refined, extras=extras)
+    return (glb if target == "glb" else as_gltf_json(glb, Limits())), report
+
+
+def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:
+    return report | {"changes": [*report["changes"], *(asdict(change) for change in changes)]}
+
+
+@contextmanager
+def _progress(console: Console) -> Iterator[Callable[[int, int], None]]:
+    """A bar that shows on a terminal while faces are made, and leaves nothing behind."""
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("refining", total=None)
+
+        def advance(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        yield advance

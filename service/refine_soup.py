@@ -1,0 +1,120 @@
+"""Refine a mesh file's triangles: weld, clean, refine once, and give the corners their UVs back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.errors import MeshError
+from pns_common.mesh import Mesh, clean, repeated_vertex
+from pns_common.refine import Refinement, refine
+from pns_common.schemes import Scheme
+from service.errors import LimitError, UnrefinableError
+from service.formats import TriangleSoup
+from service.gltf.lattice import lattice
+from service.gltf.plan import BYTES_PER_FACE
+from service.gltf.report import Change
+from service.gltf.share import refined_ids
+from service.gltf.spread import spread
+from service.options import Limits, Options
+from service.weld import Weld, distinct_rows, number_by_first_appearance, weld
+
+
+def refine_soup(
+    soup: TriangleSoup,
+    scheme: Scheme,
+    options: Options,
+    limits: Limits,
+    progress: Callable[[int, int], None] | None,
+) -> tuple[TriangleSoup, dict[str, Any]]:
+    """The refined triangles and the report.
+
+    Raises:
+        LimitError: over `max_faces` or `max_memory_bytes`.
+        UnrefinableError: a position that is no number, or no face that has an area.
+    """
+    _check_cost(len(soup.faces) * 4**options.levels, limits)
+    welded = _welded(soup)
+    proper = ~repeated_vertex(welded.faces)
+    if not proper.any():
+        raise UnrefinableError("no face has three different vertices")
+    cleaned = clean(Mesh(welded.points, welded.faces))
+    refinement = refine(
+        cleaned.mesh, scheme, options.levels, options.reference_length, progress=progress
+    )
+    ids = refined_ids(welded, cleaned, refinement, lattice(options.levels))
+    refined = _with_corners(soup, welded, proper, ids, refinement, options.levels)
+    changes = []
+    if soup.split:
+        changes.append(Change("", "triangles added by splitting polygons", soup.split))
+    report = {name: value for name, value in refinement.report.items() if name != "levels"}
+    report["totals"] = {
+        "vertices": len(refined.vertices),
+        "faces": len(refined.faces),
+        "copied_faces": cleaned.dropped_duplicate,
+    }
+    report["dropped"] = {"degenerate_faces": int((~proper).sum())}
+    report["changes"] = [asdict(change) for change in changes]
+    report["levels"] = refinement.report["levels"]
+    return refined, report
+
+
+def _check_cost(faces: int, limits: Limits) -> None:
+    for name, allowed, found in (
+        ("faces", limits.max_faces, faces),
+        ("memory", limits.max_memory_bytes, faces * BYTES_PER_FACE),
+    ):
+        if found > allowed:
+            raise LimitError(
+                f"the refined mesh would take {found} {'bytes' if name == 'memory' else name}, "
+                f"more than {allowed}",
+                limit=name,
+                allowed=allowed,
+                found=found,
+            )
+
+
+def _welded(soup: TriangleSoup) -> Weld:
+    """Welded by float32 position, as a glTF is; the positions themselves stay float64."""
+    try:
+        Mesh(soup.vertices, soup.faces)
+    except MeshError as error:
+        raise UnrefinableError(str(error)) from error
+    joined = weld(soup.vertices, soup.faces)
+    used = joined.vertex_of >= 0
+    points = np.empty_like(joined.points)
+    points[joined.vertex_of[used]] = soup.vertices[used]
+    return Weld(points=points, faces=joined.faces, vertex_of=joined.vertex_of)
+
+
+def _with_corners(
+    soup: TriangleSoup,
+    welded: Weld,
+    proper: np.ndarray,
+    ids: Int[np.ndarray, "P T"],
+    refinement: Refinement,
+    levels: int,
+) -> TriangleSoup:
+    """The refined mesh, cut open again where texture coordinates differ."""
+    points = refinement.mesh.vertices
+    grid = lattice(levels)
+    if soup.uv is None:
+        return TriangleSoup(points, ids[:, grid.faces.reshape(-1)].reshape(-1, 3))
+    corners, uv = _distinct_corners(soup.faces[proper], welded, soup.uv)
+    own = spread(corners, len(uv), grid)
+    return TriangleSoup(points[own.at_vertices(ids)], own.refined_faces, own.linear(uv))
+
+
+def _distinct_corners(
+    faces: Int[np.ndarray, "P 3"], welded: Weld, uv: Float[np.ndarray, "N 2"]
+) -> tuple[Int[np.ndarray, "P 3"], Float[np.ndarray, "C 2"]]:
+    """Faces over the distinct pairs of position and texture coordinates, and these coordinates."""
+    rows = np.column_stack([welded.vertex_of.astype(np.float64), uv])
+    corners = number_by_first_appearance(distinct_rows(rows)[faces.reshape(-1)])
+    values = np.empty((corners.max() + 1, 2))
+    values[corners] = uv[faces.reshape(-1)]
+    return corners.reshape(-1, 3), values
