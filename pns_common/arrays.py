@@ -25,7 +25,9 @@ def gather(values: Array, indices: Int[np.ndarray, "..."]) -> Array:
     """Rows of ``values`` at ``indices``: shape ``indices.shape + values.shape[1:]``."""
     xp = namespace(values)
     if is_torch_array(values):
-        rows = xp.take(values, xp.asarray(indices.reshape(-1)), axis=0)
+        # torch refuses to look at read-only memory: "W" copies only that.
+        flat = xp.asarray(np.require(indices.reshape(-1), requirements="W"))
+        rows = xp.take(values, flat, axis=0)
         return xp.reshape(rows, indices.shape + tuple(values.shape[1:]))
     # np.take is four times as fast as fancy indexing on rows of three.
     return np.take(values, indices, axis=0)
@@ -38,7 +40,7 @@ def segment_sum(
     if is_torch_array(values):
         xp = namespace(values)
         zeros = xp.zeros((count, values.shape[1]), dtype=values.dtype, device=values.device)
-        return zeros.index_add(0, xp.asarray(segments), values)
+        return zeros.index_add(0, xp.asarray(np.require(segments, requirements="W")), values)
     columns = [np.bincount(segments, column, count) for column in values.T]
     return np.stack(columns, axis=1).astype(values.dtype, copy=False)
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
 from jaxtyping import Bool, Float
 
 from pns_common.arrays import Array, namespace, norm
@@ -89,7 +88,7 @@ def finite(eta: Array, like: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
     return xp.astype(eta, like.dtype, copy=False)
 
 
-def proximity_ratio(correction: Correction) -> Float[np.ndarray, " N"]:
+def proximity_ratio(correction: Correction) -> Float[Array, " N"]:
     """‖δ‖ / (C h²) ∈ [0, 1]; 0 where the envelope is empty."""
     xp = namespace(correction.envelope)
     open_ = correction.envelope > 0

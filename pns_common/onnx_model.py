@@ -17,6 +17,7 @@ import msgspec
 import numpy as np
 import onnx
 import onnxruntime
+from google.protobuf.message import DecodeError
 from jaxtyping import Float
 
 from pns_common.errors import ModelError
@@ -126,8 +127,9 @@ def model_from_bytes(data: bytes, name: str) -> OnnxModel:
         ModelError: the file breaks the contract.
     """
     proto = _parse(data, name)
+    _check_operators(proto.graph, name)
+    _check_valid(proto, name)
     card = _read_card(proto, name)
-    _check_graph(proto.graph, name)
     _check_interface(proto.graph, card, name)
     runtime: Any = onnxruntime
     options = runtime.SessionOptions()
@@ -146,14 +148,19 @@ def model_from_bytes(data: bytes, name: str) -> OnnxModel:
 
 
 def _parse(data: bytes, name: str) -> onnx.ModelProto:
+    try:
+        return onnx.load_from_string(data)
+    except DecodeError as error:
+        raise ModelError(name, expected="an ONNX file", found="other bytes") from error
+
+
+def _check_valid(proto: onnx.ModelProto, name: str) -> None:
     checker: Any = onnx.checker
     try:
-        proto = onnx.load_from_string(data)
         checker.check_model(proto)
     except (ValueError, onnx.checker.ValidationError) as error:
         found = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ModelError(name, expected="a valid ONNX model", found=found) from error
-    return proto
 
 
 def _read_card(proto: onnx.ModelProto, name: str) -> ModelCard:
@@ -166,7 +173,7 @@ def _read_card(proto: onnx.ModelProto, name: str) -> ModelCard:
         raise ModelError(name, expected="a model card of format 1", found=str(error)) from error
 
 
-def _check_graph(graph: onnx.GraphProto, name: str) -> None:
+def _check_operators(graph: onnx.GraphProto, name: str) -> None:
     for node in graph.node:
         if node.domain not in ("", "ai.onnx") or node.op_type not in ALLOWED_OPERATORS:
             operator = f"{node.domain}.{node.op_type}" if node.domain else node.op_type

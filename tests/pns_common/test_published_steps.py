@@ -9,7 +9,13 @@ from pns_common.features import paper_features
 from pns_common.frames import edge_frames, edge_stencil, face_normals
 from pns_common.stencils import loop_edge_point
 from pns_common.topology import build_topology
-from tests.networks import PUBLISHED_BUDGET, PUBLISHED_SHARPNESS, float64_network, published_model
+from tests.networks import (
+    PUBLISHED_BUDGET,
+    PUBLISHED_SHARPNESS,
+    float64_network,
+    published_layers,
+    published_model,
+)
 from tests.shared import published
 
 
@@ -44,7 +50,7 @@ def test_edges_faces_and_opposites_are_the_published_ones(steps, sphere):
 
 def test_every_intermediate_equals_the_published_one(steps, weights, sphere):
     _, _, at = sphere
-    network = float64_network(weights, "pns_headline_C0.5")
+    network = float64_network(published_layers(weights, "pns_headline_C0.5"))
     gate = curvature_gate(PUBLISHED_SHARPNESS)
     frames = edge_frames(at)
     phi = paper_features(at, frames)

@@ -1,0 +1,119 @@
+"""Meshes for tests: shapes with names, and hypothesis strategies for everything else."""
+
+import numpy as np
+from hypothesis import strategies as st
+
+from pns_common import Mesh
+
+TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+
+
+def icosphere(subdivisions=1, radius=1.0):
+    """Vertices on a sphere, faces anticlockwise from outside: closed, valences 5 and 6."""
+    t = (1 + 5**0.5) / 2
+    vertices = [[-1, t, 0], [1, t, 0], [-1, -t, 0], [1, -t, 0], [0, -1, t], [0, 1, t]]
+    vertices += [[0, -1, -t], [0, 1, -t], [t, 0, -1], [t, 0, 1], [-t, 0, -1], [-t, 0, 1]]
+    faces = [[0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4]]
+    faces += [[11, 10, 2], [10, 7, 6], [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8]]
+    faces += [[3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1]]
+    points, faces = np.array(vertices, dtype=float), np.array(faces)
+    for _ in range(subdivisions):
+        points, faces = _midpoint_split(points, faces)
+    return radius * points / np.linalg.norm(points, axis=1, keepdims=True), faces
+
+
+def bumpy_sphere(seed=0, subdivisions=1, bump=0.15):
+    """A closed surface without symmetry."""
+    points, faces = icosphere(subdivisions)
+    rng = np.random.default_rng(seed)
+    return points * (1 + bump * rng.uniform(-1, 1, (len(points), 1))), faces
+
+
+def grid(n=6, height=None):
+    """An open n × n patch over [−1, 1]²; ``height(x, y)`` lifts it."""
+    x, y = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
+    z = np.zeros_like(x) if height is None else height(x, y)
+    i, j = np.meshgrid(np.arange(n - 1), np.arange(n - 1), indexing="ij")
+    v = (i * n + j).reshape(-1)
+    faces = np.concatenate(
+        [np.stack([v, v + n, v + n + 1], axis=1), np.stack([v, v + n + 1, v + 1], axis=1)]
+    )
+    return np.stack([x, y, z], axis=-1).reshape(-1, 3), faces
+
+
+def bent(x, y):
+    """A height with ridges and no symmetry."""
+    return 0.4 * np.exp(-6 * (x + 0.3 * y) ** 2) + 0.1 * np.sin(3 * y)
+
+
+def bow_tie():
+    """Two triangles that share one vertex only."""
+    vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0.5], [-1, -1, 0]]
+    return np.array(vertices, dtype=float), np.array([[0, 1, 2], [0, 3, 4]])
+
+
+def three_pages():
+    """Three triangles on one edge."""
+    vertices = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, -1, 0]]
+    return np.array(vertices, dtype=float), np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+
+
+def one_way_pair():
+    """Two triangles that run along their shared edge in the same direction."""
+    vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, -1, 0]]
+    return np.array(vertices, dtype=float), np.array([[0, 1, 2], [0, 1, 3]])
+
+
+def rotation(rng):
+    """A random rotation matrix."""
+    q, r = np.linalg.qr(rng.standard_normal((3, 3)))
+    q = q * np.sign(np.diag(r))
+    return q if np.linalg.det(q) > 0 else q[:, [1, 0, 2]]
+
+
+@st.composite
+def soups(draw):
+    """Any faces over any points: irregular edges, bow-ties, degenerate faces, unused vertices."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    count = draw(st.integers(3, 12))
+    faces = rng.integers(0, count, (draw(st.integers(1, 30)), 3))
+    scale = 10.0 ** draw(st.integers(-6, 6))
+    vertices = scale * rng.standard_normal((count, 3))
+    if draw(st.booleans()):
+        vertices = np.round(vertices / scale) * scale  # coincident points, no area
+    return Mesh(vertices, faces)
+
+
+@st.composite
+def manifolds(draw):
+    """Closed and open manifolds in general position, some renumbered."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    kind = draw(st.sampled_from(["sphere", "grid", "tetrahedron"]))
+    if kind == "sphere":
+        vertices, faces = icosphere(draw(st.integers(0, 1)))
+    elif kind == "grid":
+        vertices, faces = grid(draw(st.integers(2, 6)), bent)
+    else:
+        vertices, faces = rng.standard_normal((4, 3)), TETRAHEDRON
+    vertices = vertices + 0.1 * rng.standard_normal(vertices.shape)
+    order = rng.permutation(len(vertices))
+    renumbered = np.empty_like(vertices)
+    renumbered[order] = vertices
+    return Mesh(renumbered, order[faces][rng.permutation(len(faces))])
+
+
+def _midpoint_split(points, faces):
+    """A slow and obvious 1-to-4 split, independent of the package."""
+    points, middle, out = points.tolist(), {}, []
+
+    def mid(i, j):
+        key = (min(i, j), max(i, j))
+        if key not in middle:
+            middle[key] = len(points)
+            points.append([(p + q) / 2 for p, q in zip(points[i], points[j], strict=True)])
+        return middle[key]
+
+    for a, b, c in faces.tolist():
+        ab, bc, ca = mid(a, b), mid(b, c), mid(c, a)
+        out += [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
+    return np.array(points), np.array(out)

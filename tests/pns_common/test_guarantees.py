@@ -1,0 +1,196 @@
+"""What the construction promises for any weights, on any mesh, at any level."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pns_common import Mesh, loop, pns, refine
+from pns_common.correction import curvature_gate, project_to_ball
+from pns_common.frames import edge_frames, edge_stencil, face_normals
+from pns_common.topology import EdgeClass, build_topology
+from tests.meshes import bent, bumpy_sphere, grid, manifolds, rotation, soups
+from tests.networks import Float64Model, huge_model, random_layers, random_model
+
+MODELS = [random_model(0), random_model(1, scale=30.0), huge_model(2)]
+models = st.sampled_from(MODELS)
+ROUNDING = 1 + 1e-12
+
+
+@given(soups() | manifolds(), models, st.floats(1e-3, 1e3), st.sampled_from(["auto", 0.3, 1.0]))
+def test_displacement_within_budget(mesh, model, budget, reference_length):
+    """‖q − q0‖ ≤ C h² / R, from the output positions and an independent Loop step."""
+    refined = refine(mesh, pns(model, budget), reference_length=reference_length)
+    base = refine(mesh, loop()).mesh.vertices
+    length = refined.report["reference_length"]
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    a, b = (mesh.vertices[topology.edges[:, end]] for end in (0, 1))
+    envelope = budget / length * np.sum((b - a) ** 2, axis=1) if length else np.zeros(len(a))
+    apart = np.linalg.norm(refined.mesh.vertices - base, axis=1)
+    # Positions are rounded to the size of their coordinates.
+    rounding = 1e-15 * np.abs(mesh.vertices).max() * 8
+    scale = np.maximum(envelope, np.abs(mesh.vertices).max())
+    assert (apart[len(mesh.vertices) :] <= envelope + rounding + 1e-14 * scale).all()
+    assert (apart[: len(mesh.vertices)] == 0).all()
+    assert refined.ratio.max() <= ROUNDING
+
+
+@given(soups() | manifolds(), models)
+def test_only_interior_edges_are_corrected(mesh, model):
+    refined = refine(mesh, pns(model))
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    elsewhere = topology.edge_class != EdgeClass.INTERIOR
+    at_edges = slice(len(mesh.vertices), None)
+    a, b = (mesh.vertices[topology.edges[elsewhere, end]] for end in (0, 1))
+    np.testing.assert_array_equal(refined.mesh.vertices[at_edges][elsewhere], (a + b) / 2)
+    assert (refined.ratio[at_edges][elsewhere] == 0).all()
+
+
+def moved_apart(mesh, model, seed):
+    """How far refining commutes with a random rigid motion, at each vertex."""
+    rng = np.random.default_rng(seed)
+    turn, shift = rotation(rng), rng.standard_normal(3)
+    still = refine(mesh, pns(model))
+    after = refine(Mesh(mesh.vertices @ turn.T + shift, mesh.faces), pns(model))
+    assert still.report["levels"][0]["degenerate_frames"] == 0
+    return np.linalg.norm(after.mesh.vertices - (still.mesh.vertices @ turn.T + shift), axis=1)
+
+
+@given(manifolds(), st.integers(0, 2**31))
+def test_commutes_with_rigid_motion(mesh, seed):
+    assert moved_apart(mesh, Float64Model(random_layers(3)), seed).max() < 1e-12
+
+
+@given(manifolds(), st.integers(0, 2**31))
+def test_commutes_with_rigid_motion_through_a_model_file(mesh, seed):
+    """The file reads single precision: a feature's last bit may move η by 1e-6 of the budget."""
+    longest = np.linalg.norm(np.ptp(mesh.vertices, axis=0))
+    length = refine(mesh, loop()).report["reference_length"]
+    model = MODELS[0]
+    allowed = 1e-12 + 1e-6 * model.card.budget / length * longest**2
+    assert moved_apart(mesh, model, seed).max() <= allowed
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_planar_input_gives_loop_exactly_on_axis_aligned_planes(model):
+    vertices, faces = grid(6)
+    rng = np.random.default_rng(0)
+    for axis in range(3):
+        plane = vertices.copy()
+        plane[:, :2] += 0.1 * rng.standard_normal((len(plane), 2))
+        plane[:, 2] = rng.uniform(-5, 5)
+        mesh = Mesh(np.roll(plane, axis, axis=1), faces)
+        for levels in (1, 3):
+            found, base = refine(mesh, pns(model), levels), refine(mesh, loop(), levels)
+            np.testing.assert_array_equal(found.mesh.vertices, base.mesh.vertices)
+
+
+@given(models, st.integers(0, 2**31))
+def test_planar_input_gives_loop_in_any_orientation(model, seed):
+    rng = np.random.default_rng(seed)
+    vertices, faces = grid(5)
+    vertices[:, :2] += rng.uniform(-0.1, 0.1, (len(vertices), 2))
+    mesh = Mesh(vertices @ rotation(rng).T, faces)
+    scheme = pns(model)
+    refined = refine(mesh, scheme)
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    at = edge_stencil(
+        mesh.vertices,
+        face_normals(mesh.vertices, mesh.faces),
+        topology.stencil[topology.interior],
+        topology.edge_faces[topology.interior],
+    )
+    length = edge_frames(at).length
+    delta = refined.ratio[len(vertices) :][topology.interior] * model.card.budget * length**2
+    assert (delta < 1e-28 * length**2).all()
+
+
+@given(manifolds(), st.integers(-20, 20))
+def test_scaling_a_mesh_scales_the_result(mesh, power):
+    scale = 2.0**power  # exact in binary, so the comparison may be exact but for R's square root
+    scheme = pns(MODELS[0])
+    small = refine(mesh, scheme, 2).mesh.vertices
+    large = refine(Mesh(scale * mesh.vertices, mesh.faces), scheme, 2).mesh.vertices
+    np.testing.assert_allclose(large / scale, small, rtol=0, atol=1e-13)
+
+
+def test_halving_the_reference_length_doubles_the_correction():
+    mesh = Mesh(*bumpy_sphere())
+    base = refine(mesh, loop()).mesh.vertices
+    one = refine(mesh, pns(MODELS[0]), reference_length=1.0).mesh.vertices - base
+    half = refine(mesh, pns(MODELS[0]), reference_length=0.5).mesh.vertices - base
+    np.testing.assert_allclose(half, 2 * one, rtol=0, atol=1e-15)
+
+
+@given(soups())
+def test_degenerate_frames_are_rotations_and_features_finite(mesh):
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    if not len(topology.interior):
+        return
+    at = edge_stencil(
+        mesh.vertices,
+        face_normals(mesh.vertices, mesh.faces),
+        topology.stencil[topology.interior],
+        topology.edge_faces[topology.interior],
+    )
+    frames = edge_frames(at)
+    columns = np.stack([frames.tangent, frames.normal, frames.binormal], axis=-1)
+    identity = np.einsum("eij,eik->ejk", columns, columns)
+    np.testing.assert_allclose(identity, np.broadcast_to(np.eye(3), identity.shape), atol=1e-9)
+    assert (np.linalg.det(columns) > 0).all()
+
+
+def test_faces_without_area_do_not_disturb_a_plane():
+    """A sliver inside a flat patch has no normal: the gate stays shut there."""
+    vertices = np.array([[0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0], [1, -1, 0]], dtype=float)
+    faces = np.array([[0, 1, 2], [0, 3, 1], [0, 4, 3], [3, 4, 1]])
+    mesh = Mesh(vertices, faces)
+    found = refine(mesh, pns(MODELS[2]))
+    np.testing.assert_array_equal(found.mesh.vertices, refine(mesh, loop()).mesh.vertices)
+    assert found.report["levels"][0]["degenerate_frames"] == 3
+
+
+def test_gate_and_its_slope_vanish_at_coplanar_faces():
+    vertices, faces = grid(2)
+
+    def gamma(lift):
+        points = vertices.copy()
+        points[0, 2] = lift
+        topology = build_topology(faces, 4)
+        at = edge_stencil(
+            points,
+            face_normals(points, faces),
+            topology.stencil[topology.interior],
+            topology.edge_faces[topology.interior],
+        )
+        return curvature_gate(10.0)(edge_frames(at))[0]
+
+    assert gamma(0.0) == 0
+    # x ~ lift², γ ~ x² ~ lift⁴: halving the lift divides the gate by 16.
+    assert gamma(0.02) / gamma(0.01) == pytest.approx(16, rel=1e-2)
+    assert 0 < gamma(0.01) < 1e-6
+
+
+@given(st.lists(st.floats(-1e300, 1e300), min_size=3, max_size=3), st.floats(1e-3, 10))
+def test_projection_never_leaves_the_ball_and_keeps_what_is_inside(vector, radius):
+    (found,) = project_to_ball(np.array([vector]), radius)
+    length = np.linalg.norm(found)
+    assert length <= radius * ROUNDING
+    if np.linalg.norm(np.array(vector) / max(1.0, *map(abs, vector))) * max(
+        1.0, *map(abs, vector)
+    ) < radius * (1 - 1e-12):
+        np.testing.assert_array_equal(found, vector)
+
+
+def test_zero_reference_length_switches_the_correction_off():
+    points = np.zeros((4, 3)) + 2.0
+    mesh = Mesh(points, np.array([[0, 1, 2], [0, 2, 3]]))
+    refined = refine(mesh, pns(MODELS[0]))
+    assert refined.report["reference_length"] == 0
+    np.testing.assert_array_equal(refined.mesh.vertices, 2.0)
+
+
+def test_trained_levels_stay_within_the_envelope_at_every_level():
+    mesh = Mesh(*grid(7, bent))
+    report = refine(mesh, pns(MODELS[1]), 4).report
+    assert all(0 < level["proximity_ratio"]["max"] <= ROUNDING for level in report["levels"])

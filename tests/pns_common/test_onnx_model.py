@@ -1,0 +1,166 @@
+"""A model file that breaks its contract is refused, and the error says which part."""
+
+import hashlib
+
+import msgspec
+import numpy as np
+import onnx
+import pytest
+from onnx import helper
+
+from pns_common import Mesh, ModelError, load_model, pns, refine
+from pns_common.model_card import ModelCard
+from pns_common.onnx_model import ROWS, bundled_models, model_from_bytes
+from tests.meshes import bumpy_sphere
+from tests.networks import CARD, model_bytes, perceptron_bytes, random_layers, random_model
+
+GOOD = perceptron_bytes(random_layers(0))
+PASS = [helper.make_node("Slice", ["features", "from", "to", "axis"], ["three"])]
+CUT = {"from": np.array([0]), "to": np.array([3]), "axis": np.array([1])}
+
+
+def through(*nodes):
+    """Nodes that lead from the first three features to the output."""
+    return [*PASS, *nodes]
+
+
+def changed_card(**changes):
+    fields = {name: getattr(CARD, name) for name in ModelCard.__dataclass_fields__}
+    return msgspec.json.encode(fields | changes).decode()
+
+
+def refused(data):
+    with pytest.raises(ModelError) as caught:
+        model_from_bytes(data, "bad")
+    assert "bad" in str(caught.value)
+    return caught.value
+
+
+def test_a_good_file_loads_with_card_and_hash():
+    model = model_from_bytes(GOOD, "good")
+    assert model.card == CARD
+    assert model.hash == hashlib.sha256(GOOD).hexdigest()
+    assert model.size == len(GOOD)
+
+
+@pytest.mark.parametrize("data", [b"", b"not a model", GOOD[: len(GOOD) // 2], bytes(1000)])
+def test_bytes_that_are_no_onnx_file(data):
+    assert "ONNX" in refused(data).expected
+
+
+@pytest.mark.parametrize(
+    ("card", "says"),
+    [
+        (None, "0"),
+        ("{", "truncated"),
+        (changed_card(format=2), "format 2"),
+        (changed_card(features="paper-9"), "paper-9"),
+        (changed_card(orientation="left"), "left"),
+        (changed_card(budget=-1.0), "budget"),
+        (changed_card(gate_sharpness=0.0), "gate_sharpness"),
+        (changed_card(budget="much"), "budget"),
+        (changed_card(surprise=1), "surprise"),
+        ('{"format": 1}', "missing"),
+    ],
+)
+def test_a_wrong_card_is_named(card, says):
+    assert says in refused(perceptron_bytes(random_layers(0), card=card)).found
+
+
+@pytest.mark.parametrize("operator", ["Loop", "If", "Expand", "Tile", "RandomNormal", "Resize"])
+def test_operators_off_the_list_are_refused_by_name(operator):
+    nodes = through(helper.make_node(operator, ["three"], ["correction"]))
+    data = model_bytes(nodes, CUT)
+    error = refused(data)
+    assert operator in error.found
+
+
+def test_operators_of_another_domain_are_refused():
+    node = helper.make_node("Gelu", ["three"], ["correction"], domain="com.microsoft")
+    assert (
+        "com.microsoft" in refused(model_bytes(through(node), CUT, domains=["com.microsoft"])).found
+    )
+
+
+def test_external_data_is_refused():
+    model = onnx.load_from_string(GOOD)
+    weight = model.graph.initializer[0]
+    weight.ClearField("raw_data")
+    weight.data_location = onnx.TensorProto.EXTERNAL
+    entry = weight.external_data.add()
+    entry.key, entry.value = "location", "/etc/passwd"
+    error = refused(model.SerializeToString())
+    assert "external" in error.found.lower() or "passwd" in error.found
+
+
+@pytest.mark.parametrize(
+    ("inputs", "outputs"),
+    [
+        ([("features", ["edges", 6]), ("budget", [])], None),
+        ([("features", ["edges", 5])], None),
+        ([("features", ["edges", 5]), ("budget", [1])], None),
+        ([("features", ["edges", 5]), ("budget", []), ("more", [])], None),
+        (None, [("correction", ["edges", 4])]),
+        (None, [("other", ["edges", 3])]),
+    ],
+)
+def test_other_inputs_or_outputs_are_refused(inputs, outputs):
+    name = outputs[0][0] if outputs else "correction"
+    nodes = through(helper.make_node("Identity", ["three"], [name]))
+    assert "puts" in refused(model_bytes(nodes, CUT, inputs=inputs, outputs=outputs)).expected
+
+
+def test_answers_of_another_shape_are_an_error():
+    """The file declares [edges, 3] and returns fewer rows."""
+    nodes = [
+        helper.make_node("Slice", ["features", "from", "to", "axis"], ["three"]),
+        helper.make_node("Slice", ["three", "from", "to", "first"], ["correction"]),
+    ]
+    data = model_bytes(nodes, CUT | {"first": np.array([0])})
+    try:
+        model = model_from_bytes(data, "short")
+    except ModelError:
+        return  # a runtime that infers the shape refuses it earlier
+    with pytest.raises(ModelError, match="shape"):
+        refine(Mesh(*bumpy_sphere()), pns(model))
+
+
+def test_corrections_that_are_not_numbers_are_an_error():
+    weights = CUT | {"zero": np.zeros(())}
+    node = helper.make_node("Div", ["three", "zero"], ["correction"])
+    model = model_from_bytes(model_bytes(through(node), weights), "nan")
+    with pytest.raises(ModelError, match="finite"):
+        refine(Mesh(*bumpy_sphere()), pns(model))
+
+
+def test_a_rows_bits_depend_on_nothing_but_the_row():
+    model = random_model(0)
+    features = np.random.default_rng(0).uniform(-2, 2, (3 * ROWS + 17, 5))
+    together = model(features, 1.0)
+    for rows in (slice(0, 1), slice(5, ROWS + 6), slice(2 * ROWS + 3, None)):
+        np.testing.assert_array_equal(model(features[rows], 1.0), together[rows])
+    assert model(features[:0], 1.0).shape == (0, 3)
+
+
+def test_a_file_that_is_not_there_lists_the_bundled_names():
+    with pytest.raises(ModelError, match="bundled") as caught:
+        load_model("no/such/model.onnx")
+    assert caught.value.path == "no/such/model.onnx"
+
+
+def test_a_file_too_large_is_not_read(tmp_path):
+    path = tmp_path / "huge.onnx"
+    with path.open("wb") as file:
+        file.truncate(65 * 2**20)
+    with pytest.raises(ModelError, match="bytes"):
+        load_model(path)
+
+
+def test_a_file_on_disk_is_called_by_its_stem(tmp_path):
+    path = tmp_path / "mine.onnx"
+    path.write_bytes(GOOD)
+    assert load_model(path).name == "mine"
+
+
+def test_the_default_model_is_bundled():
+    assert load_model().name in bundled_models()

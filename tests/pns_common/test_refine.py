@@ -1,0 +1,175 @@
+"""refine: parameters, the report, determinism, and levels that compose."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import pns_common
+from pns_common import Mesh, ParameterError, loop, pns, refine
+from pns_common.blocks import Blocks, available_threads
+from pns_common.refine import measure_reference_length
+from pns_common.schemes import Model
+from pns_common.topology import build_topology
+from tests.meshes import bent, bow_tie, bumpy_sphere, grid, icosphere, soups, three_pages
+from tests.networks import random_model
+
+MODEL = random_model(0, scale=30.0)
+
+
+@pytest.mark.parametrize("levels", [0, -1, 17])
+def test_levels_out_of_range_are_refused(levels):
+    with pytest.raises(ParameterError) as caught:
+        refine(Mesh(*grid(3)), loop(), levels)
+    assert (caught.value.name, caught.value.value) == ("levels", levels)
+
+
+@pytest.mark.parametrize("length", [0.0, -1.0, float("nan"), float("inf"), "metres"])
+def test_reference_length_out_of_range_is_refused(length):
+    with pytest.raises(ParameterError, match="reference_length"):
+        refine(Mesh(*grid(3)), loop(), reference_length=length)
+
+
+@pytest.mark.parametrize("budget", [-0.1, float("nan"), float("inf")])
+def test_budget_out_of_range_is_refused(budget):
+    with pytest.raises(ParameterError, match="budget"):
+        pns(MODEL, budget)
+
+
+def test_a_model_file_keeps_the_model_protocol():
+    assert isinstance(MODEL, Model)
+
+
+def test_default_budget_is_the_models():
+    assert pns(MODEL).budget == MODEL.card.budget
+    assert pns(MODEL, 0.25).budget == 0.25
+
+
+def test_zero_budget_is_loop():
+    mesh = Mesh(*bumpy_sphere())
+    found, base = refine(mesh, pns(MODEL, 0.0), 2), refine(mesh, loop(), 2)
+    np.testing.assert_array_equal(found.mesh.vertices, base.mesh.vertices)
+    assert found.ratio.max() == 0
+
+
+def test_report_is_json_and_counts_what_was_made():
+    vertices, faces = grid(5, bent)
+    refined = refine(Mesh(vertices, faces), pns(MODEL), 2)
+    report = json.loads(json.dumps(refined.report))
+    assert report["scheme"] == "pns"
+    assert report["model_hash"] == MODEL.hash
+    first, second = report["levels"]
+    assert first["faces"] == 4 * len(faces)
+    assert second["faces"] == len(refined.mesh.faces)
+    assert second["vertices"] == len(refined.mesh.vertices)
+    assert first["edges"] == {"interior": 40, "boundary": 16, "irregular": 0}
+    edges = len(refined.ratio) - first["vertices"]
+    interior = build_topology(
+        refine(Mesh(vertices, faces), loop()).mesh.faces, first["vertices"]
+    ).interior
+    ratio = refined.ratio[first["vertices"] :]
+    assert len(ratio) == edges
+    assert second["proximity_ratio"]["max"] == ratio[interior].max()
+    assert second["proximity_ratio"]["mean"] == pytest.approx(ratio[interior].mean(), rel=1e-12)
+    assert second["gate"]["max"] == refined.gate.max()
+    assert (refined.ratio[: first["vertices"]] == 0).all()
+
+
+def test_irregularities_are_counted_not_refused():
+    pages = refine(Mesh(*three_pages()), pns(MODEL)).report
+    assert pages["levels"][0]["edges"] == {"interior": 0, "boundary": 6, "irregular": 1}
+    assert pages["multi_fan_vertices"] == 2
+    assert refine(Mesh(*bow_tie()), loop()).report["multi_fan_vertices"] == 1
+
+
+def slow_normal_jump(vertices, faces):
+    topology = build_topology(faces, len(vertices))
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    n1, n2 = (normals[topology.edge_faces[topology.interior, side]] for side in (0, 1))
+    sine = np.linalg.norm(np.cross(n1, n2), axis=1)
+    return np.arctan2(sine, np.sum(n1 * n2, axis=1)).max()
+
+
+@pytest.mark.parametrize("shape", [icosphere(1), grid(7, bent), bumpy_sphere(3)])
+def test_normal_jump_is_the_largest_angle_across_an_edge(shape):
+    refined = refine(Mesh(*shape), pns(MODEL), 2)
+    expected = slow_normal_jump(refined.mesh.vertices, refined.mesh.faces)
+    found = refined.report["levels"][-1]["normal_jump_max"]
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_flipped_faces_are_those_that_oppose_their_loop_counterpart():
+    mesh = Mesh(*bumpy_sphere(0, bump=0.4))
+    refined, base = refine(mesh, pns(MODEL, 60.0)), refine(mesh, loop())
+
+    def area_vectors(vertices):
+        a, b, c = (vertices[refined.mesh.faces[:, i]] for i in range(3))
+        return np.cross(b - a, c - a)
+
+    opposed = np.sum(area_vectors(refined.mesh.vertices) * area_vectors(base.mesh.vertices), axis=1)
+    assert refined.report["levels"][0]["flipped_faces"] == (opposed < 0).sum() > 0
+    assert base.report["levels"][0]["flipped_faces"] == 0
+
+
+@given(soups(), st.integers(1, 2))
+def test_a_report_has_no_nan_for_any_mesh(mesh, levels):
+    report = refine(mesh, pns(MODEL), levels).report
+    json.dumps(report, allow_nan=False)
+    for level in report["levels"]:
+        assert 0 <= level["proximity_ratio"]["max"] <= 1 + 1e-12
+        assert 0 <= level["gate"]["max"] <= 1
+        assert 0 <= level["normal_jump_max"] <= np.pi
+
+
+def test_bits_do_not_depend_on_threads_or_block_size(monkeypatch):
+    mesh = Mesh(*bumpy_sphere(0, subdivisions=3))
+    expected = refine(mesh, pns(MODEL), 2, threads=1)
+    module = sys.modules["pns_common.refine"]
+    for threads, rows in [(2, 8192), (3, 100), (1, 7)]:
+        monkeypatch.setattr(module, "Blocks", lambda threads, rows=rows: Blocks(threads, rows))
+        found = refine(mesh, pns(MODEL), 2, threads=threads)
+        np.testing.assert_array_equal(found.mesh.vertices, expected.mesh.vertices)
+        np.testing.assert_array_equal(found.ratio, expected.ratio)
+        assert found.report == expected.report
+
+
+def test_two_calls_with_the_first_ones_length_are_two_levels():
+    mesh = Mesh(*bumpy_sphere())
+    once = refine(mesh, pns(MODEL))
+    length = once.report["reference_length"]
+    again = refine(once.mesh, pns(MODEL), reference_length=length)
+    both = refine(mesh, pns(MODEL), 2)
+    np.testing.assert_array_equal(again.mesh.vertices, both.mesh.vertices)
+
+
+def test_reference_length_is_one_on_the_papers_patch_and_follows_scale_only():
+    vertices, faces = grid(9)
+    assert measure_reference_length(vertices, faces) == pytest.approx(1, rel=1e-12)
+    assert measure_reference_length(3 * vertices + 5, faces) == pytest.approx(3, rel=1e-12)
+    unused = np.concatenate([vertices, [[100.0, 0, 0]]])
+    assert measure_reference_length(unused, faces) == pytest.approx(1, rel=1e-12)
+
+
+def test_progress_ends_at_all_faces():
+    calls = []
+    refine(Mesh(*grid(3)), loop(), 3, progress=lambda done, total: calls.append((done, total)))
+    total = 8 * (4 + 16 + 64)
+    assert calls == [(32, total), (160, total), (total, total)]
+
+
+def test_an_error_in_a_block_reaches_the_caller():
+    def fail(rows):
+        raise ValueError(f"rows {rows.start}")
+
+    with pytest.raises(ValueError, match="rows"):
+        Blocks(threads=2, rows=3).run(10, fail)
+    assert available_threads() >= 1
+
+
+def test_public_names_exist():
+    assert all(hasattr(pns_common, name) for name in pns_common.__all__)
