@@ -27,7 +27,7 @@ def test_the_operator_loads_no_web_framework():
 
 
 def test_no_module_is_called_like_one_of_the_standard_library():
-    """`python train/run.py` puts train/ first on the path: such a module would hide the real one."""
+    """`python train/run.py` puts train/ first on the path, where it would hide the real one."""
     for package in ("train", "export"):
         names = {path.stem for path in (ROOT / package).glob("*.py")} - {"__init__"}
         assert not names & sys.stdlib_module_names
