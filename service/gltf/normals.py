@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.arrays import cross, dot, norm, segment_sum, unit
+from pns_common.arrays import dot, norm, unit
 from pns_common.blocks import Blocks
 
 # A sum of unit normals times angles below this has no direction that could be trusted.
@@ -28,19 +28,30 @@ def angle_weighted_normals(
     `groups` names the group of each face's corners; `fallback` is used where a group's faces have
     no area or cancel out.
     """
-    weighted = np.empty((3, len(faces), 3))
+    # Coordinates as rows: arithmetic on contiguous rows takes a third of the time.
+    rows_of = np.ascontiguousarray(points.T)
+    weighted = np.empty((3, 3, len(faces)))
 
     def block(rows: slice) -> None:
-        a, b, c = (np.take(points, faces[rows, corner], axis=0) for corner in range(3))
+        a, b, c = (np.take(rows_of, faces[rows, corner], axis=1) for corner in range(3))
         ab, bc, ca = b - a, c - b, a - c
-        area_vector = cross(ab, -ca)
-        normal, twice_area = unit(area_vector), norm(area_vector)
-        for corner, cosine in enumerate([-dot(ab, ca), -dot(bc, ab), -dot(ca, bc)]):
-            weighted[corner, rows] = np.arctan2(twice_area, cosine)[:, None] * normal
+        normal = _cross(ca, ab)
+        twice_area = np.sqrt(_dot(normal, normal))
+        normal /= np.where(twice_area > 0, twice_area, 1.0)
+        at_a = np.arctan2(twice_area, -_dot(ab, ca))
+        at_b = np.arctan2(twice_area, -_dot(bc, ab))
+        for corner, angle in enumerate([at_a, at_b, np.pi - at_a - at_b]):
+            weighted[:, corner, rows] = angle * normal
 
     blocks.run(len(faces), block)
-    total = segment_sum(weighted.reshape(-1, 3), groups.T.reshape(-1), len(fallback))
-    return np.where((norm(total) > NO_DIRECTION)[:, None], unit(total), safe_unit(fallback))
+    corners, count = groups.T.reshape(-1), len(fallback)
+    total = np.stack([np.bincount(corners, w.reshape(-1), count) for w in weighted])
+    length = np.sqrt(_dot(total, total))
+    lost = np.flatnonzero(length <= NO_DIRECTION)
+    length[lost] = 1
+    normals = np.ascontiguousarray((total / length).T)
+    normals[lost] = safe_unit(fallback[lost])
+    return normals
 
 
 def safe_unit(vectors: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
@@ -57,7 +68,15 @@ def perpendicular_tangents(
     that the normal is furthest from.
     """
     flat = tangents - dot(tangents, normals)[:, None] * normals
-    axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
-    instead = axis - dot(axis, normals)[:, None] * normals
-    lost = norm(flat) <= NO_DIRECTION * np.maximum(norm(tangents), NO_DIRECTION)
-    return unit(np.where(lost[:, None], instead, flat))
+    lost = np.flatnonzero(norm(flat) <= NO_DIRECTION * np.maximum(norm(tangents), NO_DIRECTION))
+    axis, normal = np.eye(3)[np.abs(normals[lost]).argmin(axis=1)], normals[lost]
+    flat[lost] = axis - dot(axis, normal)[:, None] * normal
+    return unit(flat)
+
+
+def _cross(u: Float[np.ndarray, "3 M"], v: Float[np.ndarray, "3 M"]) -> Float[np.ndarray, "3 M"]:
+    return u[[1, 2, 0]] * v[[2, 0, 1]] - u[[2, 0, 1]] * v[[1, 2, 0]]
+
+
+def _dot(u: Float[np.ndarray, "3 M"], v: Float[np.ndarray, "3 M"]) -> Float[np.ndarray, " M"]:
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
