@@ -40,7 +40,7 @@ def disjoint_union(instances: Sequence[Instance]) -> Batch:
     offsets = np.cumsum([0, *sizes])
     points = np.concatenate([instance.mesh.vertices for instance in instances])
     faces = np.concatenate(
-        [instance.mesh.faces + start for instance, start in zip(instances, offsets, strict=False)]
+        [one.mesh.faces + start for one, start in zip(instances, offsets[:-1], strict=True)]
     )
     topology = build_topology(faces, len(points))
     owner = np.repeat(np.arange(len(instances)), sizes)[topology.stencil[topology.interior, 0]]
@@ -65,10 +65,7 @@ def pairs_sharing_a_face(topology: Topology) -> Int[np.ndarray, "P 2"]:
 def _surface_of_each(surfaces: Sequence[Surface], owner: Int[np.ndarray, " I"]) -> Surface:
     """Return one surface whose parameters are arrays: those of `owner` at each point."""
     first = surfaces[0]
-    parameters = {
-        field.name: torch.tensor([getattr(surface, field.name) for surface in surfaces]).double()[
-            torch.from_numpy(owner)
-        ]
-        for field in fields(first)
-    }
-    return replace(first, **parameters)
+    names = [field.name for field in fields(first)]
+    table = np.array([[getattr(surface, name) for name in names] for surface in surfaces])
+    columns = torch.from_numpy(table[owner]).unbind(dim=1)
+    return replace(first, **dict(zip(names, columns, strict=True)))

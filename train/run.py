@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from pns_common.schemes import pns
 from train.checkpoint import Checkpoint, save_checkpoint
-from train.datasets import Dataset, ridge_held_out
+from train.datasets import ridge_held_out
 from train.determinism import machine_fingerprint
 from train.evaluation import compare_with_loop
 from train.metrics import improvements_as_data
@@ -53,7 +53,7 @@ def train(
     path = output or CHECKPOINTS / f"{chosen.name}.safetensors"
     began = time.perf_counter()
     trained = _fit_with_progress(chosen, console)
-    held_out: Dataset = ridge_held_out()
+    held_out = ridge_held_out()
     scheme = pns(recipe_model(chosen, trained.network), chosen.budget)
     improvements = compare_with_loop(scheme, held_out)
     metrics = {held_out.name: improvements_as_data(improvements)}

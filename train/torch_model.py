@@ -2,7 +2,6 @@
 
 import hashlib
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import safetensors.torch
@@ -22,7 +21,7 @@ class TorchModel:
     card: ModelCard
     network: BoundedNet
 
-    @cached_property
+    @property
     def hash(self) -> str:
         """The sha256 of the weights."""
         return hashlib.sha256(safetensors.torch.save(self.network.state_dict())).hexdigest()
