@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
+import array_api_compat.numpy
 import numpy as np
 from array_api_compat import array_namespace, is_torch_array
 from jaxtyping import Float, Int
@@ -18,6 +19,9 @@ Array: TypeAlias = Any
 
 def namespace(*arrays: Array) -> Any:
     """The array-API namespace that the arrays share."""
+    # Looking the namespace up costs as much as arithmetic on a hundred rows.
+    if all(type(array) is np.ndarray for array in arrays):
+        return array_api_compat.numpy
     return array_namespace(*arrays)
 
 
@@ -73,6 +77,15 @@ def norm(v: Float[Array, "N 3"]) -> Float[Array, " N"]:
 
 def unit(v: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
     """Rows scaled to length 1; zero rows stay zero."""
+    return unit_longer_than(v, 0.0)
+
+
+def unit_longer_than(
+    v: Float[Array, "N 3"], shortest: Float[Array, " N"] | float
+) -> Float[Array, "N 3"]:
+    """Rows longer than ``shortest`` scaled to length 1; all others become zero."""
     xp = namespace(v)
-    length = norm(v)
-    return v / xp.where(length > 0, length, 1.0)[:, None]
+    square = dot(v, v)
+    long = square > shortest * shortest
+    # Divide, not multiply by the inverse: on an axis-aligned plane z / √(z²) is exactly 1.
+    return v / xp.where(long, xp.sqrt(xp.where(long, square, 1.0)), xp.inf)[:, None]

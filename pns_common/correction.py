@@ -53,7 +53,8 @@ def project_to_ball(vectors: Float[Array, "N 3"], radius: float = 1.0) -> Float[
     """Vectors longer than ``radius`` are shortened to it; none is lengthened."""
     xp = namespace(vectors)
     # Dividing by the largest component first keeps the square of a huge vector finite.
-    largest = xp.max(xp.abs(vectors), axis=-1)
+    size = xp.abs(vectors)
+    largest = xp.maximum(xp.maximum(size[:, 0], size[:, 1]), size[:, 2])
     scale = xp.where(largest > 1, largest, 1.0)[:, None]
     length = norm(vectors / scale)[:, None] * scale
     return vectors * (radius / xp.where(length > radius, length, radius))

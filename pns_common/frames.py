@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.arrays import Array, cross, dot, gather, namespace, norm, unit
+from pns_common.arrays import Array, cross, dot, gather, namespace, norm, unit, unit_longer_than
 
 # Faces are antiparallel where n1 · n2 ≤ −1 + ANTIPARALLEL (the paper's ε, section 3.2).
 ANTIPARALLEL = 1e-6
@@ -49,13 +49,9 @@ class EdgeFrames:
 
 def face_normals(points: Float[Array, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Float[Array, "F 3"]:
     """Unit normals (b − a) × (c − a), anticlockwise faces seen from outside; 0 without area."""
-    xp = namespace(points)
     a, b, c = (gather(points, faces[:, corner]) for corner in range(3))
     u, v = b - a, c - a
-    area_vector = cross(u, v)
-    size = dot(u, u) + dot(v, v)
-    has_area = norm(area_vector) > NO_AREA * size
-    return unit(xp.where(has_area[:, None], area_vector, 0.0))
+    return unit_longer_than(cross(u, v), NO_AREA * (dot(u, u) + dot(v, v)))
 
 
 def edge_stencil(
