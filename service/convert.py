@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from service.gltf.extras import REPORT_KEY
 from service.gltf.report import Change
 from service.options import Limits, Options
 from service.refine_soup import refine_soup
+from service.soup import TriangleSoup
 from service.soup_glb import as_gltf_json, soup_glb
 from service.subdivide import make_scheme, subdivide_gltf
 
@@ -50,25 +51,22 @@ def convert(
     with _progress(console) as advance:
         if kind in formats.GLTF_KINDS:
             done = subdivide_gltf(data, kind, options, loaded, limits, advance)
-            content, report = _of_gltf(done.glb, done.report, target, limits)
+            written = _of_gltf(done.glb, done.report, target, limits)
         else:
             soup = formats.read(data, kind)
             refined, report = refine_soup(
                 soup, make_scheme(options, loaded), options, limits, advance
             )
-            content, report = _of_soup(refined, report, target, options)
-    replace_file(output, content)
+            written = _of_soup(refined, report, target, options)
+    replace_file(output, written.content)
     if report_file is not None:
-        replace_file(report_file, msgspec.json.format(msgspec.json.encode(report), indent=2))
-    for change in report["changes"]:
+        text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
+        replace_file(report_file, text + b"\n")
+    for change in written.report["changes"]:
         where = f" ({change['pointer']})" if change["pointer"] else ""
         console.print(f"{change['count']} × {change['what']}{where}", markup=False)
     seconds = time.perf_counter() - began
-    totals = report["totals"]
-    console.print(
-        f"{output}: {totals['faces']:,} faces, {totals['vertices']:,} vertices in {seconds:.1f} s",
-        markup=False,
-    )
+    console.print(f"{output}: {written.faces:,} faces in {seconds:.1f} s", markup=False)
 
 
 def _kind(name: str, path: Path) -> str:
@@ -78,31 +76,41 @@ def _kind(name: str, path: Path) -> str:
     return kind
 
 
-def _of_gltf(
-    glb: bytes, report: dict[str, Any], target: str, limits: Limits
-) -> tuple[bytes, dict[str, Any]]:
+@dataclass(frozen=True)
+class Written:
+    """An output file: its bytes, its report, its faces."""
+
+    content: bytes
+    report: dict[str, Any]
+    faces: int
+
+
+def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) -> Written:
+    faces = report["totals"]["faces"]
     if target == "glb":
-        return glb, report
+        return Written(glb, report, faces)
     if target == "gltf":
-        return as_gltf_json(glb, limits), report
+        return Written(as_gltf_json(glb, limits), report, faces)
     soup, changes = flatten(glb, target, limits)
-    return formats.write(soup, target), _with_changes(report, changes)
+    # A mesh that several nodes show is there several times.
+    return Written(formats.write(soup, target), _with_changes(report, changes), len(soup.faces))
 
 
 def _of_soup(
-    refined: formats.TriangleSoup, report: dict[str, Any], target: str, options: Options
-) -> tuple[bytes, dict[str, Any]]:
+    refined: TriangleSoup, report: dict[str, Any], target: str, options: Options
+) -> Written:
     changes = []
     if refined.uv is not None and target not in formats.HOLDS_UV:
         changes.append(Change("", "texture coordinates dropped: the format cannot hold them", 1))
     if options.diagnostics == "full":
         changes.append(Change("", "values at vertices dropped: only a glTF's are kept", 1))
     report = _with_changes(report, changes)
+    faces = len(refined.faces)
     if target not in formats.GLTF_KINDS:
-        return formats.write(refined, target), report
+        return Written(formats.write(refined, target), report, faces)
     extras = {} if options.diagnostics == "none" else {REPORT_KEY: report}
     glb = soup_glb(refined, extras=extras)
-    return (glb if target == "glb" else as_gltf_json(glb, Limits())), report
+    return Written(glb if target == "glb" else as_gltf_json(glb, Limits()), report, faces)
 
 
 def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from service.formats import TriangleSoup
+from service.soup import TriangleSoup
 from service.soup_glb import soup_glb
 
 TEETH = 12

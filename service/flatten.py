@@ -9,11 +9,12 @@ import numpy as np
 from jaxtyping import Float
 
 from service.errors import UnrefinableError
-from service.formats import HOLDS_UV, TriangleSoup
+from service.formats import HOLDS_UV
 from service.gltf.primitives import TrianglePrimitive, read_primitive
 from service.gltf.report import Change
 from service.gltf.upload import read_upload
 from service.options import Limits
+from service.soup import TriangleSoup
 from service.weld import weld
 
 LOST = ("materials", "textures", "images", "animations", "cameras", "extensions")

@@ -4,39 +4,22 @@ from __future__ import annotations
 
 import io
 import re
-from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
+from service import left_out
 from service.errors import UnreadableError
+from service.off import read_off, write_off
+from service.soup import NUMBER, TriangleSoup
 
 GLTF_KINDS = ("glb", "gltf")
 MESH_KINDS = ("obj", "ply", "stl", "off")
 HOLDS_UV = frozenset({"obj", *GLTF_KINDS})
 
+_OBJ_UV = re.compile(rb"^[ \t]*vt[ \t]", re.MULTILINE)
 _OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]", re.MULTILINE)
-_OFF_COUNTS = re.compile(rb"^(?:[A-Z]*OFF)?\s*\d+[ \t]+(\d+)", re.MULTILINE)
-# Twelve digits keep micrometres in coordinates of kilometres.
-_NUMBER = "%.12g"
-
-
-@dataclass(frozen=True, eq=False)
-class TriangleSoup:
-    """Triangles as a file has them: seams are open, vertices repeat.
-
-    Attributes:
-        vertices: (N, 3) positions.
-        faces: (F, 3) rows of `vertices`.
-        uv: (N, 2) texture coordinates, v upwards; None where there are none.
-        split: triangles more than the file had faces, made by splitting its polygons.
-    """
-
-    vertices: Float[np.ndarray, "N 3"]
-    faces: Int[np.ndarray, "F 3"]
-    uv: Float[np.ndarray, "N 2"] | None = None
-    split: int = 0
 
 
 def read(data: bytes, kind: str) -> TriangleSoup:
@@ -45,6 +28,8 @@ def read(data: bytes, kind: str) -> TriangleSoup:
     Raises:
         UnreadableError: not a file of this kind, or one without faces.
     """
+    if kind == "off":
+        return read_off(data)
     try:
         # Each part comes apart by material; as they are listed, they make the file's triangles.
         scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False)
@@ -57,11 +42,14 @@ def read(data: bytes, kind: str) -> TriangleSoup:
     faces = np.concatenate(
         [np.asarray(part.faces) + start for part, start in zip(parts, starts, strict=False)]
     )
+    uv = _uv(parts)
+    count, others = _beside_triangles(data, kind, parts, has_uv=uv is not None)
     return TriangleSoup(
         vertices=np.concatenate([np.asarray(part.vertices, dtype=np.float64) for part in parts]),
         faces=faces.astype(np.int64),
-        uv=_uv(parts),
-        split=max(0, len(faces) - _faces_in_file(data, kind, parts, len(faces))),
+        uv=uv,
+        split=0 if count is None else max(0, len(faces) - count),
+        left_out=others,
     )
 
 
@@ -70,7 +58,7 @@ def write(soup: TriangleSoup, kind: str) -> bytes:
     if kind == "obj":
         return _obj(soup)
     if kind == "off":
-        return _off(soup)
+        return write_off(soup)
     mesh = trimesh.Trimesh(soup.vertices, soup.faces, process=False, validate=False)
     return bytes(mesh.export(file_type=kind))
 
@@ -83,34 +71,31 @@ def _uv(parts: list[trimesh.Trimesh]) -> Float[np.ndarray, "N 2"] | None:
     return np.concatenate(found)[:, :2].astype(np.float64)
 
 
-def _faces_in_file(data: bytes, kind: str, parts: list[trimesh.Trimesh], triangles: int) -> int:
+def _beside_triangles(
+    data: bytes, kind: str, parts: list[trimesh.Trimesh], *, has_uv: bool
+) -> tuple[int | None, dict[str, int]]:
+    """How many faces the file lists (None: triangles only), and what it held beside them."""
     match kind:
         case "obj":
-            return len(_OBJ_FACE.findall(data))
+            others = left_out.of_obj(data)
+            coordinates = 0 if has_uv else len(_OBJ_UV.findall(data))
+            if coordinates:
+                others["texture coordinates that not all faces have"] = coordinates
+            return len(_OBJ_FACE.findall(data)), others
         case "ply":
-            return int(parts[0].metadata["_ply_raw"]["face"]["length"])
-        case "off":
-            counts = _OFF_COUNTS.search(data)
-            return int(counts[1]) if counts else triangles
+            elements = parts[0].metadata["_ply_raw"]
+            return int(elements["face"]["length"]), left_out.of_ply(elements, has_uv=has_uv)
         case _:
-            return triangles
+            return None, {}
 
 
 def _obj(soup: TriangleSoup) -> bytes:
     text = io.StringIO()
-    np.savetxt(text, soup.vertices, fmt=f"v {_NUMBER} {_NUMBER} {_NUMBER}")
+    np.savetxt(text, soup.vertices, fmt=f"v {NUMBER} {NUMBER} {NUMBER}")
     corner = soup.faces + 1
     if soup.uv is None:
         np.savetxt(text, corner, fmt="f %d %d %d")
     else:
-        np.savetxt(text, soup.uv, fmt=f"vt {_NUMBER} {_NUMBER}")
+        np.savetxt(text, soup.uv, fmt=f"vt {NUMBER} {NUMBER}")
         np.savetxt(text, np.repeat(corner, 2, axis=1), fmt="f %d/%d %d/%d %d/%d")
-    return text.getvalue().encode()
-
-
-def _off(soup: TriangleSoup) -> bytes:
-    text = io.StringIO()
-    text.write(f"OFF\n{len(soup.vertices)} {len(soup.faces)} 0\n")
-    np.savetxt(text, soup.vertices, fmt=f"{_NUMBER} {_NUMBER} {_NUMBER}")
-    np.savetxt(text, soup.faces, fmt="3 %d %d %d")
     return text.getvalue().encode()

@@ -14,13 +14,13 @@ from pns_common.mesh import Mesh, clean, repeated_vertex
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme
 from service.errors import LimitError, UnrefinableError
-from service.formats import TriangleSoup
 from service.gltf.lattice import lattice
 from service.gltf.plan import BYTES_PER_FACE
 from service.gltf.report import Change
 from service.gltf.share import refined_ids
 from service.gltf.spread import spread
 from service.options import Limits, Options
+from service.soup import TriangleSoup
 from service.weld import Weld, distinct_rows, number_by_first_appearance, weld
 
 
@@ -48,7 +48,7 @@ def refine_soup(
     )
     ids = refined_ids(welded, cleaned, refinement, lattice(options.levels))
     refined = _with_corners(soup, welded, proper, ids, refinement, options.levels)
-    changes = []
+    changes = [Change("", f"{name} dropped", count) for name, count in soup.left_out.items()]
     if soup.split:
         changes.append(Change("", "triangles added by splitting polygons", soup.split))
     report = {name: value for name, value in refinement.report.items() if name != "levels"}

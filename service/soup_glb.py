@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from service.formats import TriangleSoup
 from service.gltf.container import read_glb, write_glb
 from service.gltf.json_text import decode_object, encode
 from service.options import Limits
+from service.soup import TriangleSoup
 
 FLOAT, UNSIGNED_INT = 5126, 5125
 VERTEX_BUFFER, INDEX_BUFFER = 34962, 34963

@@ -1,0 +1,46 @@
+"""What a mesh file holds beside positions, faces and UVs: it is lost, so it is named."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from typing import Any
+
+_OBJ_STATEMENT = re.compile(rb"^[ \t]*(vn|usemtl|g|o|s|l|p|vp|curv|surf)[ \t]", re.MULTILINE)
+_OBJ_COLOUR = re.compile(rb"^[ \t]*v(?:[ \t]+[^\s]+){6,}[ \t]*\r?$", re.MULTILINE)
+_OBJ_NAMES = {
+    b"vn": "vertex normals",
+    b"usemtl": "materials",
+    b"g": "groups",
+    b"o": "object names",
+    b"s": "smoothing groups",
+    b"l": "lines",
+    b"p": "points",
+    b"vp": "free-form curves",
+    b"curv": "free-form curves",
+    b"surf": "free-form surfaces",
+}
+_PLY_KEPT = frozenset({"x", "y", "z", "vertex_index", "vertex_indices"})
+_PLY_UV = frozenset({"u", "v", "s", "t", "texture_u", "texture_v"})
+
+
+def of_obj(data: bytes) -> dict[str, int]:
+    """Names and counts of the statements that are passed over."""
+    found = Counter(_OBJ_NAMES[name] for name in _OBJ_STATEMENT.findall(data))
+    if colours := len(_OBJ_COLOUR.findall(data)):
+        found["vertex colours"] = colours
+    return dict(found)
+
+
+def of_ply(elements: dict[str, Any], *, has_uv: bool) -> dict[str, int]:
+    """Names and counts of the properties and elements that are passed over."""
+    kept = _PLY_KEPT | _PLY_UV if has_uv else _PLY_KEPT
+    found: dict[str, int] = {}
+    for element, content in elements.items():
+        if element not in ("vertex", "face"):
+            found[f"element {element}"] = int(content["length"])
+            continue
+        for name in content["properties"]:
+            if name not in kept:
+                found[f"{element} property {name}"] = int(content["length"])
+    return found

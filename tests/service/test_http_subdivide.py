@@ -1,0 +1,151 @@
+"""The whole service on real files: workers, pipeline and bundled model together."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import httpx2
+import msgspec
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+from service.example import part_glb
+from service.gltf.container import read_glb
+from service.options import Limits
+from service.settings import Settings
+from service.soup_glb import as_gltf_json
+
+GLB = {"Content-Type": "model/gltf-binary"}
+FACES = 1920
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[TestClient]:
+    with TestClient(create_app(Settings(workers=1, faces=100_000))) as opened:
+        for _ in range(600):
+            if opened.get("/readyz").status_code == 200:
+                break
+            time.sleep(0.05)
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def part() -> bytes:
+    return part_glb()
+
+
+def tree_of(glb: bytes) -> dict[str, Any]:
+    return msgspec.json.decode(read_glb(glb).text)
+
+
+def report_of(answer: httpx2.Response) -> dict[str, Any]:
+    assert answer.status_code == 200, answer.text
+    return tree_of(answer.content)["asset"]["extras"]["pns"]
+
+
+def test_a_raw_glb_is_refined_and_carries_its_report(client: TestClient, part: bytes) -> None:
+    answer = client.post("/subdivide?levels=2", content=part, headers=GLB)
+    assert answer.headers["content-type"] == "model/gltf-binary"
+    report = report_of(answer)
+    assert report["scheme"] == "pns"
+    assert report["totals"]["faces"] == 16 * FACES
+    assert [level["faces"] for level in report["levels"]] == [4 * FACES, 16 * FACES]
+    assert tree_of(answer.content)["materials"] == tree_of(part)["materials"]
+    assert "refine;dur=" in answer.headers["server-timing"]
+
+
+def test_every_way_to_send_a_file_gives_the_same_answer(client: TestClient, part: bytes) -> None:
+    raw = client.post("/subdivide", content=part, headers=GLB)
+    for kind in ("application/octet-stream", "model/gltf-binary"):
+        form = client.post("/subdivide", files={"file": ("part.glb", part, kind)})
+        assert form.content == raw.content
+    text = as_gltf_json(part, Limits())
+    as_json = client.post(
+        "/subdivide", content=text, headers={"Content-Type": "model/gltf+json; charset=utf-8"}
+    )
+    in_form = client.post("/subdivide", files={"file": text})
+    assert as_json.content == in_form.content
+    assert report_of(as_json)["levels"] == report_of(raw)["levels"]
+
+
+def test_accept_json_gives_the_same_report_alone(client: TestClient, part: bytes) -> None:
+    whole = client.post("/subdivide", content=part, headers=GLB)
+    alone = client.post("/subdivide", content=part, headers=GLB | {"Accept": "application/json"})
+    assert alone.headers["content-type"] == "application/json"
+    assert alone.json() == report_of(whole)
+
+
+def test_parameters_reach_the_operator(client: TestClient, part: bytes) -> None:
+    query = "/subdivide?scheme=pns&budget=0.25&reference_length=2.5&diagnostics=full"
+    answer = client.post(query, content=part, headers=GLB)
+    report = report_of(answer)
+    assert report["budget"] == 0.25
+    assert report["meshes"][0]["reference_length"] == 2.5
+    attributes = tree_of(answer.content)["meshes"][0]["primitives"][0]["attributes"]
+    assert {"_PNS_RATIO", "_PNS_GATE"} <= set(attributes)
+    loop = client.post("/subdivide?scheme=loop", content=part, headers=GLB)
+    assert report_of(loop)["scheme"] == "loop"
+    bare = client.post("/subdivide?diagnostics=none", content=part, headers=GLB)
+    assert "extras" not in tree_of(bare.content)["asset"]
+
+
+@pytest.mark.parametrize(
+    ("change", "status"),
+    [
+        (lambda part: part[:100], 400),
+        (lambda part: b"{" + part, 400),
+        (lambda part: b"", 400),
+        (lambda part: part.replace(b'"count":', b'"cOunt":'), 422),
+        (lambda part: part.replace(b'"buffer":0', b'"buffer":7'), 422),
+    ],
+)
+def test_broken_files_are_the_clients_fault(
+    client: TestClient, part: bytes, change: Any, status: int
+) -> None:
+    answer = client.post("/subdivide", content=change(part), headers=GLB)
+    assert answer.status_code == status
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+def test_413_for_more_faces_than_allowed_before_they_are_made(
+    client: TestClient, part: bytes
+) -> None:
+    began = time.monotonic()
+    answer = client.post("/subdivide?levels=6", content=part, headers=GLB)
+    assert answer.status_code == 413
+    assert answer.json()["limit"] == "faces"
+    assert answer.json()["found"] == FACES * 4**6
+    assert time.monotonic() - began < 10
+
+
+def test_413_for_a_json_of_64_mib_of_braces(client: TestClient) -> None:
+    text = b'{"asset":[' + b"{}," * 21_000_000 + b"0]}"
+    answer = client.post(
+        "/subdivide", content=text, headers={"Content-Type": "model/gltf+json"}
+    )
+    assert answer.status_code == 413
+    assert answer.json()["limit"].startswith("json")
+
+
+def test_415_in_a_form_for_what_is_no_gltf(client: TestClient) -> None:
+    answer = client.post("/subdivide", files={"file": b"\x89PNG"})
+    assert answer.status_code == 415
+
+
+def test_422_for_a_form_with_two_parts(client: TestClient, part: bytes) -> None:
+    answer = client.post("/subdivide", files=[("file", part), ("file", part)])
+    assert answer.status_code == 422
+    assert answer.json()["code"] == "invalid-multipart"
+
+
+def test_without_a_model_loop_still_works(part: bytes) -> None:
+    settings = Settings(workers=1, model="missing.onnx")
+    with TestClient(create_app(settings)) as client:
+        refused = client.post("/subdivide", content=part, headers=GLB)
+        assert refused.status_code == 503
+        assert refused.json()["code"] == "no-model"
+        assert client.post("/subdivide?scheme=loop", content=part, headers=GLB).status_code == 200
+        assert client.get("/readyz").status_code == 503
