@@ -17,6 +17,8 @@ BYTES_PER_FACE = 350
 BYTES_PER_FACE_WITH_NORMALS = 550
 # A refined face has at most 1.5 vertices: made, cast to float32, written.
 BYTES_PER_VERTEX_BYTE = 3
+# Its arrays' headers, and its accessors in the JSON (9 KiB measured over 20,000 primitives).
+BYTES_PER_PRIMITIVE = 16 * 1024
 # The upload, its decoded JSON, and its bytes again in the answer.
 BYTES_PER_INPUT_BYTE = 4
 
@@ -91,7 +93,7 @@ def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, l
             has_normals = "NORMAL" in primitive.attributes
             base = BYTES_PER_FACE_WITH_NORMALS if has_normals else BYTES_PER_FACE
             faces = _corner_count(document, primitive) // 3 * 4**levels
-            total += faces * (base + BYTES_PER_VERTEX_BYTE * width)
+            total += BYTES_PER_PRIMITIVE + faces * (base + BYTES_PER_VERTEX_BYTE * width)
     return total
 
 

@@ -13,6 +13,8 @@ TRIANGLES, STRIP, FAN = 4, 5, 6
 
 _MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 _DRACO = "KHR_draco_mesh_compression"
+# Extensions of primitives that name vertices by number: refined vertices have other numbers.
+_BY_VERTEX = ("CESIUM_primitive_outline",)
 _SKINNING = re.compile(r"(JOINTS|WEIGHTS)_\d+")
 _GEOMETRY = {"POSITION": "VEC3", "NORMAL": "VEC3", "TANGENT": "VEC4"}
 
@@ -62,6 +64,9 @@ def _refuse_primitive(document: Document, primitive: Primitive, pointer: str) ->
         raise UnsupportedFeature(name, pointer=f"{pointer}/mode")
     if primitive.targets:
         raise UnsupportedFeature("a mesh with morph targets", pointer=f"{pointer}/targets")
+    for name in _BY_VERTEX:
+        if name in primitive.extensions:
+            raise UnsupportedFeature(name, pointer=f"{pointer}/extensions/{name}")
     if "POSITION" not in primitive.attributes:
         raise UnsupportedFeature("a primitive without POSITION", pointer=f"{pointer}/attributes")
     if primitive.indices is not None:

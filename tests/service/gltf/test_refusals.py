@@ -3,6 +3,7 @@
 import base64
 import json
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -169,6 +170,11 @@ UNSUPPORTED = [
         "KHR_draco_mesh_compression",
     ),
     (
+        "/meshes/0/primitives/0/extensions",
+        {"CESIUM_primitive_outline": {"indices": 4}},
+        "CESIUM_primitive_outline",
+    ),
+    (
         "/bufferViews/0/extensions",
         {"EXT_meshopt_compression": {"buffer": 0}},
         "EXT_meshopt_compression",
@@ -211,6 +217,22 @@ def test_a_mesh_shown_by_a_skinned_node_is_refused():
     assert refusal.value.pointer == "/nodes/0/skin"
 
 
+def test_a_deep_tree_of_nodes_is_no_cycle():
+    tree, binary = files.document([octahedron()])
+    tree["nodes"] = [{"children": [number + 1]} for number in range(20_000)] + [{"mesh": 0}]
+    assert refine(files.pack(tree, binary)).report["totals"]["faces"] == 32
+    tree["nodes"][-1]["children"] = [0]
+    with pytest.raises(GltfError, match="ancestor"):
+        refine(files.pack(tree, binary))
+
+
+def test_uris_of_images_are_neither_followed_nor_lost():
+    uris = ["../../etc/passwd", "https://example.com/a.png", "data:image/png;base64,AAAA"]
+    images = [{"uri": uri} for uri in uris]
+    result = refine(edited(put("/images", images)))
+    assert files.unpack(result.glb)[0]["images"] == images
+
+
 def test_an_accessor_without_bytes_allocates_nothing():
     # Four billion points that the file does not hold: glTF reads them as zeros.
     def edit(tree):
@@ -248,6 +270,37 @@ def test_predicted_memory_is_checked():
     with pytest.raises(LimitError) as refusal:
         refine(files.glb([octahedron()]), levels=6, limits=Limits(max_memory_bytes=2**20))
     assert refusal.value.limit == "memory"
+
+
+@pytest.mark.parametrize("levels", [1, 3])
+@pytest.mark.parametrize("smooth", [True, False])
+def test_predicted_memory_bounds_what_is_used(levels, smooth):
+    # Noise over a grid; smooth shares every vertex, the other has one for each corner.
+    n = 64 // 2 ** (levels - 1)
+    x, y = np.meshgrid(np.arange(float(n + 1)), np.arange(n + 1), indexing="ij")
+    height = np.random.default_rng(0).random(x.size)
+    points = np.stack([x.reshape(-1), y.reshape(-1), height], axis=1)
+    corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).reshape(-1, 1)
+    faces = np.concatenate([np.add(corner, [0, n + 1, 1]), np.add(corner, [1, n + 1, n + 2])])
+    if not smooth:
+        points, faces = points[faces.reshape(-1)], np.arange(faces.size).reshape(-1, 3)
+    shape = {
+        "POSITION": points,
+        "NORMAL": np.random.default_rng(1).standard_normal((len(points), 3)),
+        "TEXCOORD_0": points[:, :2],
+        "indices": faces,
+    }
+    data = files.glb([shape])
+    refine(files.glb([octahedron()]), levels=levels)
+    tracemalloc.start()
+    try:
+        refine(data, levels=levels, diagnostics="full")
+        used = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    with pytest.raises(LimitError) as refusal:
+        refine(data, levels=levels, limits=Limits(max_memory_bytes=used))
+    assert used < refusal.value.found < 4 * used
 
 
 def test_many_primitives_over_one_large_accessor_count_as_they_cost():
