@@ -1,0 +1,58 @@
+"""Normals and tangents against an independent implementation, and where they have no direction."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from pns_common.blocks import Blocks
+from service.gltf.normals import angle_weighted_normals, perpendicular_tangents, safe_unit
+
+BLOCKS = Blocks(threads=1, rows=100)
+
+
+def test_normals_equal_trimesh_on_a_smooth_surface():
+    sphere = trimesh.creation.icosphere(subdivisions=2)
+    rng = np.random.default_rng(0)
+    points = sphere.vertices + 0.05 * rng.standard_normal(sphere.vertices.shape)
+    faces = sphere.faces.astype(np.int64)
+    ours = angle_weighted_normals(points, faces, faces, np.zeros_like(points), BLOCKS)
+    theirs = trimesh.Trimesh(points, faces, process=False).vertex_normals
+    np.testing.assert_allclose(ours, theirs, atol=1e-9)
+
+
+def test_a_triangulation_of_a_cube_does_not_bend_its_normals():
+    # The point of angles as weights: a corner of a cube is symmetric however its sides are cut.
+    cube = trimesh.creation.box()
+    faces = cube.faces.astype(np.int64)
+    normals = angle_weighted_normals(cube.vertices, faces, faces, np.zeros((8, 3)), BLOCKS)
+    np.testing.assert_allclose(normals, np.sign(cube.vertices) / np.sqrt(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("scale", [1e-38, 1e-10, 1.0, 1e38])
+def test_normals_do_not_depend_on_the_unit_of_length(scale):
+    points = scale * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    faces = np.array([[0, 1, 2]])
+    normals = angle_weighted_normals(points, faces, faces, np.zeros((3, 3)), BLOCKS)
+    np.testing.assert_allclose(normals, [[0, 0, 1]] * 3, atol=1e-12)
+
+
+def test_groups_without_area_take_the_fallback():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
+    line, pair = [[0, 1, 2]], [[0, 1, 3], [1, 0, 3]]
+    fallback = np.array([[0.0, 2, 0], [0, 0, 0], [1, 0, 0], [0, 0, -1]])
+    expected = [[0, 1, 0], [0, 0, 1], [1, 0, 0], [0, 0, -1]]
+    for faces in (np.array(line), np.array(pair)):
+        normals = angle_weighted_normals(points, faces, faces, fallback, BLOCKS)
+        used = np.unique(faces)
+        np.testing.assert_array_equal(normals[used], np.array(expected)[used])
+
+
+def test_tangents_along_the_normal_are_replaced_by_a_perpendicular():
+    rng = np.random.default_rng(0)
+    normals = safe_unit(rng.standard_normal((50, 3)))
+    tangents = np.concatenate([2 * normals[:20], 0 * normals[20:30], rng.standard_normal((20, 3))])
+    flat = perpendicular_tangents(tangents, normals)
+    np.testing.assert_allclose(np.linalg.norm(flat, axis=1), 1, atol=1e-12)
+    np.testing.assert_allclose((flat * normals).sum(axis=1), 0, atol=1e-12)
+    # A tangent that has a direction keeps its side.
+    assert ((flat * tangents).sum(axis=1)[30:] > 0).all()

@@ -1,0 +1,47 @@
+"""Errors cross from worker processes: what they carry must arrive."""
+
+import inspect
+import pickle
+
+import pytest
+
+from service import errors
+from service.errors import ServiceError
+
+EXAMPLES = [
+    errors.ServiceError("plain", pointer="/a"),
+    errors.UnreadableError("cut off"),
+    errors.LimitError("too many", limit="faces", allowed=1, found=2, pointer="/meshes"),
+    errors.MediaTypeError("text/html"),
+    errors.GltfError("index 9", pointer="/accessors/3"),
+    errors.UnsupportedFeature("a triangle strip", pointer="/meshes/0"),
+    errors.UnrefinableError("no face"),
+    errors.InvalidParameter("levels", "levels is 9"),
+    errors.BusyError(retry_after=7),
+    errors.NoModelError("none"),
+    errors.JobTimeout("60 s"),
+    errors.WorkerDied("signal 9"),
+]
+
+
+def test_every_kind_has_an_example():
+    kinds = {kind for _, kind in inspect.getmembers(errors, inspect.isclass)}
+    assert {type(error) for error in EXAMPLES} == {k for k in kinds if issubclass(k, ServiceError)}
+
+
+@pytest.mark.parametrize("error", EXAMPLES, ids=lambda error: type(error).__name__)
+def test_errors_survive_pickling_with_all_their_data(error):
+    copy = pickle.loads(pickle.dumps(error))
+    assert type(copy) is type(error)
+    assert vars(copy) == vars(error)
+    assert str(copy) == str(error)
+
+
+def test_codes_are_slugs_of_their_own():
+    codes = [type(error).code for error in EXAMPLES]
+    assert len(set(codes)) == len(codes)
+    assert all(code == code.lower().replace(" ", "-") for code in codes)
+
+
+def test_the_text_names_the_place():
+    assert str(errors.GltfError("index 9", pointer="/accessors/3")) == "index 9 (at /accessors/3)"
