@@ -15,6 +15,7 @@ RUN /opt/pns/bin/python -m pip install --constraint constraints.txt . \
 FROM python:3.11-slim-bookworm
 COPY --from=build /opt/pns /opt/pns
 # One thread a library: the workers are the parallelism, and a pids limit counts threads.
+# Two workers of PNS_MEMORY each fit in 1 GiB beside what they take at rest: raise it with --memory.
 ENV PATH=/opt/pns/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
@@ -22,7 +23,7 @@ ENV PATH=/opt/pns/bin:$PATH \
     OPENBLAS_NUM_THREADS=1 \
     PNS_HOST=0.0.0.0 \
     PNS_PORT=8000 \
-    PNS_MEMORY=512MiB
+    PNS_MEMORY=384MiB
 USER 10001:10001
 WORKDIR /tmp
 EXPOSE 8000
