@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from pns_common.blocks import Blocks, available_threads
 from service.gltf.control_mesh import ControlMesh, slices
 from service.gltf.lattice import Lattice
-from service.gltf.normals import angle_weighted_normals
+from service.gltf.normals import angle_weighted_normals, safe_unit
 from service.gltf.spread import Spread, spread
 from service.weld import as_words, canonical_zero, distinct_rows, number_by_first_appearance
 
@@ -51,9 +51,12 @@ def recompute_normals(
         points,
         used[:, grid.faces.reshape(-1)].reshape(-1, 3),
         groups.refined_faces,
-        fallback=groups.linear(before),
-        blocks=Blocks(threads=available_threads()),
+        groups.count,
+        Blocks(threads=available_threads()),
     )
+    undefined = np.flatnonzero(~values.any(axis=1))
+    if len(undefined):
+        values[undefined] = safe_unit(groups.linear(before)[undefined])
     shares = slices([len(ids[number]) for number in chosen])
     return NormalGroups(
         values, {number: groups.ids[at] for number, at in zip(chosen, shares, strict=True)}

@@ -44,7 +44,7 @@ class Spread:
         t = self._edge_parameter[:, None]
         start, end = (corners[self.edges[:, side], None] for side in (0, 1))
         weights = self.lattice.points[self.lattice.inner] / self.lattice.segments
-        inner = np.einsum("ij,fjk->fik", weights, corners[self.faces])
+        inner = sum(weights[:, k, None] * corners[self.faces[:, k], None] for k in range(3))
         parts = [corners, (1 - t) * start + t * end, inner]
         return np.concatenate([part.reshape(-1, values.shape[1]) for part in parts])
 
