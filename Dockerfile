@@ -6,10 +6,7 @@ RUN python -m venv /opt/pns
 COPY constraints.txt pyproject.toml README.md LICENSE ./
 COPY pns_common pns_common
 COPY service service
-COPY train train
-COPY export export
-RUN /opt/pns/bin/python -m pip install --constraint constraints.txt . \
- && find /opt/pns -name tests -type d -prune -exec rm -rf {} +
+RUN /opt/pns/bin/python -m pip install --constraint constraints.txt .
 
 # Run: the environment alone, as a user without a name, on a root that may be read-only.
 FROM python:3.11-slim-bookworm

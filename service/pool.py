@@ -83,7 +83,11 @@ class Workers:
             raise BusyError(f"no worker became free in {self._seconds:g} seconds") from error
 
     async def _call(self, pool: ProcessPool, function: Callable[..., T], *arguments: object) -> T:
-        future = pool.schedule(worker.call, args=(function, *arguments), timeout=self._seconds)
+        try:
+            future = pool.schedule(worker.call, args=(function, *arguments), timeout=self._seconds)
+        except RuntimeError as error:
+            # The process could not be started, or has died since the pool was looked at.
+            raise WorkerDied("no worker process could be started") from error
         try:
             return await asyncio.wrap_future(future)
         except TimeoutError as error:

@@ -58,9 +58,8 @@ def tree_of(path: Path) -> dict[str, Any]:
 
 def test_example_then_subdivide_as_the_readme_has_it(pns: Any, tmp_path: Path) -> None:
     assert pns("example", "part.glb").code == 0
-    outcome = pns(
-        *["subdivide", "part.glb", "-o", "part2.glb", "--levels", "2", "--report", "report.json"]
-    )
+    command = "subdivide part.glb -o part2.glb --levels 2 --report report.json"
+    outcome = pns(*command.split())
     assert outcome.code == 0
     assert outcome.out == ""
     assert f"{16 * FACES:,} faces" in outcome.err

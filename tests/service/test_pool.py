@@ -7,9 +7,11 @@ import os
 import signal
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import asynccontextmanager
 
 import pytest
+from pebble import ProcessPool
 
 from service.errors import BusyError, GltfError, JobTimeout, WorkerDied
 from service.pool import Workers
@@ -147,6 +149,24 @@ def test_ready_once_a_worker_has_warmed_up() -> None:
         async with workers(warm_up=jobs.refuse) as pool:
             await pool.run(jobs.nothing)
             assert not pool.ready
+
+    run(scenario)
+
+
+def test_a_process_that_cannot_be_started_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    schedule = ProcessPool.schedule
+    refusals = [BrokenProcessPool("no more processes")]
+
+    def refuses_once(pool: ProcessPool, *arguments: object, **options: object) -> object:
+        if refusals:
+            raise refusals.pop()
+        return schedule(pool, *arguments, **options)
+
+    monkeypatch.setattr(ProcessPool, "schedule", refuses_once)
+
+    async def scenario() -> None:
+        async with workers() as pool:
+            assert await pool.run(jobs.sleep, 0.0) == "slept"
 
     run(scenario)
 
