@@ -6,6 +6,7 @@ import trimesh
 
 from pns_common.blocks import Blocks
 from service.gltf.normals import angle_weighted_normals, perpendicular_tangents, safe_unit
+from service.gltf.smoothing import joined_normals
 
 BLOCKS = Blocks(threads=1, rows=100)
 
@@ -58,3 +59,25 @@ def test_tangents_along_the_normal_are_replaced_by_a_perpendicular():
     np.testing.assert_allclose((flat * normals).sum(axis=1), 0, atol=1e-12)
     # A tangent that has a direction keeps its side.
     assert ((flat * tangents).sum(axis=1)[30:] > 0).all()
+
+
+def test_rows_join_by_vertex_and_normal():
+    rng = np.random.default_rng(0)
+    directions = safe_unit(rng.standard_normal((40, 3)))
+    which, vertex = rng.integers(0, 40, 400), rng.integers(0, 5, 400)
+    labels = joined_normals(vertex, directions[which])
+    expected = (which[:, None] == which) & (vertex[:, None] == vertex)
+    np.testing.assert_array_equal(labels[:, None] == labels, expected)
+
+
+def test_normals_that_differ_by_rounding_are_one_and_by_a_degree_are_two():
+    def tilted(degrees):
+        return [np.sin(np.radians(degrees)), 0, np.cos(np.radians(degrees))]
+
+    normals = np.array([tilted(0), tilted(0.01), tilted(1), tilted(1.01), tilted(-0.01)])
+    assert joined_normals(np.zeros(5, dtype=np.int64), normals).tolist() == [0, 0, 1, 1, 0]
+
+
+def test_zeros_of_either_sign_are_one_normal():
+    normals = np.array([[0.0, 0.0, 1.0], [-0.0, -0.0, 1.0]])
+    assert joined_normals(np.zeros(2, dtype=np.int64), normals).tolist() == [0, 0]
