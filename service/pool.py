@@ -18,6 +18,8 @@ T = TypeVar("T")
 
 # Where a fresh process cannot even warm up, the next one is not started at once.
 RESTART_SECONDS = 1.0
+# A warm-up imports and loads; a short limit on jobs must not keep every worker from starting.
+WARM_UP_SECONDS = 120.0
 
 log = logging.getLogger("pns.service")
 
@@ -62,7 +64,7 @@ class Workers:
         """
         pool = await self._take()
         try:
-            value = await self._call(pool, function, *arguments)
+            value = await self._call(pool, self._seconds, function, *arguments)
         except (JobTimeout, WorkerDied, asyncio.CancelledError):
             self._in_background(self._replace(pool))
             raise
@@ -82,16 +84,18 @@ class Workers:
         except TimeoutError as error:
             raise BusyError(f"no worker became free in {self._seconds:g} seconds") from error
 
-    async def _call(self, pool: ProcessPool, function: Callable[..., T], *arguments: object) -> T:
+    async def _call(
+        self, pool: ProcessPool, seconds: float, function: Callable[..., T], *arguments: object
+    ) -> T:
         try:
-            future = pool.schedule(worker.call, args=(function, *arguments), timeout=self._seconds)
+            future = pool.schedule(worker.call, args=(function, *arguments), timeout=seconds)
         except RuntimeError as error:
             # The process could not be started, or has died since the pool was looked at.
             raise WorkerDied("no worker process could be started") from error
         try:
             return await asyncio.wrap_future(future)
         except TimeoutError as error:
-            raise JobTimeout(f"the job ran longer than {self._seconds:g} seconds") from error
+            raise JobTimeout(f"the job ran longer than {seconds:g} seconds") from error
         except (ProcessExpired, BrokenProcessPool) as error:
             raise WorkerDied(
                 "the worker process ended before it answered; it may have run out of memory"
@@ -106,7 +110,7 @@ class Workers:
         )
         self._pools.add(pool)
         try:
-            await self._call(pool, self._warm_up)
+            await self._call(pool, WARM_UP_SECONDS, self._warm_up)
         except (JobTimeout, WorkerDied) as error:
             log.warning("a worker did not start: %s", error)
             await asyncio.sleep(RESTART_SECONDS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack
@@ -26,6 +27,8 @@ from service.settings import Settings
 
 if TYPE_CHECKING:
     from pns_common.schemes import Model
+
+log = logging.getLogger("pns.service")
 
 T = TypeVar("T")
 Job = Callable[[Work], dict[str, float]]
@@ -102,11 +105,15 @@ async def _subdivide(service: Service, request: Request, parameters: Parameters)
             stages = await _unless_gone(request.receive, service.workers.run(service.job, work))
             finished = time.perf_counter()
         timing = {"upload": uploaded - began, **stages, "total": finished - began}
+        stages_text = _server_timing(timing)
+        log.info(
+            "%s levels=%d: %d bytes; %s", options.scheme, options.levels, answer.size, stages_text
+        )
         return FileAnswer(
             answer,
             held.pop_all(),
             media_type="application/json" if report_only else media.GLB,
-            headers={"Server-Timing": _server_timing(timing), "Vary": "Accept"},
+            headers={"Server-Timing": stages_text, "Vary": "Accept"},
             stall_seconds=settings.stall_seconds,
         )
 

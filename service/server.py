@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from types import FrameType
 
 import uvicorn
@@ -10,6 +11,9 @@ import uvicorn
 from service.app import create_app
 from service.gate import Gate
 from service.settings import Settings
+
+# After draining, what is still in the sockets' buffers may go out.
+FLUSH_SECONDS = 2
 
 
 class DrainingServer(uvicorn.Server):
@@ -43,12 +47,15 @@ class DrainingServer(uvicorn.Server):
 
 def serve(settings: Settings) -> None:
     """Serve until a signal comes."""
+    # uvicorn configures its own loggers only; this one is for the service's lines.
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s:     %(message)s")
+    logging.getLogger("pns").setLevel(logging.INFO)
     app = create_app(settings)
     config = uvicorn.Config(
         app,
         host=settings.host,
         port=settings.port,
         server_header=False,
-        timeout_graceful_shutdown=max(1, round(settings.drain_seconds)),
+        timeout_graceful_shutdown=FLUSH_SECONDS,
     )
     DrainingServer(config, app.state.gate, settings.drain_seconds).run()

@@ -9,11 +9,30 @@ import os
 import re
 import signal
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from pns_common.model_card import ModelCard
 from service import memory_file
 from service.errors import GltfError, LimitError, UnreadableError
 from service.jobs import Work
+
+
+ZERO_CARD = ModelCard(1, "paper-5", 10.0, 0.5, "first-face", {}, {})
+
+
+@dataclass(frozen=True)
+class ZeroModel:
+    """A model that corrects nothing, and crosses to the workers by pickling."""
+
+    card: ModelCard = ZERO_CARD
+    name: str = "zero"
+    hash: str = "0" * 64
+
+    def __call__(self, features: np.ndarray, budget: float) -> np.ndarray:
+        return np.zeros((len(features), 3))
 
 
 def no_warm_up(model: object) -> None:

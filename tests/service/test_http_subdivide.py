@@ -17,6 +17,7 @@ from service.gltf.container import read_glb
 from service.options import Limits
 from service.settings import Settings
 from service.soup_glb import as_gltf_json
+from tests.service.stand_in_jobs import ZeroModel
 
 GLB = {"Content-Type": "model/gltf-binary"}
 FACES = 1920
@@ -123,9 +124,7 @@ def test_413_for_more_faces_than_allowed_before_they_are_made(
 
 def test_413_for_a_json_of_64_mib_of_braces(client: TestClient) -> None:
     text = b'{"asset":[' + b"{}," * 21_000_000 + b"0]}"
-    answer = client.post(
-        "/subdivide", content=text, headers={"Content-Type": "model/gltf+json"}
-    )
+    answer = client.post("/subdivide", content=text, headers={"Content-Type": "model/gltf+json"})
     assert answer.status_code == 413
     assert answer.json()["limit"].startswith("json")
 
@@ -139,6 +138,13 @@ def test_422_for_a_form_with_two_parts(client: TestClient, part: bytes) -> None:
     answer = client.post("/subdivide", files=[("file", part), ("file", part)])
     assert answer.status_code == 422
     assert answer.json()["code"] == "invalid-multipart"
+
+
+def test_a_model_given_to_the_application_is_the_one_that_runs(part: bytes) -> None:
+    with TestClient(create_app(Settings(workers=1), model=ZeroModel())) as client:
+        report = report_of(client.post("/subdivide", content=part, headers=GLB))
+    assert report["model"] == "zero"
+    assert report["levels"][0]["proximity_ratio"]["max"] == 0
 
 
 def test_without_a_model_loop_still_works(part: bytes) -> None:

@@ -9,6 +9,7 @@ import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import asynccontextmanager
+from functools import partial
 
 import pytest
 from pebble import ProcessPool
@@ -123,6 +124,17 @@ def test_cancelling_a_job_that_waits_kills_nothing() -> None:
             await asyncio.sleep(0.2)
             waiting.cancel()
             assert await running == "slept"
+
+    run(scenario)
+
+
+def test_a_warm_up_may_take_longer_than_a_job() -> None:
+    async def scenario() -> None:
+        async with workers(seconds=0.3, warm_up=partial(jobs.sleep, 1.0)) as pool:
+            while not pool.ready:
+                await asyncio.sleep(0.1)
+            with pytest.raises(JobTimeout):
+                await pool.run(jobs.sleep, 5.0)
 
     run(scenario)
 
