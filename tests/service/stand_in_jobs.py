@@ -19,7 +19,6 @@ from service import memory_file
 from service.errors import GltfError, LimitError, UnreadableError
 from service.jobs import Work
 
-
 ZERO_CARD = ModelCard(1, "paper-5", 10.0, 0.5, "first-face", {}, {})
 
 
