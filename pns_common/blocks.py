@@ -29,6 +29,14 @@ class Blocks:
             # list() so that an error in a worker is raised here.
             list(pool.map(work, slices))
 
+    def count(self, rows: int) -> int:
+        """How many blocks ``run`` makes of so many rows."""
+        return -(-rows // self.rows)
+
+    def number(self, rows: slice) -> int:
+        """Which block it is."""
+        return rows.start // self.rows
+
     def _slices(self, count: int) -> Iterator[slice]:
         for start in range(0, count, self.rows):
             yield slice(start, min(start + self.rows, count))

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TypedDict
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from pns_common.arrays import cross, dot, gather
 from pns_common.blocks import Blocks
-from pns_common.frames import face_normals
+from pns_common.frames import triangle_normals
 from pns_common.schemes import Placement
-from pns_common.topology import EdgeClass, Topology, child_face_pairs
+from pns_common.topology import CHILDREN, EdgeClass, Topology, children_across
 
 # A gate above this counts as active.
 GATE_ACTIVE = 0.01
@@ -57,64 +57,76 @@ class LevelReport(TypedDict):
 
 @dataclass(frozen=True, eq=False)
 class ChildFaces:
-    """The faces that a step made: unit normals, and how many oppose their Loop counterpart."""
+    """The faces that a step made.
+
+    Attributes:
+        normals: unit normals, 0 where a face has no area.
+        flipped: number of faces whose normal opposes that of their Loop counterpart.
+        normal_jump_max: largest angle (radians, 0 … π) between the normals of two faces that share
+            an interior edge; faces without area are left out.
+    """
 
     normals: Float[np.ndarray, "F 3"]
     flipped: int
+    normal_jump_max: float
 
 
 def child_faces(
+    topology: Topology,
     points: Float[np.ndarray, "V 3"],
     displacement: Float[np.ndarray, "V 3"] | None,
-    faces: Int[np.ndarray, "F 3"],
     blocks: Blocks,
 ) -> ChildFaces:
-    """Normals of refined faces; a face is flipped if its normal opposes that of Loop's face.
+    """Look at the faces that ``topology`` was split into.
 
-    ``displacement`` is what the points stand away from Loop's, None if nothing.
+    ``points`` are old vertices, then edge vertices; ``displacement`` is how far they stand from
+    Loop's, None if nowhere.
     """
-    normals = np.empty((len(faces), 3))
-    flipped = np.zeros(len(faces), dtype=bool)
+    normals = np.empty((len(topology.faces), 4, 3))
+    flipped = np.zeros(len(topology.faces), dtype=np.int64)
+    inside = np.zeros(blocks.count(len(topology.faces)))
 
-    def block(rows: slice) -> None:
-        normals[rows] = face_normals(points, faces[rows])
-        if displacement is None:
-            return
-        a, b, c = (
-            gather(points, faces[rows, i]) - gather(displacement, faces[rows, i]) for i in range(3)
+    def look_inside(rows: slice) -> None:
+        six = np.concatenate(
+            [topology.faces[rows], topology.face_edges[rows] + topology.vertex_count], axis=1
+        ).T
+        corners = [gather(points, vertex) for vertex in six]
+        four = [triangle_normals(*(corners[i] for i in child)) for child in CHILDREN]
+        for child, normal in enumerate(four):
+            normals[rows, child] = normal
+        inside[blocks.number(rows)] = max(_largest_chord(four[3], normal) for normal in four[:3])
+        if displacement is not None:
+            loops = [p - gather(displacement, v) for p, v in zip(corners, six, strict=True)]
+            for child, normal in zip(CHILDREN, four, strict=True):
+                a, b, c = (loops[i] for i in child)
+                flipped[rows] += dot(cross(b - a, c - a), normal) < 0
+
+    blocks.run(len(topology.faces), look_inside)
+    normals = normals.reshape(-1, 3)
+    across = np.zeros(blocks.count(len(topology.interior)))
+
+    def look_across(rows: slice) -> None:
+        pairs = children_across(topology, topology.interior[rows])
+        across[blocks.number(rows)] = max(
+            _largest_chord(gather(normals, pair[:, 0]), gather(normals, pair[:, 1]))
+            for pair in pairs
         )
-        flipped[rows] = dot(cross(b - a, c - a), normals[rows]) < 0
 
-    blocks.run(len(faces), block)
-    return ChildFaces(normals, int(flipped.sum()))
-
-
-def normal_jump_max(
-    normals: Float[np.ndarray, "F 3"], pairs: Int[np.ndarray, "P 2"], blocks: Blocks
-) -> float:
-    """Largest angle (radians, 0 … π) between the normals of faces that share an interior edge.
-
-    Faces without area have no normal and are left out.
-    """
-    largest = np.zeros(-(-len(pairs) // blocks.rows))
-
-    def block(rows: slice) -> None:
-        n1, n2 = gather(normals, pairs[rows, 0]), gather(normals, pairs[rows, 1])
-        defined = (dot(n1, n1) > 0) & (dot(n2, n2) > 0)
-        chord = n1 - n2
-        largest[rows.start // blocks.rows] = np.max(dot(chord, chord), initial=0, where=defined)
-
-    blocks.run(len(pairs), block)
+    blocks.run(len(topology.interior), look_across)
+    chord = np.sqrt(max(inside.max(initial=0), across.max(initial=0)))
     # The chord keeps small angles that 1 − cos would round away.
-    return float(2 * np.arcsin(min(1.0, np.sqrt(largest.max(initial=0)) / 2)))
+    return ChildFaces(normals, int(flipped.sum()), float(2 * np.arcsin(min(1.0, chord / 2))))
+
+
+def _largest_chord(n1: Float[np.ndarray, "N 3"], n2: Float[np.ndarray, "N 3"]) -> float:
+    """The largest squared distance between the normals of a pair that both have one."""
+    chord = n1 - n2
+    defined = (dot(n1, n1) > 0) & (dot(n2, n2) > 0)
+    return float(np.max(dot(chord, chord), initial=0, where=defined))
 
 
 def level_report(
-    topology: Topology,
-    vertices: Placement,
-    edges: Placement,
-    children: ChildFaces,
-    blocks: Blocks,
+    topology: Topology, vertices: Placement, edges: Placement, children: ChildFaces
 ) -> LevelReport:
     """Summarise the step that refined ``topology``."""
     interior = topology.interior
@@ -141,5 +153,5 @@ def level_report(
             "max": float(gate.max(initial=0)),
             "active": float((gate > GATE_ACTIVE).mean()) if corrected else 0.0,
         },
-        "normal_jump_max": normal_jump_max(children.normals, child_face_pairs(topology), blocks),
+        "normal_jump_max": children.normal_jump_max,
     }

@@ -49,7 +49,13 @@ class EdgeFrames:
 
 def face_normals(points: Float[Array, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Float[Array, "F 3"]:
     """Unit normals (b − a) × (c − a), anticlockwise faces seen from outside; 0 without area."""
-    a, b, c = (gather(points, faces[:, corner]) for corner in range(3))
+    return triangle_normals(*(gather(points, faces[:, corner]) for corner in range(3)))
+
+
+def triangle_normals(
+    a: Float[Array, "N 3"], b: Float[Array, "N 3"], c: Float[Array, "N 3"]
+) -> Float[Array, "N 3"]:
+    """Unit normals of triangles; 0 where they have no area."""
     u, v = b - a, c - a
     return unit_longer_than(cross(u, v), NO_AREA * (dot(u, u) + dot(v, v)))
 

@@ -14,6 +14,7 @@ from pns_common.arrays import norm
 from pns_common.blocks import Blocks, available_threads
 from pns_common.diagnostics import LevelReport, child_faces, level_report
 from pns_common.errors import ParameterError
+from pns_common.frames import face_normals
 from pns_common.mesh import Mesh
 from pns_common.schemes import ControlLevel, Placement, Scheme
 from pns_common.topology import build_topology, multi_fan_vertices, split
@@ -78,7 +79,7 @@ def refine(
     done, total = 0, sum(len(mesh.faces) * 4**level for level in range(1, levels + 1))
 
     points, faces = mesh.vertices, mesh.faces
-    normals = child_faces(points, None, faces, blocks).normals
+    normals = face_normals(points, faces)
     reports: list[LevelReport] = []
     several_fans = 0
     edges: Placement | None = None
@@ -90,9 +91,9 @@ def refine(
         vertices, edges = scheme.vertex_rule(control), scheme.edge_rule(control)
         points = np.concatenate([vertices.positions, edges.positions])
         faces = split(topology)
-        children = child_faces(points, _displacement(vertices, edges), faces, blocks)
+        children = child_faces(topology, points, _displacement(vertices, edges), blocks)
         normals = children.normals
-        reports.append(level_report(topology, vertices, edges, children, blocks))
+        reports.append(level_report(topology, vertices, edges, children))
         done += len(faces)
         if progress is not None:
             progress(done, total)

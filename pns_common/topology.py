@@ -14,6 +14,9 @@ from jaxtyping import Bool, Int
 
 from pns_common.mesh import repeated_vertex
 
+# The children of a face, by its corners a, b, c (0, 1, 2) and edge vertices ab, bc, ca (3, 4, 5).
+CHILDREN = np.array([(0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)])
+
 
 class EdgeClass(IntEnum):
     """What an edge is to the rules."""
@@ -96,8 +99,8 @@ def build_topology(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Topology
     interior = np.flatnonzero(edge_class == EdgeClass.INTERIOR)
     stencil = np.full((len(edges), 4), -1, dtype=np.int64)
     stencil[:, :2] = edges
-    end_corner = next_corner(half_edges[interior], len(faces))
-    stencil[interior, 2:] = np.take(start, next_corner(end_corner, len(faces)))
+    end_corner = next_corner(half_edges[interior])
+    stencil[interior, 2:] = np.take(start, next_corner(end_corner))
     return Topology(
         vertex_count=vertex_count,
         faces=faces,
@@ -113,33 +116,22 @@ def build_topology(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Topology
 def split(topology: Topology) -> Int[np.ndarray, "C 3"]:
     """Split 1-to-4: face f becomes (a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca).
 
-    The vertex of edge e is V + e; old vertices keep their numbers.
+    These are faces 4f … 4f+3. The vertex of edge e is V + e; old vertices keep their numbers.
     """
-    a, b, c = topology.faces.T
-    ab, bc, ca = (topology.face_edges + topology.vertex_count).T
-    children = np.empty((len(topology.faces), 4, 3), dtype=np.int64)
-    for child, corners in enumerate([(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]):
-        for corner, vertex in enumerate(corners):
-            children[:, child, corner] = vertex
-    return children.reshape(-1, 3)
+    middles = topology.face_edges + topology.vertex_count
+    six = np.concatenate([topology.faces, middles], axis=1)  # a, b, c, ab, bc, ca
+    return np.take(six, CHILDREN.reshape(-1), axis=1).reshape(-1, 3)
 
 
-def child_face_pairs(topology: Topology) -> Int[np.ndarray, "P 2"]:
-    """Pairs of faces of the split mesh that share an interior edge, without building its edges.
+def children_across(topology: Topology, edges: Int[np.ndarray, " N"]) -> Int[np.ndarray, "2 N 2"]:
+    """The faces of the split mesh that meet across interior edges: pairs at one end, at the other.
 
-    Each face's centre child meets its three corner children; across an interior edge the children
-    at either end meet.
+    Corner i of face f keeps child 4f + i, and one face's half-edge starts where the other's ends.
     """
-    centre = 4 * np.arange(len(topology.faces), dtype=np.int64)[:, None] + 3
-    inside = np.stack([np.broadcast_to(centre, (len(centre), 3)), centre - [3, 2, 1]], axis=-1)
-    start = topology.half_edges[topology.interior]
-    end = next_corner(start, len(topology.faces))
-    # One face's half-edge starts where the other's ends.
-    across = [
-        np.stack([_corner_child(p), _corner_child(q)], axis=-1)
-        for p, q in [(start[:, 0], end[:, 1]), (end[:, 0], start[:, 1])]
-    ]
-    return np.concatenate([inside.reshape(-1, 2), *across])
+    start = topology.half_edges[edges]
+    end = next_corner(start)
+    children = [corners + corners // 3 for corners in (start, end)]
+    return np.stack([np.stack([children[i][:, 0], children[1 - i][:, 1]], axis=-1) for i in (0, 1)])
 
 
 def sharp_edge_count(topology: Topology) -> Int[np.ndarray, " V"]:
@@ -179,22 +171,16 @@ def stable_order(key: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
     return np.argsort(key, kind="stable")
 
 
-def next_corner(corner: Int[np.ndarray, "..."], face_count: int) -> Int[np.ndarray, "..."]:
+def next_corner(corner: Int[np.ndarray, "..."]) -> Int[np.ndarray, "..."]:
     """The corner 3 f + (i + 1) mod 3 after corner 3 f + i of the same face."""
-    # A table: numpy looks up much faster than it takes remainders.
-    following = np.arange(3 * face_count).reshape(-1, 3)[:, [1, 2, 0]].reshape(-1)
-    return np.take(following, corner)
-
-
-def _corner_child(corner: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    """The child 4 f + i of face f that keeps corner 3 f + i."""
-    return corner + corner // 3
+    place = corner - 3 * (corner // 3)  # numpy divides much faster than it takes remainders
+    return corner + 1 - 3 * (place == 2)
 
 
 def _next_around_vertex(topology: Topology) -> Int[np.ndarray, " K"]:
     """For each corner the next one around its vertex, across the half-edge that leaves it."""
     start = topology.half_edges[topology.interior]
-    end = next_corner(start, len(topology.faces))
+    end = next_corner(start)
     following = np.full(topology.faces.size, -1, dtype=np.int64)
     following[start] = end[:, ::-1]
     return following

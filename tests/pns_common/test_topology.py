@@ -8,7 +8,7 @@ from pns_common import Mesh
 from pns_common.topology import (
     EdgeClass,
     build_topology,
-    child_face_pairs,
+    children_across,
     multi_fan_vertices,
     split,
     stable_order,
@@ -67,12 +67,15 @@ def test_split_numbers_vertices_and_faces_as_promised(mesh):
 
 
 @given(soups() | manifolds())
-def test_child_face_pairs_are_the_interior_edges_of_the_split_mesh(mesh):
+def test_children_inside_and_across_are_the_interior_edges_of_the_split_mesh(mesh):
     topology = build_topology(mesh.faces, len(mesh.vertices))
     count = topology.vertex_count + len(topology.edges)
     child = build_topology(split(topology), count)
     expected = sorted(map(sorted, child.edge_faces[child.interior].tolist()))
-    found = sorted(map(sorted, child_face_pairs(topology).tolist()))
+    centres = 4 * np.arange(len(mesh.faces)) + 3
+    inside = [[centre, centre - i] for centre in centres.tolist() for i in (1, 2, 3)]
+    across = np.concatenate(children_across(topology, topology.interior)).tolist()
+    found = sorted(map(sorted, inside + across))
     proper = all(len(set(face)) == 3 for face in mesh.faces.tolist())
     if proper:
         assert found == expected
