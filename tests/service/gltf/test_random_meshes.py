@@ -1,0 +1,97 @@
+"""Messy meshes by chance: few vertices and many faces make every irregularity there is."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pns_common.mesh import Mesh, clean
+from pns_common.refine import refine
+from pns_common.schemes import loop
+from service.options import Limits, Options
+from service.subdivide import subdivide_gltf
+from service.weld import weld
+from tests.networks import random_model
+from tests.service.gltf import files
+
+MODEL = random_model(0)
+# Positions from a small grid: coincident vertices, flat faces and zero lengths are common.
+POINT = st.tuples(*[st.integers(-1, 1)] * 3)
+
+
+@st.composite
+def primitives(draw):
+    """A triangle primitive with attributes by chance."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    count = draw(st.integers(3, 7))
+    shape = {"POSITION": np.array(draw(st.lists(POINT, min_size=count, max_size=count)), float)}
+    faces = rng.integers(0, count, (draw(st.integers(1, 12)), 3))
+    if draw(st.booleans()):
+        shape["indices"] = faces.astype(draw(st.sampled_from([np.uint8, np.uint16, np.uint32])))
+    else:
+        shape["POSITION"] = shape["POSITION"][faces.reshape(-1)]
+    rows = len(shape["POSITION"])
+    if draw(st.booleans()):
+        shape["NORMAL"] = rng.integers(-1, 2, (rows, 3)).astype(float)
+    if draw(st.booleans()):
+        shape["TANGENT"] = rng.integers(-1, 2, (rows, 4)).astype(float)
+    if draw(st.booleans()):
+        shape["TEXCOORD_0"] = rng.random((rows, 2))
+    if draw(st.booleans()):
+        colours = rng.integers(0, 3, (rows, draw(st.sampled_from([3, 4]))), dtype=np.uint8)
+        shape["COLOR_0"] = files.Normalized(colours)
+    if draw(st.booleans()):
+        shape["_ID"] = rng.integers(0, 3, (rows, 1), dtype=np.uint16)
+    return shape
+
+
+def corners_of(shape):
+    indices = shape.get("indices", np.arange(len(shape["POSITION"]))).reshape(-1, 3)
+    return indices.astype(np.int64)
+
+
+@given(st.lists(primitives(), min_size=1, max_size=4), st.integers(1, 2))
+def test_any_mesh_comes_back_refined(mesh, levels):
+    data = files.glb(mesh)
+    options = Options(levels=levels, scheme="loop")
+    result = subdivide_gltf(data, "glb", options, None, Limits())
+
+    # What the operator makes of the same triangles, put together here.
+    starts = np.cumsum([0, *(len(shape["POSITION"]) for shape in mesh)])
+    joined = weld(
+        np.concatenate([shape["POSITION"] for shape in mesh]),
+        np.concatenate([corners_of(s) + n for s, n in zip(mesh, starts, strict=False)]),
+    )
+    proper = [len({*face}) == 3 for face in joined.faces.tolist()]
+    assert result.report["totals"]["faces"] == 4**levels * sum(proper)
+    if not any(proper):
+        return
+    cleaned = clean(Mesh(joined.points, joined.faces)).mesh
+    expected = refine(cleaned, loop(), levels).mesh
+    wanted = expected.vertices.astype(np.float32)[expected.faces]
+    shared = {frozenset(map(tuple, triangle)) for triangle in wanted.tolist()}
+
+    tree, _ = files.unpack(result.glb)
+    before, _ = files.unpack(data)
+    for number, shape in enumerate(mesh):
+        if tree["meshes"][0]["primitives"][number] == before["meshes"][0]["primitives"][number]:
+            continue
+        faces, attributes = files.primitive_of(result.glb, 0, number)
+        for triangle in attributes["POSITION"][faces].tolist():
+            assert frozenset(map(tuple, triangle)) in shared
+        assert faces.max() == len(attributes["POSITION"]) - 1
+        for name, values in attributes.items():
+            assert name in shape
+            assert np.isfinite(values).all()
+        for name in {"NORMAL", "TANGENT"} & set(attributes):
+            lengths = np.linalg.norm(attributes[name][:, :3], axis=1)
+            np.testing.assert_allclose(lengths, 1, atol=1e-5)
+
+
+@given(st.lists(primitives(), min_size=1, max_size=3))
+def test_the_learned_scheme_takes_any_mesh(mesh):
+    options = Options(levels=2, diagnostics="full")
+    result = subdivide_gltf(files.glb(mesh), "glb", options, MODEL, Limits())
+    for level in result.report["levels"]:
+        assert 0 <= level["proximity_ratio"]["max"] <= 1 + 1e-12
+    again = subdivide_gltf(files.glb(mesh), "glb", options, MODEL, Limits())
+    assert again.glb == result.glb
