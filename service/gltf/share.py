@@ -61,7 +61,7 @@ def refined_ids(
     proper = cleaned.representative >= 0
     leader = cleaned.representative[proper]
     blocks = refinement.mesh.faces.reshape(len(cleaned.mesh.faces), -1)
-    ids = blocks[:, grid.slot][leader]
+    ids = np.take(np.take(blocks, grid.slot, axis=1), leader, axis=0)
     copies = np.flatnonzero(cleaned.face_map[proper] < 0)
     if len(copies):
         own = cleaned.vertex_map[welded.faces[proper][copies]]

@@ -17,7 +17,7 @@ from pns_common.blocks import Blocks, available_threads
 from service.gltf.control_mesh import ControlMesh, slices
 from service.gltf.lattice import Lattice
 from service.gltf.normals import angle_weighted_normals, safe_unit
-from service.gltf.spread import Spread, spread
+from service.gltf.spread import Spread, at_descendants, spread
 from service.weld import number_by_first_appearance
 
 # Exporters compute the two sides of a UV seam apart and round differently: in real files up to
@@ -56,7 +56,7 @@ def recompute_normals(
     used = np.concatenate([ids[number] for number in chosen])
     values = angle_weighted_normals(
         points,
-        used[:, grid.faces.reshape(-1)].reshape(-1, 3),
+        at_descendants(used, grid),
         groups.refined_faces,
         groups.count,
         Blocks(threads=available_threads()),

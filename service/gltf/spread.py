@@ -36,7 +36,7 @@ class Spread:
     @property
     def refined_faces(self) -> Int[np.ndarray, "D 3"]:
         """(F · 4^L, 3) the refined faces, in the operator's order."""
-        return self.ids[:, self.lattice.faces.reshape(-1)].reshape(-1, 3)
+        return at_descendants(self.ids, self.lattice)
 
     def linear(self, values: Shaped[np.ndarray, "C K"]) -> Float[np.ndarray, "N K"]:
         """Values at the refined vertices, blended linearly along edges and over faces."""
@@ -65,6 +65,12 @@ class Spread:
     def _edge_parameter(self) -> Float[np.ndarray, " n"]:
         """Where the n − 1 vertices of an edge lie between its lower and its higher corner."""
         return np.arange(1, self.lattice.segments) / self.lattice.segments
+
+
+def at_descendants(ids: Int[np.ndarray, "F T"], lattice: Lattice) -> Int[np.ndarray, "D 3"]:
+    """From values at lattice points to values at the corners of all descendants, face by face."""
+    # np.take, unlike indexing, gives rows that need no second copy to be reshaped.
+    return np.take(ids, lattice.faces.reshape(-1), axis=1).reshape(-1, 3)
 
 
 def spread(faces: Int[np.ndarray, "F 3"], corner_count: int, lattice: Lattice) -> Spread:
