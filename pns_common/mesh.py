@@ -62,6 +62,15 @@ class Mesh:
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
 
+    @classmethod
+    def of_refined(cls, vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Mesh:
+        """A mesh from arrays that a refinement step made and checked: neither copied nor read."""
+        mesh = object.__new__(cls)
+        for name, array in (("vertices", vertices), ("faces", faces)):
+            array.flags.writeable = False
+            object.__setattr__(mesh, name, array)
+        return mesh
+
 
 @dataclass(frozen=True, eq=False)
 class Cleaned:

@@ -13,9 +13,9 @@ from jaxtyping import Float, Int
 from pns_common.arrays import norm
 from pns_common.blocks import Blocks, available_threads
 from pns_common.diagnostics import LevelReport, child_faces, level_report
-from pns_common.errors import ParameterError
+from pns_common.errors import MeshError, ParameterError
 from pns_common.frames import face_normals
-from pns_common.mesh import Mesh
+from pns_common.mesh import LARGEST_COORDINATE, Mesh
 from pns_common.schemes import ControlLevel, Placement, Scheme
 from pns_common.topology import build_topology, multi_fan_vertices, split
 
@@ -90,6 +90,8 @@ def refine(
         control = ControlLevel(points, topology, normals, length, blocks)
         vertices, edges = scheme.vertex_rule(control), scheme.edge_rule(control)
         points = np.concatenate([vertices.positions, edges.positions])
+        if not np.abs(points).max() <= LARGEST_COORDINATE:  # also where one is NaN
+            raise MeshError("refined coordinates are too large", element="vertices")
         faces = split(topology)
         children = child_faces(topology, points, _displacement(vertices, edges), blocks)
         normals = children.normals
@@ -100,7 +102,7 @@ def refine(
     assert edges is not None  # levels ≥ 1
     old = len(points) - len(edges.ratio)
     return Refinement(
-        mesh=Mesh(points, faces),
+        mesh=Mesh.of_refined(points, faces),
         report={
             "scheme": scheme.name,
             "budget": scheme.budget,

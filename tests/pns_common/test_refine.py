@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pns_common
-from pns_common import Mesh, ParameterError, loop, pns, refine
+from pns_common import Mesh, MeshError, ParameterError, loop, pns, refine
 from pns_common.blocks import Blocks, available_threads
 from pns_common.refine import measure_reference_length
 from pns_common.schemes import Model
@@ -46,6 +46,12 @@ def test_a_model_file_keeps_the_model_protocol():
 def test_default_budget_is_the_models():
     assert pns(MODEL).budget == MODEL.card.budget
     assert pns(MODEL, 0.25).budget == 0.25
+
+
+def test_coordinates_that_outgrow_the_operator_are_an_error():
+    vertices, faces = bumpy_sphere(0, subdivisions=0)
+    with pytest.raises(MeshError, match="too large"):
+        refine(Mesh(vertices, faces), pns(MODEL, 1e80))
 
 
 def test_zero_budget_is_loop():
