@@ -12,7 +12,8 @@ RUN /opt/pns/bin/python -m pip install --constraint constraints.txt .
 FROM python:3.11-slim-bookworm
 COPY --from=build /opt/pns /opt/pns
 # One thread a library: the workers are the parallelism, and a pids limit counts threads.
-# Two workers of PNS_MEMORY each fit in 1 GiB beside what they take at rest: raise it with --memory.
+# For 1 GiB: two workers of PNS_MEMORY each, four bodies of 64 MiB, and what all take at rest.
+# With a larger --memory, raise both.
 ENV PATH=/opt/pns/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
@@ -20,7 +21,8 @@ ENV PATH=/opt/pns/bin:$PATH \
     OPENBLAS_NUM_THREADS=1 \
     PNS_HOST=0.0.0.0 \
     PNS_PORT=8000 \
-    PNS_MEMORY=384MiB
+    PNS_MEMORY=320MiB \
+    PNS_QUEUE=2
 USER 10001:10001
 WORKDIR /tmp
 EXPOSE 8000
