@@ -8,6 +8,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from pns_common.features import FEATURE_COUNT
+
+RAW_COORDINATES = "raw-12"
+"""The coordinates of a, b, c, d: what the unconstrained network sees instead of features."""
+
+INPUT_COUNT: Mapping[str, int] = MappingProxyType({**FEATURE_COUNT, RAW_COORDINATES: 12})
+
 ACTIVATIONS: Mapping[str, Callable[[], nn.Module]] = MappingProxyType(
     # nn.GELU is the exact one, x Φ(x) with erf, unless told otherwise.
     {"gelu": nn.GELU, "tanh": nn.Tanh}

@@ -43,13 +43,20 @@ def refine_once(
     normals = face_normals(points, topology.faces)
     at = edge_stencil(points, normals, topology.stencil[interior], topology.edge_faces[interior])
     correction = correct(at, features, network, gate, budget)
+    return displaced(points, topology, correction.displacement, proximity_ratio(correction))
+
+
+def displaced(
+    points: Float[Tensor, "V 3"],
+    topology: Topology,
+    displacement: Float[Tensor, "I 3"],
+    ratio: Float[Tensor, " I"],
+) -> Step:
+    """Refine by one step of Loop and move the interior edge vertices."""
     edge_vertices = loop_edge_vertices(points, topology).index_add(
-        0, torch.from_numpy(interior), correction.displacement
+        0, torch.from_numpy(topology.interior), displacement
     )
-    return Step(
-        points=torch.cat([loop_vertex_vertices(points, topology), edge_vertices]),
-        ratio=proximity_ratio(correction),
-    )
+    return Step(torch.cat([loop_vertex_vertices(points, topology), edge_vertices]), ratio)
 
 
 def vertex_normals(

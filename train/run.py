@@ -17,6 +17,7 @@ from train.checkpoint import Checkpoint, save_checkpoint
 from train.datasets import ridge_held_out
 from train.determinism import machine_fingerprint
 from train.evaluation import compare_with_loop
+from train.experiments.command import reproduce_command
 from train.metrics import improvements_as_data
 from train.recipes import RECIPES, Recipe
 from train.tables import improvement_table
@@ -29,6 +30,7 @@ RecipeName = StrEnum("RecipeName", {name: name for name in RECIPES})
 DEFAULT_RECIPE = RecipeName("ridge")
 
 app = typer.Typer(help="Train, measure and certify the operator.", pretty_exceptions_enable=False)
+app.command("reproduce")(reproduce_command)
 
 
 @app.callback(invoke_without_command=True)

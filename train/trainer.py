@@ -10,18 +10,20 @@ from torch import Tensor
 
 from pns_common.arrays import gather
 from pns_common.correction import curvature_gate
-from pns_common.features import FEATURE_COUNT, FEATURE_SETS
+from pns_common.features import FEATURE_SETS
 from train.batch import Batch, disjoint_union
 from train.datasets import DATASETS, Instance
 from train.determinism import deterministic
 from train.losses import weighted_loss
-from train.networks import BoundedNet, unit_correction
-from train.one_step import refine_once, vertex_normals
+from train.networks import INPUT_COUNT, BoundedNet, unit_correction
+from train.one_step import Step, refine_once, vertex_normals
 from train.recipes import Recipe
 from train.surfaces import signed_distance, unit_normal
 
 OnStep = Callable[[int, float], None]
 """Called after each step with the number of steps done and the loss."""
+
+Loss = Callable[[BoundedNet, Batch], Float[Tensor, ""]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +37,16 @@ class Fit:
 def initial_network(recipe: Recipe) -> BoundedNet:
     """Return the untrained network of a recipe."""
     generator = torch.Generator().manual_seed(recipe.seed)
-    count = FEATURE_COUNT[recipe.features]
-    return BoundedNet(count, recipe.hidden, recipe.activation, generator)
+    return BoundedNet(INPUT_COUNT[recipe.features], recipe.hidden, recipe.activation, generator)
 
 
 def fit(recipe: Recipe, on_step: OnStep) -> Fit:
-    """Train with Adam on the recipe's data set."""
+    """Train the operator with Adam on the recipe's data set."""
+    return optimise(recipe, lambda network, batch: batch_loss(recipe, network, batch), on_step)
+
+
+def optimise(recipe: Recipe, loss_of: Loss, on_step: OnStep) -> Fit:
+    """Train a recipe's network with Adam against any loss of a batch."""
     instances = DATASETS[recipe.dataset]().instances
     with deterministic():
         network = initial_network(recipe)
@@ -51,7 +57,7 @@ def fit(recipe: Recipe, on_step: OnStep) -> Fit:
         losses: list[float] = []
         for batch in _batches(recipe, instances):
             optimiser.zero_grad()
-            loss = batch_loss(recipe, network, batch)
+            loss = loss_of(network, batch)
             loss.backward()
             optimiser.step()
             schedule.step()
@@ -61,7 +67,7 @@ def fit(recipe: Recipe, on_step: OnStep) -> Fit:
 
 
 def batch_loss(recipe: Recipe, network: BoundedNet, batch: Batch) -> Float[Tensor, ""]:
-    """Refine a batch by one step and weigh its four loss terms."""
+    """Refine a batch by one step of the operator and weigh its loss."""
     step = refine_once(
         batch.points,
         batch.topology,
@@ -70,6 +76,11 @@ def batch_loss(recipe: Recipe, network: BoundedNet, batch: Batch) -> Float[Tenso
         curvature_gate(recipe.gate_sharpness),
         recipe.budget,
     )
+    return step_loss(recipe, batch, step)
+
+
+def step_loss(recipe: Recipe, batch: Batch, step: Step) -> Float[Tensor, ""]:
+    """Weigh the four loss terms of a refined batch."""
     inserted = gather(step.points, batch.inserted)
     normals = gather(vertex_normals(step.points, batch.children), batch.inserted)
     return weighted_loss(

@@ -1,0 +1,88 @@
+"""`python train/run.py reproduce`: progress with an estimate, and the page at the end."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from pns_common.errors import PnsError
+from train.experiments.experiment import Experiment
+from train.experiments.laboratory import FULL, Laboratory, Scale
+from train.experiments.page import markdown_page
+from train.experiments.registry import EXPERIMENTS
+from train.experiments.reproduce import Record, read_record, reproduce
+
+
+def reproduce_command(
+    name: Annotated[str | None, typer.Argument(help="One experiment; all if not given.")] = None,
+    checkpoints: Annotated[
+        Path | None, typer.Option(help="Networks to take by recipe name instead of training.")
+    ] = None,
+    published: Annotated[
+        Path | None, typer.Option(help="The author's published data, or a clone with .pt files.")
+    ] = None,
+    output: Annotated[Path, typer.Option(help="Folder to write.")] = Path("results"),
+    force: Annotated[bool, typer.Option(help="Run finished experiments again.")] = False,
+) -> None:
+    """Make the paper's tables and figures again, and those that it leaves open."""
+    console = Console()
+    try:
+        chosen = _chosen(name, published)
+        run_all(chosen, FULL, console, checkpoints, published, output, force=force)
+    except PnsError as error:
+        console.print(str(error), style="red", soft_wrap=True)
+        raise typer.Exit(1) from error
+
+
+def run_all(
+    experiments: list[Experiment],
+    scale: Scale,
+    console: Console,
+    checkpoints: Path | None,
+    published: Path | None,
+    output: Path,
+    *,
+    force: bool,
+) -> None:
+    """Run experiments one after another and write the page of everything found so far."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console) as progress:
+        total = sum(one.seconds for one in experiments)
+        overall = progress.add_task("all", total=total)
+        for experiment in experiments:
+            began = time.perf_counter()
+            step = progress.add_task(experiment.name, total=None)
+
+            def on_progress(text: str, done: int, of: int, step: TaskID = step) -> None:
+                progress.update(step, description=text, completed=done, total=of)
+
+            laboratory = Laboratory(
+                scale, output / "cache" / "networks", checkpoints, published, on_progress
+            )
+            reproduce(experiment, laboratory, output, force=force)
+            progress.remove_task(step)
+            progress.advance(overall, experiment.seconds)
+            console.print(f"{experiment.name}: {time.perf_counter() - began:.1f} s")
+    page = output / "README.md"
+    page.write_text(markdown_page(EXPERIMENTS, _records(output)), encoding="utf-8")
+    console.print(f"{page} written", soft_wrap=True)
+
+
+def _chosen(name: str | None, published: Path | None) -> list[Experiment]:
+    if name is None:
+        return [
+            one for one in EXPERIMENTS.values() if published is not None or not one.needs_published
+        ]
+    if name not in EXPERIMENTS:
+        raise typer.BadParameter(f"no experiment {name!r}; there are {', '.join(EXPERIMENTS)}")
+    if EXPERIMENTS[name].needs_published and published is None:
+        raise typer.BadParameter(f"{name} needs --published DIR")
+    return [EXPERIMENTS[name]]
+
+
+def _records(output: Path) -> dict[str, Record]:
+    found = {name: read_record(output / "cache" / f"{name}.json") for name in EXPERIMENTS}
+    return {name: record for name, record in found.items() if record is not None}
