@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from pns_common.schemes import pns
+from train.certify_command import certify_command
 from train.checkpoint import Checkpoint, save_checkpoint
 from train.datasets import ridge_held_out
 from train.determinism import machine_fingerprint
@@ -31,6 +32,7 @@ DEFAULT_RECIPE = RecipeName("ridge")
 
 app = typer.Typer(help="Train, measure and certify the operator.", pretty_exceptions_enable=False)
 app.command("reproduce")(reproduce_command)
+app.command("certify")(certify_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -1,0 +1,52 @@
+"""T1, bounded displacement: no vertex leaves Loop's by more than C h² / R.
+
+h is the edge's length at an edge vertex and the longest edge around an old vertex; boundary and
+irregular edges, and the vertices on them, are not moved at all.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pns_common.mesh import Mesh
+from pns_common.refine import refine
+from train.certificates.bodies import Body
+from train.certificates.certificate import Certificate, worst
+from train.certificates.plain_loop import plain_loop
+from train.certificates.step import rounding
+from train.certificates.subject import Subject
+
+LARGEST = 20_000
+"""Faces up to which a mesh is refined further."""
+
+AT_MOST = 1 + 1e-12
+
+
+def bounded_displacement(
+    subject: Subject, bodies: Sequence[Body], levels: int = 3, reference_length: float = 1.0
+) -> Certificate:
+    """Certify T1 from output positions and an independent Loop, at every level.
+
+    The value is the largest proximity ratio; positions may be off by their rounding.
+    """
+    found = []
+    for body in bodies:
+        mesh = body.mesh
+        for level in range(1, levels + 1):
+            if level > 1 and len(mesh.faces) > LARGEST:
+                break
+            refined = refine(mesh, subject.scheme, 1, reference_length, threads=1).mesh
+            ratio, place = worst_ratio(mesh, refined, subject.budget / reference_length)
+            found.append((ratio, f"{body.name}, level {level}, {place}"))
+            mesh = refined
+    ratio, place = worst(found)
+    return Certificate("T1", "bounded displacement", ratio, high=AT_MOST, where=place)
+
+
+def worst_ratio(control: Mesh, refined: Mesh, curvature: float) -> tuple[float, str]:
+    """The largest ratio ‖p − p_Loop‖ / (C h² / R) of one step, and at which vertex."""
+    base = plain_loop(control.vertices, control.faces)
+    apart = np.linalg.norm(refined.vertices - base.positions, axis=1)
+    ratio = apart / (curvature * base.reach**2 + rounding(control))
+    place = int(np.argmax(ratio))  # numpy's argmax finds a NaN first
+    return float(ratio[place]), base.labels[place]

@@ -1,0 +1,85 @@
+"""A model file's network in double precision, by onnx's own reference evaluator.
+
+onnxruntime runs several operators in single precision only. The file is the same one: its weights
+are widened, which is exact, and every operator then computes in double.
+"""
+
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import scipy.special
+from jaxtyping import Float
+from onnx import NodeProto, TensorProto, numpy_helper
+from onnx.reference import ReferenceEvaluator
+from onnx.reference.op_run import OpRun
+
+from pns_common.model_card import ModelCard
+from pns_common.onnx_model import OnnxModel, bundled_models
+
+
+class Erf(OpRun):
+    """erf in the precision of its input: the evaluator's own rounds to single."""
+
+    def _run(self, x: np.ndarray) -> tuple[np.ndarray]:
+        return (scipy.special.erf(x),)
+
+
+@dataclass(frozen=True, eq=False)
+class DoubleModel:
+    """A model file in double precision; it keeps the `Model` protocol of pns_common.schemes."""
+
+    name: str
+    card: ModelCard
+    hash: str
+    _evaluator: Any = field(repr=False)
+
+    def __call__(
+        self, features: Float[np.ndarray, "E K"], budget: float
+    ) -> Float[np.ndarray, "E 3"]:
+        """Return the corrections, float64."""
+        inputs = {"features": np.asarray(features, dtype=np.float64), "budget": np.float64(budget)}
+        (correction,) = self._evaluator.run(["correction"], inputs)
+        return correction
+
+
+def double_model(model: OnnxModel, data: bytes) -> DoubleModel:
+    """The network of a checked model file (`data` are its bytes) in double precision."""
+    proto = onnx.load_from_string(data)
+    for tensor in proto.graph.initializer:
+        tensor.CopyFrom(_widened(tensor))
+    for node in proto.graph.node:
+        _widen_node(node)
+    for value in (*proto.graph.input, *proto.graph.output):
+        value.type.tensor_type.elem_type = TensorProto.DOUBLE
+    evaluator = ReferenceEvaluator(proto, new_ops=[Erf])
+    return DoubleModel(model.name, model.card, model.hash, evaluator)
+
+
+def read_bytes(source: str | Path) -> bytes:
+    """The bytes of a bundled model or of a file that `load_model` has accepted."""
+    if str(source) in bundled_models():
+        return (resources.files("pns_common") / "models" / f"{source}.onnx").read_bytes()
+    return Path(source).read_bytes()
+
+
+def _widen_node(node: NodeProto) -> None:
+    """Make a node's own single precision constants, or a cast to single precision, double."""
+    for attribute in node.attribute:
+        if attribute.name == "value":
+            attribute.t.CopyFrom(_widened(attribute.t))
+        elif attribute.name in ("value_float", "value_floats"):
+            scalar = attribute.name == "value_float"
+            values = np.array(attribute.f if scalar else list(attribute.floats), dtype=np.float64)
+            attribute.CopyFrom(onnx.helper.make_attribute("value", numpy_helper.from_array(values)))
+        elif node.op_type == "Cast" and attribute.name == "to":
+            attribute.i = TensorProto.DOUBLE if attribute.i == TensorProto.FLOAT else attribute.i
+
+
+def _widened(tensor: TensorProto) -> TensorProto:
+    if tensor.data_type != TensorProto.FLOAT:
+        return tensor
+    return numpy_helper.from_array(numpy_helper.to_array(tensor).astype(np.float64), tensor.name)

@@ -1,0 +1,94 @@
+"""Does a model file keep its word? Finite corrections, within the budget, as good as its card says.
+
+The operator projects and checks whatever a network returns, so no theorem hangs on this; but a file
+that breaks its contract, or claims what it does not reach, is not to be trusted.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.features import FEATURE_COUNT
+from pns_common.schemes import Model, pns
+from train.certificates.certificate import Certificate
+from train.datasets import DATASETS
+from train.evaluation import compare_with_loop
+
+BUDGETS = (1e-6, 0.1, 0.5, 1.0, 1e3)
+SINGLE_PRECISION = 1 + 1e-6
+SAMPLES = 4096
+
+POINTS = 0.05
+"""Percentage points between a card's improvement and the measured one: rounding on another
+machine, no more."""
+
+
+def keeps_its_word(model: Model) -> list[Certificate]:
+    """Certify a model's answers at sample features and its card's metrics."""
+    return [*_answers(model), _metrics(model)]
+
+
+def sample_features(count: int, seed: int = 0) -> Float[np.ndarray, "N K"]:
+    """Rows as meshes give them, then wide ones, then slivers (e^±30), flat and folded edges."""
+    rng = np.random.default_rng(seed)
+    width = 10.0 ** rng.uniform(-1, 1.5, size=(SAMPLES, 1))
+    rows = width * rng.uniform(-1, 1, size=(SAMPLES, count))
+    rows[:, 0] = rng.uniform(0, 2, SAMPLES)
+    extremes = [(x, side) for x in (0.0, 2.0) for side in (-350.0, -30.0, 0.0, 30.0, 350.0)]
+    rows[-len(extremes) :] = [[x, *[side] * (count - 1)] for x, side in extremes]
+    return rows
+
+
+def _answers(model: Model) -> list[Certificate]:
+    features = sample_features(FEATURE_COUNT[model.card.features])
+    not_finite, longest, at = 0, 0.0, BUDGETS[0]
+    for budget in BUDGETS:
+        found = np.asarray(model(features, budget), dtype=np.float64)
+        finite = np.isfinite(found).all(axis=1)
+        not_finite += int((~finite).sum())
+        share = np.linalg.norm(found[finite], axis=1).max(initial=0) / budget
+        longest, at = max((longest, at), (float(share), budget))
+    return [
+        Certificate(
+            "file",
+            "finite corrections",
+            not_finite,
+            0,
+            0,
+            f"of {len(BUDGETS) * len(features)} rows",
+        ),
+        Certificate(
+            "file",
+            "corrections within the budget given",
+            longest,
+            high=SINGLE_PRECISION,
+            where=f"budget {at:g}",
+        ),
+    ]
+
+
+def _metrics(model: Model) -> Certificate:
+    name, unknown = "the card's metrics come out again", []
+    worst, where = 0.0, "no metrics on the card"
+    for dataset, claimed in model.card.metrics.items():
+        if dataset not in DATASETS:
+            unknown.append(dataset)
+            continue
+        measured = compare_with_loop(pns(model), DATASETS[dataset]())
+        for metric, row in measured.items():
+            off = abs(_claimed_percent(claimed, metric) - row.percent)
+            if not off <= worst:
+                worst, where = off, f"{dataset}, {metric}: measured {row.percent:+.2f} %"
+    if unknown:
+        where += f"; not known here: {', '.join(unknown)}"
+    return Certificate("file", name, worst, high=POINTS, where=where)
+
+
+def _claimed_percent(claimed: Any, metric: str) -> float:
+    """What a card says of a metric; NaN, which fails, where it says nothing readable."""
+    row = claimed.get(metric) if isinstance(claimed, Mapping) else None
+    value = row.get("percent") if isinstance(row, Mapping) else None
+    return float(value) if isinstance(value, int | float) else math.nan

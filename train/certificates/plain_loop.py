@@ -1,0 +1,72 @@
+"""Loop subdivision once more, written plainly: one vertex after the other, nothing shared.
+
+Certificates measure displacements from these positions, so that an error in the operator's own
+masks or topology shows as a displacement that the envelope does not allow.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+
+@dataclass(frozen=True, eq=False)
+class PlainLoop:
+    """One step of Loop: old vertices first, then one vertex for each edge in order of appearance.
+
+    Attributes:
+        positions: where Loop puts them.
+        reach: how long the displacement's h is there: the edge's length at an interior edge, the
+            longest edge around an old vertex with interior edges only, and 0 where no correction
+            is allowed.
+        labels: what each vertex is, for messages.
+    """
+
+    positions: Float[np.ndarray, "N 3"]
+    reach: Float[np.ndarray, " N"]
+    labels: list[str]
+
+
+def plain_loop(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> PlainLoop:
+    """Subdivide once; every loop here is meant to be read, not to be fast."""
+    opposites: dict[tuple[int, int], list[tuple[int, bool]]] = {}
+    for a, b, c in faces.tolist():
+        for start, end, opposite in ((a, b, c), (b, c, a), (c, a, b)):
+            key = (min(start, end), max(start, end))
+            opposites.setdefault(key, []).append((opposite, start < end))
+
+    neighbours: list[list[int]] = [[] for _ in vertices]
+    sharp: list[list[int]] = [[] for _ in vertices]
+    edge_positions, edge_reach, labels = [], [], [f"vertex {v}" for v in range(len(vertices))]
+    for (a, b), sides in opposites.items():
+        for one, other in ((a, b), (b, a)):
+            neighbours[one].append(other)
+        labels.append(f"edge ({a}, {b})")
+        if len(sides) == 2 and sides[0][1] != sides[1][1]:
+            (c, _), (d, _) = sides
+            ends, wings = vertices[a] + vertices[b], vertices[c] + vertices[d]
+            edge_positions.append((3 * ends + wings) / 8)
+            edge_reach.append(math.dist(vertices[a], vertices[b]))
+        else:
+            edge_positions.append((vertices[a] + vertices[b]) / 2)
+            edge_reach.append(0.0)
+            for one, other in ((a, b), (b, a)):
+                sharp[one].append(other)
+
+    moved, reach = [], []
+    for v, point in enumerate(vertices):
+        ring = neighbours[v]
+        if len(sharp[v]) > 2 or not ring:
+            moved.append(point)
+        elif len(sharp[v]) == 2:
+            moved.append((6 * point + vertices[sharp[v]].sum(axis=0)) / 8)
+        else:
+            # Loop's own weights: the centre keeps (3/8 + ¼ cos 2π/k)² + 3/8.
+            keep = (3 / 8 + math.cos(2 * math.pi / len(ring)) / 4) ** 2 + 3 / 8
+            moved.append(keep * point + (1 - keep) * vertices[ring].mean(axis=0))
+        smooth = bool(ring) and not sharp[v]
+        reach.append(max(math.dist(point, vertices[n]) for n in ring) if smooth else 0.0)
+
+    positions = np.array([*moved, *edge_positions])
+    return PlainLoop(positions, np.array([*reach, *edge_reach]), labels)

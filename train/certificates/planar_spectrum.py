@@ -1,0 +1,76 @@
+"""T8, planar spectral inheritance: at a flat k-star the scheme's linearisation is Loop's."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pns_common.refine import refine
+from pns_common.schemes import Scheme, loop
+from train.certificates.certificate import Certificate, worst
+from train.certificates.subject import Subject
+from train.spectrum import (
+    SPOKE,
+    TANGENT_COUNT,
+    VALENCES,
+    closed_star,
+    jacobian,
+    loop_eigenvalue,
+    loop_gap,
+    perturbed_stars,
+    refined_inner,
+    without_translations,
+)
+
+TINY = 1e-8
+"""In spokes: what is of second order in the lift is then below rounding."""
+
+FLAT = 1e-7
+EIGENVALUE = 1e-9
+
+
+def planar_spectrum(subject: Subject, valences: Sequence[int] = VALENCES) -> list[Certificate]:
+    """Certify T8 for each valence: the derivative, the tangent eigenvalues and the Reif gap."""
+    deviations, tangents, gaps = [], [], []
+    for valence in valences:
+        place = f"k = {valence}"
+        size = spectrum(subject.exact, valence)
+        tangent = np.abs(size[:TANGENT_COUNT] - loop_eigenvalue(valence)).max()
+        gap = size[TANGENT_COUNT - 1] - size[TANGENT_COUNT]
+        deviations.append((derivative_of_departure(subject.exact, valence), place))
+        tangents.append((float(tangent), place))
+        gaps.append((float(abs(gap - loop_gap(valence))), place))
+    rows = (
+        ("derivative of the departure from Loop", deviations, FLAT),
+        ("tangent eigenvalues against 3/8 + ¼ cos 2π/k", tangents, EIGENVALUE),
+        ("Reif gap against Loop's", gaps, EIGENVALUE),
+    )
+    return [
+        Certificate("T8", f"planar spectrum: {name}", *_value_high(found, bound))
+        for name, found, bound in rows
+    ]
+
+
+def spectrum(scheme: Scheme, valence: int) -> np.ndarray:
+    """|λ| of the linearisation at a flat star, largest first, translations left out."""
+    matrix = without_translations(jacobian(scheme, closed_star(scheme, valence)(0.0)))
+    return np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
+
+
+def derivative_of_departure(scheme: Scheme, valence: int) -> float:
+    """The largest ‖S − S_Loop‖ / ε of a flat star moved by a tiny ε in any inner coordinate.
+
+    One-sided: a gate with a kink at flat faces cancels in central differences, and automatic
+    differentiation calls its slope 0 too.
+    """
+    at, step = closed_star(scheme, valence)(0.0), TINY * SPOKE
+    mesh, count = perturbed_stars(at, step)
+    refined, base = (
+        refined_inner(at, refine(mesh, one, 1, 1.0, threads=1).mesh.vertices, 2 * count)
+        for one in (scheme, loop())
+    )
+    return float(np.abs(refined - base).max()) / step
+
+
+def _value_high(found: list[tuple[float, str]], high: float) -> tuple[float, float, float, str]:
+    value, place = worst(found)
+    return value, -np.inf, high, place

@@ -1,0 +1,78 @@
+"""T4 and T6, the orders in h: one mesh scaled down with the reference length held at 1.
+
+Features do not see the scale, so the correction falls as h² exactly, and normals approach Loop's
+as h.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.frames import face_normals
+from pns_common.mesh import Mesh
+from pns_common.schemes import Scheme, loop
+from pns_common.topology import split
+from train.certificates.bodies import Body
+from train.certificates.certificate import Certificate, farthest
+from train.certificates.step import step
+from train.certificates.subject import Subject
+
+# Powers of two: scaling is exact. Normals need small ones to be in the linear regime.
+SCALES = 2.0 ** -np.arange(4, 11)
+
+Measure = Callable[[Scheme, Mesh], float]
+
+
+def proximity_slope(subject: Subject, bodies: Sequence[Body]) -> Certificate:
+    """Certify T4: the largest distance from Loop falls with slope 2."""
+    return _slope("T4", "proximity slope", 2.0, 1e-3, subject, bodies, distance_from_loop)
+
+
+def normal_variation_slope(subject: Subject, bodies: Sequence[Body]) -> Certificate:
+    """Certify T6: the largest difference of a face's normal from Loop's falls with slope 1."""
+    return _slope("T6", "normal-variation slope", 1.0, 1e-2, subject, bodies, normals_from_loop)
+
+
+def distance_from_loop(scheme: Scheme, mesh: Mesh) -> float:
+    """‖S(M) − S_Loop(M)‖ over all new vertices."""
+    apart = step(scheme, mesh).positions - step(loop(), mesh).positions
+    return float(np.linalg.norm(apart, axis=1).max())
+
+
+def normals_from_loop(scheme: Scheme, mesh: Mesh) -> float:
+    """‖n − n_Loop‖ over all faces of the refined mesh."""
+    found, base = step(scheme, mesh), step(loop(), mesh)
+    faces = split(found.topology)
+    apart = face_normals(found.positions, faces) - face_normals(base.positions, faces)
+    return float(np.linalg.norm(apart, axis=1).max())
+
+
+def fitted_slope(x: Float[np.ndarray, " N"], y: Float[np.ndarray, " N"]) -> float:
+    """The slope of log y over log x, by least squares."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+
+
+def _slope(
+    theorem: str,
+    name: str,
+    expected: float,
+    tolerance: float,
+    subject: Subject,
+    bodies: Sequence[Body],
+    measure: Measure,
+) -> Certificate:
+    low, high = expected - tolerance, expected + tolerance
+    found = []
+    for body in bodies:
+        values = np.array(
+            [measure(subject.exact, Mesh(s * body.mesh.vertices, body.mesh.faces)) for s in SCALES]
+        )
+        # A scheme that is Loop here has no slope, and holds the theorem at any.
+        if values.any():
+            slope = fitted_slope(SCALES, values) if values.all() else float("nan")
+            found.append((slope, body.name))
+    if not found:
+        return Certificate(theorem, name, expected, low, high, "the scheme is Loop on every mesh")
+    slope, place = farthest(found, expected)
+    return Certificate(theorem, name, slope, low, high, place)

@@ -1,0 +1,52 @@
+"""What is certified: a scheme as it runs, and the same scheme in double precision."""
+
+import copy
+from dataclasses import dataclass
+
+from pns_common.schemes import Model, Scheme, pns
+from train.networks import BoundedNet
+from train.torch_model import TorchModel
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A scheme under certification.
+
+    Attributes:
+        name: for reports.
+        scheme: the scheme as the product runs it.
+        exact: the same with its network in double precision; `scheme` itself where there is no
+            network or it is double already. Slopes and spectra need it: the noise of a single
+            precision network drowns small differences.
+        budget: C of the envelope C h² / R that the scheme is held to.
+    """
+
+    name: str
+    scheme: Scheme
+    exact: Scheme
+    budget: float
+
+    @property
+    def is_single_precision(self) -> bool:
+        """Whether the network runs in single precision."""
+        return self.exact is not self.scheme
+
+
+def subject_of_scheme(scheme: Scheme, budget: float) -> Subject:
+    """A scheme that is double precision throughout, held to a budget of the caller's."""
+    return Subject(scheme.name, scheme, scheme, budget)
+
+
+def subject_of_model(model: Model, exact: Model, budget: float | None = None) -> Subject:
+    """The learned operator with a model, and with the same model in double precision."""
+    scheme = pns(model, budget)
+    return Subject(model.name, scheme, pns(exact, budget), float(scheme.budget or 0.0))
+
+
+def subject_of_network(model: TorchModel, budget: float | None = None) -> Subject:
+    """The learned operator with a torch network."""
+    return subject_of_model(model, TorchModel(model.name, model.card, _double(model)), budget)
+
+
+def _double(model: TorchModel) -> BoundedNet:
+    return copy.deepcopy(model.network).double()

@@ -1,0 +1,183 @@
+"""The spectrum of a scheme at a star: its Jacobian, Loop's eigenvalues, the Reif gap and margin."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+from pns_common.errors import ParameterError
+from pns_common.mesh import Mesh
+from pns_common.refine import refine
+from pns_common.schemes import Scheme
+from train.stars import Star, star
+
+SPOKE = 0.25
+"""Spoke of every star, in reference lengths."""
+
+STEP = 1e-5
+"""Step of the central differences, in spokes: their error is then about 1e-10."""
+
+RINGS = ((2, 2), (3, 2), (4, 3), (6, 4))
+"""Rings of a star and how many of them are inner, tried in this order."""
+
+VALENCES = tuple(range(3, 13))
+TANGENT_COUNT = 6
+"""Loop's tangent eigenvalue is double, once for each of three coordinates."""
+
+
+def loop_eigenvalue(valence: int, frequency: int = 1) -> float:
+    """Return 3/8 + ¼ cos 2πj/k; j = 1 is the tangent eigenvalue, real and double."""
+    return 3 / 8 + math.cos(2 * math.pi * frequency / valence) / 4
+
+
+def loop_third(valence: int) -> float:
+    """Return Loop's largest |λ| below the tangent pair: of frequency 0, of frequency 2, or 1/8.
+
+    The 1/8 belongs to the second ring; the paper's (k+1)-star leaves it out, and so puts the gap
+    at k = 3 at 3/16 rather than 1/8.
+    """
+    second = loop_eigenvalue(valence, 2) if valence >= 4 else 0.0
+    return max(loop_eigenvalue(valence) ** 2, second, 1 / 8)
+
+
+def loop_gap(valence: int) -> float:
+    """Return Loop's Reif gap λ_t − |λ_3|."""
+    return loop_eigenvalue(valence) - loop_third(valence)
+
+
+def closed_star(scheme: Scheme, valence: int) -> Callable[[float], Star]:
+    """Return the stars, by lift, on which a scheme maps the inner rings to themselves.
+
+    Two rings suffice where an edge sees its two faces and a vertex its neighbours; a scheme that
+    sees further gets more. Tried out: what lies outside must change nothing.
+
+    Raises:
+        ParameterError: the scheme sees further than all rings tried.
+    """
+    for rings, inner_rings in RINGS:
+        build = partial(star, valence, rings, SPOKE, inner_rings=inner_rings)
+        alone = build(0.0)
+        wider = star(valence, rings + 2, SPOKE, inner_rings=inner_rings)
+        noise = np.random.default_rng(0).standard_normal(wider.mesh.vertices.shape) * SPOKE / 20
+        found = []
+        for one in (alone, wider):
+            mesh = Mesh(one.mesh.vertices + noise[: len(one.mesh.vertices)], one.mesh.faces)
+            found.append(refine(mesh, scheme, 1, 1.0, threads=1).mesh.vertices[one.refined])
+        outside = noise[: len(alone.mesh.vertices)].copy()
+        outside[len(alone.inner) :] *= -1
+        mesh = Mesh(alone.mesh.vertices + outside, alone.mesh.faces)
+        found.append(refine(mesh, scheme, 1, 1.0, threads=1).mesh.vertices[alone.refined])
+        if max(np.abs(one - found[0]).max() for one in found) < 1e-12:
+            return build
+    raise ParameterError("scheme", scheme.name, expected="a rule that sees at most four rings")
+
+
+def perturbed_stars(at: Star, step: float) -> tuple[Mesh, int]:
+    """Return one mesh of copies of a star, and the number of inner coordinates M.
+
+    Copy n < M has inner coordinate n moved by +step, copy M + n by −step. One call of the
+    operator then differentiates it in every direction.
+    """
+    points, faces = at.mesh.vertices, at.mesh.faces
+    count = 3 * len(at.inner)
+    copies = np.repeat(points[None], 2 * count, axis=0)
+    column = np.arange(count)
+    copies[column, at.inner[column // 3], column % 3] += step
+    copies[count + column, at.inner[column // 3], column % 3] -= step
+    offsets = np.arange(2 * count)[:, None, None] * len(points)
+    return Mesh(copies.reshape(-1, 3), (faces[None] + offsets).reshape(-1, 3)), count
+
+
+def refined_inner(
+    at: Star, refined: Float[np.ndarray, "V 3"], copies: int
+) -> Float[np.ndarray, "S M"]:
+    """Return the refined inner coordinates of each of `copies` stars that were refined together."""
+    old = len(at.mesh.vertices)
+    total = copies * old
+    edges = (len(refined) - total) // copies
+    copy = np.arange(copies)[:, None]
+    rows = np.where(
+        at.refined < old, copy * old + at.refined, total + copy * edges + at.refined - old
+    )
+    return refined[rows].reshape(copies, -1)
+
+
+def jacobian(scheme: Scheme, at: Star) -> Float[np.ndarray, "M M"]:
+    """Differentiate one step of a scheme, inner rings to inner rings in all coordinates.
+
+    By central differences on the scheme itself, in double precision: any scheme will do, and
+    nothing is assumed of how it computes. The reference length is 1.
+    """
+    step = STEP * SPOKE
+    mesh, count = perturbed_stars(at, step)
+    refined = refine(mesh, scheme, levels=1, reference_length=1.0, threads=1).mesh.vertices
+    moved = refined_inner(at, refined, 2 * count)
+    return (moved[:count] - moved[count:]).T / (2 * step)
+
+
+def without_translations(matrix: Float[np.ndarray, "M M"]) -> Float[np.ndarray, "L L"]:
+    """Return the matrix on the quotient by translations: its spectrum less three eigenvalues 1.
+
+    A scheme that commutes with translations keeps their space, so that this is exact.
+    """
+    count = len(matrix) // 3
+    translations = np.kron(np.ones((count, 1)), np.eye(3))
+    basis = np.linalg.qr(translations, mode="complete").Q[:, 3:]
+    return basis.T @ matrix @ basis
+
+
+@dataclass(frozen=True, slots=True)
+class Margin:
+    """The off-planar spectrum of a star.
+
+    Attributes:
+        lift: of the centre, in spokes.
+        tangent: least |λ| of the six eigenvalues continued from Loop's tangent pair.
+        third: largest |λ| of the rest but the translations.
+        largest: largest |λ| of all but the translations; 1 or more is unstable.
+    """
+
+    lift: float
+    tangent: float
+    third: float
+    largest: float
+
+    @property
+    def margin(self) -> float:
+        """The signed Reif margin: negative where another eigenvalue has overtaken the tangents."""
+        return self.tangent - self.third
+
+
+def margins(scheme: Scheme, valence: int, lifts: Sequence[float]) -> list[Margin]:
+    """Follow the tangent eigenvalues of a star while its centre is lifted; the first lift is 0.
+
+    Lifted stars are no fixed points, so this is a diagnostic, not Reif's condition.
+    """
+    build = closed_star(scheme, valence)
+    found: list[Margin] = []
+    tangents: Complex[np.ndarray, "L L"] | None = None
+    for lift in lifts:
+        matrix = without_translations(jacobian(scheme, build(lift)))
+        values, right = np.linalg.eig(matrix)
+        if tangents is None:
+            nearness = -np.abs(values - loop_eigenvalue(valence))
+        else:
+            # How much of each eigenvector lies in the space followed so far.
+            nearness = np.linalg.norm(tangents @ right, axis=0)
+        chosen = np.zeros(len(values), dtype=bool)
+        chosen[np.argsort(-nearness, kind="stable")[:TANGENT_COUNT]] = True
+        # The spectral projector: oblique, because the matrix is not normal.
+        tangents = right[:, chosen] @ np.linalg.inv(right)[chosen]
+        size = np.abs(values)
+        found.append(
+            Margin(
+                lift=float(lift),
+                tangent=float(size[chosen].min()),
+                third=float(size[~chosen].max()),
+                largest=float(size.max()),
+            )
+        )
+    return found
