@@ -1,0 +1,55 @@
+"""What the baselines share: placements measured against Loop as PNS is."""
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.arrays import norm
+from pns_common.schemes import (
+    ControlLevel,
+    Placement,
+    loop_edge_rule,
+    loop_vertex_rule,
+)
+from pns_common.topology import EdgeClass, Topology
+
+COMPARED_BUDGET = 0.5
+"""The C of the envelope that methods without a budget are measured against."""
+
+
+def placed_edges(level: ControlLevel, positions: Float[np.ndarray, "E 3"]) -> Placement:
+    """Return edge vertices at `positions`; ratio ‖q − q0‖ R / (C h²) on interior edges."""
+    base, interior = loop_edge_rule(level), level.topology.interior
+    displacement = positions - base.loop
+    a, b = level.topology.edges[interior].T
+    envelope = COMPARED_BUDGET * norm(level.points[b] - level.points[a]) ** 2
+    ratio = np.zeros(len(positions))
+    away = norm(displacement[interior]) * level.reference_length
+    ratio[interior] = np.where(envelope > 0, away / np.where(envelope > 0, envelope, 1), 0)
+    return Placement(base.loop, displacement, ratio, base.gate, base.degenerate)
+
+
+def kept_vertices(level: ControlLevel) -> Placement:
+    """Leave old vertices where they are: the vertex rule of interpolating schemes."""
+    base = loop_vertex_rule(level)
+    return Placement(base.loop, level.points - base.loop, base.ratio, base.gate, base.degenerate)
+
+
+def vertex_normals(level: ControlLevel) -> Float[np.ndarray, "V 3"]:
+    """Return unit vertex normals, faces weighted by area; zero where there is none."""
+    from_points = level.points[level.topology.faces]
+    area = np.cross(from_points[:, 1] - from_points[:, 0], from_points[:, 2] - from_points[:, 0])
+    summed = np.zeros_like(level.points)
+    for corner in range(3):
+        np.add.at(summed, level.topology.faces[:, corner], area)
+    length = norm(summed)[:, None]
+    return summed / np.where(length > 0, length, 1)
+
+
+def midpoints(level: ControlLevel) -> Float[np.ndarray, "E 3"]:
+    """Return the midpoint of every edge."""
+    return level.points[level.topology.edges].mean(axis=1)
+
+
+def is_interior(topology: Topology) -> np.ndarray:
+    """Whether each edge is an interior one, as a column."""
+    return (topology.edge_class == EdgeClass.INTERIOR)[:, None]
