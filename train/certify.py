@@ -24,6 +24,7 @@ from train.certificates.regular import regular_smoothness
 from train.certificates.scaling import normal_variation_slope, proximity_slope
 from train.certificates.stability import lipschitz_slope
 from train.certificates.subject import Subject, subject_of_model
+from train.spectrum import VALENCES
 
 OnProgress = Callable[[str, int, int], None]
 """Called with what comes next, how many steps are done, and of how many."""
@@ -57,13 +58,18 @@ class Step:
 
 
 def certify_model_file(
-    source: str | Path | None, real: Sequence[Body], seed: int, on_progress: OnProgress
+    source: str | Path | None,
+    real: Sequence[Body],
+    seed: int,
+    on_progress: OnProgress,
+    valences: Sequence[int] = VALENCES,
 ) -> Verdict:
     """Certify a model file, also one that someone else made.
 
     Args:
         source: a file, a bundled name, or None for the default.
         real: meshes beside the synthetic ones.
+        valences: of the stars.
     """
     source = DEFAULT_MODEL if source is None else source
     facts: dict[str, Any] = {"source": str(source)}
@@ -74,19 +80,25 @@ def certify_model_file(
         return Verdict(str(source), facts, (refused("file", "the file keeps the contract", error),))
     facts |= {"sha256": model.hash, "budget": subject.budget, "meshes": [one.name for one in real]}
     word = Step("file", "the file keeps its word", lambda: keeps_its_word(model))
-    found = run_steps([word, *scheme_steps(subject, real, seed)], on_progress)
+    found = run_steps([word, *scheme_steps(subject, real, seed, valences)], on_progress)
     return Verdict(model.name, facts, found)
 
 
 def certify_scheme(
-    subject: Subject, real: Sequence[Body], seed: int, on_progress: OnProgress
+    subject: Subject,
+    real: Sequence[Body],
+    seed: int,
+    on_progress: OnProgress,
+    valences: Sequence[int] = VALENCES,
 ) -> Verdict:
     """Certify any scheme against T1–T8 and the lifted stars."""
-    found = run_steps(scheme_steps(subject, real, seed), on_progress)
+    found = run_steps(scheme_steps(subject, real, seed, valences), on_progress)
     return Verdict(subject.name, {"budget": subject.budget}, found)
 
 
-def scheme_steps(subject: Subject, real: Sequence[Body], seed: int) -> list[Step]:
+def scheme_steps(
+    subject: Subject, real: Sequence[Body], seed: int, valences: Sequence[int]
+) -> list[Step]:
     """The certificates of a scheme, ready to run."""
     shaped, flat = synthetic_bodies(seed), flat_bodies(seed)
     every = (*shaped, *real)
@@ -98,8 +110,8 @@ def scheme_steps(subject: Subject, real: Sequence[Body], seed: int) -> list[Step
         Step("T5", "regular regions", lambda: regular_smoothness(subject, seed)),
         Step("T6", "normal-variation slope", lambda: normal_variation_slope(subject, shaped)),
         Step("T7", "Lipschitz slope", lambda: lipschitz_slope(subject, shaped, seed)),
-        Step("T8", "planar spectrum", lambda: planar_spectrum(subject)),
-        Step("stars", "lifted stars", lambda: lifted_stars(subject)),
+        Step("T8", "planar spectrum", lambda: planar_spectrum(subject, valences)),
+        Step("stars", "lifted stars", lambda: lifted_stars(subject, valences)),
     ]
 
 

@@ -24,7 +24,7 @@ from train.spectrum import (
 TINY = 1e-8
 """In spokes: what is of second order in the lift is then below rounding."""
 
-FLAT = 1e-7
+FLAT = 1e-6
 EIGENVALUE = 1e-9
 
 
