@@ -1,6 +1,6 @@
 """README's picture: the example part, coarse, refined and coloured by proximity ratio.
 
-    python docs/picture.py            # writes docs/picture.png
+python docs/picture.py            # writes docs/picture.png
 """
 
 from __future__ import annotations

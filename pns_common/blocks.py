@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import dataclass
 
 # Rows a block: a dozen (rows, 3) float64 temporaries stay in the second-level cache.
 ROWS = 8192
+MOST_THREADS = 8
 
 
 @dataclass(frozen=True)
@@ -25,9 +27,12 @@ class Blocks:
             for rows in slices:
                 work(rows)
             return
+        # Each block in the caller's context: numpy's error state is part of it.
+        contexts = [copy_context() for _ in slices]
         with ThreadPoolExecutor(self.threads) as pool:
-            # list() so that an error in a worker is raised here.
-            list(pool.map(work, slices))
+            jobs = [pool.submit(c.run, work, s) for c, s in zip(contexts, slices, strict=True)]
+            for job in jobs:
+                job.result()
 
     def count(self, rows: int) -> int:
         """How many blocks ``run`` makes of so many rows."""
@@ -43,5 +48,7 @@ class Blocks:
 
 
 def available_threads() -> int:
-    """The processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """The processors that this process may use, up to where memory is the limit."""
+    known = hasattr(os, "sched_getaffinity")
+    processors = len(os.sched_getaffinity(0)) if known else os.cpu_count() or 1
+    return min(processors, MOST_THREADS)

@@ -63,7 +63,12 @@ class OnnxModel:
     card: ModelCard
     hash: str
     size: int
+    _data: bytes = field(repr=False)
     _session: Any = field(repr=False)  # onnxruntime ships no types
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # A session cannot travel to a worker process; the file it was made from can.
+        return model_from_bytes, (self._data, self.name)
 
     def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
         """Corrections (N, 3) float32, for features (N, K) and a dimensionless budget."""
@@ -144,7 +149,7 @@ def model_from_bytes(data: bytes, name: str) -> OnnxModel:
             name, expected="a graph that onnxruntime runs", found=str(error)
         ) from error
     digest = hashlib.sha256(data).hexdigest()
-    return OnnxModel(name=name, card=card, hash=digest, size=len(data), _session=session)
+    return OnnxModel(name, card, digest, len(data), data, session)
 
 
 def _parse(data: bytes, name: str) -> onnx.ModelProto:

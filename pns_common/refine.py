@@ -88,8 +88,10 @@ def refine(
         if level == 0:
             several_fans = int(multi_fan_vertices(topology).sum())
         control = ControlLevel(points, topology, normals, length, blocks)
-        vertices, edges = scheme.vertex_rule(control), scheme.edge_rule(control)
-        points = np.concatenate([vertices.positions, edges.positions])
+        # What overflows under an absurd budget is caught just below.
+        with np.errstate(over="ignore", invalid="ignore"):
+            vertices, edges = scheme.vertex_rule(control), scheme.edge_rule(control)
+            points = np.concatenate([vertices.positions, edges.positions])
         if not np.abs(points).max() <= LARGEST_COORDINATE:  # also where one is NaN
             raise MeshError("refined coordinates are too large", element="vertices")
         faces = split(topology)

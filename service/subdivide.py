@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -26,6 +25,7 @@ from service.gltf.share import RefinedPrimitive, share
 from service.gltf.upload import Media, Upload, read_upload
 from service.gltf.writer import Writer
 from service.options import Limits, Options
+from service.stopwatch import Stopwatch
 
 RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 
@@ -54,16 +54,18 @@ def subdivide_gltf(
     model: Model | None,
     limits: Limits,
     progress: Progress | None = None,
+    clock: Stopwatch | None = None,
 ) -> Subdivided:
     """Refine every triangle mesh of a glTF file.
 
-    `progress` is called with (faces made so far, faces made in the end).
+    `progress` is called with (faces made so far, faces made in the end); `clock` is told where
+    each stage ends.
 
     Raises:
         ServiceError: the upload is unreadable, wrong, over a limit, or cannot be refined yet.
         pns_common.errors.ModelError: the model answered with something that is no correction.
     """
-    clock = _Clock()
+    clock = Stopwatch() if clock is None else clock
     scheme = make_scheme(options, model)
     upload = read_upload(data, media, options.levels, limits)
     instances = mesh_instances(upload.document)
@@ -189,17 +191,3 @@ def _report_progress(
     progress: Progress, before: float, share_of_all: float, done: int, total: int
 ) -> None:
     progress(round(total * (before / share_of_all) + done), round(total / share_of_all))
-
-
-@dataclass
-class _Clock:
-    """Adds up the seconds between laps under the lap's name."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-    last: float = field(default_factory=time.perf_counter)
-
-    def lap(self, stage: str) -> None:
-        """Book the time since the last lap."""
-        now = time.perf_counter()
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self.last
-        self.last = now

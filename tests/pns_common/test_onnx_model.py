@@ -1,6 +1,7 @@
 """A model file that breaks its contract is refused, and the error says which part."""
 
 import hashlib
+import pickle
 
 import msgspec
 import numpy as np
@@ -140,6 +141,14 @@ def test_a_rows_bits_depend_on_nothing_but_the_row():
     for rows in (slice(0, 1), slice(5, ROWS + 6), slice(2 * ROWS + 3, None)):
         np.testing.assert_array_equal(model(features[rows], 1.0), together[rows])
     assert model(features[:0], 1.0).shape == (0, 3)
+
+
+def test_a_model_travels_to_another_process():
+    model = random_model(0)
+    copy = pickle.loads(pickle.dumps(model))
+    assert (copy.name, copy.hash, copy.card) == (model.name, model.hash, model.card)
+    features = np.random.default_rng(0).uniform(-2, 2, (9, 5))
+    np.testing.assert_array_equal(copy(features, 0.5), model(features, 0.5))
 
 
 def test_a_file_that_is_not_there_lists_the_bundled_names():

@@ -50,8 +50,9 @@ def test_default_budget_is_the_models():
 
 def test_coordinates_that_outgrow_the_operator_are_an_error():
     vertices, faces = bumpy_sphere(0, subdivisions=0)
-    with pytest.raises(MeshError, match="too large"):
-        refine(Mesh(vertices, faces), pns(MODEL, 1e80))
+    for budget, levels in [(1e80, 1), (1e308, 1), (1e70, 3)]:
+        with pytest.raises(MeshError, match="too large"):
+            refine(Mesh(vertices, faces), pns(MODEL, budget), levels)
 
 
 def test_zero_budget_is_loop():

@@ -1,0 +1,67 @@
+"""A glTF file from bytes to bytes, by stage: seconds, and peak memory above what stood before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from benchmarks.generated import torus
+from benchmarks.memory import in_fresh_process, peak_mib, reset_peak
+from pns_common import load_model
+from service.errors import ServiceError
+from service.options import Limits, Options
+from service.soup import TriangleSoup
+from service.soup_glb import soup_glb
+from service.stopwatch import Stopwatch
+from service.subdivide import subdivide_gltf
+
+STAGES = ("read", "weld", "refine", "attributes", "write")
+
+
+@dataclass
+class MemoryStopwatch(Stopwatch):
+    """Also keeps each stage's peak memory, in MiB above what stood at the start."""
+
+    mib: dict[str, float] = field(default_factory=dict)
+    base: float = 0.0
+
+    def lap(self, stage: str) -> None:
+        """Book the time and the peak since the last lap."""
+        super().lap(stage)
+        self.mib[stage] = max(self.mib.get(stage, 0.0), peak_mib() - self.base)
+        reset_peak()
+
+
+@dataclass(frozen=True)
+class MeasuredFile:
+    """What one file took; ``refused`` says why where it was not refined."""
+
+    faces: int = 0
+    seconds: dict[str, float] = field(default_factory=dict)
+    mib: dict[str, float] = field(default_factory=dict)
+    refused: str | None = None
+
+
+def measure_file(path: Path, levels: int) -> MeasuredFile:
+    """Refine a file on disk in a process of its own."""
+    return in_fresh_process(_measure, path.read_bytes(), levels)
+
+
+def measure_generated(faces: int, levels: int) -> MeasuredFile:
+    """Refine a generated GLB of about so many faces in a process of its own."""
+    mesh = torus(faces)
+    data = soup_glb(TriangleSoup(mesh.vertices, mesh.faces, None))
+    return in_fresh_process(_measure, data, levels)
+
+
+def _measure(data: bytes, levels: int) -> MeasuredFile:
+    model, limits = load_model(), Limits(max_faces=10**8, max_memory_bytes=10**11)
+    media = "glb" if data[:4] == b"glTF" else "gltf"
+    try:
+        subdivide_gltf(data, media, Options(levels), model, limits)  # warm
+        reset_peak()
+        clock = MemoryStopwatch(base=peak_mib())
+        done = subdivide_gltf(data, media, Options(levels), model, limits, clock=clock)
+    except ServiceError as error:
+        return MeasuredFile(refused=f"{error.code}: {error.detail}")
+    return MeasuredFile(done.report["totals"]["faces"], clock.seconds, clock.mib)
