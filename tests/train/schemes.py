@@ -34,9 +34,8 @@ def shifted(scheme, edges=0.0, vertices=0.0):
     def moved(rule, shift):
         def shifted_rule(level):
             found = rule(level)
-            return Placement(
-                found.positions + [shift, 0, 0], None, found.ratio, found.gate, found.degenerate
-            )
+            positions = found.positions + np.array([shift, 0, 0])
+            return Placement(positions, None, found.ratio, found.gate, found.degenerate)
 
         return shifted_rule
 

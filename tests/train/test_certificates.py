@@ -126,10 +126,8 @@ def test_a_frame_fixed_in_the_world_fails_through_a_model_too():
 
     def edge_rule(level):
         found = edges(level)
-        size = np.linalg.norm(found.displacement, axis=1, keepdims=True)
-        return Placement(
-            found.loop + size * [0, 0, 1e-3], None, found.ratio, found.gate, found.degenerate
-        )
+        up = np.linalg.norm(found.displacement, axis=1, keepdims=True) * np.array([0, 0, 1e-3])
+        return Placement(found.loop + up, None, found.ratio, found.gate, found.degenerate)
 
     world = Scheme("world", loop_vertex_rule, edge_rule)
     broken = type(subject)("world", world, subject.exact, subject.budget)

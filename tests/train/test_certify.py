@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import msgspec
 import numpy as np
@@ -179,7 +180,8 @@ def test_the_command_exits_with_failure_and_writes_json(tmp_path):
 
 
 def test_the_command_passes_and_looks_at_given_meshes(tmp_path, monkeypatch):
-    monkeypatch.setattr("train.certify.VALENCES", (3,))
+    quicker = partial(certify_model_file, valences=(3,))
+    monkeypatch.setattr("train.certify_command.certify_model_file", quicker)
     folder, verdict = tmp_path / "meshes", tmp_path / "verdict.json"
     folder.mkdir()
     (folder / "tetrahedron.off").write_text(

@@ -28,6 +28,17 @@ class Erf(OpRun):
         return (scipy.special.erf(x),)
 
 
+class Gelu(OpRun):
+    """x Φ(x), or its tanh approximation: the evaluator's own goes through its own erf."""
+
+    op_domain = ""
+
+    def _run(self, x: np.ndarray, approximate: str = "none") -> tuple[np.ndarray]:
+        if approximate == "tanh":
+            return (x / 2 * (1 + np.tanh(np.sqrt(2 / np.pi) * (x + 0.044715 * x**3))),)
+        return (x * scipy.special.ndtr(x),)
+
+
 @dataclass(frozen=True, eq=False)
 class DoubleModel:
     """A model file in double precision; it keeps the `Model` protocol of pns_common.schemes."""
@@ -42,7 +53,9 @@ class DoubleModel:
     ) -> Float[np.ndarray, "E 3"]:
         """Return the corrections, float64."""
         inputs = {"features": np.asarray(features, dtype=np.float64), "budget": np.float64(budget)}
-        (correction,) = self._evaluator.run(["correction"], inputs)
+        # A hostile file may overflow or make a NaN; the operator looks at what comes out.
+        with np.errstate(all="ignore"):
+            (correction,) = self._evaluator.run(["correction"], inputs)
         return correction
 
 
@@ -55,7 +68,7 @@ def double_model(model: OnnxModel, data: bytes) -> DoubleModel:
         _widen_node(node)
     for value in (*proto.graph.input, *proto.graph.output):
         value.type.tensor_type.elem_type = TensorProto.DOUBLE
-    evaluator = ReferenceEvaluator(proto, new_ops=[Erf])
+    evaluator = ReferenceEvaluator(proto, new_ops=[Erf, Gelu])
     return DoubleModel(model.name, model.card, model.hash, evaluator)
 
 
