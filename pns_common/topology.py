@@ -99,8 +99,11 @@ def build_topology(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Topology
     interior = np.flatnonzero(edge_class == EdgeClass.INTERIOR)
     stencil = np.full((len(edges), 4), -1, dtype=np.int64)
     stencil[:, :2] = edges
-    end_corner = next_corner(half_edges[interior])
-    stencil[interior, 2:] = np.take(start, next_corner(end_corner))
+    # The vertex of a triangle that is on neither end: all three less those two.
+    vertex_sum = faces[:, 0] + faces[:, 1] + faces[:, 2]
+    ends = edges[interior, 0] + edges[interior, 1]
+    for side in (0, 1):
+        stencil[interior, 2 + side] = np.take(vertex_sum, half_edges[interior, side] // 3) - ends
     return Topology(
         vertex_count=vertex_count,
         faces=faces,
@@ -165,9 +168,10 @@ def stable_order(key: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
     Packing (key, position) into one integer and sorting values is several times faster than
     argsort; where the pack would overflow, argsort serves.
     """
-    count = len(key)
-    if count and int(key.max()) < (2**63 - 1) // count - 1:
-        return np.sort(key * np.int64(count) + np.arange(count)) % count
+    bits = len(key).bit_length()
+    if len(key) and int(key.max()) < 2 ** (63 - bits):
+        packed = np.sort(key << bits | np.arange(len(key)))
+        return packed & (2**bits - 1)
     return np.argsort(key, kind="stable")
 
 
