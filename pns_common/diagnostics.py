@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 
 import numpy as np
 from jaxtyping import Float
@@ -19,11 +19,12 @@ GATE_ACTIVE = 0.01
 
 
 class EdgeCounts(TypedDict):
-    """The edges that a level refined, by class."""
+    """The edges that a level refined, by class; ``crease`` only where there are some."""
 
     interior: int
     boundary: int
     irregular: int
+    crease: NotRequired[int]
 
 
 class RatioSummary(TypedDict):
@@ -131,16 +132,19 @@ def level_report(
     """Summarise the step that refined ``topology``."""
     interior = topology.interior
     classes = np.bincount(topology.edge_class, minlength=len(EdgeClass))
+    counts: EdgeCounts = {
+        "interior": int(classes[EdgeClass.INTERIOR]),
+        "boundary": int(classes[EdgeClass.BOUNDARY]),
+        "irregular": int(classes[EdgeClass.IRREGULAR]),
+    }
+    if classes[EdgeClass.CREASE]:
+        counts["crease"] = int(classes[EdgeClass.CREASE])
     corrected = len(interior) > 0
     ratio, gate = edges.ratio[interior], edges.gate[interior]
     return {
         "vertices": topology.vertex_count + len(topology.edges),
         "faces": 4 * len(topology.faces),
-        "edges": {
-            "interior": int(classes[EdgeClass.INTERIOR]),
-            "boundary": int(classes[EdgeClass.BOUNDARY]),
-            "irregular": int(classes[EdgeClass.IRREGULAR]),
-        },
+        "edges": counts,
         "degenerate_frames": int(edges.degenerate.sum() + vertices.degenerate.sum()),
         "flipped_faces": children.flipped,
         "proximity_ratio": {

@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 
 from pns_common.arrays import norm
 from pns_common.blocks import Blocks, available_threads
+from pns_common.creases import crease_children, with_creases
 from pns_common.diagnostics import LevelReport, child_faces, level_report
 from pns_common.errors import MeshError, ParameterError
 from pns_common.frames import face_normals
@@ -53,6 +54,7 @@ def refine(
     levels: int = 1,
     reference_length: float | str = "auto",
     *,
+    creases: Int[np.ndarray, "N 2"] | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Refinement:
@@ -65,11 +67,14 @@ def refine(
         reference_length: R, the unit of length of the budget: the largest curvature that the
             budget C can represent is 8 C / R. "auto" measures the mesh; 1 is the paper's absolute
             unit. It is fixed here for all levels: pass the first call's R when calling again.
+        creases: edges to keep sharp, as pairs of vertices: no correction, and the rules of Hoppe
+            et al. 1994. Their children are creases too; boundary and irregular edges stay what
+            they are.
         threads: worker threads, default all processors; the result does not depend on it.
         progress: called after each level with (faces made so far, faces made in the end).
 
     Raises:
-        ParameterError: levels or reference_length out of range.
+        ParameterError: levels or reference_length out of range, a crease that is no edge.
         ModelError: the network returned something that is not finite, or of another shape.
         MeshError: the refined coordinates are too large.
     """
@@ -82,11 +87,14 @@ def refine(
     normals = face_normals(points, faces)
     reports: list[LevelReport] = []
     several_fans = 0
-    edges: Placement | None = None
+    sharp, edges = creases, None
     for level in range(levels):
         topology = build_topology(faces, len(points))
         if level == 0:
             several_fans = int(multi_fan_vertices(topology).sum())
+        if sharp is not None:
+            topology = with_creases(topology, sharp)
+            sharp = crease_children(topology)
         control = ControlLevel(points, topology, normals, length, blocks)
         # What overflows under an absurd budget is caught just below.
         with np.errstate(over="ignore", invalid="ignore"):

@@ -24,13 +24,13 @@ def loop_beta(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
 
 
 def loop_edge_point(
-    a: Float[Array, "N 3"], b: Float[Array, "N 3"], c: Float[Array, "N 3"], d: Float[Array, "N 3"]
-) -> Float[Array, "N 3"]:
+    a: Float[Array, "N K"], b: Float[Array, "N K"], c: Float[Array, "N K"], d: Float[Array, "N K"]
+) -> Float[Array, "N K"]:
     """q0 = 3/8 (a + b) + 1/8 (c + d), the edge vertex of interior edges (equation 2)."""
     return EDGE_ENDPOINT * (a + b) + EDGE_OPPOSITE * (c + d)
 
 
-def loop_edge_vertices(points: Float[Array, "V 3"], topology: Topology) -> Float[Array, "E 3"]:
+def loop_edge_vertices(points: Float[Array, "V K"], topology: Topology) -> Float[Array, "E K"]:
     """One vertex for each edge: Loop's on interior edges, the midpoint on all others."""
     xp = namespace(points)
     a, b = topology.edges.T
@@ -45,12 +45,13 @@ def loop_edge_vertices(points: Float[Array, "V 3"], topology: Topology) -> Float
     )
 
 
-def loop_vertex_vertices(points: Float[Array, "V 3"], topology: Topology) -> Float[Array, "V 3"]:
+def loop_vertex_vertices(points: Float[Array, "V K"], topology: Topology) -> Float[Array, "V K"]:
     """The moved old vertices.
 
-    Counting boundary and irregular edges at a vertex: none or one (a dart), Loop's rule
+    Counting boundary, irregular and crease edges at a vertex: none or one (a dart), Loop's rule
     (equation 3); two, the cubic curve rule 1/8, 3/4, 1/8 along them; more, it stays. An isolated
-    vertex stays.
+    vertex stays. For creases these are the rules of Hoppe et al. 1994 (smooth, dart, crease,
+    corner).
     """
     xp = namespace(points)
     sharp_edges = topology.edges[topology.edge_class != EdgeClass.INTERIOR]
@@ -70,8 +71,8 @@ def loop_vertex_vertices(points: Float[Array, "V 3"], topology: Topology) -> Flo
 
 
 def _neighbour_sum(
-    points: Float[Array, "V 3"], edges: Int[np.ndarray, "E 2"]
-) -> Float[Array, "V 3"]:
+    points: Float[Array, "V K"], edges: Int[np.ndarray, "E 2"]
+) -> Float[Array, "V K"]:
     """For each vertex the sum of its neighbours along ``edges``."""
     neighbours = gather(points, edges[:, ::-1].reshape(-1))
     return segment_sum(neighbours, edges.reshape(-1), points.shape[0])

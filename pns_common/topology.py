@@ -24,6 +24,7 @@ class EdgeClass(IntEnum):
     INTERIOR = 0  # exactly two incident faces, of opposite direction
     BOUNDARY = 1  # one incident face
     IRREGULAR = 2  # anything else
+    CREASE = 3  # would be interior, and is kept sharp on request
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +36,10 @@ class Topology:
         faces: (F, 3) vertices of each face.
         edges: (E, 2) endpoints a < b.
         face_edges: (F, 3) edges (a, b), (b, c), (c, a) of each face.
-        half_edges: (E, 2) of an interior edge its half-edges, lower face first; else −1.
+        half_edges: (E, 2) of an interior or crease edge its half-edges, lower face first; else −1.
             Half-edge h = 3 f + i runs from corner i of face f to the next corner.
-        stencil: (E, 4) a, b, c, d; c is opposite in the face of lower index, d in the other.
+        stencil: (E, 4) a, b, c, d; c is opposite in the face of lower index, d in the other; −1
+            where there are no half-edges.
         edge_class: (E,) EdgeClass values.
         interior: (I,) indices of the interior edges.
     """
@@ -53,7 +55,7 @@ class Topology:
 
     @property
     def edge_faces(self) -> Int[np.ndarray, "E 2"]:
-        """The two faces of each interior edge, lower index first; −1 at other edges."""
+        """The two faces of interior and crease edges, lower index first; −1 at other edges."""
         return self.half_edges // 3
 
 
@@ -138,7 +140,7 @@ def children_across(topology: Topology, edges: Int[np.ndarray, " N"]) -> Int[np.
 
 
 def sharp_edge_count(topology: Topology) -> Int[np.ndarray, " V"]:
-    """For each vertex the number of boundary or irregular edges at it."""
+    """For each vertex the number of edges at it that are not interior."""
     sharp = topology.edges[topology.edge_class != EdgeClass.INTERIOR]
     return np.bincount(sharp.reshape(-1), minlength=topology.vertex_count)
 
@@ -183,7 +185,7 @@ def next_corner(corner: Int[np.ndarray, "..."]) -> Int[np.ndarray, "..."]:
 
 def _next_around_vertex(topology: Topology) -> Int[np.ndarray, " K"]:
     """For each corner the next one around its vertex, across the half-edge that leaves it."""
-    start = topology.half_edges[topology.interior]
+    start = topology.half_edges[topology.half_edges[:, 0] >= 0]
     end = next_corner(start)
     following = np.full(topology.faces.size, -1, dtype=np.int64)
     following[start] = end[:, ::-1]
