@@ -7,7 +7,8 @@ from matplotlib.figure import Figure as Drawing
 from train.ablations import UNCONSTRAINED, variant_recipe, variant_scheme
 from train.envelope import envelope_limit
 from train.evaluation import compare_with_loop
-from train.experiments.experiment import Column, Experiment, Figure, Outcome, Table
+from train.experiments.comparison import COLUMNS, LIMIT_NOTE, comparison_rows
+from train.experiments.experiment import Experiment, Figure, Outcome, Table
 from train.experiments.laboratory import Laboratory
 from train.experiments.paper_values import (
     PAPER_HEADLINE,
@@ -20,25 +21,8 @@ from train.metrics import METRICS, Improvement
 from train.recipes import paper_text, ridge
 from train.tables import METRIC_TITLES
 
-COLUMNS = (
-    Column("method", "Method"),
-    Column("metric", "Metric"),
-    Column("loop", "Loop", ".6f"),
-    Column("mean", "Mean", ".6f"),
-    Column("improvement_percent", "Improvement %", "+.2f"),
-    Column("low", "95 % low", "+.2f"),
-    Column("high", "95 % high", "+.2f"),
-    Column("limit_percent", "Limit %", "+.2f"),
-    Column("share_of_limit", "Used", ".0%"),
-    Column("paper_percent", "Paper %", "+.1f"),
-    Column("paper_low", "Paper low", "+.1f"),
-    Column("paper_high", "Paper high", "+.1f"),
-    Column("published_percent", "Published %", "+.2f"),
-)
 NOTES = (
-    "*Limit* is the best that any network could do with the same C and c: the distance minimised "
-    "over each vertex's ball. *Used* is the share of it that the row reaches. The unconstrained "
-    "network knows no ball, so it has no limit.",
+    LIMIT_NOTE + " The unconstrained network knows no ball, so it has no limit.",
     "**Where this differs from the paper.** The default recipe `ridge` is our own: the paper's "
     "class of networks, trained a little longer with a falling learning rate and a smaller weight "
     "on normals. The row *PNS, the paper's text* trains exactly what the text says (3 × 64 tanh, "
@@ -61,10 +45,21 @@ def run(laboratory: Laboratory) -> Outcome:
     laboratory.progress("the envelope's limit", 0, 1)
     limit = envelope_limit(held_out, recipe.budget, recipe.gate_sharpness)
     rows = [
-        *_rows("PNS", ours, limit, PAPER_HEADLINE, PUBLISHED_HEADLINE),
-        *_rows("PNS, the paper's text", text, limit, {}, {}),
-        *_rows(
-            "Unconstrained MLP", unconstrained, {}, PAPER_UNCONSTRAINED, PUBLISHED_UNCONSTRAINED
+        *comparison_rows(
+            "PNS",
+            held_out.name,
+            ours,
+            limit=limit,
+            paper=PAPER_HEADLINE,
+            published=PUBLISHED_HEADLINE,
+        ),
+        *comparison_rows("PNS, the paper's text", held_out.name, text, limit=limit),
+        *comparison_rows(
+            "Unconstrained MLP",
+            held_out.name,
+            unconstrained,
+            paper=PAPER_UNCONSTRAINED,
+            published=PUBLISHED_UNCONSTRAINED,
         ),
     ]
     return Outcome(
@@ -79,34 +74,6 @@ def run(laboratory: Laboratory) -> Outcome:
         ),
         notes=NOTES,
     )
-
-
-def _rows(
-    method: str,
-    found: Mapping[str, Improvement],
-    limit: Mapping[str, Improvement],
-    paper: Mapping[str, tuple[float, float, float]],
-    published: Mapping[str, float],
-) -> list[tuple]:
-    rows = []
-    for metric in METRICS:
-        one, best = found[metric], limit[metric].percent if metric in limit else None
-        rows.append(
-            (
-                method,
-                METRIC_TITLES[metric],
-                one.reference_mean,
-                one.method_mean,
-                one.percent,
-                one.low,
-                one.high,
-                best,
-                one.percent / best if best else None,
-                *paper.get(metric, (None, None, None)),
-                published.get(metric),
-            )
-        )
-    return rows
 
 
 def _draw(
