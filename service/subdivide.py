@@ -22,6 +22,7 @@ from service.gltf.plan import MeshPlan
 from service.gltf.primitives import read_primitive
 from service.gltf.report import Change, MeshResult, build_report
 from service.gltf.share import RefinedPrimitive, share
+from service.gltf.storage import storage_changes, withdraw_unused
 from service.gltf.upload import Media, Upload, read_upload
 from service.gltf.writer import Writer
 from service.options import Limits, Options
@@ -70,6 +71,7 @@ def subdivide_gltf(
     upload = read_upload(data, media, options.levels, limits)
     instances = mesh_instances(upload.document)
     changes = _changes_of_container(upload, options)
+    changes += storage_changes(upload.document, upload.plans)
     writer = Writer.start(upload.tree, upload.buffers)
     clock.lap("read")
 
@@ -103,6 +105,7 @@ def subdivide_gltf(
             )
         )
 
+    withdraw_unused(upload.tree)
     report = build_report(scheme, options.levels, results, changes)
     if options.diagnostics != "none":
         put_report(upload.tree, report)

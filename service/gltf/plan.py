@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from service.errors import GltfError, LimitError, UnrefinableError
+from service.errors import LimitError, UnrefinableError
 from service.gltf.accessors import element_size
-from service.gltf.refusals import TRIANGLES
+from service.gltf.modes import SURFACES, triangle_count
 from service.gltf.schema import Document, Primitive
 from service.options import Limits
 
@@ -36,16 +36,18 @@ def plan(document: Document) -> list[MeshPlan]:
     """The meshes to refine; others have only points or lines and stay as they are.
 
     Raises:
-        GltfError: a triangle primitive whose number of corners is no multiple of three.
+        GltfError: a primitive whose corners make no whole triangles.
         UnrefinableError: no mesh has triangles.
     """
     plans: list[MeshPlan] = []
     for number, mesh in enumerate(document.meshes):
-        triangles = [
-            p for p, primitive in enumerate(mesh.primitives) if primitive.mode == TRIANGLES
-        ]
+        triangles = [p for p, primitive in enumerate(mesh.primitives) if primitive.mode in SURFACES]
         faces = [
-            _face_count(document, mesh.primitives[p], f"/meshes/{number}/primitives/{p}")
+            triangle_count(
+                _corner_count(document, mesh.primitives[p]),
+                mesh.primitives[p].mode,
+                f"/meshes/{number}/primitives/{p}",
+            )
             for p in triangles
         ]
         if triangles:
@@ -92,16 +94,10 @@ def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, l
             width = sum(element_size(document.accessors[i]) for i in primitive.attributes.values())
             has_normals = "NORMAL" in primitive.attributes
             base = BYTES_PER_FACE_WITH_NORMALS if has_normals else BYTES_PER_FACE
-            faces = _corner_count(document, primitive) // 3 * 4**levels
+            corners = _corner_count(document, primitive)
+            faces = triangle_count(corners, primitive.mode, "") * 4**levels
             total += BYTES_PER_PRIMITIVE + faces * (base + BYTES_PER_VERTEX_BYTE * width)
     return total
-
-
-def _face_count(document: Document, primitive: Primitive, pointer: str) -> int:
-    corners = _corner_count(document, primitive)
-    if corners % 3:
-        raise GltfError(f"{corners} corners are no whole triangles", pointer=pointer)
-    return corners // 3
 
 
 def _corner_count(document: Document, primitive: Primitive) -> int:

@@ -9,7 +9,9 @@ import numpy as np
 from jaxtyping import Int, Shaped
 
 from service.errors import GltfError
-from service.gltf.accessors import FLOAT, read
+from service.gltf.accessors import FLOAT, read, read_rows
+from service.gltf.modes import triangles
+from service.gltf.quantization import dequantised
 from service.gltf.schema import Accessor, Document
 from service.weld import as_words, distinct_rows, number_by_first_appearance
 
@@ -21,8 +23,9 @@ class TrianglePrimitive:
     Attributes:
         number: its place in the mesh.
         corners: (F, 3) rows of `attributes`.
-        attributes: by name (N, K) arrays in the file's component type.
-        accessors: by name the accessor that an attribute came from.
+        attributes: by name (N, K) arrays in the component type that they are written in.
+        accessors: by name an accessor that describes them; one without bytes of its own where
+            they were quantised.
     """
 
     number: int
@@ -44,7 +47,7 @@ def read_primitive(
     if primitive.indices is None:
         flat = np.arange(count, dtype=np.int64)
     else:
-        flat = read(document, buffers, document.accessors[primitive.indices])[:, 0].astype(np.int64)
+        flat = read(document, buffers, primitive.indices)[:, 0].astype(np.int64)
         if flat.max() >= count:
             raise GltfError(
                 f"index {flat.max()}, but there are {count} vertices",
@@ -52,17 +55,18 @@ def read_primitive(
             )
     used, corners = compact(flat, count)
     attributes: dict[str, Shaped[np.ndarray, "N K"]] = {}
+    accessors: dict[str, Accessor] = {}
     for name, index in primitive.attributes.items():
         accessor = document.accessors[index]
-        values = read(document, buffers, accessor)[used]
+        values = read_rows(document, buffers, index, used)
         if accessor.component_type == FLOAT and not np.isfinite(values).all():
             raise GltfError(f"{name} holds NaN or infinity", pointer=f"/accessors/{index}")
-        attributes[name] = values
+        attributes[name], accessors[name] = dequantised(name, values, accessor)
     return TrianglePrimitive(
         number=number,
-        corners=corners.reshape(-1, 3),
+        corners=triangles(corners, primitive.mode),
         attributes=attributes,
-        accessors={n: document.accessors[i] for n, i in primitive.attributes.items()},
+        accessors=accessors,
     )
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 
 from service.errors import GltfError, UnsupportedFeature
-from service.gltf.accessors import FLOAT, is_padded
+from service.gltf.accessors import FLOAT
+from service.gltf.modes import SURFACES
+from service.gltf.quantization import allowed, is_dequantised
 from service.gltf.schema import Accessor, Document, Primitive
-
-POINTS_TO_LINES = (0, 1, 2, 3)
-TRIANGLES, STRIP, FAN = 4, 5, 6
 
 _MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 _DRACO = "KHR_draco_mesh_compression"
@@ -44,24 +43,21 @@ def refuse_features(document: Document) -> None:
     """Refuse primitives of surfaces that would come back incomplete; references are checked.
 
     Raises:
-        UnsupportedFeature: skins, morph targets, strips, fans, sparse or quantised attributes.
+        UnsupportedFeature: skins, morph targets.
         GltfError: an attribute of a type that glTF does not allow.
     """
     for number, mesh in enumerate(document.meshes):
         for place, primitive in enumerate(mesh.primitives):
-            if primitive.mode not in POINTS_TO_LINES:
+            if primitive.mode in SURFACES:
                 _refuse_primitive(document, primitive, f"/meshes/{number}/primitives/{place}")
     for number, node in enumerate(document.nodes):
         if node.skin is not None and node.mesh is not None:
             primitives = document.meshes[node.mesh].primitives
-            if any(primitive.mode == TRIANGLES for primitive in primitives):
+            if any(primitive.mode in SURFACES for primitive in primitives):
                 raise UnsupportedFeature("a skinned mesh", pointer=f"/nodes/{number}/skin")
 
 
 def _refuse_primitive(document: Document, primitive: Primitive, pointer: str) -> None:
-    if primitive.mode != TRIANGLES:
-        name = {STRIP: "a triangle strip", FAN: "a triangle fan"}[primitive.mode]
-        raise UnsupportedFeature(name, pointer=f"{pointer}/mode")
     if primitive.targets:
         raise UnsupportedFeature("a mesh with morph targets", pointer=f"{pointer}/targets")
     for name in _BY_VERTEX:
@@ -69,37 +65,24 @@ def _refuse_primitive(document: Document, primitive: Primitive, pointer: str) ->
             raise UnsupportedFeature(name, pointer=f"{pointer}/extensions/{name}")
     if "POSITION" not in primitive.attributes:
         raise UnsupportedFeature("a primitive without POSITION", pointer=f"{pointer}/attributes")
-    if primitive.indices is not None:
-        _refuse_storage(document.accessors[primitive.indices], primitive.indices)
     for name, index in primitive.attributes.items():
         accessor = document.accessors[index]
         if _SKINNING.fullmatch(name):
             raise UnsupportedFeature("a skinned mesh", pointer=f"{pointer}/attributes/{name}")
-        _refuse_storage(accessor, index)
         _refuse_type(name, accessor, f"/accessors/{index}")
 
 
-def _refuse_storage(accessor: Accessor, index: int) -> None:
-    if accessor.sparse is not None:
-        raise UnsupportedFeature("a sparse accessor", pointer=f"/accessors/{index}/sparse")
-    if accessor.buffer_view is None:
-        raise UnsupportedFeature("an accessor without a buffer view", pointer=f"/accessors/{index}")
-    if is_padded(accessor):
-        raise UnsupportedFeature("a matrix of padded columns", pointer=f"/accessors/{index}")
-
-
 def _refuse_type(name: str, accessor: Accessor, pointer: str) -> None:
-    if name in _GEOMETRY:
-        if accessor.type != _GEOMETRY[name]:
-            raise GltfError(f"{name} must be {_GEOMETRY[name]}", pointer=f"{pointer}/type")
-        if accessor.component_type != FLOAT:
-            raise UnsupportedFeature(
-                f"KHR_mesh_quantization of {name}", pointer=f"{pointer}/componentType"
-            )
-    elif accessor.component_type != FLOAT and not accessor.normalized:
-        if name.startswith("TEXCOORD_"):
-            raise UnsupportedFeature(
-                f"KHR_mesh_quantization of {name}", pointer=f"{pointer}/componentType"
-            )
-        if name.startswith("COLOR_"):
-            raise GltfError(f"integers in {name} must be normalized", pointer=pointer)
+    if name in _GEOMETRY and accessor.type != _GEOMETRY[name]:
+        raise GltfError(f"{name} must be {_GEOMETRY[name]}", pointer=f"{pointer}/type")
+    if name.startswith("TEXCOORD_") and accessor.type != "VEC2":
+        raise GltfError(f"{name} must be VEC2", pointer=f"{pointer}/type")
+    if accessor.component_type == FLOAT:
+        return
+    storage = (accessor.component_type, accessor.normalized)
+    if is_dequantised(name) and storage not in allowed(name):
+        raise GltfError(
+            f"{name} may not be stored as integers of this type", pointer=f"{pointer}/componentType"
+        )
+    if name.startswith("COLOR_") and not accessor.normalized:
+        raise GltfError(f"integers in {name} must be normalized", pointer=pointer)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Shaped
 
-from service.gltf.accessors import COMPONENT_TYPES
+from service.gltf.accessors import COLUMNS, COMPONENT_TYPES
+from service.gltf.modes import TRIANGLES
 from service.gltf.share import RefinedPrimitive
 
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
@@ -17,7 +18,6 @@ ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 LARGEST_UINT16_INDEX = 65534
 
 _COMPONENT_TYPE_OF = {dtype: number for number, dtype in COMPONENT_TYPES.items()}
-_VECTORS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
 @dataclass
@@ -46,9 +46,13 @@ class Writer:
             name: self._attribute(refined, name, values)
             for name, values in refined.attributes.items()
         }
+        if primitive.get("mode", TRIANGLES) != TRIANGLES:
+            primitive["mode"] = TRIANGLES
         small = refined.faces.max() <= LARGEST_UINT16_INDEX
         indices = refined.faces.astype(np.uint16 if small else np.uint32)
-        primitive["indices"] = self._accessor(indices.reshape(-1, 1), ELEMENT_ARRAY_BUFFER)
+        primitive["indices"] = self._accessor(
+            indices.reshape(-1, 1), ELEMENT_ARRAY_BUFFER, "SCALAR"
+        )
 
     def finish(self) -> list[bytes | memoryview]:
         """Write the buffer's length into the tree; the pieces of BIN."""
@@ -62,31 +66,29 @@ class Writer:
     def _attribute(
         self, refined: RefinedPrimitive, name: str, values: Shaped[np.ndarray, "N K"]
     ) -> int:
-        index = self._accessor(values, ARRAY_BUFFER)
-        accessor = self.tree["accessors"][index]
         before = refined.source.accessors.get(name)
-        if before is not None:
-            accessor["type"] = before.type
-            if before.normalized:
-                accessor["normalized"] = True
+        kind = "SCALAR" if before is None else before.type
+        index = self._accessor(values, ARRAY_BUFFER, kind)
+        accessor = self.tree["accessors"][index]
+        if before is not None and before.normalized:
+            accessor["normalized"] = True
         if name == "POSITION":
             accessor["min"] = values.min(axis=0).tolist()
             accessor["max"] = values.max(axis=0).tolist()
         return index
 
-    def _accessor(self, values: Shaped[np.ndarray, "N K"], target: int) -> int:
-        """Append the rows, each padded to whole words where they are vertices; its accessor."""
-        width = values.shape[1] * values.itemsize
-        padded = target == ARRAY_BUFFER and width % 4 != 0
-        if padded:
-            octets = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), width)
-            content = np.pad(octets, ((0, 0), (0, -width % 4)))
-        else:
-            content = np.ascontiguousarray(values)
+    def _accessor(self, values: Shaped[np.ndarray, "N K"], target: int, kind: str) -> int:
+        """Append the elements; their accessor's index."""
+        vertices = target == ARRAY_BUFFER
+        content = in_words(values, kind) if vertices else np.ascontiguousarray(values)
         data = memoryview(content).cast("B")
         view: dict[str, Any] = {"buffer": 0, "byteOffset": self._append(data)}
         view["byteLength"] = len(data)
-        if padded:
+        if (
+            vertices
+            and kind not in COLUMNS
+            and content.shape[1] != values.shape[1] * values.itemsize
+        ):
             view["byteStride"] = content.shape[1]
         view["target"] = target
         self.tree.setdefault("bufferViews", []).append(view)
@@ -96,7 +98,7 @@ class Writer:
                 "bufferView": len(self.tree["bufferViews"]) - 1,
                 "componentType": _COMPONENT_TYPE_OF[values.dtype],
                 "count": len(values),
-                "type": _VECTORS.get(values.shape[1], "SCALAR"),
+                "type": kind,
             }
         )
         return len(accessors) - 1
@@ -110,3 +112,13 @@ class Writer:
         self.pieces.append(data)
         self.length = start + len(data)
         return start
+
+
+def in_words(values: Shaped[np.ndarray, "N K"], kind: str) -> Shaped[np.ndarray, "N B"]:
+    """Rows as bytes, each column of a matrix and each row padded to whole words where needed."""
+    narrow = np.ascontiguousarray(values)
+    if narrow.itemsize == 4:
+        return narrow.view(np.uint8).reshape(len(values), -1)
+    columns = narrow.view(np.uint8).reshape(len(values), COLUMNS.get(kind, 1), -1)
+    padding = -columns.shape[2] % 4
+    return np.pad(columns, ((0, 0), (0, 0), (0, padding))).reshape(len(values), -1)

@@ -158,8 +158,6 @@ UNSUPPORTED = [
     ("/buffers/0/uri", "box.bin", "a buffer in an external file"),
     ("/buffers/0/uri", "file:///etc/passwd", "a buffer in an external file"),
     ("/buffers/0/uri", "https://example.com/box.bin", "a buffer in an external file"),
-    ("/meshes/0/primitives/0/mode", 5, "a triangle strip"),
-    ("/meshes/0/primitives/0/mode", 6, "a triangle fan"),
     ("/meshes/0/primitives/0/targets", [{"POSITION": 0}], "a mesh with morph targets"),
     ("/meshes/0/primitives/0/attributes/JOINTS_0", 2, "a skinned mesh"),
     ("/meshes/0/primitives/0/attributes/WEIGHTS_1", 2, "a skinned mesh"),
@@ -184,17 +182,6 @@ UNSUPPORTED = [
         {"KHR_meshopt_compression": {"buffer": 0}},
         "KHR_meshopt_compression",
     ),
-    (
-        "/accessors/0/sparse",
-        {
-            "count": 1,
-            "indices": {"bufferView": 0, "componentType": 5123},
-            "values": {"bufferView": 0},
-        },
-        "a sparse accessor",
-    ),
-    ("/accessors/0/componentType", 5122, "KHR_mesh_quantization of POSITION"),
-    ("/accessors/3/componentType", 5123, "KHR_mesh_quantization of TEXCOORD_0"),
 ]
 
 

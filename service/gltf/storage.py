@@ -1,0 +1,59 @@
+"""What is written otherwise than it was stored: sparse, quantised, strips and fans."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from service.gltf.extensions import withdraw
+from service.gltf.modes import FAN, STRIP
+from service.gltf.plan import MeshPlan
+from service.gltf.quantization import EXTENSION, needs_extension, still_needed
+from service.gltf.report import Change
+from service.gltf.schema import Document, Primitive
+
+_MODES = {STRIP: "triangle strip written as triangles", FAN: "triangle fan written as triangles"}
+
+
+def storage_changes(document: Document, plans: Sequence[MeshPlan]) -> list[Change]:
+    """One change for each primitive and way of storing that refinement gives up."""
+    return [
+        change
+        for plan in plans
+        for number in plan.primitives
+        for change in _of_primitive(
+            document,
+            document.meshes[plan.mesh].primitives[number],
+            f"/meshes/{plan.mesh}/primitives/{number}",
+        )
+    ]
+
+
+def withdraw_unused(tree: dict[str, Any]) -> None:
+    """Take KHR_mesh_quantization off the lists where no primitive of the new file needs it."""
+    if not still_needed(tree):
+        withdraw(tree, EXTENSION)
+
+
+def _of_primitive(document: Document, primitive: Primitive, pointer: str) -> Iterator[Change]:
+    accessors = document.accessors
+    if primitive.mode in _MODES:
+        yield Change(f"{pointer}/mode", _MODES[primitive.mode], 1)
+    indices = [] if primitive.indices is None else [primitive.indices]
+    named = [
+        (name, index)
+        for attributes in (primitive.attributes, *primitive.targets)
+        for name, index in attributes.items()
+    ]
+    stored = [*indices, *(index for _, index in named)]
+    sparse = sum(accessors[index].sparse is not None for index in stored)
+    if sparse:
+        yield Change(pointer, "sparse accessors written dense", sparse)
+    quantised = sum(
+        needs_extension(
+            name, accessors[index].component_type, normalized=accessors[index].normalized
+        )
+        for name, index in named
+    )
+    if quantised:
+        yield Change(pointer, "quantised attributes written as float32", quantised)
