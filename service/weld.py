@@ -2,7 +2,8 @@
 
 Formats store one vertex for each distinct set of attributes, so a UV seam or a hard edge looks like
 a boundary, and refining that mesh would crack it. Every format is therefore welded by exact float32
-position first; attributes stay with the corners.
+position first; attributes stay with the corners. What would move two vertices apart later (morph
+deltas, a skin binding) keeps them apart here: closed lips are two lips.
 """
 
 from __future__ import annotations
@@ -28,15 +29,34 @@ class Weld:
     vertex_of: Int[np.ndarray, " N"]
 
 
-def weld(positions: Float[np.ndarray, "N 3"], faces: Int[np.ndarray, "F 3"]) -> Weld:
-    """Join the vertices whose float32 positions are equal (−0 = 0), whatever lies near them."""
+def weld(
+    positions: Float[np.ndarray, "N 3"],
+    faces: Int[np.ndarray, "F 3"],
+    movement: Int[np.ndarray, " N"] | None = None,
+) -> Weld:
+    """Join the vertices whose float32 positions are equal (−0 = 0), whatever lies near them.
+
+    `movement` labels what else must be equal; None where nothing else moves a vertex.
+    """
     single = canonical_zero(positions.astype(np.float32))
-    group = number_by_first_appearance(distinct_rows(single)[faces.reshape(-1)])
-    # Any corner of a group has the group's position.
+    labels = distinct_rows(single)
+    if movement is not None:
+        labels = distinct_rows(np.column_stack([labels, movement]))
+    return weld_by_label(single, faces, labels)
+
+
+def weld_by_label(
+    positions: Float[np.ndarray, "N 3"],
+    faces: Int[np.ndarray, "F 3"],
+    labels: Int[np.ndarray, " N"],
+) -> Weld:
+    """Join the vertices that share a label, at the position of the first corner of each."""
+    flat = faces.reshape(-1)
+    group = number_by_first_appearance(labels[flat])
     points = np.empty((group.max(initial=-1) + 1, 3))
-    points[group] = single[faces.reshape(-1)]
+    points[group[::-1]] = positions[flat[::-1]]
     vertex_of = np.full(len(positions), -1, dtype=np.int64)
-    vertex_of[faces.reshape(-1)] = group
+    vertex_of[flat] = group
     return Weld(points=points, faces=group.reshape(-1, 3), vertex_of=vertex_of)
 
 
