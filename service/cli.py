@@ -54,6 +54,15 @@ def subdivide(
     diagnostics: Annotated[
         Literal["summary", "full", "none"], typer.Option(help="what a glTF carries of the report")
     ] = "summary",
+    uv: Annotated[
+        Literal["linear", "smooth"], typer.Option(help="smooth: Loop's stencil inside charts")
+    ] = "linear",
+    crease: Annotated[
+        str, typer.Option(metavar="off|normals|angle:DEG", help="edges to keep sharp")
+    ] = "off",
+    weld_tolerance: Annotated[
+        float, typer.Option(metavar="X", help="join vertices nearer than X times R")
+    ] = 0.0,
     report: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help="write the report too")
     ] = None,
@@ -69,6 +78,9 @@ def subdivide(
         budget=budget,
         reference_length=_reference_length(reference_length),
         diagnostics=diagnostics,
+        uv=uv,
+        crease=crease,
+        weld_tolerance=weld_tolerance,
     )
     convert(source, output, options, model, report, Settings().job_limits())
 
@@ -96,13 +108,12 @@ def info(
     """Show what MODEL says of itself; without MODEL, list the bundled models."""
     from pns_common.onnx_model import bundled_models, load_model
 
-    if model is None:
-        for name in bundled_models():
-            typer.echo(name)
-        return
-    from service.model_info import print_model
+    from service.model_info import print_model, print_models
 
-    print_model(load_model(model))
+    if model is None:
+        print_models(load_model(name) for name in bundled_models())
+    else:
+        print_model(load_model(model))
 
 
 @app.command()

@@ -240,12 +240,16 @@ def test_a_fault_of_ours_is_a_traceback(pns: Any, monkeypatch: pytest.MonkeyPatc
 
 
 def test_info_lists_models_and_shows_a_card(pns: Any) -> None:
-    assert pns("info").out.split() == bundled_models()
+    listed = pns("info").out
+    assert all(name in listed for name in bundled_models())
+    assert "(default)" in listed
     shown = pns("info", "paper").out
     model = load_model("paper")
     assert model.hash in shown
     assert str(model.card.budget) in shown
     assert model.card.features in shown
+    percent = model.card.metrics["ridge-held-out"]["distance_near"]["percent"]
+    assert f"{percent:.4g}" in shown
 
 
 def test_settings_from_the_environment_hold_here_too(
