@@ -30,6 +30,8 @@ def print_model(model: OnnxModel) -> None:
     """Print what the file says of itself, and its size and hash."""
     card = model.card
     table = Table(title=model.name, show_header=False, title_justify="left")
+    table.add_column()
+    table.add_column(overflow="fold")  # a hash cut short is no hash
     rows: dict[str, Any] = {
         "format": card.format,
         "features": card.features,
