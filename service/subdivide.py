@@ -71,7 +71,7 @@ def subdivide_gltf(
     upload = read_upload(data, media, options.levels, limits)
     instances = mesh_instances(upload.document)
     changes = _changes_of_container(upload, options)
-    changes += storage_changes(upload.document, upload.plans)
+    changes += upload.changes + storage_changes(upload.document, upload.plans)
     writer = Writer.start(upload.tree, upload.buffers)
     clock.lap("read")
 
@@ -172,8 +172,6 @@ def _changes_of_mesh(mesh: int, control: ControlMesh) -> list[Change]:
 
 def _changes_of_container(upload: Upload, options: Options) -> list[Change]:
     changes: list[Change] = []
-    if len(upload.buffers) > 1:
-        changes.append(Change("/buffers", "joined into one", len(upload.buffers)))
     if options.diagnostics != "none" and replaces_extras(upload.tree):
         changes.append(Change("/asset/extras", "moved to /asset/extras/extras", 1))
     return changes

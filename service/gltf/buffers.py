@@ -6,6 +6,7 @@ import base64
 import re
 
 from service.errors import GltfError, UnsupportedFeature
+from service.gltf.meshopt import placeholders
 from service.gltf.schema import Buffer, Document
 
 _DATA_URI = re.compile(r"data:[^,]*;base64,", re.IGNORECASE)
@@ -21,8 +22,13 @@ def resolve_buffers(document: Document, binary: memoryview | None) -> list[memor
         GltfError: no bytes, or fewer than `byteLength` says.
     """
     resolved: list[memoryview] = []
+    without = placeholders(document)
     for number, buffer in enumerate(document.buffers):
         pointer = f"/buffers/{number}"
+        is_binary = number == 0 and binary is not None
+        if buffer.uri is None and not is_binary and number in without:
+            resolved.append(memoryview(b""))
+            continue
         content = _content(buffer, binary if number == 0 else None, pointer)
         if len(content) < buffer.byte_length:
             raise GltfError(

@@ -77,12 +77,28 @@ def check_cost(
         )
     memory = predicted_memory(document, plans, size, levels)
     if memory > limits.max_memory_bytes:
-        raise LimitError(
-            f"the work would take {memory} bytes, more than {limits.max_memory_bytes}",
-            limit="memory",
-            allowed=limits.max_memory_bytes,
-            found=memory,
-        )
+        raise over_memory(limits.max_memory_bytes, memory)
+
+
+def check_decoded(decoded: int, size: int, limits: Limits) -> None:
+    """Check bytes that compressed data will take, beside an upload of `size`, before decoding.
+
+    Raises:
+        LimitError: over `max_memory_bytes`.
+    """
+    memory = decoded + BYTES_PER_INPUT_BYTE * size
+    if memory > limits.max_memory_bytes:
+        raise over_memory(limits.max_memory_bytes, memory)
+
+
+def over_memory(allowed: int, found: int) -> LimitError:
+    """The error of work that would take more memory than a job may."""
+    return LimitError(
+        f"the work would take {found} bytes, more than {allowed}",
+        limit="memory",
+        allowed=allowed,
+        found=found,
+    )
 
 
 def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, levels: int) -> int:

@@ -10,33 +10,22 @@ from service.gltf.modes import SURFACES
 from service.gltf.quantization import allowed, is_dequantised
 from service.gltf.schema import Accessor, Document, Primitive
 
-_MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-_DRACO = "KHR_draco_mesh_compression"
 # Extensions of primitives that name vertices by number: refined vertices have other numbers.
 _BY_VERTEX = ("CESIUM_primitive_outline",)
 _SKINNING = re.compile(r"(JOINTS|WEIGHTS)_\d+")
 _GEOMETRY = {"POSITION": "VEC3", "NORMAL": "VEC3", "TANGENT": "VEC4"}
 
 
-def refuse_compression(document: Document) -> None:
-    """Refuse what must be decoded before its references mean anything.
+def refuse_version(document: Document) -> None:
+    """Refuse another version of glTF.
 
     Raises:
-        UnsupportedFeature: another version of glTF, Draco or meshopt.
+        UnsupportedFeature: another version of glTF.
     """
     if document.asset.version.partition(".")[0] != "2":
         raise UnsupportedFeature(
             f"glTF version {document.asset.version[:16]}", pointer="/asset/version"
         )
-    for number, view in enumerate(document.buffer_views):
-        for name in _MESHOPT:
-            if name in view.extensions:
-                raise UnsupportedFeature(name, pointer=f"/bufferViews/{number}/extensions/{name}")
-    for number, mesh in enumerate(document.meshes):
-        for place, primitive in enumerate(mesh.primitives):
-            if _DRACO in primitive.extensions:
-                pointer = f"/meshes/{number}/primitives/{place}/extensions/{_DRACO}"
-                raise UnsupportedFeature(_DRACO, pointer=pointer)
 
 
 def refuse_features(document: Document) -> None:

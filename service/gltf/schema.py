@@ -7,7 +7,7 @@ it. What is not named here (factors, names, extras, extensions) is never looked 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import msgspec
 from msgspec import Meta
@@ -16,6 +16,7 @@ from service.errors import GltfError
 
 Index = Annotated[int, Meta(ge=0)]
 Size = Annotated[int, Meta(ge=1)]
+Shape = TypeVar("Shape", bound="Part")
 
 
 class Part(msgspec.Struct, frozen=True, rename="camel"):
@@ -209,11 +210,20 @@ def view(tree: dict[str, Any]) -> Document:
     Raises:
         GltfError: a property is missing, of another type or outside its range.
     """
+    return checked(tree, Document, "")
+
+
+def checked(value: Any, kind: type[Shape], pointer: str) -> Shape:
+    """A typed view of the JSON value at `pointer`; extensions have types of their own.
+
+    Raises:
+        GltfError: a property is missing, of another type or outside its range.
+    """
     try:
-        return msgspec.convert(tree, Document)
+        return msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
         message, _, path = str(error).partition(" - at ")
-        raise GltfError(message, pointer=_pointer(path)) from error
+        raise GltfError(message, pointer=pointer + _pointer(path)) from error
 
 
 def _pointer(path: str) -> str:

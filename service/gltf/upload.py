@@ -7,11 +7,14 @@ from typing import Any, Literal
 
 from service.gltf.buffers import resolve_buffers
 from service.gltf.container import Container, read_glb
+from service.gltf.draco import decode_primitives
 from service.gltf.json_text import decode_object
+from service.gltf.meshopt import decode_views
 from service.gltf.nodes import check_nodes
 from service.gltf.plan import MeshPlan, check_cost, plan
 from service.gltf.references import check_references
-from service.gltf.refusals import refuse_compression, refuse_features
+from service.gltf.refusals import refuse_features, refuse_version
+from service.gltf.report import Change
 from service.gltf.schema import Document, view
 from service.options import Limits
 
@@ -28,6 +31,7 @@ class Upload:
         document: a typed view of the JSON as it came.
         buffers: the bytes of each buffer.
         plans: the meshes to refine.
+        changes: what was joined and decoded on the way.
     """
 
     container: Container
@@ -35,6 +39,7 @@ class Upload:
     document: Document
     buffers: list[memoryview]
     plans: list[MeshPlan]
+    changes: list[Change]
 
 
 def read_upload(data: bytes, media: Media, levels: int, limits: Limits) -> Upload:
@@ -46,11 +51,28 @@ def read_upload(data: bytes, media: Media, levels: int, limits: Limits) -> Uploa
     container = read_glb(data) if media == "glb" else Container(text=data)
     tree = decode_object(container.text, limits)
     document = view(tree)
-    refuse_compression(document)
+    refuse_version(document)
     buffers = resolve_buffers(document, container.binary)
+    stored, files = len(buffers), sum(len(buffer) > 0 for buffer in buffers)
+    views = decode_views(tree, document, buffers, len(data), limits)
+    document = view(tree)
     check_references(document, buffers)
+    primitives = decode_primitives(tree, document, buffers, len(data), limits)
+    if primitives:
+        document = view(tree)
+        check_references(document, buffers)
+    changes = [
+        Change(pointer, what, count)
+        for pointer, what, count in (
+            ("/buffers", "joined into one", files if files > 1 else 0),
+            ("/bufferViews", "meshopt compression decoded", views),
+            ("/meshes", "Draco compression decoded", primitives),
+        )
+        if count
+    ]
     check_nodes(document)
     refuse_features(document)
     plans = plan(document)
-    check_cost(document, plans, len(data), levels, limits)
-    return Upload(container, tree, document, buffers, plans)
+    size = len(data) + sum(len(buffer) for buffer in buffers[stored:])
+    check_cost(document, plans, size, levels, limits)
+    return Upload(container, tree, document, buffers, plans, changes)

@@ -118,6 +118,16 @@ BROKEN = [
         },
         "/accessors/0/sparse/indices",
     ),
+    (
+        "/bufferViews/0/extensions",
+        {"EXT_meshopt_compression": {"buffer": 0}},
+        "/bufferViews/0/extensions/EXT_meshopt_compression",
+    ),
+    (
+        "/meshes/0/primitives/0/extensions",
+        {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {}}},
+        "/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression",
+    ),
     ("/accessors/4/count", 35, "/meshes/0/primitives/0"),
     ("/accessors/0/type", "SCALAR", "/accessors/0/type"),
 ]
@@ -164,23 +174,8 @@ UNSUPPORTED = [
     ("/meshes/0/primitives/0/attributes", {"NORMAL": 1}, "a primitive without POSITION"),
     (
         "/meshes/0/primitives/0/extensions",
-        {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {}}},
-        "KHR_draco_mesh_compression",
-    ),
-    (
-        "/meshes/0/primitives/0/extensions",
         {"CESIUM_primitive_outline": {"indices": 4}},
         "CESIUM_primitive_outline",
-    ),
-    (
-        "/bufferViews/0/extensions",
-        {"EXT_meshopt_compression": {"buffer": 0}},
-        "EXT_meshopt_compression",
-    ),
-    (
-        "/bufferViews/0/extensions",
-        {"KHR_meshopt_compression": {"buffer": 0}},
-        "KHR_meshopt_compression",
     ),
 ]
 
