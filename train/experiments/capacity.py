@@ -31,7 +31,8 @@ def run(laboratory: Laboratory) -> Outcome:
         LIMIT_NOTE,
         f"The intervals of the near-feature improvement {overlap}: "
         f"[{small.low:+.2f}, {small.high:+.2f}] and [{large.low:+.2f}, {large.high:+.2f}]. "
-        "The envelope limits the near-feature gain, not the network: both reach most of the limit.",
+        f"The limit is {limit['distance_near'].percent:+.2f} % near the feature and "
+        f"{limit['distance'].percent:+.2f} % everywhere, whatever the network.",
     )
     table = Table("capacity", "A network three times as large", COLUMNS, tuple(rows))
     return Outcome((table,), notes=notes)

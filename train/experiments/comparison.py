@@ -23,6 +23,9 @@ COLUMNS = (
     Column("paper_high", "Paper high", "+.1f"),
     Column("published_percent", "Published %", "+.2f"),
 )
+SMALLEST_LIMIT = 0.1
+"""Per cent of improvement below which no share of the limit is given."""
+
 NOTHING: Mapping[str, object] = MappingProxyType({})
 
 LIMIT_NOTE = (
@@ -56,7 +59,8 @@ def comparison_rows(
                 one.low,
                 one.high,
                 best,
-                one.percent / best if best else None,
+                # A share of next to nothing says nothing, nor does a share of a loss.
+                one.percent / best if best and best > SMALLEST_LIMIT and one.percent > 0 else None,
                 *paper.get(metric, (None, None, None)),
                 published.get(metric),
             )

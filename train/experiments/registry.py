@@ -5,10 +5,16 @@ from types import MappingProxyType
 
 from train.experiments import (
     ablation,
+    budget,
     c_sweep,
+    cad,
     capacity,
+    cross_section,
+    extended,
     headline,
+    hero,
     published,
+    repeated,
     saddle,
     sphere_ridge,
 )
@@ -20,10 +26,16 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
         for module in (
             ablation,
             headline,
+            cross_section,
+            repeated,
             c_sweep,
+            budget,
             capacity,
             saddle,
             sphere_ridge,
+            hero,
+            extended,
+            cad,
             published,
         )
     }

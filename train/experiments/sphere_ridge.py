@@ -11,8 +11,8 @@ from train.recipes import ridge
 NOTES = (
     LIMIT_NOTE,
     "The published +1.38 % is the plain ratio of means, not the bootstrap's mean (see "
-    "`published`). Near-feature errors are missing where the crest lies outside some patches, and then the mean "
-    "over the data set is missing too, as in the published table.",
+    "`published`). Near-feature errors are missing where the crest lies outside some patches; the "
+    "mean over the data set is then missing too, as in the published table.",
 )
 
 

@@ -1,0 +1,100 @@
+"""Shaded renders without a display: by pyvista where it is installed (the extra `render`).
+
+Without it matplotlib draws the same view, flat-shaded and sorted by depth. Camera, light and
+colours are one and the same.
+"""
+
+import importlib.util
+from dataclasses import dataclass
+
+import matplotlib
+import numpy as np
+from jaxtyping import Float, UInt8
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+
+from pns_common.frames import face_normals
+from pns_common.mesh import Mesh
+
+PIXELS = 900
+COLOUR_MAP = matplotlib.colormaps["cividis"]
+LIGHT = np.array([-0.35, -0.5, 0.8])
+AMBIENT = 0.35
+HALF_WIDTH = 1.42
+"""Half the width of the view: a patch over [−1, 1]² fits whatever the azimuth."""
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A parallel view of the origin's surroundings; angles in degrees."""
+
+    azimuth: float
+    elevation: float
+
+    def axes(self) -> Float[np.ndarray, "3 3"]:
+        """Return rows: right, up, and towards the viewer."""
+        a, e = np.radians([self.azimuth, self.elevation])
+        towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        right = np.array([-np.sin(a), np.cos(a), 0.0])
+        return np.stack([right, np.cross(towards, right), towards])
+
+
+def shaded_image(
+    mesh: Mesh, values: Float[np.ndarray, " V"], largest: float, camera: Camera
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Return a picture of a mesh coloured by a value at each vertex, 0 … `largest`."""
+    if importlib.util.find_spec("pyvista") is None:
+        return _by_matplotlib(mesh, values, largest, camera)
+    return _by_pyvista(mesh, values, largest, camera)
+
+
+def _by_pyvista(mesh: Mesh, values: np.ndarray, largest: float, camera: Camera) -> np.ndarray:
+    import pyvista
+
+    plotter = pyvista.Plotter(off_screen=True, window_size=(PIXELS, PIXELS * 3 // 4), lighting=None)
+    surface = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
+    plotter.add_mesh(
+        surface,
+        scalars=values,
+        cmap=COLOUR_MAP,
+        clim=(0, largest),
+        show_scalar_bar=False,
+        smooth_shading=False,
+        ambient=AMBIENT,
+        diffuse=1 - AMBIENT,
+        specular=0.15,
+    )
+    plotter.add_light(pyvista.Light(position=tuple(10 * LIGHT), light_type="scene light"))
+    towards = camera.axes()[2]
+    plotter.camera_position = [tuple(8 * towards), (0, 0, 0.15), (0, 0, 1)]
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = HALF_WIDTH * 3 / 4
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    image = plotter.screenshot(return_img=True)
+    plotter.close()
+    return np.asarray(image)
+
+
+def _by_matplotlib(mesh: Mesh, values: np.ndarray, largest: float, camera: Camera) -> np.ndarray:
+    seen = (mesh.vertices - [0, 0, 0.15]) @ camera.axes().T
+    depth = seen[mesh.faces, 2].mean(axis=1)
+    order = np.argsort(depth)
+    normals = face_normals(mesh.vertices, mesh.faces)
+    # Both sides of a face are lit.
+    lit = np.abs(normals @ (LIGHT / np.linalg.norm(LIGHT)))
+    colours = COLOUR_MAP(np.clip(values[mesh.faces].mean(axis=1) / largest, 0, 1))[:, :3]
+    colours = colours * (AMBIENT + (1 - AMBIENT) * lit)[:, None]
+    figure = Figure(figsize=(PIXELS / 150, PIXELS * 0.75 / 150), dpi=150)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_axis_off()
+    axes.set(xlim=(-HALF_WIDTH, HALF_WIDTH), ylim=(-0.75 * HALF_WIDTH, 0.75 * HALF_WIDTH))
+    shown = np.clip(colours, 0, 1)[order]
+    # Edges in the face's own colour close the hairlines between antialiased triangles.
+    axes.add_collection(
+        PolyCollection(seen[mesh.faces][order, :, :2], facecolors=shown, edgecolors=shown, lw=0.3)
+    )
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
