@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Bool, Complex, Float
 
 from pns_common.errors import ParameterError
 from pns_common.mesh import Mesh
@@ -118,66 +118,93 @@ def jacobian(scheme: Scheme, at: Star) -> Float[np.ndarray, "M M"]:
     return (moved[:count] - moved[count:]).T / (2 * step)
 
 
-def without_translations(matrix: Float[np.ndarray, "M M"]) -> Float[np.ndarray, "L L"]:
-    """Return the matrix on the quotient by translations: its spectrum less three eigenvalues 1.
+def translation_quotient(size: int) -> Float[np.ndarray, "M L"]:
+    """Return an orthonormal basis Q of what is orthogonal to the translations, L = M − 3.
 
-    A scheme that commutes with translations keeps their space, so that this is exact.
+    A scheme that commutes with translations keeps their space, so that Qᵀ J Q has exactly the
+    spectrum of J but for three eigenvalues 1.
     """
-    count = len(matrix) // 3
-    translations = np.kron(np.ones((count, 1)), np.eye(3))
-    basis = np.linalg.qr(translations, mode="complete").Q[:, 3:]
+    translations = np.kron(np.ones((size // 3, 1)), np.eye(3))
+    return np.linalg.qr(translations, mode="complete").Q[:, 3:]
+
+
+def without_translations(matrix: Float[np.ndarray, "M M"]) -> Float[np.ndarray, "L L"]:
+    """Return the matrix on the quotient by translations."""
+    basis = translation_quotient(len(matrix))
     return basis.T @ matrix @ basis
 
 
-@dataclass(frozen=True, slots=True)
-class Margin:
-    """The off-planar spectrum of a star.
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Eigenvalues of a star's Jacobian on the quotient by translations.
 
     Attributes:
-        lift: of the centre, in spokes.
-        tangent: least |λ| of the six eigenvalues continued from Loop's tangent pair.
-        third: largest |λ| of the rest but the translations.
-        largest: largest |λ| of all but the translations; 1 or more is unstable.
+        right, left: eigenvectors as columns of one and rows of the other, its inverse.
+        tangent: the six eigenvalues continued from Loop's tangent pair.
     """
 
-    lift: float
-    tangent: float
-    third: float
-    largest: float
+    values: Complex[np.ndarray, " L"]
+    right: Complex[np.ndarray, "L L"]
+    left: Complex[np.ndarray, "L L"]
+    tangent: Bool[np.ndarray, " L"]
+
+    @property
+    def least_tangent(self) -> int:
+        """Which of the tangent eigenvalues is smallest."""
+        return int(np.argmin(np.where(self.tangent, np.abs(self.values), np.inf)))
+
+    @property
+    def largest_other(self) -> int:
+        """Which of the others is largest."""
+        return int(np.argmax(np.where(self.tangent, -1.0, np.abs(self.values))))
 
     @property
     def margin(self) -> float:
         """The signed Reif margin: negative where another eigenvalue has overtaken the tangents."""
-        return self.tangent - self.third
+        size = np.abs(self.values)
+        return float(size[self.least_tangent] - size[self.largest_other])
+
+    @property
+    def largest(self) -> float:
+        """The largest |λ|; 1 or more is unstable."""
+        return float(np.abs(self.values).max())
 
 
-def margins(scheme: Scheme, valence: int, lifts: Sequence[float]) -> list[Margin]:
-    """Follow the tangent eigenvalues of a star while its centre is lifted; the first lift is 0.
+def flat_spectrum(matrix: Float[np.ndarray, "L L"], valence: int) -> Spectrum:
+    """Return the spectrum of a flat star: the tangents are the six nearest Loop's."""
+    values, right = np.linalg.eig(matrix)
+    return _spectrum(values, right, -np.abs(values - loop_eigenvalue(valence)))
 
-    Lifted stars are no fixed points, so this is a diagnostic, not Reif's condition.
+
+def continued_spectrum(matrix: Float[np.ndarray, "L L"], before: Spectrum) -> Spectrum:
+    """Return the spectrum of a star a little different from the one before.
+
+    The tangents are the six whose eigenvectors lie most in the tangent space before, by its
+    spectral projector: an oblique one, because the matrix is not normal.
+    """
+    values, right = np.linalg.eig(matrix)
+    projector = before.right[:, before.tangent] @ before.left[before.tangent]
+    return _spectrum(values, right, np.linalg.norm(projector @ right, axis=0))
+
+
+def follow_lift(scheme: Scheme, valence: int, lifts: Sequence[float]) -> list[Spectrum]:
+    """Follow the spectrum of a star while its centre is lifted; the first lift is 0.
+
+    Lifted stars are no fixed points, so the margin is a diagnostic, not Reif's condition.
     """
     build = closed_star(scheme, valence)
-    found: list[Margin] = []
-    tangents: Complex[np.ndarray, "L L"] | None = None
-    for lift in lifts:
-        matrix = without_translations(jacobian(scheme, build(lift)))
-        values, right = np.linalg.eig(matrix)
-        if tangents is None:
-            nearness = -np.abs(values - loop_eigenvalue(valence))
-        else:
-            # How much of each eigenvector lies in the space followed so far.
-            nearness = np.linalg.norm(tangents @ right, axis=0)
-        chosen = np.zeros(len(values), dtype=bool)
-        chosen[np.argsort(-nearness, kind="stable")[:TANGENT_COUNT]] = True
-        # The spectral projector: oblique, because the matrix is not normal.
-        tangents = right[:, chosen] @ np.linalg.inv(right)[chosen]
-        size = np.abs(values)
-        found.append(
-            Margin(
-                lift=float(lift),
-                tangent=float(size[chosen].min()),
-                third=float(size[~chosen].max()),
-                largest=float(size.max()),
-            )
-        )
+    matrices = [without_translations(jacobian(scheme, build(lift))) for lift in lifts]
+    found = [flat_spectrum(matrices[0], valence)]
+    for matrix in matrices[1:]:
+        found.append(continued_spectrum(matrix, found[-1]))
     return found
+
+
+def _spectrum(
+    values: Complex[np.ndarray, " L"],
+    right: Complex[np.ndarray, "L L"],
+    nearness: Float[np.ndarray, " L"],
+) -> Spectrum:
+    tangent = np.zeros(len(values), dtype=bool)
+    tangent[np.argsort(-nearness, kind="stable")[:TANGENT_COUNT]] = True
+    return Spectrum(values, right, np.linalg.inv(right), tangent)

@@ -7,6 +7,7 @@ irregular edges, and the vertices on them, are not moved at all.
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
 
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
@@ -36,17 +37,19 @@ def bounded_displacement(
             if level > 1 and len(mesh.faces) > LARGEST:
                 break
             refined = refine(mesh, subject.scheme, 1, reference_length, threads=1).mesh
-            ratio, place = worst_ratio(mesh, refined, subject.budget / reference_length)
+            ratio, place = worst_ratio(mesh, refined.vertices, subject.budget / reference_length)
             found.append((ratio, f"{body.name}, level {level}, {place}"))
             mesh = refined
     ratio, place = worst(found)
     return Certificate("T1", "bounded displacement", ratio, high=AT_MOST, where=place)
 
 
-def worst_ratio(control: Mesh, refined: Mesh, curvature: float) -> tuple[float, str]:
+def worst_ratio(
+    control: Mesh, refined: Float[np.ndarray, "N 3"], curvature: float
+) -> tuple[float, str]:
     """The largest ratio ‖p − p_Loop‖ / (C h² / R) of one step, and at which vertex."""
     base = plain_loop(control.vertices, control.faces)
-    apart = np.linalg.norm(refined.vertices - base.positions, axis=1)
+    apart = np.linalg.norm(refined - base.positions, axis=1)
     ratio = apart / (curvature * base.reach**2 + rounding(control))
     place = int(np.argmax(ratio))  # numpy's argmax finds a NaN first
     return float(ratio[place]), base.labels[place]

@@ -19,8 +19,11 @@ EXACT = 1e-12
 SINGLE = 1e-6
 """Of the envelope C h² / R: a feature's last single precision bit may turn with the mesh."""
 
-WELL_SHAPED = 1e-3
-"""A face's smallest sine, and the length of n1 + n2, above which frames are well conditioned."""
+WELL_SHAPED = 1e-2
+"""A face's smallest sine, and the length of n1 + n2, above which frames are well conditioned.
+
+Antiparallel faces, where the fallback begins, are at a length of 1.4e-3.
+"""
 
 
 def equivariance(subject: Subject, bodies: Sequence[Body], seed: int) -> list[Certificate]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from train.certificates.certificate import Certificate, Kind
 from train.certificates.subject import Subject
-from train.spectrum import VALENCES, margins
+from train.spectrum import VALENCES, follow_lift
 
 HIGHEST = 0.4
 """Lift, in spokes."""
@@ -16,7 +16,7 @@ LIFTS = np.linspace(0, HIGHEST, 9)
 
 def lifted_stars(subject: Subject, valences: Sequence[int] = VALENCES) -> list[Certificate]:
     """Measure the least margin over valences at lift 0.4, and the largest |λ|, which 1 bounds."""
-    found = [(margins(subject.exact, valence, LIFTS)[-1], valence) for valence in valences]
+    found = [(follow_lift(subject.exact, valence, LIFTS)[-1], valence) for valence in valences]
     least, at_least = min(found, key=lambda entry: entry[0].margin)
     largest, at_largest = max(found, key=lambda entry: entry[0].largest)
     below_one = float(np.nextafter(1, 0))

@@ -1,0 +1,79 @@
+"""Adversaries reach the caps of the theorems and never pass them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.meshes import rotation
+from train.adversary import (
+    affine_attack,
+    equivariance_attack,
+    folding,
+    proximity_attack,
+)
+from train.certificates.affine import TURNED
+from train.certificates.bodies import bumpy_sphere, synthetic_bodies
+from train.certificates.displacement import bounded_displacement
+from train.certificates.subject import subject_of_network
+from train.gap_collapse import gap_attack
+from train.recipes import ridge
+from train.torch_model import recipe_model
+
+
+def quiet(done, value):
+    pass
+
+
+def test_the_proximity_adversary_finds_the_cap_and_never_passes_it():
+    attack = proximity_attack(ridge(0), 60, quiet)
+    assert attack.values[0] < 0.1
+    assert 0.999 < attack.worst <= attack.cap
+    assert attack.held
+    assert len(attack.values) == 60
+    # What it has found holds in the product's code too.
+    model = recipe_model(ridge(0), attack.network)
+    assert bounded_displacement(subject_of_network(model), synthetic_bodies(0), levels=1).passed
+
+
+def test_the_equivariance_adversary_stays_at_rounding():
+    attack = equivariance_attack(ridge(0), 40, quiet)
+    assert attack.held
+    assert 0 < attack.worst < 1e-12
+    # It did bend the mesh: the search was not idle.
+    assert folding(attack.mesh) > folding(bumpy_sphere(0))
+
+
+def test_the_affine_adversary_finds_nothing_on_an_axis_aligned_plane():
+    attack = affine_attack(ridge(0), np.eye(3), 0.0, 20, quiet)
+    assert attack.worst == 0.0
+    assert attack.held
+
+
+def test_the_affine_adversary_stays_at_the_square_of_rounding_on_any_plane():
+    turn = rotation(np.random.default_rng(0))
+    attack = affine_attack(ridge(0), turn, TURNED, 20, quiet)
+    assert attack.held
+    assert 0 < attack.worst < 1e-28
+    assert folding(attack.mesh) < 1e-12
+
+
+def test_a_passed_cap_is_not_held():
+    attack = replace(affine_attack(ridge(0), np.eye(3), 0.0, 1, quiet), values=(0.0, 1e-3))
+    assert not attack.held
+    assert not replace(attack, values=(0.0, float("nan"))).held
+
+
+def test_the_same_seed_finds_the_same_and_another_seed_another():
+    first, again = (proximity_attack(ridge(3), 5, quiet).values for _ in range(2))
+    assert first == again
+    assert proximity_attack(ridge(4), 5, quiet).values != first
+
+
+def test_a_smaller_budget_leaves_the_adversary_a_wider_margin():
+    narrow, wide = (
+        gap_attack(replace(ridge(0), budget=budget), 5, 10, quiet) for budget in (0.1, 1.0)
+    )
+    assert narrow.after > wide.after
+    assert wide.after < wide.before
+    assert narrow.after == pytest.approx(0.2477, abs=0.05)
