@@ -62,42 +62,39 @@ class Topology:
 def build_topology(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Topology:
     """Pair the half-edges of ``faces`` into edges and classify them."""
     start = faces.reshape(-1)
-    end = faces[:, [1, 2, 0]].reshape(-1)
+    end = np.take(faces, [1, 2, 0], axis=1).reshape(-1)
     low, high = np.minimum(start, end), np.maximum(start, end)
-    key = low * np.int64(vertex_count) + high
-    order = stable_order(key)
+    key, order = stable_sort(low * np.int64(vertex_count) + high)
 
     # Runs of equal keys are edges; within a run half-edges ascend, so the first is the earliest.
-    ordered = key[order]
-    opens = np.empty(len(order), dtype=bool)
-    opens[:1] = True
-    np.not_equal(ordered[1:], ordered[:-1], out=opens[1:])
+    opens = np.ones(len(key), dtype=bool)
+    np.not_equal(key[1:], key[:-1], out=opens[1:])
     run_start = np.flatnonzero(opens)
-    count = np.diff(run_start, append=len(order))
-    first = order[run_start]
+    count = np.diff(run_start, append=len(key))
+    first, second = order[run_start], order[np.minimum(run_start + 1, len(key) - 1)]
 
     # Number the edges by their first half-edge.
-    is_first = np.zeros(len(order), dtype=bool)
+    is_first = np.zeros(len(key), dtype=bool)
     is_first[first] = True
-    number = (np.cumsum(is_first) - 1)[first]
-    edge_of = np.empty(len(order), dtype=np.int64)
+    number = np.take(np.cumsum(is_first), first) - 1
+    edge_of = np.empty(len(key), dtype=np.int64)
     edge_of[order] = np.repeat(number, count)
-    edges = np.stack([low[is_first], high[is_first]], axis=1)
+    earliest = np.flatnonzero(is_first)
+    edges = np.stack([np.take(low, earliest), np.take(high, earliest)], axis=1)
 
-    # An interior edge has two half-edges that run against each other.
-    second = order[np.minimum(run_start + 1, len(order) - 1)]
-    proper = ~repeated_vertex(faces)
-    opposed = (count == 2) & (start[first] == end[second]) & (start[first] != end[first])
-    opposed &= proper[first // 3] & proper[second // 3]
-    edge_class = np.empty(len(edges), dtype=np.int8)
-    edge_class[number] = np.where(
-        opposed,
-        EdgeClass.INTERIOR,
-        np.where((count == 1) & proper[first // 3], EdgeClass.BOUNDARY, EdgeClass.IRREGULAR),
-    )
+    # An interior edge has two half-edges that run against each other, in faces of three vertices.
+    proper = ~np.repeat(repeated_vertex(faces), 3)
+    forward = start < end
+    whole = np.take(proper, first)
+    opposed = (count == 2) & (np.take(forward, first) != np.take(forward, second))
+    opposed &= whole & np.take(proper, second)
+    edge_class = np.full(len(edges), EdgeClass.IRREGULAR, dtype=np.int8)
+    edge_class[number[(count == 1) & whole]] = EdgeClass.BOUNDARY
+    edge_class[number[opposed]] = EdgeClass.INTERIOR
 
     half_edges = np.full((len(edges), 2), -1, dtype=np.int64)
-    half_edges[number[opposed]] = np.stack([first[opposed], second[opposed]], axis=1)
+    half_edges[number[opposed], 0] = first[opposed]
+    half_edges[number[opposed], 1] = second[opposed]
     interior = np.flatnonzero(edge_class == EdgeClass.INTERIOR)
     stencil = np.full((len(edges), 4), -1, dtype=np.int64)
     stencil[:, :2] = edges
@@ -164,17 +161,22 @@ def multi_fan_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
     return fans > 1
 
 
-def stable_order(key: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    """The stable argsort of non-negative keys.
+def stable_sort(
+    key: Int[np.ndarray, " N"],
+) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " N"]]:
+    """Non-negative keys in order, and the positions they come from; equal keys keep theirs.
 
     Packing (key, position) into one integer and sorting values is several times faster than
     argsort; where the pack would overflow, argsort serves.
     """
     bits = len(key).bit_length()
     if len(key) and int(key.max()) < 2 ** (63 - bits):
-        packed = np.sort(key << bits | np.arange(len(key)))
-        return packed & (2**bits - 1)
-    return np.argsort(key, kind="stable")
+        packed = key << bits
+        packed |= np.arange(len(key))
+        packed.sort()
+        return packed >> bits, packed & (2**bits - 1)
+    order = np.argsort(key, kind="stable")
+    return key[order], order
 
 
 def next_corner(corner: Int[np.ndarray, "..."]) -> Int[np.ndarray, "..."]:

@@ -11,7 +11,7 @@ from pns_common.topology import (
     children_across,
     multi_fan_vertices,
     split,
-    stable_order,
+    stable_sort,
 )
 from tests.meshes import bow_tie, icosphere, manifolds, one_way_pair, soups, three_pages
 
@@ -122,6 +122,9 @@ def test_edge_classes_of_named_shapes(shape, interior, boundary, irregular):
     assert np.bincount(classes, minlength=3).tolist() == [interior, boundary, irregular]
 
 
-def test_stable_order_with_keys_too_large_to_pack():
-    key = np.array([2**62, 5, 2**62, 1, 5])
-    np.testing.assert_array_equal(stable_order(key), np.argsort(key, kind="stable"))
+@pytest.mark.parametrize("largest", [7, 2**62])
+def test_stable_sort_with_keys_that_can_and_cannot_be_packed(largest):
+    key = np.array([largest, 5, largest, 1, 5])
+    ordered, order = stable_sort(key)
+    np.testing.assert_array_equal(order, np.argsort(key, kind="stable"))
+    np.testing.assert_array_equal(ordered, np.sort(key))
