@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NotRequired, TypedDict
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from pns_common.arrays import cross, dot, gather
 from pns_common.blocks import Blocks
@@ -84,6 +84,7 @@ def child_faces(
     Loop's, None if nowhere.
     """
     normals = np.empty((len(topology.faces), 4, 3))
+    has_area = np.empty((len(topology.faces), 4), dtype=bool)
     flipped = np.zeros(len(topology.faces), dtype=np.int64)
     inside = np.zeros(blocks.count(len(topology.faces)))
 
@@ -95,7 +96,11 @@ def child_faces(
         four = [triangle_normals(*(corners[i] for i in child)) for child in CHILDREN]
         for child, normal in enumerate(four):
             normals[rows, child] = normal
-        inside[blocks.number(rows)] = max(_largest_chord(four[3], normal) for normal in four[:3])
+            has_area[rows, child] = dot(normal, normal) > 0
+        defined = has_area[rows]
+        inside[blocks.number(rows)] = max(
+            _largest_chord(four[3], four[i], defined[:, 3] & defined[:, i]) for i in range(3)
+        )
         if displacement is not None:
             loops = [p - gather(displacement, v) for p, v in zip(corners, six, strict=True)]
             for child, normal in zip(CHILDREN, four, strict=True):
@@ -103,14 +108,16 @@ def child_faces(
                 flipped[rows] += dot(cross(b - a, c - a), normal) < 0
 
     blocks.run(len(topology.faces), look_inside)
-    normals = normals.reshape(-1, 3)
+    normals, defined = normals.reshape(-1, 3), has_area.reshape(-1)
     across = np.zeros(blocks.count(len(topology.interior)))
 
     def look_across(rows: slice) -> None:
         pairs = children_across(topology, topology.interior[rows])
         across[blocks.number(rows)] = max(
-            _largest_chord(gather(normals, pair[:, 0]), gather(normals, pair[:, 1]))
-            for pair in pairs
+            _largest_chord(
+                gather(normals, one), gather(normals, other), defined[one] & defined[other]
+            )
+            for one, other in pairs.transpose(0, 2, 1)
         )
 
     blocks.run(len(topology.interior), look_across)
@@ -119,10 +126,11 @@ def child_faces(
     return ChildFaces(normals, int(flipped.sum()), float(2 * np.arcsin(min(1.0, chord / 2))))
 
 
-def _largest_chord(n1: Float[np.ndarray, "N 3"], n2: Float[np.ndarray, "N 3"]) -> float:
+def _largest_chord(
+    n1: Float[np.ndarray, "N 3"], n2: Float[np.ndarray, "N 3"], defined: Bool[np.ndarray, " N"]
+) -> float:
     """The largest squared distance between the normals of a pair that both have one."""
     chord = n1 - n2
-    defined = (dot(n1, n1) > 0) & (dot(n2, n2) > 0)
     return float(np.max(dot(chord, chord), initial=0, where=defined))
 
 

@@ -84,7 +84,7 @@ def refine(
     done, total = 0, sum(len(mesh.faces) * 4**level for level in range(1, levels + 1))
 
     points, faces = mesh.vertices, mesh.faces
-    normals = face_normals(points, faces)
+    normals = _face_normals(points, faces, blocks)
     reports: list[LevelReport] = []
     several_fans = 0
     sharp, edges = creases, None
@@ -149,6 +149,18 @@ def _displacement(vertices: Placement, edges: Placement) -> Float[np.ndarray, "V
         for p in (vertices, edges)
     ]
     return np.concatenate(parts)
+
+
+def _face_normals(
+    points: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"], blocks: Blocks
+) -> Float[np.ndarray, "F 3"]:
+    normals = np.empty((len(faces), 3))
+
+    def measure(rows: slice) -> None:
+        normals[rows] = face_normals(points, faces[rows])
+
+    blocks.run(len(faces), measure)
+    return normals
 
 
 def _check_levels(levels: int) -> None:

@@ -141,7 +141,13 @@ def loop_vertex_rule(level: ControlLevel) -> Placement:
 
 def loop_edge_rule(level: ControlLevel) -> Placement:
     """Loop's rule for edge vertices."""
-    return without_correction(loop_edge_vertices(level.points, level.topology))
+    positions = np.empty((len(level.topology.edges), 3))
+
+    def place(rows: slice) -> None:
+        positions[rows] = loop_edge_vertices(level.points, level.topology, rows)
+
+    level.blocks.run(len(positions), place)
+    return without_correction(positions)
 
 
 def without_correction(positions: Float[np.ndarray, "N 3"]) -> Placement:

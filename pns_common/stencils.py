@@ -12,6 +12,8 @@ EDGE_ENDPOINT, EDGE_OPPOSITE = 3 / 8, 1 / 8
 MIDPOINT = 1 / 2
 CURVE_CENTRE, CURVE_NEIGHBOUR = 3 / 4, 1 / 8
 
+ALL = slice(None)
+
 
 def loop_beta(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
     """β_k = (5/8 − (3/8 + ¼ cos 2π/k)²) / k, the weight of one neighbour; 0 for valence 0.
@@ -30,14 +32,17 @@ def loop_edge_point(
     return EDGE_ENDPOINT * (a + b) + EDGE_OPPOSITE * (c + d)
 
 
-def loop_edge_vertices(points: Float[Array, "V K"], topology: Topology) -> Float[Array, "E K"]:
-    """One vertex for each edge: Loop's on interior edges, the midpoint on all others."""
+def loop_edge_vertices(
+    points: Float[Array, "V K"], topology: Topology, rows: slice = ALL
+) -> Float[Array, "E K"]:
+    """A vertex for each edge (of ``rows``): Loop's on interior edges, the midpoint on others."""
     xp = namespace(points)
-    a, b = topology.edges.T
+    stencil = topology.stencil[rows]
+    a, b, c, d = (stencil[:, column] for column in range(4))
     # A missing opposite (−1) is read as the endpoint a and its result thrown away.
-    c, d = np.where(topology.stencil[:, 2:] < 0, a[:, None], topology.stencil[:, 2:]).T
+    c, d = np.where(c < 0, a, c), np.where(d < 0, a, d)
     pa, pb = gather(points, a), gather(points, b)
-    interior = xp.asarray(topology.edge_class == EdgeClass.INTERIOR)
+    interior = xp.asarray(topology.edge_class[rows] == EdgeClass.INTERIOR)
     return xp.where(
         interior[:, None],
         loop_edge_point(pa, pb, gather(points, c), gather(points, d)),
