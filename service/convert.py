@@ -18,6 +18,7 @@ from service import formats
 from service.errors import InvalidParameter
 from service.files import replace_file
 from service.flatten import flatten
+from service.folder import folder_of
 from service.gltf.extras import REPORT_KEY
 from service.gltf.report import Change
 from service.options import Limits, Options
@@ -50,7 +51,9 @@ def convert(
     loaded = load_model(model) if options.scheme == "pns" else None
     with _progress(console) as advance:
         if kind in formats.GLTF_KINDS:
-            done = subdivide_gltf(data, kind, options, loaded, limits, advance)
+            done = subdivide_gltf(
+                data, kind, options, loaded, limits, advance, neighbours=folder_of(source)
+            )
             written = _of_gltf(done.glb, done.report, target, limits)
         else:
             soup = formats.read(data, kind)

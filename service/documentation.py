@@ -16,12 +16,23 @@ _BODY = {
         media.GLTF: {
             "schema": {"type": "object", "description": "glTF 2.0 with embedded (data:) buffers"}
         },
+        media.ZIP: {
+            "schema": {
+                "type": "string",
+                "format": "binary",
+                "description": "one .gltf or .glb, and the files that it names",
+            }
+        },
         media.MULTIPART: {
             "schema": {
                 "type": "object",
                 "required": ["file"],
                 "properties": {"file": {"type": "string", "format": "binary"}},
-                "additionalProperties": False,
+                "additionalProperties": {
+                    "type": "string",
+                    "format": "binary",
+                    "description": "a file that the document names, under that name",
+                },
             }
         },
     },

@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service import media, memory_file, multipart
+from service import memory_file
 from service.errors import NoModelError
 from service.options import Limits, Options
 
@@ -42,11 +42,14 @@ def subdivide(work: Work) -> dict[str, float]:
     """
     import msgspec
 
+    from service import upload_body
     from service.subdivide import subdivide_gltf
 
-    data, media_type = _file_of(Path(work.body).read_bytes(), work.content_type)
+    sent = upload_body.sent(Path(work.body).read_bytes(), work.content_type, work.limits)
     model = _model(work.model) if work.options.scheme == "pns" else None
-    done = subdivide_gltf(data, media.FORMATS[media_type], work.options, model, work.limits)
+    done = subdivide_gltf(
+        sent.data, sent.kind, work.options, model, work.limits, neighbours=sent.neighbours
+    )
     memory_file.write(
         work.answer, msgspec.json.encode(done.report) if work.report_only else done.glb
     )
@@ -58,14 +61,6 @@ def warm_up(model: Model | str | None) -> None:
     import service.subdivide  # noqa: F401
 
     _model(model)
-
-
-def _file_of(body: bytes, content_type: str) -> tuple[bytes, str]:
-    media_type = media.of_request(content_type)
-    if media_type != media.MULTIPART:
-        return body, media_type
-    data = multipart.only_file(body, content_type)
-    return data, media.sniff(data)
 
 
 def _model(source: Model | str | None) -> Model:

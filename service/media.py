@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from service.errors import MediaTypeError
 
 GLB = "model/gltf-binary"
 GLTF = "model/gltf+json"
 MULTIPART = "multipart/form-data"
-ACCEPTED = (GLB, GLTF, MULTIPART)
+ZIP = "application/zip"
+ACCEPTED = (GLB, GLTF, ZIP, MULTIPART)
 
-FORMATS = {GLB: "glb", GLTF: "gltf"}
+Kind = Literal["glb", "gltf"]
+FORMATS: dict[str, Kind] = {GLB: "glb", GLTF: "gltf"}
 """The pipeline's name of each file type."""
 
 GLB_MAGIC = b"glTF"
+ZIP_MAGIC = b"PK\x03\x04"
 BLANK = b" \t\r\n"
 
 
@@ -26,13 +31,15 @@ def of_request(content_type: str) -> str:
 
 
 def sniff(data: bytes) -> str:
-    """GLB or glTF JSON, by the first bytes: form clients send application/octet-stream.
+    """GLB, glTF JSON or an archive, by the first bytes: form clients send application/octet-stream.
 
     Raises MediaTypeError.
     """
     if data.startswith(GLB_MAGIC):
         return GLB
+    if data.startswith(ZIP_MAGIC):
+        return ZIP
     # A slice: a file of nothing but blanks is not to be copied to find that out.
     if data[:4096].lstrip(b"\xef\xbb\xbf" + BLANK).startswith(b"{"):
         return GLTF
-    raise MediaTypeError("the file is neither a GLB nor glTF JSON")
+    raise MediaTypeError("the file is neither a GLB nor glTF JSON, nor a .zip of one")

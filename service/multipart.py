@@ -1,32 +1,44 @@
-"""The one file of a multipart body, unpacked in a worker once all of the body is there."""
+"""The files of a multipart body, unpacked in a worker once all of the body is there."""
 
 from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field
 
 from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import MultipartParser, parse_options_header
 
-from service.errors import ServiceError, UnreadableError
+from service.errors import LimitError, ServiceError, UnreadableError
+from service.gltf.neighbours import File, Neighbours, relative_name
 
 # A part has three or four short headers; a megabyte of them is an attack.
 MAX_HEADER_BYTES = 16 * 1024
+MAX_PARTS = 256
+MAIN = "file"
 
 
 class MultipartError(ServiceError):
-    """A multipart body that reads, but is not one part with the name `file`."""
+    """A multipart body that reads, but is not one part with the name `file` and files beside it."""
 
     status = 422
     code = "invalid-multipart"
-    title = "The multipart body must have one part, named file"
+    title = "The multipart body must have one part named file, and others with names of their own"
 
 
-class _OnePart:
-    """Collects the only part that is allowed; a second one, or another name, is an error."""
+@dataclass
+class _Part:
+    headers: dict[bytes, bytes] = field(default_factory=dict)
+    data: bytearray = field(default_factory=bytearray)
+    name: str = ""
+    filename: str = ""
+
+
+class _Parts:
+    """Collects the parts."""
 
     def __init__(self) -> None:
-        self.parts = 0
+        self.parts: list[_Part] = []
         self.finished = False
-        self.headers: dict[bytes, bytes] = {}
-        self.data = bytearray()
         self._field = bytearray()
         self._value = bytearray()
         self._header_bytes = 0
@@ -43,9 +55,15 @@ class _OnePart:
         }
 
     def _part_begin(self) -> None:
-        self.parts += 1
-        if self.parts > 1:
-            raise MultipartError("the body has more than one part")
+        if len(self.parts) == MAX_PARTS:
+            raise LimitError(
+                f"the body has more than {MAX_PARTS} parts",
+                limit="parts",
+                allowed=MAX_PARTS,
+                found=MAX_PARTS + 1,
+            )
+        self.parts.append(_Part())
+        self._header_bytes = 0
 
     def _header(self, target: bytearray, piece: bytes) -> None:
         self._header_bytes += len(piece)
@@ -54,40 +72,77 @@ class _OnePart:
         target += piece
 
     def _header_end(self) -> None:
-        self.headers[bytes(self._field).lower()] = bytes(self._value)
+        self.parts[-1].headers[bytes(self._field).lower()] = bytes(self._value)
         self._field.clear()
         self._value.clear()
 
     def _headers_finished(self) -> None:
-        _, options = parse_options_header(self.headers.get(b"content-disposition", b""))
-        if options.get(b"name") != b"file":
-            raise MultipartError("the part's name is not file")
+        part = self.parts[-1]
+        _, options = parse_options_header(part.headers.get(b"content-disposition", b""))
+        part.name, part.filename = (
+            options.get(key, b"").decode(errors="replace") for key in (b"name", b"filename")
+        )
+        if not part.name:
+            raise MultipartError("a part has no name")
 
     def _part_data(self, data: bytes, start: int, end: int) -> None:
-        self.data += memoryview(data)[start:end]
+        self.parts[-1].data += memoryview(data)[start:end]
 
     def _end(self) -> None:
         self.finished = True
 
 
-def only_file(body: bytes, content_type: str) -> bytes:
-    """The content of the one part named `file`.
+def sent_files(body: bytes, content_type: str) -> tuple[bytes, Neighbours]:
+    """The content of the one part named `file`, and the other parts as its neighbours.
 
-    Raises UnreadableError where the body is no multipart body, MultipartError where it holds
-    something else.
+    A neighbour is called by its part's name, or else by its file name: form clients strip folders
+    from the latter.
+
+    Raises:
+        UnreadableError: no multipart body.
+        MultipartError: none or several parts named `file`, or others that share a name.
+        LimitError: too many parts.
     """
+    parts = _parsed(body, content_type)
+    main = [part for part in parts if part.name == MAIN]
+    if len(main) != 1:
+        raise MultipartError(f"{len(main)} parts have the name {MAIN}, not one")
+    others = [part for part in parts if part.name != MAIN]
+    return bytes(main[0].data), _neighbours(others)
+
+
+def _parsed(body: bytes, content_type: str) -> list[_Part]:
     boundary = parse_options_header(content_type)[1].get(b"boundary")
     if not boundary:
         raise UnreadableError("the Content-Type names no multipart boundary")
-    part = _OnePart()
+    collected = _Parts()
     try:
-        parser = MultipartParser(boundary, part.callbacks())
+        parser = MultipartParser(boundary, collected.callbacks())
         parser.write(body)
         parser.finalize()
     except FormParserError as error:
         raise UnreadableError(f"the multipart body cannot be read: {error}") from error
-    if part.parts == 0:
-        raise MultipartError("the body has no part")
-    if not part.finished:
+    if collected.parts and not collected.finished:
         raise UnreadableError("the multipart body ends before its closing boundary")
-    return bytes(part.data)
+    return collected.parts
+
+
+def _neighbours(parts: list[_Part]) -> Neighbours:
+    by_name: dict[str, File] = {}
+    by_filename: defaultdict[str, list[File]] = defaultdict(list)
+    for part in parts:
+        file = File(part.name, bytes(part.data))
+        if part.name in by_name:
+            raise MultipartError(f"two parts have the name {part.name!r}")
+        by_name[part.name] = file
+        by_filename[relative_name(part.filename) or ""].append(file)
+    names = {relative_name(name) or "": file for name, file in by_name.items()}
+
+    def find(name: str) -> File | None:
+        if name in names:
+            return names[name]
+        # A file name that two parts share is no name.
+        found = by_filename.get(name, [])
+        return found[0] if len(found) == 1 else None
+
+    return Neighbours(find, frozenset(by_name))

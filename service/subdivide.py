@@ -17,6 +17,7 @@ from service.gltf.container import write_glb
 from service.gltf.control_mesh import ControlMesh, control_mesh
 from service.gltf.extras import put_report, replaces_extras
 from service.gltf.json_text import encode
+from service.gltf.neighbours import ALONE, Neighbours
 from service.gltf.nodes import mesh_instances
 from service.gltf.plan import MeshPlan
 from service.gltf.primitives import read_primitive
@@ -56,11 +57,12 @@ def subdivide_gltf(
     limits: Limits,
     progress: Progress | None = None,
     clock: Stopwatch | None = None,
+    neighbours: Neighbours = ALONE,
 ) -> Subdivided:
     """Refine every triangle mesh of a glTF file.
 
     `progress` is called with (faces made so far, faces made in the end); `clock` is told where
-    each stage ends.
+    each stage ends. `neighbours` are the files that the document may name.
 
     Raises:
         ServiceError: the upload is unreadable, wrong, over a limit, or cannot be refined yet.
@@ -68,7 +70,7 @@ def subdivide_gltf(
     """
     clock = Stopwatch() if clock is None else clock
     scheme = make_scheme(options, model)
-    upload = read_upload(data, media, options.levels, limits)
+    upload = read_upload(data, media, options.levels, limits, neighbours)
     instances = mesh_instances(upload.document)
     changes = _changes_of_container(upload, options)
     changes += upload.changes + storage_changes(upload.document, upload.plans)

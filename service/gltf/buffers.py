@@ -1,25 +1,28 @@
-"""The bytes behind `buffers[]`: BIN and base64 data URIs. No other URI is ever followed."""
+"""The bytes behind `buffers[]`: BIN, base64 data URIs, and files that came with the document."""
 
 from __future__ import annotations
 
 import base64
 import re
 
-from service.errors import GltfError, UnsupportedFeature
+from service.errors import GltfError
 from service.gltf.meshopt import placeholders
+from service.gltf.neighbours import Opened, safe_name
 from service.gltf.schema import Buffer, Document
 
 _DATA_URI = re.compile(r"data:[^,]*;base64,", re.IGNORECASE)
 
 
-def resolve_buffers(document: Document, binary: memoryview | None) -> list[memoryview]:
+def resolve_buffers(
+    document: Document, binary: memoryview | None, opened: Opened
+) -> list[memoryview]:
     """The bytes of each buffer, exactly `byteLength` long.
 
     A data URI's bytes are fewer than its characters, so the body's limit bounds them too.
 
     Raises:
-        UnsupportedFeature: a buffer in another file.
-        GltfError: no bytes, or fewer than `byteLength` says.
+        GltfError: no bytes, or fewer than `byteLength` says; a file that did not come, or a URI
+            that leads elsewhere.
     """
     resolved: list[memoryview] = []
     without = placeholders(document)
@@ -29,7 +32,7 @@ def resolve_buffers(document: Document, binary: memoryview | None) -> list[memor
         if buffer.uri is None and not is_binary and number in without:
             resolved.append(memoryview(b""))
             continue
-        content = _content(buffer, binary if number == 0 else None, pointer)
+        content = _content(buffer, binary if number == 0 else None, opened, pointer)
         if len(content) < buffer.byte_length:
             raise GltfError(
                 f"byteLength is {buffer.byte_length}, but there are {len(content)} bytes",
@@ -39,13 +42,13 @@ def resolve_buffers(document: Document, binary: memoryview | None) -> list[memor
     return resolved
 
 
-def _content(buffer: Buffer, binary: memoryview | None, pointer: str) -> memoryview:
+def _content(buffer: Buffer, binary: memoryview | None, opened: Opened, pointer: str) -> memoryview:
     if buffer.uri is None:
         if binary is None:
             raise GltfError("the buffer has neither a URI nor a BIN chunk", pointer=pointer)
         return binary
-    if not buffer.uri[:5].lower() == "data:":
-        raise UnsupportedFeature("a buffer in an external file", pointer=f"{pointer}/uri")
+    if buffer.uri[:5].lower() != "data:":
+        return _neighbour(buffer.uri, opened, f"{pointer}/uri")
     scheme = _DATA_URI.match(buffer.uri)
     if scheme is None:
         raise GltfError("the data URI is not base64", pointer=f"{pointer}/uri")
@@ -54,3 +57,16 @@ def _content(buffer: Buffer, binary: memoryview | None, pointer: str) -> memoryv
         return memoryview(base64.b64decode(encoded + "=" * (-len(encoded) % 4), validate=True))
     except ValueError as error:
         raise GltfError(f"the data URI: {error}", pointer=f"{pointer}/uri") from error
+
+
+def _neighbour(uri: str, opened: Opened, pointer: str) -> memoryview:
+    if safe_name(uri) is None:
+        raise GltfError(
+            "only files that come with the document are read", pointer=pointer, code="unsafe-uri"
+        )
+    file = opened.open(uri)
+    if file is None:
+        raise GltfError(
+            "the buffer's file did not come with the document", pointer=pointer, code="missing-file"
+        )
+    return memoryview(file.content).cast("B")

@@ -8,8 +8,10 @@ from typing import Any, Literal
 from service.gltf.buffers import resolve_buffers
 from service.gltf.container import Container, read_glb
 from service.gltf.draco import decode_primitives
+from service.gltf.images import embed_images
 from service.gltf.json_text import decode_object
 from service.gltf.meshopt import decode_views
+from service.gltf.neighbours import ALONE, Neighbours, Opened
 from service.gltf.nodes import check_nodes
 from service.gltf.plan import MeshPlan, check_cost, plan
 from service.gltf.references import check_references
@@ -42,7 +44,9 @@ class Upload:
     changes: list[Change]
 
 
-def read_upload(data: bytes, media: Media, levels: int, limits: Limits) -> Upload:
+def read_upload(
+    data: bytes, media: Media, levels: int, limits: Limits, neighbours: Neighbours = ALONE
+) -> Upload:
     """Check a file in the order in which its parts lean on each other; decode no geometry yet.
 
     Raises:
@@ -52,12 +56,15 @@ def read_upload(data: bytes, media: Media, levels: int, limits: Limits) -> Uploa
     tree = decode_object(container.text, limits)
     document = view(tree)
     refuse_version(document)
-    buffers = resolve_buffers(document, container.binary)
+    opened = Opened(neighbours)
+    buffers = resolve_buffers(document, container.binary, opened)
     stored, files = len(buffers), sum(len(buffer) > 0 for buffer in buffers)
-    views = decode_views(tree, document, buffers, len(data), limits)
+    images = embed_images(tree, document, buffers, opened)
+    size = len(data) + opened.size
+    views = decode_views(tree, document, buffers, size, limits)
     document = view(tree)
     check_references(document, buffers)
-    primitives = decode_primitives(tree, document, buffers, len(data), limits)
+    primitives = decode_primitives(tree, document, buffers, size, limits)
     if primitives:
         document = view(tree)
         check_references(document, buffers)
@@ -70,9 +77,11 @@ def read_upload(data: bytes, media: Media, levels: int, limits: Limits) -> Uploa
         )
         if count
     ]
+    changes += images
+    changes += [Change("", f"not used by the document: {name}", 1) for name in opened.unused]
     check_nodes(document)
     refuse_features(document)
     plans = plan(document)
-    size = len(data) + sum(len(buffer) for buffer in buffers[stored:])
+    size += sum(len(buffer) for buffer in buffers[stored:])
     check_cost(document, plans, size, levels, limits)
     return Upload(container, tree, document, buffers, plans, changes)

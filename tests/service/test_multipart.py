@@ -1,12 +1,12 @@
-"""The one part of a multipart body, whatever a client makes of it."""
+"""The parts of a multipart body, whatever a client makes of it."""
 
 from __future__ import annotations
 
 import pytest
 
-from service.errors import MediaTypeError, ServiceError, UnreadableError
-from service.media import GLB, GLTF, sniff
-from service.multipart import MAX_HEADER_BYTES, MultipartError, only_file
+from service.errors import LimitError, MediaTypeError, ServiceError, UnreadableError
+from service.media import GLB, GLTF, ZIP, sniff
+from service.multipart import MAX_HEADER_BYTES, MAX_PARTS, MultipartError, sent_files
 
 TYPE = "multipart/form-data; boundary=X"
 HEAD = b'Content-Disposition: form-data; name="file"; filename="cow.glb"\r\n'
@@ -21,7 +21,7 @@ def part(head: bytes, content: bytes) -> bytes:
 )
 def test_the_content_comes_out_as_it_went_in(content: bytes) -> None:
     typed = HEAD + b"Content-Type: application/octet-stream\r\n"
-    assert only_file(part(typed, content) + b"--X--\r\n", TYPE) == content
+    assert sent_files(part(typed, content) + b"--X--\r\n", TYPE)[0] == content
 
 
 @pytest.mark.parametrize(
@@ -37,22 +37,55 @@ def test_the_content_comes_out_as_it_went_in(content: bytes) -> None:
         (part(HEAD + b"A: " + b"b" * MAX_HEADER_BYTES + b"\r\n", b"") + b"--X--", UnreadableError),
     ],
 )
-def test_anything_but_one_whole_part_named_file_is_refused(
+def test_a_body_without_one_whole_part_named_file_is_refused(
     body: bytes, error: type[ServiceError]
 ) -> None:
     with pytest.raises(error):
-        only_file(body, TYPE)
+        sent_files(body, TYPE)
+
+
+def other(name: str, filename: str, content: bytes) -> bytes:
+    head = f'Content-Disposition: form-data; name="{name}"; filename="{filename}"\r\n'
+    return part(head.encode(), content)
+
+
+def test_other_parts_are_found_by_their_name_or_their_file_name() -> None:
+    body = part(HEAD, b"{}") + other("tex/a.png", "a.png", b"1") + other("b", "b.bin", b"2")
+    _, neighbours = sent_files(body + b"--X--\r\n", TYPE)
+    assert neighbours.names == {"tex/a.png", "b"}
+    for name, content in [("tex/a.png", b"1"), ("a.png", b"1"), ("b", b"2"), ("b.bin", b"2")]:
+        found = neighbours.find(name)
+        assert found is not None
+        assert found.content == content
+    assert neighbours.find("c") is None
+
+
+def test_a_file_name_that_two_parts_share_names_neither() -> None:
+    body = part(HEAD, b"{}") + other("a", "x.bin", b"1") + other("b", "x.bin", b"2")
+    _, neighbours = sent_files(body + b"--X--\r\n", TYPE)
+    assert neighbours.find("x.bin") is None
+
+
+def test_names_are_distinct_and_parts_are_few() -> None:
+    twice = part(HEAD, b"{}") + 2 * other("a", "", b"1")
+    with pytest.raises(MultipartError, match="'a'"):
+        sent_files(twice + b"--X--\r\n", TYPE)
+    many = b"".join(other(f"p{number}", "", b"") for number in range(MAX_PARTS))
+    with pytest.raises(LimitError) as refusal:
+        sent_files(part(HEAD, b"{}") + many + b"--X--\r\n", TYPE)
+    assert refusal.value.limit == "parts"
 
 
 def test_a_boundary_is_needed() -> None:
     with pytest.raises(UnreadableError, match="boundary"):
-        only_file(part(HEAD, b"") + b"--X--\r\n", "multipart/form-data")
+        sent_files(part(HEAD, b"") + b"--X--\r\n", "multipart/form-data")
 
 
 def test_a_file_is_what_its_first_bytes_say() -> None:
     assert sniff(b"glTF\2\0\0\0") == GLB
     assert sniff(b' \r\n\t{"asset": {}}') == GLTF
     assert sniff(b'\xef\xbb\xbf{"asset": {}}') == GLTF
-    for other in (b"", b"\x89PNG", b"v 0 0 0", b" " * 100_000 + b"{"):
+    assert sniff(b"PK\3\4") == ZIP
+    for unknown in (b"", b"\x89PNG", b"v 0 0 0", b" " * 100_000 + b"{"):
         with pytest.raises(MediaTypeError):
-            sniff(other)
+            sniff(unknown)
