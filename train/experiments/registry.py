@@ -13,10 +13,13 @@ from train.experiments import (
     extended,
     headline,
     hero,
+    lifted_stars,
     published,
     repeated,
     saddle,
+    spectral,
     sphere_ridge,
+    structural,
 )
 from train.experiments.experiment import Experiment
 
@@ -24,6 +27,8 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
     {
         module.EXPERIMENT.name: module.EXPERIMENT
         for module in (
+            structural,
+            spectral,
             ablation,
             headline,
             cross_section,
@@ -35,6 +40,7 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
             sphere_ridge,
             hero,
             extended,
+            lifted_stars,
             cad,
             published,
         )
