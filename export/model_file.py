@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from export.onnx_graph import model_bytes
-from export.parity import Parity, check_parity
+from export.parity import TOLERANCE, Parity, check_parity
 from pns_common.model_card import FORMAT, ModelCard
 from pns_common.onnx_model import model_from_bytes
 from train.checkpoint import Checkpoint
@@ -30,11 +30,13 @@ def export_model(checkpoint: Checkpoint, path: Path) -> Exported:
     return write_model(checkpoint.network, checkpoint_card(checkpoint), path)
 
 
-def write_model(network: BoundedNet, card: ModelCard, path: Path) -> Exported:
+def write_model(
+    network: BoundedNet, card: ModelCard, path: Path, tolerance: float = TOLERANCE
+) -> Exported:
     """Write a network under a card, in one piece; raises as `export_model` does."""
     data = model_bytes(network, card)
     model = model_from_bytes(data, name=path.stem)
-    parity = check_parity(model, network)
+    parity = check_parity(model, network, tolerance)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(path.name + ".tmp")
     temporary.write_bytes(data)

@@ -29,22 +29,23 @@ class Parity:
 class ParityError(PnsError):
     """The model file and the network differ; nothing is written."""
 
-    def __init__(self, *, budget: float, difference: float):
+    def __init__(self, *, budget: float, difference: float, tolerance: float = TOLERANCE):
         self.budget = budget
         self.difference = difference
+        self.tolerance = tolerance
         super().__init__(
             f"the model file and the network differ by {difference:.2e} of the budget {budget:g}, "
-            f"more than {TOLERANCE:g}"
+            f"more than {tolerance:g}"
         )
 
 
-def check_parity(model: Model, network: BoundedNet) -> Parity:
+def check_parity(model: Model, network: BoundedNet, tolerance: float = TOLERANCE) -> Parity:
     """Compare the file, run by onnxruntime in float32, with the torch network in float64.
 
     Against torch's float32 the rounding of torch would count too; it is the larger of the two.
 
     Raises:
-        ParityError: they differ by more than 1e-6 of a budget.
+        ParityError: they differ by more than `tolerance` of a budget.
     """
     features = sample_features(network.linear_layers[0].in_features)
     exact = copy.deepcopy(network).double()
@@ -55,8 +56,8 @@ def check_parity(model: Model, network: BoundedNet) -> Parity:
         found = np.asarray(model(features, budget))
         difference = float(np.abs(found - expected).max()) / budget
         # Written so that NaN fails it too.
-        if not difference <= TOLERANCE:
-            raise ParityError(budget=budget, difference=difference)
+        if not difference <= tolerance:
+            raise ParityError(budget=budget, difference=difference, tolerance=tolerance)
         largest = max(largest, difference)
         longest = max(longest, float(np.linalg.norm(found, axis=1).max()) / budget)
     return Parity(largest, longest)

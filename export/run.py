@@ -1,4 +1,7 @@
-"""The exporter's entry: `python export/run.py` makes the bundled model from its checkpoint."""
+"""The exporter's entry: `python export/run.py` makes the bundled model from its checkpoint.
+
+With `--published DIR` it makes one model file of each of the author's PNS networks instead.
+"""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,11 +9,14 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from export.model_file import export_model
+from export.model_file import Exported, export_model
+from export.published import export_published
 from pns_common.errors import PnsError
 from train.checkpoint import load_checkpoint
 
 BUNDLED = Path(__file__).resolve().parents[1] / "pns_common" / "models" / "paper.onnx"
+
+PUBLISHED_MODELS = Path("checkpoints/published")
 
 app = typer.Typer(help="Turn a checkpoint into a model file.", pretty_exceptions_enable=False)
 
@@ -20,17 +26,29 @@ def main(
     checkpoint: Annotated[Path, typer.Option(help="What `train/run.py` wrote.")] = Path(
         "checkpoints/ridge.safetensors"
     ),
-    output: Annotated[Path, typer.Option(help="Model file to write.")] = BUNDLED,
+    published: Annotated[
+        Path | None, typer.Option(help="The author's published data: export its networks.")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(help="Model file to write, or with --published the folder of the files."),
+    ] = None,
 ) -> None:
-    """Write the model file, after checking that it says what the network says."""
+    """Write model files, after checking that each says what its network says."""
     console = Console()
+    written: dict[Path, Exported] = {}
     try:
-        exported = export_model(load_checkpoint(checkpoint), output)
+        if published is not None:
+            written = export_published(published, output or PUBLISHED_MODELS)
+        else:
+            path = output or BUNDLED
+            written = {path: export_model(load_checkpoint(checkpoint), path)}
     except PnsError as error:
         console.print(str(error), style="red", soft_wrap=True)
         raise typer.Exit(1) from error
-    console.print(f"parity with torch: {exported.parity.difference:.1e} of the budget")
-    console.print(f"{output} written, sha256 {exported.sha256}", soft_wrap=True)
+    for path, exported in written.items():
+        console.print(f"parity with torch: {exported.parity.difference:.1e} of the budget")
+        console.print(f"{path} written, sha256 {exported.sha256}", soft_wrap=True)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ Layout and settings of the weights (GELU, c = 10) are facts of that repository.
 """
 
 import pickle
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -19,7 +20,20 @@ from train.networks import BoundedNet
 ACTIVATION = "gelu"
 GATE_SHARPNESS = 10.0
 
+DEFAULT_BUDGET = 0.5
+
 State = Mapping[str, Tensor]
+
+
+def is_operator(checkpoint: str) -> bool:
+    """Whether a checkpoint's network is PNS itself, not an ablated or unconstrained variant."""
+    return checkpoint.startswith("pns_") or checkpoint == "ablation_PNS_full_trained"
+
+
+def published_budget(checkpoint: str) -> float:
+    """Return the C of a checkpoint, which its name tells where it is not 0.5."""
+    found = re.search(r"_C(\d+(?:\.\d+)?)", checkpoint)
+    return float(found.group(1)) if found else DEFAULT_BUDGET
 
 
 def load_published(folder: Path) -> dict[str, BoundedNet]:

@@ -12,7 +12,7 @@ from pns_common.topology import build_topology
 from train.experiments.experiment import Column, Experiment, Figure, Outcome, Table
 from train.experiments.laboratory import Laboratory
 from train.experiments.methods import PAPER_UNITS, hard_instance
-from train.experiments.style import panels
+from train.experiments.style import SEQUENTIAL, panels
 from train.recipes import ridge
 from train.surfaces import Ridge
 
@@ -110,7 +110,7 @@ def _draw_localisation(surface: Ridge, spending: Spending) -> Drawing:
     figure, (above, scatter) = panels(2, height=2.9)
     order = np.argsort(spending.ratio)
     lines = LineCollection(
-        spending.ends[order, :, :2], array=spending.ratio[order], cmap="cividis_r", linewidth=1.8
+        spending.ends[order, :, :2], array=spending.ratio[order], cmap=SEQUENTIAL, linewidth=1.8
     )
     lines.set_clim(0, 1)
     above.add_collection(lines)
@@ -119,13 +119,13 @@ def _draw_localisation(surface: Ridge, spending: Spending) -> Drawing:
         surface.centre_x + t * np.cos(surface.angle),
         surface.centre_y + t * np.sin(surface.angle),
         "--",
-        color="#D55E00",
+        color="#0072B2",
         linewidth=1.2,
     )
     above.set(title="From above", xlabel="x", ylabel="y", xlim=(-1.05, 1.05), ylim=(-1.05, 1.05))
     above.set_aspect("equal")
     above.grid(visible=False)
-    figure.colorbar(lines, ax=above, label="Proximity ratio", shrink=0.85)
+    figure.colorbar(lines, ax=above, label="Proximity ratio")
     scatter.scatter(spending.distance, spending.ratio, s=9, color="#009E73", linewidth=0)
     scatter.set(
         title="Against distance", xlabel="|y'|", ylabel="Proximity ratio", ylim=(-0.03, 1.05)

@@ -72,12 +72,19 @@ def _draw(rows: list[tuple[Cell, ...]]) -> Drawing:
     figure, (gain, ratio) = panels(2, height=2.4)
     budgets = [row[0] for row in rows]
     series = (("near the feature", 1, "o", COLOURS["pns"]), ("all", 6, "s", COLOURS["loop"]))
-    for label, first, marker, colour in series:
+    for shift, (label, first, marker, colour) in zip((-0.008, 0.008), series, strict=True):
         value, low, high, best = ([row[first + i] for row in rows] for i in range(4))
         below = [v - x for v, x in zip(value, low, strict=True)]
         above = [x - v for v, x in zip(value, high, strict=True)]
+        # Side by side, so that neither interval hides the other.
         gain.errorbar(
-            budgets, value, [below, above], marker=marker, color=colour, capsize=2, label=label
+            [budget + shift for budget in budgets],
+            value,
+            [below, above],
+            marker=marker,
+            color=colour,
+            capsize=2,
+            label=label,
         )
         gain.plot(budgets, best, ":", color=colour, label=f"limit, {label}")
     gain.set(xlabel="Budget C", ylabel="Improvement over Loop (%)", title="Gain", ylim=(0, None))

@@ -26,13 +26,15 @@ COLUMNS = (
 )
 
 
-def section(mesh: Mesh, ridge: Ridge) -> Float[np.ndarray, "S 2 2"]:
-    """Return the segments (y', z) in which the plane across the crest cuts a mesh."""
+def section(
+    mesh: Mesh, ridge: Ridge, through: Float[np.ndarray, " 3"]
+) -> Float[np.ndarray, "S 2 2"]:
+    """Return the segments (y', z) in which the plane across the crest through a point cuts it."""
     across = np.array([-np.sin(ridge.angle), np.cos(ridge.angle), 0.0])
     along = np.array([np.cos(ridge.angle), np.sin(ridge.angle), 0.0])
     centre = np.array([ridge.centre_x, ridge.centre_y, 0.0])
     solid = Trimesh(mesh.vertices, mesh.faces, process=False)
-    segments = mesh_plane(solid, plane_normal=along, plane_origin=centre)
+    segments = mesh_plane(solid, plane_normal=along, plane_origin=through)
     return np.stack([(segments - centre) @ across, segments[..., 2]], axis=-1)
 
 
@@ -56,25 +58,30 @@ def run(laboratory: Laboratory) -> Outcome:
                 float(np.sqrt((error[~near] ** 2).mean())),
             )
         )
+    # A section between two corrected vertices would show Loop twice.
+    moved = np.linalg.norm(meshes["pns"].vertices - meshes["loop"].vertices, axis=1)
+    through = meshes["loop"].vertices[moved.argmax()]
     figure = Figure(
         "cross_section",
         f"One step on the held-out ridge a = {instance.surface.amplitude:.2f}, "
-        f"b = {instance.surface.sharpness:.2f}. Left: the section across the crest; middle: its "
-        "cap; right: signed distance of every inserted vertex against y'. Grey: near the feature.",
-        lambda: _draw(instance.surface, meshes, old),
+        f"b = {instance.surface.sharpness:.2f}. Left: the section across the crest, through the "
+        "vertex that PNS moves most; middle: its cap; right: signed distance of every inserted "
+        "vertex against y'. Grey: near the feature.",
+        lambda: _draw(instance.surface, meshes, old, through),
     )
     table = Table("cross_section", "Errors at inserted vertices", COLUMNS, tuple(rows))
     return Outcome((table,), (figure,))
 
 
-def _draw(ridge: Ridge, meshes: dict[str, Mesh], old: int) -> Drawing:
-    figure, (whole, cap, error) = panels(3, height=2.5)
+def _draw(
+    ridge: Ridge, meshes: dict[str, Mesh], old: int, through: Float[np.ndarray, " 3"]
+) -> Drawing:
+    figure, (whole, cap, error) = panels(3, height=2.8)
     for axes in (whole, cap):
-        _draw_section(axes, ridge, meshes)
+        _draw_section(axes, ridge, meshes, through)
     whole.set(title="Section", xlabel="y'", ylabel="z", xlim=(-1.1, 1.1))
     top = ridge.amplitude
     cap.set(title="Cap", xlabel="y'", xlim=(-0.32, 0.32), ylim=(0.45 * top, 1.08 * top))
-    whole.legend(loc="upper left", fontsize=5.5)
     error.axvspan(-NEAR_FEATURE, NEAR_FEATURE, color="0.93", linewidth=0)
     for name, mesh in meshes.items():
         inserted = mesh.vertices[old:]
@@ -89,17 +96,21 @@ def _draw(ridge: Ridge, meshes: dict[str, Mesh], old: int) -> Drawing:
         )
     zero_line(error)
     error.set(title="Signed distance", xlabel="y'", xlim=(-1.1, 1.1))
+    handles, labels = whole.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
     return figure
 
 
-def _draw_section(axes: Axes, ridge: Ridge, meshes: dict[str, Mesh]) -> None:
+def _draw_section(
+    axes: Axes, ridge: Ridge, meshes: dict[str, Mesh], through: Float[np.ndarray, " 3"]
+) -> None:
     y = np.linspace(-1.3, 1.3, 500)
     exact = ridge.amplitude * np.exp(-ridge.sharpness * y**2)
     axes.plot(y, exact, color=COLOURS["surface"], linewidth=0.9, label=TITLES["surface"])
     dashes = {"loop": "--", "pns": "-", "unconstrained": "-."}
     for name, mesh in meshes.items():
         lines = LineCollection(
-            section(mesh, ridge),
+            section(mesh, ridge, through),
             color=COLOURS[name],
             linewidth=1.3,
             linestyle=dashes[name],

@@ -8,15 +8,15 @@ from matplotlib.figure import Figure as Drawing
 from train.experiments.experiment import Column, Experiment, Figure, Outcome, Table
 from train.experiments.laboratory import Laboratory
 from train.experiments.methods import hard_instance, learned_methods, level_by_level
-from train.experiments.render import COLOUR_MAP, Camera, shaded_image
-from train.experiments.style import TITLES, panels
+from train.experiments.render import Camera, shaded_image
+from train.experiments.style import SEQUENTIAL, TITLES, panels
 from train.shape_metrics import LevelErrors, level_errors
 from train.surfaces import signed_distance
 
 LARGEST_ERROR = 0.1
 """End of the shared colour scale, in the patch's units."""
 
-CAMERA = Camera(azimuth=-62.0, elevation=38.0)
+CAMERA = Camera(azimuth=-62.0, elevation=42.0)
 COLUMNS = (
     Column("method", "Method"),
     Column("level", "Level"),
@@ -67,7 +67,7 @@ def _draw(
     levels: int,
 ) -> Drawing:
     names = list(dict.fromkeys(name for name, _ in images))
-    figure, axes = panels(len(names), height=4.4, rows=2)
+    figure, axes = panels(len(names), height=3.6, rows=2)
     places = [(name, level) for level in (1, levels) for name in names]
     for panel, (name, level) in zip(axes, places, strict=True):
         one = errors[name, level]
@@ -83,8 +83,8 @@ def _draw(
             va="top",
             fontsize=7,
         )
-    scale = ScalarMappable(Normalize(0, LARGEST_ERROR), COLOUR_MAP)
-    figure.colorbar(scale, ax=axes, label="Distance from the surface", shrink=0.6, pad=0.02)
+    scale = ScalarMappable(Normalize(0, LARGEST_ERROR), SEQUENTIAL)
+    figure.colorbar(scale, ax=axes, label="Distance from the surface", shrink=0.7, pad=0.02)
     return figure
 
 

@@ -27,7 +27,7 @@ from train.experiments.paper_values import (
 )
 from train.metrics import Improvement
 from train.networks import BoundedNet
-from train.published import GATE_SHARPNESS, load_published
+from train.published import GATE_SHARPNESS, load_published, published_budget
 from train.recipes import ridge
 from train.torch_model import recipe_model
 
@@ -45,7 +45,6 @@ class Claim:
     checkpoint: str
     dataset: str
     percent: Mapping[str, float]
-    budget: float = 0.5
     variant: Variant | None = None
     plain: bool = False
 
@@ -53,7 +52,7 @@ class Claim:
 def _sweep(budget: str) -> Claim:
     near, everywhere, _ = PUBLISHED_C_SWEEP[budget]
     percent = {"distance_near": near, "distance": everywhere}
-    return Claim(f"pns_sweep_C{budget}", "ridge-held-out", percent, budget=float(budget))
+    return Claim(f"pns_sweep_C{budget}", "ridge-held-out", percent)
 
 
 def _ablation(checkpoint: str, name: str, variant: Variant | None) -> Claim:
@@ -107,11 +106,10 @@ NOTES = (
 
 def published_scheme(claim: Claim, network: BoundedNet) -> Scheme:
     """Return the scheme that a published network was trained in."""
-    recipe = replace(
-        ridge(), name=claim.checkpoint, budget=claim.budget, gate_sharpness=GATE_SHARPNESS
-    )
+    budget = published_budget(claim.checkpoint)
+    recipe = replace(ridge(), name=claim.checkpoint, budget=budget, gate_sharpness=GATE_SHARPNESS)
     if claim.variant is None:
-        return pns(recipe_model(recipe, network), claim.budget)
+        return pns(recipe_model(recipe, network), budget)
     own = replace(recipe, features=claim.variant.features)
     return variant_scheme(claim.variant, network, own)
 

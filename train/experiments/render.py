@@ -7,7 +7,6 @@ colours are one and the same.
 import importlib.util
 from dataclasses import dataclass
 
-import matplotlib
 import numpy as np
 from jaxtyping import Float, UInt8
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -16,18 +15,21 @@ from matplotlib.figure import Figure
 
 from pns_common.frames import face_normals
 from pns_common.mesh import Mesh
+from train.experiments.style import SEQUENTIAL
 
-PIXELS = 900
-COLOUR_MAP = matplotlib.colormaps["cividis"]
+WIDTH, HEIGHT = 1000, 680
+ASPECT = HEIGHT / WIDTH
 LIGHT = np.array([-0.35, -0.5, 0.8])
 AMBIENT = 0.35
-HALF_WIDTH = 1.42
-"""Half the width of the view: a patch over [−1, 1]² fits whatever the azimuth."""
+HALF_WIDTH = 1.38
+"""Half the width of the view, in the patch's units."""
+
+CENTRE = np.array([0.0, 0.0, 0.05])
 
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """A parallel view of the origin's surroundings; angles in degrees."""
+    """A parallel view of a patch; angles in degrees."""
 
     azimuth: float
     elevation: float
@@ -52,12 +54,12 @@ def shaded_image(
 def _by_pyvista(mesh: Mesh, values: np.ndarray, largest: float, camera: Camera) -> np.ndarray:
     import pyvista
 
-    plotter = pyvista.Plotter(off_screen=True, window_size=(PIXELS, PIXELS * 3 // 4), lighting=None)
+    plotter = pyvista.Plotter(off_screen=True, window_size=(WIDTH, HEIGHT), lighting=None)
     surface = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
     plotter.add_mesh(
         surface,
         scalars=values,
-        cmap=COLOUR_MAP,
+        cmap=SEQUENTIAL,
         clim=(0, largest),
         show_scalar_bar=False,
         smooth_shading=False,
@@ -67,9 +69,9 @@ def _by_pyvista(mesh: Mesh, values: np.ndarray, largest: float, camera: Camera) 
     )
     plotter.add_light(pyvista.Light(position=tuple(10 * LIGHT), light_type="scene light"))
     towards = camera.axes()[2]
-    plotter.camera_position = [tuple(8 * towards), (0, 0, 0.15), (0, 0, 1)]
+    plotter.camera_position = [tuple(CENTRE + 8 * towards), tuple(CENTRE), (0, 0, 1)]
     plotter.enable_parallel_projection()
-    plotter.camera.parallel_scale = HALF_WIDTH * 3 / 4
+    plotter.camera.parallel_scale = HALF_WIDTH * ASPECT
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
     image = plotter.screenshot(return_img=True)
@@ -78,19 +80,19 @@ def _by_pyvista(mesh: Mesh, values: np.ndarray, largest: float, camera: Camera) 
 
 
 def _by_matplotlib(mesh: Mesh, values: np.ndarray, largest: float, camera: Camera) -> np.ndarray:
-    seen = (mesh.vertices - [0, 0, 0.15]) @ camera.axes().T
+    seen = (mesh.vertices - CENTRE) @ camera.axes().T
     depth = seen[mesh.faces, 2].mean(axis=1)
     order = np.argsort(depth)
     normals = face_normals(mesh.vertices, mesh.faces)
     # Both sides of a face are lit.
     lit = np.abs(normals @ (LIGHT / np.linalg.norm(LIGHT)))
-    colours = COLOUR_MAP(np.clip(values[mesh.faces].mean(axis=1) / largest, 0, 1))[:, :3]
+    colours = SEQUENTIAL(np.clip(values[mesh.faces].mean(axis=1) / largest, 0, 1))[:, :3]
     colours = colours * (AMBIENT + (1 - AMBIENT) * lit)[:, None]
-    figure = Figure(figsize=(PIXELS / 150, PIXELS * 0.75 / 150), dpi=150)
+    figure = Figure(figsize=(WIDTH / 150, HEIGHT / 150), dpi=150)
     canvas = FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set_axis_off()
-    axes.set(xlim=(-HALF_WIDTH, HALF_WIDTH), ylim=(-0.75 * HALF_WIDTH, 0.75 * HALF_WIDTH))
+    axes.set(xlim=(-HALF_WIDTH, HALF_WIDTH), ylim=(-ASPECT * HALF_WIDTH, ASPECT * HALF_WIDTH))
     shown = np.clip(colours, 0, 1)[order]
     # Edges in the face's own colour close the hairlines between antialiased triangles.
     axes.add_collection(

@@ -6,6 +6,7 @@ from types import MappingProxyType
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 TEXT_WIDTH = 6.6
@@ -50,6 +51,9 @@ COLOURS: Mapping[str, str] = MappingProxyType(
         "surface": "#000000",
     }
 )
+# Light where there is nothing to see, so that shading and thin lines stay readable.
+SEQUENTIAL = LinearSegmentedColormap.from_list("sequential", ["#DADADA", "#E69F00", "#7A1F00"])
+
 MARKERS: Mapping[str, str] = MappingProxyType(
     {
         "loop": "o",
