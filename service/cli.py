@@ -107,7 +107,6 @@ def info(
 ) -> None:
     """Show what MODEL says of itself; without MODEL, list the bundled models."""
     from pns_common.onnx_model import bundled_models, load_model
-
     from service.model_info import print_model, print_models
 
     if model is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,6 +13,11 @@ MAX_LEVELS = 6
 
 SCHEMES = ("pns", "loop")
 DIAGNOSTICS = ("summary", "full", "none")
+UV_RULES = ("linear", "smooth")
+# A weld further than a hundredth of R is a different tool: it would take features away.
+MAX_WELD_TOLERANCE = 0.01
+# `off`, `normals`, or `angle:` and degrees.
+CREASE_PATTERN = r"off|normals|angle:\d{1,3}(\.\d{1,6})?"
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +25,7 @@ class Options:
     """One request's parameters, valid once constructed.
 
     `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
-    mesh's local coordinates, or "auto". Raises InvalidParameter.
+    mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R. Raises InvalidParameter.
     """
 
     levels: int = 1
@@ -27,6 +33,9 @@ class Options:
     budget: float | None = None
     reference_length: float | Literal["auto"] = "auto"
     diagnostics: Literal["summary", "full", "none"] = "summary"
+    uv: Literal["linear", "smooth"] = "linear"
+    crease: str = "off"
+    weld_tolerance: float = 0.0
 
     def __post_init__(self) -> None:
         if not 1 <= self.levels <= MAX_LEVELS:
@@ -47,6 +56,27 @@ class Options:
             raise InvalidParameter(
                 "reference_length", "reference_length must be 'auto' or a finite positive number"
             )
+        if self.uv not in UV_RULES:
+            raise InvalidParameter("uv", f"uv must be one of {', '.join(UV_RULES)}")
+        if not re.fullmatch(CREASE_PATTERN, self.crease) or not (self.crease_angle or 0) <= math.pi:
+            raise InvalidParameter(
+                "crease", "crease must be 'off', 'normals' or 'angle:' and 0 to 180 degrees"
+            )
+        if not 0 <= self.weld_tolerance <= MAX_WELD_TOLERANCE:
+            raise InvalidParameter(
+                "weld_tolerance", f"weld_tolerance must be 0 to {MAX_WELD_TOLERANCE}"
+            )
+
+    @property
+    def crease_angle(self) -> float | None:
+        """The dihedral angle, in radians, above which an edge is a crease; None without one."""
+        rule, _, degrees = self.crease.partition(":")
+        return math.radians(float(degrees)) if rule == "angle" else None
+
+    @property
+    def weld_unit(self) -> float | None:
+        """The length that `weld_tolerance` counts in; None: each mesh's own R."""
+        return None if self.reference_length == "auto" else self.reference_length
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from service.options import MAX_LEVELS, Options
+from service.options import CREASE_PATTERN, MAX_LEVELS, MAX_WELD_TOLERANCE, Options
 
 Finite = Field(allow_inf_nan=False)
 
@@ -37,6 +37,23 @@ class Parameters(BaseModel):
     diagnostics: Literal["summary", "full", "none"] = Field(
         default="summary",
         description="`full` adds the vertex attributes `_PNS_RATIO` and `_PNS_GATE`",
+    )
+    uv: Literal["linear", "smooth"] = Field(
+        default="linear",
+        description="`smooth`: Loop's stencil inside charts; their boundaries stay linear",
+    )
+    crease: str = Field(
+        default="off",
+        pattern=f"^({CREASE_PATTERN})$",
+        description="edges to keep sharp: `off`, `normals` (where the two sides carry different "
+        "normals) or `angle:` and degrees (where the faces meet at more)",
+    )
+    weld_tolerance: float = Field(
+        default=0,
+        ge=0,
+        le=MAX_WELD_TOLERANCE,
+        allow_inf_nan=False,
+        description="join vertices nearer than this times R; 0: exactly equal ones alone",
     )
 
     def options(self) -> Options:

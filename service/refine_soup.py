@@ -13,13 +13,16 @@ from pns_common.errors import MeshError
 from pns_common.mesh import Mesh, clean, repeated_vertex
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme
-from service.errors import LimitError, UnrefinableError
+from service.errors import InvalidParameter, LimitError, UnrefinableError
+from service.gltf.charts import uv_blend
 from service.gltf.lattice import lattice
 from service.gltf.plan import BYTES_PER_FACE
 from service.gltf.report import Change
 from service.gltf.share import refined_ids
 from service.gltf.spread import spread
+from service.nearness import weld_within
 from service.options import Limits, Options
+from service.sharpness import edges_sharper_than
 from service.soup import TriangleSoup
 from service.weld import Weld, distinct_rows, number_by_first_appearance, weld
 
@@ -36,21 +39,34 @@ def refine_soup(
     Raises:
         LimitError: over `max_faces` or `max_memory_bytes`.
         UnrefinableError: a position that is no number, or no face that has an area.
+        InvalidParameter: creases by normals, which these formats do not hand on.
     """
     _check_cost(len(soup.faces) * 4**options.levels, limits)
-    welded = _welded(soup)
+    if options.crease == "normals":
+        raise InvalidParameter("crease", "crease=normals needs a glTF; use angle:DEGREES here")
+    exact = _welded(soup)
+    welded = weld_within(exact, options.weld_tolerance, options.weld_unit, None)
     proper = ~repeated_vertex(welded.faces)
     if not proper.any():
         raise UnrefinableError("no face has three different vertices")
     cleaned = clean(Mesh(welded.points, welded.faces))
+    angle = options.crease_angle
     refinement = refine(
-        cleaned.mesh, scheme, options.levels, options.reference_length, progress=progress
+        cleaned.mesh,
+        scheme,
+        options.levels,
+        options.reference_length,
+        creases=None if angle is None else edges_sharper_than(cleaned.mesh, angle),
+        progress=progress,
     )
     ids = refined_ids(welded, cleaned, refinement, lattice(options.levels))
-    refined = _with_corners(soup, welded, proper, ids, refinement, options.levels)
+    refined = _with_corners(soup, welded, proper, ids, refinement, options)
     changes = [Change("", f"{name} dropped", count) for name, count in soup.left_out.items()]
     if soup.split:
         changes.append(Change("", "triangles added by splitting polygons", soup.split))
+    near = len(exact.points) - len(welded.points)
+    if near:
+        changes.append(Change("", "vertices joined within weld_tolerance", near))
     report = {name: value for name, value in refinement.report.items() if name != "levels"}
     report["totals"] = {
         "vertices": len(refined.vertices),
@@ -97,24 +113,25 @@ def _with_corners(
     proper: np.ndarray,
     ids: Int[np.ndarray, "P T"],
     refinement: Refinement,
-    levels: int,
+    options: Options,
 ) -> TriangleSoup:
     """The refined mesh, cut open again where texture coordinates differ."""
     points = refinement.mesh.vertices
-    grid = lattice(levels)
+    grid = lattice(options.levels)
     if soup.uv is None:
         return TriangleSoup(points, ids[:, grid.faces.reshape(-1)].reshape(-1, 3))
-    corners, uv = _distinct_corners(soup.faces[proper], welded, soup.uv)
+    corners, vertex, uv = _distinct_corners(soup.faces[proper], welded, soup.uv)
     own = spread(corners, len(uv), grid)
-    return TriangleSoup(points[own.at_vertices(ids)], own.refined_faces, own.linear(uv))
+    blended = uv_blend(options)(own, vertex, uv)
+    return TriangleSoup(points[own.at_vertices(ids)], own.refined_faces, blended)
 
 
 def _distinct_corners(
     faces: Int[np.ndarray, "P 3"], welded: Weld, uv: Float[np.ndarray, "N 2"]
-) -> tuple[Int[np.ndarray, "P 3"], Float[np.ndarray, "C 2"]]:
-    """Faces over the distinct pairs of position and texture coordinates, and these coordinates."""
+) -> tuple[Int[np.ndarray, "P 3"], Int[np.ndarray, " C"], Float[np.ndarray, "C 2"]]:
+    """Faces over the distinct pairs of a welded vertex and texture coordinates, and these."""
     rows = np.column_stack([welded.vertex_of.astype(np.float64), uv])
     corners = number_by_first_appearance(distinct_rows(rows)[faces.reshape(-1)])
-    values = np.empty((corners.max() + 1, 2))
-    values[corners] = uv[faces.reshape(-1)]
-    return corners.reshape(-1, 3), values
+    row = np.empty(corners.max() + 1, dtype=np.int64)
+    row[corners] = faces.reshape(-1)
+    return corners.reshape(-1, 3), welded.vertex_of[row], uv[row]

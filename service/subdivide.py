@@ -7,20 +7,19 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
-
-from pns_common.errors import MeshError
-from pns_common.refine import Refinement, refine
 from pns_common.schemes import Model, Scheme, loop, pns
-from service.errors import NoModelError, UnrefinableError
+from service.errors import NoModelError
+from service.gltf.charts import uv_blend
 from service.gltf.container import write_glb
-from service.gltf.control_mesh import ControlMesh, control_mesh
+from service.gltf.control_mesh import control_mesh
 from service.gltf.extras import put_report, replaces_extras
 from service.gltf.json_text import encode
+from service.gltf.lattice import lattice
 from service.gltf.neighbours import ALONE, Neighbours
 from service.gltf.nodes import mesh_instances
 from service.gltf.plan import MeshPlan
 from service.gltf.primitives import read_primitive
+from service.gltf.refinement import changes_of_mesh, refine_control_mesh
 from service.gltf.report import Change, MeshResult, build_report
 from service.gltf.share import RefinedPrimitive, share
 from service.gltf.storage import storage_changes, withdraw_unused
@@ -28,8 +27,6 @@ from service.gltf.upload import Media, Upload, read_upload
 from service.gltf.writer import Writer
 from service.options import Limits, Options
 from service.stopwatch import Stopwatch
-
-RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 
 Progress = Callable[[int, int], None]
 
@@ -84,16 +81,21 @@ def subdivide_gltf(
             for number in mesh.primitives
         ]
         clock.lap("read")
-        control = control_mesh(primitives)
+        control = control_mesh(primitives, options.weld_tolerance, options.weld_unit)
         clock.lap("weld")
-        refinement = _refine(control, scheme, options, f"/meshes/{mesh.mesh}", mesh_progress)
+        pointer = f"/meshes/{mesh.mesh}"
+        made = refine_control_mesh(control, scheme, options, pointer, mesh_progress)
         clock.lap("refine")
-        refined = _share(control, refinement, options)
+        refined: list[RefinedPrimitive] = []
+        if made is not None and control.cleaned is not None:
+            refined = share(
+                control, control.cleaned, made, lattice(options.levels), uv_blend(options)
+            )
         clock.lap("attributes")
         for primitive in refined:
             writer.replace(mesh.mesh, primitive)
         clock.lap("write")
-        changes += _changes_of_mesh(mesh.mesh, control)
+        changes += changes_of_mesh(control, made, pointer)
         results.append(
             MeshResult(
                 index=mesh.mesh,
@@ -103,7 +105,7 @@ def subdivide_gltf(
                 faces=sum(len(p.faces) for p in refined),
                 degenerate=control.degenerate,
                 copies=control.copies,
-                report=None if refinement is None else refinement.report,
+                report=None if made is None else made.refinement.report,
             )
         )
 
@@ -128,48 +130,6 @@ def make_scheme(options: Options, model: Model | None) -> Scheme:
     if model is None:
         raise NoModelError("no model is loaded; scheme=loop needs none")
     return pns(model, options.budget)
-
-
-def _refine(
-    control: ControlMesh,
-    scheme: Scheme,
-    options: Options,
-    pointer: str,
-    progress: Progress | None,
-) -> Refinement | None:
-    """Refine a control mesh whose positions will be written as float32; None if it has no face."""
-    if control.cleaned is None:
-        return None
-    mesh, length = control.cleaned.mesh, options.reference_length
-    try:
-        refinement = refine(mesh, scheme, options.levels, length, progress=progress)
-    except MeshError as error:
-        raise UnrefinableError(str(error), pointer=pointer) from error
-    if np.abs(refinement.mesh.vertices).max() > np.finfo(np.float32).max:
-        raise UnrefinableError("refined positions leave the range of float32", pointer=pointer)
-    return refinement
-
-
-def _share(
-    control: ControlMesh, refinement: Refinement | None, options: Options
-) -> list[RefinedPrimitive]:
-    if control.cleaned is None or refinement is None:
-        return []
-    scalars = {RATIO: refinement.ratio, GATE: refinement.gate}
-    wanted = scalars if options.diagnostics == "full" else {}
-    return share(control, control.cleaned, refinement, options.levels, wanted)
-
-
-def _changes_of_mesh(mesh: int, control: ControlMesh) -> list[Change]:
-    return [
-        Change(
-            f"/meshes/{mesh}/primitives/{primitive.number}",
-            "degenerate faces dropped" if keep.any() else "left as it was: no face has an area",
-            int((~keep).sum()),
-        )
-        for primitive, keep in zip(control.primitives, control.kept, strict=True)
-        if not keep.all()
-    ]
 
 
 def _changes_of_container(upload: Upload, options: Options) -> list[Change]:

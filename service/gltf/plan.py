@@ -15,6 +15,8 @@ from service.options import Limits
 # 240,000 to 960,000 faces, levels 1 to 6, smooth ones and ones where every corner is a vertex.
 BYTES_PER_FACE = 350
 BYTES_PER_FACE_WITH_NORMALS = 550
+# The levels' connectivity again, and a block of columns, for skins and morph targets.
+BYTES_PER_FACE_WITH_FOLLOWERS = 250
 # A refined face has at most 1.5 vertices: made, cast to float32, written.
 BYTES_PER_VERTEX_BYTE = 3
 # Its arrays' headers, and its accessors in the JSON (9 KiB measured over 20,000 primitives).
@@ -107,9 +109,15 @@ def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, l
     for mesh in plans:
         for number in mesh.primitives:
             primitive = document.meshes[mesh.mesh].primitives[number]
-            width = sum(element_size(document.accessors[i]) for i in primitive.attributes.values())
+            width = sum(
+                element_size(document.accessors[index])
+                for attributes in (primitive.attributes, *primitive.targets)
+                for index in attributes.values()
+            )
             has_normals = "NORMAL" in primitive.attributes
             base = BYTES_PER_FACE_WITH_NORMALS if has_normals else BYTES_PER_FACE
+            if primitive.targets or "JOINTS_0" in primitive.attributes:
+                base += BYTES_PER_FACE_WITH_FOLLOWERS
             corners = _corner_count(document, primitive)
             faces = triangle_count(corners, primitive.mode, "") * 4**levels
             total += BYTES_PER_PRIMITIVE + faces * (base + BYTES_PER_VERTEX_BYTE * width)

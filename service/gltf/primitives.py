@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,8 @@ from service.gltf.quantization import dequantised
 from service.gltf.schema import Accessor, Document
 from service.weld import as_words, distinct_rows, number_by_first_appearance
 
+_FOLLOWS_VERTEX = re.compile(r"POSITION|JOINTS_\d+|WEIGHTS_\d+")
+
 
 @dataclass(frozen=True, eq=False)
 class TrianglePrimitive:
@@ -26,12 +29,16 @@ class TrianglePrimitive:
         attributes: by name (N, K) arrays in the component type that they are written in.
         accessors: by name an accessor that describes them; one without bytes of its own where
             they were quantised.
+        targets: the same of each morph target, whose values are added to the attributes'.
+        target_accessors: the same of each morph target.
     """
 
     number: int
     corners: Int[np.ndarray, "F 3"]
     attributes: dict[str, Shaped[np.ndarray, "N K"]]
     accessors: dict[str, Accessor]
+    targets: tuple[dict[str, Shaped[np.ndarray, "N K"]], ...] = ()
+    target_accessors: tuple[dict[str, Accessor], ...] = ()
 
 
 def read_primitive(
@@ -54,20 +61,36 @@ def read_primitive(
                 pointer=f"/accessors/{primitive.indices}",
             )
     used, corners = compact(flat, count)
-    attributes: dict[str, Shaped[np.ndarray, "N K"]] = {}
-    accessors: dict[str, Accessor] = {}
-    for name, index in primitive.attributes.items():
-        accessor = document.accessors[index]
-        values = read_rows(document, buffers, index, used)
-        if accessor.component_type == FLOAT and not np.isfinite(values).all():
-            raise GltfError(f"{name} holds NaN or infinity", pointer=f"/accessors/{index}")
-        attributes[name], accessors[name] = dequantised(name, values, accessor)
+    attributes, accessors = _read_attributes(document, buffers, primitive.attributes, used)
+    targets = [_read_attributes(document, buffers, t, used) for t in primitive.targets]
     return TrianglePrimitive(
         number=number,
         corners=triangles(corners, primitive.mode),
         attributes=attributes,
         accessors=accessors,
+        targets=tuple(values for values, _ in targets),
+        target_accessors=tuple(described for _, described in targets),
     )
+
+
+def _read_attributes(
+    document: Document,
+    buffers: Sequence[memoryview],
+    indices: dict[str, int],
+    rows: Int[np.ndarray, " N"],
+) -> tuple[dict[str, Shaped[np.ndarray, "N K"]], dict[str, Accessor]]:
+    """The rows of attributes, by name, and what describes them."""
+    attributes: dict[str, Shaped[np.ndarray, "N K"]] = {}
+    accessors: dict[str, Accessor] = {}
+    for name, index in indices.items():
+        accessor = document.accessors[index]
+        values = read_rows(document, buffers, index, rows)
+        if accessor.component_type == FLOAT and not np.isfinite(values).all():
+            raise GltfError(f"{name} holds NaN or infinity", pointer=f"/accessors/{index}")
+        if name.startswith("WEIGHTS_") and accessor.component_type == FLOAT and (values < 0).any():
+            raise GltfError(f"{name} holds negative weights", pointer=f"/accessors/{index}")
+        attributes[name], accessors[name] = dequantised(name, values, accessor)
+    return attributes, accessors
 
 
 def compact(
@@ -91,12 +114,18 @@ def distinct_corners(
     corners: Int[np.ndarray, "F 3"],
     welded: Int[np.ndarray, " N"],
 ) -> tuple[Int[np.ndarray, "F 3"], Int[np.ndarray, " C"]]:
-    """Join vertices that agree in position and in all attributes.
+    """Join vertices that agree in position and in all attributes, those of morph targets too.
 
-    `welded` is the welded vertex of each row. Gives the distinct corners of each face, numbered by
+    `welded` is the welded vertex of each row, and says what follows it: the position, how morph
+    targets move it, the skin's binding. Gives the distinct corners of each face, numbered by
     first appearance, and for each of them a row of the primitive's attributes.
     """
-    others = [values for name, values in primitive.attributes.items() if name != "POSITION"]
+    others = [
+        values
+        for attributes in (primitive.attributes, *primitive.targets)
+        for name, values in attributes.items()
+        if not _FOLLOWS_VERTEX.fullmatch(name)
+    ]
     words = np.hstack([welded.astype(np.uint32)[:, None], *(as_words(o) for o in others)])
     flat = corners.reshape(-1)
     distinct = number_by_first_appearance(distinct_rows(words)[flat])

@@ -12,8 +12,16 @@ from service.gltf.schema import Accessor, Document, Primitive
 
 # Extensions of primitives that name vertices by number: refined vertices have other numbers.
 _BY_VERTEX = ("CESIUM_primitive_outline",)
-_SKINNING = re.compile(r"(JOINTS|WEIGHTS)_\d+")
-_GEOMETRY = {"POSITION": "VEC3", "NORMAL": "VEC3", "TANGENT": "VEC4"}
+_SKIN_SET = re.compile(r"(JOINTS|WEIGHTS)_(\d+)")
+_PARTNER = {"JOINTS": "WEIGHTS", "WEIGHTS": "JOINTS"}
+_INTEGERS = (5121, 5123)
+_SKIN_STORAGE = {
+    "JOINTS": {(kind, False) for kind in _INTEGERS},
+    "WEIGHTS": {(FLOAT, False), *((kind, True) for kind in _INTEGERS)},
+}
+# The types of attributes and of what morph targets add to them; `_n` stands for any number.
+_DELTAS = {"POSITION": "VEC3", "NORMAL": "VEC3", "TANGENT": "VEC3", "TEXCOORD_n": "VEC2"}
+_GEOMETRY = _DELTAS | {"TANGENT": "VEC4", "JOINTS_n": "VEC4", "WEIGHTS_n": "VEC4"}
 
 
 def refuse_version(document: Document) -> None:
@@ -32,43 +40,45 @@ def refuse_features(document: Document) -> None:
     """Refuse primitives of surfaces that would come back incomplete; references are checked.
 
     Raises:
-        UnsupportedFeature: skins, morph targets.
+        UnsupportedFeature: no POSITION, or an extension that names vertices by number.
         GltfError: an attribute of a type that glTF does not allow.
     """
     for number, mesh in enumerate(document.meshes):
         for place, primitive in enumerate(mesh.primitives):
             if primitive.mode in SURFACES:
                 _refuse_primitive(document, primitive, f"/meshes/{number}/primitives/{place}")
-    for number, node in enumerate(document.nodes):
-        if node.skin is not None and node.mesh is not None:
-            primitives = document.meshes[node.mesh].primitives
-            if any(primitive.mode in SURFACES for primitive in primitives):
-                raise UnsupportedFeature("a skinned mesh", pointer=f"/nodes/{number}/skin")
 
 
 def _refuse_primitive(document: Document, primitive: Primitive, pointer: str) -> None:
-    if primitive.targets:
-        raise UnsupportedFeature("a mesh with morph targets", pointer=f"{pointer}/targets")
     for name in _BY_VERTEX:
         if name in primitive.extensions:
             raise UnsupportedFeature(name, pointer=f"{pointer}/extensions/{name}")
     if "POSITION" not in primitive.attributes:
         raise UnsupportedFeature("a primitive without POSITION", pointer=f"{pointer}/attributes")
     for name, index in primitive.attributes.items():
-        accessor = document.accessors[index]
-        if _SKINNING.fullmatch(name):
-            raise UnsupportedFeature("a skinned mesh", pointer=f"{pointer}/attributes/{name}")
-        _refuse_type(name, accessor, f"/accessors/{index}")
+        _refuse_type(name, document.accessors[index], _GEOMETRY, f"/accessors/{index}")
+        pair = _SKIN_SET.fullmatch(name)
+        if pair and f"{_PARTNER[pair[1]]}_{pair[2]}" not in primitive.attributes:
+            raise GltfError(
+                f"{name} without {_PARTNER[pair[1]]}_{pair[2]}",
+                pointer=f"{pointer}/attributes/{name}",
+            )
+    for target in primitive.targets:
+        for name, index in target.items():
+            _refuse_type(name, document.accessors[index], _DELTAS, f"/accessors/{index}")
 
 
-def _refuse_type(name: str, accessor: Accessor, pointer: str) -> None:
-    if name in _GEOMETRY and accessor.type != _GEOMETRY[name]:
-        raise GltfError(f"{name} must be {_GEOMETRY[name]}", pointer=f"{pointer}/type")
-    if name.startswith("TEXCOORD_") and accessor.type != "VEC2":
-        raise GltfError(f"{name} must be VEC2", pointer=f"{pointer}/type")
+def _refuse_type(name: str, accessor: Accessor, types: dict[str, str], pointer: str) -> None:
+    expected = types.get(name, types.get(name.partition("_")[0] + "_n", accessor.type))
+    if accessor.type != expected:
+        raise GltfError(f"{name} must be {expected}", pointer=f"{pointer}/type")
+    storage = (accessor.component_type, accessor.normalized)
+    if storage not in _SKIN_STORAGE.get(name.partition("_")[0], {storage}):
+        raise GltfError(
+            f"{name} may not be stored as this type", pointer=f"{pointer}/componentType"
+        )
     if accessor.component_type == FLOAT:
         return
-    storage = (accessor.component_type, accessor.normalized)
     if is_dequantised(name) and storage not in allowed(name):
         raise GltfError(
             f"{name} may not be stored as integers of this type", pointer=f"{pointer}/componentType"

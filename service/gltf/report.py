@@ -80,6 +80,8 @@ def total_level(levels: Sequence[LevelReport]) -> LevelReport:
     ratios = [level["proximity_ratio"] for level in levels]
     gates = [level["gate"] for level in levels]
 
+    creases = sum(level["edges"].get("crease", 0) for level in levels)
+
     def mean(values: list[float]) -> float:
         weighted = [weight * value for weight, value in zip(weights, values, strict=True)]
         return sum(weighted) / max(sum(weights), 1)
@@ -91,6 +93,7 @@ def total_level(levels: Sequence[LevelReport]) -> LevelReport:
             "interior": sum(weights),
             "boundary": sum(level["edges"]["boundary"] for level in levels),
             "irregular": sum(level["edges"]["irregular"] for level in levels),
+            **({"crease": creases} if creases else {}),
         },
         "degenerate_frames": sum(level["degenerate_frames"] for level in levels),
         "flipped_faces": sum(level["flipped_faces"] for level in levels),

@@ -16,7 +16,7 @@ from pns_common.arrays import norm
 from pns_common.blocks import Blocks, available_threads
 from service.gltf.control_mesh import ControlMesh, slices
 from service.gltf.lattice import Lattice
-from service.gltf.normals import angle_weighted_normals, safe_unit
+from service.gltf.normals import angle_weighted_normals
 from service.gltf.spread import Spread, at_descendants, spread
 from service.weld import number_by_first_appearance
 
@@ -29,19 +29,37 @@ SCAN = np.array([1.0, np.sqrt(2), np.sqrt(3)])
 
 @dataclass(frozen=True, eq=False)
 class NormalGroups:
-    """New normals of G groups, and by primitive the groups of its faces' lattice points."""
+    """The G groups of refined corners that share a normal.
 
-    values: Float[np.ndarray, "G 3"]
+    Attributes:
+        vertices: (D, 3) the refined vertices of the faces that have normals.
+        groups: (D, 3) their corners' groups.
+        before: (G, 3) the old normals, blended linearly: what is left where faces have no area.
+        ids: by primitive the groups of its faces' lattice points.
+    """
+
+    vertices: Int[np.ndarray, "D 3"]
+    groups: Int[np.ndarray, "D 3"]
+    before: Float[np.ndarray, "G 3"]
     ids: dict[int, Int[np.ndarray, "F T"]]
 
+    def normals(
+        self, points: Float[np.ndarray, "V 3"], otherwise: Float[np.ndarray, "G 3"]
+    ) -> Float[np.ndarray, "G 3"]:
+        """The groups' unit normals over refined vertices; `otherwise` where they have none."""
+        blocks = Blocks(threads=available_threads())
+        values = angle_weighted_normals(
+            points, self.vertices, self.groups, len(self.before), blocks
+        )
+        undefined = np.flatnonzero(~values.any(axis=1))
+        values[undefined] = otherwise[undefined]
+        return values
 
-def recompute_normals(
-    control: ControlMesh,
-    ids: Sequence[Int[np.ndarray, "F T"]],
-    grid: Lattice,
-    points: Float[np.ndarray, "V 3"],
-) -> NormalGroups:
-    """The normals of the primitives that have normals.
+
+def normal_groups(
+    control: ControlMesh, ids: Sequence[Int[np.ndarray, "F T"]], grid: Lattice
+) -> NormalGroups | None:
+    """The groups over the primitives that have normals; None where none has.
 
     `ids` are, for each primitive, the refined vertices at the lattice points of its faces.
     """
@@ -51,22 +69,15 @@ def recompute_normals(
         if "NORMAL" in primitive.attributes and len(ids[number])
     ]
     if not chosen:
-        return NormalGroups(np.zeros((0, 3)), {})
+        return None
     groups, before = _split_groups(control, chosen, grid)
     used = np.concatenate([ids[number] for number in chosen])
-    values = angle_weighted_normals(
-        points,
-        at_descendants(used, grid),
-        groups.refined_faces,
-        groups.count,
-        Blocks(threads=available_threads()),
-    )
-    undefined = np.flatnonzero(~values.any(axis=1))
-    if len(undefined):
-        values[undefined] = safe_unit(groups.linear(before)[undefined])
     shares = slices([len(ids[number]) for number in chosen])
     return NormalGroups(
-        values, {number: groups.ids[at] for number, at in zip(chosen, shares, strict=True)}
+        vertices=at_descendants(used, grid),
+        groups=groups.refined_faces,
+        before=groups.linear(before),
+        ids={number: groups.ids[at] for number, at in zip(chosen, shares, strict=True)},
     )
 
 

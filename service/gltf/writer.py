@@ -11,6 +11,7 @@ from jaxtyping import Shaped
 
 from service.gltf.accessors import COLUMNS, COMPONENT_TYPES
 from service.gltf.modes import TRIANGLES
+from service.gltf.schema import Accessor
 from service.gltf.share import RefinedPrimitive
 
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
@@ -43,9 +44,16 @@ class Writer:
         """Point a primitive of the tree at its refined geometry."""
         primitive = self.tree["meshes"][mesh]["primitives"][refined.source.number]
         primitive["attributes"] = {
-            name: self._attribute(refined, name, values)
+            name: self._attribute(refined.source.accessors.get(name), name, values)
             for name, values in refined.attributes.items()
         }
+        if refined.targets:
+            primitive["targets"] = [
+                {name: self._attribute(before[name], name, values[name]) for name in before}
+                for before, values in zip(
+                    refined.source.target_accessors, refined.targets, strict=True
+                )
+            ]
         if primitive.get("mode", TRIANGLES) != TRIANGLES:
             primitive["mode"] = TRIANGLES
         small = refined.faces.max() <= LARGEST_UINT16_INDEX
@@ -64,9 +72,8 @@ class Writer:
         return self.pieces
 
     def _attribute(
-        self, refined: RefinedPrimitive, name: str, values: Shaped[np.ndarray, "N K"]
+        self, before: Accessor | None, name: str, values: Shaped[np.ndarray, "N K"]
     ) -> int:
-        before = refined.source.accessors.get(name)
         kind = "SCALAR" if before is None else before.type
         index = self._accessor(values, ARRAY_BUFFER, kind)
         accessor = self.tree["accessors"][index]

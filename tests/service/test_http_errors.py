@@ -220,7 +220,16 @@ def test_the_description_names_bodies_parameters_and_errors(client: TestClient) 
         "multipart/form-data",
     }
     names = {parameter["name"] for parameter in operation["parameters"]}
-    assert names == {"levels", "scheme", "budget", "reference_length", "diagnostics"}
+    assert names == {
+        "levels",
+        "scheme",
+        "budget",
+        "reference_length",
+        "diagnostics",
+        "uv",
+        "crease",
+        "weld_tolerance",
+    }
     statuses = {"200", "400", "408", "413", "415", "422", "500", "503", "504"}
     assert set(operation["responses"]) == statuses
     for status in statuses - {"200"}:

@@ -20,6 +20,17 @@ WRONG = [
     ("reference_length", -1.0),
     ("reference_length", math.nan),
     ("reference_length", math.inf),
+    ("uv", "cubic"),
+    ("crease", "on"),
+    ("crease", "angle"),
+    ("crease", "angle:"),
+    ("crease", "angle:-3"),
+    ("crease", "angle:181"),
+    ("crease", "angle:nan"),
+    ("crease", "normals\n"),
+    ("weld_tolerance", -1e-9),
+    ("weld_tolerance", 0.011),
+    ("weld_tolerance", math.nan),
 ]
 
 
@@ -31,6 +42,22 @@ def test_a_value_outside_its_range_is_refused_by_name(name, value):
     assert refusal.value.status == 422
 
 
-@pytest.mark.parametrize("options", [{}, {"levels": 6}, {"budget": 0.0, "reference_length": 1.0}])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"levels": 6},
+        {"budget": 0.0, "reference_length": 1.0},
+        {"uv": "smooth", "crease": "angle:180", "weld_tolerance": 0.01},
+        {"crease": "normals"},
+    ],
+)
 def test_values_in_range_are_taken(options):
     assert all(getattr(Options(**options), name) == value for name, value in options.items())
+
+
+def test_angles_are_in_degrees_and_other_creases_have_none():
+    assert Options(crease="angle:90").crease_angle == math.pi / 2
+    assert Options(crease="angle:37.5").crease_angle == math.radians(37.5)
+    assert Options(crease="normals").crease_angle is None
+    assert Options().crease_angle is None
