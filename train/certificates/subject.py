@@ -45,8 +45,10 @@ def subject_of_model(model: Model, exact: Model, budget: float | None = None) ->
 
 def subject_of_network(model: TorchModel, budget: float | None = None) -> Subject:
     """The learned operator with a torch network."""
-    return subject_of_model(model, TorchModel(model.name, model.card, _double(model)), budget)
+    exact = TorchModel(model.name, model.card, in_double(model.network))
+    return subject_of_model(model, exact, budget)
 
 
-def _double(model: TorchModel) -> BoundedNet:
-    return copy.deepcopy(model.network).double()
+def in_double(network: BoundedNet) -> BoundedNet:
+    """A copy of a network in double precision."""
+    return copy.deepcopy(network).double()

@@ -107,3 +107,34 @@ PAPER_REPEATED = _table(
 )
 # The instance of the paper's cross-section, hero and repeated figures.
 PAPER_INSTANCE = _table({"amplitude": 0.61, "sharpness": 8.94})
+
+# structural_certification.csv, and the paper's table "Structural tests"; "T4" is the paper's only.
+PUBLISHED_STRUCTURAL = _table(
+    {
+        "bounded displacement": (0.073609, None),
+        "equivariance, double precision": (1.780e-15, 3.5e-15),
+        "affine reproduction, axis-aligned": (0.0, 0.0),
+        "proximity slope": (None, 2.000),
+        "normal-variation slope": (None, 1.000),
+        "Lipschitz slope": (None, 1.02),
+    }
+)
+PUBLISHED_ADVERSARIAL = _table(
+    {"proximity ratio": 1.0, "equivariance": 1.018e-15, "affine reproduction": 0.0}
+)
+
+# spectral_certification.csv: tangent eigenvalue and Reif gap of the (k+1)-star.
+PUBLISHED_SPECTRAL = _table(
+    {
+        "3": (0.250000000, 0.187500),
+        "4": (0.375000000, 0.234375),
+        "5": (0.452254249, 0.247720),
+        "6": (0.500000000, 0.250000),
+        "7": (0.530872450, 0.211503),
+        "8": (0.551776695, 0.176777),
+        "9": (0.566511111, 0.148099),
+        "10": (0.577254249, 0.125000),
+        "11": (0.585313383, 0.106460),
+        "12": (0.591506351, 0.091506),
+    }
+)
