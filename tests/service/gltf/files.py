@@ -21,7 +21,8 @@ class Normalized:
 def document(*meshes):
     """(JSON tree, BIN) of meshes; a mesh is a list of primitives, a primitive a dictionary.
 
-    A primitive has `indices` (or none), perhaps `mode`, and attributes by their glTF names.
+    A primitive has `indices` (or none), perhaps `mode`, perhaps `targets` (dictionaries of deltas),
+    and attributes by their glTF names.
     """
     tree = {
         "asset": {"version": "2.0"},
@@ -43,6 +44,11 @@ def document(*meshes):
                     entry["mode"] = values
                 elif name == "indices":
                     entry["indices"] = add_accessor(tree, binary, np.asarray(values).reshape(-1, 1))
+                elif name == "targets":
+                    entry["targets"] = [
+                        {key: add_accessor(tree, binary, delta) for key, delta in target.items()}
+                        for target in values
+                    ]
                 else:
                     entry["attributes"][name] = add_accessor(tree, binary, values)
             primitives.append(entry)
@@ -146,3 +152,13 @@ def primitive_of(data, mesh=0, primitive=0):
     attributes = {n: values_of(tree, binary, i) for n, i in entry["attributes"].items()}
     faces = values_of(tree, binary, entry["indices"]).astype(np.int64).reshape(-1, 3)
     return faces, attributes
+
+
+def targets_of(data, mesh=0, primitive=0):
+    """The morph targets of a primitive of a GLB: deltas by name."""
+    tree, binary = unpack(data)
+    entry = tree["meshes"][mesh]["primitives"][primitive]
+    return [
+        {name: values_of(tree, binary, index) for name, index in target.items()}
+        for target in entry.get("targets", [])
+    ]

@@ -165,9 +165,6 @@ def test_values_that_are_not_finite_are_refused(place, name, value):
 
 UNSUPPORTED = [
     ("/asset/version", "1.0", "glTF version 1.0"),
-    ("/meshes/0/primitives/0/targets", [{"POSITION": 0}], "a mesh with morph targets"),
-    ("/meshes/0/primitives/0/attributes/JOINTS_0", 2, "a skinned mesh"),
-    ("/meshes/0/primitives/0/attributes/WEIGHTS_1", 2, "a skinned mesh"),
     ("/meshes/0/primitives/0/attributes", {"NORMAL": 1}, "a primitive without POSITION"),
     (
         "/meshes/0/primitives/0/extensions",
@@ -186,14 +183,30 @@ def test_what_cannot_be_refined_yet_is_refused_by_name(path, value, feature):
     assert (refusal.value.status, refusal.value.code) == (422, "unsupported-feature")
 
 
-def test_a_mesh_shown_by_a_skinned_node_is_refused():
-    def edit(tree):
-        tree["skins"] = [{"joints": [0]}]
-        tree["nodes"][0]["skin"] = 0
+JOINTS, SHARES = np.zeros((24, 4), dtype=np.uint8), np.full((24, 4), 0.25)
 
-    with pytest.raises(UnsupportedFeature, match="skinned") as refusal:
-        refine(edited(edit))
-    assert refusal.value.pointer == "/nodes/0/skin"
+
+@pytest.mark.parametrize(
+    ("attributes", "pointer"),
+    [
+        ({"JOINTS_0": JOINTS}, "/meshes/0/primitives/0/attributes/JOINTS_0"),
+        ({"WEIGHTS_1": SHARES}, "/meshes/0/primitives/0/attributes/WEIGHTS_1"),
+        ({"JOINTS_0": SHARES, "WEIGHTS_0": SHARES}, "/accessors/5/componentType"),
+        ({"JOINTS_0": JOINTS, "WEIGHTS_0": JOINTS}, "/accessors/6/componentType"),
+        ({"JOINTS_0": JOINTS[:, :3], "WEIGHTS_0": SHARES}, "/accessors/5/type"),
+        ({"JOINTS_0": JOINTS, "WEIGHTS_0": SHARES - 0.5}, "/accessors/6"),
+        ({"JOINTS_0": JOINTS, "WEIGHTS_0": SHARES * np.nan}, "/accessors/6"),
+        ({"targets": [{"TANGENT": np.zeros((24, 4))}]}, "/accessors/5/type"),
+        ({"targets": [{"POSITION": np.full((24, 3), np.inf)}]}, "/accessors/5"),
+    ],
+)
+def test_wrong_skins_and_targets_are_refused_with_a_pointer(attributes, pointer):
+    tree, binary = files.document([box(**attributes)])
+    for accessor in tree["accessors"]:
+        accessor.pop("min", None), accessor.pop("max", None)
+    with pytest.raises(GltfError) as refusal:
+        refine(files.pack(tree, binary))
+    assert refusal.value.pointer == pointer
 
 
 def test_a_deep_tree_of_nodes_is_no_cycle():
