@@ -79,11 +79,19 @@ class OnnxModel:
             piece = rows[start : start + ROWS]
             padded = np.zeros((ROWS, rows.shape[1]), dtype=np.float32)
             padded[: len(piece)] = piece
-            (answer,) = self._session.run(["correction"], {"features": padded, "budget": limit})
-            corrections[start : start + ROWS] = self._checked(np.asarray(answer))[: len(piece)]
+            answer = self._run(padded, limit)
+            corrections[start : start + ROWS] = answer[: len(piece)]
         return corrections
 
-    def _checked(self, answer: np.ndarray) -> np.ndarray:
+    def _run(self, rows: np.ndarray, limit: np.ndarray) -> np.ndarray:
+        try:
+            (answer,) = self._session.run(["correction"], {"features": rows, "budget": limit})
+        except Exception as error:  # onnxruntime's errors share no base below Exception
+            found = str(error).splitlines()[0]
+            raise ModelError(
+                self.name, expected="a graph that runs to its end", found=found
+            ) from error
+        answer = np.asarray(answer)
         if answer.shape != (ROWS, 3):
             raise ModelError(
                 self.name, expected=f"corrections of shape ({ROWS}, 3)", found=f"{answer.shape}"

@@ -134,6 +134,16 @@ def test_corrections_that_are_not_numbers_are_an_error():
         refine(Mesh(*bumpy_sphere()), pns(model))
 
 
+def test_a_graph_that_breaks_off_while_running_is_an_error_of_the_model():
+    nodes = [
+        helper.make_node("Reshape", ["features", "shape"], ["rows"]),
+        helper.make_node("Mul", ["rows", "budget"], ["correction"]),
+    ]
+    model = model_from_bytes(model_bytes(nodes, {"shape": np.array([7, 3])}), "breaks")
+    with pytest.raises(ModelError, match="runs to its end"):
+        refine(Mesh(*bumpy_sphere()), pns(model))
+
+
 def test_a_rows_bits_depend_on_nothing_but_the_row():
     model = random_model(0)
     features = np.random.default_rng(0).uniform(-2, 2, (3 * ROWS + 17, 5))

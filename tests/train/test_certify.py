@@ -74,6 +74,17 @@ def test_a_model_of_other_shapes_fails_by_name(tmp_path):
     assert "outputs" in reason
 
 
+def test_a_graph_that_breaks_off_fails_by_name(tmp_path):
+    nodes = [
+        helper.make_node("Reshape", ["features", "shape"], ["rows"]),
+        helper.make_node("Mul", ["rows", "budget"], ["correction"]),
+    ]
+    path = written(tmp_path, model_bytes(nodes, {"shape": np.array([7, 3])}))
+    verdict = certify_model_file(path, (), 0, quiet, valences=(3,))
+    assert "runs to its end" in failures(verdict)["the file keeps its word"]
+    assert "runs in double precision" in failures(verdict)["proximity slope"]
+
+
 def test_other_bytes_fail_by_name(tmp_path):
     verdict = certify_model_file(written(tmp_path, b"no model"), (), 0, quiet)
     assert set(failures(verdict)) == {"the file keeps the contract"}

@@ -7,14 +7,13 @@ import pytest
 import torch
 
 from pns_common import loop, pns, refine
-from pns_common.correction import curvature_gate
 from pns_common.errors import ParameterError
-from pns_common.features import paper_features
 from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule
 from pns_common.topology import build_topology
+from train.adversary import Operator
 from train.gap_collapse import margin_gradient
-from train.networks import BoundedNet, unit_correction
-from train.one_step import refine_once
+from train.networks import BoundedNet
+from train.operator_jacobian import operator_jacobian
 from train.recipes import ridge
 from train.spectrum import (
     SPOKE,
@@ -107,16 +106,7 @@ def test_stars_are_regular_but_for_their_centre(k, rings):
 @pytest.mark.parametrize("lift", [0.0, 0.3])
 def test_differences_agree_with_autograd_through_the_kernels(lift):
     network, recipe, at = steep_network(), ridge(), star(5, 2, SPOKE, lift)
-    topology = build_topology(at.mesh.faces, len(at.mesh.vertices))
-
-    def inner_to_inner(inner):
-        points = torch.tensor(at.mesh.vertices).index_put((torch.from_numpy(at.inner),), inner)
-        gate = curvature_gate(recipe.gate_sharpness)
-        args = (topology, paper_features, unit_correction(network), gate, recipe.budget)
-        return refine_once(points, *args).points[torch.from_numpy(at.refined)].reshape(-1)
-
-    inner = torch.tensor(at.mesh.vertices[at.inner])
-    exact = torch.autograd.functional.jacobian(inner_to_inner, inner).reshape(48, 48).numpy()
+    exact = operator_jacobian(Operator(network, recipe), at).numpy()
     found = jacobian(pns(recipe_model(recipe, network)), at)
     np.testing.assert_allclose(found, exact, atol=1e-8)
     base = jacobian(loop(), at)

@@ -17,6 +17,7 @@ from onnx import NodeProto, TensorProto, numpy_helper
 from onnx.reference import ReferenceEvaluator
 from onnx.reference.op_run import OpRun
 
+from pns_common.errors import ModelError
 from pns_common.model_card import ModelCard
 from pns_common.onnx_model import OnnxModel, bundled_models
 
@@ -55,7 +56,12 @@ class DoubleModel:
         inputs = {"features": np.asarray(features, dtype=np.float64), "budget": np.float64(budget)}
         # A hostile file may overflow or make a NaN; the operator looks at what comes out.
         with np.errstate(all="ignore"):
-            (correction,) = self._evaluator.run(["correction"], inputs)
+            try:
+                (correction,) = self._evaluator.run(["correction"], inputs)
+            except Exception as error:  # the evaluator's errors share no base below Exception
+                raise ModelError(
+                    self.name, expected="a graph that runs in double precision", found=str(error)
+                ) from error
         return correction
 
 
