@@ -1,0 +1,162 @@
+"""What a request may ask for beside the scheme: creases, smooth UVs, a weld tolerance."""
+
+import numpy as np
+import pytest
+
+from service.options import Limits, Options
+from service.subdivide import subdivide_gltf
+from tests.networks import random_model
+from tests.service.gltf import files
+from tests.service.gltf.shapes import box, octahedron
+
+
+def subdivide(*meshes, **options):
+    options = Options(**{"scheme": "loop", **options})
+    return subdivide_gltf(files.glb(*meshes), "glb", options, random_model(0), Limits())
+
+
+def cylinder(sides=8):
+    """A prism with smooth sides and flat ends: two closed rings of hard edges."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    points, normals, faces = [], [], []
+    for z in (-1.0, 1.0):
+        points.append(np.column_stack([ring, np.full(sides, z)]))
+        normals.append(np.column_stack([ring, np.zeros(sides)]))
+    step, after = np.arange(sides), (np.arange(sides) + 1) % sides
+    faces += [np.stack([step, after, after + sides], axis=1)]
+    faces += [np.stack([step, after + sides, step + sides], axis=1)]
+    for number, z in enumerate((-1.0, 1.0)):
+        start = (2 + number) * sides + number
+        points += [np.column_stack([ring, np.full(sides, z)]), [[0, 0, z]]]
+        normals += [np.tile([0, 0, z], (sides + 1, 1))]
+        fan = np.stack([step + start, after + start, np.full(sides, start + sides)], axis=1)
+        faces += [fan if z > 0 else fan[:, ::-1]]
+    shape = {"POSITION": np.concatenate(points), "NORMAL": np.concatenate(normals)}
+    return shape | {"indices": np.concatenate(faces)}
+
+
+@pytest.mark.parametrize("crease", ["normals", "angle:60"])
+@pytest.mark.parametrize("scheme", ["loop", "pns"])
+def test_creases_of_a_prism_keep_its_ends_flat(crease, scheme):
+    result = subdivide([cylinder()], crease=crease, scheme=scheme, levels=2)
+    counts = [level["edges"] for level in result.report["levels"]]
+    assert [count["crease"] for count in counts] == [16, 32]
+    assert result.report["meshes"][0]["levels"][0]["edges"]["crease"] == 16
+    soft = subdivide([cylinder()], scheme=scheme, levels=2)
+    for glb, flat in ((result.glb, True), (soft.glb, False)):
+        faces, attributes = files.primitive_of(glb)
+        ends = attributes["POSITION"][faces[16 * 16 :]]
+        assert (np.abs(ends[..., 2]) == 1).all() == flat
+    assert "crease" not in subdivide([cylinder()]).report["levels"][0]["edges"]
+
+
+def test_every_edge_of_a_cube_is_a_crease_and_its_corners_stay():
+    for crease in ("normals", "angle:89"):
+        result = subdivide([box()], crease=crease, scheme="pns", levels=3)
+        assert result.report["levels"][0]["edges"] == {
+            "interior": 6,
+            "boundary": 0,
+            "irregular": 0,
+            "crease": 12,
+        }
+        _, attributes = files.primitive_of(result.glb)
+        # A cube refines to itself: three creases make a corner, and the sides are flat.
+        assert np.abs(attributes["POSITION"]).max(axis=1).tolist() == [1] * len(
+            attributes["POSITION"]
+        )
+    assert "crease" not in subdivide([box()], crease="angle:91").report["levels"][0]["edges"]
+
+
+def test_smooth_normals_and_absent_ones_make_no_crease():
+    smooth = octahedron(NORMAL=octahedron()["POSITION"])
+    for shape in (smooth, octahedron()):
+        assert "crease" not in subdivide([shape], crease="normals").report["levels"][0]["edges"]
+
+
+def test_the_tip_of_a_cone_makes_no_creases():
+    # Each side has its own normal at the tip, and shares those along the base.
+    sides = 6
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
+    tips = np.tile([0.0, 0, 1], (sides, 1))
+    middle = angle + np.pi / sides
+    normals = np.concatenate([ring, np.column_stack([np.cos(middle), np.sin(middle), 0 * middle])])
+    faces = [[k, (k + 1) % sides, sides + k] for k in range(sides)]
+    cone = {"POSITION": np.concatenate([ring, tips]), "NORMAL": np.add(normals, [0, 0, 0.5])}
+    report = subdivide([cone | {"indices": np.array(faces)}], crease="normals").report
+    assert report["levels"][0]["edges"] == {"interior": 6, "boundary": 6, "irregular": 0}
+
+
+def test_creases_cross_primitives():
+    shape = cylinder()
+    halves = [
+        {**shape, "indices": shape["indices"][:16]},
+        {**shape, "indices": shape["indices"][16:]},
+    ]
+    report = subdivide(halves, crease="normals").report
+    assert report["levels"][0]["edges"]["crease"] == 16
+
+
+def flat_grid(n=5):
+    """A flat patch whose UVs are its coordinates, but for one vertex in the middle."""
+    x, y = np.meshgrid(np.arange(float(n)), np.arange(n), indexing="ij")
+    uv = np.stack([x, y], axis=-1).reshape(-1, 2)
+    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1, 1)
+    faces = np.concatenate([np.add(corner, [0, n, n + 1]), np.add(corner, [0, n + 1, 1])])
+    points = np.column_stack([uv, np.zeros(n * n)])
+    return {"POSITION": points, "TEXCOORD_0": uv.copy(), "indices": faces}
+
+
+@pytest.mark.parametrize("levels", [1, 2, 3])
+def test_smooth_uvs_are_refined_as_positions_are_inside_a_chart(levels):
+    rng = np.random.default_rng(0)
+    shape = octahedron()
+    shape["TEXCOORD_0"] = rng.random((6, 2))
+    shape["POSITION"] = np.column_stack([shape["TEXCOORD_0"], rng.random(6)])
+    _, attributes = files.primitive_of(subdivide([shape], uv="smooth", levels=levels).glb)
+    # One closed chart: the same stencils move both.
+    np.testing.assert_allclose(attributes["TEXCOORD_0"], attributes["POSITION"][:, :2], atol=1e-6)
+    _, linear = files.primitive_of(subdivide([shape], levels=levels).glb)
+    assert np.abs(linear["TEXCOORD_0"] - attributes["TEXCOORD_0"]).max() > 0.01
+
+
+@pytest.mark.parametrize("levels", [1, 2])
+def test_smooth_uvs_leave_seams_and_rims_linear(levels):
+    # On each side of a box, a chart of two faces, every vertex lies on the rim.
+    results = [
+        files.primitive_of(subdivide([box()], uv=rule, levels=levels).glb)
+        for rule in ("smooth", "linear")
+    ]
+    seam = np.isin(results[1][1]["TEXCOORD_0"], [0, 1]).any(axis=1)
+    np.testing.assert_array_equal(
+        results[0][1]["TEXCOORD_0"][seam], results[1][1]["TEXCOORD_0"][seam]
+    )
+    # A flat chart that is a regular grid is reproduced, its rim included.
+    smooth, linear = (
+        files.primitive_of(subdivide([flat_grid()], uv=rule, levels=levels).glb)[1]["TEXCOORD_0"]
+        for rule in ("smooth", "linear")
+    )
+    on_rim = (linear == 0).any(axis=1) | (linear == 4).any(axis=1)
+    np.testing.assert_array_equal(smooth[on_rim], linear[on_rim])
+
+
+def test_smooth_uvs_keep_the_type_of_fractions():
+    uv = files.Normalized(np.random.default_rng(0).integers(0, 65536, (6, 2), dtype=np.uint16))
+    _, attributes = files.primitive_of(subdivide([octahedron(TEXCOORD_1=uv)], uv="smooth").glb)
+    assert attributes["TEXCOORD_1"].dtype in (np.uint16, np.float32)
+
+
+def test_a_weld_tolerance_closes_what_does_not_quite_meet():
+    flat = octahedron()["indices"].reshape(-1)
+    noise = 1e-5 * np.random.default_rng(0).standard_normal((24, 3))
+    loose = {"POSITION": octahedron()["POSITION"][flat] + noise}
+    assert subdivide([loose]).report["levels"][0]["edges"]["boundary"] == 24
+    result = subdivide([loose], weld_tolerance=1e-3)
+    assert result.report["levels"][0]["edges"]["boundary"] == 0
+    assert result.report["changes"] == [
+        {"pointer": "/meshes/0", "what": "vertices joined within weld_tolerance", "count": 18}
+    ]
+    # It is relative to R: a mesh a million times larger is welded alike.
+    large = {"POSITION": 1e6 * loose["POSITION"]}
+    assert subdivide([large], weld_tolerance=1e-3).report["changes"] == result.report["changes"]
