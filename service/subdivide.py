@@ -22,7 +22,7 @@ from service.gltf.primitives import read_primitive
 from service.gltf.refinement import changes_of_mesh, refine_control_mesh
 from service.gltf.report import Change, MeshResult, build_report
 from service.gltf.share import RefinedPrimitive, share
-from service.gltf.storage import storage_changes, withdraw_unused
+from service.gltf.storage import remove_replaced, storage_changes, withdraw_unused
 from service.gltf.upload import Media, Upload, read_upload
 from service.gltf.writer import Writer
 from service.options import Limits, Options
@@ -110,6 +110,7 @@ def subdivide_gltf(
         )
 
     withdraw_unused(upload.tree)
+    changes += remove_replaced(writer, upload.spare)
     report = build_report(scheme, options.levels, results, changes)
     if options.diagnostics != "none":
         put_report(upload.tree, report)

@@ -45,8 +45,8 @@ def decode_primitives(
     buffers: list[memoryview],
     size: int,
     limits: Limits,
-) -> int:
-    """Give every compressed primitive plain accessors; how many there were.
+) -> list[int]:
+    """Give every compressed primitive plain accessors; the views of the compressed data.
 
     Edits the tree and appends to `buffers`. Buffer views have been checked. `size` is the upload's,
     in bytes.
@@ -56,7 +56,7 @@ def decode_primitives(
         UnsupportedFeature: another version of the bitstream.
         LimitError: decoding would take more memory than allowed.
     """
-    number = 0
+    views: list[int] = []
     for mesh_number, mesh in enumerate(document.meshes):
         for place, primitive in enumerate(mesh.primitives):
             if EXTENSION in primitive.extensions:
@@ -64,10 +64,11 @@ def decode_primitives(
                 held = size + sum(len(buffer) for buffer in buffers)
                 decoded = _decode(document, buffers, primitive, pointer, held, limits)
                 entry = tree["meshes"][mesh_number]["primitives"][place]
+                entry_view = entry["extensions"][EXTENSION]["bufferView"]
                 _store(tree, buffers, entry, decoded)
-                number += 1
+                views.append(entry_view)
     withdraw(tree, EXTENSION)
-    return number
+    return views
 
 
 def _decode(

@@ -62,8 +62,10 @@ def decode_views(
     buffers: list[memoryview],
     size: int,
     limits: Limits,
-) -> int:
-    """Give every compressed view a buffer of its own with its bytes; how many there were.
+) -> list[tuple[int, int, int]]:
+    """Give every compressed view a buffer of its own with its bytes.
+
+    Gives (buffer, start, end) of the compressed data, which nothing needs any more.
 
     Edits the tree and appends to `buffers`. `size` is the upload's, in bytes.
 
@@ -90,7 +92,9 @@ def decode_views(
         withdraw(tree, name)
         for buffer in tree.get("buffers", []):
             _drop(buffer, name)
-    return len(found)
+    return [
+        (f.view.buffer, f.view.byte_offset, f.view.byte_offset + f.view.byte_length) for f in found
+    ]
 
 
 def _checked_view(value: Any, length: int, number: int, name: str) -> CompressedView:

@@ -6,11 +6,14 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from service.gltf.extensions import withdraw
+from service.gltf.index_references import unknown_extensions
 from service.gltf.modes import FAN, STRIP
 from service.gltf.plan import MeshPlan
+from service.gltf.prune import Spare
 from service.gltf.quantization import EXTENSION, needs_extension, still_needed
 from service.gltf.report import Change
 from service.gltf.schema import Document, Primitive
+from service.gltf.writer import Writer
 
 _MODES = {STRIP: "triangle strip written as triangles", FAN: "triangle fan written as triangles"}
 
@@ -27,6 +30,16 @@ def storage_changes(document: Document, plans: Sequence[MeshPlan]) -> list[Chang
             f"/meshes/{plan.mesh}/primitives/{number}",
         )
     ]
+
+
+def remove_replaced(writer: Writer, spare: Spare) -> list[Change]:
+    """Let the geometry that was replaced leave the file, unless something may still point at it."""
+    unknown = unknown_extensions(writer.tree)
+    if not unknown:
+        writer.remove(spare)
+        return []
+    names = ", ".join(unknown)
+    return [Change("/bufferViews", f"replaced geometry kept: {names} may refer to it", 1)]
 
 
 def withdraw_unused(tree: dict[str, Any]) -> None:

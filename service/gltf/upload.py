@@ -14,6 +14,7 @@ from service.gltf.meshopt import decode_views
 from service.gltf.neighbours import ALONE, Neighbours, Opened
 from service.gltf.nodes import check_nodes
 from service.gltf.plan import MeshPlan, check_cost, plan
+from service.gltf.prune import Spare, spare
 from service.gltf.references import check_references
 from service.gltf.refusals import refuse_features, refuse_version
 from service.gltf.report import Change
@@ -34,6 +35,7 @@ class Upload:
         buffers: the bytes of each buffer.
         plans: the meshes to refine.
         changes: what was joined and decoded on the way.
+        spare: what may leave the file once the meshes have been refined.
     """
 
     container: Container
@@ -42,6 +44,7 @@ class Upload:
     buffers: list[memoryview]
     plans: list[MeshPlan]
     changes: list[Change]
+    spare: Spare
 
 
 def read_upload(
@@ -58,22 +61,23 @@ def read_upload(
     refuse_version(document)
     opened = Opened(neighbours)
     buffers = resolve_buffers(document, container.binary, opened)
+    original = document
     stored, files = len(buffers), sum(len(buffer) > 0 for buffer in buffers)
     images = embed_images(tree, document, buffers, opened)
     size = len(data) + opened.size
-    views = decode_views(tree, document, buffers, size, limits)
+    ranges = decode_views(tree, document, buffers, size, limits)
     document = view(tree)
     check_references(document, buffers)
-    primitives = decode_primitives(tree, document, buffers, size, limits)
-    if primitives:
+    draco_views = decode_primitives(tree, document, buffers, size, limits)
+    if draco_views:
         document = view(tree)
         check_references(document, buffers)
     changes = [
         Change(pointer, what, count)
         for pointer, what, count in (
             ("/buffers", "joined into one", files if files > 1 else 0),
-            ("/bufferViews", "meshopt compression decoded", views),
-            ("/meshes", "Draco compression decoded", primitives),
+            ("/bufferViews", "meshopt compression decoded", len(ranges)),
+            ("/meshes", "Draco compression decoded", len(draco_views)),
         )
         if count
     ]
@@ -84,4 +88,5 @@ def read_upload(
     plans = plan(document)
     size += sum(len(buffer) for buffer in buffers[stored:])
     check_cost(document, plans, size, levels, limits)
-    return Upload(container, tree, document, buffers, plans, changes)
+    leavable = spare(original, draco_views, ranges)
+    return Upload(container, tree, document, buffers, plans, changes, leavable)

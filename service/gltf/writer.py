@@ -11,6 +11,7 @@ from jaxtyping import Shaped
 
 from service.gltf.accessors import COLUMNS, COMPONENT_TYPES
 from service.gltf.modes import TRIANGLES
+from service.gltf.prune import Spare, cut, moved, remove_unused
 from service.gltf.schema import Accessor
 from service.gltf.share import RefinedPrimitive
 
@@ -28,15 +29,16 @@ class Writer:
     tree: dict[str, Any]
     pieces: list[bytes | memoryview] = field(default_factory=list)
     length: int = 0
+    starts: list[int] = field(default_factory=list)
 
     @staticmethod
     def start(tree: dict[str, Any], buffers: Sequence[memoryview]) -> Writer:
         """Take over the tree, with all its buffers one after the other as the first."""
         writer = Writer(tree)
-        starts = [writer._append(buffer) for buffer in buffers]
+        writer.starts = [writer._append(buffer) for buffer in buffers]
         for view in tree.get("bufferViews", []):
-            if starts[view["buffer"]]:
-                view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
+            if view["buffer"]:
+                view["byteOffset"] = view.get("byteOffset", 0) + writer.starts[view["buffer"]]
                 view["buffer"] = 0
         return writer
 
@@ -61,6 +63,21 @@ class Writer:
         primitive["indices"] = self._accessor(
             indices.reshape(-1, 1), ELEMENT_ARRAY_BUFFER, "SCALAR"
         )
+
+    def remove(self, spare: Spare) -> None:
+        """Take what refinement has left without use out of the tree, and its bytes out of BIN."""
+        gone = remove_unused(self.tree, spare)
+        gone += [
+            (self.starts[buffer] + start, self.starts[buffer] + end)
+            for buffer, start, end in spare.ranges
+        ]
+        views = self.tree.get("bufferViews", [])
+        needed = [(v.get("byteOffset", 0), v.get("byteOffset", 0) + v["byteLength"]) for v in views]
+        self.pieces, shifts = cut(self.pieces, gone, needed)
+        for view in views:
+            if "byteOffset" in view:
+                view["byteOffset"] = moved(view["byteOffset"], shifts)
+        self.length = sum(len(piece) for piece in self.pieces)
 
     def finish(self) -> list[bytes | memoryview]:
         """Write the buffer's length into the tree; the pieces of BIN."""

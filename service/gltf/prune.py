@@ -1,0 +1,179 @@
+"""Geometry that refinement has replaced leaves the file: accessors, buffer views and bytes.
+
+New entries take the places of old ones, so that numbers elsewhere (animations, skins, images) stay
+as they were. What the file carried without use stays too: it was not ours to judge.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from operator import itemgetter
+from typing import Any
+
+from service.gltf.index_references import Reference, accessor_references, view_references
+from service.gltf.modes import SURFACES
+from service.gltf.schema import Document
+
+
+@dataclass(frozen=True)
+class Spare:
+    """What refinement may leave without use.
+
+    Attributes:
+        accessors, views: the file's own, that surfaces use; all later ones are spare as well.
+        accessor_count, view_count: how many the file had.
+        ranges: (buffer, start, end) of compressed data that have been decoded.
+    """
+
+    accessors: frozenset[int]
+    views: frozenset[int]
+    accessor_count: int
+    view_count: int
+    ranges: tuple[tuple[int, int, int], ...] = ()
+
+
+def spare(
+    document: Document, draco_views: Iterable[int], ranges: Iterable[tuple[int, int, int]]
+) -> Spare:
+    """What the surfaces of a document, as it came, stand on."""
+    accessors: set[int] = set()
+    for mesh in document.meshes:
+        for primitive in mesh.primitives:
+            if primitive.mode in SURFACES:
+                for attributes in (primitive.attributes, *primitive.targets):
+                    accessors.update(attributes.values())
+                accessors |= set() if primitive.indices is None else {primitive.indices}
+    views = set(draco_views)
+    for index in accessors:
+        if index < len(document.accessors):
+            accessor = document.accessors[index]
+            views |= set() if accessor.buffer_view is None else {accessor.buffer_view}
+            if accessor.sparse is not None:
+                views |= {accessor.sparse.indices.buffer_view, accessor.sparse.values.buffer_view}
+    return Spare(
+        frozenset(accessors),
+        frozenset(views),
+        len(document.accessors),
+        len(document.buffer_views),
+        tuple(ranges),
+    )
+
+
+def remove_unused(tree: dict[str, Any], spare: Spare) -> list[tuple[int, int]]:
+    """Take unused spare accessors and views out of the tree; (start, end) of views that went.
+
+    All buffers have been joined: every view lies in buffer 0, or is compressed.
+    """
+    accessors = tree.get("accessors", [])
+    named = list(accessor_references(tree))
+    used = {reference.index for reference in named}
+    kept = [
+        index in used or (index < spare.accessor_count and index not in spare.accessors)
+        for index in range(len(accessors))
+    ]
+    tree["accessors"] = _renumbered(accessors, kept, named)
+
+    views = tree.get("bufferViews", [])
+    named = list(view_references(tree, tree["accessors"]))
+    used = {reference.index for reference in named}
+    kept = [
+        index in used or (index < spare.view_count and index not in spare.views)
+        for index in range(len(views))
+    ]
+    gone = [view for view, keep in zip(views, kept, strict=True) if not keep]
+    tree["bufferViews"] = _renumbered(views, kept, named)
+    for key in ("accessors", "bufferViews"):
+        if not tree[key]:
+            del tree[key]
+    return [
+        (view.get("byteOffset", 0), view.get("byteOffset", 0) + view["byteLength"]) for view in gone
+    ]
+
+
+def _renumbered(
+    entries: list[dict[str, Any]], kept: list[bool], references: Iterable[Reference]
+) -> list[dict[str, Any]]:
+    """The kept entries: those beyond their number move into the places of those that went."""
+    count = sum(kept)
+    holes = [index for index in range(count) if not kept[index]]
+    movers = [index for index in range(count, len(entries)) if kept[index]]
+    place = dict(zip(movers, holes, strict=True))
+    result = entries[:count]
+    for old, new in place.items():
+        result[new] = entries[old]
+    for reference in references:
+        reference.point_at(place.get(reference.index, reference.index))
+    return result
+
+
+def cut(
+    pieces: Sequence[bytes | memoryview],
+    gone: Iterable[tuple[int, int]],
+    needed: Iterable[tuple[int, int]],
+) -> tuple[list[bytes | memoryview], list[tuple[int, int]]]:
+    """The pieces without the bytes of `gone` that nothing in `needed` covers.
+
+    Whole words go, so that what follows stays aligned. Also the (position, bytes before it that
+    went) of each cut, ascending, for `moved`.
+    """
+    cuts = [
+        (start + -start % 4, end - end % 4)
+        for start, end in _without(_merged(gone), _merged(needed))
+        if end - end % 4 > start + -start % 4
+    ]
+    result: list[bytes | memoryview] = []
+    shifts: list[tuple[int, int]] = []
+    removed, position, upcoming = 0, 0, iter([*cuts, (None, None)])
+    start, end = next(upcoming)
+    for piece in pieces:
+        data, offset = memoryview(piece), 0
+        while start is not None and start < position + len(data):
+            lower, upper = max(start - position, 0), min(end - position, len(data))
+            if lower > offset:
+                result.append(data[offset:lower])
+            offset = upper
+            if end > position + len(data):
+                break
+            removed += end - start
+            shifts.append((end, removed))
+            start, end = next(upcoming)
+        if offset < len(data):
+            result.append(data[offset:] if offset else piece)
+        position += len(data)
+    return result, shifts
+
+
+def moved(offset: int, shifts: Sequence[tuple[int, int]]) -> int:
+    """Where a byte lies after the cuts."""
+    at = bisect_right(shifts, offset, key=itemgetter(0))
+    return offset - (shifts[at - 1][1] if at else 0)
+
+
+def _merged(ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    merged: list[tuple[int, int]] = []
+    for start, end in sorted(ranges):
+        if merged and start <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], end))
+        else:
+            merged.append((start, end))
+    return merged
+
+
+def _without(ranges: list[tuple[int, int]], others: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """What is left of disjoint ascending ranges without others of the same kind."""
+    left: list[tuple[int, int]] = []
+    place = 0
+    for start, end in ranges:
+        while place < len(others) and others[place][1] <= start:
+            place += 1
+        at = place
+        while at < len(others) and others[at][0] < end:
+            if others[at][0] > start:
+                left.append((start, others[at][0]))
+            start = max(start, others[at][1])
+            at += 1
+        if start < end:
+            left.append((start, end))
+    return left
