@@ -5,7 +5,7 @@ DEV    := .venv
 HOST   ?= 127.0.0.1
 PORT   ?= 8000
 
-.PHONY: serve test lint unit model constraints clean
+.PHONY: serve test lint unit fuzz model constraints clean
 
 serve: $(SERVE)/.ready
 	$(SERVE)/bin/pns serve --host $(HOST) --port $(PORT)
@@ -20,6 +20,11 @@ lint: $(DEV)/.ready
 
 unit: $(DEV)/.ready
 	$(DEV)/bin/python -m pytest -n 2
+
+# Malformed files by the thousand: FUZZ='--count 1000', or --seconds 60, for less.
+FUZZ ?= --count 100000
+fuzz: $(DEV)/.ready
+	$(DEV)/bin/python -m tests.fuzz $(FUZZ)
 
 # Train and export the bundled model again; the same machine gives the same bytes.
 model: $(DEV)/.ready

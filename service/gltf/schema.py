@@ -34,6 +34,7 @@ class Buffer(Part):
 
     byte_length: Size
     uri: str | None = None
+    extensions: dict[str, Any] = {}
 
 
 class BufferView(Part):
@@ -105,6 +106,7 @@ class Node(Part):
     mesh: Index | None = None
     skin: Index | None = None
     camera: Index | None = None
+    extensions: dict[str, Any] = {}
 
 
 class Scene(Part):
@@ -193,6 +195,8 @@ class Document(Part):
     buffer_views: list[BufferView] = []
     buffers: list[Buffer] = []
     cameras: list[dict[str, Any]] = []
+    extensions_required: list[str] = []
+    extensions_used: list[str] = []
     images: list[Image] = []
     materials: list[Material] = []
     meshes: list[Mesh] = []

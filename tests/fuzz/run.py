@@ -1,0 +1,90 @@
+"""Feed malformed bodies to the job's own path, and keep count of what became of them."""
+
+from __future__ import annotations
+
+import random
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from benchmarks.memory import peak_mib, reset_peak
+from service.errors import ServiceError
+from service.options import Limits, Options
+from service.subdivide import subdivide_gltf
+from service.upload_body import sent
+from tests.fuzz.mutate import mutated
+from tests.fuzz.seeds import Seed
+
+MIB = 2**20
+LIMITS = Limits(max_faces=20_000, max_memory_bytes=64 * MIB)
+# The promise: no input takes more than its limit and this.
+ALLOWANCE = 64 * MIB
+
+
+@dataclass
+class Tally:
+    """What a run has seen.
+
+    Attributes:
+        run: bodies tried.
+        outcomes: how many were refined, or refused with each code.
+        peak: MiB at the worst, above what stood before.
+        faults: (seed, number, what went wrong) of bodies that broke a promise.
+    """
+
+    run: int = 0
+    outcomes: Counter[str] = field(default_factory=Counter)
+    peak: float = 0.0
+    faults: list[tuple[str, int, str]] = field(default_factory=list)
+
+
+def run(seeds: list[Seed], count: int, seconds: float, start: int, kept: Path | None) -> Tally:
+    """Try `count` bodies, or as many as fit into `seconds`.
+
+    Body `number` follows from its number alone, whatever ran before: (start + number) names it. The
+    body under way is kept in a file, so that even a crash leaves its cause behind.
+    """
+    tally = Tally()
+    for seed in seeds:
+        outcome(seed, seed.body)
+    reset_peak()
+    base = peak_mib()
+    deadline = time.monotonic() + seconds
+    for number in range(start, start + count):
+        if time.monotonic() > deadline:
+            break
+        rng = random.Random(number)
+        seed = rng.choice(seeds)
+        body = mutated(seed, rng)
+        if kept is not None:
+            kept.write_bytes(body)
+        try:
+            found = outcome(seed, body)
+        except Exception as error:
+            found = "fault"
+            tally.faults.append((seed.name, number, repr(error)))
+        tally.run += 1
+        tally.outcomes[found] += 1
+        used = peak_mib() - base
+        if used > tally.peak:
+            tally.peak = used
+            if used * MIB > LIMITS.max_memory_bytes + ALLOWANCE:
+                tally.faults.append((seed.name, number, f"{used:.0f} MiB"))
+                reset_peak()
+    return tally
+
+
+def outcome(seed: Seed, body: bytes) -> str:
+    """ "refined", or the code of the refusal. Any other exception is a fault."""
+    options = Options(levels=1, scheme="loop")
+    try:
+        upload = sent(body, seed.content_type, LIMITS)
+        subdivide_gltf(
+            upload.data, upload.kind, options, None, LIMITS, neighbours=upload.neighbours
+        )
+    except ServiceError as refusal:
+        if not 400 <= refusal.status < 500:
+            raise
+        return refusal.code
+    return "refined"
