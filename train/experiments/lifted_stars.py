@@ -60,7 +60,7 @@ def run(laboratory: Laboratory) -> Outcome:
         scheme = subject_of_network(model, budget).exact
         found[valence, budget] = follow_lift(scheme, valence, LIFTS)
     rows = tuple(
-        _row(valence, budget, lift, spectrum)
+        lifted_star_row(valence, budget, lift, spectrum)
         for (valence, budget), spectra in found.items()
         for lift, spectrum in zip(LIFTS.tolist(), spectra, strict=True)
     )
@@ -78,7 +78,10 @@ def run(laboratory: Laboratory) -> Outcome:
     )
 
 
-def _row(valence: int, budget: float, lift: float, spectrum: Spectrum) -> tuple[Cell, ...]:
+def lifted_star_row(
+    valence: int, budget: float, lift: float, spectrum: Spectrum
+) -> tuple[Cell, ...]:
+    """Return one row of the table: tangents, their drift, the margin."""
     size = np.abs(spectrum.values)
     tangent, third = float(size[spectrum.least_tangent]), float(size[spectrum.largest_other])
     drift = tangent - loop_eigenvalue(valence)

@@ -75,7 +75,7 @@ def run(laboratory: Laboratory) -> Outcome:
     rows = []
     for done, valence in enumerate(valences):
         laboratory.progress("planar spectrum", done, len(valences))
-        rows.append(_row(exact, operator, valence))
+        rows.append(planar_row(exact, operator, valence))
     steps = min(ATTACK_STEPS, laboratory.scale.training_steps)
     attacks = [
         gap_attack(
@@ -108,7 +108,8 @@ def run(laboratory: Laboratory) -> Outcome:
     )
 
 
-def _row(exact: Scheme, operator: Operator, valence: int) -> tuple[Cell, ...]:
+def planar_row(exact: Scheme, operator: Operator, valence: int) -> tuple[Cell, ...]:
+    """Return one row of the table, from an operator in double precision and as a scheme."""
     size = spectrum(exact, valence)
     at = closed_star(exact, valence)(0.0)
     without_budget = Operator(operator.network, replace(operator.recipe, budget=0.0))

@@ -148,7 +148,11 @@ def certify(subject: Subject, laboratory: Laboratory, name: str) -> tuple[Certif
 def lacking(name: str, laboratory: Laboratory) -> Subject:
     """Return the operator without one of its parts, trained."""
     recipe = variant_recipe(ridge(SEED), VARIANTS[name])
-    network = laboratory.network(recipe, VARIANTS[name])
+    return variant_subject(name, laboratory.network(recipe, VARIANTS[name]), recipe)
+
+
+def variant_subject(name: str, network: BoundedNet, recipe: Recipe) -> Subject:
+    """Return a variant of the operator with a network of its recipe."""
     single, double = (
         variant_scheme(VARIANTS[name], one, recipe) for one in (network, in_double(network))
     )
