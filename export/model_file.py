@@ -47,11 +47,12 @@ def write_model(
 def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:
     """Return the model card of a checkpoint: the whole recipe, its machine and its metrics."""
     recipe: dict[str, Any] = asdict(checkpoint.recipe)
-    on_card = {name: recipe.pop(name) for name in ("features", "gate_sharpness", "budget")}
+    on_card = {
+        name: recipe.pop(name) for name in ("features", "gate_sharpness", "budget", "orientation")
+    }
     training = {"recipe": recipe.pop("name"), **recipe, "machine": checkpoint.machine}
     return ModelCard(
         format=FORMAT,
-        orientation="first-face",
         training=training,
         metrics=checkpoint.metrics,
         **on_card,

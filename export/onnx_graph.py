@@ -3,9 +3,10 @@
 import numpy as np
 import onnx
 from onnx import NodeProto, TensorProto, helper, numpy_helper
+from torch import Tensor
 
 from pns_common.model_card import CARD_KEY, ModelCard
-from train.networks import BoundedNet
+from train.networks import BoundedNet, SymmetricNet
 
 OPSET = 17
 """New enough for every operator here; runtimes of the last years all read it."""
@@ -21,16 +22,9 @@ def model_bytes(network: BoundedNet, card: ModelCard) -> bytes:
     Only long-standing standard operators: the exact GELU is x/2 (1 + erf(x/√2)), spelt out.
     """
     graph = _Graph()
-    value = "features"
-    layers = network.linear_layers
-    for index, layer in enumerate(layers):
-        weight = graph.constant(f"weight_{index}", layer.weight.detach().numpy())
-        bias = graph.constant(f"bias_{index}", layer.bias.detach().numpy())
-        value = graph.apply("Gemm", value, weight, bias, transB=1)
-        if index < len(layers) - 1:
-            value = _ACTIVATIONS[network.activation](graph, value)
-    _project_onto_ball(graph, value)
-    return _serialise(graph, layers[0].in_features, card)
+    perceptron = _symmetric_perceptron if isinstance(network, SymmetricNet) else _perceptron
+    _project_onto_ball(graph, perceptron(graph, network, "features"))
+    return _serialise(graph, network.linear_layers[0].in_features, card)
 
 
 class _Graph:
@@ -42,8 +36,14 @@ class _Graph:
 
     def constant(self, name: str, values: np.ndarray | float) -> str:
         """Add a float32 constant under a name of its own, once."""
+        return self._keep(name, np.asarray(values, dtype=np.float32))
+
+    def shape(self, name: str, sizes: list[int]) -> str:
+        """Add an int64 constant for Reshape, once; −1 stands for what is left."""
+        return self._keep(name, np.asarray(sizes, dtype=np.int64))
+
+    def _keep(self, name: str, array: np.ndarray) -> str:
         if name not in {tensor.name for tensor in self.constants}:
-            array = np.asarray(values, dtype=np.float32)
             self.constants.append(numpy_helper.from_array(array, name))
         return name
 
@@ -52,6 +52,55 @@ class _Graph:
         name = output or f"{operator.lower()}_{len(self.nodes)}"
         self.nodes.append(helper.make_node(operator, inputs, [name], **attributes))
         return name
+
+
+def _perceptron(graph: _Graph, network: BoundedNet, value: str) -> str:
+    """Add the layers and return z."""
+    for index, layer in enumerate(network.linear_layers):
+        value = _layer(graph, network, index, value, _array(layer.weight), _array(layer.bias))
+    return value
+
+
+def _symmetric_perceptron(graph: _Graph, network: BoundedNet, value: str) -> str:
+    """Add the layers for all G images of the features at once, and return the mean of D_g z(g φ).
+
+    The images are made by the first layer's weights: W (g φ) = W_g φ, columns of W permuted and
+    signed. Later layers see G rows for each edge; the last product signs and averages them.
+    """
+    assert isinstance(network, SymmetricNet)
+    group, layers = network.group, network.linear_layers
+    count, width = len(group.order), layers[0].out_features
+    first = _array(layers[0].weight)
+    images = np.zeros((count, *first.shape), dtype=np.float32)
+    for g in range(count):
+        images[g][:, group.order[g]] = first * group.signs[g]
+    stacked, bias = images.reshape(count * width, -1), np.tile(_array(layers[0].bias), count)
+    value = _layer(graph, network, 0, value, stacked, bias)
+    value = graph.apply("Reshape", value, graph.shape("row_an_image", [-1, width]))
+    for index, layer in enumerate(layers[1:], start=1):
+        value = _layer(graph, network, index, value, _array(layer.weight), _array(layer.bias))
+    value = graph.apply("Reshape", value, graph.shape("row_an_edge", [-1, 3 * count]))
+    signed_mean = np.concatenate([np.diag(local) for local in group.local]) / count
+    return graph.apply("MatMul", value, graph.constant("signed_mean", signed_mean))
+
+
+def _layer(
+    graph: _Graph,
+    network: BoundedNet,
+    index: int,
+    value: str,
+    weight: np.ndarray,
+    bias: np.ndarray,
+) -> str:
+    """Add a layer, and its activation unless it is the last."""
+    weights = graph.constant(f"weight_{index}", weight), graph.constant(f"bias_{index}", bias)
+    value = graph.apply("Gemm", value, *weights, transB=1)
+    last = index == len(network.linear_layers) - 1
+    return value if last else _ACTIVATIONS[network.activation](graph, value)
+
+
+def _array(tensor: Tensor) -> np.ndarray:
+    return tensor.detach().numpy()
 
 
 def _gelu(graph: _Graph, x: str) -> str:

@@ -14,11 +14,12 @@ from jaxtyping import Bool, Float
 
 from pns_common.arrays import Array, namespace, norm
 from pns_common.errors import ModelError
-from pns_common.features import FeatureSet
 from pns_common.frames import EdgeFrames, EdgeStencil, edge_frames, rotate
 
 # Features (N, K) -> local corrections (N, 3) for a budget of 1.
 Network = Callable[[Array], Array]
+# Points and normals (N) -> features (N, K).
+Features = Callable[[EdgeStencil, EdgeFrames], Array]
 # Curvature x and frames -> γ ∈ [0, 1].
 Gate = Callable[[EdgeFrames], Array]
 
@@ -61,14 +62,19 @@ def project_to_ball(vectors: Float[Array, "N 3"], radius: float = 1.0) -> Float[
 
 
 def correct(
-    at: EdgeStencil, features: FeatureSet, network: Network, gate: Gate, budget: float
+    at: EdgeStencil,
+    features: Features,
+    network: Network,
+    gate: Gate,
+    budget: float,
+    frames_of: Callable[[EdgeStencil], EdgeFrames] = edge_frames,
 ) -> Correction:
     """δ = h² γ F η(φ) for interior edges; ``budget`` is C / R, per unit of length.
 
     Raises:
         ModelError: the network returned something that is not finite.
     """
-    frames = edge_frames(at)
+    frames = frames_of(at)
     gamma = gate(frames)
     eta = network(features(at, frames))
     envelope = budget * frames.length**2

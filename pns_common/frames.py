@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -18,7 +18,13 @@ NO_AREA = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class EdgeStencil:
-    """The points a, b, c, d of N interior edges and the unit normals n1, n2 of their two faces."""
+    """What N interior edges see.
+
+    Attributes:
+        a, b, c, d: their points.
+        n1, n2: unit normals of the faces of c and of d.
+        fields: M numbers for each of a, b, c, d, where the features ask for vertex data.
+    """
 
     a: Float[Array, "N 3"]
     b: Float[Array, "N 3"]
@@ -26,6 +32,7 @@ class EdgeStencil:
     d: Float[Array, "N 3"]
     n1: Float[Array, "N 3"]
     n2: Float[Array, "N 3"]
+    fields: Float[Array, "N 4 M"] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +72,15 @@ def edge_stencil(
     normals: Float[Array, "F 3"],
     stencil: Int[np.ndarray, "N 4"],
     edge_faces: Int[np.ndarray, "N 2"],
+    fields: Float[Array, "V M"] | None = None,
 ) -> EdgeStencil:
-    """Gather the points and face normals of interior edges (rows of the topology's tables)."""
+    """Gather the points, face normals and vertex data of interior edges.
+
+    ``stencil`` and ``edge_faces`` are rows of the topology's tables or of an orientation's.
+    """
     a, b, c, d = (gather(points, stencil[:, column]) for column in range(4))
     n1, n2 = (gather(normals, edge_faces[:, column]) for column in range(2))
-    return EdgeStencil(a, b, c, d, n1, n2)
+    return EdgeStencil(a, b, c, d, n1, n2, None if fields is None else gather(fields, stencil))
 
 
 def edge_frames(at: EdgeStencil) -> EdgeFrames:
@@ -98,6 +109,16 @@ def edge_frames(at: EdgeStencil) -> EdgeFrames:
         curvature=xp.where(undefined, 0.0, 1 - cosine),
         degenerate=degenerate,
     )
+
+
+def shut_where_degenerate(at: EdgeStencil) -> EdgeFrames:
+    """Edge frames with x = 0 on all degenerate edges: no gate opens where F would not turn along.
+
+    Antiparallel faces are among them, where x would be 2.
+    """
+    frames = edge_frames(at)
+    curvature = namespace(at.a).where(frames.degenerate, 0.0, frames.curvature)
+    return replace(frames, curvature=curvature)
 
 
 def rotate(frames: EdgeFrames, local: Float[Array, "N 3"]) -> Float[Array, "N 3"]:

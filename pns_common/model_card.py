@@ -9,11 +9,11 @@ from typing import Any
 import msgspec
 
 from pns_common.features import FEATURE_SETS
+from pns_common.orientation import ORIENTATIONS
 
 # The metadata key of an ONNX file that holds the card.
 CARD_KEY = "pns_card"
 FORMAT = 1
-ORIENTATIONS = ("first-face",)
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class ModelCard:
         features: name of the feature set that the network reads.
         gate_sharpness: c of the gate γ = tanh(c x²).
         budget: C that the model was trained at, and the default.
-        orientation: how (a, b, c, d) are ordered: "first-face".
+        orientation: how (a, b, c, d) are ordered: "first-face" or "symmetric".
         training: recipe, seed and whatever else fixes the training; no dates.
         metrics: measured on held-out data.
     """

@@ -16,11 +16,12 @@ from jaxtyping import Bool, Float
 
 from pns_common.arrays import Array
 from pns_common.blocks import Blocks
-from pns_common.correction import correct, curvature_gate, proximity_ratio
+from pns_common.correction import curvature_gate, proximity_ratio
+from pns_common.edge_operator import EdgeOperator
 from pns_common.errors import ParameterError
 from pns_common.features import FEATURE_SETS
-from pns_common.frames import edge_stencil
 from pns_common.model_card import ModelCard
+from pns_common.orientation import ORIENTATIONS
 from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
 from pns_common.topology import Topology
 
@@ -127,7 +128,7 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     return Scheme(
         "pns",
         loop_vertex_rule,
-        _learned_edge_rule(model, budget),
+        learned_edge_rule(edge_operator(model), float(budget)),
         budget=float(budget),
         model=model.name,
         model_hash=model.hash,
@@ -156,14 +157,23 @@ def without_correction(positions: Float[np.ndarray, "N 3"]) -> Placement:
     return Placement(positions, None, nothing, nothing, np.zeros(len(positions), dtype=bool))
 
 
-def _learned_edge_rule(model: Model, budget: float) -> Rule:
-    """q = q0 + h² γ F η(φ) on interior edges, the midpoint on all others."""
-    features = FEATURE_SETS[model.card.features]
-    gate = curvature_gate(model.card.gate_sharpness)
+def edge_operator(model: Model) -> EdgeOperator:
+    """What a model's card and network make of interior edges."""
 
     def network(rows: Array) -> Array:
         # The unit budget, scaled in float64 afterwards: one file serves every C / R exactly.
         return model(rows, 1.0)
+
+    return EdgeOperator(
+        FEATURE_SETS[model.card.features],
+        ORIENTATIONS[model.card.orientation],
+        network,
+        curvature_gate(model.card.gate_sharpness),
+    )
+
+
+def learned_edge_rule(operator: EdgeOperator, budget: float) -> Rule:
+    """q = q0 + h² γ F η(φ) on interior edges, the midpoint on all others; ``budget`` is C."""
 
     def edge_rule(level: ControlLevel) -> Placement:
         base = loop_edge_rule(level)
@@ -172,12 +182,12 @@ def _learned_edge_rule(model: Model, budget: float) -> Rule:
         topology, count = level.topology, len(level.topology.edges)
         displacement, ratio = np.zeros((count, 3)), np.zeros(count)
         gamma, degenerate = np.zeros(count), np.zeros(count, dtype=bool)
+        fields = operator.features.fields(level.points, topology)
 
         def correct_block(rows: slice) -> None:
             edges = topology.interior[rows]
-            stencil, faces = topology.stencil[edges], topology.half_edges[edges] // 3
-            at = edge_stencil(level.points, level.normals, stencil, faces)
-            result = correct(at, features, network, gate, budget / level.reference_length)
+            at = operator.look(level.points, level.normals, fields, topology, edges)
+            result = operator.correct(at, budget / level.reference_length)
             displacement[edges] = result.displacement
             ratio[edges] = proximity_ratio(result)
             gamma[edges], degenerate[edges] = result.gate, result.degenerate

@@ -162,7 +162,7 @@ def _edges(points: Float[Tensor, "V 3"], batch: Batch) -> EdgeStencil:
 
 def _raw_output(network: BoundedNet, inputs: Float[Tensor, "N K"]) -> Float[Tensor, "N 3"]:
     own = network.linear_layers[0].weight.dtype
-    return network.net(inputs.to(own)).to(inputs.dtype)
+    return network.raw(inputs.to(own)).to(inputs.dtype)
 
 
 def _scattered(rows: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:

@@ -13,8 +13,6 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.correction import curvature_gate
-from pns_common.features import FEATURE_SETS
 from pns_common.frames import edge_stencil, face_normals
 from pns_common.mesh import Mesh
 from pns_common.topology import Topology, build_topology
@@ -24,10 +22,10 @@ from train.certificates.displacement import AT_MOST, worst_ratio
 from train.certificates.equivariance import EXACT, well_conditioned
 from train.determinism import deterministic
 from train.grid import grid_faces, jittered_grid
-from train.networks import BoundedNet, unit_correction
+from train.networks import BoundedNet
 from train.one_step import Step, refine_once
 from train.recipes import Recipe
-from train.trainer import initial_network
+from train.trainer import initial_network, recipe_operator
 
 OnStep = Callable[[int, float], None]
 """Called after each step with the number of steps done and the value found."""
@@ -73,14 +71,8 @@ class Operator:
 
     def __call__(self, points: Float[Tensor, "V 3"], topology: Topology) -> Step:
         """Refine by one step at reference length 1."""
-        return refine_once(
-            points,
-            topology,
-            FEATURE_SETS[self.recipe.features],
-            unit_correction(self.network),
-            curvature_gate(self.recipe.gate_sharpness),
-            self.recipe.budget,
-        )
+        operator = recipe_operator(self.recipe, self.network)
+        return refine_once(points, topology, operator, self.recipe.budget)
 
 
 def initial_operator(recipe: Recipe) -> Operator:

@@ -4,11 +4,13 @@ from collections.abc import Callable, Mapping
 from itertools import pairwise
 from types import MappingProxyType
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
 from pns_common.features import FEATURE_COUNT
+from pns_common.symmetry import Symmetries
 
 RAW_COORDINATES = "raw-12"
 """The coordinates of a, b, c, d: what the unconstrained network sees instead of features."""
@@ -47,13 +49,42 @@ class BoundedNet(nn.Module):
         self, features: Float[Tensor, "E K"], budget: float | Float[Tensor, ""]
     ) -> Float[Tensor, "E 3"]:
         """Return η with ‖η‖ ≤ budget."""
-        z = self.net(features)
+        z = self.raw(features)
         return budget * z / torch.linalg.vector_norm(z, dim=-1, keepdim=True).clamp(min=1)
+
+    def raw(self, features: Float[Tensor, "E K"]) -> Float[Tensor, "E 3"]:
+        """Return z, of any length."""
+        return self.net(features)
 
     @property
     def linear_layers(self) -> list[nn.Linear]:
         """The layers that hold weights, from features to z."""
         return [layer for layer in self.net if isinstance(layer, nn.Linear)]
+
+
+class SymmetricNet(BoundedNet):
+    """The same perceptron averaged over a group: z ← mean over g of D_g z(g φ), then projected.
+
+    η(g φ) = D_g η(φ) then holds for any weights, and ‖η‖ ≤ C as before.
+    """
+
+    def __init__(
+        self,
+        group: Symmetries,
+        hidden: tuple[int, ...],
+        activation: str,
+        generator: torch.Generator,
+    ):
+        super().__init__(group.order.shape[1], hidden, activation, generator)
+        self.group = group
+        self.register_buffer("order", torch.from_numpy(group.order), persistent=False)
+        self.register_buffer("signs", _single(group.signs), persistent=False)
+        self.register_buffer("local", _single(group.local), persistent=False)
+
+    def raw(self, features: Float[Tensor, "E K"]) -> Float[Tensor, "E 3"]:
+        """Return the averaged z, of any length."""
+        images = features[:, self.order] * self.signs
+        return (self.net(images) * self.local).mean(dim=1)
 
 
 def unit_correction(network: BoundedNet) -> Callable[[Tensor], Tensor]:
@@ -67,6 +98,11 @@ def unit_correction(network: BoundedNet) -> Callable[[Tensor], Tensor]:
         return network(features.to(own), 1.0).to(features.dtype)
 
     return correction
+
+
+def _single(values: Float[np.ndarray, "..."]) -> Float[Tensor, "..."]:
+    # Every entry is 1 or −1: exact in any precision that the network is turned to.
+    return torch.from_numpy(values.astype(np.float32))
 
 
 def _seeded_linear(fan_in: int, fan_out: int, generator: torch.Generator) -> nn.Linear:

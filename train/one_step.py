@@ -8,9 +8,9 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from pns_common.arrays import cross, gather, segment_sum, unit
-from pns_common.correction import Gate, Network, correct, proximity_ratio
-from pns_common.features import FeatureSet
-from pns_common.frames import edge_stencil, face_normals
+from pns_common.correction import proximity_ratio
+from pns_common.edge_operator import EdgeOperator
+from pns_common.frames import face_normals
 from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
 from pns_common.topology import Topology
 
@@ -30,19 +30,18 @@ class Step:
 def refine_once(
     points: Float[Tensor, "V 3"],
     topology: Topology,
-    features: FeatureSet,
-    network: Network,
-    gate: Gate,
+    operator: EdgeOperator,
     budget: float,
 ) -> Step:
     """Refine by one step at reference length 1 (the paper's absolute units).
 
-    `network` gives corrections at budget 1. Gradients flow to it, and to the points if they ask.
+    The operator's network gives corrections at budget 1. Gradients flow to it, and to the points
+    if they ask.
     """
-    interior = topology.interior
     normals = face_normals(points, topology.faces)
-    at = edge_stencil(points, normals, topology.stencil[interior], topology.edge_faces[interior])
-    correction = correct(at, features, network, gate, budget)
+    fields = operator.features.fields(points, topology)
+    at = operator.look(points, normals, fields, topology, topology.interior)
+    correction = operator.correct(at, budget)
     return displaced(points, topology, correction.displacement, proximity_ratio(correction))
 
 

@@ -31,6 +31,7 @@ class Recipe:
         learning_rate: at the first step; it falls along a half cosine.
         final_learning_rate: at the last step; the same value gives a constant rate.
         seed: of the initial weights and of the batches.
+        orientation: as on the model card; "symmetric" averages the network over its symmetries.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Recipe:
     learning_rate: float
     final_learning_rate: float
     seed: int
+    orientation: str = "first-face"
 
 
 def ridge(seed: int = 0) -> Recipe:

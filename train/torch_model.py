@@ -42,7 +42,7 @@ def recipe_model(recipe: Recipe, network: BoundedNet) -> TorchModel:
         features=recipe.features,
         gate_sharpness=recipe.gate_sharpness,
         budget=recipe.budget,
-        orientation="first-face",
+        orientation=recipe.orientation,
         training={},
         metrics={},
     )

@@ -10,12 +10,14 @@ from torch import Tensor
 
 from pns_common.arrays import gather
 from pns_common.correction import curvature_gate
+from pns_common.edge_operator import EdgeOperator
 from pns_common.features import FEATURE_SETS
+from pns_common.orientation import ORIENTATIONS
 from train.batch import Batch, disjoint_union
 from train.datasets import DATASETS, Instance
 from train.determinism import deterministic
 from train.losses import weighted_loss
-from train.networks import INPUT_COUNT, BoundedNet, unit_correction
+from train.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_correction
 from train.one_step import Step, refine_once, vertex_normals
 from train.recipes import Recipe
 from train.surfaces import signed_distance, unit_normal
@@ -37,6 +39,9 @@ class Fit:
 def initial_network(recipe: Recipe) -> BoundedNet:
     """Return the untrained network of a recipe."""
     generator = torch.Generator().manual_seed(recipe.seed)
+    if recipe.orientation == "symmetric":
+        group = FEATURE_SETS[recipe.features].symmetries
+        return SymmetricNet(group, recipe.hidden, recipe.activation, generator)
     return BoundedNet(INPUT_COUNT[recipe.features], recipe.hidden, recipe.activation, generator)
 
 
@@ -68,15 +73,19 @@ def optimise(recipe: Recipe, loss_of: Loss, on_step: OnStep) -> Fit:
 
 def batch_loss(recipe: Recipe, network: BoundedNet, batch: Batch) -> Float[Tensor, ""]:
     """Refine a batch by one step of the operator and weigh its loss."""
-    step = refine_once(
-        batch.points,
-        batch.topology,
+    operator = recipe_operator(recipe, network)
+    step = refine_once(batch.points, batch.topology, operator, recipe.budget)
+    return step_loss(recipe, batch, step)
+
+
+def recipe_operator(recipe: Recipe, network: BoundedNet) -> EdgeOperator:
+    """Return what a recipe makes of interior edges, with a network at budget 1."""
+    return EdgeOperator(
         FEATURE_SETS[recipe.features],
+        ORIENTATIONS[recipe.orientation],
         unit_correction(network),
         curvature_gate(recipe.gate_sharpness),
-        recipe.budget,
     )
-    return step_loss(recipe, batch, step)
 
 
 def step_loss(recipe: Recipe, batch: Batch, step: Step) -> Float[Tensor, ""]:

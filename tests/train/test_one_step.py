@@ -1,28 +1,18 @@
 import numpy as np
 import torch
 
-from pns_common.correction import curvature_gate
-from pns_common.features import FEATURE_SETS
 from pns_common.refine import refine
 from pns_common.schemes import pns
 from pns_common.topology import build_topology, split
 from train.datasets import ridge_held_out
-from train.networks import unit_correction
 from train.one_step import refine_once, vertex_normals
 from train.recipes import ridge
 from train.torch_model import recipe_model
-from train.trainer import initial_network
+from train.trainer import initial_network, recipe_operator
 
 
 def one_step(points, topology, network, budget=0.5):
-    return refine_once(
-        points,
-        topology,
-        FEATURE_SETS["paper-5"],
-        unit_correction(network),
-        curvature_gate(10.0),
-        budget,
-    )
+    return refine_once(points, topology, recipe_operator(ridge(), network), budget)
 
 
 def example():

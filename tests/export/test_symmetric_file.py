@@ -1,0 +1,71 @@
+"""A symmetric network as a model file: the average is inside, and no numbering is in the result."""
+
+from dataclasses import replace
+
+import numpy as np
+import onnx
+import pytest
+import torch
+
+from export.onnx_graph import model_bytes
+from export.parity import TOLERANCE, check_parity
+from pns_common import Mesh, pns, refine
+from pns_common.features import FEATURE_SETS
+from pns_common.onnx_model import ALLOWED_OPERATORS, model_from_bytes
+from pns_common.topology import build_topology
+from tests.meshes import bent, bumpy_sphere, grid
+from tests.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
+from train.certificates.equivariance import well_conditioned
+from train.recipes import ridge
+from train.torch_model import recipe_model
+from train.trainer import initial_network
+
+BUDGET = 0.5
+SINGLE = 1e-6
+SIGNED = sorted(name for name, one in FEATURE_SETS.items() if len(one.symmetries.order) == 8)
+feature_sets = pytest.mark.parametrize("features", sorted(FEATURE_SETS))
+
+
+def network_and_file(features, scale=3.0):
+    recipe = replace(ridge(), features=features, orientation="symmetric")
+    network = initial_network(recipe)
+    with torch.no_grad():
+        network.linear_layers[-1].weight *= scale
+    return network, model_bytes(network, recipe_model(recipe, network).card)
+
+
+@feature_sets
+@pytest.mark.parametrize("scale", [1.0, 4.0])
+def test_file_says_what_the_network_says(features, scale):
+    network, data = network_and_file(features, scale)
+    parity = check_parity(model_from_bytes(data, "test"), network)
+    assert parity.difference <= TOLERANCE
+    assert parity.length <= 1 + TOLERANCE
+
+
+@feature_sets
+def test_same_network_same_bytes_and_only_listed_operators(features):
+    _, data = network_and_file(features)
+    assert data == network_and_file(features)[1]
+    operators = {node.op_type for node in onnx.load_from_string(data).graph.node}
+    assert operators <= ALLOWED_OPERATORS
+    assert model_from_bytes(data, "test").card.orientation == "symmetric"
+
+
+@feature_sets
+@pytest.mark.parametrize("name", ["sphere", "patch", *ASSETS])
+def test_numbering_and_mirrors_change_nothing_through_a_file(features, name):
+    shapes = {"sphere": bumpy_sphere, "patch": lambda: grid(7, bent)}
+    mesh = Mesh(*shapes[name]()) if name in shapes else asset(name)
+    scheme = pns(model_from_bytes(network_and_file(features)[1], "test"), BUDGET)
+    still = refine(mesh, scheme, reference_length=1.0).mesh.vertices
+    twins = [(renumbered(mesh, 0), still), (mirrored(mesh), still * MIRROR)]
+    if features in SIGNED:
+        twins.append((turned_over(mesh), still))
+    edges = build_topology(mesh.faces, len(mesh.vertices)).edges
+    square = np.sum((mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]]) ** 2, axis=1)
+    allowed = 1e-12 + SINGLE * BUDGET * np.concatenate([np.zeros(len(mesh.vertices)), square])
+    kept = np.concatenate([np.ones(len(mesh.vertices), dtype=bool), well_conditioned(mesh)])
+    for twin, expected in twins:
+        found = refine(twin.mesh, scheme, reference_length=1.0).mesh.vertices[twin.place]
+        assert (np.linalg.norm(found - expected, axis=1) <= allowed)[kept].all()
