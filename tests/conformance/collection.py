@@ -1,0 +1,102 @@
+"""The shared collection of glTF assets, what becomes of each, and what three.js makes of both."""
+
+import base64
+import csv
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from pns_common import load_model
+from service.folder import folder_of
+from service.options import Limits, Options
+from service.subdivide import subdivide_gltf
+from tests import node_tools
+from tests.shared import SHARED
+
+LEVELS = (1, 2)
+# Files that break their promises, or have nothing to refine; tests/service has their refusals.
+REFUSED = {"IndexOutOfRange.gltf", "BoxWithInfinites.glb", "empty_nodes.glb"}
+
+
+def _rows():
+    table = SHARED / "assets" / "assets.csv"
+    if not table.exists():
+        return {}
+    with table.open(newline="") as lines:
+        rows = [row for row in csv.DictReader(lines) if row["format"] in ("glb", "gltf")]
+    paths = {path.name: path for path in (SHARED / "assets").rglob("*.gl*")}
+    return {row["name"]: {**row, "path": paths[row["name"]]} for row in rows}
+
+
+ROWS = _rows()
+NAMES = sorted(set(ROWS) - REFUSED)
+
+
+@cache
+def refined(name, levels, scheme="pns"):
+    """The refined GLB and its report."""
+    path = ROWS[name]["path"]
+    options = Options(levels=levels, scheme=scheme)
+    media = path.suffix.removeprefix(".")
+    return subdivide_gltf(
+        path.read_bytes(), media, options, _model(), Limits(), neighbours=folder_of(path)
+    )
+
+
+@cache
+def _model():
+    return load_model()
+
+
+class Conformance:
+    """All refined assets as files, and one run each of the validator and of three.js over them."""
+
+    def __init__(self, folder):
+        self.paths, self._meshes = {}, {}
+        for name in NAMES:
+            self.paths[name, 0, None] = ROWS[name]["path"]
+            for levels in LEVELS:
+                for scheme in ("pns", "loop"):
+                    path = folder / f"{Path(name).stem}-{levels}-{scheme}.glb"
+                    path.write_bytes(refined(name, levels, scheme).glb)
+                    self.paths[name, levels, scheme] = path
+        checked = [path for (_, _, scheme), path in self.paths.items() if scheme != "loop"]
+        self._messages = node_tools.run("validate.mjs", checked)
+        self._loaded = node_tools.run("load.mjs", self.paths.values())
+
+    def errors(self, name, levels, scheme):
+        """The validator's error codes."""
+        messages = self._messages[str(self.paths[name, levels, scheme])]
+        return {message["code"] for message in messages if message["severity"] == 0}
+
+    def loaded(self, name, levels, scheme):
+        """What three.js made of the file."""
+        return self._loaded[str(self.paths[name, levels, scheme])]
+
+    def meshes(self, name, levels, scheme):
+        """The meshes as three.js has them, each a list of primitives as arrays."""
+        key = name, levels, scheme
+        if key not in self._meshes:
+            meshes = self.loaded(*key)["meshes"]
+            self._meshes[key] = [[_arrays(p) for p in mesh if p["triangles"]] for mesh in meshes]
+        return self._meshes[key]
+
+
+def _arrays(primitive):
+    """Faces over the vertices that they use, and what these carry."""
+    indices = np.frombuffer(base64.b64decode(primitive["indices"]), np.uint32)
+    used, faces = np.unique(indices, return_inverse=True)
+    skin = {
+        name: _floats(primitive[key], 4)[used] if key in primitive else np.zeros((0, 4))
+        for name, key in (("joints", "skinIndex"), ("weights", "skinWeight"))
+    }
+    return skin | {
+        "faces": faces.reshape(-1, 3),
+        "points": _floats(primitive["position"], 3)[used],
+        "targets": [_floats(target, 3)[used] for target in primitive["targets"]],
+    }
+
+
+def _floats(text, width):
+    return np.frombuffer(base64.b64decode(text), np.float32).reshape(-1, width)
