@@ -47,11 +47,12 @@ def shaded_image(
 ) -> UInt8[np.ndarray, "H W 3"]:
     """Return a picture of a mesh coloured by a value at each vertex, 0 … `largest`."""
     if importlib.util.find_spec("pyvista") is None:
-        return _by_matplotlib(mesh, values, largest, camera)
-    return _by_pyvista(mesh, values, largest, camera)
+        return by_matplotlib(mesh, values, largest, camera)
+    return by_pyvista(mesh, values, largest, camera)
 
 
-def _by_pyvista(mesh: Mesh, values: np.ndarray, largest: float, camera: Camera) -> np.ndarray:
+def by_pyvista(mesh: Mesh, values: np.ndarray, largest: float, camera: Camera) -> np.ndarray:
+    """Render off-screen through VTK; on Linux it needs EGL or falls back to software."""
     import pyvista
 
     plotter = pyvista.Plotter(off_screen=True, window_size=(WIDTH, HEIGHT), lighting=None)
@@ -79,7 +80,8 @@ def _by_pyvista(mesh: Mesh, values: np.ndarray, largest: float, camera: Camera) 
     return np.asarray(image)
 
 
-def _by_matplotlib(mesh: Mesh, values: np.ndarray, largest: float, camera: Camera) -> np.ndarray:
+def by_matplotlib(mesh: Mesh, values: np.ndarray, largest: float, camera: Camera) -> np.ndarray:
+    """Draw triangles from back to front, each in one lit colour."""
     seen = (mesh.vertices - CENTRE) @ camera.axes().T
     depth = seen[mesh.faces, 2].mean(axis=1)
     order = np.argsort(depth)

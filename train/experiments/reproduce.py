@@ -8,6 +8,7 @@ from pathlib import Path
 
 import msgspec
 
+from train.determinism import deterministic
 from train.experiments.experiment import Cell, Column, Experiment, Figure, Table
 from train.experiments.laboratory import Laboratory
 from train.experiments.style import shared_style
@@ -48,7 +49,8 @@ def reproduce(
         record = read_record(kept)
         if record is not None and record.key == key and _written(record, output):
             return record
-    outcome = experiment.run(laboratory)
+    with deterministic():
+        outcome = experiment.run(laboratory)
     for table in outcome.tables:
         write_csv(table, output / f"{table.name}.csv")
     for figure in outcome.figures:
