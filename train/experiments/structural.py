@@ -204,5 +204,5 @@ EXPERIMENT = Experiment(
     title="Structural certification",
     source="Paper: the table of structural tests, and the adversarial searches.",
     run=run,
-    seconds=90,
+    seconds=120,
 )
