@@ -63,6 +63,9 @@ def subdivide(
     weld_tolerance: Annotated[
         float, typer.Option(metavar="X", help="join vertices nearer than X times R")
     ] = 0.0,
+    compress: Annotated[
+        Literal["none", "draco", "meshopt"], typer.Option(help="how a glTF's geometry is written")
+    ] = "none",
     report: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help="write the report too")
     ] = None,
@@ -81,6 +84,7 @@ def subdivide(
         uv=uv,
         crease=crease,
         weld_tolerance=weld_tolerance,
+        compress=compress,
     )
     convert(source, output, options, model, report, Settings().job_limits())
 

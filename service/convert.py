@@ -107,6 +107,8 @@ def _of_soup(
         changes.append(Change("", "texture coordinates dropped: the format cannot hold them", 1))
     if options.diagnostics == "full":
         changes.append(Change("", "values at vertices dropped: only a glTF's are kept", 1))
+    if options.compress != "none":
+        changes.append(Change("", "not compressed: only a glTF that came as one is", 1))
     report = _with_changes(report, changes)
     faces = len(refined.faces)
     if target not in formats.GLTF_KINDS:

@@ -13,6 +13,7 @@ MAX_LEVELS = 6
 
 SCHEMES = ("pns", "loop")
 DIAGNOSTICS = ("summary", "full", "none")
+COMPRESSIONS = ("none", "draco", "meshopt")
 UV_RULES = ("linear", "smooth")
 # A weld further than a hundredth of R is a different tool: it would take features away.
 MAX_WELD_TOLERANCE = 0.01
@@ -36,6 +37,7 @@ class Options:
     uv: Literal["linear", "smooth"] = "linear"
     crease: str = "off"
     weld_tolerance: float = 0.0
+    compress: Literal["none", "draco", "meshopt"] = "none"
 
     def __post_init__(self) -> None:
         if not 1 <= self.levels <= MAX_LEVELS:
@@ -56,6 +58,8 @@ class Options:
             raise InvalidParameter(
                 "reference_length", "reference_length must be 'auto' or a finite positive number"
             )
+        if self.compress not in COMPRESSIONS:
+            raise InvalidParameter("compress", f"compress must be one of {', '.join(COMPRESSIONS)}")
         if self.uv not in UV_RULES:
             raise InvalidParameter("uv", f"uv must be one of {', '.join(UV_RULES)}")
         if not re.fullmatch(CREASE_PATTERN, self.crease) or not (self.crease_angle or 0) <= math.pi:

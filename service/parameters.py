@@ -56,6 +56,11 @@ class Parameters(BaseModel):
         description="join vertices nearer than this times R; 0: exactly equal ones alone",
     )
 
+    compress: Literal["none", "draco", "meshopt"] = Field(
+        default="none",
+        description="`meshopt` is exact; `draco` is smaller, and rounds positions, normals and UVs",
+    )
+
     def options(self) -> Options:
         """The same as the pipeline takes them."""
         return Options(**self.model_dump())

@@ -17,6 +17,7 @@ from service.gltf.json_text import encode
 from service.gltf.lattice import lattice
 from service.gltf.neighbours import ALONE, Neighbours
 from service.gltf.nodes import mesh_instances
+from service.gltf.packing import BYTES_PER_FACE, WRITERS
 from service.gltf.plan import MeshPlan
 from service.gltf.primitives import read_primitive
 from service.gltf.refinement import changes_of_mesh, refine_control_mesh
@@ -24,7 +25,6 @@ from service.gltf.report import Change, MeshResult, build_report
 from service.gltf.share import RefinedPrimitive, share
 from service.gltf.storage import remove_replaced, storage_changes, withdraw_unused
 from service.gltf.upload import Media, Upload, read_upload
-from service.gltf.writer import Writer
 from service.options import Limits, Options
 from service.stopwatch import Stopwatch
 
@@ -67,11 +67,12 @@ def subdivide_gltf(
     """
     clock = Stopwatch() if clock is None else clock
     scheme = make_scheme(options, model)
-    upload = read_upload(data, media, options.levels, limits, neighbours)
+    packing = BYTES_PER_FACE[options.compress]
+    upload = read_upload(data, media, options.levels, limits, neighbours, packing)
     instances = mesh_instances(upload.document)
     changes = _changes_of_container(upload, options)
     changes += upload.changes + storage_changes(upload.document, upload.plans)
-    writer = Writer.start(upload.tree, upload.buffers)
+    writer = WRITERS[options.compress].start(upload.tree, upload.buffers)
     clock.lap("read")
 
     results: list[MeshResult] = []
@@ -92,8 +93,7 @@ def subdivide_gltf(
                 control, control.cleaned, made, lattice(options.levels), uv_blend(options)
             )
         clock.lap("attributes")
-        for primitive in refined:
-            writer.replace(mesh.mesh, primitive)
+        writer.replace_mesh(mesh.mesh, refined)
         clock.lap("write")
         changes += changes_of_mesh(control, made, pointer)
         results.append(
@@ -110,7 +110,7 @@ def subdivide_gltf(
         )
 
     withdraw_unused(upload.tree)
-    changes += remove_replaced(writer, upload.spare)
+    changes += remove_replaced(writer, upload.spare) + writer.changes()
     report = build_report(scheme, options.levels, results, changes)
     if options.diagnostics != "none":
         put_report(upload.tree, report)

@@ -60,11 +60,16 @@ def plan(document: Document) -> list[MeshPlan]:
 
 
 def check_cost(
-    document: Document, plans: Sequence[MeshPlan], size: int, levels: int, limits: Limits
+    document: Document,
+    plans: Sequence[MeshPlan],
+    size: int,
+    levels: int,
+    limits: Limits,
+    bytes_per_face: int = 0,
 ) -> None:
     """Check the refined faces and the memory that they will take against the limits.
 
-    `size` is the upload's, in bytes.
+    `size` is the upload's, in bytes; `bytes_per_face` what a refined face takes beside the rest.
 
     Raises:
         LimitError: over `max_faces` or `max_memory_bytes`.
@@ -77,7 +82,7 @@ def check_cost(
             allowed=limits.max_faces,
             found=faces,
         )
-    memory = predicted_memory(document, plans, size, levels)
+    memory = predicted_memory(document, plans, size, levels) + faces * bytes_per_face
     if memory > limits.max_memory_bytes:
         raise over_memory(limits.max_memory_bytes, memory)
 

@@ -48,9 +48,16 @@ class Upload:
 
 
 def read_upload(
-    data: bytes, media: Media, levels: int, limits: Limits, neighbours: Neighbours = ALONE
+    data: bytes,
+    media: Media,
+    levels: int,
+    limits: Limits,
+    neighbours: Neighbours = ALONE,
+    bytes_per_face: int = 0,
 ) -> Upload:
-    """Check a file in the order in which its parts lean on each other; decode no geometry yet.
+    """Check a file in the order in which its parts lean on each other; refine nothing yet.
+
+    `bytes_per_face` is what writing takes for each refined face, beside refining.
 
     Raises:
         ServiceError: the file is unreadable, wrong, over a limit, or cannot be refined yet.
@@ -87,6 +94,6 @@ def read_upload(
     refuse_features(document)
     plans = plan(document)
     size += sum(len(buffer) for buffer in buffers[stored:])
-    check_cost(document, plans, size, levels, limits)
+    check_cost(document, plans, size, levels, limits, bytes_per_face)
     leavable = spare(original, draco_views, ranges)
     return Upload(container, tree, document, buffers, plans, changes, leavable)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from jaxtyping import Shaped
@@ -12,6 +12,7 @@ from jaxtyping import Shaped
 from service.gltf.accessors import COLUMNS, COMPONENT_TYPES
 from service.gltf.modes import TRIANGLES
 from service.gltf.prune import Spare, cut, moved, remove_unused
+from service.gltf.report import Change
 from service.gltf.schema import Accessor
 from service.gltf.share import RefinedPrimitive
 
@@ -31,16 +32,25 @@ class Writer:
     length: int = 0
     starts: list[int] = field(default_factory=list)
 
-    @staticmethod
-    def start(tree: dict[str, Any], buffers: Sequence[memoryview]) -> Writer:
+    @classmethod
+    def start(cls, tree: dict[str, Any], buffers: Sequence[memoryview]) -> Self:
         """Take over the tree, with all its buffers one after the other as the first."""
-        writer = Writer(tree)
-        writer.starts = [writer._append(buffer) for buffer in buffers]
+        writer = cls(tree)
+        writer.starts = [writer.append(buffer) for buffer in buffers]
         for view in tree.get("bufferViews", []):
             if view["buffer"]:
                 view["byteOffset"] = view.get("byteOffset", 0) + writer.starts[view["buffer"]]
                 view["buffer"] = 0
         return writer
+
+    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive]) -> None:
+        """Point the primitives of a mesh at their refined geometry."""
+        for primitive in refined:
+            self.replace(mesh, primitive)
+
+    def changes(self) -> list[Change]:
+        """What was not written as it was made."""
+        return []
 
     def replace(self, mesh: int, refined: RefinedPrimitive) -> None:
         """Point a primitive of the tree at its refined geometry."""
@@ -72,12 +82,19 @@ class Writer:
             for buffer, start, end in spare.ranges
         ]
         views = self.tree.get("bufferViews", [])
-        needed = [(v.get("byteOffset", 0), v.get("byteOffset", 0) + v["byteLength"]) for v in views]
+        stored = [self.bytes_of(view) for view in views]
+        needed = [
+            (p.get("byteOffset", 0), p.get("byteOffset", 0) + p["byteLength"]) for p in stored
+        ]
         self.pieces, shifts = cut(self.pieces, gone, needed)
-        for view in views:
-            if "byteOffset" in view:
-                view["byteOffset"] = moved(view["byteOffset"], shifts)
+        for place in stored:
+            if "byteOffset" in place:
+                place["byteOffset"] = moved(place["byteOffset"], shifts)
         self.length = sum(len(piece) for piece in self.pieces)
+
+    def bytes_of(self, view: dict[str, Any]) -> dict[str, Any]:
+        """The object that says where a view's bytes lie in BIN."""
+        return view
 
     def finish(self) -> list[bytes | memoryview]:
         """Write the buffer's length into the tree; the pieces of BIN."""
@@ -93,33 +110,39 @@ class Writer:
     ) -> int:
         kind = "SCALAR" if before is None else before.type
         index = self._accessor(values, ARRAY_BUFFER, kind)
-        accessor = self.tree["accessors"][index]
-        if before is not None and before.normalized:
-            accessor["normalized"] = True
-        if name == "POSITION":
-            accessor["min"] = values.min(axis=0).tolist()
-            accessor["max"] = values.max(axis=0).tolist()
+        describe(self.tree["accessors"][index], before, name, values)
         return index
 
     def _accessor(self, values: Shaped[np.ndarray, "N K"], target: int, kind: str) -> int:
         """Append the elements; their accessor's index."""
         vertices = target == ARRAY_BUFFER
         content = in_words(values, kind) if vertices else np.ascontiguousarray(values)
-        data = memoryview(content).cast("B")
-        view: dict[str, Any] = {"buffer": 0, "byteOffset": self._append(data)}
-        view["byteLength"] = len(data)
-        if (
-            vertices
-            and kind not in COLUMNS
-            and content.shape[1] != values.shape[1] * values.itemsize
-        ):
+        view = self.stored(content)
+        padded = vertices and content.shape[1] != values.shape[1] * values.itemsize
+        # A matrix is as long as its padded columns: its elements lie close.
+        if padded and kind not in COLUMNS:
             view["byteStride"] = content.shape[1]
         view["target"] = target
-        self.tree.setdefault("bufferViews", []).append(view)
+        return self.add_accessor(values, kind, self.add_view(view))
+
+    def stored(self, content: Shaped[np.ndarray, "N B"]) -> dict[str, Any]:
+        """Append elements of a buffer view; the view."""
+        data = memoryview(content).cast("B")
+        return {"buffer": 0, "byteOffset": self.append(data), "byteLength": len(data)}
+
+    def add_view(self, view: dict[str, Any]) -> int:
+        """A new buffer view's index."""
+        views = self.tree.setdefault("bufferViews", [])
+        views.append(view)
+        return len(views) - 1
+
+    def add_accessor(self, values: Shaped[np.ndarray, "N K"], kind: str, view: int | None) -> int:
+        """A new accessor's index; `view` None: its elements lie elsewhere."""
         accessors = self.tree.setdefault("accessors", [])
+        place = {} if view is None else {"bufferView": view}
         accessors.append(
             {
-                "bufferView": len(self.tree["bufferViews"]) - 1,
+                **place,
                 "componentType": _COMPONENT_TYPE_OF[values.dtype],
                 "count": len(values),
                 "type": kind,
@@ -127,7 +150,7 @@ class Writer:
         )
         return len(accessors) - 1
 
-    def _append(self, data: memoryview) -> int:
+    def append(self, data: memoryview) -> int:
         """Add bytes at the next multiple of four; where they begin."""
         padding = -self.length % 4
         if padding:
@@ -136,6 +159,17 @@ class Writer:
         self.pieces.append(data)
         self.length = start + len(data)
         return start
+
+
+def describe(
+    accessor: dict[str, Any], before: Accessor | None, name: str, values: Shaped[np.ndarray, "N K"]
+) -> None:
+    """Say of an attribute's accessor what its type does not."""
+    if before is not None and before.normalized:
+        accessor["normalized"] = True
+    if name == "POSITION":
+        accessor["min"] = values.min(axis=0).tolist()
+        accessor["max"] = values.max(axis=0).tolist()
 
 
 def in_words(values: Shaped[np.ndarray, "N K"], kind: str) -> Shaped[np.ndarray, "N B"]:
