@@ -34,8 +34,12 @@ from train.torch_model import recipe_model
 SWAY = 0.1
 """How far the adversary may move a vertex of the star, in spokes and each coordinate."""
 
-FOLLOWED = 17
-"""Stars between the flat one and the final one along which eigenvalues are followed."""
+FOLLOWED = 65
+"""Stars between the flat one and the final one along which eigenvalues are followed.
+
+With a quarter of them a crossing is taken for another and the margin changes sign; half give the
+same.
+"""
 
 
 @dataclass(frozen=True, eq=False)
