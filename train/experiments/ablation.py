@@ -109,5 +109,5 @@ EXPERIMENT = Experiment(
     title="Architectural ablation",
     source="Paper: the ablation table.",
     run=run,
-    seconds=60,
+    seconds=55,
 )

@@ -100,5 +100,5 @@ EXPERIMENT = Experiment(
     title="Sweep of the budget C",
     source="Paper: the capacity sweep figure.",
     run=run,
-    seconds=60,
+    seconds=40,
 )

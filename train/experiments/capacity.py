@@ -43,5 +43,5 @@ EXPERIMENT = Experiment(
     title="Capacity control",
     source="Paper: Capacity sweep and budget localisation, last paragraph.",
     run=run,
-    seconds=45,
+    seconds=30,
 )

@@ -51,6 +51,8 @@ def run_all(
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as progress:
         total = sum(one.seconds for one in experiments)
+        minutes = max(1, round(total / 60))
+        progress.print(f"{len(experiments)} experiments, up to about {minutes} min on two cores")
         overall = progress.add_task("all", total=total)
         for experiment in experiments:
             began = time.perf_counter()

@@ -130,5 +130,5 @@ EXPERIMENT = Experiment(
     title="Extended iteration",
     source="Beyond the paper, which names it as open (Implementation and scope).",
     run=run,
-    seconds=120,
+    seconds=15,
 )

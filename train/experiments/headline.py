@@ -121,5 +121,5 @@ EXPERIMENT = Experiment(
     title="Held-out ridges, one step",
     source="Paper: the headline table and figure.",
     run=run,
-    seconds=60,
+    seconds=25,
 )

@@ -71,7 +71,7 @@ def _draw(
     places = [(name, level) for level in (1, levels) for name in names]
     for panel, (name, level) in zip(axes, places, strict=True):
         one = errors[name, level]
-        panel.imshow(images[name, level], interpolation="lanczos")
+        panel.imshow(images[name, level], interpolation="antialiased")
         panel.set_axis_off()
         panel.set_title(f"{TITLES[name]}, level {level}")
         panel.text(
@@ -93,5 +93,5 @@ EXPERIMENT = Experiment(
     title="One step and four",
     source="Paper: the first figure.",
     run=run,
-    seconds=20,
+    seconds=15,
 )

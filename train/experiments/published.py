@@ -164,6 +164,6 @@ EXPERIMENT = Experiment(
     title="The published networks",
     source="Published: headline, ablation, sweep, capacity, saddle and cross-family tables.",
     run=run,
-    seconds=10,
+    seconds=5,
     needs_published=True,
 )

@@ -136,5 +136,5 @@ EXPERIMENT = Experiment(
     title="Repeated subdivision",
     source="Paper: the repeated-subdivision table and figure.",
     run=run,
-    seconds=90,
+    seconds=50,
 )

@@ -80,5 +80,5 @@ EXPERIMENT = Experiment(
     title="Saddles: a null result",
     source="Paper: Capacity sweep and budget localisation, last paragraph.",
     run=run,
-    seconds=15,
+    seconds=10,
 )
