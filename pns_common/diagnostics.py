@@ -8,7 +8,7 @@ from typing import NotRequired, TypedDict
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pns_common.arrays import cross, dot, gather
+from pns_common.arrays import dot, gather
 from pns_common.blocks import Blocks
 from pns_common.frames import triangle_normals
 from pns_common.schemes import Placement
@@ -28,7 +28,7 @@ class EdgeCounts(TypedDict):
 
 
 class RatioSummary(TypedDict):
-    """Proximity ratio ‖δ‖ / (C h²) over the level's interior edges; never above 1."""
+    """Proximity ratio ‖δ‖ / (C h²) over the level's interior edges; above 1 by rounding only."""
 
     max: float
     mean: float
@@ -75,13 +75,13 @@ class ChildFaces:
 def child_faces(
     topology: Topology,
     points: Float[np.ndarray, "V 3"],
-    displacement: Float[np.ndarray, "V 3"] | None,
+    loop_points: Float[np.ndarray, "V 3"] | None,
     blocks: Blocks,
 ) -> ChildFaces:
     """Look at the faces that ``topology`` was split into.
 
-    ``points`` are old vertices, then edge vertices; ``displacement`` is how far they stand from
-    Loop's, None if nowhere.
+    ``points`` are old vertices, then edge vertices; ``loop_points`` is where Loop would have put
+    them, None if they are there.
     """
     normals = np.empty((len(topology.faces), 4, 3))
     has_area = np.empty((len(topology.faces), 4), dtype=bool)
@@ -101,11 +101,11 @@ def child_faces(
         inside[blocks.number(rows)] = max(
             _largest_chord(four[3], four[i], defined[:, 3] & defined[:, i]) for i in range(3)
         )
-        if displacement is not None:
-            loops = [p - gather(displacement, v) for p, v in zip(corners, six, strict=True)]
+        if loop_points is not None:
+            loop_corners = [gather(loop_points, vertex) for vertex in six]
             for child, normal in zip(CHILDREN, four, strict=True):
-                a, b, c = (loops[i] for i in child)
-                flipped[rows] += dot(cross(b - a, c - a), normal) < 0
+                counterpart = triangle_normals(*(loop_corners[i] for i in child))
+                flipped[rows] += dot(counterpart, normal) < 0
 
     blocks.run(len(topology.faces), look_inside)
     normals, defined = normals.reshape(-1, 3), has_area.reshape(-1)

@@ -9,8 +9,9 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.errors import MeshError
 
-# Fourth powers of lengths (squared cross products) must stay finite in float64.
+# Fourth powers of lengths (squared cross products) must neither overflow nor vanish in float64.
 LARGEST_COORDINATE = 1e75
+SMALLEST_EXTENT = 1e-70
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,18 +19,19 @@ class Mesh:
     """A triangle mesh: ``vertices`` (V, 3) float64 and ``faces`` (F, 3) int64, both read-only.
 
     No mesh is refused for its topology: boundaries, irregular edges, several components, bow-ties
-    and isolated vertices are all allowed.
+    and isolated vertices are all allowed. Coordinates reach from −1e75 to 1e75, and their extent is
+    at least 1e-70 or exactly 0.
 
     Raises:
-        MeshError: wrong shapes or types, no faces, a NaN, infinite or huge coordinate, or an index
-            out of range; the error names the element.
+        MeshError: wrong shapes or types, no faces, a NaN, infinite or huge coordinate, an extent
+            too small to compute with, or an index out of range; the error names the element.
     """
 
     vertices: Float[np.ndarray, "V 3"]
     faces: Int[np.ndarray, "F 3"]
 
     def __post_init__(self) -> None:
-        vertices, faces = np.asarray(self.vertices), np.asarray(self.faces)
+        vertices, faces = _array(self.vertices, "vertices"), _array(self.faces, "faces")
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise MeshError(f"shape {vertices.shape}, expected (V, 3)", element="vertices")
         if vertices.dtype.kind not in "fiu":
@@ -40,6 +42,15 @@ class Mesh:
             raise MeshError("no faces to refine", element="faces")
         if faces.dtype.kind not in "iu":
             raise MeshError(f"type {faces.dtype}, expected integers", element="faces")
+        # Before the cast: an index of 2⁶⁴ − 1 would become −1.
+        inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
+        if not inside.all():
+            worst = int(np.argmin(inside))
+            raise MeshError(
+                f"indices {faces[worst].tolist()}, expected 0 … {len(vertices) - 1}",
+                element="face",
+                index=worst,
+            )
         vertices, faces = _frozen(vertices, np.float64), _frozen(faces, np.int64)
         # Written so that NaN fails it too.
         fits = (np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1)
@@ -51,13 +62,11 @@ class Mesh:
                 element="vertex",
                 index=worst,
             )
-        inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
-        if not inside.all():
-            worst = int(np.argmin(inside))
+        extent = np.ptp(vertices, axis=0).max()
+        if 0 < extent < SMALLEST_EXTENT:
             raise MeshError(
-                f"indices {faces[worst].tolist()}, expected 0 … {len(vertices) - 1}",
-                element="face",
-                index=worst,
+                f"extent {extent:g}, expected at least {SMALLEST_EXTENT:g}: scale the mesh up",
+                element="vertices",
             )
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
@@ -130,6 +139,16 @@ def repeated_vertex(faces: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
     """Whether a face names a vertex twice."""
     a, b, c = faces.T
     return (a == b) | (b == c) | (c == a)
+
+
+def _array(values: object, element: str) -> np.ndarray:
+    """What numpy makes of the input, refused where its rows differ in length."""
+    try:
+        return np.asarray(values)
+    except ValueError as error:
+        raise MeshError(
+            "rows of different lengths, expected three numbers each", element=element
+        ) from error
 
 
 def _frozen(values: np.ndarray, dtype: np.typing.DTypeLike) -> np.ndarray:

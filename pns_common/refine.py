@@ -17,6 +17,7 @@ from pns_common.diagnostics import LevelReport, child_faces, level_report
 from pns_common.errors import MeshError, ParameterError
 from pns_common.frames import face_normals
 from pns_common.mesh import LARGEST_COORDINATE, Mesh
+from pns_common.parameters import is_number, is_whole
 from pns_common.schemes import ControlLevel, Placement, Scheme
 from pns_common.topology import build_topology, multi_fan_vertices, split
 
@@ -74,13 +75,13 @@ def refine(
         progress: called after each level with (faces made so far, faces made in the end).
 
     Raises:
-        ParameterError: levels or reference_length out of range, a crease that is no edge.
+        ParameterError: levels, reference_length or threads out of range, a crease that is no edge.
         ModelError: the network returned something that is not finite, or of another shape.
         MeshError: the refined coordinates are too large.
     """
     _check_levels(levels)
     length = _reference_length(mesh, reference_length)
-    blocks = Blocks(threads=available_threads() if threads is None else threads)
+    blocks = Blocks(threads=_threads(threads))
     done, total = 0, sum(len(mesh.faces) * 4**level for level in range(1, levels + 1))
 
     points, faces = mesh.vertices, mesh.faces
@@ -103,7 +104,7 @@ def refine(
         if not np.abs(points).max() <= LARGEST_COORDINATE:  # also where one is NaN
             raise MeshError("refined coordinates are too large", element="vertices")
         faces = split(topology)
-        children = child_faces(topology, points, _displacement(vertices, edges), blocks)
+        children = child_faces(topology, points, _loop_points(vertices, edges), blocks)
         normals = children.normals
         reports.append(level_report(topology, vertices, edges, children))
         done += len(faces)
@@ -140,15 +141,11 @@ def measure_reference_length(
     return float(norm(referenced - referenced.mean(axis=0)).max()) / math.sqrt(2)
 
 
-def _displacement(vertices: Placement, edges: Placement) -> Float[np.ndarray, "V 3"] | None:
-    """How far all new vertices stand from Loop's; None if no rule has moved any."""
+def _loop_points(vertices: Placement, edges: Placement) -> Float[np.ndarray, "V 3"] | None:
+    """Where Loop would have put all vertices; None if they are there."""
     if vertices.displacement is None and edges.displacement is None:
         return None
-    parts = [
-        np.zeros_like(p.loop) if p.displacement is None else p.displacement
-        for p in (vertices, edges)
-    ]
-    return np.concatenate(parts)
+    return np.concatenate([vertices.loop, edges.loop])
 
 
 def _face_normals(
@@ -163,14 +160,22 @@ def _face_normals(
     return normals
 
 
+def _threads(given: int | None) -> int:
+    if given is None:
+        return available_threads()
+    if not (is_whole(given) and given >= 1):
+        raise ParameterError("threads", given, expected="a whole number, at least 1")
+    return given
+
+
 def _check_levels(levels: int) -> None:
-    if not (1 <= levels <= HIGHEST_LEVELS):
-        raise ParameterError("levels", levels, expected=f"1 … {HIGHEST_LEVELS}")
+    if not (is_whole(levels) and 1 <= levels <= HIGHEST_LEVELS):
+        raise ParameterError("levels", levels, expected=f"a whole number, 1 … {HIGHEST_LEVELS}")
 
 
 def _reference_length(mesh: Mesh, given: float | str) -> float:
     if given == "auto":
         return measure_reference_length(mesh.vertices, mesh.faces)
-    if isinstance(given, str) or not (math.isfinite(given) and given > 0):
+    if not (is_number(given) and float(given) > 0):
         raise ParameterError("reference_length", given, expected='"auto" or a number > 0')
     return float(given)

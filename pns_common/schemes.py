@@ -6,7 +6,6 @@ new scheme is two functions and no change here.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -22,6 +21,7 @@ from pns_common.errors import ParameterError
 from pns_common.features import FEATURE_SETS
 from pns_common.model_card import ModelCard
 from pns_common.orientation import ORIENTATIONS
+from pns_common.parameters import is_number
 from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
 from pns_common.topology import Topology
 
@@ -123,7 +123,7 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         ParameterError: the budget is negative or not finite.
     """
     budget = model.card.budget if budget is None else budget
-    if not (math.isfinite(budget) and budget >= 0):
+    if not (is_number(budget) and budget >= 0):
         raise ParameterError("budget", budget, expected="a finite number ≥ 0")
     return Scheme(
         "pns",

@@ -16,7 +16,9 @@ import numpy as np
 from service.errors import GltfError, LimitError, UnreadableError
 from service.options import Limits
 
-_STRING = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
+# Possessive, and an unterminated string runs to the end: no quote is ever looked at twice, however
+# hostile the text.
+_STRING = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+(?:"|\\?\Z)', re.DOTALL)
 
 
 def decode_object(text: bytes, limits: Limits) -> dict[str, Any]:

@@ -150,6 +150,26 @@ def test_faces_without_area_do_not_disturb_a_plane():
     assert found.report["levels"][0]["degenerate_frames"] == 3
 
 
+def degenerate_frames(points, faces=((0, 1, 2), (1, 0, 3))):
+    return refine(Mesh(np.array(points, dtype=float), np.array(faces)), pns(MODELS[0])).report[
+        "levels"
+    ][0]["degenerate_frames"]
+
+
+@pytest.mark.parametrize(("height", "degenerate"), [(1e-13, 1), (1e-11, 0)])
+def test_a_face_has_no_area_where_rounding_would_make_its_normal(height, degenerate):
+    points = [[0, 0, 0], [1, 0, 0], [0.5, height, 0], [0.5, -1, 0]]
+    assert degenerate_frames(points) == degenerate
+
+
+@pytest.mark.parametrize(("angle", "degenerate"), [(1e-4, 1), (1e-2, 0)])
+def test_faces_folded_onto_each_other_are_antiparallel_within_the_papers_epsilon(angle, degenerate):
+    """1 + n1 · n2 = 1 − cos(angle): 5e-9 within ε = 1e-6, 5e-5 outside."""
+    lifted = [0.5, np.cos(angle), np.sin(angle)]
+    points = [[0, 0, 0], [1, 0, 0], [0.5, 1, 0], lifted]
+    assert degenerate_frames(points) == degenerate
+
+
 def test_gate_and_its_slope_vanish_at_coplanar_faces():
     vertices, faces = grid(2)
 

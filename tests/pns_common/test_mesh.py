@@ -26,6 +26,10 @@ FACE = np.array([[0, 1, 2]])
         (np.array([[0, 0, 0], [0, np.nan, 0], [1, 1, 1]]), FACE, "vertex", 1),
         (np.array([[0, 0, 0], [0, 1, 0], [1, -np.inf, 1]]), FACE, "vertex", 2),
         (np.array([[1e80, 0, 0], [0, 1, 0], [1, 1, 1]]), FACE, "vertex", 0),
+        (1e-80 * POINTS, FACE, "vertices", None),
+        ([[0, 0, 0], [1, 0], [0, 1, 0]], FACE, "vertices", None),
+        (POINTS, [[0, 1, 2], [0, 1]], "faces", None),
+        (POINTS, np.array([[0, 1, 2**64 - 1]], dtype=np.uint64), "face", 0),
     ],
 )
 def test_invalid_input_names_the_element(vertices, faces, element, index):
@@ -33,6 +37,7 @@ def test_invalid_input_names_the_element(vertices, faces, element, index):
         Mesh(vertices, faces)
     assert (caught.value.element, caught.value.index) == (element, index)
     assert element in str(caught.value)
+    assert "-1" not in str(caught.value) or np.any(np.asarray(faces) == -1)
 
 
 def test_mesh_does_not_follow_changes_of_its_input():

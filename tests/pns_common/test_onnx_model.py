@@ -94,6 +94,38 @@ def test_external_data_is_refused():
     assert "external" in error.found.lower() or "passwd" in error.found
 
 
+def test_external_data_in_a_constant_is_refused():
+    tensor = onnx.TensorProto(name="c", data_type=onnx.TensorProto.FLOAT, dims=[1])
+    tensor.data_location = onnx.TensorProto.EXTERNAL
+    entry = tensor.external_data.add()
+    entry.key, entry.value = "location", "secret.bin"
+    nodes = through(
+        helper.make_node("Constant", [], ["c"], value=tensor),
+        helper.make_node("Mul", ["three", "c"], ["correction"]),
+    )
+    assert refused(model_bytes(nodes, CUT)).found == "external data"
+
+
+def test_a_graph_inside_a_node_is_refused():
+    inner = helper.make_graph([], "inner", [], [])
+    node = helper.make_node("Identity", ["three"], ["correction"], body=inner)
+    assert "graph" in refused(model_bytes(through(node), CUT)).found
+
+
+def test_functions_of_the_files_own_are_refused():
+    model = onnx.load_from_string(GOOD)
+    opset = [helper.make_opsetid("", 20)]
+    body = [helper.make_node("Neg", ["x"], ["y"])]
+    model.functions.append(helper.make_function("", "Abs", ["x"], ["y"], body, opset))
+    assert "functions" in refused(model.SerializeToString()).found
+
+
+def test_sparse_weights_are_refused():
+    model = onnx.load_from_string(GOOD)
+    model.graph.sparse_initializer.add()
+    assert "sparse" in refused(model.SerializeToString()).found
+
+
 @pytest.mark.parametrize(
     ("inputs", "outputs"),
     [

@@ -20,14 +20,14 @@ from tests.networks import random_model
 MODEL = random_model(0, scale=30.0)
 
 
-@pytest.mark.parametrize("levels", [0, -1, 17])
+@pytest.mark.parametrize("levels", [0, -1, 17, 1.5, "2", True, None])
 def test_levels_out_of_range_are_refused(levels):
     with pytest.raises(ParameterError) as caught:
         refine(Mesh(*grid(3)), loop(), levels)
     assert (caught.value.name, caught.value.value) == ("levels", levels)
 
 
-@pytest.mark.parametrize("length", [0.0, -1.0, float("nan"), float("inf"), "metres"])
+@pytest.mark.parametrize("length", [0.0, -1.0, float("nan"), float("inf"), "metres", None])
 def test_reference_length_out_of_range_is_refused(length):
     with pytest.raises(ParameterError, match="reference_length"):
         refine(Mesh(*grid(3)), loop(), reference_length=length)
@@ -37,6 +37,12 @@ def test_reference_length_out_of_range_is_refused(length):
 def test_budget_out_of_range_is_refused(budget):
     with pytest.raises(ParameterError, match="budget"):
         pns(MODEL, budget)
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5])
+def test_threads_out_of_range_are_refused(threads):
+    with pytest.raises(ParameterError, match="threads"):
+        refine(Mesh(*grid(3)), loop(), threads=threads)
 
 
 def test_a_model_file_keeps_the_model_protocol():
@@ -108,6 +114,22 @@ def test_normal_jump_is_the_largest_angle_across_an_edge(shape):
     expected = slow_normal_jump(refined.mesh.vertices, refined.mesh.faces)
     found = refined.report["levels"][-1]["normal_jump_max"]
     assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_summaries_are_the_percentile_and_the_share_that_they_name():
+    mesh = Mesh(*bumpy_sphere(1, subdivisions=2))
+    refined = refine(mesh, pns(MODEL))
+    at_edges = slice(len(mesh.vertices), None)
+    ratio, gate = np.sort(refined.ratio[at_edges]), refined.gate[at_edges]
+    level = refined.report["levels"][0]
+    # All edges are interior. The 99th percentile by hand, between two order statistics.
+    place = 0.99 * (len(ratio) - 1)
+    below = int(place)
+    expected = ratio[below] + (place - below) * (ratio[below + 1] - ratio[below])
+    assert level["proximity_ratio"]["p99"] == pytest.approx(expected, rel=1e-12)
+    assert level["gate"]["active"] == np.mean(gate > 0.01)
+    assert 0 < level["gate"]["active"] < 1
+    assert np.mean(gate > 0.5) != level["gate"]["active"]
 
 
 def test_flipped_faces_are_those_that_oppose_their_loop_counterpart():
