@@ -1,12 +1,12 @@
 # Build: a virtual environment with the pinned inference dependencies; no torch, no compiler.
 FROM python:3.11-slim-bookworm AS build
-ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
+ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_CONSTRAINT=/src/constraints.txt
 WORKDIR /src
 RUN python -m venv /opt/pns
 COPY constraints.txt pyproject.toml README.md LICENSE ./
 COPY pns_common pns_common
 COPY service service
-RUN /opt/pns/bin/python -m pip install --constraint constraints.txt .
+RUN /opt/pns/bin/python -m pip install .
 
 # Run: the environment alone, as a user without a name, on a root that may be read-only.
 FROM python:3.11-slim-bookworm

@@ -1,14 +1,15 @@
-# `make serve` and `make test` do all their own set-up; only Python 3.11 or newer, make and (for some tests) node are needed.
+# `make serve` and `make test` do all their own set-up. They need Python 3.11 or newer and make, and
+# node for some of the tests.
 PYTHON ?= python3
 SERVE  := .venv-serve
 DEV    := .venv
-HOST   ?= 127.0.0.1
-PORT   ?= 8000
+# Pins what is installed, and what builds it.
+export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .PHONY: serve test lint unit fuzz model constraints clean
 
 serve: $(SERVE)/.ready
-	$(SERVE)/bin/pns serve --host $(HOST) --port $(PORT)
+	$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
 
 test: lint unit
 
@@ -19,7 +20,7 @@ lint: $(DEV)/.ready
 	$(DEV)/bin/lint-imports
 
 unit: $(DEV)/.ready
-	$(DEV)/bin/python -m pytest -n 2
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n 2
 
 # Malformed files by the thousand: FUZZ='--count 1000', or --seconds 60, for less.
 FUZZ ?= --count 100000
@@ -34,16 +35,17 @@ model: $(DEV)/.ready
 # Inference only: no torch.
 $(SERVE)/.ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(SERVE)
-	$(SERVE)/bin/python -m pip install --quiet --constraint constraints.txt --editable .
+	$(SERVE)/bin/python -m pip install --quiet --editable .
 	touch $@
 
 $(DEV)/.ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(DEV)
-	$(DEV)/bin/python -m pip install --quiet --constraint constraints.txt torch==2.13.0
-	$(DEV)/bin/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(DEV)/bin/python -m pip install --quiet torch==2.13.0
+	$(DEV)/bin/python -m pip install --quiet --editable '.[dev]'
 	touch $@
 
 # Resolve every dependency anew within pyproject's ranges and write the pins.
+constraints: export PIP_CONSTRAINT :=
 constraints:
 	rm -rf .venv-constraints
 	$(PYTHON) -m venv .venv-constraints
@@ -54,4 +56,4 @@ constraints:
 	rm -rf .venv-constraints
 
 clean:
-	rm -rf $(SERVE) $(DEV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis results/cache
+	rm -rf $(SERVE) $(DEV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis tests/node/node_modules results/cache
