@@ -29,8 +29,8 @@ TRIANGLES, STRIP = 4, 5
 BYTES_PER_FACE = 300
 BYTES_PER_FACE_AND_TABLE = 120
 BYTES_PER_POINT_AND_ATTRIBUTE = 80
-# Arenas of the allocator, which are address space and not memory.
-SLACK = 256 * 2**20
+# What the allocator may reserve beside.
+SLACK = 64 * 2**20
 
 
 class CompressedPrimitive(Part):

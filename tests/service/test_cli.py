@@ -277,3 +277,27 @@ def test_help_names_the_commands() -> None:
     shown = subprocess.run([executable, "--help"], check=True, capture_output=True, text=True)
     for command in ("subdivide", "serve", "info", "example"):
         assert command in shown.stdout
+
+
+def test_a_gltf_is_read_with_the_files_of_its_own_folder(pns: Any, tmp_path: Path) -> None:
+    container = read_glb(part_glb())
+    tree = msgspec.json.decode(container.text)
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "part.bin").write_bytes(bytes(container.binary or b""))
+    source = tmp_path / "in" / "part.gltf"
+    for uri, code in (("part.bin", 0), ("other.bin", 1), ("../part.bin", 1)):
+        tree["buffers"][0]["uri"] = uri
+        source.write_bytes(msgspec.json.encode(tree))
+        done = pns("subdivide", "in/part.gltf", "-o", "out.glb", "--scheme", "loop")
+        assert done.code == code
+        assert len(done.err.splitlines()) == 1
+    assert "buffers" in tree_of(tmp_path / "out.glb")
+
+
+@pytest.mark.parametrize("compress", ["draco", "meshopt"])
+def test_compressed_files_are_written_and_read(pns: Any, part_file: Path, compress: str) -> None:
+    assert pns("subdivide", "part.glb", "-o", "packed.glb", "--compress", compress).code == 0
+    assert tree_of(part_file.with_name("packed.glb"))["extensionsRequired"]
+    done = pns("subdivide", "packed.glb", "-o", "again.obj")
+    assert done.code == 0
+    assert f"{16 * FACES:,} faces" in done.err

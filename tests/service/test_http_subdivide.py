@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import time
+import zipfile
 from collections.abc import Iterator
 from typing import Any
 
@@ -70,6 +72,41 @@ def test_every_way_to_send_a_file_gives_the_same_answer(client: TestClient, part
     in_form = client.post("/subdivide", files={"file": text})
     assert as_json.content == in_form.content
     assert report_of(as_json)["levels"] == report_of(raw)["levels"]
+
+
+def test_files_beside_the_document_come_as_parts_or_in_an_archive(
+    client: TestClient, part: bytes
+) -> None:
+    container = read_glb(part)
+    tree = msgspec.json.decode(container.text)
+    tree["buffers"][0]["uri"] = "data/part%201.bin"
+    text, binary = msgspec.json.encode(tree), bytes(container.binary or b"")
+    named = {"file": ("part.gltf", text), "data/part 1.bin": ("part 1.bin", binary)}
+    in_parts = client.post("/subdivide", files=named)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("scene/part.gltf", text)
+        archive.writestr("scene/data/part 1.bin", binary)
+    raw = client.post(
+        "/subdivide", content=packed.getvalue(), headers={"Content-Type": "application/zip"}
+    )
+    in_form = client.post("/subdivide", files={"file": ("part.zip", packed.getvalue())})
+    assert report_of(in_parts)["totals"]["faces"] == 4 * FACES
+    assert in_parts.content == raw.content == in_form.content
+
+    missing = client.post("/subdivide", files={"file": ("part.gltf", text)})
+    assert missing.status_code == 422
+    assert missing.json()["code"] == "missing-file"
+    assert missing.json()["pointer"] == "/buffers/0/uri"
+
+
+@pytest.mark.parametrize("compress", ["draco", "meshopt"])
+def test_compressed_answers_are_smaller(client: TestClient, part: bytes, compress: str) -> None:
+    plain = client.post("/subdivide", content=part, headers=GLB)
+    packed = client.post(f"/subdivide?compress={compress}", content=part, headers=GLB)
+    assert report_of(packed)["totals"] == report_of(plain)["totals"]
+    assert len(packed.content) < 0.8 * len(plain.content)
+    assert client.post("/subdivide?compress=zip", content=part, headers=GLB).status_code == 422
 
 
 def test_accept_json_gives_the_same_report_alone(client: TestClient, part: bytes) -> None:
