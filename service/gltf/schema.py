@@ -80,6 +80,8 @@ class Accessor(Part):
     byte_offset: Index = 0
     normalized: bool = False
     sparse: Sparse | None = None
+    name: str | None = None
+    extras: Any = None
 
 
 class Primitive(Part):

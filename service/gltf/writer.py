@@ -164,9 +164,13 @@ class Writer:
 def describe(
     accessor: dict[str, Any], before: Accessor | None, name: str, values: Shaped[np.ndarray, "N K"]
 ) -> None:
-    """Say of an attribute's accessor what its type does not."""
-    if before is not None and before.normalized:
-        accessor["normalized"] = True
+    """Say of an attribute's accessor what its type does not, as the one before it did."""
+    if before is not None:
+        if before.normalized:
+            accessor["normalized"] = True
+        # Some readers name a morph target by its accessor.
+        given = {"name": before.name, "extras": before.extras}
+        accessor.update({key: value for key, value in given.items() if value is not None})
     if name == "POSITION":
         accessor["min"] = values.min(axis=0).tolist()
         accessor["max"] = values.max(axis=0).tolist()

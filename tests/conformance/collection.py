@@ -86,15 +86,12 @@ class Conformance:
 def _arrays(primitive):
     """Faces over the vertices that they use, and what these carry."""
     indices = np.frombuffer(base64.b64decode(primitive["indices"]), np.uint32)
-    used, faces = np.unique(indices, return_inverse=True)
-    skin = {
-        name: _floats(primitive[key], 4)[used] if key in primitive else np.zeros((0, 4))
-        for name, key in (("joints", "skinIndex"), ("weights", "skinWeight"))
-    }
-    return skin | {
-        "faces": faces.reshape(-1, 3),
-        "points": _floats(primitive["position"], 3)[used],
-        "targets": [_floats(target, 3)[used] for target in primitive["targets"]],
+    return {
+        "faces": indices.astype(np.int64).reshape(-1, 3),
+        "points": _floats(primitive["position"], 3),
+        "targets": [_floats(target, 3) for target in primitive["targets"]],
+        "joints": _floats(primitive.get("skinIndex", ""), 4),
+        "weights": _floats(primitive.get("skinWeight", ""), 4),
     }
 
 

@@ -83,21 +83,24 @@ async function describe(gltf) {
 function primitive({ isMesh, geometry }) {
   const { index, attributes, morphAttributes } = geometry;
   const count = attributes.position.count;
-  const indices = Uint32Array.from({ length: index?.count ?? count }, (_, i) => index?.getX(i) ?? i);
+  const corners = Array.from({ length: index?.count ?? count }, (_, i) => index?.getX(i) ?? i);
+  // Primitives may share the vertices of a whole file: only those in use are printed.
+  const used = [...new Set(corners)];
+  const place = new Map(used.map((vertex, i) => [vertex, i]));
   const kept = ["position", "skinIndex", "skinWeight"].filter((name) => name in attributes);
   return {
     triangles: Boolean(isMesh),
-    indices: base64(indices),
-    ...Object.fromEntries(kept.map((name) => [name, base64(components(attributes[name]))])),
-    targets: (morphAttributes.position ?? []).map((target) => base64(components(target))),
+    indices: base64(Uint32Array.from(corners, (vertex) => place.get(vertex))),
+    ...Object.fromEntries(kept.map((name) => [name, base64(components(attributes[name], used))])),
+    targets: (morphAttributes.position ?? []).map((target) => base64(components(target, used))),
   };
 }
 
 // As three.js shows them to a shader: dequantised, and without gaps.
-function components(attribute) {
+function components(attribute, vertices) {
   const width = attribute.itemSize;
-  return Float32Array.from({ length: attribute.count * width }, (_, i) =>
-    attribute.getComponent(Math.floor(i / width), i % width),
+  return Float32Array.from({ length: vertices.length * width }, (_, i) =>
+    attribute.getComponent(vertices[Math.floor(i / width)], i % width),
   );
 }
 

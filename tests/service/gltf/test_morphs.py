@@ -152,10 +152,14 @@ def test_weights_names_and_bounds_stay_valid(tmp_path):
             "samplers": [{"input": times, "output": output}],
         }
     ]
+    first = tree["meshes"][0]["primitives"][0]["targets"][0]["POSITION"]
+    tree["accessors"][first] |= {"name": "smile", "extras": {"by": "hand"}}
     data = files.pack(tree, binary)
     result = subdivide_gltf(data, "glb", Options(scheme="loop", levels=2), None, Limits())
     after, _ = files.unpack(result.glb)
-    assert after["animations"] == tree["animations"]
+    assert after["animations"][0]["channels"] == tree["animations"][0]["channels"]
+    written = after["accessors"][after["meshes"][0]["primitives"][0]["targets"][0]["POSITION"]]
+    assert (written["name"], written["extras"]) == ("smile", {"by": "hand"})
     for key in ("weights", "extras"):
         assert after["meshes"][0][key] == tree["meshes"][0][key]
     for index, values in zip(
