@@ -13,7 +13,7 @@ import zlib
 from dataclasses import dataclass, field
 from functools import partial
 
-from service.errors import LimitError, ServiceError, UnreadableError
+from service.errors import ServiceError, UnreadableError, check_limit
 from service.gltf.neighbours import File, Neighbours, relative_name
 
 MAX_ENTRIES = 1024
@@ -48,8 +48,7 @@ def open_archive(data: bytes, max_bytes: int) -> tuple[File, Neighbours]:
     """
     # Counted in the raw bytes before the library makes an object of each; chance adds hardly one.
     count = data.count(_INDEX_ENTRY)
-    if count > MAX_ENTRIES:
-        raise _over("archive-entries", MAX_ENTRIES, count)
+    check_limit("archive-entries", count, MAX_ENTRIES, f"the archive has {count} entries")
     try:
         opened = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, NotImplementedError, ValueError, EOFError) as error:
@@ -90,8 +89,8 @@ def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
         if name in entries:
             raise ArchiveError("two entries have the same name")
         entries[name] = entry
-    if index_bytes > MAX_INDEX_BYTES:
-        raise _over("archive-index", MAX_INDEX_BYTES, index_bytes)
+    text = f"the archive's index has {index_bytes} bytes"
+    check_limit("archive-index", index_bytes, MAX_INDEX_BYTES, text)
     return entries
 
 
@@ -111,18 +110,9 @@ class _Unpacker:
             with self.opened.open(self.entries[name]) as file:
                 while piece := file.read(_PIECE):
                     self.unpacked += len(piece)
-                    if self.unpacked > allowed:
-                        raise _over("archive-bytes", allowed, self.unpacked)
+                    text = f"the archive unpacks to {self.unpacked} bytes or more"
+                    check_limit("archive-bytes", self.unpacked, allowed, text)
                     pieces.append(piece)
         except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, ValueError) as error:
             raise UnreadableError(f"the archive cannot be read: {error}") from error
         return File(name, b"".join(pieces))
-
-
-def _over(limit: str, allowed: int, found: int) -> LimitError:
-    return LimitError(
-        f"the archive is over a limit ({limit}): {found}, more than {allowed}",
-        limit=limit,
-        allowed=allowed,
-        found=found,
-    )

@@ -155,6 +155,12 @@ class WorkerDied(ServiceError):  # noqa: N818
     title = "The worker process ended unexpectedly"
 
 
+def check_limit(limit: str, found: int, allowed: int, text: str) -> None:
+    """Raise LimitError where `found` is more than `allowed`; `text` says what has so much."""
+    if found > allowed:
+        raise LimitError(f"{text}, more than {allowed}", limit=limit, allowed=allowed, found=found)
+
+
 def _restore_limit_error(kind: type[LimitError], state: dict[str, object]) -> LimitError:
     error = kind.__new__(kind)
     Exception.__init__(error, state["detail"])

@@ -7,7 +7,7 @@ import asyncio
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service import problems
-from service.errors import LimitError, ServiceError, UnreadableError
+from service.errors import ServiceError, UnreadableError, check_limit
 
 
 class UploadTimeoutError(ServiceError):
@@ -51,13 +51,7 @@ class BodyLimit:
                 self._check(int(value))
 
     def _check(self, size: int) -> None:
-        if size > self.max_bytes:
-            raise LimitError(
-                f"the body is larger than {self.max_bytes} bytes",
-                limit="body",
-                allowed=self.max_bytes,
-                found=size,
-            )
+        check_limit("body", size, self.max_bytes, f"the body has {size} bytes or more")
 
     def _counted(self, receive: Receive) -> Receive:
         size = 0

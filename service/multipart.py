@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import MultipartParser, parse_options_header
 
-from service.errors import LimitError, ServiceError, UnreadableError
+from service.errors import ServiceError, UnreadableError, check_limit
 from service.gltf.neighbours import File, Neighbours, relative_name
 
 # A part has three or four short headers; a megabyte of them is an attack.
@@ -55,13 +55,8 @@ class _Parts:
         }
 
     def _part_begin(self) -> None:
-        if len(self.parts) == MAX_PARTS:
-            raise LimitError(
-                f"the body has more than {MAX_PARTS} parts",
-                limit="parts",
-                allowed=MAX_PARTS,
-                found=MAX_PARTS + 1,
-            )
+        count = len(self.parts) + 1
+        check_limit("parts", count, MAX_PARTS, f"the body has {count} parts or more")
         self.parts.append(_Part())
         self._header_bytes = 0
 

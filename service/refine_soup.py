@@ -13,10 +13,10 @@ from pns_common.errors import MeshError
 from pns_common.mesh import Mesh, clean, repeated_vertex
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme
-from service.errors import InvalidParameter, LimitError, UnrefinableError
+from service.errors import InvalidParameter, UnrefinableError, check_limit
 from service.gltf.charts import uv_blend
 from service.gltf.lattice import lattice
-from service.gltf.plan import BYTES_PER_FACE
+from service.gltf.plan import BYTES_PER_FACE, check_memory
 from service.gltf.report import Change
 from service.gltf.share import refined_ids
 from service.gltf.spread import spread
@@ -80,18 +80,8 @@ def refine_soup(
 
 
 def _check_cost(faces: int, limits: Limits) -> None:
-    for name, allowed, found in (
-        ("faces", limits.max_faces, faces),
-        ("memory", limits.max_memory_bytes, faces * BYTES_PER_FACE),
-    ):
-        if found > allowed:
-            raise LimitError(
-                f"the refined mesh would take {found} {'bytes' if name == 'memory' else name}, "
-                f"more than {allowed}",
-                limit=name,
-                allowed=allowed,
-                found=found,
-            )
+    check_limit("faces", faces, limits.max_faces, f"the refined file would have {faces} faces")
+    check_memory(faces * BYTES_PER_FACE, limits)
 
 
 def _welded(soup: TriangleSoup) -> Weld:

@@ -17,7 +17,7 @@ from starlette.types import Receive
 
 from service import documentation, media
 from service.answer import FileAnswer
-from service.errors import LimitError, MediaTypeError, NoModelError
+from service.errors import MediaTypeError, NoModelError, check_limit
 from service.gate import DrainingError, Gate
 from service.jobs import Work
 from service.memory_file import MemoryFile
@@ -71,13 +71,7 @@ def router(service: Service) -> APIRouter:
 async def _subdivide(service: Service, request: Request, parameters: Parameters) -> Response:
     settings = service.settings
     options = parameters.options()
-    if options.levels > settings.levels:
-        raise LimitError(
-            f"levels is {options.levels}; this service refines {settings.levels} at most",
-            limit="levels",
-            allowed=settings.levels,
-            found=options.levels,
-        )
+    check_limit("levels", options.levels, settings.levels, f"levels is {options.levels}")
     content_type = request.headers.get("content-type", "")
     media.of_request(content_type)
     if request.headers.get("content-encoding", "identity").lower() != "identity":

@@ -6,7 +6,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from service.errors import LimitError, UnreadableError
+from service.errors import UnreadableError, check_limit
 
 MAGIC = b"glTF"
 VERSION = 2
@@ -71,13 +71,7 @@ def write_glb(
     for kind, data in others:
         pieces += _padded_chunk(kind, [data], b"\0")
     length = _HEADER.size + sum(len(piece) for piece in pieces)
-    if length > _LARGEST:
-        raise LimitError(
-            f"the refined file would have {length} bytes, more than a GLB can hold",
-            limit="glb-bytes",
-            allowed=_LARGEST,
-            found=length,
-        )
+    check_limit("glb-bytes", length, _LARGEST, f"the refined GLB would have {length} bytes")
     return b"".join([_HEADER.pack(MAGIC, VERSION, length), *pieces])
 
 

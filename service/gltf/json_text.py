@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from service.errors import GltfError, LimitError, UnreadableError
+from service.errors import GltfError, UnreadableError, check_limit
 from service.options import Limits
 
 # Possessive, and an unterminated string runs to the end: no quote is ever looked at twice, however
@@ -46,21 +46,9 @@ def encode(value: Any) -> bytes:
 
 def _check_size(text: bytes, limits: Limits) -> None:
     items = sum(text.count(mark) for mark in b'{[,:"')
-    if items > limits.max_json_items:
-        raise LimitError(
-            f"the JSON holds {items} separators, more than {limits.max_json_items}",
-            limit="json-items",
-            allowed=limits.max_json_items,
-            found=items,
-        )
+    check_limit("json-items", items, limits.max_json_items, f"the JSON holds {items} separators")
     depth = _depth(text)
-    if depth > limits.max_json_depth:
-        raise LimitError(
-            f"the JSON nests {depth} deep, more than {limits.max_json_depth}",
-            limit="json-depth",
-            allowed=limits.max_json_depth,
-            found=depth,
-        )
+    check_limit("json-depth", depth, limits.max_json_depth, f"the JSON nests {depth} deep")
 
 
 def _depth(text: bytes) -> int:

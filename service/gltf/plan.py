@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from service.errors import LimitError, UnrefinableError
+from service.errors import LimitError, UnrefinableError, check_limit
 from service.gltf.accessors import element_size
 from service.gltf.modes import SURFACES, triangle_count
 from service.gltf.schema import Document, Primitive
@@ -75,16 +75,9 @@ def check_cost(
         LimitError: over `max_faces` or `max_memory_bytes`.
     """
     faces = sum(mesh.faces for mesh in plans) * 4**levels
-    if faces > limits.max_faces:
-        raise LimitError(
-            f"the refined file would have {faces} faces, more than {limits.max_faces}",
-            limit="faces",
-            allowed=limits.max_faces,
-            found=faces,
-        )
+    check_limit("faces", faces, limits.max_faces, f"the refined file would have {faces} faces")
     memory = predicted_memory(document, plans, size, levels) + faces * bytes_per_face
-    if memory > limits.max_memory_bytes:
-        raise over_memory(limits.max_memory_bytes, memory)
+    check_memory(memory, limits)
 
 
 def check_decoded(decoded: int, size: int, limits: Limits) -> None:
@@ -93,13 +86,16 @@ def check_decoded(decoded: int, size: int, limits: Limits) -> None:
     Raises:
         LimitError: over `max_memory_bytes`.
     """
-    memory = decoded + BYTES_PER_INPUT_BYTE * size
-    if memory > limits.max_memory_bytes:
-        raise over_memory(limits.max_memory_bytes, memory)
+    check_memory(decoded + BYTES_PER_INPUT_BYTE * size, limits)
+
+
+def check_memory(found: int, limits: Limits) -> None:
+    """Check bytes that work will take, before it takes them. Raises LimitError."""
+    check_limit("memory", found, limits.max_memory_bytes, f"the work would take {found} bytes")
 
 
 def over_memory(allowed: int, found: int) -> LimitError:
-    """The error of work that would take more memory than a job may."""
+    """The error of work that took more memory than was predicted."""
     return LimitError(
         f"the work would take {found} bytes, more than {allowed}",
         limit="memory",

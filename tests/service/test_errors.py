@@ -45,3 +45,12 @@ def test_codes_are_slugs_of_their_own():
 
 def test_the_text_names_the_place():
     assert str(errors.GltfError("index 9", pointer="/accessors/3")) == "index 9 (at /accessors/3)"
+
+
+def test_a_limit_allows_what_it_says_and_refuses_one_more():
+    errors.check_limit("faces", 5, 5, "there are 5 faces")
+    with pytest.raises(errors.LimitError) as refusal:
+        errors.check_limit("faces", 6, 5, "there are 6 faces")
+    found = refusal.value
+    assert (found.limit, found.found, found.allowed) == ("faces", 6, 5)
+    assert str(found) == "there are 6 faces, more than 5"

@@ -217,6 +217,7 @@ def test_the_description_names_bodies_parameters_and_errors(client: TestClient) 
     assert set(operation["requestBody"]["content"]) == {
         "model/gltf-binary",
         "model/gltf+json",
+        "application/zip",
         "multipart/form-data",
     }
     names = {parameter["name"] for parameter in operation["parameters"]}
@@ -229,6 +230,7 @@ def test_the_description_names_bodies_parameters_and_errors(client: TestClient) 
         "uv",
         "crease",
         "weld_tolerance",
+        "compress",
     }
     statuses = {"200", "400", "408", "413", "415", "422", "500", "503", "504"}
     assert set(operation["responses"]) == statuses
