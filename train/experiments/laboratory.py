@@ -12,6 +12,7 @@ from train.ablations import PNS, Variant, fit_variant
 from train.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from train.datasets import DATASETS, Dataset
 from train.determinism import machine_fingerprint
+from train.experiments.sources import sources_of
 from train.networks import BoundedNet
 from train.recipes import Recipe
 from train.torch_model import recipe_model
@@ -93,9 +94,7 @@ class Laboratory:
 
 
 def _digest(recipe: Recipe, variant: Variant) -> str:
-    """Return a short hash of what decides the weights: the recipe, the rule, the trainer's code."""
-    folder = Path(__file__).resolve().parents[1]
-    modules = ("ablations", "batch", "datasets", "grid", "losses", "networks", "one_step")
+    """Return a short hash of what decides the weights: the recipe, the rule, the code."""
     parts = [msgspec.json.encode(recipe), variant.name.encode()]
-    parts += [(folder / f"{module}.py").read_bytes() for module in (*modules, "trainer")]
+    parts += [path.read_bytes() for path in sources_of("train.ablations")]
     return hashlib.sha256(b"\n".join(parts)).hexdigest()[:12]

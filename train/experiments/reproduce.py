@@ -2,7 +2,7 @@
 
 import csv
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,9 +11,8 @@ import msgspec
 from train.determinism import deterministic
 from train.experiments.experiment import Cell, Column, Experiment, Figure, Table
 from train.experiments.laboratory import Laboratory
+from train.experiments.sources import sources_of
 from train.experiments.style import shared_style
-
-PACKAGE = Path(__file__).resolve().parents[2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,18 +73,13 @@ def read_record(path: Path) -> Record | None:
 
 def content_key(experiment: Experiment, laboratory: Laboratory) -> str:
     """Return a hash of an experiment's inputs: code, scale, given checkpoints, published data."""
-    own = Path(PACKAGE / f"{experiment.run.__module__.replace('.', '/')}.py")
-    sources: list[Path] = [own]
-    for folder in ("pns_common", "train", "train/baselines"):
-        sources += (PACKAGE / folder).glob("*.py")
-    sources += [PACKAGE / "train" / "experiments" / "experiment.py"]
     inputs: list[Path] = []
     if laboratory.checkpoints is not None:
         inputs += laboratory.checkpoints.glob("*.safetensors")
     if experiment.needs_published and laboratory.published is not None:
         inputs += (path for path in laboratory.published.rglob("*") if path.is_file())
     digest = hashlib.sha256(msgspec.json.encode(laboratory.scale))
-    for path in (*_in_order(sources), *_in_order(inputs)):
+    for path in (*sources_of(experiment.run.__module__), *sorted(inputs)):
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
@@ -132,10 +126,6 @@ def _written(record: Record, output: Path) -> bool:
     for figure in record.figures:
         names += [output / "figures" / f"{figure.name}.{ending}" for ending in ("png", "pdf")]
     return all(path.is_file() for path in names)
-
-
-def _in_order(paths: Iterable[Path]) -> Sequence[Path]:
-    return sorted(set(paths))
 
 
 def _replace(path: Path, write: Callable[[Path], object]) -> None:
