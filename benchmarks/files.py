@@ -9,6 +9,8 @@ from benchmarks.generated import torus
 from benchmarks.memory import in_fresh_process, peak_mib, reset_peak
 from pns_common import load_model
 from service.errors import ServiceError
+from service.folder import folder_of
+from service.gltf.neighbours import ALONE, Neighbours
 from service.options import Limits, Options
 from service.soup import TriangleSoup
 from service.soup_glb import soup_glb
@@ -44,7 +46,7 @@ class MeasuredFile:
 
 def measure_file(path: Path, levels: int) -> MeasuredFile:
     """Refine a file on disk in a process of its own."""
-    return in_fresh_process(_measure, path.read_bytes(), levels)
+    return in_fresh_process(_measure, path.read_bytes(), levels, folder_of(path))
 
 
 def measure_generated(faces: int, levels: int) -> MeasuredFile:
@@ -54,14 +56,16 @@ def measure_generated(faces: int, levels: int) -> MeasuredFile:
     return in_fresh_process(_measure, data, levels)
 
 
-def _measure(data: bytes, levels: int) -> MeasuredFile:
+def _measure(data: bytes, levels: int, neighbours: Neighbours = ALONE) -> MeasuredFile:
     model, limits = load_model(), Limits(max_faces=10**8, max_memory_bytes=10**11)
     media = "glb" if data[:4] == b"glTF" else "gltf"
     try:
-        subdivide_gltf(data, media, Options(levels), model, limits)  # warm
+        subdivide_gltf(data, media, Options(levels), model, limits, neighbours=neighbours)  # warm
         reset_peak()
         clock = MemoryStopwatch(base=peak_mib())
-        done = subdivide_gltf(data, media, Options(levels), model, limits, clock=clock)
+        done = subdivide_gltf(
+            data, media, Options(levels), model, limits, clock=clock, neighbours=neighbours
+        )
     except ServiceError as error:
         return MeasuredFile(refused=f"{error.code}: {error.detail}")
     return MeasuredFile(done.report["totals"]["faces"], clock.seconds, clock.mib)
