@@ -137,6 +137,8 @@ def variant_scheme(variant: Variant, network: BoundedNet, recipe: Recipe) -> Sch
 
     def edge_rule(level: ControlLevel) -> Placement:
         base, topology = loop_edge_rule(level), level.topology
+        if level.reference_length == 0:
+            return base
         interior = topology.interior
         stencil, faces = topology.stencil[interior], topology.edge_faces[interior]
         at = edge_stencil(torch.tensor(level.points), torch.tensor(level.normals), stencil, faces)

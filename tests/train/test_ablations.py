@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
 
 from pns_common import Mesh, loop, refine
 from pns_common.schemes import pns
-from tests.meshes import bent, bumpy_sphere, grid, rotation
+from tests.meshes import bent, bumpy_sphere, grid, rotation, soups
 from train.ablations import (
     PNS,
     UNCONSTRAINED,
@@ -102,3 +103,18 @@ def test_every_variant_learns(variant):
     recipe = replace(variant_recipe(ridge(), variant), steps=12)
     losses = fit_variant(variant, recipe, lambda *_: None).losses
     assert losses[-1] < losses[0]
+
+
+@pytest.mark.parametrize("variant", VARIANTS.values(), ids=lambda one: one.name)
+@settings(max_examples=10)
+@given(mesh=soups())
+def test_every_variant_refines_any_mesh_over_and_over(variant, mesh):
+    recipe = variant_recipe(ridge(), variant)
+    scheme = variant_scheme(variant, initial_network(recipe), recipe)
+    assert np.isfinite(refine(mesh, scheme, levels=2, threads=1).mesh.vertices).all()
+
+
+def test_a_mesh_without_size_is_left_to_loop():
+    point = Mesh(np.ones((4, 3)), np.array([[0, 1, 2], [2, 1, 3]]))
+    found = refine(point, loud_scheme(UNCONSTRAINED)).mesh.vertices
+    np.testing.assert_array_equal(found, 1)
