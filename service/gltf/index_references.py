@@ -60,10 +60,14 @@ class Reference:
         self.holder[self.key] = index
 
 
-def unknown_extensions(tree: dict[str, Any]) -> list[str]:
-    """The extensions in use that may hold numbers which `references` does not see."""
+def unknown_extensions(tree: dict[str, Any], text: bytes) -> list[str]:
+    """The extensions in use that may hold numbers which `references` does not see.
+
+    `text` is the JSON that the tree came from: most files have no extension, and a search tells.
+    """
     found = {name for key in ("extensionsUsed", "extensionsRequired") for name in tree.get(key, [])}
-    pending: list[Any] = [tree]
+    # An escape could spell the word too.
+    pending: list[Any] = [tree] if b'"extensions"' in text or b"\\u" in text else []
     while pending:
         value = pending.pop()
         if isinstance(value, dict):

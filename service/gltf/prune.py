@@ -25,17 +25,22 @@ class Spare:
         accessors, views: the file's own, that surfaces use; all later ones are spare as well.
         accessor_count, view_count: how many the file had.
         ranges: (buffer, start, end) of compressed data that have been decoded.
+        unknown: extensions that may point at any of it.
     """
 
     accessors: frozenset[int]
     views: frozenset[int]
     accessor_count: int
     view_count: int
-    ranges: tuple[tuple[int, int, int], ...] = ()
+    ranges: tuple[tuple[int, int, int], ...]
+    unknown: tuple[str, ...]
 
 
 def spare(
-    document: Document, draco_views: Iterable[int], ranges: Iterable[tuple[int, int, int]]
+    document: Document,
+    draco_views: Iterable[int],
+    ranges: Iterable[tuple[int, int, int]],
+    unknown: Iterable[str],
 ) -> Spare:
     """What the surfaces of a document, as it came, stand on."""
     accessors: set[int] = set()
@@ -58,6 +63,7 @@ def spare(
         len(document.accessors),
         len(document.buffer_views),
         tuple(ranges),
+        tuple(unknown),
     )
 
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from service.gltf.extensions import withdraw
-from service.gltf.index_references import unknown_extensions
 from service.gltf.modes import FAN, STRIP
 from service.gltf.plan import MeshPlan
 from service.gltf.prune import Spare
@@ -34,11 +33,10 @@ def storage_changes(document: Document, plans: Sequence[MeshPlan]) -> list[Chang
 
 def remove_replaced(writer: Writer, spare: Spare) -> list[Change]:
     """Let the geometry that was replaced leave the file, unless something may still point at it."""
-    unknown = unknown_extensions(writer.tree)
-    if not unknown:
+    if not spare.unknown:
         writer.remove(spare)
         return []
-    names = ", ".join(unknown)
+    names = ", ".join(spare.unknown)
     return [Change("/bufferViews", f"replaced geometry kept: {names} may refer to it", 1)]
 
 

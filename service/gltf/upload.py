@@ -9,6 +9,7 @@ from service.gltf.buffers import resolve_buffers
 from service.gltf.container import Container, read_glb
 from service.gltf.draco import decode_primitives
 from service.gltf.images import embed_images
+from service.gltf.index_references import unknown_extensions
 from service.gltf.json_text import decode_object
 from service.gltf.meshopt import decode_views
 from service.gltf.neighbours import ALONE, Neighbours, Opened
@@ -73,7 +74,8 @@ def read_upload(
     images = embed_images(tree, document, buffers, opened)
     size = len(data) + opened.size
     ranges = decode_views(tree, document, buffers, size, limits)
-    document = view(tree)
+    if ranges or len(buffers) > stored:
+        document = view(tree)
     check_references(document, buffers)
     draco_views = decode_primitives(tree, document, buffers, size, limits)
     if draco_views:
@@ -95,5 +97,5 @@ def read_upload(
     plans = plan(document)
     size += sum(len(buffer) for buffer in buffers[stored:])
     check_cost(document, plans, size, levels, limits, bytes_per_face)
-    leavable = spare(original, draco_views, ranges)
+    leavable = spare(original, draco_views, ranges, unknown_extensions(tree, container.text))
     return Upload(container, tree, document, buffers, plans, changes, leavable)
