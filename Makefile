@@ -3,10 +3,11 @@
 PYTHON ?= python3
 SERVE  := .venv-serve
 DEV    := .venv
+BLENDER := .venv-blender
 # Pins what is installed, and what builds it.
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
-.PHONY: serve test lint unit fuzz model constraints clean
+.PHONY: serve test lint unit fuzz model constraints clean blender
 
 serve: $(SERVE)/.ready
 	$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
@@ -32,6 +33,16 @@ model: $(DEV)/.ready
 	$(DEV)/bin/python train/run.py
 	$(DEV)/bin/python export/run.py
 
+# Blender imports, animates and renders a skinned and a morphed result: docs/blender-*.png. bpy is
+# large, for Python 3.11 alone, and wants an older numpy: it has a venv of its own, without our pins.
+blender: $(DEV)/.ready $(BLENDER)/.ready
+	$(DEV)/bin/python -m tests.blender.run $(BLENDER)/bin/python
+
+$(BLENDER)/.ready: tests/blender/requirements.txt
+	$(PYTHON) -m venv $(BLENDER)
+	PIP_CONSTRAINT= $(BLENDER)/bin/python -m pip install --quiet --requirement tests/blender/requirements.txt
+	touch $@
+
 # Inference only: no torch.
 $(SERVE)/.ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(SERVE)
@@ -56,4 +67,4 @@ constraints:
 	rm -rf .venv-constraints
 
 clean:
-	rm -rf $(SERVE) $(DEV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis tests/node/node_modules results/cache
+	rm -rf $(SERVE) $(DEV) $(BLENDER) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis tests/node/node_modules results/cache

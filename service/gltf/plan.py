@@ -16,7 +16,7 @@ from service.options import Limits
 BYTES_PER_FACE = 350
 BYTES_PER_FACE_WITH_NORMALS = 550
 # The levels' connectivity again, and a block of columns, for skins and morph targets.
-BYTES_PER_FACE_WITH_FOLLOWERS = 250
+BYTES_PER_FACE_WITH_FOLLOWERS = 200
 # A refined face has at most 1.5 vertices: made, cast to float32, written.
 BYTES_PER_VERTEX_BYTE = 3
 # Its arrays' headers, and its accessors in the JSON (9 KiB measured over 20,000 primitives).

@@ -12,7 +12,7 @@ import bpy
 from mathutils import Vector
 
 SAMPLES = 24
-WIDTH, HEIGHT = 960, 480
+WIDTH, HEIGHT = 840, 420
 GAP = 0.15
 # From the scene towards the eye, z up.
 VIEW = Vector((0.8, -1.0, 0.45))
