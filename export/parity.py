@@ -1,6 +1,7 @@
 """Does the file say what the trained network says? Checked before anything is written."""
 
 import copy
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,10 @@ import torch
 from jaxtyping import Float
 
 from pns_common.errors import PnsError
-from pns_common.schemes import Model
+from pns_common.features import FEATURE_SETS
+from pns_common.onnx_model import OnnxModel
+from pns_common.ring_features import RING_FEATURE_SETS
+from pns_common.symmetry import Feature
 from train.networks import BoundedNet
 
 TOLERANCE = 1e-6
@@ -39,7 +43,12 @@ class ParityError(PnsError):
         )
 
 
-def check_parity(model: Model, network: BoundedNet, tolerance: float = TOLERANCE) -> Parity:
+def check_parity(
+    model: OnnxModel,
+    network: BoundedNet,
+    tolerance: float = TOLERANCE,
+    vertex_network: BoundedNet | None = None,
+) -> Parity:
     """Compare the file, run by onnxruntime in float32, with the torch network in float64.
 
     Against torch's float32 the rounding of torch would count too; it is the larger of the two.
@@ -47,13 +56,28 @@ def check_parity(model: Model, network: BoundedNet, tolerance: float = TOLERANCE
     Raises:
         ParityError: they differ by more than `tolerance` of a budget.
     """
-    features = sample_features(network.linear_layers[0].in_features)
+    seen = FEATURE_SETS[model.card.features].features
+    edges = _compare(model, network, seen, tolerance)
+    if vertex_network is None or model.card.vertex_features is None:
+        return edges
+    seen = RING_FEATURE_SETS[model.card.vertex_features].features
+    vertices = _compare(model.vertex_correction, vertex_network, seen, tolerance)
+    return Parity(max(edges.difference, vertices.difference), max(edges.length, vertices.length))
+
+
+def _compare(
+    answers: Callable[[np.ndarray, float], np.ndarray],
+    network: BoundedNet,
+    seen: Sequence[Feature],
+    tolerance: float,
+) -> Parity:
+    features = within(sample_features(len(seen)), seen)
     exact = copy.deepcopy(network).double()
     largest, longest = 0.0, 0.0
     for budget in BUDGETS:
         with torch.no_grad():
             expected = exact(torch.from_numpy(features).double(), budget).numpy()
-        found = np.asarray(model(features, budget))
+        found = np.asarray(answers(features, budget))
         difference = float(np.abs(found - expected).max()) / budget
         # Written so that NaN fails it too.
         if not difference <= tolerance:
@@ -61,6 +85,12 @@ def check_parity(model: Model, network: BoundedNet, tolerance: float = TOLERANCE
         largest = max(largest, difference)
         longest = max(longest, float(np.linalg.norm(found, axis=1).max()) / budget)
     return Parity(largest, longest)
+
+
+def within(rows: Float[np.ndarray, "N K"], features: Sequence[Feature]) -> Float[np.ndarray, "N K"]:
+    """Return rows cut to the ranges of their features: no mesh has others."""
+    limits = [feature.limit for feature in features]
+    return np.clip(rows, -np.float32(limits), np.float32(limits))
 
 
 def sample_features(count: int) -> Float[np.ndarray, "N K"]:

@@ -1,4 +1,4 @@
-"""The feature sets that a model card may name.
+"""The feature sets that a model card may name: the paper's five, and those with signed ones.
 
 ``paper-5`` (the paper's section 3.2), one row for each interior edge:
 
@@ -6,11 +6,14 @@
 
 x = 1 − n1 · n2 ∈ [0, 2] is the curvature; the others are shape: real, invariant under scale too.
 All see the two faces of the edge and nothing else, and none has a sign.
+
+``signed-18`` adds to them the thirteen of signed_features.py. docs/features.md defines them all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from types import MappingProxyType
 
 from jaxtyping import Float
@@ -18,6 +21,7 @@ from jaxtyping import Float
 from pns_common.arrays import Array, namespace, norm
 from pns_common.feature_set import Block, FeatureSet
 from pns_common.frames import EdgeFrames, EdgeStencil
+from pns_common.signed_features import DIHEDRAL, ENDS, UMBRELLA, WINGS, vertex_fields
 from pns_common.symmetry import Feature
 
 # Lengths of zero are read as this, so that every logarithm is finite.
@@ -40,13 +44,18 @@ def log_ratios(at: EdgeStencil, frames: EdgeFrames) -> list[Float[Array, " N"]]:
     return [log(norm(side)) - log(frames.length) for side in sides]
 
 
-CURVATURE = Block("curvature", (Feature("x"),), curvature)
-SHAPE = Block("shape", tuple(Feature("log", s) for s in ("ac", "bc", "ad", "bd")), log_ratios)
+CURVATURE = Block("curvature", (Feature("x", limit=2.0),), curvature)
+SHAPE = Block(
+    "shape", tuple(Feature("log", s, limit=inf) for s in ("ac", "bc", "ad", "bd")), log_ratios
+)
 
 paper_features = FeatureSet("paper-5", (CURVATURE, SHAPE))
+signed_features = FeatureSet(
+    "signed-18", (CURVATURE, SHAPE, DIHEDRAL, ENDS, WINGS, UMBRELLA), vertex_fields
+)
 
 FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType(
-    {one.name: one for one in (paper_features,)}
+    {one.name: one for one in (paper_features, signed_features)}
 )
 FEATURE_COUNT: Mapping[str, int] = MappingProxyType(
     {name: one.count for name, one in FEATURE_SETS.items()}

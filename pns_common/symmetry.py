@@ -31,6 +31,7 @@ class Feature:
         vertices: the vertices of the stencil that it belongs to, such as "a" or "bc"; none where it
             belongs to all.
         half_turn, mirror, turn_over: 1 or −1, beside the renaming.
+        limit: the largest absolute value.
     """
 
     kind: str
@@ -38,6 +39,7 @@ class Feature:
     half_turn: int = 1
     mirror: int = 1
     turn_over: int = 1
+    limit: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -50,11 +50,16 @@ def fit(recipe: Recipe, on_step: OnStep) -> Fit:
     return optimise(recipe, lambda network, batch: batch_loss(recipe, network, batch), on_step)
 
 
-def optimise(recipe: Recipe, loss_of: Loss, on_step: OnStep) -> Fit:
-    """Train a recipe's network with Adam against any loss of a batch."""
+def optimise(
+    recipe: Recipe,
+    loss_of: Loss,
+    on_step: OnStep,
+    initial: Callable[[Recipe], BoundedNet] = initial_network,
+) -> Fit:
+    """Train a recipe's network, or another that `initial` makes, against any loss of a batch."""
     instances = DATASETS[recipe.dataset]().instances
     with deterministic():
-        network = initial_network(recipe)
+        network = initial(recipe)
         optimiser = torch.optim.Adam(network.parameters(), lr=recipe.learning_rate)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
             optimiser, T_max=recipe.steps, eta_min=recipe.final_learning_rate

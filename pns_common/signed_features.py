@@ -1,0 +1,85 @@
+"""Features with a sign: they tell a crest from a trough. Definitions: docs/features.md.
+
+With m_v the mean normal of vertex v's faces, u_v the mean of its neighbours less itself and r_v the
+root mean square of its spokes, beside the five of ``paper-5``:
+
+    dihedral   (n1 × n2) · T                 positive on a crest
+    ends       m_a · T, m_b · T, m_a · B, m_b · B
+    wings      m_c · T, m_d · T, m_c · B, m_d · B
+    umbrella   u_v · m_v / r_v               for v = a, b, c, d; negative on a crest
+
+All lie in [−1, 1]; none sees scale. Vertex data is read from ``EdgeStencil.fields``: m_v in the
+first three columns, u_v · m_v / r_v in the fourth.
+"""
+
+from __future__ import annotations
+
+from jaxtyping import Float
+
+from pns_common.arrays import Array, cross, dot, namespace
+from pns_common.feature_set import Block
+from pns_common.frames import EdgeFrames, EdgeStencil
+from pns_common.symmetry import Feature
+from pns_common.topology import Topology
+from pns_common.vertex_fields import divided, mean_normals, ring_square, umbrellas
+
+
+def vertex_fields(points: Float[Array, "V 3"], topology: Topology) -> Float[Array, "V 4"]:
+    """m_v and u_v · m_v / r_v."""
+    xp = namespace(points)
+    normals = mean_normals(points, topology.faces)
+    height = dot(umbrellas(points, topology), normals)[:, None]
+    square = ring_square(points, topology)
+    # No gradient at a root of 0: there the height is 0 too.
+    reach = xp.sqrt(xp.where(square > 0, square, 1.0))
+    return xp.concat([normals, divided(height, xp.where(square > 0, reach, 0.0))], axis=1)
+
+
+def signed_dihedral(at: EdgeStencil, frames: EdgeFrames) -> list[Float[Array, " N"]]:
+    """(n1 × n2) · T: the sine of the angle between the faces, positive on a crest."""
+    return [dot(cross(at.n1, at.n2), frames.tangent)]
+
+
+def end_normals(at: EdgeStencil, frames: EdgeFrames) -> list[Float[Array, " N"]]:
+    """How the surface tilts at the two ends, along the edge and across it."""
+    return _tilts(at, frames, (0, 1))
+
+
+def wing_normals(at: EdgeStencil, frames: EdgeFrames) -> list[Float[Array, " N"]]:
+    """How the surface tilts at the two opposite vertices."""
+    return _tilts(at, frames, (2, 3))
+
+
+def umbrella_heights(at: EdgeStencil, frames: EdgeFrames) -> list[Float[Array, " N"]]:
+    """How far each vertex stands below its neighbours' mean."""
+    fields = _fields(at)
+    return [fields[:, vertex, 3] for vertex in range(4)]
+
+
+def _tilts(
+    at: EdgeStencil, frames: EdgeFrames, vertices: tuple[int, int]
+) -> list[Float[Array, " N"]]:
+    fields = _fields(at)
+    axes = (frames.tangent, frames.binormal)
+    return [dot(fields[:, vertex, :3], axis) for axis in axes for vertex in vertices]
+
+
+def _fields(at: EdgeStencil) -> Float[Array, "N 4 4"]:
+    assert at.fields is not None, "edge_stencil was not given the feature set's fields"
+    return at.fields
+
+
+def _tilt_features(vertices: str) -> tuple[Feature, ...]:
+    along = [Feature("m T", vertex, half_turn=-1, turn_over=-1) for vertex in vertices]
+    across = [Feature("m B", vertex, half_turn=-1, mirror=-1) for vertex in vertices]
+    return (*along, *across)
+
+
+DIHEDRAL = Block("dihedral", (Feature("dihedral", turn_over=-1),), signed_dihedral)
+ENDS = Block("ends", _tilt_features("ab"), end_normals)
+WINGS = Block("wings", _tilt_features("cd"), wing_normals)
+UMBRELLA = Block(
+    "umbrella",
+    tuple(Feature("umbrella", vertex, turn_over=-1) for vertex in "abcd"),
+    umbrella_heights,
+)
