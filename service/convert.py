@@ -23,6 +23,7 @@ from service.gltf.extras import REPORT_KEY
 from service.gltf.report import Change
 from service.options import Limits, Options
 from service.refine_soup import refine_soup
+from service.single_precision import rounding_changes
 from service.soup import TriangleSoup
 from service.soup_glb import as_gltf_json, soup_glb
 from service.subdivide import make_scheme, subdivide_gltf
@@ -60,16 +61,27 @@ def convert(
             refined, report = refine_soup(
                 soup, make_scheme(options, loaded), options, limits, advance
             )
-            written = _of_soup(refined, report, target, options)
+            written = _of_soup(refined, report, target, options, limits)
     replace_file(output, written.content)
     if report_file is not None:
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
         replace_file(report_file, text + b"\n")
-    for change in written.report["changes"]:
-        where = f" ({change['pointer']})" if change["pointer"] else ""
-        console.print(f"{change['count']} × {change['what']}{where}", markup=False)
+    for line in _lines(written.report):
+        console.print(line, markup=False)
     seconds = time.perf_counter() - began
     console.print(f"{output}: {written.faces:,} faces in {seconds:.1f} s", markup=False)
+
+
+def _lines(report: dict[str, Any]) -> Iterator[str]:
+    """What was changed or lost, and where, each thing once."""
+    for change in report["changes"]:
+        where = f" ({change['pointer']})" if change["pointer"] else ""
+        yield f"{change['count']} × {change['what']}{where}"
+    said = {change["what"] for change in report["changes"]}
+    for name, count in report["dropped"].items():
+        what = f"{name.replace('_', ' ')} dropped"
+        if count and what not in said:
+            yield f"{count} × {what}"
 
 
 def _kind(name: str, path: Path) -> str:
@@ -95,14 +107,16 @@ def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) ->
     if target == "gltf":
         return Written(as_gltf_json(glb, limits), report, faces)
     soup, changes = flatten(glb, target, limits)
+    if target not in formats.HOLDS_DOUBLE:
+        changes += rounding_changes(soup)
     # A mesh that several nodes show is there several times.
     return Written(formats.write(soup, target), _with_changes(report, changes), len(soup.faces))
 
 
 def _of_soup(
-    refined: TriangleSoup, report: dict[str, Any], target: str, options: Options
+    refined: TriangleSoup, report: dict[str, Any], target: str, options: Options, limits: Limits
 ) -> Written:
-    changes = []
+    changes = [] if target in formats.HOLDS_DOUBLE else rounding_changes(refined)
     if refined.uv is not None and target not in formats.HOLDS_UV:
         changes.append(Change("", "texture coordinates dropped: the format cannot hold them", 1))
     if options.diagnostics == "full":
@@ -115,7 +129,7 @@ def _of_soup(
         return Written(formats.write(refined, target), report, faces)
     extras = {} if options.diagnostics == "none" else {REPORT_KEY: report}
     glb = soup_glb(refined, extras=extras)
-    return Written(glb if target == "glb" else as_gltf_json(glb, Limits()), report, faces)
+    return Written(glb if target == "glb" else as_gltf_json(glb, limits), report, faces)
 
 
 def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:

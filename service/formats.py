@@ -16,6 +16,7 @@ from service.soup import NUMBER, TriangleSoup
 
 GLTF_KINDS = ("glb", "gltf")
 MESH_KINDS = ("obj", "ply", "stl", "off")
+HOLDS_DOUBLE = frozenset({"obj", "off"})
 HOLDS_UV = frozenset({"obj", *GLTF_KINDS})
 
 _OBJ_UV = re.compile(rb"^[ \t]*vt[ \t]", re.MULTILINE)
@@ -48,6 +49,7 @@ def read(data: bytes, kind: str) -> TriangleSoup:
         vertices=np.concatenate([np.asarray(part.vertices, dtype=np.float64) for part in parts]),
         faces=faces.astype(np.int64),
         uv=uv,
+        unused=left_out.unused_in_obj(data) if kind == "obj" else 0,
         split=0 if count is None else max(0, len(faces) - count),
         left_out=others,
     )

@@ -6,8 +6,15 @@ import re
 from collections import Counter
 from typing import Any
 
+import numpy as np
+
 _OBJ_STATEMENT = re.compile(rb"^[ \t]*(vn|usemtl|g|o|s|l|p|vp|curv|surf)[ \t]", re.MULTILINE)
 _OBJ_COLOUR = re.compile(rb"^[ \t]*v(?:[ \t]+[^\s]+){6,}[ \t]*\r?$", re.MULTILINE)
+_OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
+_OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
+# The first number of each corner, and the ends of lines.
+_OBJ_REFERENCE = re.compile(rb"(?<![^\s])-?\d{1,18}|\n")
+_OBJ_CONTINUED = re.compile(rb"\\\r?\n")
 _OBJ_NAMES = {
     b"vn": "vertex normals",
     b"usemtl": "materials",
@@ -30,6 +37,20 @@ def of_obj(data: bytes) -> dict[str, int]:
     if colours := len(_OBJ_COLOUR.findall(data)):
         found["vertex colours"] = colours
     return dict(found)
+
+
+def unused_in_obj(data: bytes) -> int:
+    """How many vertices no face names; trimesh leaves them out without a word."""
+    text = _OBJ_CONTINUED.sub(b" ", data)
+    starts = np.array([match.start() for match in _OBJ_VERTEX.finditer(text)], dtype=np.int64)
+    lines = list(_OBJ_FACE.finditer(text))
+    words = np.array(_OBJ_REFERENCE.findall(b"\n".join(line[1] for line in lines)), dtype=bytes)
+    ends = words == b"\n"
+    number, line = words[~ends].astype(np.int64), np.cumsum(ends)[~ends]
+    # A negative index counts back from its own line.
+    before = starts.searchsorted([match.start() for match in lines])
+    index = np.where(number < 0, before[line] + number, number - 1)
+    return len(starts) - len(np.unique(index[(index >= 0) & (index < len(starts))]))
 
 
 def of_ply(elements: dict[str, Any], *, has_uv: bool) -> dict[str, int]:

@@ -10,14 +10,14 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.errors import MeshError
-from pns_common.mesh import Mesh, clean, repeated_vertex
+from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme
 from service.errors import InvalidParameter, UnrefinableError, check_limit
 from service.gltf.charts import uv_blend
 from service.gltf.lattice import lattice
 from service.gltf.plan import BYTES_PER_FACE, check_memory
-from service.gltf.report import Change
+from service.gltf.report import Change, dropped
 from service.gltf.share import refined_ids
 from service.gltf.spread import spread
 from service.nearness import weld_within
@@ -44,7 +44,8 @@ def refine_soup(
     _check_cost(len(soup.faces) * 4**options.levels, limits)
     if options.crease == "normals":
         raise InvalidParameter("crease", "crease=normals needs a glTF; use angle:DEGREES here")
-    exact = _welded(soup)
+    control = _checked(soup)
+    exact = weld(control.vertices, control.faces)
     welded = weld_within(exact, options.weld_tolerance, options.weld_unit, None)
     proper = ~repeated_vertex(welded.faces)
     if not proper.any():
@@ -72,8 +73,9 @@ def refine_soup(
         "vertices": len(refined.vertices),
         "faces": len(refined.faces),
         "copied_faces": cleaned.dropped_duplicate,
+        "zero_reference_lengths": int(report["reference_length"] == 0),
     }
-    report["dropped"] = {"degenerate_faces": int((~proper).sum())}
+    report["dropped"] = dropped(int((~proper).sum()), _unused_vertices(soup, welded, cleaned))
     report["changes"] = [asdict(change) for change in changes]
     report["levels"] = refinement.report["levels"]
     return refined, report
@@ -84,17 +86,18 @@ def _check_cost(faces: int, limits: Limits) -> None:
     check_memory(faces * BYTES_PER_FACE, limits)
 
 
-def _welded(soup: TriangleSoup) -> Weld:
-    """Welded by float32 position, as a glTF is; the positions themselves stay float64."""
+def _checked(soup: TriangleSoup) -> Mesh:
     try:
-        Mesh(soup.vertices, soup.faces)
+        return Mesh(soup.vertices, soup.faces)
     except MeshError as error:
         raise UnrefinableError(str(error)) from error
-    joined = weld(soup.vertices, soup.faces)
-    used = joined.vertex_of >= 0
-    points = np.empty_like(joined.points)
-    points[joined.vertex_of[used]] = soup.vertices[used]
-    return Weld(points=points, faces=joined.faces, vertex_of=joined.vertex_of)
+
+
+def _unused_vertices(soup: TriangleSoup, welded: Weld, cleaned: Cleaned) -> int:
+    """How many of the file's vertices no refined face uses."""
+    used = welded.vertex_of >= 0
+    stay = cleaned.vertex_map[welded.vertex_of[used]] >= 0
+    return soup.unused + len(used) - int(stay.sum())
 
 
 def _with_corners(

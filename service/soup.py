@@ -20,6 +20,7 @@ class TriangleSoup:
         faces: (F, 3) rows of `vertices`.
         uv: (N, 2) texture coordinates, v upwards; None where there are none.
         split: triangles more than the file had faces, made by splitting its polygons.
+        unused: vertices of the file that its reader has left out because no face uses them.
         left_out: name and count of what the file held beside this.
     """
 
@@ -27,4 +28,5 @@ class TriangleSoup:
     faces: Int[np.ndarray, "F 3"]
     uv: Float[np.ndarray, "N 2"] | None = None
     split: int = 0
+    unused: int = 0
     left_out: dict[str, int] = field(default_factory=dict)

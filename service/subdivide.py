@@ -24,6 +24,7 @@ from service.gltf.refinement import changes_of_mesh, refine_control_mesh
 from service.gltf.report import Change, MeshResult, build_report
 from service.gltf.share import RefinedPrimitive, share
 from service.gltf.storage import remove_replaced, storage_changes, withdraw_unused
+from service.gltf.unused import VertexUse
 from service.gltf.upload import Media, Upload, read_upload
 from service.options import Limits, Options
 from service.stopwatch import Stopwatch
@@ -76,6 +77,7 @@ def subdivide_gltf(
     clock.lap("read")
 
     results: list[MeshResult] = []
+    vertices = VertexUse(upload.document)
     for mesh, mesh_progress in zip(upload.plans, _by_mesh(upload.plans, progress), strict=True):
         primitives = [
             read_primitive(upload.document, upload.buffers, mesh.mesh, number)
@@ -94,6 +96,7 @@ def subdivide_gltf(
             )
         clock.lap("attributes")
         writer.replace_mesh(mesh.mesh, refined)
+        vertices.add(mesh.mesh, control)
         clock.lap("write")
         changes += changes_of_mesh(control, made, pointer)
         results.append(
@@ -111,7 +114,7 @@ def subdivide_gltf(
 
     withdraw_unused(upload.tree)
     changes += remove_replaced(writer, upload.spare) + writer.changes()
-    report = build_report(scheme, options.levels, results, changes)
+    report = build_report(scheme, options.levels, results, vertices.unused(), changes)
     if options.diagnostics != "none":
         put_report(upload.tree, report)
     pieces = writer.finish()

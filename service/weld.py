@@ -1,9 +1,10 @@
 """Weld: join by position what a file format splits at its seams.
 
 Formats store one vertex for each distinct set of attributes, so a UV seam or a hard edge looks like
-a boundary, and refining that mesh would crack it. Every format is therefore welded by exact float32
-position first; attributes stay with the corners. What would move two vertices apart later (morph
-deltas, a skin binding) keeps them apart here: closed lips are two lips.
+a boundary, and refining that mesh would crack it. Every format is therefore welded by exact
+position first, in the precision that the file stores (float32 in glTF and STL, double in OBJ and
+OFF, either in PLY); attributes stay with the corners. What would move two vertices apart later
+(morph deltas, a skin binding) keeps them apart here: closed lips are two lips.
 """
 
 from __future__ import annotations
@@ -34,15 +35,15 @@ def weld(
     faces: Int[np.ndarray, "F 3"],
     movement: Int[np.ndarray, " N"] | None = None,
 ) -> Weld:
-    """Join the vertices whose float32 positions are equal (−0 = 0), whatever lies near them.
+    """Join the vertices whose positions are equal (−0 = 0), whatever lies near them.
 
     `movement` labels what else must be equal; None where nothing else moves a vertex.
     """
-    single = canonical_zero(positions.astype(np.float32))
-    labels = distinct_rows(single)
+    positions = canonical_zero(positions)
+    labels = distinct_rows(positions)
     if movement is not None:
         labels = distinct_rows(np.column_stack([labels, movement]))
-    return weld_by_label(single, faces, labels)
+    return weld_by_label(positions, faces, labels)
 
 
 def weld_by_label(

@@ -25,6 +25,7 @@ class TrianglePrimitive:
 
     Attributes:
         number: its place in the mesh.
+        rows: the accessors' elements that `attributes` hold, in ascending order.
         corners: (F, 3) rows of `attributes`.
         attributes: by name (N, K) arrays in the component type that they are written in.
         accessors: by name an accessor that describes them; one without bytes of its own where
@@ -34,6 +35,7 @@ class TrianglePrimitive:
     """
 
     number: int
+    rows: Int[np.ndarray, " N"]
     corners: Int[np.ndarray, "F 3"]
     attributes: dict[str, Shaped[np.ndarray, "N K"]]
     accessors: dict[str, Accessor]
@@ -65,6 +67,7 @@ def read_primitive(
     targets = [_read_attributes(document, buffers, t, used) for t in primitive.targets]
     return TrianglePrimitive(
         number=number,
+        rows=used,
         corners=triangles(corners, primitive.mode),
         attributes=attributes,
         accessors=accessors,

@@ -44,9 +44,13 @@ class MeshResult:
 
 
 def build_report(
-    scheme: Scheme, levels: int, results: Sequence[MeshResult], changes: Sequence[Change]
+    scheme: Scheme,
+    levels: int,
+    results: Sequence[MeshResult],
+    unused_vertices: int,
+    changes: Sequence[Change],
 ) -> dict[str, Any]:
-    """The report as JSON data."""
+    """The report as JSON data; `unused_vertices` of the file were dropped."""
     refined = [result.report for result in results if result.report is not None]
     return {
         "scheme": scheme.name,
@@ -61,7 +65,7 @@ def build_report(
             "copied_faces": sum(result.copies for result in results),
             "zero_reference_lengths": sum(report["reference_length"] == 0 for report in refined),
         },
-        "dropped": {"degenerate_faces": sum(result.degenerate for result in results)},
+        "dropped": dropped(sum(result.degenerate for result in results), unused_vertices),
         "changes": [asdict(change) for change in changes],
         "levels": [
             total_level([report["levels"][level] for report in refined])
@@ -69,6 +73,11 @@ def build_report(
         ],
         "meshes": [_mesh(result) for result in results],
     }
+
+
+def dropped(degenerate_faces: int, vertices: int) -> dict[str, int]:
+    """What a file loses. Duplicate faces never are: refined once, they come back as copies."""
+    return {"degenerate_faces": degenerate_faces, "duplicate_faces": 0, "vertices": vertices}
 
 
 def total_level(levels: Sequence[LevelReport]) -> LevelReport:

@@ -118,6 +118,36 @@ def test_what_a_format_cannot_hold_is_said_and_reported(
     assert "values at vertices dropped" in outcome.err
 
 
+def test_every_loss_is_a_line_once(pns: Any, tmp_path: Path) -> None:
+    text = "OFF\n5 2 0\n0 0 0\n1 0 0\n0 1 0\n9 9 9\n8 8 8\n3 0 1 2\n3 0 3 3\n"
+    (tmp_path / "in.off").write_text(text)
+    outcome = pns("subdivide", "in.off", "-o", "out.off", "--scheme", "loop")
+    assert "1 × degenerate faces dropped\n" in outcome.err
+    assert "2 × vertices dropped\n" in outcome.err
+    assert "duplicate" not in outcome.err
+    tree = tree_of_bytes(part_glb())
+    indices = tree["accessors"][tree["meshes"][0]["primitives"][0]["indices"]]
+    indices["count"] -= 3
+    indices["byteOffset"] = 4
+    (tmp_path / "in.glb").write_bytes(with_tree(part_glb(), tree))
+    outcome = pns("subdivide", "in.glb", "-o", "out.glb", "--scheme", "loop")
+    assert outcome.err.count("degenerate faces dropped") <= 1
+
+
+@pytest.mark.parametrize("target", ["glb", "gltf", "ply", "stl"])
+def test_what_float32_cannot_tell_apart_is_said(pns: Any, tmp_path: Path, target: str) -> None:
+    far = "OFF\n3 1 0\n4500000 0 0\n4500000.2 0 0\n4500000 1 0\n3 0 1 2\n"
+    (tmp_path / "far.off").write_text(far)
+    assert "float32" in pns("subdivide", "far.off", "-o", f"out.{target}").err
+    assert "float32" not in pns("subdivide", "far.off", "-o", "out.obj").err
+    (tmp_path / "huge.off").write_text("OFF\n3 1 0\n1e40 0 0\n2e40 0 0\n0 1e40 0\n3 0 1 2\n")
+    huge = pns("subdivide", "huge.off", "-o", f"huge.{target}")
+    assert huge.code == 1
+    assert "float32" in huge.err
+    assert "Warning" not in huge.err
+    assert not (tmp_path / f"huge.{target}").exists()
+
+
 def test_texture_coordinates_keep_their_direction(pns: Any, tmp_path: Path) -> None:
     (tmp_path / "in.obj").write_bytes(formats.write(part(), "obj"))
     (tmp_path / "in.glb").write_bytes(soup_glb(part()))
@@ -184,7 +214,7 @@ def with_tree(glb: bytes, tree: dict[str, Any]) -> bytes:
         ("subdivide part.glb -o out.glb --levels 6", 1, "faces"),
         ("subdivide broken.glb -o out.glb", 1, "GLB"),
         ("subdivide broken.ply -o out.glb", 1, "PLY"),
-        ("subdivide external.gltf -o out.glb", 1, "external"),
+        ("subdivide external.gltf -o out.glb", 1, "buffer"),
         ("info missing", 1, "missing"),
         ("example part.obj", 2, "part.obj"),
         ("serve --port 70000", 2, "port"),

@@ -16,6 +16,8 @@ from service.example import part
 from service.options import Limits, Options
 from service.refine_soup import refine_soup
 from service.soup import TriangleSoup
+from service.soup_glb import soup_glb
+from service.subdivide import subdivide_gltf
 from tests.shared import shared_path
 
 KINDS = ("obj", "ply", "stl", "off")
@@ -162,9 +164,33 @@ def test_degenerate_faces_are_dropped_and_copies_kept_and_both_counted() -> None
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -0.0]])
     soup = TriangleSoup(vertices, np.array([[0, 1, 2], [0, 1, 3], [2, 1, 0]]))
     fine, report = refined(soup)
-    assert report["dropped"] == {"degenerate_faces": 1}
+    assert report["dropped"] == {"degenerate_faces": 1, "duplicate_faces": 0, "vertices": 0}
     assert report["totals"]["copied_faces"] == 1
     assert len(fine.faces) == 8
+
+
+@pytest.mark.parametrize(
+    ("kind", "data", "unused"),
+    [
+        ("obj", b"v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 2 \\\n 3 4\n", 1),
+        ("obj", b"v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 8 8 8\nv 7 7 7\n", 3),
+        ("off", b"OFF\n5 1 0\n0 0 0\n9 9 9\n1 0 0\n0 1 0\n8 8 8\n3 0 2 3\n", 2),
+        ("off", b"OFF\n5 2 0\n0 0 0\n9 9 9\n1 0 0\n0 1 0\n8 8 8\n3 0 2 3\n3 0 1 1\n", 2),
+        ("off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", 0),
+    ],
+)
+def test_vertices_that_no_face_uses_are_counted(kind: str, data: bytes, unused: int) -> None:
+    _, report = refined(formats.read(data, kind))
+    assert report["dropped"]["vertices"] == unused
+
+
+def test_what_the_report_counts_is_the_same_as_a_gltfs() -> None:
+    _, report = refined(part())
+    options = Options(scheme="loop")
+    of_gltf = subdivide_gltf(soup_glb(part()), "glb", options, None, Limits()).report
+    assert report["dropped"] == of_gltf["dropped"]
+    assert set(of_gltf["totals"]) - set(report["totals"]) == {"meshes", "primitives"}
+    assert report["totals"]["zero_reference_lengths"] == 0
 
 
 @pytest.mark.parametrize("kind", KINDS)

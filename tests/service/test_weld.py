@@ -1,4 +1,4 @@
-"""Welding by exact float32 position."""
+"""Welding by exact position, in the precision that it comes in."""
 
 import numpy as np
 from hypothesis import given
@@ -29,9 +29,11 @@ def test_neighbouring_floats_stay_apart():
     assert len(weld(positions, np.array([[0, 1, 2]])).points) == 3
 
 
-def test_double_precision_is_welded_as_float32():
-    positions = np.array([[0, 0, 0], [1, 0, 0], [1 + 1e-12, 0, 0], [0, 1, 0]])
-    assert weld(positions, np.array([[0, 1, 3], [2, 3, 0]])).vertex_of.tolist() == [0, 1, 1, 2]
+def test_double_precision_is_welded_as_double():
+    positions = np.array([[0, 0, 0], [1, 0, 0], [1 + 1e-12, 0, 0], [1, -0.0, 0]])
+    welded = weld(positions, np.array([[0, 1, 2], [3, 2, 0]]))
+    assert welded.vertex_of.tolist() == [0, 1, 2, 1]
+    np.testing.assert_array_equal(welded.points, positions[:3])
 
 
 # Values whose sums and bits are easy to confuse.

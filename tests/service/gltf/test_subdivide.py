@@ -207,12 +207,42 @@ def test_vertices_that_differ_in_nothing_are_joined():
     assert len(files.primitive_of(subdivide([loose]).glb)[1]["POSITION"]) == 6 + 12
 
 
+def test_vertices_that_no_refined_face_uses_are_counted_once():
+    # Two primitives share the positions; neither uses the last two, one of which is degenerate.
+    shape = octahedron()
+    shape["POSITION"] = np.concatenate([shape["POSITION"], [[7, 7, 7], [8, 8, 8]]])
+    tree, binary = files.document(
+        [
+            shape | {"indices": shape["indices"][:3]},
+            shape | {"indices": np.concatenate([shape["indices"][3:], [[0, 7, 7]]])},
+        ]
+    )
+    first, second = tree["meshes"][0]["primitives"]
+    apart = subdivide(data=files.pack(tree, binary)).report
+    assert apart["dropped"]["vertices"] == 2 * 8 - 5 - 6
+    second["attributes"] = first["attributes"]
+    shared = subdivide(data=files.pack(tree, binary)).report
+    assert shared["dropped"]["vertices"] == 2
+    # What points still show is not lost.
+    tree["meshes"].append({"primitives": [{"attributes": first["attributes"], "mode": 0}]})
+    assert subdivide(data=files.pack(tree, binary)).report["dropped"]["vertices"] == 0
+
+
+def test_a_mesh_without_a_length_is_counted():
+    # Morph targets keep the three vertices apart, which lie in one place.
+    moved = {"POSITION": np.eye(3), "indices": np.array([[0, 1, 2]])}
+    point = {**moved, "POSITION": np.zeros((3, 3)), "targets": [{"POSITION": np.eye(3)}]}
+    totals = subdivide([point], [moved], scheme="pns").report["totals"]
+    assert totals["zero_reference_lengths"] == 1
+
+
 def test_degenerate_faces_are_dropped_and_reported():
     shape = octahedron()
     shape["indices"] = np.concatenate([[[0, 0, 2]], shape["indices"], [[3, 1, 3]]])
     result = subdivide([shape, octahedron(indices=np.array([[4, 5, 5]]))])
     assert result.report["totals"]["faces"] == 32
-    assert result.report["dropped"] == {"degenerate_faces": 3}
+    dropped = {"degenerate_faces": 3, "duplicate_faces": 0, "vertices": 0}
+    assert result.report["dropped"] == dropped
     assert result.report["changes"] == [
         {"pointer": "/meshes/0/primitives/0", "what": "degenerate faces dropped", "count": 2},
         {
