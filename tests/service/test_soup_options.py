@@ -1,0 +1,50 @@
+"""Creases, smooth UVs and the weld tolerance for formats without a scene."""
+
+import numpy as np
+import pytest
+
+from pns_common import loop
+from service.errors import InvalidParameter
+from service.options import Limits, Options
+from service.refine_soup import refine_soup
+from service.soup import TriangleSoup
+from tests.service.gltf.shapes import box, octahedron
+
+
+def refined(shape, texture=None, **options):
+    soup = TriangleSoup(shape["POSITION"], shape["indices"].astype(np.int64), texture)
+    return refine_soup(soup, loop(), Options(**options), Limits(), None)
+
+
+def test_mesh_files_take_creases_by_angle():
+    soup, report = refined(box(), levels=2, crease="angle:60")
+    assert report["levels"][0]["edges"]["crease"] == 12
+    assert (np.abs(soup.vertices).max(axis=1) == 1).all()
+
+
+def test_creases_by_normals_need_a_gltf():
+    with pytest.raises(InvalidParameter) as refusal:
+        refined(box(), crease="normals")
+    assert refusal.value.name == "crease"
+
+
+def test_smooth_uvs_follow_the_positions_of_a_closed_chart():
+    shape = octahedron()
+    soup, _ = refined(shape, shape["POSITION"][:, :2], levels=2, uv="smooth")
+    np.testing.assert_allclose(soup.uv, soup.vertices[:, :2], atol=1e-12)
+
+
+def test_a_weld_tolerance_is_counted():
+    flat = octahedron()["indices"].reshape(-1)
+    noise = 1e-6 * np.random.default_rng(0).standard_normal((24, 3))
+    loose = {
+        "POSITION": octahedron()["POSITION"][flat] + noise,
+        "indices": np.arange(24).reshape(-1, 3),
+    }
+    _, report = refined(loose, weld_tolerance=1e-4)
+    assert report["levels"][0]["edges"]["boundary"] == 0
+    assert {
+        "pointer": "",
+        "what": "vertices joined within weld_tolerance",
+        "count": 18,
+    } in report["changes"]
