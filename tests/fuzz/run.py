@@ -17,6 +17,8 @@ from tests.fuzz.mutate import mutated
 from tests.fuzz.seeds import Seed
 
 MIB = 2**20
+# What a malformed file leaves of itself is written in every way.
+COMPRESS = ("none", "none", "draco", "meshopt")
 LIMITS = Limits(max_faces=20_000, max_memory_bytes=64 * MIB)
 # The promise: no input takes more than its limit and this.
 ALLOWANCE = 64 * MIB
@@ -60,7 +62,7 @@ def run(seeds: list[Seed], count: int, seconds: float, start: int, kept: Path | 
         if kept is not None:
             kept.write_bytes(body)
         try:
-            found = outcome(seed, body)
+            found = outcome(seed, body, rng.choice(COMPRESS))
         except Exception as error:
             found = "fault"
             tally.faults.append((seed.name, number, repr(error)))
@@ -75,9 +77,9 @@ def run(seeds: list[Seed], count: int, seconds: float, start: int, kept: Path | 
     return tally
 
 
-def outcome(seed: Seed, body: bytes) -> str:
+def outcome(seed: Seed, body: bytes, compress: str = "none") -> str:
     """ "refined", or the code of the refusal. Any other exception is a fault."""
-    options = Options(levels=1, scheme="loop")
+    options = Options(levels=1, scheme="loop", compress=compress)
     try:
         upload = sent(body, seed.content_type, LIMITS)
         subdivide_gltf(
