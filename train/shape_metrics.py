@@ -58,6 +58,32 @@ class LevelErrors:
         return {**asdict(self.shape), **{k: v for k, v in asdict(self).items() if k != "shape"}}
 
 
+@dataclass(frozen=True, slots=True)
+class DistanceLevel:
+    """What a step has made, without normal errors: cheap on half a million faces."""
+
+    faces: int
+    distance: float
+    hausdorff: float
+    jump: float
+    ratio: float
+    flipped: int
+
+
+def distance_level(surface: Surface, refinement: Refinement) -> DistanceLevel:
+    """Measure the distances and the report of a refinement's last step."""
+    distance = np.abs(signed_distance(surface, refinement.mesh.vertices))
+    last = refinement.report["levels"][-1]
+    return DistanceLevel(
+        faces=last["faces"],
+        distance=float(np.sqrt((distance**2).mean())),
+        hausdorff=float(distance.max()),
+        jump=last["normal_jump_max"],
+        ratio=last["proximity_ratio"]["max"],
+        flipped=last["flipped_faces"],
+    )
+
+
 def level_errors(surface: Surface, refinement: Refinement, level: int) -> LevelErrors:
     """Measure a refinement whose last step was the given level."""
     last = refinement.report["levels"][-1]

@@ -5,6 +5,7 @@ from pns_common import Mesh, loop, refine
 from tests.meshes import grid, icosphere
 from train.datasets import ridge_held_out
 from train.shape_metrics import (
+    distance_level,
     face_normal_error,
     level_errors,
     nearest_points,
@@ -73,3 +74,6 @@ def test_a_level_has_the_report_beside_its_errors():
     assert row["normal_jump"] == report["normal_jump_max"]
     assert row["ratio"] == row["flipped"] == 0
     assert row["level"] == 2
+    cheap = distance_level(instance.surface, refinement)
+    assert (cheap.distance, cheap.hausdorff) == (row["distance"], row["hausdorff"])
+    assert (cheap.faces, cheap.jump, cheap.ratio) == (row["faces"], row["normal_jump"], 0)

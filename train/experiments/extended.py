@@ -1,18 +1,15 @@
 """Extended iteration: many levels on a small patch, until the faces run out."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from pns_common.mesh import Mesh
-from pns_common.refine import Refinement
 from train.datasets import Instance
 from train.experiments.experiment import Column, Experiment, Figure, Outcome, Table
 from train.experiments.laboratory import Laboratory
 from train.experiments.methods import eight_methods, hard_instance, level_by_level
 from train.experiments.style import TITLES, method_style, panels
-from train.surfaces import Ridge, signed_distance
+from train.shape_metrics import DistanceLevel, distance_level
 
 SIDE = 5
 """Vertices along one side of the reduced patch: 32 faces, half a million at level 7."""
@@ -37,18 +34,6 @@ NOTES = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Level:
-    """What one more step has made: faces, errors over all vertices, jump, ratio, flipped faces."""
-
-    faces: int
-    distance: float
-    hausdorff: float
-    jump: float
-    ratio: float
-    flipped: int
-
-
 def reduced_patch() -> Instance:
     """Return the hard ridge sampled on a 5 × 5 grid without jitter."""
     surface = hard_instance().surface
@@ -71,7 +56,7 @@ def run(laboratory: Laboratory) -> Outcome:
         steps = level_by_level(instance.mesh, methods[name], laboratory.scale.deepest)
         for level, refinement in enumerate(steps, start=1):
             laboratory.progress(f"extended {TITLES[name]}, level {level}", number, len(METHODS))
-            found[name].append(_measure(instance.surface, refinement))
+            found[name].append(distance_level(instance.surface, refinement))
     rows = [
         (
             TITLES[name],
@@ -96,21 +81,7 @@ def run(laboratory: Laboratory) -> Outcome:
     return Outcome((table,), (figure,), NOTES)
 
 
-def _measure(surface: Ridge, refinement: Refinement) -> Level:
-    # Not `level_errors`: nearest points of half a million faces would take most of the time.
-    distance = np.abs(signed_distance(surface, refinement.mesh.vertices))
-    last = refinement.report["levels"][-1]
-    return Level(
-        faces=last["faces"],
-        distance=float(np.sqrt((distance**2).mean())),
-        hausdorff=float(distance.max()),
-        jump=last["normal_jump_max"],
-        ratio=last["proximity_ratio"]["max"],
-        flipped=last["flipped_faces"],
-    )
-
-
-def _draw(found: dict[str, list[Level]]) -> Drawing:
+def _draw(found: dict[str, list[DistanceLevel]]) -> Drawing:
     figure, (jump, ratio) = panels(2, height=2.8)
     for name, levels in found.items():
         at = range(1, len(levels) + 1)

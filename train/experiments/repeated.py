@@ -13,7 +13,7 @@ from train.experiments.laboratory import Laboratory
 from train.experiments.methods import eight_methods, hard_instance, level_by_level
 from train.experiments.paper_values import PAPER_REPEATED
 from train.experiments.style import TITLES, method_style, panels
-from train.shape_metrics import LevelErrors, level_errors
+from train.shape_metrics import DistanceLevel, LevelErrors, distance_level, level_errors
 
 SUMMARY_COLUMNS = (
     Column("method", "Method"),
@@ -61,7 +61,7 @@ def run(laboratory: Laboratory) -> Outcome:
     methods, levels = eight_methods(laboratory), laboratory.scale.levels
     instances = laboratory.dataset("ridge-held-out").instances
     hard, summary, by_level = hard_instance(), [], []
-    curves: dict[str, list[list[LevelErrors]]] = {}
+    curves: dict[str, list[list[DistanceLevel]]] = {}
     for number, (name, scheme) in enumerate(methods.items()):
         laboratory.progress(f"repeated {TITLES[name]}", number, len(methods))
         found = measure(hard, scheme, levels)
@@ -70,7 +70,13 @@ def run(laboratory: Laboratory) -> Outcome:
             (TITLES[name], *(one.as_row()[column.name] for column in LEVEL_COLUMNS[1:]))
             for one in found
         ]
-        curves[name] = [measure(instance, scheme, levels) for instance in instances]
+        curves[name] = [
+            [
+                distance_level(instance.surface, refinement)
+                for refinement in level_by_level(instance.mesh, scheme, levels)
+            ]
+            for instance in instances
+        ]
     figure = Figure(
         "repeated",
         "Eight methods on the held-out ridges, level by level. Left: distance RMSE over all "
@@ -107,14 +113,14 @@ def _summary(name: str, found: list[LevelErrors]) -> tuple[Cell, ...]:
     )
 
 
-def _draw(curves: Mapping[str, list[list[LevelErrors]]]) -> Drawing:
+def _draw(curves: Mapping[str, list[list[DistanceLevel]]]) -> Drawing:
     figure, (distance, ratio, jump) = panels(3, height=2.9)
     for name, runs in curves.items():
         style = method_style(name)
-        level = [one.level for one in runs[0]]
-        errors = np.array([[one.shape.distance for one in run] for run in runs])
+        level = range(1, len(runs[0]) + 1)
+        errors = np.array([[one.distance for one in run] for run in runs])
         ratios = np.array([[one.ratio for one in run] for run in runs])
-        jumps = np.array([[one.normal_jump for one in run] for run in runs])
+        jumps = np.array([[one.jump for one in run] for run in runs])
         distance.plot(level, errors.mean(axis=0), **style)
         if name != "loop":
             ratio.plot(level, np.maximum(ratios.max(axis=0), 1e-3), **style)
