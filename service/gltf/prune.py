@@ -110,7 +110,8 @@ def _renumbered(
     for old, new in place.items():
         result[new] = entries[old]
     for reference in references:
-        reference.point_at(place.get(reference.index, reference.index))
+        if reference.index in place:
+            reference.point_at(place[reference.index])
     return result
 
 
