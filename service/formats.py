@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 
 import numpy as np
 import trimesh
@@ -31,11 +32,7 @@ def read(data: bytes, kind: str) -> TriangleSoup:
     """
     if kind == "off":
         return read_off(data)
-    try:
-        # Each part comes apart by material; as they are listed, they make the file's triangles.
-        scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False)
-    except (ValueError, IndexError, KeyError, TypeError, UnicodeDecodeError) as error:
-        raise UnreadableError(f"this is not a readable {kind.upper()} file: {error}") from error
+    scene = _scene(data, kind)
     parts = [part for part in scene.geometry.values() if isinstance(part, trimesh.Trimesh)]
     if not parts:
         raise UnreadableError(f"the {kind.upper()} file has no faces")
@@ -63,6 +60,36 @@ def write(soup: TriangleSoup, kind: str) -> bytes:
         return write_off(soup)
     mesh = trimesh.Trimesh(soup.vertices, soup.faces, process=False, validate=False)
     return bytes(mesh.export(file_type=kind))
+
+
+def _scene(data: bytes, kind: str) -> trimesh.Scene:
+    """What trimesh makes of the file."""
+    text = _as_utf8(data) if kind == "obj" or (kind == "stl" and not _is_binary_stl(data)) else data
+    try:
+        with warnings.catch_warnings():
+            # Where a number cannot be read, numpy warns and leaves out all that follows.
+            warnings.simplefilter("error")
+            # Each part comes apart by material; as they are listed, they make the file's triangles.
+            return trimesh.load_scene(io.BytesIO(text), file_type=kind, process=False)
+    except MemoryError:
+        raise
+    except Exception as error:
+        # On a broken file these readers fail as it comes, with an UnboundLocalError for one.
+        raise UnreadableError(f"this is not a readable {kind.upper()} file") from error
+
+
+def _as_utf8(data: bytes) -> bytes:
+    """The same text; names in old files are Latin-1, and geometry is ASCII in either."""
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return data.decode("latin-1").encode()
+    return data
+
+
+def _is_binary_stl(data: bytes) -> bool:
+    """Whether the count of faces agrees with the length: text may begin in any way."""
+    return len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
 
 
 def _uv(parts: list[trimesh.Trimesh]) -> Float[np.ndarray, "N 2"] | None:

@@ -10,13 +10,17 @@ import re
 from itertools import islice, pairwise
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from service.errors import UnreadableError
 from service.soup import NUMBER, TriangleSoup
 
 _COMMENT = re.compile(rb"#[^\n]*")
 _HEADER = re.compile(rb"\s*((?:ST)?C?N?)OFF\b")
-_COUNTS = re.compile(rb"\s*(\d+)\s+(\d+)(?:[ \t]+\d+)?[ \t]*\r?\n")
+_COUNTS = re.compile(rb"\s*(\d{1,18})\s+(\d{1,18})(?:[ \t]+\d+)?[ \t]*\r?\n")
+
+_CUT_OFF = "the OFF file ends before its last face, or has none"
+_NO_FACE = "the OFF file has a face that is not a count and as many vertices"
 
 
 def read_off(data: bytes) -> TriangleSoup:
@@ -30,27 +34,27 @@ def read_off(data: bytes) -> TriangleSoup:
     counts = _COUNTS.match(text, header.end() if header else 0)
     if header is None or counts is None:
         raise UnreadableError("this is not a readable OFF file: no header")
-    lines = (line.split() for line in text[counts.end() :].splitlines() if line.strip())
     vertex_count, face_count = int(counts[1]), int(counts[2])
-    try:
-        vertices = np.array([line[:3] for line in islice(lines, vertex_count)], dtype=np.float64)
-        # Faces differ in length, so they are read one by one.
-        polygons = [_corners(line) for line in islice(lines, face_count)]
-    except ValueError as error:
-        raise UnreadableError(f"this is not a readable OFF file: {error}") from error
+    # Before anything is made of them: a vertex takes six bytes at least, a face two.
+    if 6 * vertex_count + 2 * face_count > len(text) + 1:
+        raise UnreadableError(_CUT_OFF)
+    lines = (line.split() for line in text[counts.end() :].splitlines() if line.strip())
+    vertices = _vertices(list(islice(lines, vertex_count)))
+    # Faces differ in length, so they are read one by one.
+    polygons = [_corners(line) for line in islice(lines, face_count)]
     if len(vertices) < vertex_count or len(polygons) < face_count or not polygons:
-        raise UnreadableError("the OFF file ends before its last face, or has none")
-    faces = np.array(
-        [
-            (polygon[0], second, third)
-            for polygon in polygons
-            for second, third in pairwise(polygon[1:])
-        ],
-        dtype=np.int64,
-    ).reshape(-1, 3)
+        raise UnreadableError(_CUT_OFF)
     extras = header[1].decode()
-    left_out = {f"values that {extras}OFF adds to vertices": vertex_count} if extras else {}
-    return TriangleSoup(vertices, faces, split=max(0, len(faces) - face_count), left_out=left_out)
+    left_out = {
+        f"values that {extras}OFF adds to vertices": vertex_count if extras else 0,
+        "faces of fewer than three vertices": sum(len(polygon) < 3 for polygon in polygons),
+    }
+    return TriangleSoup(
+        vertices,
+        _fans(polygons),
+        split=sum(max(0, len(polygon) - 3) for polygon in polygons),
+        left_out={name: count for name, count in left_out.items() if count},
+    )
 
 
 def write_off(soup: TriangleSoup) -> bytes:
@@ -62,9 +66,31 @@ def write_off(soup: TriangleSoup) -> bytes:
     return text.getvalue().encode()
 
 
+def _vertices(lines: list[list[bytes]]) -> Float[np.ndarray, "V 3"]:
+    try:
+        return np.array([line[:3] for line in lines], dtype=np.float64).reshape(-1, 3)
+    except ValueError as error:
+        raise UnreadableError("the OFF file has a vertex that is not three numbers") from error
+
+
 def _corners(line: list[bytes]) -> list[int]:
-    count = int(line[0])
-    corners = [int(word) for word in line[1 : 1 + count]]
-    if len(corners) < count:
-        raise ValueError("a face has fewer corners than it says")
+    try:
+        count = int(line[0])
+        corners = [int(word) for word in line[1 : 1 + max(count, 0)]]
+    except ValueError as error:
+        raise UnreadableError(_NO_FACE) from error
+    if len(corners) != count:
+        raise UnreadableError(_NO_FACE)
     return corners
+
+
+def _fans(polygons: list[list[int]]) -> Int[np.ndarray, "F 3"]:
+    triangles = [
+        (polygon[0], second, third)
+        for polygon in polygons
+        for second, third in pairwise(polygon[1:])
+    ]
+    try:
+        return np.array(triangles, dtype=np.int64).reshape(-1, 3)
+    except OverflowError as error:
+        raise UnreadableError(_NO_FACE) from error

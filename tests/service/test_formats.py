@@ -202,6 +202,52 @@ def test_what_is_no_mesh_is_unreadable(kind: str, data: bytes) -> None:
         formats.read(data, kind)
 
 
+TRIANGLE = b"0 0 0\n1 0 0\n0 1 0\n"
+
+
+@pytest.mark.parametrize(
+    ("kind", "data"),
+    [
+        ("stl", bytes(80) + b"\xff\xff\xff\xff"),
+        ("stl", b"solid\nfacet\nvertex 0 0 0\nvertex 1 0 x\nvertex 0 1 0\nendsolid\n"),
+        ("obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999999\n"),
+        ("off", b"OFF\n3 1 0\n" + TRIANGLE + b"3 0 1 99999999999999999999999\n"),
+        ("off", b"OFF\n3 " + b"9" * 25 + b" 0\n" + TRIANGLE + b"3 0 1 2\n"),
+        ("off", b"OFF\n999999999999999999 1 0\n" + TRIANGLE + b"3 0 1 2\n"),
+        ("off", b"OFF\n3 1 0\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n"),
+        ("off", b"OFF\n3 1 0\n" + TRIANGLE + b"-3 0 1 2\n"),
+        ("off", b"OFF\n3 1 0\n" + TRIANGLE + b"4 0 1 2\n"),
+    ],
+)
+def test_refusals_speak_of_the_file(kind: str, data: bytes) -> None:
+    with pytest.raises(UnreadableError) as refusal:
+        formats.read(data, kind)
+    assert kind.upper() in refusal.value.detail
+    for word in ("islice", "inhomogeneous", "int", "charset", "list", "array", "Traceback"):
+        assert word not in refusal.value.detail.split()
+
+
+@pytest.mark.parametrize("kind", ["obj", "stl"])
+def test_names_in_old_encodings_are_no_obstacle(kind: str) -> None:
+    name = "Geh\xe4use".encode("latin-1")
+    corners = [b"0 0 0", b"1 0 0", b"0 1 0"]
+    text = {
+        "obj": b"# " + name + b"\n" + b"".join(b"v %b\n" % c for c in corners) + b"f 1 2 3\n",
+        "stl": b"solid "
+        + name
+        + b"\nfacet normal 0 0 1\nouter loop\n"
+        + b"".join(b"vertex %b\n" % c for c in corners)
+        + b"endloop\nendfacet\nendsolid\n",
+    }
+    assert len(formats.read(text[kind], kind).faces) == 1
+
+
+def test_faces_of_two_vertices_are_counted() -> None:
+    soup = formats.read(b"OFF\n3 2 0\n" + TRIANGLE + b"3 0 1 2\n2 0 1\n", "off")
+    assert soup.left_out == {"faces of fewer than three vertices": 1}
+    assert soup.split == 0
+
+
 @pytest.mark.parametrize(
     "text",
     [
