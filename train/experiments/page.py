@@ -23,6 +23,10 @@ Every table is a CSV file with all digits beside this page, every figure a PNG a
 """
 
 
+LONGEST = 60
+"""Rows of the longest table that the page shows; of longer ones it names the file."""
+
+
 def markdown_page(experiments: Mapping[str, Experiment], records: Mapping[str, Record]) -> str:
     """Return the page of all experiments that have a record, in their order."""
     parts = [INTRODUCTION]
@@ -37,7 +41,11 @@ def _section(experiment: Experiment, record: Record) -> str:
     if record.scale != "full":
         lines += [f"*Scale {record.scale}: a trial run, no number here means anything.*", ""]
     for table in record.tables:
-        lines += [f"**{table.title}** ([CSV]({table.name}.csv))", "", _table(table), ""]
+        lines += [f"**{table.title}** ([CSV]({table.name}.csv))", ""]
+        if len(table.rows) <= LONGEST:
+            lines += [_table(table), ""]
+        else:
+            lines += [f"{len(table.rows)} rows, in the CSV file.", ""]
     for figure in record.figures:
         lines += [f"![{figure.name}](figures/{figure.name}.png)", "", f"*{figure.caption}*", ""]
     for note in record.notes:
