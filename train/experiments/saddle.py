@@ -23,14 +23,14 @@ GATE_COLUMNS = (
 )
 NOTES = (
     LIMIT_NOTE,
-    "The gate stays close to zero on saddles, and Loop's own error there is a hundredth of that on "
+    "The gate stays close to zero on saddles, and Loop's own error there is small beside that on "
     "ridges. Trained on saddles, the network learns to leave them alone, as in the paper. The "
     "network of the ridges, which knows nothing of saddles, spends what little the gate lets "
-    "through in the wrong direction: large in per cent, some 4e-5 in length. The limit shows that "
-    "a network could gain here. *Near* means within 0.3 of the saddle point in the plane.",
-    "The published near-feature normal error of saddles (+0.59 %) does not come out of the "
-    "published weights: in float64 they give about −0.02 %. The angles there are 1.6e-3 radians, "
-    "and a cosine in float32 resolves steps of 3.5e-4 near 1: the published number is rounding.",
+    "through in the wrong direction: large in per cent, small in length. The limit shows that a "
+    "network could gain here. *Near* means within 0.3 of the saddle point in the plane.",
+    "The published near-feature normal error of saddles does not come out of the published weights "
+    "(see `published`). Its angles are so small that a cosine in float32, which resolves steps of "
+    "3.5e-4 radians near 1, cannot tell them apart: the published number is rounding.",
 )
 
 
