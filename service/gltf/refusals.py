@@ -40,7 +40,8 @@ def refuse_features(document: Document) -> None:
     """Refuse primitives of surfaces that would come back incomplete; references are checked.
 
     Raises:
-        UnsupportedFeature: no POSITION, or an extension that names vertices by number.
+        UnsupportedFeature: no POSITION, weights of several types, or an extension that names
+            vertices by number.
         GltfError: an attribute of a type that glTF does not allow.
     """
     for number, mesh in enumerate(document.meshes):
@@ -63,6 +64,16 @@ def _refuse_primitive(document: Document, primitive: Primitive, pointer: str) ->
                 f"{name} without {_PARTNER[pair[1]]}_{pair[2]}",
                 pointer=f"{pointer}/attributes/{name}",
             )
+    storages = {
+        (document.accessors[index].component_type, document.accessors[index].normalized)
+        for name, index in primitive.attributes.items()
+        if name.startswith("WEIGHTS_")
+    }
+    if len(storages) > 1:
+        # No rounding would let them add up to one.
+        raise UnsupportedFeature(
+            "WEIGHTS_n of different component types", pointer=f"{pointer}/attributes"
+        )
     for target in primitive.targets:
         for name, index in target.items():
             _refuse_type(name, document.accessors[index], _DELTAS, f"/accessors/{index}")

@@ -80,7 +80,7 @@ def refine_binding(
     row, slot = np.nonzero(bound)
     column, value = np.searchsorted(used, binding.joints[row, slot]), binding.weights[row, slot]
     count = topologies[-1].vertex_count + len(topologies[-1].edges)
-    joints, weights = np.zeros((count, 0), dtype=np.int64), np.zeros((count, 0))
+    joints, weights = np.zeros((count, width), dtype=np.int64), np.zeros((count, width))
     cut = np.zeros(count)
     for start in range(0, len(used), COLUMNS):
         block = used[start : start + COLUMNS]
@@ -88,13 +88,12 @@ def refine_binding(
         dense = np.zeros((len(bound), len(block)))
         dense[row[here], column[here] - start] = value[here]
         part = refine_linear(dense, topologies)
-        joints = np.hstack([joints, np.broadcast_to(block, part.shape)])
-        weights = np.hstack([weights, part])
-        total = weights.sum(axis=1)
-        joints, weights = _heaviest(joints, weights, width)
-        cut += total - weights.sum(axis=1)
-    missing = width - weights.shape[1]
-    joints, weights = (np.pad(part, ((0, 0), (0, missing))) for part in (joints, weights))
+        # Joints are local: most vertices have none of a block.
+        rows = np.flatnonzero(part.any(axis=1))
+        named = np.broadcast_to(block, (len(rows), len(block)))
+        heavy = np.hstack([weights[rows], part[rows]])
+        joints[rows], weights[rows] = _heaviest(np.hstack([joints[rows], named]), heavy, width)
+        cut[rows] += heavy.sum(axis=1) - weights[rows].sum(axis=1)
     return _normalised(joints, weights), np.flatnonzero(cut > NOTHING)
 
 

@@ -95,3 +95,50 @@ def test_the_learned_scheme_takes_any_mesh(mesh):
         assert 0 <= level["proximity_ratio"]["max"] <= 1 + 1e-12
     again = subdivide_gltf(files.glb(mesh), "glb", options, MODEL, Limits())
     assert again.glb == result.glb
+
+
+@st.composite
+def moving_primitives(draw):
+    """A primitive by chance that may have a skin and morph targets, in any storage."""
+    shape = draw(primitives())
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rows = len(shape["POSITION"])
+    storage = draw(st.sampled_from([lambda w: w / 2, files.Normalized, lambda w: 0.0 * w]))
+    for number in range(draw(st.integers(0, 2))):
+        joints = rng.integers(0, 5, (rows, 4)).astype(draw(st.sampled_from([np.uint8, np.uint16])))
+        weights = rng.integers(0, 3, (rows, 4), dtype=np.uint8)
+        shape[f"JOINTS_{number}"] = joints
+        shape[f"WEIGHTS_{number}"] = storage(weights)
+    names = draw(st.sets(st.sampled_from(["POSITION", "NORMAL", "TANGENT", "COLOR_0"])))
+    deltas = {name: rng.integers(-1, 2, (rows, 3)).astype(float) for name in sorted(names)}
+    shape["targets"] = [deltas] * draw(st.integers(0, 2)) if deltas else []
+    if not shape["targets"]:
+        del shape["targets"]
+    return shape
+
+
+@given(
+    st.lists(moving_primitives(), min_size=1, max_size=3),
+    st.sampled_from(["off", "normals", "angle:30"]),
+    st.sampled_from([0.0, 0.01]),
+)
+def test_any_skins_targets_and_creases_come_back_whole(mesh, crease, tolerance):
+    options = Options(scheme="pns", levels=2, crease=crease, weld_tolerance=tolerance, uv="smooth")
+    data = files.glb(mesh)
+    result = subdivide_gltf(data, "glb", options, MODEL, Limits())
+    before, after = (files.unpack(glb)[0]["meshes"][0]["primitives"] for glb in (data, result.glb))
+    for number in range(len(mesh)):
+        if after[number] == before[number]:
+            continue
+        _, attributes = files.primitive_of(result.glb, 0, number)
+        targets = files.targets_of(result.glb, 0, number)
+        given_targets = mesh[number].get("targets", [])
+        assert [list(target) for target in targets] == [list(target) for target in given_targets]
+        for values in (*attributes.values(), *(v for target in targets for v in target.values())):
+            assert np.isfinite(values).all()
+            assert len(values) == len(attributes["POSITION"])
+        weights = [v for name, v in attributes.items() if name.startswith("WEIGHTS_")]
+        if weights:
+            rows = np.hstack(weights)
+            full = 1 if rows.dtype.kind == "f" else 255
+            assert set(rows.sum(axis=1, dtype=np.float64).tolist()) <= {0, full}

@@ -209,6 +209,14 @@ def test_wrong_skins_and_targets_are_refused_with_a_pointer(attributes, pointer)
     assert refusal.value.pointer == pointer
 
 
+def test_weights_of_several_types_are_refused_by_name():
+    skin = {"JOINTS_0": JOINTS, "WEIGHTS_0": SHARES, "JOINTS_1": JOINTS}
+    skin["WEIGHTS_1"] = files.Normalized(JOINTS)
+    with pytest.raises(UnsupportedFeature, match="different component types") as refusal:
+        refine(files.glb([box(**skin)]))
+    assert refusal.value.pointer == "/meshes/0/primitives/0/attributes"
+
+
 def test_a_deep_tree_of_nodes_is_no_cycle():
     tree, binary = files.document([octahedron()])
     tree["nodes"] = [{"children": [number + 1]} for number in range(20_000)] + [{"mesh": 0}]
