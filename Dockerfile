@@ -4,9 +4,11 @@ ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_CONSTRAINT=/src/const
 WORKDIR /src
 RUN python -m venv /opt/pns
 COPY constraints.txt pyproject.toml README.md LICENSE ./
+COPY requirements requirements
 COPY pns_common pns_common
 COPY service service
-RUN /opt/pns/bin/python -m pip install .
+RUN /opt/pns/bin/python -m pip install --no-deps --require-hashes -r requirements/meshopt.txt \
+ && /opt/pns/bin/python -m pip install .
 
 # Run: the environment alone, as a user without a name, on a root that may be read-only.
 FROM python:3.11-slim-bookworm

@@ -6,6 +6,8 @@ DEV    := .venv
 BLENDER := .venv-blender
 # Pins what is installed, and what builds it.
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
+# What has one maintainer is pinned by hash, and first.
+HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.txt
 
 .PHONY: serve test lint unit fuzz model constraints clean blender
 
@@ -46,11 +48,13 @@ $(BLENDER)/.ready: tests/blender/requirements.txt
 # Inference only: no torch.
 $(SERVE)/.ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(SERVE)
+	$(SERVE)/bin/python -m pip install $(HASHED)
 	$(SERVE)/bin/python -m pip install --quiet --editable .
 	touch $@
 
 $(DEV)/.ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(DEV)
+	$(DEV)/bin/python -m pip install $(HASHED)
 	$(DEV)/bin/python -m pip install --quiet torch==2.13.0
 	$(DEV)/bin/python -m pip install --quiet --editable '.[dev]'
 	touch $@
