@@ -20,6 +20,8 @@ T = TypeVar("T")
 RESTART_SECONDS = 1.0
 # A warm-up imports and loads; a short limit on jobs must not keep every worker from starting.
 WARM_UP_SECONDS = 120.0
+# How long a worker that has died may go unnoticed while none is asked for.
+WATCH_SECONDS = 1.0
 
 log = logging.getLogger("pns.service")
 
@@ -39,13 +41,18 @@ class Workers:
         self._free: asyncio.Queue[ProcessPool] = asyncio.Queue()
         self._pools: set[ProcessPool] = set()
         self._background: set[asyncio.Task[None]] = set()
-        self.ready = False
-        """Whether a worker has warmed up."""
+        self._warm: set[ProcessPool] = set()
+
+    @property
+    def ready(self) -> bool:
+        """Whether a worker that has warmed up is alive."""
+        return any(pool.active for pool in self._warm)
 
     def start(self) -> None:
         """Start the processes; they warm up in the background."""
         for _ in range(self._count):
             self._in_background(self._add())
+        self._in_background(self._watch())
 
     async def stop(self) -> None:
         """End every process, whatever it is doing."""
@@ -84,6 +91,17 @@ class Workers:
         except TimeoutError as error:
             raise BusyError(f"no worker became free in {self._seconds:g} seconds") from error
 
+    async def _watch(self) -> None:
+        """Replace those that die idle: with no request to find them, readiness would not return."""
+        while True:
+            await asyncio.sleep(WATCH_SECONDS)
+            for _ in range(self._free.qsize()):
+                pool = self._free.get_nowait()
+                if pool.active:
+                    self._free.put_nowait(pool)
+                else:
+                    self._in_background(self._replace(pool))
+
     async def _call(
         self, pool: ProcessPool, seconds: float, function: Callable[..., T], *arguments: object
     ) -> T:
@@ -120,11 +138,12 @@ class Workers:
             # The process lives: it may still serve what does not need the thing that failed.
             log.warning("a worker did not warm up: %s", error)
         else:
-            self.ready = True
+            self._warm.add(pool)
         self._free.put_nowait(pool)
 
     async def _replace(self, pool: ProcessPool) -> None:
         self._pools.discard(pool)
+        self._warm.discard(pool)
         await asyncio.to_thread(_end, pool)
         await self._add()
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from pns_common.model_card import ModelCard
 from service import memory_file
-from service.errors import GltfError, LimitError, UnreadableError
+from service.errors import GltfError, LimitError, NoModelError, UnreadableError
 from service.jobs import Work
 
 ZERO_CARD = ModelCard(1, "paper-5", 10.0, 0.5, "first-face", {}, {})
@@ -104,3 +104,8 @@ def refuse() -> None:
 
 def nothing() -> None:
     pass
+
+
+def needs(path: str) -> None:
+    if not Path(path).exists():
+        raise NoModelError(f"no {path}")

@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import asynccontextmanager
 from functools import partial
+from pathlib import Path
 
 import pytest
 from pebble import ProcessPool
@@ -161,6 +162,38 @@ def test_ready_once_a_worker_has_warmed_up() -> None:
         async with workers(warm_up=jobs.refuse) as pool:
             await pool.run(jobs.nothing)
             assert not pool.ready
+
+    run(scenario)
+
+
+def test_not_ready_once_the_last_warm_worker_is_gone(tmp_path: Path) -> None:
+    model = tmp_path / "model"
+    model.touch()
+
+    async def scenario() -> None:
+        async with workers(warm_up=partial(jobs.needs, str(model))) as pool:
+            first = await pool.run(jobs.pid)
+            assert pool.ready
+            model.unlink()
+            os.kill(first, signal.SIGKILL)
+            while pool.ready:
+                await asyncio.sleep(0.05)
+            # The next one lives, but has no model.
+            assert await pool.run(jobs.pid) != first
+            assert not pool.ready
+
+    run(scenario)
+
+
+def test_readiness_returns_without_a_request() -> None:
+    async def scenario() -> None:
+        async with workers() as pool:
+            first = await pool.run(jobs.pid)
+            os.kill(first, signal.SIGKILL)
+            while pool.ready:
+                await asyncio.sleep(0.05)
+            while not pool.ready:
+                await asyncio.sleep(0.05)
 
     run(scenario)
 
