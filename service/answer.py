@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
+from service.gate import DrainingError, Gate
 from service.memory_file import MemoryFile
 
 log = logging.getLogger("pns.service")
@@ -24,6 +25,7 @@ class FileAnswer(Response):
         self,
         content: MemoryFile,
         held: ExitStack,
+        gate: Gate,
         *,
         media_type: str,
         headers: dict[str, str],
@@ -34,15 +36,19 @@ class FileAnswer(Response):
         )
         self._content = content
         self._held = held
+        self._gate = gate
         self._stall_seconds = stall_seconds
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send the answer."""
         with self._held:
             try:
-                await self._send_pieces(send)
+                async with self._gate.working():
+                    await self._send_pieces(send)
             except TimeoutError:
                 log.warning("a client took too long to read its answer")
+            except DrainingError:
+                log.warning("an answer was cut off by the shutdown")
 
     async def _send_pieces(self, send: Send) -> None:
         await send(

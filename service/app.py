@@ -37,7 +37,11 @@ def create_app(
     settings = settings or Settings()
     source = model if model is not None else settings.model
     workers = Workers(settings.workers, settings.job_seconds, partial(warm_up, source))
-    gate = Gate(settings.workers + settings.queue)
+    gate = Gate(
+        jobs=settings.places,
+        uploads=settings.uploads,
+        body_bytes=settings.places * int(settings.body),
+    )
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -57,5 +61,10 @@ def create_app(
     app.state.gate = gate
     problems.install(app)
     app.include_router(router(Service(settings, source, job, workers, gate)))
-    app.add_middleware(BodyLimit, max_bytes=int(settings.body), seconds=settings.upload_seconds)
+    app.add_middleware(
+        BodyLimit,
+        max_bytes=int(settings.body),
+        seconds=settings.upload_seconds,
+        idle_seconds=settings.idle_seconds,
+    )
     return app

@@ -22,14 +22,17 @@ class BodyLimit:
     """ASGI layer that counts a request's body while it arrives, in bytes and in seconds.
 
     A Content-Length over the limit is answered at once with 413. A body without one is counted: the
-    read that passes the limit raises LimitError inside the application, the read that comes too
-    late UploadTimeoutError.
+    read that passes the limit raises LimitError inside the application, the read that comes later
+    than `seconds` after the first, or `idle_seconds` after the last, UploadTimeoutError.
     """
 
-    def __init__(self, app: ASGIApp, *, max_bytes: int, seconds: float) -> None:
+    def __init__(
+        self, app: ASGIApp, *, max_bytes: int, seconds: float, idle_seconds: float
+    ) -> None:
         self.app = app
         self.max_bytes = max_bytes
         self.seconds = seconds
+        self.idle_seconds = idle_seconds
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
@@ -56,7 +59,8 @@ class BodyLimit:
     def _counted(self, receive: Receive) -> Receive:
         size = 0
         complete = False
-        deadline = asyncio.get_running_loop().time() + self.seconds
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + self.seconds
 
         async def counted() -> Message:
             nonlocal size, complete
@@ -64,11 +68,14 @@ class BodyLimit:
                 # Only a disconnect can follow, and that may be waited for without a limit.
                 return await receive()
             try:
-                async with asyncio.timeout_at(deadline):
+                async with asyncio.timeout_at(min(deadline, loop.time() + self.idle_seconds)):
                     message = await receive()
             except TimeoutError as error:
+                late = loop.time() >= deadline
                 raise UploadTimeoutError(
                     f"the body did not arrive within {self.seconds:g} seconds"
+                    if late
+                    else f"nothing of the body arrived for {self.idle_seconds:g} seconds"
                 ) from error
             if message["type"] == "http.request":
                 size += len(message.get("body", b""))

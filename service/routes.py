@@ -78,15 +78,18 @@ async def _subdivide(service: Service, request: Request, parameters: Parameters)
         raise MediaTypeError("a compressed body (Content-Encoding) is not supported")
     report_only = _wants_report(request.headers.get("accept", ""))
 
+    gate = service.gate
     with ExitStack() as held:
-        held.enter_context(service.gate.admit())
         # The body's memory is given back before the answer is sent; the answer's, after.
-        with MemoryFile() as body:
-            answer = held.enter_context(MemoryFile())
+        with gate.body() as grow, MemoryFile() as body:
             began = time.perf_counter()
-            async for piece in request.stream():
-                body.append(piece)
+            async with gate.upload():
+                async for piece in request.stream():
+                    grow(len(piece))
+                    body.append(piece)
             uploaded = time.perf_counter()
+            held.enter_context(gate.job())
+            answer = held.enter_context(MemoryFile())
             work = Work(
                 body=body.path,
                 answer=answer.path,
@@ -96,7 +99,8 @@ async def _subdivide(service: Service, request: Request, parameters: Parameters)
                 limits=settings.job_limits(),
                 model=service.model,
             )
-            stages = await _unless_gone(request.receive, service.workers.run(service.job, work))
+            async with gate.working():
+                stages = await _unless_gone(request.receive, service.workers.run(service.job, work))
             finished = time.perf_counter()
         timing = {"upload": uploaded - began, **stages, "total": finished - began}
         stages_text = _server_timing(timing)
@@ -106,6 +110,7 @@ async def _subdivide(service: Service, request: Request, parameters: Parameters)
         return FileAnswer(
             answer,
             held.pop_all(),
+            gate,
             media_type="application/json" if report_only else media.GLB,
             headers={"Server-Timing": stages_text, "Vary": "Accept"},
             stall_seconds=settings.stall_seconds,

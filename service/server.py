@@ -19,8 +19,9 @@ FLUSH_SECONDS = 2
 class DrainingServer(uvicorn.Server):
     """On the first SIGTERM or SIGINT it closes the gate; it exits once no request is under way.
 
-    Until then it still answers: /readyz and new requests with 503. uvicorn's own shutdown would
-    close the socket at once. A second signal ends it without waiting.
+    Bodies that have not arrived whole by then are refused: they may never. Until it exits it still
+    answers: /readyz and new requests with 503; uvicorn's own shutdown would close the socket at
+    once. A second signal, and the deadline, end what is under way with 503.
     """
 
     def __init__(self, config: uvicorn.Config, gate: Gate, drain_seconds: float) -> None:
@@ -28,19 +29,25 @@ class DrainingServer(uvicorn.Server):
         self._gate = gate
         self._drain_seconds = drain_seconds
         self._deadline: float | None = None
+        self._signals = 0
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Close the gate; uvicorn calls this as the signal handler."""
-        if self._gate.draining:
-            self.should_exit = self.force_exit = True
+        self._signals += 1
         self._gate.draining = True
+        # The third is for a shutdown that hangs.
+        self.force_exit = self._signals > 2
 
     async def on_tick(self, counter: int) -> bool:
         """Decide, ten times a second, whether to exit."""
         if self._gate.draining:
             now = asyncio.get_running_loop().time()
             self._deadline = self._deadline or now + self._drain_seconds
-            if self._gate.admitted == 0 or now >= self._deadline:
+            self._gate.end_uploads()
+            if self._signals > 1 or now >= self._deadline:
+                self._gate.end()
+                self.should_exit = True
+            if self._gate.admitted == 0:
                 self.should_exit = True
         return await super().on_tick(counter)
 

@@ -41,15 +41,24 @@ class Settings(BaseSettings):
 
     workers: int = Field(default_factory=_worker_default, ge=1, description="worker processes")
     queue: int = Field(default=8, ge=0, description="requests that may wait beside those that run")
+    uploads: int = Field(default=64, gt=0, description="bodies that may arrive at the same time")
 
     job_seconds: float = Field(default=60, gt=0, description="longest job")
     upload_seconds: float = Field(default=120, gt=0, description="longest upload of one body")
+    idle_seconds: float = Field(
+        default=10, gt=0, description="longest wait for the next piece of a body"
+    )
     stall_seconds: float = Field(
         default=30, gt=0, description="longest wait for a client to take one piece of its answer"
     )
     drain_seconds: float = Field(
         default=75, gt=0, description="longest wait for running requests after SIGTERM"
     )
+
+    @property
+    def places(self) -> int:
+        """Requests that run or wait."""
+        return self.workers + self.queue
 
     def job_limits(self) -> Limits:
         """What one job may cost, as the pipeline checks it."""

@@ -104,6 +104,49 @@ def test_408_for_an_upload_that_trickles(address: tuple[str, int]) -> None:
     assert b"upload-timeout" in answer
 
 
+def test_408_for_an_upload_that_stops() -> None:
+    with (
+        served(workers=1, idle_seconds=0.3, upload_seconds=60) as where,
+        socket.create_connection(where) as connection,
+    ):
+        connection.sendall(request_head(100))
+        for _ in range(4):
+            # Slow, but never idle.
+            time.sleep(0.15)
+            connection.sendall(b"some")
+        connection.settimeout(10)
+        began = time.monotonic()
+        answer = connection.recv(4096)
+        assert time.monotonic() - began < 5
+    assert answer.startswith(b"HTTP/1.1 408 ")
+    assert b"nothing of the body arrived" in answer
+
+
+def test_idle_uploads_refuse_nobody(address: tuple[str, int], client: httpx2.Client) -> None:
+    idle = [socket.create_connection(address) for _ in range(10)]
+    try:
+        for connection in idle:
+            connection.sendall(request_head(100) + b"half")
+        time.sleep(0.3)
+        assert subdivide(client, b"here").content == b"here"
+    finally:
+        for connection in idle:
+            connection.close()
+
+
+def test_503_for_more_uploads_than_are_taken() -> None:
+    with (
+        served(workers=1, uploads=1) as where,
+        socket.create_connection(where) as idle,
+        httpx2.Client(base_url=f"http://{where[0]}:{where[1]}", timeout=60) as client,
+    ):
+        idle.sendall(request_head(100) + b"half")
+        time.sleep(0.3)
+        refused = subdivide(client, b"one too many")
+        assert refused.status_code == 503
+        assert refused.json()["code"] == "busy"
+
+
 def test_413_is_answered_before_the_body_is_sent(address: tuple[str, int]) -> None:
     with socket.create_connection(address) as connection:
         connection.sendall(request_head(10**12, extra="Expect: 100-continue\r\n"))
