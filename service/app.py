@@ -60,7 +60,7 @@ def create_app(
     )
     app.state.gate = gate
     problems.install(app)
-    app.include_router(router(Service(settings, source, job, workers, gate)))
+    app.include_router(router(Service(settings, job, workers, gate)))
     app.add_middleware(
         BodyLimit,
         max_bytes=int(settings.body),

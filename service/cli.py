@@ -22,6 +22,12 @@ USAGE_ERROR = 2
 FAILURE = 1
 """Exit code for a file or a model that cannot be used."""
 
+_SETTING_OF_LIMIT = {
+    "faces": "PNS_FACES",
+    "memory": "PNS_MEMORY",
+    "json-items": "PNS_JSON_ITEMS",
+}
+
 
 def main() -> None:
     """Run the command line; an error that a user can act on is one line, any other a traceback."""
@@ -148,7 +154,7 @@ def _explained(error: Exception) -> tuple[str, int] | None:
     from pydantic import ValidationError
 
     from pns_common.errors import ParameterError, PnsError
-    from service.errors import InvalidParameter, ServiceError
+    from service.errors import InvalidParameter, LimitError, ServiceError
 
     match error:
         case InvalidParameter() | ParameterError():
@@ -157,6 +163,8 @@ def _explained(error: Exception) -> tuple[str, int] | None:
             first = error.errors()[0]
             name = ".".join(str(part) for part in first["loc"])
             return f"setting {name}: {first['msg']}", USAGE_ERROR
+        case LimitError(limit=limit) if limit in _SETTING_OF_LIMIT:
+            return f"{error}; {_SETTING_OF_LIMIT[limit]} allows more", FAILURE
         case ServiceError() | PnsError():
             return str(error), FAILURE
         case OSError():

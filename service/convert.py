@@ -46,6 +46,8 @@ def convert(
         OSError: a file cannot be read or written.
     """
     kind, target = _kind("IN", source), _kind("OUT", output)
+    if report_file is not None and report_file.resolve() in (source.resolve(), output.resolve()):
+        raise InvalidParameter("report", f"{report_file}: the report would replace a model")
     began = time.perf_counter()
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     data = source.read_bytes()

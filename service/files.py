@@ -13,7 +13,14 @@ def replace_file(path: Path, data: bytes) -> None:
     Raises:
         OSError: the folder is missing or cannot be written; `path` is then as it was.
     """
-    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
+    try:
+        handle, temporary = tempfile.mkstemp(
+            prefix=f".{path.name}.", suffix=".tmp", dir=path.parent
+        )
+    except OSError as error:
+        # Nobody asked for the temporary name.
+        error.filename = str(path)
+        raise
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)

@@ -7,7 +7,6 @@ imports this module to name its jobs, and never runs them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,10 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """One request, small enough for a pipe: body and answer are the paths of memory files.
-
-    `model` is a model, or the name or file of one, or None for the bundled model.
-    """
+    """One request, small enough for a pipe: body and answer are the paths of memory files."""
 
     body: str
     answer: str
@@ -32,7 +28,6 @@ class Work:
     report_only: bool
     options: Options
     limits: Limits
-    model: Model | str | None
 
 
 def subdivide(work: Work) -> dict[str, float]:
@@ -46,7 +41,7 @@ def subdivide(work: Work) -> dict[str, float]:
     from service.subdivide import subdivide_gltf
 
     sent = upload_body.sent(Path(work.body).read_bytes(), work.content_type, work.limits)
-    model = _model(work.model) if work.options.scheme == "pns" else None
+    model = _MODEL.get() if work.options.scheme == "pns" else None
     done = subdivide_gltf(
         sent.data, sent.kind, work.options, model, work.limits, neighbours=sent.neighbours
     )
@@ -56,22 +51,37 @@ def subdivide(work: Work) -> dict[str, float]:
     return done.timings
 
 
+class WorkersModel:
+    """The model of a worker process, handed over once, when the process starts.
+
+    A model may weigh megabytes and take long to build: requests do not carry it.
+    """
+
+    def __init__(self) -> None:
+        self._source: Model | str | None = None
+
+    def hold(self, source: Model | str | None) -> None:
+        """Keep a model, or the name or file of one; None stands for the bundled model."""
+        self._source = source
+
+    def get(self) -> Model:
+        """The model, loaded where it has not been yet. Raises NoModelError."""
+        from pns_common import ModelError, load_model
+
+        if self._source is None or isinstance(self._source, str):
+            try:
+                self._source = load_model(self._source)
+            except ModelError as error:
+                raise NoModelError(str(error)) from error
+        return self._source
+
+
+_MODEL = WorkersModel()
+
+
 def warm_up(model: Model | str | None) -> None:
     """Import and load what the first request would otherwise wait for. Raises NoModelError."""
     import service.subdivide  # noqa: F401
 
-    _model(model)
-
-
-def _model(source: Model | str | None) -> Model:
-    return _load(source) if source is None or isinstance(source, str) else source
-
-
-@lru_cache(maxsize=1)
-def _load(source: str | None) -> Model:
-    from pns_common import ModelError, load_model
-
-    try:
-        return load_model(source)
-    except ModelError as error:
-        raise NoModelError(str(error)) from error
+    _MODEL.hold(model)
+    _MODEL.get()

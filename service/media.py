@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import Literal
 
 from service.errors import MediaTypeError
 
 GLB = "model/gltf-binary"
 GLTF = "model/gltf+json"
+JSON = "application/json"
 MULTIPART = "multipart/form-data"
 ZIP = "application/zip"
 ACCEPTED = (GLB, GLTF, ZIP, MULTIPART)
@@ -15,6 +17,8 @@ ACCEPTED = (GLB, GLTF, ZIP, MULTIPART)
 Kind = Literal["glb", "gltf"]
 FORMATS: dict[str, Kind] = {GLB: "glb", GLTF: "gltf"}
 """The pipeline's name of each file type."""
+
+_WEIGHT = re.compile(r"q\s*=\s*(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)")
 
 GLB_MAGIC = b"glTF"
 ZIP_MAGIC = b"PK\x03\x04"
@@ -28,6 +32,19 @@ def of_request(content_type: str) -> str:
         named = f"{media!r} is not supported" if media else "the request has no Content-Type"
         raise MediaTypeError(f"{named}; send one of {', '.join(ACCEPTED)}")
     return media
+
+
+def quality(media: str, accept: str) -> float:
+    """How much an Accept header wants a media type, 0 to 1: its most specific range decides."""
+    wanted: dict[str, float] = {}
+    for entry in accept.split(","):
+        pattern, *parameters = (part.strip().lower() for part in entry.split(";"))
+        weight = next((found[1] for p in parameters if (found := _WEIGHT.fullmatch(p))), "1")
+        wanted[pattern] = float(weight)
+    for pattern in (media, f"{media.partition('/')[0]}/*", "*/*"):
+        if pattern in wanted:
+            return wanted[pattern]
+    return 0.0
 
 
 def sniff(data: bytes) -> str:

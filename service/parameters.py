@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
 
 from service.options import CREASE_PATTERN, MAX_LEVELS, MAX_WELD_TOLERANCE, Options
 
@@ -14,6 +16,19 @@ Finite = Field(allow_inf_nan=False)
 def _empty_is_absent(value: Any) -> Any:
     """`budget=` in a URL means the same as no budget at all."""
     return None if value == "" else value
+
+
+def _length(value: Any) -> float | Literal["auto"]:
+    """One sentence for a value that is neither, where a union would explain only one of the two."""
+    if value == "auto":
+        return "auto"
+    try:
+        length = float(value)
+    except (TypeError, ValueError):
+        length = math.nan
+    if not (math.isfinite(length) and length > 0):
+        raise PydanticCustomError("reference_length", "it must be 'auto' or a finite number > 0")
+    return length
 
 
 class Parameters(BaseModel):
@@ -31,7 +46,10 @@ class Parameters(BaseModel):
         Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,
         BeforeValidator(_empty_is_absent),
     ] = Field(default=None, description="C, dimensionless; empty: the model's own")
-    reference_length: Literal["auto"] | Annotated[float, Field(gt=0, allow_inf_nan=False)] = Field(
+    reference_length: Annotated[
+        Literal["auto"] | Annotated[float, Field(gt=0, allow_inf_nan=False)],
+        BeforeValidator(_length),
+    ] = Field(
         default="auto", description="R, the unit of length of the budget; `auto` measures each mesh"
     )
     diagnostics: Literal["summary", "full", "none"] = Field(

@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from collections import Counter
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from fastapi import APIRouter, Query, Request
 from starlette.requests import ClientDisconnect
@@ -17,16 +18,13 @@ from starlette.types import Receive
 
 from service import documentation, media
 from service.answer import FileAnswer
-from service.errors import MediaTypeError, NoModelError, check_limit
+from service.errors import InvalidParameter, MediaTypeError, NoModelError, check_limit
 from service.gate import DrainingError, Gate
 from service.jobs import Work
 from service.memory_file import MemoryFile
 from service.parameters import Parameters
 from service.pool import Workers
 from service.settings import Settings
-
-if TYPE_CHECKING:
-    from pns_common.schemes import Model
 
 log = logging.getLogger("pns.service")
 
@@ -39,7 +37,6 @@ class Service:
     """What the routes share."""
 
     settings: Settings
-    model: Model | str | None
     job: Job
     workers: Workers
     gate: Gate
@@ -70,13 +67,15 @@ def router(service: Service) -> APIRouter:
 
 async def _subdivide(service: Service, request: Request, parameters: Parameters) -> Response:
     settings = service.settings
+    _refuse_repeated(request)
     options = parameters.options()
     check_limit("levels", options.levels, settings.levels, f"levels is {options.levels}")
     content_type = request.headers.get("content-type", "")
     media.of_request(content_type)
     if request.headers.get("content-encoding", "identity").lower() != "identity":
         raise MediaTypeError("a compressed body (Content-Encoding) is not supported")
-    report_only = _wants_report(request.headers.get("accept", ""))
+    accept = request.headers.get("accept", "*/*")
+    report_only = media.quality(media.JSON, accept) > media.quality(media.GLB, accept)
 
     gate = service.gate
     with ExitStack() as held:
@@ -97,7 +96,6 @@ async def _subdivide(service: Service, request: Request, parameters: Parameters)
                 report_only=report_only,
                 options=options,
                 limits=settings.job_limits(),
-                model=service.model,
             )
             async with gate.working():
                 stages = await _unless_gone(request.receive, service.workers.run(service.job, work))
@@ -111,15 +109,18 @@ async def _subdivide(service: Service, request: Request, parameters: Parameters)
             answer,
             held.pop_all(),
             gate,
-            media_type="application/json" if report_only else media.GLB,
+            media_type=media.JSON if report_only else media.GLB,
             headers={"Server-Timing": stages_text, "Vary": "Accept"},
             stall_seconds=settings.stall_seconds,
         )
 
 
-def _wants_report(accept: str) -> bool:
-    wanted = {entry.partition(";")[0].strip().lower() for entry in accept.split(",")}
-    return "application/json" in wanted and media.GLB not in wanted
+def _refuse_repeated(request: Request) -> None:
+    """Of a parameter that is given twice, one value would be lost without a word."""
+    given = Counter(name for name, _ in request.query_params.multi_items())
+    for name, count in given.items():
+        if count > 1:
+            raise InvalidParameter(name, f"{name} is given {count} times")
 
 
 def _server_timing(seconds: dict[str, float]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import traceback
@@ -26,6 +27,8 @@ def prepare() -> None:
     """Set up a fresh worker process."""
     # A Python handler would wait for the next bytecode, and one numpy call may take seconds.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    # It logs what an upload says, word for word.
+    logging.getLogger("python_multipart").setLevel(logging.CRITICAL)
     # A signal to the server's process group (a terminal, a supervisor) must not end requests that
     # run.
     os.setsid()

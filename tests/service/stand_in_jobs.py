@@ -34,6 +34,16 @@ class ZeroModel:
         return np.zeros((len(features), 3))
 
 
+class CountedModel(ZeroModel):
+    """A model that counts how often it is sent somewhere; it arrives as a ZeroModel."""
+
+    pickled = 0
+
+    def __reduce__(self) -> tuple[object, ...]:
+        CountedModel.pickled += 1
+        return (ZeroModel, ())
+
+
 def no_warm_up(model: object) -> None:
     pass
 

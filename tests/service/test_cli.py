@@ -255,6 +255,40 @@ def test_output_has_the_permissions_of_any_new_file(
     assert len(modes) == 1
 
 
+@pytest.mark.parametrize(
+    ("output", "report"),
+    [("same.glb", "same.glb"), ("same.glb", "sub/../same.glb"), ("out.glb", "part.glb")],
+)
+def test_a_report_never_replaces_a_model(
+    pns: Any, tmp_path: Path, part_file: Path, output: str, report: str
+) -> None:
+    (tmp_path / "sub").mkdir()
+    outcome = pns("subdivide", "part.glb", "-o", output, "--report", report)
+    assert outcome.code == 2
+    assert report in outcome.err
+    assert part_file.read_bytes() == part_glb()
+    assert not (tmp_path / "same.glb").exists()
+
+
+def test_a_missing_folder_is_named_with_the_file_that_was_asked_for(
+    pns: Any, part_file: Path
+) -> None:
+    outcome = pns("subdivide", "part.glb", "-o", "nowhere/out.glb")
+    assert outcome.err == "pns: nowhere/out.glb: No such file or directory\n"
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"), [("PNS_FACES", "1000"), ("PNS_MEMORY", "1MiB"), ("PNS_JSON_ITEMS", "9")]
+)
+def test_a_limit_names_the_setting_that_raises_it(
+    pns: Any, part_file: Path, monkeypatch: pytest.MonkeyPatch, setting: str, value: str
+) -> None:
+    monkeypatch.setenv(setting, value)
+    outcome = pns("subdivide", "part.glb", "-o", "out.glb")
+    assert outcome.code == 1
+    assert f"{setting} allows more" in outcome.err
+
+
 def test_a_file_may_replace_itself(pns: Any, part_file: Path) -> None:
     assert pns("subdivide", str(part_file), "-o", str(part_file)).code == 0
     assert tree_of(part_file)["asset"]["extras"]["pns"]["totals"]["faces"] == 4 * FACES

@@ -81,6 +81,38 @@ def test_422_names_the_bad_parameter(client: TestClient, query: str, name: str) 
     assert document["parameter"] == name
 
 
+@pytest.mark.parametrize("value", ["0", "-1", "inf", "nan", "Auto", "many"])
+def test_a_reference_length_is_explained_whole(client: TestClient, value: str) -> None:
+    document = post(client, b"x", f"reference_length={value}").json()
+    assert document["detail"] == "reference_length: it must be 'auto' or a finite number > 0"
+
+
+@pytest.mark.parametrize("query", ["levels=1&levels=2", "scheme=loop&levels=3&scheme=loop"])
+def test_422_for_a_parameter_given_twice(client: TestClient, query: str) -> None:
+    document = assert_problem(post(client, b"x", query), 422, "invalid-parameter")
+    assert document["parameter"] == query.partition("=")[0]
+
+
+@pytest.mark.parametrize(
+    ("accept", "kind"),
+    [
+        ("application/json", "application/json"),
+        ("APPLICATION/JSON; charset=utf-8", "application/json"),
+        ("application/json, model/gltf-binary;q=0.5", "application/json"),
+        ("application/json, */*;q=0.1", "application/json"),
+        ("application/*, model/gltf-binary;q=0", "application/json"),
+        ("application/json;q=0.5, model/gltf-binary", "model/gltf-binary"),
+        ("application/json;q=0.5, model/*;q=0.6", "model/gltf-binary"),
+        ("application/json;q=0", "model/gltf-binary"),
+        ("application/json, model/gltf-binary", "model/gltf-binary"),
+        ("*/*", "model/gltf-binary"),
+        ("image/png", "model/gltf-binary"),
+    ],
+)
+def test_the_answer_is_what_is_wanted_most(client: TestClient, accept: str, kind: str) -> None:
+    assert post(client, b"{}", Accept=accept).headers["content-type"] == kind
+
+
 @pytest.mark.parametrize(
     "query",
     [

@@ -19,7 +19,7 @@ from service.gltf.container import read_glb
 from service.options import Limits
 from service.settings import Settings
 from service.soup_glb import as_gltf_json
-from tests.service.stand_in_jobs import ZeroModel
+from tests.service.stand_in_jobs import CountedModel, ZeroModel
 
 GLB = {"Content-Type": "model/gltf-binary"}
 FACES = 1920
@@ -182,6 +182,24 @@ def test_a_model_given_to_the_application_is_the_one_that_runs(part: bytes) -> N
         report = report_of(client.post("/subdivide", content=part, headers=GLB))
     assert report["model"] == "zero"
     assert report["levels"][0]["proximity_ratio"]["max"] == 0
+
+
+def test_a_model_crosses_to_a_worker_once(part: bytes) -> None:
+    before = CountedModel.pickled
+    with TestClient(create_app(Settings(workers=1), model=CountedModel())) as client:
+        for _ in range(3):
+            report = report_of(client.post("/subdivide", content=part, headers=GLB))
+            assert report["model"] == "zero"
+    assert CountedModel.pickled == before + 1
+
+
+def test_what_an_upload_says_is_not_logged(capfd: pytest.CaptureFixture[str]) -> None:
+    kind = {"Content-Type": "multipart/form-data; boundary=b"}
+    # Its worker starts here, so that it writes to the stream that is captured.
+    with TestClient(create_app(Settings(workers=1))) as client:
+        answer = client.post("/subdivide", content=b"--b\r\nNot a header: x", headers=kind)
+        assert answer.status_code == 400
+    assert "header" not in capfd.readouterr().err
 
 
 def test_without_a_model_loop_still_works(part: bytes) -> None:
