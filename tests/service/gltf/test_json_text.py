@@ -70,3 +70,20 @@ def test_values_and_their_order_survive_the_round_trip():
     value = decode_object(text, LIMITS)
     assert decode_object(encode(value), LIMITS) == value
     assert encode(value) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "marks"),
+    [
+        (b"{}", 1),
+        (b'{"":0}', 4),
+        (b'{"a":["b","c"]}', 10),
+        (b'{"a":[{},[],{}]}', 10),
+        (b'{"a":"{[,:"}', 10),
+    ],
+)
+def test_each_mark_counts_once(text, marks):
+    assert decode_object(text, Limits(max_json_items=marks)) is not None
+    with pytest.raises(LimitError) as refusal:
+        decode_object(text, Limits(max_json_items=marks - 1))
+    assert refusal.value.found == marks
