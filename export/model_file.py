@@ -31,12 +31,16 @@ def export_model(checkpoint: Checkpoint, path: Path) -> Exported:
 
 
 def write_model(
-    network: BoundedNet, card: ModelCard, path: Path, tolerance: float = TOLERANCE
+    network: BoundedNet,
+    card: ModelCard,
+    path: Path,
+    tolerance: float = TOLERANCE,
+    vertex_network: BoundedNet | None = None,
 ) -> Exported:
-    """Write a network under a card, in one piece; raises as `export_model` does."""
-    data = model_bytes(network, card)
+    """Write a network, or two, under a card, in one piece; raises as `export_model` does."""
+    data = model_bytes(network, card, vertex_network)
     model = model_from_bytes(data, name=path.stem)
-    parity = check_parity(model, network, tolerance)
+    parity = check_parity(model, network, tolerance, vertex_network)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(path.name + ".tmp")
     temporary.write_bytes(data)

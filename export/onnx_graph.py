@@ -2,7 +2,7 @@
 
 import numpy as np
 import onnx
-from onnx import NodeProto, TensorProto, helper, numpy_helper
+from onnx import NodeProto, TensorProto, ValueInfoProto, helper, numpy_helper
 from torch import Tensor
 
 from pns_common.model_card import CARD_KEY, ModelCard
@@ -15,22 +15,31 @@ IR_VERSION = 8
 """The file format that came with this operator set."""
 
 
-def model_bytes(network: BoundedNet, card: ModelCard) -> bytes:
+def model_bytes(
+    network: BoundedNet, card: ModelCard, vertex_network: BoundedNet | None = None
+) -> bytes:
     """Return the model file: features [edges, K] and budget in, corrections [edges, 3] out.
 
+    With a vertex network also vertex_features [vertices, L] in and vertex_correction out.
     The projection onto the ball is inside, so ‖correction‖ ≤ budget whatever the weights are.
     Only long-standing standard operators: the exact GELU is x/2 (1 + erf(x/√2)), spelt out.
     """
     graph = _Graph()
-    perceptron = _symmetric_perceptron if isinstance(network, SymmetricNet) else _perceptron
-    _project_onto_ball(graph, perceptron(graph, network, "features"))
-    return _serialise(graph, network.linear_layers[0].in_features, card)
+    _add_network(graph, network, "features", "correction")
+    inputs, outputs = [_rows("features", "edges", network)], [_answers("correction", "edges")]
+    if vertex_network is not None:
+        graph.prefix = "vertex_"
+        _add_network(graph, vertex_network, "vertex_features", "vertex_correction")
+        inputs.append(_rows("vertex_features", "vertices", vertex_network))
+        outputs.append(_answers("vertex_correction", "vertices"))
+    return _serialise(graph, inputs, outputs, card)
 
 
 class _Graph:
-    """Nodes and constants in the order of their making."""
+    """Nodes and constants in the order of their making; constants are named with the prefix."""
 
     def __init__(self) -> None:
+        self.prefix = ""
         self.nodes: list[NodeProto] = []
         self.constants: list[TensorProto] = []
 
@@ -43,6 +52,7 @@ class _Graph:
         return self._keep(name, np.asarray(sizes, dtype=np.int64))
 
     def _keep(self, name: str, array: np.ndarray) -> str:
+        name = self.prefix + name
         if name not in {tensor.name for tensor in self.constants}:
             self.constants.append(numpy_helper.from_array(array, name))
         return name
@@ -52,6 +62,11 @@ class _Graph:
         name = output or f"{operator.lower()}_{len(self.nodes)}"
         self.nodes.append(helper.make_node(operator, inputs, [name], **attributes))
         return name
+
+
+def _add_network(graph: _Graph, network: BoundedNet, features: str, output: str) -> None:
+    perceptron = _symmetric_perceptron if isinstance(network, SymmetricNet) else _perceptron
+    _project_onto_ball(graph, perceptron(graph, network, features), output)
 
 
 def _perceptron(graph: _Graph, network: BoundedNet, value: str) -> str:
@@ -117,19 +132,27 @@ def _tanh(graph: _Graph, x: str) -> str:
 _ACTIVATIONS = {"gelu": _gelu, "tanh": _tanh}
 
 
-def _project_onto_ball(graph: _Graph, z: str) -> None:
+def _project_onto_ball(graph: _Graph, z: str, output: str) -> None:
     """Add budget · z / max(1, ‖z‖)."""
     length = graph.apply("ReduceL2", z, axes=[1], keepdims=1)
     divisor = graph.apply("Max", length, graph.constant("one", 1.0))
-    graph.apply("Mul", graph.apply("Div", z, divisor), "budget", output="correction")
+    graph.apply("Mul", graph.apply("Div", z, divisor), "budget", output=output)
 
 
-def _serialise(graph: _Graph, feature_count: int, card: ModelCard) -> bytes:
-    inputs = [
-        helper.make_tensor_value_info("features", TensorProto.FLOAT, ["edges", feature_count]),
-        helper.make_tensor_value_info("budget", TensorProto.FLOAT, []),
-    ]
-    outputs = [helper.make_tensor_value_info("correction", TensorProto.FLOAT, ["edges", 3])]
+def _rows(name: str, rows: str, network: BoundedNet) -> ValueInfoProto:
+    width = network.linear_layers[0].in_features
+    return helper.make_tensor_value_info(name, TensorProto.FLOAT, [rows, width])
+
+
+def _answers(name: str, rows: str) -> ValueInfoProto:
+    return helper.make_tensor_value_info(name, TensorProto.FLOAT, [rows, 3])
+
+
+def _serialise(
+    graph: _Graph, features: list[ValueInfoProto], outputs: list[ValueInfoProto], card: ModelCard
+) -> bytes:
+    budget = helper.make_tensor_value_info("budget", TensorProto.FLOAT, [])
+    inputs = [features[0], budget, *features[1:]]
     model = helper.make_model(
         helper.make_graph(graph.nodes, "pns", inputs, outputs, initializer=graph.constants),
         opset_imports=[helper.make_opsetid("", OPSET)],

@@ -43,8 +43,20 @@ class GateSummary(TypedDict):
     active: float
 
 
+class VertexSummary(TypedDict):
+    """The vertex rule: how many old vertices it may move, ‖δ‖ / (C h_v²) and γ_v over them."""
+
+    vertices: int
+    proximity_ratio: RatioSummary
+    gate: GateSummary
+
+
 class LevelReport(TypedDict):
-    """One level: counts of the mesh it made and diagnostics of the step that made it."""
+    """One level: counts of the mesh it made and diagnostics of the step that made it.
+
+    ``vertex_rule`` stands only where the model has one; ``proximity_ratio`` and ``gate`` are the
+    interior edges'.
+    """
 
     vertices: int
     faces: int
@@ -54,6 +66,7 @@ class LevelReport(TypedDict):
     proximity_ratio: RatioSummary
     gate: GateSummary
     normal_jump_max: float
+    vertex_rule: NotRequired[VertexSummary]
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,23 +160,38 @@ def level_report(
     }
     if classes[EdgeClass.CREASE]:
         counts["crease"] = int(classes[EdgeClass.CREASE])
-    corrected = len(interior) > 0
-    ratio, gate = edges.ratio[interior], edges.gate[interior]
-    return {
+    report: LevelReport = {
         "vertices": topology.vertex_count + len(topology.edges),
         "faces": 4 * len(topology.faces),
         "edges": counts,
         "degenerate_frames": int(edges.degenerate.sum() + vertices.degenerate.sum()),
         "flipped_faces": children.flipped,
-        "proximity_ratio": {
-            "max": float(ratio.max(initial=0)),
-            "mean": float(ratio.mean()) if corrected else 0.0,
-            "p99": float(np.percentile(ratio, 99)) if corrected else 0.0,
-        },
-        "gate": {
-            "mean": float(gate.mean()) if corrected else 0.0,
-            "max": float(gate.max(initial=0)),
-            "active": float((gate > GATE_ACTIVE).mean()) if corrected else 0.0,
-        },
+        "proximity_ratio": _ratio_summary(edges.ratio[interior]),
+        "gate": _gate_summary(edges.gate[interior]),
         "normal_jump_max": children.normal_jump_max,
+    }
+    if vertices.corrected is not None:
+        report["vertex_rule"] = {
+            "vertices": int(vertices.corrected.sum()),
+            "proximity_ratio": _ratio_summary(vertices.ratio[vertices.corrected]),
+            "gate": _gate_summary(vertices.gate[vertices.corrected]),
+        }
+    return report
+
+
+def _ratio_summary(ratio: Float[np.ndarray, " N"]) -> RatioSummary:
+    some = len(ratio) > 0
+    return {
+        "max": float(ratio.max(initial=0)),
+        "mean": float(ratio.mean()) if some else 0.0,
+        "p99": float(np.percentile(ratio, 99)) if some else 0.0,
+    }
+
+
+def _gate_summary(gate: Float[np.ndarray, " N"]) -> GateSummary:
+    some = len(gate) > 0
+    return {
+        "mean": float(gate.mean()) if some else 0.0,
+        "max": float(gate.max(initial=0)),
+        "active": float((gate > GATE_ACTIVE).mean()) if some else 0.0,
     }

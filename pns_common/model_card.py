@@ -1,4 +1,7 @@
-"""The model card: what a model file says of itself, as JSON in its metadata."""
+"""The model card: what a model file says of itself, as JSON in its metadata.
+
+Format 1 knows a network for interior edges; format 2 may have a second one, for old vertices.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +13,17 @@ import msgspec
 
 from pns_common.features import FEATURE_SETS
 from pns_common.orientation import ORIENTATIONS
+from pns_common.ring_features import RING_FEATURE_SETS
 
 # The metadata key of an ONNX file that holds the card.
 CARD_KEY = "pns_card"
-FORMAT = 1
+FORMAT, VERTEX_FORMAT = 1, 2
+FORMATS = (FORMAT, VERTEX_FORMAT)
 
 
 @dataclass(frozen=True)
 class ModelCard:
-    """What a model file says of itself (card format 1).
+    """What a model file says of itself.
 
     Attributes:
         format: version of the file format.
@@ -28,6 +33,9 @@ class ModelCard:
         orientation: how (a, b, c, d) are ordered: "first-face" or "symmetric".
         training: recipe, seed and whatever else fixes the training; no dates.
         metrics: measured on held-out data.
+        vertex_features: name of the feature set that the vertex network reads; None where the
+            model leaves old vertices to Loop. Format 2.
+        vertex_gate_sharpness: c of the gate γ_v = tanh(c x_v), with ``vertex_features``.
     """
 
     format: int
@@ -37,10 +45,13 @@ class ModelCard:
     orientation: str
     training: dict[str, Any]
     metrics: dict[str, Any]
+    vertex_features: str | None = None
+    vertex_gate_sharpness: float | None = None
 
     def to_json(self) -> str:
-        """The card as JSON, keys in the order of the attributes."""
-        return msgspec.json.encode(self).decode()
+        """The card as JSON, keys in the order of the attributes; without those that are None."""
+        fields = {name: getattr(self, name) for name in ModelCard.__dataclass_fields__}
+        return msgspec.json.encode({k: v for k, v in fields.items() if v is not None}).decode()
 
     @staticmethod
     def from_json(text: str) -> ModelCard:
@@ -63,8 +74,8 @@ class ModelCard:
 
 def _problem(card: ModelCard) -> str | None:
     """What is wrong with the card's values, or None."""
-    if card.format != FORMAT:
-        return f"format {card.format}, not {FORMAT}"
+    if card.format not in FORMATS:
+        return f"format {card.format}, not {' or '.join(map(str, FORMATS))}"
     if card.features not in FEATURE_SETS:
         return f"features {card.features!r}, not one of {', '.join(FEATURE_SETS)}"
     if card.orientation not in ORIENTATIONS:
@@ -73,4 +84,20 @@ def _problem(card: ModelCard) -> str | None:
         return f"gate_sharpness {card.gate_sharpness}, not a finite number > 0"
     if not (math.isfinite(card.budget) and card.budget > 0):
         return f"budget {card.budget}, not a finite number > 0"
+    return _vertex_problem(card)
+
+
+def _vertex_problem(card: ModelCard) -> str | None:
+    """What is wrong with the fields of the vertex network, or None."""
+    name, sharpness = card.vertex_features, card.vertex_gate_sharpness
+    if name is None and sharpness is None:
+        return None
+    if card.format < VERTEX_FORMAT:
+        return f"vertex fields in format {card.format}, not {VERTEX_FORMAT}"
+    if name is None or sharpness is None:
+        return "one of vertex_features and vertex_gate_sharpness without the other"
+    if name not in RING_FEATURE_SETS:
+        return f"vertex_features {name!r}, not one of {', '.join(RING_FEATURE_SETS)}"
+    if not (math.isfinite(sharpness) and sharpness > 0):
+        return f"vertex_gate_sharpness {sharpness}, not a finite number > 0"
     return None

@@ -1,8 +1,10 @@
 """A model file as a callable η: one ONNX file, checked against its contract before it runs.
 
-Contract (format 1): input ``features`` float32 [edges, K], input ``budget`` float32 scalar, output
+Contract: input ``features`` float32 [edges, K], input ``budget`` float32 scalar, output
 ``correction`` float32 [edges, 3]; standard operators from an allow-list; no external data; the
-model card under the metadata key ``pns_card``.
+model card under the metadata key ``pns_card``. Where the card (format 2) names vertex features,
+also an input ``vertex_features`` float32 [vertices, L] and an output ``vertex_correction`` float32
+[vertices, 3].
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ from jaxtyping import Float
 
 from pns_common.errors import ModelError
 from pns_common.features import FEATURE_COUNT
-from pns_common.model_card import CARD_KEY, ModelCard
+from pns_common.model_card import CARD_KEY, FORMATS, ModelCard
+from pns_common.ring_features import RING_FEATURE_SETS
 
 DEFAULT_MODEL = "paper"
 LARGEST_FILE = 64 * 2**20
@@ -71,20 +74,38 @@ class OnnxModel:
 
     def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
         """Corrections (N, 3) float32, for features (N, K) and a dimensionless budget."""
+        return self._answers("correction", "features", features, budget)
+
+    def vertex_correction(self, features: Float[np.ndarray, "N L"], budget: float) -> np.ndarray:
+        """Weights (N, 3) float32 for the rings of old vertices, where the card has features.
+
+        Raises:
+            ModelError: the model has no vertex rule.
+        """
+        if self.card.vertex_features is None:
+            raise ModelError(self.name, expected="a vertex rule", found="none")
+        return self._answers("vertex_correction", "vertex_features", features, budget)
+
+    def _answers(
+        self, output: str, given: str, features: Float[np.ndarray, "N K"], budget: float
+    ) -> np.ndarray:
         rows = np.asarray(features, dtype=np.float32)
         corrections = np.empty((len(rows), 3), dtype=np.float32)
-        limit = np.asarray(budget, dtype=np.float32)
+        # The runtime wants every input, also those that this output does not need: one row each.
+        widths = feature_inputs(self.card)
+        inputs = {name: np.zeros((1, width), dtype=np.float32) for name, width in widths}
+        inputs["budget"] = np.asarray(budget, dtype=np.float32)
         for start in range(0, len(rows), ROWS):
             piece = rows[start : start + ROWS]
             padded = np.zeros((ROWS, rows.shape[1]), dtype=np.float32)
             padded[: len(piece)] = piece
-            answer = self._run(padded, limit)
+            answer = self._run(output, inputs | {given: padded})
             corrections[start : start + ROWS] = answer[: len(piece)]
         return corrections
 
-    def _run(self, rows: np.ndarray, limit: np.ndarray) -> np.ndarray:
+    def _run(self, output: str, inputs: dict[str, np.ndarray]) -> np.ndarray:
         try:
-            (answer,) = self._session.run(["correction"], {"features": rows, "budget": limit})
+            (answer,) = self._session.run([output], inputs)
         except Exception as error:  # onnxruntime's errors share no base below Exception
             found = str(error).splitlines()[0]
             raise ModelError(
@@ -182,7 +203,9 @@ def _read_card(proto: onnx.ModelProto, name: str) -> ModelCard:
     try:
         return ModelCard.from_json(texts[0])
     except (ValueError, msgspec.MsgspecError) as error:
-        raise ModelError(name, expected="a model card of format 1", found=str(error)) from error
+        raise ModelError(
+            name, expected=f"a model card of format {_or(FORMATS)}", found=str(error)
+        ) from error
 
 
 def _check_operators(proto: onnx.ModelProto, name: str) -> None:
@@ -211,12 +234,26 @@ def _check_interface(graph: onnx.GraphProto, card: ModelCard, name: str) -> None
     weights = {tensor.name for tensor in graph.initializer}
     inputs = [_signature(value) for value in graph.input if value.name not in weights]
     outputs = [_signature(value) for value in graph.output]
-    features = FEATURE_COUNT[card.features]
-    wanted_in: list[Signature] = [("features", "FLOAT", ["*", features]), ("budget", "FLOAT", [])]
-    wanted_out: list[Signature] = [("correction", "FLOAT", ["*", 3])]
+    widths = feature_inputs(card)
+    wanted_in: list[Signature] = [(what, "FLOAT", ["*", width]) for what, width in widths]
+    wanted_in.append(("budget", "FLOAT", []))
+    names = ("correction", "vertex_correction")[: len(widths)]
+    wanted_out: list[Signature] = [(what, "FLOAT", ["*", 3]) for what in names]
     for what, wanted, found in [("inputs", wanted_in, inputs), ("outputs", wanted_out, outputs)]:
         if sorted(wanted, key=str) != sorted(found, key=str):
             raise ModelError(name, expected=f"{what} {wanted}", found=f"{found}")
+
+
+def feature_inputs(card: ModelCard) -> list[tuple[str, int]]:
+    """The inputs that are features, and how many columns each has."""
+    widths = [("features", FEATURE_COUNT[card.features])]
+    if card.vertex_features is not None:
+        widths.append(("vertex_features", RING_FEATURE_SETS[card.vertex_features].count))
+    return widths
+
+
+def _or(values: tuple[int, ...]) -> str:
+    return " or ".join(str(value) for value in values)
 
 
 def _signature(value: onnx.ValueInfoProto) -> Signature:

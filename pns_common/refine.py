@@ -40,7 +40,7 @@ class Report(TypedDict):
 class Refinement:
     """A refined mesh, its report, and the last level's diagnostics at each of its vertices.
 
-    ``ratio`` and ``gate`` are 0 at old vertices.
+    ``ratio`` and ``gate`` are 0 at old vertices, but where the model has a vertex rule.
     """
 
     mesh: Mesh
@@ -88,7 +88,7 @@ def refine(
     normals = _face_normals(points, faces, blocks)
     reports: list[LevelReport] = []
     several_fans = 0
-    sharp, edges = creases, None
+    sharp, vertices, edges = creases, None, None
     for level in range(levels):
         topology = build_topology(faces, len(points))
         if level == 0:
@@ -110,8 +110,8 @@ def refine(
         done += len(faces)
         if progress is not None:
             progress(done, total)
-    assert edges is not None  # levels ≥ 1
-    old = len(points) - len(edges.ratio)
+    assert vertices is not None  # levels ≥ 1
+    assert edges is not None
     return Refinement(
         mesh=Mesh.of_refined(points, faces),
         report={
@@ -123,8 +123,8 @@ def refine(
             "multi_fan_vertices": several_fans,
             "levels": reports,
         },
-        ratio=np.concatenate([np.zeros(old), edges.ratio]),
-        gate=np.concatenate([np.zeros(old), edges.gate]),
+        ratio=np.concatenate([vertices.ratio, edges.ratio]),
+        gate=np.concatenate([vertices.gate, edges.gate]),
     )
 
 

@@ -17,13 +17,15 @@ from pns_common.arrays import Array
 from pns_common.blocks import Blocks
 from pns_common.correction import curvature_gate, proximity_ratio
 from pns_common.edge_operator import EdgeOperator
-from pns_common.errors import ParameterError
+from pns_common.errors import ModelError, ParameterError
 from pns_common.features import FEATURE_SETS
 from pns_common.model_card import ModelCard
 from pns_common.orientation import ORIENTATIONS
 from pns_common.parameters import is_number
+from pns_common.ring_features import RING_FEATURE_SETS, look_around
 from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
 from pns_common.topology import Topology
+from pns_common.vertex_operator import VertexOperator, smooth_vertices
 
 
 @runtime_checkable
@@ -47,6 +49,15 @@ class Model(Protocol):
 
     def __call__(self, features: Array, budget: float) -> Array:
         """Corrections (N, 3) in the edge frame for features (N, K)."""
+        ...
+
+
+@runtime_checkable
+class VertexModel(Model, Protocol):
+    """A model with a second network, for old vertices."""
+
+    def vertex_correction(self, features: Array, budget: float) -> Array:
+        """Weights (N, 3) of the ring's three vectors for features (N, L); norm ≤ budget."""
         ...
 
 
@@ -75,6 +86,7 @@ class Placement:
         ratio: proximity ratio ‖δ‖ / (C h²), 0 for Loop.
         gate: γ, 0 where there is no correction.
         degenerate: vertices whose frame was the fallback.
+        corrected: of a vertex rule that is not Loop's, the vertices that it may move.
     """
 
     loop: Float[np.ndarray, "N 3"]
@@ -82,6 +94,7 @@ class Placement:
     ratio: Float[np.ndarray, " N"]
     gate: Float[np.ndarray, " N"]
     degenerate: Bool[np.ndarray, " N"]
+    corrected: Bool[np.ndarray, " N"] | None = None
 
     @property
     def positions(self) -> Float[np.ndarray, "N 3"]:
@@ -125,9 +138,10 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     budget = model.card.budget if budget is None else budget
     if not (is_number(budget) and budget >= 0):
         raise ParameterError("budget", budget, expected="a finite number ≥ 0")
+    vertices = vertex_operator(model)
     return Scheme(
         "pns",
-        loop_vertex_rule,
+        loop_vertex_rule if vertices is None else learned_vertex_rule(vertices, float(budget)),
         learned_edge_rule(edge_operator(model), float(budget)),
         budget=float(budget),
         model=model.name,
@@ -170,6 +184,45 @@ def edge_operator(model: Model) -> EdgeOperator:
         network,
         curvature_gate(model.card.gate_sharpness),
     )
+
+
+def vertex_operator(model: Model) -> VertexOperator | None:
+    """What a model makes of old vertices; None where it leaves them to Loop.
+
+    Raises:
+        ModelError: the card names vertex features, and the model has no network for them.
+    """
+    card = model.card
+    if card.vertex_features is None or card.vertex_gate_sharpness is None:
+        return None
+    if not isinstance(model, VertexModel):
+        raise ModelError(model.name, expected="a vertex network, as on the card", found="none")
+
+    def network(rows: Array) -> Array:
+        return model.vertex_correction(rows, 1.0)
+
+    features = RING_FEATURE_SETS[card.vertex_features]
+    return VertexOperator(features, network, card.vertex_gate_sharpness)
+
+
+def learned_vertex_rule(operator: VertexOperator, budget: float) -> Rule:
+    """p' = p0 + h_v² γ_v (C / R) v on closed rings, Loop's rule on all others; ``budget`` is C."""
+
+    def vertex_rule(level: ControlLevel) -> Placement:
+        base = loop_vertex_rule(level)
+        if level.reference_length == 0:
+            return base
+        corrected = smooth_vertices(level.topology)
+        rows = np.flatnonzero(corrected)
+        rings = look_around(level.points, level.normals, level.topology)
+        result = operator.correct(rings, rows, budget / level.reference_length)
+        displacement, ratio = np.zeros_like(base.loop), base.ratio.copy()
+        gamma = base.gate.copy()
+        displacement[rows], gamma[rows] = result.displacement, result.gate
+        ratio[rows] = proximity_ratio(result)
+        return Placement(base.loop, displacement, ratio, gamma, base.degenerate, corrected)
+
+    return vertex_rule
 
 
 def learned_edge_rule(operator: EdgeOperator, budget: float) -> Rule:

@@ -1,6 +1,6 @@
 """One differentiable step of the operator: the kernels of pns_common on torch tensors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -11,8 +11,10 @@ from pns_common.arrays import cross, gather, segment_sum, unit
 from pns_common.correction import proximity_ratio
 from pns_common.edge_operator import EdgeOperator
 from pns_common.frames import face_normals
+from pns_common.ring_features import look_around
 from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
 from pns_common.topology import Topology
+from pns_common.vertex_operator import VertexOperator, smooth_vertices
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,10 +23,12 @@ class Step:
 
     Attributes:
         ratio: ‖q − q0‖ / (C h²) of each interior edge, in [0, 1].
+        vertex_ratio: ‖p' − p0‖ / (C h_v²) of each vertex that the vertex rule may move, if any.
     """
 
     points: Float[Tensor, "N 3"]
     ratio: Float[Tensor, " I"]
+    vertex_ratio: Float[Tensor, " M"] | None = None
 
 
 def refine_once(
@@ -32,6 +36,7 @@ def refine_once(
     topology: Topology,
     operator: EdgeOperator,
     budget: float,
+    vertex_operator: VertexOperator | None = None,
 ) -> Step:
     """Refine by one step at reference length 1 (the paper's absolute units).
 
@@ -42,7 +47,14 @@ def refine_once(
     fields = operator.features.fields(points, topology)
     at = operator.look(points, normals, fields, topology, topology.interior)
     correction = operator.correct(at, budget)
-    return displaced(points, topology, correction.displacement, proximity_ratio(correction))
+    step = displaced(points, topology, correction.displacement, proximity_ratio(correction))
+    if vertex_operator is None:
+        return step
+    moved = np.flatnonzero(smooth_vertices(topology))
+    rings = look_around(points, normals, topology)
+    at_vertices = vertex_operator.correct(rings, moved, budget)
+    refined = step.points.index_add(0, torch.from_numpy(moved), at_vertices.displacement)
+    return replace(step, points=refined, vertex_ratio=proximity_ratio(at_vertices))
 
 
 def displaced(

@@ -105,13 +105,13 @@ def refined_inner(
     return refined[rows].reshape(copies, -1)
 
 
-def jacobian(scheme: Scheme, at: Star) -> Float[np.ndarray, "M M"]:
+def jacobian(scheme: Scheme, at: Star, step: float = STEP) -> Float[np.ndarray, "M M"]:
     """Differentiate one step of a scheme, inner rings to inner rings in all coordinates.
 
     By central differences on the scheme itself, in double precision: any scheme will do, and
-    nothing is assumed of how it computes. The reference length is 1.
+    nothing is assumed of how it computes. `step` is in spokes; the reference length is 1.
     """
-    step = STEP * SPOKE
+    step = step * SPOKE
     mesh, count = perturbed_stars(at, step)
     refined = refine(mesh, scheme, levels=1, reference_length=1.0, threads=1).mesh.vertices
     moved = refined_inner(at, refined, 2 * count)

@@ -117,7 +117,9 @@ def test_a_file_that_differs_is_not_written(tmp_path, monkeypatch, damage):
         other.linear_layers[-1].bias += damage
     path = tmp_path / "model.onnx"
     path.write_bytes(b"the old file")
-    monkeypatch.setattr("export.model_file.model_bytes", lambda _, card: model_bytes(other, card))
+    monkeypatch.setattr(
+        "export.model_file.model_bytes", lambda _, card, *rest: model_bytes(other, card)
+    )
     with pytest.raises(ParityError, match="differ") as caught:
         write_model(network, card_of(ridge()), path)
     assert caught.value.budget in BUDGETS

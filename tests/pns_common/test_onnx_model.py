@@ -54,7 +54,7 @@ def test_bytes_that_are_no_onnx_file(data):
     [
         (None, "0"),
         ("{", "truncated"),
-        (changed_card(format=2), "format 2"),
+        (changed_card(format=3), "format 3"),
         (changed_card(features="paper-9"), "paper-9"),
         (changed_card(orientation="left"), "left"),
         (changed_card(budget=-1.0), "budget"),

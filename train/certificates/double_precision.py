@@ -19,7 +19,7 @@ from onnx.reference.op_run import OpRun
 
 from pns_common.errors import ModelError
 from pns_common.model_card import ModelCard
-from pns_common.onnx_model import OnnxModel, bundled_models
+from pns_common.onnx_model import OnnxModel, bundled_models, feature_inputs
 
 
 class Erf(OpRun):
@@ -53,11 +53,25 @@ class DoubleModel:
         self, features: Float[np.ndarray, "E K"], budget: float
     ) -> Float[np.ndarray, "E 3"]:
         """Return the corrections, float64."""
-        inputs = {"features": np.asarray(features, dtype=np.float64), "budget": np.float64(budget)}
+        return self._answer("correction", "features", features, budget)
+
+    def vertex_correction(
+        self, features: Float[np.ndarray, "N L"], budget: float
+    ) -> Float[np.ndarray, "N 3"]:
+        """Return the weights for the rings of old vertices, float64."""
+        return self._answer("vertex_correction", "vertex_features", features, budget)
+
+    def _answer(
+        self, output: str, given: str, features: Float[np.ndarray, "N K"], budget: float
+    ) -> Float[np.ndarray, "N 3"]:
+        # The evaluator wants every input, also those that this output does not need.
+        inputs = {name: np.zeros((1, width)) for name, width in feature_inputs(self.card)}
+        inputs[given] = np.asarray(features, dtype=np.float64)
+        inputs["budget"] = np.asarray(budget, dtype=np.float64)
         # A hostile file may overflow or make a NaN; the operator looks at what comes out.
         with np.errstate(all="ignore"):
             try:
-                (correction,) = self._evaluator.run(["correction"], inputs)
+                (correction,) = self._evaluator.run([output], inputs)
             except Exception as error:  # the evaluator's errors share no base below Exception
                 raise ModelError(
                     self.name, expected="a graph that runs in double precision", found=str(error)

@@ -5,14 +5,15 @@ that breaks its contract, or claims what it does not reach, is not to be trusted
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.features import FEATURE_COUNT
-from pns_common.schemes import Model, pns
+from pns_common.features import FEATURE_SETS
+from pns_common.ring_features import RING_FEATURE_SETS
+from pns_common.schemes import Model, VertexModel, pns
 from train.certificates.certificate import Certificate
 from train.datasets import DATASETS
 from train.evaluation import compare_with_loop
@@ -28,7 +29,11 @@ machine, no more."""
 
 def keeps_its_word(model: Model) -> list[Certificate]:
     """Certify a model's answers at sample features and its card's metrics."""
-    return [*_answers(model), _metrics(model)]
+    rows = _answers(model, FEATURE_SETS[model.card.features].count, "corrections")
+    if model.card.vertex_features is not None and isinstance(model, VertexModel):
+        count = RING_FEATURE_SETS[model.card.vertex_features].count
+        rows += _answers(model.vertex_correction, count, "vertex corrections")
+    return [*rows, _metrics(model)]
 
 
 def sample_features(count: int, seed: int = 0) -> Float[np.ndarray, "N K"]:
@@ -42,8 +47,10 @@ def sample_features(count: int, seed: int = 0) -> Float[np.ndarray, "N K"]:
     return rows
 
 
-def _answers(model: Model) -> list[Certificate]:
-    features = sample_features(FEATURE_COUNT[model.card.features])
+def _answers(
+    model: Callable[[np.ndarray, float], np.ndarray], count: int, what: str
+) -> list[Certificate]:
+    features = sample_features(count)
     not_finite, longest, at = 0, 0.0, BUDGETS[0]
     for budget in BUDGETS:
         found = np.asarray(model(features, budget), dtype=np.float64)
@@ -54,7 +61,7 @@ def _answers(model: Model) -> list[Certificate]:
     return [
         Certificate(
             "file",
-            "finite corrections",
+            f"finite {what}",
             not_finite,
             0,
             0,
@@ -62,7 +69,7 @@ def _answers(model: Model) -> list[Certificate]:
         ),
         Certificate(
             "file",
-            "corrections within the budget given",
+            f"{what} within the budget given",
             longest,
             high=SINGLE_PRECISION,
             where=f"budget {at:g}",

@@ -24,6 +24,10 @@ from train.spectrum import (
 TINY = 1e-8
 """In spokes: what is of second order in the lift is then below rounding."""
 
+FINE = 5e-7
+"""In spokes, for eigenvalues: central differences err by its square times the third derivative,
+which a gate of order two does not keep small, and by the rounding of positions over it."""
+
 FLAT = 1e-6
 EIGENVALUE = 1e-9
 
@@ -52,7 +56,7 @@ def planar_spectrum(subject: Subject, valences: Sequence[int] = VALENCES) -> lis
 
 def spectrum(scheme: Scheme, valence: int) -> np.ndarray:
     """|λ| of the linearisation at a flat star, largest first, translations left out."""
-    matrix = without_translations(jacobian(scheme, closed_star(scheme, valence)(0.0)))
+    matrix = without_translations(jacobian(scheme, closed_star(scheme, valence)(0.0), FINE))
     return np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
 
 

@@ -45,7 +45,8 @@ def subject_of_model(model: Model, exact: Model, budget: float | None = None) ->
 
 def subject_of_network(model: TorchModel, budget: float | None = None) -> Subject:
     """The learned operator with a torch network."""
-    exact = TorchModel(model.name, model.card, in_double(model.network))
+    vertices = None if model.vertex_network is None else in_double(model.vertex_network)
+    exact = TorchModel(model.name, model.card, in_double(model.network), vertices)
     return subject_of_model(model, exact, budget)
 
 
