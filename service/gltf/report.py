@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from pns_common.diagnostics import LevelReport
+from pns_common.diagnostics import GateSummary, LevelReport, RatioSummary
 from pns_common.refine import Report
 from pns_common.schemes import Scheme
 
@@ -81,21 +81,13 @@ def dropped(degenerate_faces: int, vertices: int) -> dict[str, int]:
 
 
 def total_level(levels: Sequence[LevelReport]) -> LevelReport:
-    """One level over several meshes: counts add, means weigh by interior edges, largest wins.
+    """One level over several meshes: counts add, means weigh by what is meant, largest wins.
 
     The p99 of the whole does not follow from the meshes' own; the largest of them bounds it.
     """
     weights = [level["edges"]["interior"] for level in levels]
-    ratios = [level["proximity_ratio"] for level in levels]
-    gates = [level["gate"] for level in levels]
-
     creases = sum(level["edges"].get("crease", 0) for level in levels)
-
-    def mean(values: list[float]) -> float:
-        weighted = [weight * value for weight, value in zip(weights, values, strict=True)]
-        return sum(weighted) / max(sum(weights), 1)
-
-    return {
+    total: LevelReport = {
         "vertices": sum(level["vertices"] for level in levels),
         "faces": sum(level["faces"] for level in levels),
         "edges": {
@@ -106,18 +98,40 @@ def total_level(levels: Sequence[LevelReport]) -> LevelReport:
         },
         "degenerate_frames": sum(level["degenerate_frames"] for level in levels),
         "flipped_faces": sum(level["flipped_faces"] for level in levels),
-        "proximity_ratio": {
-            "max": max(ratio["max"] for ratio in ratios),
-            "mean": mean([ratio["mean"] for ratio in ratios]),
-            "p99": max(ratio["p99"] for ratio in ratios),
-        },
-        "gate": {
-            "mean": mean([gate["mean"] for gate in gates]),
-            "max": max(gate["max"] for gate in gates),
-            "active": mean([gate["active"] for gate in gates]),
-        },
+        "proximity_ratio": _total_ratio([level["proximity_ratio"] for level in levels], weights),
+        "gate": _total_gate([level["gate"] for level in levels], weights),
         "normal_jump_max": max(level["normal_jump_max"] for level in levels),
     }
+    rules = [level["vertex_rule"] for level in levels if "vertex_rule" in level]
+    if rules:
+        moved = [rule["vertices"] for rule in rules]
+        total["vertex_rule"] = {
+            "vertices": sum(moved),
+            "proximity_ratio": _total_ratio([rule["proximity_ratio"] for rule in rules], moved),
+            "gate": _total_gate([rule["gate"] for rule in rules], moved),
+        }
+    return total
+
+
+def _total_ratio(ratios: Sequence[RatioSummary], weights: Sequence[int]) -> RatioSummary:
+    return {
+        "max": max(ratio["max"] for ratio in ratios),
+        "mean": _mean([ratio["mean"] for ratio in ratios], weights),
+        "p99": max(ratio["p99"] for ratio in ratios),
+    }
+
+
+def _total_gate(gates: Sequence[GateSummary], weights: Sequence[int]) -> GateSummary:
+    return {
+        "mean": _mean([gate["mean"] for gate in gates], weights),
+        "max": max(gate["max"] for gate in gates),
+        "active": _mean([gate["active"] for gate in gates], weights),
+    }
+
+
+def _mean(values: Sequence[float], weights: Sequence[int]) -> float:
+    weighted = [weight * value for weight, value in zip(weights, values, strict=True)]
+    return sum(weighted) / max(sum(weights), 1)
 
 
 def _mesh(result: MeshResult) -> dict[str, Any]:
