@@ -12,7 +12,7 @@ from train.experiments.reproduce import reproduce
 
 NAMES = (
     "structural, spectral, ablation, headline, cross-section, repeated, c-sweep, budget, capacity, "
-    "saddle, sphere-ridge, extended, lifted-stars, cad, hero, published"
+    "saddle, sphere-ridge, features, extended, lifted-stars, cad, hero, published"
 )
 
 
