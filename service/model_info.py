@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from pns_common.model_card import ModelCard
 from pns_common.onnx_model import DEFAULT_MODEL, OnnxModel
 
 # A metric on the card: what was measured, and its improvement over the reference in per cent.
@@ -38,6 +39,7 @@ def print_model(model: OnnxModel) -> None:
         "gate sharpness c": card.gate_sharpness,
         "budget C": card.budget,
         "orientation": card.orientation,
+        **_vertex_rows(card),
         **{f"training: {name}": value for name, value in card.training.items()},
         "bytes": model.size,
         "sha256": model.hash,
@@ -53,6 +55,16 @@ def print_model(model: OnnxModel) -> None:
     console = Console(soft_wrap=True)
     for each in [table, *tables]:
         console.print(each)
+
+
+def _vertex_rows(card: ModelCard) -> dict[str, Any]:
+    """What the card says of the vertex rule, where there is one."""
+    if card.vertex_features is None:
+        return {}
+    return {
+        "vertex features": card.vertex_features,
+        "vertex gate sharpness c": card.vertex_gate_sharpness,
+    }
 
 
 def _is_measured(value: Any) -> bool:
