@@ -19,6 +19,7 @@ from train.determinism import deterministic
 from train.losses import weighted_loss
 from train.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_correction
 from train.one_step import Step, refine_once, vertex_normals
+from train.quiet import quiet_term
 from train.recipes import Recipe
 from train.surfaces import signed_distance, unit_normal
 
@@ -47,7 +48,15 @@ def initial_network(recipe: Recipe) -> BoundedNet:
 
 def fit(recipe: Recipe, on_step: OnStep) -> Fit:
     """Train the operator with Adam on the recipe's data set."""
-    return optimise(recipe, lambda network, batch: batch_loss(recipe, network, batch), on_step)
+    if recipe.quiet == 0:
+        return optimise(recipe, lambda network, batch: batch_loss(recipe, network, batch), on_step)
+    meshes = [instance.mesh for instance in DATASETS[recipe.dataset]().instances]
+    quiet = quiet_term(meshes, FEATURE_SETS[recipe.features], recipe.seed)
+
+    def loss(network: BoundedNet, batch: Batch) -> Float[Tensor, ""]:
+        return batch_loss(recipe, network, batch) + recipe.quiet * quiet(network)
+
+    return optimise(recipe, loss, on_step)
 
 
 def optimise(
