@@ -7,7 +7,8 @@
 x = 1 − n1 · n2 ∈ [0, 2] is the curvature; the others are shape: real, invariant under scale too.
 All see the two faces of the edge and nothing else, and none has a sign.
 
-``signed-18`` adds to them the thirteen of signed_features.py. docs/features.md defines them all.
+``signed-18`` adds to them the thirteen of signed_features.py, ``signed-14`` those without the
+umbrella. docs/features.md defines them all.
 """
 
 from __future__ import annotations
@@ -21,7 +22,14 @@ from jaxtyping import Float
 from pns_common.arrays import Array, namespace, norm
 from pns_common.feature_set import Block, FeatureSet
 from pns_common.frames import EdgeFrames, EdgeStencil
-from pns_common.signed_features import DIHEDRAL, ENDS, UMBRELLA, WINGS, vertex_fields
+from pns_common.signed_features import (
+    DIHEDRAL,
+    ENDS,
+    UMBRELLA,
+    WINGS,
+    normal_fields,
+    vertex_fields,
+)
 from pns_common.symmetry import Feature
 
 # Lengths of zero are read as this, so that every logarithm is finite.
@@ -50,12 +58,13 @@ SHAPE = Block(
 )
 
 paper_features = FeatureSet("paper-5", (CURVATURE, SHAPE))
+tilt_features = FeatureSet("signed-14", (CURVATURE, SHAPE, DIHEDRAL, ENDS, WINGS), normal_fields)
 signed_features = FeatureSet(
     "signed-18", (CURVATURE, SHAPE, DIHEDRAL, ENDS, WINGS, UMBRELLA), vertex_fields
 )
 
 FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType(
-    {one.name: one for one in (paper_features, signed_features)}
+    {one.name: one for one in (paper_features, tilt_features, signed_features)}
 )
 FEATURE_COUNT: Mapping[str, int] = MappingProxyType(
     {name: one.count for name, one in FEATURE_SETS.items()}

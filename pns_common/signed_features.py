@@ -9,7 +9,7 @@ root mean square of its spokes, beside the five of ``paper-5``:
     umbrella   u_v · m_v / r_v               for v = a, b, c, d; negative on a crest
 
 All lie in [−1, 1]; none sees scale. Vertex data is read from ``EdgeStencil.fields``: m_v in the
-first three columns, u_v · m_v / r_v in the fourth.
+first three columns, u_v · m_v / r_v in the fourth where the set has the umbrella.
 """
 
 from __future__ import annotations
@@ -22,6 +22,11 @@ from pns_common.frames import EdgeFrames, EdgeStencil
 from pns_common.symmetry import Feature
 from pns_common.topology import Topology
 from pns_common.vertex_fields import divided, mean_normals, ring_square, umbrellas
+
+
+def normal_fields(points: Float[Array, "V 3"], topology: Topology) -> Float[Array, "V 3"]:
+    """m_v alone, for sets without the umbrella."""
+    return mean_normals(points, topology.faces)
 
 
 def vertex_fields(points: Float[Array, "V 3"], topology: Topology) -> Float[Array, "V 4"]:
@@ -64,7 +69,7 @@ def _tilts(
     return [dot(fields[:, vertex, :3], axis) for axis in axes for vertex in vertices]
 
 
-def _fields(at: EdgeStencil) -> Float[Array, "N 4 4"]:
+def _fields(at: EdgeStencil) -> Float[Array, "N 4 M"]:
     assert at.fields is not None, "edge_stencil was not given the feature set's fields"
     return at.fields
 

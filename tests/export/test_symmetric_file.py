@@ -35,7 +35,7 @@ def network_and_file(features, scale=3.0):
 
 
 @feature_sets
-@pytest.mark.parametrize("scale", [1.0, 4.0])
+@pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_file_says_what_the_network_says(features, scale):
     network, data = network_and_file(features, scale)
     parity = check_parity(model_from_bytes(data, "test"), network)
