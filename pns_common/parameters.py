@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from numbers import Integral, Real
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a finite real number (a bool is none)."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        return False
-    return math.isfinite(value)
+    """Whether a value is a finite real number, numpy's too (a bool is none)."""
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def is_whole(value: object) -> bool:
     """Whether a value is a whole number of an integer type (a bool is none)."""
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+    return isinstance(value, Integral) and not isinstance(value, bool)

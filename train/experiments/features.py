@@ -39,7 +39,12 @@ def setting(budget: float, sharpness: float) -> Recipe:
     """Return the default recipe, symmetric, with another C and c."""
     name = f"features-C{budget:g}-c{sharpness:g}"
     return replace(
-        ridge(), name=name, budget=budget, gate_sharpness=sharpness, orientation="symmetric", quiet=0.0
+        ridge(),
+        name=name,
+        budget=budget,
+        gate_sharpness=sharpness,
+        orientation="symmetric",
+        quiet=0.0,
     )
 
 
