@@ -8,9 +8,9 @@ from numbers import Integral, Real
 
 def is_number(value: object) -> bool:
     """Whether a value is a finite real number, numpy's too (a bool is none)."""
-    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    return not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
 
 
 def is_whole(value: object) -> bool:
     """Whether a value is a whole number of an integer type (a bool is none)."""
-    return isinstance(value, Integral) and not isinstance(value, bool)
+    return not isinstance(value, bool) and isinstance(value, Integral)
