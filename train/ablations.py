@@ -28,7 +28,7 @@ from train.batch import Batch
 from train.networks import RAW_COORDINATES, BoundedNet, unit_correction
 from train.one_step import displaced
 from train.recipes import Recipe
-from train.trainer import Fit, OnStep, optimise, step_loss
+from train.trainer import Fit, OnStep, optimise, step_loss, with_quiet
 
 EdgeCorrection = Callable[[EdgeStencil, BoundedNet, Recipe, float], Correction]
 """Interior edges, the network, its recipe and C / R to what is added to Loop's edge vertices.
@@ -113,10 +113,14 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType(
 def variant_recipe(recipe: Recipe, variant: Variant) -> Recipe:
     """Return a recipe under which a variant is trained; it differs in name and inputs only.
 
-    The unconstrained network has a third hidden layer, as the published one.
+    The unconstrained network has a third hidden layer, as the published one, and no quiet term: it
+    sees no features.
     """
-    hidden = (32, 32, 32) if variant.features == RAW_COORDINATES else recipe.hidden
-    return replace(recipe, name=variant.name, features=variant.features, hidden=hidden)
+    if variant.features == RAW_COORDINATES:
+        return replace(
+            recipe, name=variant.name, features=RAW_COORDINATES, hidden=(32, 32, 32), quiet=0.0
+        )
+    return replace(recipe, name=variant.name)
 
 
 def fit_variant(variant: Variant, recipe: Recipe, on_step: OnStep) -> Fit:
@@ -129,7 +133,7 @@ def fit_variant(variant: Variant, recipe: Recipe, on_step: OnStep) -> Fit:
         step = displaced(batch.points, batch.topology, correction.displacement, ratio)
         return step_loss(recipe, batch, step)
 
-    return optimise(recipe, loss, on_step)
+    return optimise(recipe, with_quiet(recipe, loss), on_step)
 
 
 def variant_scheme(variant: Variant, network: BoundedNet, recipe: Recipe) -> Scheme:

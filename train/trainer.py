@@ -48,15 +48,17 @@ def initial_network(recipe: Recipe) -> BoundedNet:
 
 def fit(recipe: Recipe, on_step: OnStep) -> Fit:
     """Train the operator with Adam on the recipe's data set."""
+    loss = with_quiet(recipe, lambda network, batch: batch_loss(recipe, network, batch))
+    return optimise(recipe, loss, on_step)
+
+
+def with_quiet(recipe: Recipe, loss: Loss) -> Loss:
+    """Add the recipe's quiet term, if it has one, to any loss of a batch."""
     if recipe.quiet == 0:
-        return optimise(recipe, lambda network, batch: batch_loss(recipe, network, batch), on_step)
+        return loss
     meshes = [instance.mesh for instance in DATASETS[recipe.dataset]().instances]
     quiet = quiet_term(meshes, FEATURE_SETS[recipe.features], recipe.seed)
-
-    def loss(network: BoundedNet, batch: Batch) -> Float[Tensor, ""]:
-        return batch_loss(recipe, network, batch) + recipe.quiet * quiet(network)
-
-    return optimise(recipe, loss, on_step)
+    return lambda network, batch: loss(network, batch) + recipe.quiet * quiet(network)
 
 
 def optimise(
