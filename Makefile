@@ -23,7 +23,7 @@ lint: $(DEV)/.ready
 	$(DEV)/bin/lint-imports
 
 unit: $(DEV)/.ready
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n 2
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n 2 --dist loadgroup
 
 # Malformed files by the thousand: FUZZ='--count 1000', or --seconds 60, for less.
 FUZZ ?= --count 100000

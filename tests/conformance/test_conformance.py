@@ -11,7 +11,11 @@ from tests.conformance.collection import LEVELS, NAMES, ROWS, Conformance, refin
 from tests.conformance.surfaces import loop_step, open_edges, proper, welded
 from tests.service.gltf import files
 
-pytestmark = pytest.mark.skipif(not NAMES, reason="needs the assets of the shared data")
+pytestmark = [
+    pytest.mark.skipif(not NAMES, reason="needs the assets of the shared data"),
+    # The collection is refined, validated and loaded once: on one worker.
+    pytest.mark.xdist_group("conformance"),
+]
 
 ASSET = pytest.mark.parametrize("name", NAMES)
 LEVEL = pytest.mark.parametrize("levels", LEVELS)

@@ -193,9 +193,8 @@ def test_the_file_in_double_precision_is_the_network_in_double_precision():
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7)
 
 
-@pytest.mark.parametrize("scale", [1.0, 1e3])
-def test_every_certificate_passes_with_the_vertex_rule_on(scale):
-    model = two_networks(scale)
+def test_every_certificate_passes_with_the_vertex_rule_on():
+    model = two_networks(1e3)  # loud: both rules use their whole envelope
     subject = subject_of_network(model)
     verdict = certify_scheme(subject, (), 0, lambda *_: None, valences=(3, 6, 9))
     failed = [
