@@ -61,6 +61,20 @@ def perceptron_bytes(layers, *, project=True, card=CARD):
     return model_bytes(nodes, weights, card=card, width=len(layers[0][0]))
 
 
+def breaking_off_bytes():
+    """A file that keeps the contract and reads rows that there are not, whatever it is given."""
+    nodes = [
+        helper.make_node("Slice", ["features", "zero", "one", "axis"], ["first"]),
+        helper.make_node("Slice", ["features", "zero", "three", "axis"], ["answer"]),
+        helper.make_node("Squeeze", ["first", "axis"], ["flat"]),
+        helper.make_node("Add", ["flat", "far"], ["beyond"]),
+        helper.make_node("Cast", ["beyond"], ["rows"], to=TensorProto.INT64),
+        helper.make_node("Gather", ["answer", "rows"], ["correction"]),
+    ]
+    whole = {name: np.array([i]) for name, i in (("zero", 0), ("one", 1), ("three", 3))}
+    return model_bytes(nodes, whole | {"axis": whole["one"], "far": np.full(1, 1e6)})
+
+
 def random_layers(seed, widths=(5, 32, 32, 3), scale=1.0):
     """Random weights of a perceptron."""
     rng = np.random.default_rng(seed)

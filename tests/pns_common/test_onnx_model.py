@@ -2,6 +2,8 @@
 
 import hashlib
 import pickle
+from dataclasses import replace
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -13,7 +15,14 @@ from pns_common import Mesh, ModelError, load_model, pns, refine
 from pns_common.model_card import ModelCard
 from pns_common.onnx_model import ROWS, bundled_models, model_from_bytes
 from tests.meshes import bumpy_sphere
-from tests.networks import CARD, model_bytes, perceptron_bytes, random_layers, random_model
+from tests.networks import (
+    CARD,
+    breaking_off_bytes,
+    model_bytes,
+    perceptron_bytes,
+    random_layers,
+    random_model,
+)
 
 GOOD = perceptron_bytes(random_layers(0))
 PASS = [helper.make_node("Slice", ["features", "from", "to", "axis"], ["three"])]
@@ -143,17 +152,19 @@ def test_other_inputs_or_outputs_are_refused(inputs, outputs):
     assert "puts" in refused(model_bytes(nodes, CUT, inputs=inputs, outputs=outputs)).expected
 
 
-def test_answers_of_another_shape_are_an_error():
+def test_answers_of_another_shape_are_refused():
     """The file declares [edges, 3] and returns fewer rows."""
-    nodes = [
-        helper.make_node("Slice", ["features", "from", "to", "axis"], ["three"]),
-        helper.make_node("Slice", ["three", "from", "to", "first"], ["correction"]),
-    ]
-    data = model_bytes(nodes, CUT | {"first": np.array([0])})
-    try:
-        model = model_from_bytes(data, "short")
-    except ModelError:
-        return  # a runtime that infers the shape refuses it earlier
+    nodes = through(helper.make_node("Slice", ["three", "from", "to", "first"], ["correction"]))
+    error = refused(model_bytes(nodes, CUT | {"first": np.array([0])}))
+    assert (error.expected, error.found) == (f"correction of shape [{ROWS}, 3]", "[3, 3]")
+
+
+def test_a_runtime_that_answers_otherwise_than_the_file_says_is_an_error():
+    class Short:
+        def run(self, outputs, inputs):
+            return [np.zeros((1, 3), dtype=np.float32)]
+
+    model = replace(random_model(0), _session=Short())
     with pytest.raises(ModelError, match="shape"):
         refine(Mesh(*bumpy_sphere()), pns(model))
 
@@ -167,11 +178,7 @@ def test_corrections_that_are_not_numbers_are_an_error():
 
 
 def test_a_graph_that_breaks_off_while_running_is_an_error_of_the_model():
-    nodes = [
-        helper.make_node("Reshape", ["features", "shape"], ["rows"]),
-        helper.make_node("Mul", ["rows", "budget"], ["correction"]),
-    ]
-    model = model_from_bytes(model_bytes(nodes, {"shape": np.array([7, 3])}), "breaks")
+    model = model_from_bytes(breaking_off_bytes(), "breaks")
     with pytest.raises(ModelError, match="runs to its end"):
         refine(Mesh(*bumpy_sphere()), pns(model))
 
@@ -205,6 +212,14 @@ def test_a_file_too_large_is_not_read(tmp_path):
         file.truncate(65 * 2**20)
     with pytest.raises(ModelError, match="bytes"):
         load_model(path)
+
+
+def test_a_bundled_name_wins_over_a_file_and_a_path_is_a_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "paper").write_bytes(GOOD)
+    assert load_model("paper").hash != hashlib.sha256(GOOD).hexdigest()
+    for path in ("./paper", tmp_path / "paper", Path("paper")):
+        assert load_model(path).hash == hashlib.sha256(GOOD).hexdigest()
 
 
 def test_a_file_on_disk_is_called_by_its_stem(tmp_path):

@@ -13,7 +13,14 @@ from typer.testing import CliRunner
 import train.run
 from pns_common import pns
 from pns_common.onnx_model import load_model, model_from_bytes
-from tests.networks import CARD, Float64Model, model_bytes, perceptron_bytes, random_layers
+from tests.networks import (
+    CARD,
+    Float64Model,
+    breaking_off_bytes,
+    model_bytes,
+    perceptron_bytes,
+    random_layers,
+)
 from train.certificates.double_precision import double_model, read_bytes
 from train.certificates.model_file import keeps_its_word, sample_features
 from train.certificates.subject import subject_of_scheme
@@ -75,11 +82,7 @@ def test_a_model_of_other_shapes_fails_by_name(tmp_path):
 
 
 def test_a_graph_that_breaks_off_fails_by_name(tmp_path):
-    nodes = [
-        helper.make_node("Reshape", ["features", "shape"], ["rows"]),
-        helper.make_node("Mul", ["rows", "budget"], ["correction"]),
-    ]
-    path = written(tmp_path, model_bytes(nodes, {"shape": np.array([7, 3])}))
+    path = written(tmp_path, breaking_off_bytes())
     verdict = certify_model_file(path, (), 0, quiet, valences=(3,))
     assert "runs to its end" in failures(verdict)["the file keeps its word"]
     assert "runs in double precision" in failures(verdict)["proximity slope"]

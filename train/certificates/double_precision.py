@@ -94,7 +94,7 @@ def double_model(model: OnnxModel, data: bytes) -> DoubleModel:
 
 def read_bytes(source: str | Path) -> bytes:
     """The bytes of a bundled model or of a file that `load_model` has accepted."""
-    if str(source) in bundled_models():
+    if isinstance(source, str) and source in bundled_models():
         return (resources.files("pns_common") / "models" / f"{source}.onnx").read_bytes()
     return Path(source).read_bytes()
 
