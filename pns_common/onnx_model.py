@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 import onnxruntime
@@ -19,9 +19,11 @@ from pns_common.model_shapes import ROWS
 
 DEFAULT_MODEL = "paper"
 LARGEST_FILE = 64 * 2**20
+BUNDLED = resources.files("pns_common") / "models"
 
 __all__ = [
     "ALLOWED_OPERATORS",
+    "BUNDLED",
     "DEFAULT_MODEL",
     "LARGEST_FILE",
     "ROWS",
@@ -30,6 +32,7 @@ __all__ = [
     "feature_inputs",
     "load_model",
     "model_from_bytes",
+    "model_name",
 ]
 
 
@@ -102,12 +105,16 @@ class OnnxModel:
 
 def bundled_models() -> list[str]:
     """Names of the model files that come with the package."""
-    folder = resources.files("pns_common") / "models"
     return sorted(
         entry.name.removesuffix(".onnx")
-        for entry in folder.iterdir()
+        for entry in BUNDLED.iterdir()
         if entry.name.endswith(".onnx")
     )
+
+
+def model_name(source: str | Path) -> str:
+    """What the model of a bundled name or a file is called: the name, or the file's stem."""
+    return source if _is_bundled(source) else Path(source).stem
 
 
 def load_model(source: str | Path | None = None) -> OnnxModel:
@@ -121,9 +128,9 @@ def load_model(source: str | Path | None = None) -> OnnxModel:
         ModelError: there is no such file, or it breaks the contract; says which part.
     """
     source = DEFAULT_MODEL if source is None else source
-    if isinstance(source, str) and source in bundled_models():
-        data = (resources.files("pns_common") / "models" / f"{source}.onnx").read_bytes()
-        return model_from_bytes(data, name=source)
+    if _is_bundled(source):
+        data = (BUNDLED / f"{source}.onnx").read_bytes()
+        return model_from_bytes(data, model_name(source))
     path = Path(source)
     if not path.is_file():
         names = ", ".join(bundled_models()) or "none"
@@ -132,7 +139,12 @@ def load_model(source: str | Path | None = None) -> OnnxModel:
         raise ModelError(
             str(path), expected=f"at most {LARGEST_FILE} bytes", found=str(path.stat().st_size)
         )
-    return model_from_bytes(path.read_bytes(), name=path.stem)
+    return model_from_bytes(path.read_bytes(), model_name(path))
+
+
+def _is_bundled(source: str | Path) -> TypeGuard[str]:
+    """Whether it is a bundled name; a Path never is."""
+    return isinstance(source, str) and source in bundled_models()
 
 
 def model_from_bytes(data: bytes, name: str) -> OnnxModel:

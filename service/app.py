@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from fastapi import FastAPI
 
 from service import jobs, problems
+from service.catalogue import Catalogue, ReadOnce
 from service.gate import Gate
 from service.limits import BodyLimit
 from service.pool import Workers
@@ -27,12 +28,14 @@ def create_app(
     *,
     job: Job = jobs.subdivide,
     warm_up: Callable[[Model | str | None], None] = jobs.warm_up,
+    catalogue: Callable[[], Catalogue] = jobs.catalogue,
 ) -> FastAPI:
     """The application, with worker processes that live as long as its lifespan.
 
     `settings` None reads the environment; `model` None loads `settings.model`. `job` is what a
-    worker calls for each request, `warm_up` what it calls once, before. A model that does not load
-    leaves the service up: /readyz says 503, scheme=loop works.
+    worker calls for each request, `warm_up` what it calls once, before, `catalogue` what one of
+    them calls once, later. A model that does not load leaves the service up: /readyz says 503,
+    scheme=loop and the other models work.
     """
     settings = settings or Settings()
     source = model if model is not None else settings.model
@@ -60,7 +63,8 @@ def create_app(
     )
     app.state.gate = gate
     problems.install(app)
-    app.include_router(router(Service(settings, job, workers, gate)))
+    models = ReadOnce(workers, gate, catalogue)
+    app.include_router(router(Service(settings, job, workers, gate, models)))
     app.add_middleware(
         BodyLimit,
         max_bytes=int(settings.body),

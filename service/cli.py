@@ -52,7 +52,12 @@ def subdivide(
         float | None, typer.Option(metavar="C", help="default: the model's own")
     ] = None,
     model: Annotated[
-        str | None, typer.Option(metavar="FILE", help="default: the bundled model")
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="a bundled model (see pns info), else a model file; ./NAME is always a file. "
+            "Default: the default model",
+        ),
     ] = None,
     reference_length: Annotated[
         str, typer.Option(metavar="auto|X", help="unit of length of the budget")
@@ -100,7 +105,11 @@ def serve(
     host: Annotated[str | None, typer.Option(help="default: PNS_HOST, else 127.0.0.1")] = None,
     port: Annotated[int | None, typer.Option(help="default: PNS_PORT, else 8000")] = None,
     model: Annotated[
-        str | None, typer.Option(metavar="FILE", help="default: PNS_MODEL, else the bundled one")
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="the model of requests that name none. Default: PNS_MODEL, else the default model",
+        ),
     ] = None,
 ) -> None:
     """Serve HTTP; every other setting is an environment variable PNS_…."""
@@ -113,9 +122,12 @@ def serve(
 
 @app.command()
 def info(
-    model: Annotated[str | None, typer.Argument(metavar="MODEL", help="name or file")] = None,
+    model: Annotated[
+        str | None,
+        typer.Argument(metavar="NAME|FILE", help="a bundled model, else a model file"),
+    ] = None,
 ) -> None:
-    """Show what MODEL says of itself; without MODEL, list the bundled models."""
+    """List the bundled models; with a name or a file, show what that model says of itself."""
     from pns_common.onnx_model import bundled_models, load_model
     from service.model_info import print_model, print_models
 

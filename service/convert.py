@@ -41,6 +41,8 @@ def convert(
 ) -> None:
     """Refine `source` into `output`; what was changed or lost goes to stderr and the report.
 
+    `model` is a bundled name or a file; None: the default one.
+
     Raises:
         ServiceError, PnsError: the file, the model or a parameter cannot be used.
         OSError: a file cannot be read or written.
@@ -51,7 +53,8 @@ def convert(
     began = time.perf_counter()
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     data = source.read_bytes()
-    loaded = load_model(model) if options.scheme == "pns" else None
+    # Loop needs none, but one that is named and does not exist is a mistake to be told.
+    loaded = load_model(model) if options.scheme == "pns" or model is not None else None
     with _progress(console) as advance:
         if kind in formats.GLTF_KINDS:
             done = subdivide_gltf(

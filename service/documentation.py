@@ -81,6 +81,22 @@ SUBDIVIDE: dict[str, Any] = {
     },
 }
 
+MODELS: dict[str, Any] = {
+    "summary": "The models that `model=` may name",
+    "description": (
+        "The bundled models and the one that is served, each with its card, sorted by name. "
+        "The bytes change only with the service: `If-None-Match` with the `ETag` saves them."
+    ),
+    "responses": {
+        200: {"headers": {"ETag": {"schema": {"type": "string"}}}},
+        304: {"description": "The client has this list"},
+        **_problems(
+            _500="A fault of the service, or a worker that died",
+            _503="Busy (see Retry-After), or shutting down",
+        ),
+    },
+}
+
 HEALTHZ: dict[str, Any] = {"summary": "Whether the process answers"}
 
 READYZ: dict[str, Any] = {

@@ -8,6 +8,8 @@ dressed up as one of these.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 class ServiceError(Exception):
     """Base of everything that the service answers with a problem document."""
@@ -105,15 +107,16 @@ class UnrefinableError(ServiceError):
 
 
 class InvalidParameter(ServiceError):  # noqa: N818
-    """A query parameter outside its range; `name` says which."""
+    """A query parameter outside its range; `name` says which, `choices` what it may be."""
 
     status = 422
     code = "invalid-parameter"
     title = "A parameter is out of range"
 
-    def __init__(self, name: str, detail: str) -> None:
+    def __init__(self, name: str, detail: str, *, choices: Sequence[str] = ()) -> None:
         super().__init__(detail)
         self.name = name
+        self.choices = tuple(choices)
 
     def __reduce__(self) -> tuple[object, ...]:
         return (type(self), (self.name, self.detail), dict(self.__dict__))
@@ -159,6 +162,13 @@ def check_limit(limit: str, found: int, allowed: int, text: str) -> None:
     """Raise LimitError where `found` is more than `allowed`; `text` says what has so much."""
     if found > allowed:
         raise LimitError(f"{text}, more than {allowed}", limit=limit, allowed=allowed, found=found)
+
+
+def check_choice(name: str, value: str, choices: Sequence[str]) -> None:
+    """Raise InvalidParameter where the value of the parameter `name` is none of `choices`."""
+    if value not in choices:
+        text = f"{name} must be one of {', '.join(choices)}"
+        raise InvalidParameter(name, text, choices=choices)
 
 
 def _restore_limit_error(kind: type[LimitError], state: dict[str, object]) -> LimitError:

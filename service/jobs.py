@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service import memory_file
-from service.errors import NoModelError
+from service.catalogue import Catalogue, catalogue_of
+from service.models import Models
 from service.options import Limits, Options
 
 if TYPE_CHECKING:
@@ -20,68 +21,57 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """One request, small enough for a pipe: body and answer are the paths of memory files."""
+    """One request, small enough for a pipe: body and answer are the paths of memory files.
+
+    `model` is the name of one of the worker's models; None: the served one.
+    """
 
     body: str
     answer: str
     content_type: str
     report_only: bool
     options: Options
+    model: str | None
     limits: Limits
 
 
-def subdivide(work: Work) -> dict[str, float]:
-    """Write the GLB, or the report as JSON, to `work.answer`; returns the seconds of each stage.
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What is known of a request that was answered: the seconds of each stage, and the model."""
 
-    Raises ServiceError.
-    """
+    seconds: dict[str, float]
+    model: str | None
+
+
+def subdivide(work: Work) -> Done:
+    """Write the GLB, or the report as JSON, to `work.answer`. Raises ServiceError."""
     import msgspec
 
     from service import upload_body
     from service.subdivide import subdivide_gltf
 
     sent = upload_body.sent(Path(work.body).read_bytes(), work.content_type, work.limits)
-    model = _MODEL.get() if work.options.scheme == "pns" else None
+    model = _MODELS.get(work.model) if work.options.scheme == "pns" else None
     done = subdivide_gltf(
         sent.data, sent.kind, work.options, model, work.limits, neighbours=sent.neighbours
     )
     memory_file.write(
         work.answer, msgspec.json.encode(done.report) if work.report_only else done.glb
     )
-    return done.timings
+    return Done(done.timings, None if model is None else model.name)
 
 
-class WorkersModel:
-    """The model of a worker process, handed over once, when the process starts.
-
-    A model may weigh megabytes and take long to build: requests do not carry it.
-    """
-
-    def __init__(self) -> None:
-        self._source: Model | str | None = None
-
-    def hold(self, source: Model | str | None) -> None:
-        """Keep a model, or the name or file of one; None stands for the bundled model."""
-        self._source = source
-
-    def get(self) -> Model:
-        """The model, loaded where it has not been yet. Raises NoModelError."""
-        from pns_common import ModelError, load_model
-
-        if self._source is None or isinstance(self._source, str):
-            try:
-                self._source = load_model(self._source)
-            except ModelError as error:
-                raise NoModelError(str(error)) from error
-        return self._source
-
-
-_MODEL = WorkersModel()
+_MODELS = Models()
 
 
 def warm_up(model: Model | str | None) -> None:
     """Import and load what the first request would otherwise wait for. Raises NoModelError."""
     import service.subdivide  # noqa: F401
 
-    _MODEL.hold(model)
-    _MODEL.get()
+    _MODELS.hold(model)
+    _MODELS.get()
+
+
+def catalogue() -> Catalogue:
+    """What this worker's models say of themselves."""
+    return catalogue_of(_MODELS)

@@ -1,9 +1,9 @@
-"""`pns info`: bundled models, and a model's card, as tables."""
+"""`pns info`: the bundled models side by side, and a model's card whole, as tables."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from rich.console import Console
@@ -14,25 +14,37 @@ from pns_common.onnx_model import DEFAULT_MODEL, OnnxModel
 
 # A metric on the card: what was measured, and its improvement over the reference in per cent.
 METRIC_COLUMNS = ("reference_mean", "method_mean", "percent", "low", "high")
+# What models are compared by: the data set, and the metrics with their short headings.
+HEADLINE = "ridge-held-out"
+HEADLINE_COLUMNS = {"distance_near": "near", "distance": "all", "hausdorff": "Haus-\ndorff"}
+_LEGEND = """
+* default. C: budget; c: sharpness of the gate. Last columns: improvement over
+Loop on held-out ridges in %: distance near the ridge, everywhere, Hausdorff."""
+# More columns than this do not fit a terminal; such data are shown row by row.
+WIDEST_GRID = 5
 
 
 def print_models(models: Iterable[OnnxModel]) -> None:
-    """Print a line a model."""
-    table = Table("model", "features", "budget C", "gate sharpness c", "bytes")
+    """Print a line a model, the default one marked."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("model", overflow="fold")
+    for heading in ("features", "orientation", "vertex\nrule"):
+        table.add_column(heading)
+    for heading in ("C", "c", *HEADLINE_COLUMNS.values()):
+        table.add_column(heading, justify="right")
     for model in models:
-        name = f"{model.name} (default)" if model.name == DEFAULT_MODEL else model.name
         card = model.card
-        values = [card.budget, card.gate_sharpness, model.size]
-        table.add_row(name, card.features, *(_text(value) for value in values))
-    Console(soft_wrap=True).print(table)
+        name = f"{model.name} *" if model.name == DEFAULT_MODEL else model.name
+        rule = "no" if card.vertex_features is None else "yes"
+        values = [_text(card.budget), _text(card.gate_sharpness), *_headline(card)]
+        table.add_row(name, card.features, card.orientation, rule, *values)
+    console = Console(soft_wrap=True)
+    console.print(table, _LEGEND, sep="\n", markup=False, highlight=False)
 
 
 def print_model(model: OnnxModel) -> None:
     """Print what the file says of itself, and its size and hash."""
     card = model.card
-    table = Table(title=model.name, show_header=False, title_justify="left")
-    table.add_column()
-    table.add_column(overflow="fold")  # a hash cut short is no hash
     rows: dict[str, Any] = {
         "format": card.format,
         "features": card.features,
@@ -40,21 +52,14 @@ def print_model(model: OnnxModel) -> None:
         "budget C": card.budget,
         "orientation": card.orientation,
         **_vertex_rows(card),
-        **{f"training: {name}": value for name, value in card.training.items()},
         "bytes": model.size,
         "sha256": model.hash,
     }
-    tables = []
-    for name, value in card.metrics.items():
-        if _is_measured(value):
-            tables.append(_metrics_table(name, value))
-        else:
-            rows[f"metric: {name}"] = value
-    for name, value in rows.items():
-        table.add_row(name, _text(value))
     console = Console(soft_wrap=True)
-    for each in [table, *tables]:
-        console.print(each)
+    console.print(_list(model.name, rows))
+    for title, data in (("training", card.training), ("metrics", card.metrics)):
+        for table in _tables(title, data):
+            console.print(table)
 
 
 def _vertex_rows(card: ModelCard) -> dict[str, Any]:
@@ -67,21 +72,75 @@ def _vertex_rows(card: ModelCard) -> dict[str, Any]:
     }
 
 
+def _headline(card: ModelCard) -> list[str]:
+    """The improvements by which models are compared; a dash for what the card does not hold."""
+    measured = card.metrics.get(HEADLINE)
+    if not _is_measured(measured):
+        return ["–"] * len(HEADLINE_COLUMNS)
+    rows = [measured.get(metric) for metric in HEADLINE_COLUMNS]
+    return ["–" if row is None else f"{row['percent']:+.1f}" for row in rows]
+
+
+def _tables(title: str, data: Mapping[str, Any]) -> Iterator[Table]:
+    """Nested data as tables: single values in a list, what has rows and columns in a grid."""
+    if _is_measured(data):
+        yield _metrics_table(title, data)
+    elif _is_grid(data):
+        yield _grid(title, data)
+    else:
+        inner = {name: value for name, value in data.items() if isinstance(value, Mapping)}
+        single = {name: value for name, value in data.items() if name not in inner}
+        if single:
+            yield _list(title, single)
+        for name, value in inner.items():
+            yield from _tables(f"{title}: {name}", value)
+
+
 def _is_measured(value: Any) -> bool:
     """Whether a card's metric is a table of rows as this project's export writes them."""
-    return isinstance(value, Mapping) and all(
-        isinstance(row, Mapping) and set(METRIC_COLUMNS) <= set(row) for row in value.values()
+    return _is_grid(value, most=None) and all(
+        set(METRIC_COLUMNS) <= set(row) for row in value.values()
     )
 
 
-def _metrics_table(name: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
-    table = Table(title=name, title_justify="left")
-    table.add_column("metric")
-    for heading in ("Loop", "model", "improvement %", "95 % from", "to"):
+def _is_grid(value: Any, most: int | None = WIDEST_GRID) -> bool:
+    """Whether it is rows by name, with the same columns of single values in each."""
+    if not isinstance(value, Mapping) or not value:
+        return False
+    rows = list(value.values())
+    if not all(isinstance(row, Mapping) and list(row) == list(rows[0]) for row in rows):
+        return False
+    if any(isinstance(cell, Mapping | list) for row in rows for cell in row.values()):
+        return False
+    return len(rows[0]) > 0 and (most is None or len(rows[0]) <= most)
+
+
+def _metrics_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
+    headings = ("Loop", "model", "improvement %", "95 % from", "to")
+    named = dict(zip(METRIC_COLUMNS, headings, strict=True))
+    cells = {
+        metric.replace("_", ", "): {heading: row[column] for column, heading in named.items()}
+        for metric, row in rows.items()
+    }
+    return _grid(title, cells)
+
+
+def _grid(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
+    table = Table(title=title, title_justify="left")
+    table.add_column()
+    for heading in next(iter(rows.values())):
         table.add_column(heading, justify="right")
-    for metric, row in rows.items():
-        cells = [_text(row[column]) for column in METRIC_COLUMNS]
-        table.add_row(metric.replace("_", ", "), *cells)
+    for name, row in rows.items():
+        table.add_row(name, *(_text(value) for value in row.values()))
+    return table
+
+
+def _list(title: str, rows: Mapping[str, Any]) -> Table:
+    table = Table(title=title, show_header=False, title_justify="left")
+    table.add_column()
+    table.add_column(overflow="fold")  # a hash cut short is no hash
+    for name, value in rows.items():
+        table.add_row(name, _text(value))
     return table
 
 

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from service.errors import InvalidParameter
+from service.errors import InvalidParameter, check_choice
 
 MAX_LEVELS = 6
 
@@ -44,12 +44,10 @@ class Options:
             raise InvalidParameter(
                 "levels", f"levels is {self.levels}; it must be 1 to {MAX_LEVELS}"
             )
-        if self.scheme not in SCHEMES:
-            raise InvalidParameter("scheme", f"scheme must be one of {', '.join(SCHEMES)}")
-        if self.diagnostics not in DIAGNOSTICS:
-            raise InvalidParameter(
-                "diagnostics", f"diagnostics must be one of {', '.join(DIAGNOSTICS)}"
-            )
+        check_choice("scheme", self.scheme, SCHEMES)
+        check_choice("diagnostics", self.diagnostics, DIAGNOSTICS)
+        check_choice("compress", self.compress, COMPRESSIONS)
+        check_choice("uv", self.uv, UV_RULES)
         if self.budget is not None and not (math.isfinite(self.budget) and self.budget >= 0):
             raise InvalidParameter("budget", "budget must be a finite number, zero or more")
         if self.reference_length != "auto" and not (
@@ -58,10 +56,6 @@ class Options:
             raise InvalidParameter(
                 "reference_length", "reference_length must be 'auto' or a finite positive number"
             )
-        if self.compress not in COMPRESSIONS:
-            raise InvalidParameter("compress", f"compress must be one of {', '.join(COMPRESSIONS)}")
-        if self.uv not in UV_RULES:
-            raise InvalidParameter("uv", f"uv must be one of {', '.join(UV_RULES)}")
         if not re.fullmatch(CREASE_PATTERN, self.crease) or not (self.crease_angle or 0) <= math.pi:
             raise InvalidParameter(
                 "crease", "crease must be 'off', 'normals' or 'angle:' and 0 to 180 degrees"

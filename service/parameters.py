@@ -42,6 +42,11 @@ class Parameters(BaseModel):
     scheme: Literal["pns", "loop"] = Field(
         default="pns", description="`loop` is the same path without the learned correction"
     )
+    model: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
+        default=None,
+        description="a name from `GET /models`; empty: the service's default. `scheme=loop` has no "
+        "use for it, nor for `budget`: both are checked and nothing else",
+    )
     budget: Annotated[
         Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,
         BeforeValidator(_empty_is_absent),
@@ -80,5 +85,5 @@ class Parameters(BaseModel):
     )
 
     def options(self) -> Options:
-        """The same as the pipeline takes them."""
-        return Options(**self.model_dump())
+        """The same as the pipeline takes them: all but the model, which is not its to find."""
+        return Options(**self.model_dump(exclude={"model"}))

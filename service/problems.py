@@ -32,6 +32,7 @@ class Problem(BaseModel):
     code: str = Field(description="stable slug to branch on")
     pointer: str | None = Field(default=None, description="JSON pointer of the offending value")
     parameter: str | None = Field(default=None, description="name of the offending parameter")
+    choices: list[str] | None = Field(default=None, description="what the parameter may be")
     limit: str | None = Field(default=None, description="name of the limit that was exceeded")
     allowed: float | None = Field(default=None, description="the limit's value")
     found: float | None = Field(default=None, description="what this request would have taken")
@@ -66,7 +67,7 @@ def of_service_error(error: ServiceError) -> JSONResponse:
         case LimitError():
             members |= {"limit": error.limit, "allowed": error.allowed, "found": error.found}
         case InvalidParameter():
-            members["parameter"] = error.name
+            members |= {"parameter": error.name, "choices": list(error.choices) or None}
         case BusyError():
             headers["Retry-After"] = str(error.retry_after)
     if error.status in (408, 413):

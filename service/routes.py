@@ -1,4 +1,4 @@
-"""The routes: a refined file, and two probes for whoever runs the service."""
+"""The routes: a refined file, the models, and two probes for whoever runs the service."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from starlette.types import Receive
 
 from service import documentation, media
 from service.answer import FileAnswer
+from service.catalogue import ModelEntry, ReadOnce
 from service.errors import InvalidParameter, MediaTypeError, NoModelError, check_limit
 from service.gate import DrainingError, Gate
-from service.jobs import Work
+from service.jobs import Done, Work
 from service.memory_file import MemoryFile
 from service.parameters import Parameters
 from service.pool import Workers
@@ -29,7 +30,7 @@ from service.settings import Settings
 log = logging.getLogger("pns.service")
 
 T = TypeVar("T")
-Job = Callable[[Work], dict[str, float]]
+Job = Callable[[Work], Done]
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class Service:
     job: Job
     workers: Workers
     gate: Gate
+    models: ReadOnce
 
 
 def router(service: Service) -> APIRouter:
@@ -49,6 +51,15 @@ def router(service: Service) -> APIRouter:
     @routes.post("/subdivide", response_class=Response, **documentation.SUBDIVIDE)
     async def subdivide(request: Request, parameters: Annotated[Parameters, Query()]) -> Response:
         return await _subdivide(service, request, parameters)
+
+    @routes.get("/models", response_model=list[ModelEntry], **documentation.MODELS)
+    async def models(request: Request) -> Response:
+        catalogue = await service.models.get()
+        # It may change when the service starts again, so a copy is asked for, and costs nothing.
+        headers = {"ETag": catalogue.tag, "Cache-Control": "no-cache"}
+        if catalogue.is_known(request.headers.get("if-none-match", "")):
+            return Response(status_code=304, headers=headers)
+        return Response(catalogue.content, headers=headers, media_type=media.JSON)
 
     @routes.get("/healthz", **documentation.HEALTHZ)
     async def healthz() -> dict[str, str]:
@@ -69,6 +80,7 @@ async def _subdivide(service: Service, request: Request, parameters: Parameters)
     settings = service.settings
     _refuse_repeated(request)
     options = parameters.options()
+    await service.models.check(parameters.model)
     check_limit("levels", options.levels, settings.levels, f"levels is {options.levels}")
     content_type = request.headers.get("content-type", "")
     media.of_request(content_type)
@@ -95,16 +107,17 @@ async def _subdivide(service: Service, request: Request, parameters: Parameters)
                 content_type=content_type,
                 report_only=report_only,
                 options=options,
+                model=parameters.model,
                 limits=settings.job_limits(),
             )
             async with gate.working():
-                stages = await _unless_gone(request.receive, service.workers.run(service.job, work))
+                done = await _unless_gone(request.receive, service.workers.run(service.job, work))
             finished = time.perf_counter()
-        timing = {"upload": uploaded - began, **stages, "total": finished - began}
+        timing = {"upload": uploaded - began, **done.seconds, "total": finished - began}
         stages_text = _server_timing(timing)
-        log.info(
-            "%s levels=%d: %d bytes; %s", options.scheme, options.levels, answer.size, stages_text
-        )
+        what = options.scheme if done.model is None else f"{options.scheme} ({done.model})"
+        size = answer.size
+        log.info("%s levels=%d: %d bytes; %s", what, options.levels, size, stages_text)
         return FileAnswer(
             answer,
             held.pop_all(),

@@ -27,7 +27,9 @@ class Settings(BaseSettings):
 
     host: str = "127.0.0.1"
     port: int = Field(default=8000, ge=0, le=65535)
-    model: str | None = Field(default=None, description="model name or file; none: the bundled one")
+    model: str | None = Field(
+        default=None, description="bundled name or model file; none: the default bundled one"
+    )
 
     body: ByteSize = Field(default=ByteSize(64 * MIB), gt=0, description="largest request body")
     faces: int = Field(default=5_000_000, gt=0, description="most faces predicted in an answer")

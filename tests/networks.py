@@ -6,12 +6,15 @@ from itertools import pairwise
 import numpy as np
 from onnx import TensorProto, helper, numpy_helper
 
+from pns_common.features import FEATURE_COUNT
 from pns_common.model_card import CARD_KEY, ModelCard
 from pns_common.onnx_model import model_from_bytes
+from pns_common.ring_features import RING_10
 
 PUBLISHED_BUDGET, PUBLISHED_SHARPNESS = 0.5, 10.0
 
 CARD = ModelCard(1, "paper-5", PUBLISHED_SHARPNESS, PUBLISHED_BUDGET, "first-face", {}, {})
+VERTEX_CARD = ModelCard(2, "signed-18", 50.0, 1.0, "symmetric", {}, {}, "ring-10", 50.0)
 
 
 def model_bytes(nodes, weights, *, card=CARD, width=5, inputs=None, outputs=None, domains=()):
@@ -40,25 +43,48 @@ def _tensor(values):
 
 def perceptron_bytes(layers, *, project=True, card=CARD):
     """A GELU perceptron from (weight (in, out), bias) pairs, projected onto the ball or not."""
+    nodes, weights = perceptron(layers, project=project)
+    return model_bytes(nodes, weights, card=card, width=len(layers[0][0]))
+
+
+def two_perceptrons_bytes(edges, vertices, *, card=VERTEX_CARD):
+    """A file of format 2: one perceptron for edges, one for old vertices."""
+    nodes, weights = perceptron(edges)
+    more_nodes, more_weights = perceptron(vertices, prefix="vertex_")
+    return model_bytes(
+        nodes + more_nodes,
+        weights | more_weights,
+        card=card,
+        inputs=[
+            ("features", ["edges", len(edges[0][0])]),
+            ("budget", []),
+            ("vertex_features", ["vertices", len(vertices[0][0])]),
+        ],
+        outputs=[("correction", ["edges", 3]), ("vertex_correction", ["vertices", 3])],
+    )
+
+
+def perceptron(layers, *, project=True, prefix=""):
+    """Nodes and weights from the input ``features`` to the output ``correction``, prefixed."""
     nodes, weights, name = [], {}, "features"
+
+    def add(operator, inputs, output, **attributes):
+        inputs = [i if i == "budget" else f"{prefix}{i}" for i in inputs]
+        nodes.append(helper.make_node(operator, inputs, [f"{prefix}{output}"], **attributes))
+        return output
+
     for number, (weight, bias) in enumerate(layers):
         weights |= {f"w{number}": weight, f"b{number}": bias}
-        nodes.append(helper.make_node("Gemm", [name, f"w{number}", f"b{number}"], [f"z{number}"]))
-        name = f"z{number}"
+        name = add("Gemm", [name, f"w{number}", f"b{number}"], f"z{number}")
         if number < len(layers) - 1:
-            nodes.append(helper.make_node("Gelu", [name], [f"g{number}"]))
-            name = f"g{number}"
+            name = add("Gelu", [name], f"g{number}")
     if project:
-        weights |= {"one": 1.0}
-        nodes += [
-            helper.make_node("ReduceL2", [name, "last"], ["length"], keepdims=1),
-            helper.make_node("Max", ["length", "one"], ["divisor"]),
-            helper.make_node("Div", [name, "divisor"], ["in_ball"]),
-        ]
-        name = "in_ball"
-        weights |= {"last": np.array([1])}
-    nodes.append(helper.make_node("Mul", [name, "budget"], ["correction"]))
-    return model_bytes(nodes, weights, card=card, width=len(layers[0][0]))
+        weights |= {"one": 1.0, "last": np.array([1])}
+        add("ReduceL2", [name, "last"], "length", keepdims=1)
+        add("Max", ["length", "one"], "divisor")
+        name = add("Div", [name, "divisor"], "in_ball")
+    add("Mul", [name, "budget"], "correction")
+    return nodes, {f"{prefix}{key}": value for key, value in weights.items()}
 
 
 def breaking_off_bytes():
@@ -87,6 +113,13 @@ def random_layers(seed, widths=(5, 32, 32, 3), scale=1.0):
 def random_model(seed, scale=1.0):
     """A model with random weights."""
     return model_from_bytes(perceptron_bytes(random_layers(seed, scale=scale)), "random")
+
+
+def vertex_model_bytes(seed, scale=2.0):
+    """A file of format 2 with random weights, so loud that both rules use much of their bound."""
+    edges = random_layers(seed, (FEATURE_COUNT["signed-18"], 16, 3), scale)
+    vertices = random_layers(seed + 1, (RING_10.count, 16, 3), scale)
+    return two_perceptrons_bytes(edges, vertices)
 
 
 def huge_model(seed):

@@ -14,10 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from pns_common import onnx_model
 from pns_common.model_card import ModelCard
+from pns_common.schemes import Model
 from service import memory_file
 from service.errors import GltfError, LimitError, NoModelError, UnreadableError
-from service.jobs import Work
+from service.jobs import Done, Work, warm_up
 
 ZERO_CARD = ModelCard(1, "paper-5", 10.0, 0.5, "first-face", {}, {})
 
@@ -48,11 +50,22 @@ def no_warm_up(model: object) -> None:
     pass
 
 
+def warm_up_among(folder: str, model: Model | str | None) -> None:
+    """The real warm-up, in a package whose bundled files are those of another folder."""
+    onnx_model.BUNDLED = Path(folder)
+    warm_up(model)
+
+
+def stay_away(seconds: float, model: object) -> None:
+    """A warm-up that does not come to its end."""
+    time.sleep(seconds)
+
+
 def fails_to_warm_up(model: object) -> None:
     raise RuntimeError("no such thing")
 
 
-def obey(work: Work) -> dict[str, float]:
+def obey(work: Work) -> Done:
     """`sleep 2`, `die`, `hold`, … as the body says; anything else is echoed."""
     body = Path(work.body).read_bytes()
     word, _, argument = body[:100].decode(errors="replace").partition(" ")
@@ -76,11 +89,11 @@ def obey(work: Work) -> dict[str, float]:
             raise LimitError("too many faces", limit="faces", allowed=5, found=20)
         case "large":
             memory_file.write(work.answer, bytes(int(argument)))
-            return {}
+            return Done({}, None)
         case "pid":
             body = str(os.getpid()).encode()
     memory_file.write(work.answer, body)
-    return {"read": 0.001, "refine": 0.002}
+    return Done({"read": 0.001, "refine": 0.002}, None)
 
 
 class UnpicklableError(Exception):

@@ -14,13 +14,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from pns_common.onnx_model import bundled_models, load_model
+from pns_common.onnx_model import DEFAULT_MODEL, bundled_models, load_model
 from service import cli, formats
 from service.example import part, part_glb
 from service.gltf.container import read_glb
 from service.soup_glb import soup_glb
+from tests.networks import vertex_model_bytes
 
 FACES = 1920
+NAMES = ", ".join(bundled_models())
 
 
 class Outcome(NamedTuple):
@@ -210,12 +212,16 @@ def with_tree(glb: bytes, tree: dict[str, Any]) -> bytes:
         ("subdivide part.glb -o out.glb --reference-length long", 2, "reference-length"),
         ("subdivide part.glb -o out.glb --reference-length 0", 2, "reference_length"),
         ("subdivide part.glb -o out.glb --model missing.onnx", 1, "missing.onnx"),
+        ("subdivide part.glb -o out.glb --model pape", 1, "bundled name (" + NAMES),
+        ("subdivide part.glb -o out.glb --model pape --scheme loop", 1, "bundled name (" + NAMES),
+        ("subdivide part.glb -o out.glb --model ./paper", 1, "./paper"),
         ("subdivide part.glb -o out.glb --model part.glb", 1, "model part"),
         ("subdivide part.glb -o out.glb --levels 6", 1, "faces"),
         ("subdivide broken.glb -o out.glb", 1, "GLB"),
         ("subdivide broken.ply -o out.glb", 1, "PLY"),
         ("subdivide external.gltf -o out.glb", 1, "buffer"),
-        ("info missing", 1, "missing"),
+        ("info missing", 1, "bundled name (" + NAMES),
+        ("info part.glb", 1, "ONNX"),
         ("example part.obj", 2, "part.obj"),
         ("serve --port 70000", 2, "port"),
         ("subdivide part.glb", 2, "--output"),
@@ -303,10 +309,34 @@ def test_a_fault_of_ours_is_a_traceback(pns: Any, monkeypatch: pytest.MonkeyPatc
         cli.main()
 
 
+def test_a_model_is_a_name_or_a_file_and_the_name_wins(
+    pns: Any, tmp_path: Path, part_file: Path
+) -> None:
+    (tmp_path / "paper").write_bytes(vertex_model_bytes(0))
+    report = tmp_path / "r.json"
+    for given, features in (("paper", "paper-5"), ("./paper", "signed-18")):
+        command = f"subdivide part.glb -o out.glb --model {given} --report r.json"
+        assert pns(*command.split()).code == 0
+        found = json.loads(report.read_text())
+        assert found["model"] == "paper"
+        assert found["model_hash"] == load_model(given).hash
+        assert load_model(given).card.features == features
+    assert "vertex_rule" in found["levels"][0]
+    loop = "subdivide part.glb -o out.glb --scheme loop --model ./paper --report r.json"
+    assert pns(*loop.split()).code == 0
+    assert json.loads(report.read_text())["model"] is None
+
+
+def test_help_says_that_a_model_is_a_name_or_a_file(pns: Any) -> None:
+    for command in ("subdivide", "serve", "info"):
+        assert "NAME|FILE" in pns(command, "--help").out
+    assert "./NAME" in pns("subdivide", "--help").out
+
+
 def test_info_lists_models_and_shows_a_card(pns: Any) -> None:
-    listed = pns("info").out
-    assert all(name in listed for name in bundled_models())
-    assert "(default)" in listed
+    listed = pns("info").out.splitlines()
+    assert set(bundled_models()) <= {line.partition(" ")[0] for line in listed}
+    assert [line.partition(" ")[0] for line in listed if " * " in line] == [DEFAULT_MODEL]
     shown = pns("info", "paper").out
     model = load_model("paper")
     assert model.hash in shown

@@ -16,7 +16,7 @@ EXAMPLES = [
     errors.GltfError("index 9", pointer="/accessors/3"),
     errors.UnsupportedFeature("a triangle strip", pointer="/meshes/0"),
     errors.UnrefinableError("no face"),
-    errors.InvalidParameter("levels", "levels is 9"),
+    errors.InvalidParameter("model", "model must be one of a, b", choices=["a", "b"]),
     errors.BusyError(retry_after=7),
     errors.NoModelError("none"),
     errors.JobTimeout("60 s"),
@@ -54,3 +54,11 @@ def test_a_limit_allows_what_it_says_and_refuses_one_more():
     found = refusal.value
     assert (found.limit, found.found, found.allowed) == ("faces", 6, 5)
     assert str(found) == "there are 6 faces, more than 5"
+
+
+def test_a_choice_is_one_of_what_there_is_or_lists_it():
+    errors.check_choice("scheme", "loop", ("pns", "loop"))
+    with pytest.raises(errors.InvalidParameter) as refusal:
+        errors.check_choice("scheme", "Loop", ("pns", "loop"))
+    assert (refusal.value.name, refusal.value.choices) == ("scheme", ("pns", "loop"))
+    assert str(refusal.value) == "scheme must be one of pns, loop"

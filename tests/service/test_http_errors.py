@@ -256,6 +256,7 @@ def test_the_description_names_bodies_parameters_and_errors(client: TestClient) 
     assert names == {
         "levels",
         "scheme",
+        "model",
         "budget",
         "reference_length",
         "diagnostics",

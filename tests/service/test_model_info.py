@@ -1,14 +1,88 @@
-"""`pns info` says whether a model has a vertex rule."""
+"""`pns info`: the bundled models side by side, and a card with all that it holds."""
 
-from pns_common.onnx_model import load_model, model_from_bytes
-from service.model_info import print_model
-from tests.export.test_vertex_file import file_bytes, two_networks
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from pns_common.onnx_model import DEFAULT_MODEL, OnnxModel, load_model, model_from_bytes
+from service.model_info import print_model, print_models
+from tests.networks import vertex_model_bytes
+
+NESTED = {
+    "ridge-held-out": {
+        metric: {"reference_mean": 0.5, "method_mean": 0.25, "percent": 50.0, "low": 4, "high": 6}
+        for metric in ("distance_near", "distance")
+    },
+    "decimation": {"meshes": 7, "mean": {"bunny": {"loop": 0.125}, "cow": {"loop": 0.0625}}},
+    "jump": {"ridges": {"by level": [1.5, 1.25], "worst": {"value": 1.75}}},
+    "margin": 0.375,
+}
 
 
-def test_a_vertex_rule_is_shown_where_there_is_one(capsys):
-    print_model(model_from_bytes(file_bytes(two_networks()), "two"))
+@pytest.fixture
+def vertices() -> OnnxModel:
+    return model_from_bytes(vertex_model_bytes(0), "vertices")
+
+
+def with_card(model: OnnxModel, **changes: Any) -> OnnxModel:
+    return replace(model, card=replace(model.card, **changes))
+
+
+def test_models_are_compared_in_80_columns(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, vertices: OnnxModel
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    long = replace(with_card(vertices, metrics=NESTED), name="symmetric-signed")
+    print_models([load_model("paper"), long, vertices])
+    lines = capsys.readouterr().out.splitlines()
+    assert all(len(line) <= 80 for line in lines)
+    rows = {line.split()[0]: line.replace(" *", "").split()[1:] for line in lines[2:5]}
+    percent = load_model("paper").card.metrics["ridge-held-out"]["distance_near"]["percent"]
+    assert rows["paper"][:5] == ["paper-5", "first-face", "no", "0.5", "10"]
+    assert rows["paper"][5] == f"{percent:+.1f}"
+    assert rows["vertices"] == ["signed-18", "symmetric", "yes", "1", "50", "–", "–", "–"]
+    # A metric that the card does not hold is a dash beside those that it does.
+    assert rows[long.name][5:] == ["+50.0", "+50.0", "–"]
+
+
+def test_the_default_alone_is_marked(capsys: pytest.CaptureFixture[str]) -> None:
+    default = load_model()
+    print_models([default, replace(default, name="other")])
+    lines = capsys.readouterr().out.splitlines()
+    assert sum(" * " in line for line in lines) == 1
+    assert any(line.startswith(f"{DEFAULT_MODEL} *") for line in lines)
+
+
+def test_a_vertex_rule_is_shown_where_there_is_one(
+    capsys: pytest.CaptureFixture[str], vertices: OnnxModel
+) -> None:
+    print_model(with_card(vertices, vertex_gate_sharpness=37.5))
     shown = capsys.readouterr().out
-    assert "ring-10" in shown
-    assert "symmetric" in shown
+    for value in ("ring-10", "37.5", "symmetric", "signed-18"):
+        assert value in shown
     print_model(load_model("paper"))
     assert "vertex" not in capsys.readouterr().out
+
+
+def test_metrics_are_shown_however_deep_they_lie(
+    capsys: pytest.CaptureFixture[str], vertices: OnnxModel
+) -> None:
+    print_model(with_card(vertices, metrics=NESTED, training={"stages": {"first": {"steps": 11}}}))
+    shown = capsys.readouterr().out
+    for value in ("0.25", "50", "0.125", "0.0625", "[1.5, 1.25]", "1.75", "0.375", "11"):
+        assert value in shown
+    for title in ("metrics: decimation: mean", "metrics: jump: ridges: worst", "training: stages"):
+        assert title in shown
+    assert "{" not in shown
+
+
+def test_a_card_without_metrics_is_shown(
+    capsys: pytest.CaptureFixture[str], vertices: OnnxModel
+) -> None:
+    print_model(vertices)
+    shown = capsys.readouterr().out
+    assert vertices.hash[:20] in shown
+    assert "metrics" not in shown

@@ -5,7 +5,6 @@ are widened, which is exact, and every operator then computes in double.
 """
 
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from onnx.reference.op_run import OpRun
 
 from pns_common.errors import ModelError
 from pns_common.model_card import ModelCard
-from pns_common.onnx_model import OnnxModel, bundled_models, feature_inputs
+from pns_common.onnx_model import BUNDLED, OnnxModel, bundled_models, feature_inputs
 
 
 class Erf(OpRun):
@@ -95,7 +94,7 @@ def double_model(model: OnnxModel, data: bytes) -> DoubleModel:
 def read_bytes(source: str | Path) -> bytes:
     """The bytes of a bundled model or of a file that `load_model` has accepted."""
     if isinstance(source, str) and source in bundled_models():
-        return (resources.files("pns_common") / "models" / f"{source}.onnx").read_bytes()
+        return (BUNDLED / f"{source}.onnx").read_bytes()
     return Path(source).read_bytes()
 
 
