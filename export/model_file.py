@@ -6,7 +6,7 @@ from typing import Any
 
 from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, Parity, check_parity
-from pns_common.model_card import FORMAT, ModelCard
+from pns_common.model_card import FORMAT, VERTEX_FORMAT, ModelCard
 from pns_common.onnx_model import model_from_bytes
 from train.checkpoint import Checkpoint
 from train.networks import BoundedNet
@@ -27,7 +27,12 @@ def export_model(checkpoint: Checkpoint, path: Path) -> Exported:
         ParityError: the file would not say what the network says; nothing is written.
         ModelError: the file would break the model contract; nothing is written.
     """
-    return write_model(checkpoint.network, checkpoint_card(checkpoint), path)
+    return write_model(
+        checkpoint.network,
+        checkpoint_card(checkpoint),
+        path,
+        vertex_network=checkpoint.vertex_network,
+    )
 
 
 def write_model(
@@ -54,9 +59,15 @@ def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:
     on_card = {
         name: recipe.pop(name) for name in ("features", "gate_sharpness", "budget", "orientation")
     }
-    training = {"recipe": recipe.pop("name"), **recipe, "machine": checkpoint.machine}
+    vertex = checkpoint.recipe.vertex
+    if vertex is not None:
+        on_card["vertex_features"] = recipe["vertex"].pop("features")
+        on_card["vertex_gate_sharpness"] = recipe["vertex"].pop("gate_sharpness")
+    # What a recipe leaves out its card does not mention.
+    given = {name: value for name, value in recipe.items() if value is not None}
+    training = {"recipe": given.pop("name"), **given, "machine": checkpoint.machine}
     return ModelCard(
-        format=FORMAT,
+        format=FORMAT if vertex is None else VERTEX_FORMAT,
         training=training,
         metrics=checkpoint.metrics,
         **on_card,

@@ -24,8 +24,8 @@ from train.determinism import deterministic
 from train.grid import grid_faces, jittered_grid
 from train.networks import BoundedNet
 from train.one_step import Step, refine_once
+from train.recipe_operator import initial_network, recipe_operator
 from train.recipes import Recipe
-from train.trainer import initial_network, recipe_operator
 
 OnStep = Callable[[int, float], None]
 """Called after each step with the number of steps done and the value found."""

@@ -16,6 +16,53 @@ class LossWeights:
 
 
 @dataclass(frozen=True, slots=True)
+class VertexRule:
+    """The learned rule for old vertices: its features, hidden widths and gate, as on the card."""
+
+    features: str
+    hidden: tuple[int, ...]
+    gate_sharpness: float
+
+
+@dataclass(frozen=True, slots=True)
+class LevelWeights:
+    """Weights of a level's terms (train/level_loss.py); all but `jump` are against Loop's.
+
+    Attributes:
+        distance, peak: root mean square distance of all vertices, and its soft maximum.
+        inserted, inserted_peak: the same of the vertices just inserted on interior edges.
+        normal: face normals.
+        jump: the largest jump between face normals, beyond what is allowed.
+        worse: whatever is worse than Loop.
+    """
+
+    distance: float
+    peak: float
+    inserted: float
+    inserted_peak: float
+    normal: float
+    jump: float
+    worse: float
+
+
+@dataclass(frozen=True, slots=True)
+class StreamTraining:
+    """Training through levels on the stream of random surfaces (train/stream.py).
+
+    Attributes:
+        levels: weights after one step, two steps, …; as many steps are taken.
+        star: weight of the star term (train/star_term.py), which is added at every `star_every`th
+            step.
+        star_margin: the Reif margin that lifted stars are asked for.
+    """
+
+    levels: tuple[LevelWeights, ...]
+    star: float
+    star_every: int
+    star_margin: float
+
+
+@dataclass(frozen=True, slots=True)
 class Recipe:
     """Everything that decides the trained weights, apart from the machine.
 
@@ -33,6 +80,8 @@ class Recipe:
         seed: of the initial weights and of the batches.
         orientation: as on the model card; "symmetric" averages the network over its symmetries.
         quiet: weight of the quiet term (train/quiet.py), for the features paper-5; 0 leaves it out.
+        vertex: the learned rule for old vertices; None leaves them to Loop.
+        stream: training through levels, in place of `dataset` and `weights`; None for one step.
     """
 
     name: str
@@ -50,6 +99,8 @@ class Recipe:
     seed: int
     orientation: str = "first-face"
     quiet: float = 0.0
+    vertex: VertexRule | None = None
+    stream: StreamTraining | None = None
 
 
 def ridge(seed: int = 0) -> Recipe:

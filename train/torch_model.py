@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float
 
 from pns_common.errors import ModelError
-from pns_common.model_card import FORMAT, ModelCard
+from pns_common.model_card import FORMAT, VERTEX_FORMAT, ModelCard
 from train.networks import BoundedNet, unit_correction
 from train.recipes import Recipe
 
@@ -76,15 +76,20 @@ def numpy_correction(
     return on_arrays
 
 
-def recipe_model(recipe: Recipe, network: BoundedNet) -> TorchModel:
-    """Return a recipe's network as a model whose card has no metrics yet."""
+def recipe_model(
+    recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet | None = None
+) -> TorchModel:
+    """Return a recipe's networks as a model whose card has no metrics yet."""
+    rule = recipe.vertex
     card = ModelCard(
-        format=FORMAT,
+        format=FORMAT if rule is None else VERTEX_FORMAT,
         features=recipe.features,
         gate_sharpness=recipe.gate_sharpness,
         budget=recipe.budget,
         orientation=recipe.orientation,
         training={},
         metrics={},
+        vertex_features=None if rule is None else rule.features,
+        vertex_gate_sharpness=None if rule is None else rule.gate_sharpness,
     )
-    return TorchModel(recipe.name, card, network)
+    return TorchModel(recipe.name, card, network, vertex_network)

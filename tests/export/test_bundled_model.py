@@ -14,9 +14,10 @@ from train.datasets import ridge_held_out
 from train.determinism import machine_fingerprint
 from train.evaluation import compare_with_loop
 from train.metrics import METRICS, improvements_as_data
+from train.recipe_operator import initial_network
 from train.recipes import RECIPES, ridge
 from train.torch_model import recipe_model
-from train.trainer import fit, initial_network
+from train.trainer import fit
 
 PERCENT_POINTS = 0.01
 

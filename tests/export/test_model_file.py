@@ -10,9 +10,9 @@ from export.onnx_graph import OPSET, model_bytes
 from export.parity import BUDGETS, ROWS, TOLERANCE, ParityError, check_parity, sample_features
 from pns_common.onnx_model import load_model, model_from_bytes
 from train.checkpoint import Checkpoint
+from train.recipe_operator import initial_network
 from train.recipes import paper_text, ridge
 from train.torch_model import recipe_model
-from train.trainer import initial_network
 
 RECIPES = [pytest.param(recipe, id=recipe.name) for recipe in (ridge(), paper_text())]
 

@@ -16,9 +16,9 @@ from pns_common.topology import build_topology
 from tests.meshes import bent, bumpy_sphere, grid
 from tests.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
 from train.certificates.equivariance import well_conditioned
+from train.recipe_operator import initial_network
 from train.recipes import ridge
 from train.torch_model import recipe_model
-from train.trainer import initial_network
 
 BUDGET = 0.5
 SINGLE = 1e-6

@@ -26,9 +26,9 @@ from train.certificates.subject import in_double, subject_of_model, subject_of_n
 from train.certify import certify_scheme
 from train.networks import SymmetricNet
 from train.one_step import refine_once
+from train.recipe_operator import initial_network, recipe_operator
 from train.recipes import ridge
 from train.torch_model import TorchModel, recipe_model
-from train.trainer import initial_network, recipe_operator
 
 RECIPE = replace(ridge(), features="signed-18", orientation="symmetric")
 FIELDS = {"format": 2, "vertex_features": "ring-10", "vertex_gate_sharpness": 10.0}

@@ -21,9 +21,10 @@ from train.ablations import (
     variant_recipe,
     variant_scheme,
 )
+from train.recipe_operator import initial_network
 from train.recipes import ridge
 from train.torch_model import recipe_model
-from train.trainer import fit, initial_network
+from train.trainer import fit
 
 LOUD = 20.0
 

@@ -16,10 +16,10 @@ from train.certificates.subject import in_double, subject_of_network
 from train.experiments import spectral
 from train.experiments.lifted_stars import lifted_star_row
 from train.experiments.structural import scaled, variant_subject
+from train.recipe_operator import initial_network
 from train.recipes import ridge
 from train.spectrum import follow_lift
 from train.torch_model import recipe_model
-from train.trainer import initial_network
 
 BODIES = synthetic_bodies(0)
 

@@ -4,8 +4,8 @@ import torch
 
 from pns_common.errors import ModelError
 from train.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from train.recipe_operator import initial_network
 from train.recipes import paper_text, ridge
-from train.trainer import initial_network
 
 
 def checkpoint(recipe):

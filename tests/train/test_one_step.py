@@ -6,9 +6,9 @@ from pns_common.schemes import pns
 from pns_common.topology import build_topology, split
 from train.datasets import ridge_held_out
 from train.one_step import refine_once, vertex_normals
+from train.recipe_operator import initial_network, recipe_operator
 from train.recipes import ridge
 from train.torch_model import recipe_model
-from train.trainer import initial_network, recipe_operator
 
 
 def one_step(points, topology, network, budget=0.5):

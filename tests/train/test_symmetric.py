@@ -17,9 +17,9 @@ from tests.meshes import TETRAHEDRON, bumpy_sphere, manifolds, soups
 from tests.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
 from train.certificates.equivariance import well_conditioned
 from train.networks import BoundedNet
+from train.recipe_operator import initial_network
 from train.recipes import ridge
 from train.torch_model import recipe_model
-from train.trainer import initial_network
 
 EXACT = 1e-12
 SIGNED = sorted(name for name, one in FEATURE_SETS.items() if len(one.symmetries.order) == 8)

@@ -7,8 +7,9 @@ import torch
 from train.batch import disjoint_union
 from train.datasets import ridge_training
 from train.determinism import deterministic, machine_fingerprint
+from train.recipe_operator import initial_network
 from train.recipes import RECIPES, paper_text, ridge
-from train.trainer import batch_loss, fit, initial_network
+from train.trainer import batch_loss, fit
 
 
 def ignore(done, loss):

@@ -16,9 +16,9 @@ from train.experiments.laboratory import Laboratory
 from train.experiments.methods import PAPER_UNITS, level_by_level
 from train.experiments.paper_values import PUBLISHED_ABLATION
 from train.grid import grid_faces, jittered_grid
+from train.recipe_operator import initial_network
 from train.recipes import ridge
 from train.torch_model import recipe_model
-from train.trainer import initial_network
 
 LEVEL = 3
 TITLES: Mapping[str, str] = MappingProxyType(

@@ -18,10 +18,10 @@ from train.experiments.experiment import Cell, Column, Experiment, Outcome, Tabl
 from train.experiments.laboratory import Laboratory
 from train.experiments.paper_values import PUBLISHED_ADVERSARIAL, PUBLISHED_STRUCTURAL
 from train.networks import BoundedNet
+from train.recipe_operator import initial_network
 from train.recipes import Recipe, ridge
 from train.spectrum import VALENCES
 from train.torch_model import recipe_model
-from train.trainer import initial_network
 
 SEED = 0
 SCALED = 5.0

@@ -14,8 +14,8 @@ from train.experiments.laboratory import FULL, SMALL, Laboratory
 from train.experiments.page import markdown_page
 from train.experiments.reproduce import content_key, read_record, reproduce
 from train.experiments.style import panels
+from train.recipe_operator import initial_network
 from train.recipes import ridge
-from train.trainer import initial_network
 
 COLUMNS = (Column("name", "Name"), Column("value", "Value", "+.2f"), Column("paper", "Paper"))
 

@@ -1,0 +1,49 @@
+"""What a recipe makes of edges and vertices: its untrained networks, and their rules."""
+
+import torch
+
+from pns_common.correction import curvature_gate
+from pns_common.edge_operator import EdgeOperator
+from pns_common.features import FEATURE_SETS
+from pns_common.orientation import ORIENTATIONS
+from pns_common.ring_features import RING_FEATURE_SETS
+from pns_common.vertex_operator import VertexOperator
+from train.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_correction
+from train.recipes import Recipe, VertexRule
+
+# The vertex network's draw is not the edge network's.
+VERTEX_SEED = 1 << 20
+
+
+def initial_network(recipe: Recipe) -> BoundedNet:
+    """Return the untrained edge network of a recipe."""
+    generator = torch.Generator().manual_seed(recipe.seed)
+    if recipe.orientation == "symmetric":
+        group = FEATURE_SETS[recipe.features].symmetries
+        return SymmetricNet(group, recipe.hidden, recipe.activation, generator)
+    return BoundedNet(INPUT_COUNT[recipe.features], recipe.hidden, recipe.activation, generator)
+
+
+def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
+    """Return the untrained vertex network of a recipe; None where old vertices are Loop's."""
+    if recipe.vertex is None:
+        return None
+    generator = torch.Generator().manual_seed(VERTEX_SEED + recipe.seed)
+    group = RING_FEATURE_SETS[recipe.vertex.features].symmetries
+    return SymmetricNet(group, recipe.vertex.hidden, recipe.activation, generator)
+
+
+def recipe_operator(recipe: Recipe, network: BoundedNet) -> EdgeOperator:
+    """Return what a recipe makes of interior edges, with a network at budget 1."""
+    return EdgeOperator(
+        FEATURE_SETS[recipe.features],
+        ORIENTATIONS[recipe.orientation],
+        unit_correction(network),
+        curvature_gate(recipe.gate_sharpness),
+    )
+
+
+def vertex_rule_operator(rule: VertexRule, network: BoundedNet) -> VertexOperator:
+    """Return what a vertex rule makes of old vertices, likewise."""
+    features = RING_FEATURE_SETS[rule.features]
+    return VertexOperator(features, unit_correction(network), rule.gate_sharpness)
