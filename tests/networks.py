@@ -14,7 +14,7 @@ from pns_common.ring_features import RING_10
 PUBLISHED_BUDGET, PUBLISHED_SHARPNESS = 0.5, 10.0
 
 CARD = ModelCard(1, "paper-5", PUBLISHED_SHARPNESS, PUBLISHED_BUDGET, "first-face", {}, {})
-VERTEX_CARD = ModelCard(2, "signed-18", 50.0, 1.0, "symmetric", {}, {}, "ring-10", 50.0)
+VERTEX_CARD = ModelCard(2, "signed-18", 40.0, 0.25, "symmetric", {}, {}, "ring-10", 20.0)
 
 
 def model_bytes(nodes, weights, *, card=CARD, width=5, inputs=None, outputs=None, domains=()):
@@ -120,6 +120,11 @@ def vertex_model_bytes(seed, scale=2.0):
     edges = random_layers(seed, (FEATURE_COUNT["signed-18"], 16, 3), scale)
     vertices = random_layers(seed + 1, (RING_10.count, 16, 3), scale)
     return two_perceptrons_bytes(edges, vertices)
+
+
+def vertex_model(seed=0, scale=2.0):
+    """A model with random weights for edges and for old vertices."""
+    return model_from_bytes(vertex_model_bytes(seed, scale), "vertices")
 
 
 def huge_model(seed):

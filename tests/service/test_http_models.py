@@ -17,6 +17,7 @@ from pns_common.onnx_model import DEFAULT_MODEL, load_model
 from service.app import create_app
 from service.example import part_glb
 from service.settings import Settings
+from tests.networks import VERTEX_CARD
 from tests.service import stand_in_jobs as jobs
 from tests.service.packages import served_file, several_models
 
@@ -66,14 +67,14 @@ def test_a_request_picks_its_model_by_name(client: TestClient) -> None:
     assert paper["budget"] == load_model("paper").card.budget
     both = report(client, "model=vertices")
     assert both["model"] == "vertices"
-    assert both["budget"] == 1.0
+    assert both["budget"] == VERTEX_CARD.budget
     assert both["levels"][0]["vertex_rule"]["proximity_ratio"]["max"] > 0.1
     assert report(client, "")["model"] == DEFAULT_MODEL
     assert report(client, "model=") == report(client, f"model={DEFAULT_MODEL}")
 
 
 def test_another_models_budget_is_its_own_unless_it_is_given(client: TestClient) -> None:
-    assert report(client, "model=vertices&budget=0.25")["budget"] == 0.25
+    assert report(client, "model=vertices&budget=0.75")["budget"] == 0.75
 
 
 @pytest.mark.parametrize("name", ["pape", "Paper", "./paper", "paper.onnx", "/etc/passwd", "../x"])

@@ -43,7 +43,7 @@ def test_models_are_compared_in_80_columns(
     percent = load_model("paper").card.metrics["ridge-held-out"]["distance_near"]["percent"]
     assert rows["paper"][:5] == ["paper-5", "first-face", "no", "0.5", "10"]
     assert rows["paper"][5] == f"{percent:+.1f}"
-    assert rows["vertices"] == ["signed-18", "symmetric", "yes", "1", "50", "–", "–", "–"]
+    assert rows["vertices"] == ["signed-18", "symmetric", "yes", "0.25", "40", "–", "–", "–"]
     # A metric that the card does not hold is a dash beside those that it does.
     assert rows[long.name][5:] == ["+50.0", "+50.0", "–"]
 
