@@ -10,7 +10,7 @@ from pathlib import Path
 
 import fast_simplification
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from pns_common.arrays import cross, dot, norm
 from pns_common.frames import face_normals
@@ -18,7 +18,7 @@ from pns_common.mesh import Mesh
 from pns_common.refine import refine
 from pns_common.schemes import Scheme
 from train.dense_meshes import DenseMesh, asset_meshes, cad_meshes, is_manifold, largest_part
-from train.point_mesh import BoxTree, box_tree, nearest
+from train.point_mesh import BoxTree, box_tree, farthest, nearest
 
 COARSE_FACES = 800
 """About 400 vertices on a closed mesh, as in the source."""
@@ -157,7 +157,7 @@ class Target:
 
     def errors(self, refined: Mesh) -> SurfaceErrors:
         """Measure a refined mesh."""
-        other = _sampled(refined, self.surface.samples)
+        other = _sampled(refined, len(self.surface.points))
         there, back = _one_way(other, self.surface), _one_way(self.surface, other)
         return SurfaceErrors(
             mean=(there.mean + back.mean) / 2 / self.diagonal,
@@ -169,22 +169,22 @@ class Target:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Sampled:
-    """A surface with its tree, its sample points (vertices follow them) and faces' normals."""
+    """A surface with its tree, its sample points and its faces' normals."""
 
-    samples: int
     tree: BoxTree
-    points: Float[np.ndarray, "P 3"]
+    vertices: Float[np.ndarray, "V 3"]
     normals: Float[np.ndarray, "F 3"]
-    sample_face: np.ndarray
+    points: Float[np.ndarray, "P 3"]
+    sample_face: Int[np.ndarray, " P"]
 
 
 def _sampled(mesh: Mesh, samples: int) -> _Sampled:
     points, face = surface_samples(mesh, samples, np.random.default_rng(SEED))
     return _Sampled(
-        samples=samples,
         tree=box_tree(mesh),
-        points=np.concatenate([points, mesh.vertices]),
+        vertices=mesh.vertices,
         normals=face_normals(mesh.vertices, mesh.faces),
+        points=points,
         sample_face=face,
     )
 
@@ -210,13 +210,12 @@ def surface_samples(
 
 def _one_way(source: _Sampled, target: _Sampled) -> SurfaceErrors:
     found = nearest(target.tree, source.points)
-    sampled = found.distance[: source.samples]
     here = source.normals[source.sample_face]
-    there = target.normals[found.face[: source.samples]]
+    there = target.normals[found.face]
     angle = np.arctan2(norm(cross(here, there)), dot(here, there))
     return SurfaceErrors(
-        mean=float(sampled.mean()),
-        p95=float(np.percentile(sampled, 95)),
-        hausdorff=float(found.distance.max()),
+        mean=float(found.distance.mean()),
+        p95=float(np.percentile(found.distance, 95)),
+        hausdorff=farthest(target.tree, source.vertices, float(found.distance.max())),
         normal=float(angle.mean()),
     )

@@ -9,12 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.spatial import cKDTree
 
 from pns_common.arrays import cross, dot
 from pns_common.mesh import Mesh
 
 LEAF = 4
 """Triangles in a box of the last level."""
+
+SEARCHED = 1000
+"""Points whose distance is found at once where only the largest is wanted."""
 
 BLOCK = 16_384
 """Points that go down the tree together: their boxes stay in the processor's cache."""
@@ -26,6 +30,7 @@ class BoxTree:
 
     Attributes:
         corners: of each triangle.
+        centroids: tree of their centroids, for a first guess.
         order: the triangles of box i of the last level are `order[LEAF i … LEAF (i + 1) − 1]`; some
             come twice, to fill the last box.
         lower, upper: of each level, from the root down, its boxes; box i of a level holds boxes
@@ -33,6 +38,7 @@ class BoxTree:
     """
 
     corners: Float[np.ndarray, "F 3 3"]
+    centroids: cKDTree
     order: Int[np.ndarray, " N"]
     lower: tuple[Float[np.ndarray, "B 3"], ...]
     upper: tuple[Float[np.ndarray, "B 3"], ...]
@@ -64,6 +70,7 @@ def box_tree(mesh: Mesh) -> BoxTree:
     shapes = [(2**level, -1, 3) for level in range(depth + 1)]
     return BoxTree(
         corners=corners,
+        centroids=cKDTree(middle),
         order=order,
         lower=tuple(low.reshape(shape).min(axis=1) for shape in shapes),
         upper=tuple(high.reshape(shape).max(axis=1) for shape in shapes),
@@ -77,6 +84,30 @@ def nearest(tree: BoxTree, points: Float[np.ndarray, "P 3"]) -> Nearest:
         distance=np.concatenate([block.distance for block in blocks]),
         face=np.concatenate([block.face for block in blocks]),
     )
+
+
+def _first_guess(
+    tree: BoxTree, points: Float[np.ndarray, "P 3"]
+) -> tuple[Float[np.ndarray, " P"], Int[np.ndarray, " P"]]:
+    """Return the squared distance to the triangle whose centroid is nearest, and that triangle."""
+    _, face = tree.centroids.query(points)
+    return squared_distance(points, tree.corners[face]), face
+
+
+def farthest(tree: BoxTree, points: Float[np.ndarray, "P 3"], least: float) -> float:
+    """Return the largest distance of any point from the mesh, or `least` if that is larger.
+
+    Most points are passed over: some triangle is nearer than the largest distance found so far.
+    """
+    bound = np.sqrt(_first_guess(tree, points)[0])
+    order = np.argsort(-bound)
+    for start in range(0, len(order), SEARCHED):
+        rows = order[start : start + SEARCHED]
+        rows = rows[bound[rows] > least]
+        if len(rows) == 0:
+            break
+        least = max(least, float(nearest(tree, points[rows]).distance.max()))
+    return least
 
 
 def squared_distance(
@@ -125,23 +156,6 @@ def _nearest(tree: BoxTree, points: Float[np.ndarray, "P 3"]) -> Nearest:
         distance=np.sqrt(np.where(better, distance2[first], best)),
         face=np.where(better, triangle[first], face),
     )
-
-
-def _first_guess(
-    tree: BoxTree, points: Float[np.ndarray, "P 3"]
-) -> tuple[Float[np.ndarray, " P"], Int[np.ndarray, " P"]]:
-    """Return the nearest triangle of the leaf that each point comes to by the nearer box."""
-    box = np.zeros(len(points), dtype=np.int64)
-    for level in range(1, len(tree.lower)):
-        left = _box_distance2(tree, level, 2 * box, points)
-        right = _box_distance2(tree, level, 2 * box + 1, points)
-        box = 2 * box + (right < left)
-    triangle = tree.order[LEAF * box[:, None] + np.arange(LEAF)]
-    flat = squared_distance(np.repeat(points, LEAF, axis=0), tree.corners[triangle.reshape(-1)])
-    found = flat.reshape(-1, LEAF)
-    best = found.argmin(axis=1)[:, None]
-    at = np.take_along_axis
-    return at(found, best, axis=1)[:, 0], at(triangle, best, axis=1)[:, 0]
 
 
 def _box_distance2(
