@@ -5,20 +5,17 @@ simplified meshes). They simplify at random; here the simplification is fixed.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import fast_simplification
 import numpy as np
-from jaxtyping import Float, Int
 
-from pns_common.arrays import cross, dot, norm
-from pns_common.frames import face_normals
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
 from pns_common.schemes import Scheme
 from train.dense_meshes import DenseMesh, asset_meshes, cad_meshes, is_manifold, largest_part
-from train.point_mesh import BoxTree, box_tree, farthest, nearest
+from train.surface_distance import SAMPLES, SURFACE_METRICS, SurfaceErrors, prepared, surface_errors
 
 COARSE_FACES = 800
 """About 400 vertices on a closed mesh, as in the source."""
@@ -29,13 +26,14 @@ LEAST_REDUCTION = 5
 AGGRESSIVENESS = 5.0
 """How fast the simplification raises its threshold: below the library's 7, for better triangles."""
 
+LARGEST_CUT = 1 / 20
+"""Largest share of the coarse faces that may be cut off as pinched."""
+
+WORSE = 1.0
+"""From how many per cent on a method counts as worse."""
+
 SEARCH = 9
 """How many counts of faces near the target are tried for a manifold."""
-
-SAMPLES = 10_000
-"""Sample points on each of the two surfaces."""
-
-SEED = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,27 +57,6 @@ class NotSimplified:
 
 
 @dataclass(frozen=True, slots=True)
-class SurfaceErrors:
-    """How far two surfaces are apart, both ways; lengths in the dense mesh's diagonal.
-
-    Attributes:
-        mean: mean distance of a surface's points from the other surface, mean of both ways.
-        p95: 95th percentile of that distance, mean of both ways.
-        hausdorff: the largest distance found, vertices included.
-        normal: mean angle between the faces at a point and at its nearest point, mean of both
-            ways, radians.
-    """
-
-    mean: float
-    p95: float
-    hausdorff: float
-    normal: float
-
-
-SURFACE_METRICS = tuple(field.name for field in fields(SurfaceErrors))
-
-
-@dataclass(frozen=True, slots=True)
 class Row:
     """The errors of one method on one mesh after so many levels."""
 
@@ -87,6 +64,31 @@ class Row:
     level: int
     method: str
     errors: SurfaceErrors
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """One method after so many levels, against the reference method on the same meshes.
+
+    Attributes:
+        percent: for each metric by how many per cent the error is lower, mean over the meshes.
+        by_mesh: the same of the mean distance, for each mesh.
+    """
+
+    method: str
+    level: int
+    percent: Mapping[str, float]
+    by_mesh: Mapping[str, float]
+
+    @property
+    def worst(self) -> str:
+        """The mesh where the mean distance gains least."""
+        return min(self.by_mesh, key=self.by_mesh.__getitem__)
+
+    @property
+    def worse(self) -> int:
+        """Meshes whose mean distance is above the reference's by more than 1 %."""
+        return sum(percent < -WORSE for percent in self.by_mesh.values())
 
 
 def simplified_pairs(assets: Path | None = None) -> list[Pair]:
@@ -110,8 +112,10 @@ def simplify(dense: DenseMesh) -> Pair | NotSimplified:
         count = target + (tries + 1) // 2 * (2 if tries % 2 else -2)
         whole = collapsed(dense.mesh, count)
         coarse = largest_part(whole)
-        if is_manifold(coarse) and euler_characteristic(coarse) == wanted:
-            return Pair(dense, coarse, len(whole.faces) - len(coarse.faces))
+        cut_off = len(whole.faces) - len(coarse.faces)
+        alike = is_manifold(coarse) and euler_characteristic(coarse) == wanted
+        if alike and cut_off <= LARGEST_CUT * len(whole.faces):
+            return Pair(dense, coarse, cut_off)
     return NotSimplified(dense)
 
 
@@ -140,82 +144,39 @@ def compare(
     """Refine every coarse mesh by every scheme and measure it against its dense mesh."""
     rows, wanted = [], sorted(levels)
     for pair in pairs:
-        target = Target(pair.dense.mesh, samples)
+        true = prepared(pair.dense.mesh, samples)
         for method, scheme in schemes.items():
             for level in wanted:
                 refined = refine(pair.coarse, scheme, level, threads=1).mesh
-                rows.append(Row(pair.dense.name, level, method, target.errors(refined)))
+                errors = surface_errors(true, prepared(refined, samples))
+                rows.append(Row(pair.dense.name, level, method, errors))
     return rows
 
 
-class Target:
-    """A dense mesh, prepared once for many comparisons."""
-
-    def __init__(self, dense: Mesh, samples: int = SAMPLES) -> None:
-        self.surface = _sampled(dense, samples)
-        self.diagonal = float(np.linalg.norm(np.ptp(dense.vertices, axis=0)))
-
-    def errors(self, refined: Mesh) -> SurfaceErrors:
-        """Measure a refined mesh."""
-        other = _sampled(refined, len(self.surface.points))
-        there, back = _one_way(other, self.surface), _one_way(self.surface, other)
-        return SurfaceErrors(
-            mean=(there.mean + back.mean) / 2 / self.diagonal,
-            p95=(there.p95 + back.p95) / 2 / self.diagonal,
-            hausdorff=max(there.hausdorff, back.hausdorff) / self.diagonal,
-            normal=(there.normal + back.normal) / 2,
-        )
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Sampled:
-    """A surface with its tree, its sample points and its faces' normals."""
-
-    tree: BoxTree
-    vertices: Float[np.ndarray, "V 3"]
-    normals: Float[np.ndarray, "F 3"]
-    points: Float[np.ndarray, "P 3"]
-    sample_face: Int[np.ndarray, " P"]
+def summaries(rows: Iterable[Row], reference: str = "loop") -> list[Summary]:
+    """Return one summary for each other method and level, in the order of the rows."""
+    errors = {(row.method, row.level, row.mesh): row.errors for row in rows}
+    meshes = list(dict.fromkeys(mesh for _, _, mesh in errors))
+    found = []
+    for method, level in dict.fromkeys((method, level) for method, level, _ in errors):
+        if method == reference:
+            continue
+        gains = {
+            mesh: gain(errors[reference, level, mesh], errors[method, level, mesh])
+            for mesh in meshes
+        }
+        percent = {
+            metric: float(np.mean([one[metric] for one in gains.values()]))
+            for metric in SURFACE_METRICS
+        }
+        by_mesh = {mesh: one["mean"] for mesh, one in gains.items()}
+        found.append(Summary(method, level, percent, by_mesh))
+    return found
 
 
-def _sampled(mesh: Mesh, samples: int) -> _Sampled:
-    points, face = surface_samples(mesh, samples, np.random.default_rng(SEED))
-    return _Sampled(
-        tree=box_tree(mesh),
-        vertices=mesh.vertices,
-        normals=face_normals(mesh.vertices, mesh.faces),
-        points=points,
-        sample_face=face,
-    )
-
-
-def surface_samples(
-    mesh: Mesh, count: int, rng: np.random.Generator
-) -> tuple[Float[np.ndarray, "N 3"], np.ndarray]:
-    """Return points spread evenly by area, and their faces.
-
-    Stratified: one point in each of `count` pieces of equal area, in the order of the faces, so
-    that means over two surfaces with like faces differ by the surfaces and hardly by the draw.
-    """
-    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
-    area = norm(cross(b - a, c - a))
-    upto = np.cumsum(area)
-    place = (np.arange(count) + rng.random(count)) / count * upto[-1]
-    face = np.searchsorted(upto, place, side="right").clip(max=len(area) - 1)
-    u, v = rng.random((2, count, 1))
-    # The square's upper half is folded onto the triangle.
-    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    return a[face] + u * (b - a)[face] + v * (c - a)[face], face
-
-
-def _one_way(source: _Sampled, target: _Sampled) -> SurfaceErrors:
-    found = nearest(target.tree, source.points)
-    here = source.normals[source.sample_face]
-    there = target.normals[found.face]
-    angle = np.arctan2(norm(cross(here, there)), dot(here, there))
-    return SurfaceErrors(
-        mean=float(found.distance.mean()),
-        p95=float(np.percentile(found.distance, 95)),
-        hausdorff=farthest(target.tree, source.vertices, float(found.distance.max())),
-        normal=float(angle.mean()),
-    )
+def gain(reference: SurfaceErrors, errors: SurfaceErrors) -> dict[str, float]:
+    """Return for each metric by how many per cent errors are below the reference's."""
+    return {
+        metric: 100 * (1 - getattr(errors, metric) / getattr(reference, metric))
+        for metric in SURFACE_METRICS
+    }

@@ -66,14 +66,17 @@ def box_tree(mesh: Mesh) -> BoxTree:
         along = np.take_along_axis(points, axis[:, None, None], axis=2)[..., 0]
         sorting = np.argsort(along, axis=1, kind="stable")
         order = np.take_along_axis(boxes, sorting, axis=1).reshape(-1)
-    low, high = corners.min(axis=1)[order], corners.max(axis=1)[order]
-    shapes = [(2**level, -1, 3) for level in range(depth + 1)]
+    leaves = corners[order].reshape(-1, LEAF * 3, 3)
+    lower, upper = [leaves.min(axis=1)], [leaves.max(axis=1)]
+    for _ in range(depth):
+        lower.append(np.minimum(lower[-1][0::2], lower[-1][1::2]))
+        upper.append(np.maximum(upper[-1][0::2], upper[-1][1::2]))
     return BoxTree(
         corners=corners,
         centroids=cKDTree(middle),
         order=order,
-        lower=tuple(low.reshape(shape).min(axis=1) for shape in shapes),
-        upper=tuple(high.reshape(shape).max(axis=1) for shape in shapes),
+        lower=tuple(lower[::-1]),
+        upper=tuple(upper[::-1]),
     )
 
 
