@@ -24,6 +24,12 @@ def reproduce_command(
     published: Annotated[
         Path | None, typer.Option(help="The author's published data, or a clone with .pt files.")
     ] = None,
+    assets: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of dense meshes for the decimation test.", exists=True, file_okay=False
+        ),
+    ] = None,
     output: Annotated[Path, typer.Option(help="Folder to write.")] = Path("results"),
     force: Annotated[bool, typer.Option(help="Run finished experiments again.")] = False,
 ) -> None:
@@ -31,7 +37,7 @@ def reproduce_command(
     console = Console()
     try:
         chosen = _chosen(name, published)
-        run_all(chosen, FULL, console, checkpoints, published, output, force=force)
+        run_all(chosen, FULL, console, checkpoints, published, assets, output, force=force)
     except PnsError as error:
         console.print(str(error), style="red", soft_wrap=True)
         raise typer.Exit(1) from error
@@ -43,6 +49,7 @@ def run_all(
     console: Console,
     checkpoints: Path | None,
     published: Path | None,
+    assets: Path | None,
     output: Path,
     *,
     force: bool,
@@ -61,9 +68,8 @@ def run_all(
             def on_progress(text: str, done: int, of: int, step: TaskID = step) -> None:
                 progress.update(step, description=text, completed=done, total=of)
 
-            laboratory = Laboratory(
-                scale, output / "cache" / "networks", checkpoints, published, on_progress
-            )
+            networks = output / "cache" / "networks"
+            laboratory = Laboratory(scale, networks, checkpoints, published, on_progress, assets)
             reproduce(experiment, laboratory, output, force=force)
             progress.remove_task(step)
             progress.advance(overall, experiment.seconds)

@@ -1,7 +1,8 @@
 """What an experiment is: a function of the laboratory whose tables and figures are data."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 from matplotlib.figure import Figure as Drawing
 
@@ -65,6 +66,7 @@ class Experiment:
         run: does the work; at `SMALL` scale it takes a few seconds.
         seconds: about how long it takes at full scale, for the estimate.
         needs_published: cannot run without the author's published data.
+        reads: the files that it reads beside code, checkpoints and published data.
     """
 
     name: str
@@ -73,3 +75,4 @@ class Experiment:
     run: Callable[[Laboratory], Outcome]
     seconds: float
     needs_published: bool = False
+    reads: Callable[[Laboratory], Iterable[Path]] = lambda _: ()

@@ -57,6 +57,7 @@ class Laboratory:
         cache: folder where trained networks are kept between runs.
         published: folder of the author's published data, or None.
         progress: called while something takes long.
+        assets: folder of dense meshes, or None.
     """
 
     scale: Scale
@@ -64,6 +65,7 @@ class Laboratory:
     checkpoints: Path | None
     published: Path | None
     progress: OnProgress
+    assets: Path | None = None
 
     def dataset(self, name: str) -> Dataset:
         """Return a data set, cut to the scale."""

@@ -10,6 +10,7 @@ from train.experiments import (
     cad,
     capacity,
     cross_section,
+    decimation,
     extended,
     features,
     headline,
@@ -44,6 +45,7 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
             extended,
             lifted_stars,
             cad,
+            decimation,
             published,
         )
     }

@@ -72,8 +72,8 @@ def read_record(path: Path) -> Record | None:
 
 
 def content_key(experiment: Experiment, laboratory: Laboratory) -> str:
-    """Return a hash of an experiment's inputs: code, scale, given checkpoints, published data."""
-    inputs: list[Path] = []
+    """Return a hash of an experiment's inputs: code, scale, checkpoints and all files it reads."""
+    inputs = list(experiment.reads(laboratory))
     if laboratory.checkpoints is not None:
         inputs += laboratory.checkpoints.glob("*.safetensors")
     if experiment.needs_published and laboratory.published is not None:
