@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service import memory_file
-from service.catalogue import Catalogue, catalogue_of
 from service.models import Models
 from service.options import Limits, Options
 
 if TYPE_CHECKING:
     from pns_common.schemes import Model
+    from service.catalogue import Catalogue
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,4 +74,6 @@ def warm_up(model: Model | str | None) -> None:
 
 def catalogue() -> Catalogue:
     """What this worker's models say of themselves."""
+    from service.catalogue import catalogue_of
+
     return catalogue_of(_MODELS)
