@@ -2,6 +2,7 @@
 
 python -m benchmarks                         # generated meshes, 20k to 1.3M faces
 python -m benchmarks --assets FOLDER         # also every glTF file in a folder
+python -m benchmarks --model paper           # another model than the default
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from rich.table import Table
 
 from benchmarks.files import STAGES, MeasuredFile, measure_file, measure_generated
 from benchmarks.operator import METHODS, measure_operator
+from pns_common.onnx_model import DEFAULT_MODEL
 
 SIZES = (20_000, 80_000, 320_000, 1_300_000)
 # In a file or a pipe tables are not squeezed.
@@ -28,26 +30,30 @@ def main(
     levels: Annotated[int, typer.Option(help="levels for files")] = 1,
     runs: Annotated[int, typer.Option(help="runs of each operator measurement; the median")] = 5,
     largest: Annotated[int, typer.Option(help="leave out generated meshes above this")] = SIZES[-1],
+    model: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="bundled model, or model file")
+    ] = DEFAULT_MODEL,
 ) -> None:
     """Measure the operator and the whole path of a file, each case in a process of its own."""
     console = Console()
     if not console.is_terminal:
         console = Console(width=FILE_WIDTH)
-    console.print(operator_table([size for size in SIZES if size <= largest], runs))
+    console.print(f"model: {model}")
+    console.print(operator_table([size for size in SIZES if size <= largest], runs, model))
     named = {
-        f"torus, {size:,} faces": measure_generated(size, levels)
+        f"torus, {size:,} faces": measure_generated(size, levels, model)
         for size in FILE_SIZES
         if size <= largest
     }
     for path in sorted(assets.glob("*.gl*")) if assets else []:
-        named[path.name] = measure_file(path, levels)
+        named[path.name] = measure_file(path, levels, model)
     console.print(file_table(named, levels))
     for name, file in named.items():
         if file.refused is not None:
             console.print(f"{name} was refused: {file.refused}")
 
 
-def operator_table(sizes: list[int], runs: int) -> Table:
+def operator_table(sizes: list[int], runs: int, model: str) -> Table:
     """One level on generated meshes: seconds, MiB, and trimesh's Loop over ours."""
     table = Table(title=f"One level in memory, median of {runs} runs")
     table.add_column("faces", justify="right")
@@ -56,7 +62,7 @@ def operator_table(sizes: list[int], runs: int) -> Table:
         table.add_column("MiB", justify="right")
     table.add_column("trimesh / pns", justify="right")
     for size in sizes:
-        measured = [measure_operator(size, method, runs) for method in METHODS]
+        measured = [measure_operator(size, method, runs, model) for method in METHODS]
         cells = [cell for m in measured for cell in (f"{m.seconds:.3f}", f"{m.mib:.0f}")]
         ratio = measured[2].seconds / measured[1].seconds
         table.add_row(f"{size:,}", *cells, f"{ratio:.1f}")

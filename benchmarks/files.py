@@ -44,20 +44,22 @@ class MeasuredFile:
     refused: str | None = None
 
 
-def measure_file(path: Path, levels: int) -> MeasuredFile:
-    """Refine a file on disk in a process of its own."""
-    return in_fresh_process(_measure, path.read_bytes(), levels, folder_of(path))
+def measure_file(path: Path, levels: int, model: str | None = None) -> MeasuredFile:
+    """Refine a file on disk in a process of its own; `model` is a name or file, or the default."""
+    return in_fresh_process(_measure, path.read_bytes(), levels, model, folder_of(path))
 
 
-def measure_generated(faces: int, levels: int) -> MeasuredFile:
+def measure_generated(faces: int, levels: int, model: str | None = None) -> MeasuredFile:
     """Refine a generated GLB of about so many faces in a process of its own."""
     mesh = torus(faces)
     data = soup_glb(TriangleSoup(mesh.vertices, mesh.faces, None))
-    return in_fresh_process(_measure, data, levels)
+    return in_fresh_process(_measure, data, levels, model)
 
 
-def _measure(data: bytes, levels: int, neighbours: Neighbours = ALONE) -> MeasuredFile:
-    model, limits = load_model(), Limits(max_faces=10**8, max_memory_bytes=10**11)
+def _measure(
+    data: bytes, levels: int, source: str | None, neighbours: Neighbours = ALONE
+) -> MeasuredFile:
+    model, limits = load_model(source), Limits(max_faces=10**8, max_memory_bytes=10**11)
     media = "glb" if data[:4] == b"glTF" else "gltf"
     try:
         subdivide_gltf(data, media, Options(levels), model, limits, neighbours=neighbours)  # warm

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from benchmarks.__main__ import file_table
 from benchmarks.files import MeasuredFile, measure_file
+from pns_common.onnx_model import DEFAULT_MODEL
 
 LARGE = 5000
 BESIDE = ("read", "weld", "write")
@@ -22,13 +23,17 @@ BESIDE = ("read", "weld", "write")
 def main(
     folder: Annotated[Path, typer.Argument(help="folder of .glb and .gltf files")],
     levels: Annotated[int, typer.Option(help="depth")] = 2,
+    model: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="bundled model, or model file")
+    ] = DEFAULT_MODEL,
 ) -> None:
     """Measure every file, each in a process of its own; name the large ones and their ratio."""
     paths = [p for p in sorted(folder.rglob("*")) if p.suffix in (".glb", ".gltf")]
-    measured = {path.name: measure_file(path, levels) for path in paths}
+    measured = {path.name: measure_file(path, levels, model) for path in paths}
     console = Console()
     # A file has no width of its own.
     console = console if console.is_terminal else Console(width=160)
+    console.print(f"model: {model}")
     console.print(file_table(measured, levels))
     for name, file in measured.items():
         if file.faces // 4**levels > LARGE:

@@ -24,15 +24,18 @@ class Measured:
 METHODS = ("loop", "pns", "trimesh loop")
 
 
-def measure_operator(faces: int, method: str, runs: int) -> Measured:
-    """Measure one method on a torus of about so many faces, in a process of its own."""
-    return in_fresh_process(_measure, faces, method, runs)
+def measure_operator(faces: int, method: str, runs: int, model: str | None = None) -> Measured:
+    """Measure one method on a torus of about so many faces, in a process of its own.
+
+    `model` is a name or a file, or the default.
+    """
+    return in_fresh_process(_measure, faces, method, runs, model)
 
 
-def _measure(faces: int, method: str, runs: int) -> Measured:
+def _measure(faces: int, method: str, runs: int, source: str | None) -> Measured:
     mesh = torus(faces)
     vertices, triangles = mesh.vertices.copy(), mesh.faces.copy()
-    model = load_model()
+    model = load_model(source)
     work: dict[str, Callable[[], object]] = {
         "loop": lambda: refine(mesh, loop()),
         "pns": lambda: refine(mesh, pns(model)),

@@ -1,4 +1,4 @@
-"""README's picture: the example part, coarse, refined and coloured by proximity ratio.
+"""README's picture: the example part, coarse, refined by the default model, and by its ratio.
 
 python docs/picture.py            # writes docs/picture.png
 """

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from pns_common.onnx_model import DEFAULT_MODEL
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -34,8 +36,8 @@ def wheel(tmp_path_factory):
 
 def test_the_wheel_holds_packages_models_and_licence(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
-    wanted = {"pns_common/models/paper.onnx", "pns_common/py.typed", "service/cli.py"}
-    wanted |= {"train/run.py", "export/run.py"}
+    wanted = {"pns_common/py.typed", "service/cli.py", "train/run.py", "export/run.py"}
+    wanted |= {f"pns_common/models/{name}.onnx" for name in ("paper", DEFAULT_MODEL)}
     assert wanted <= names
     assert not any(name.startswith(("tests/", "docs/", "benchmarks/")) for name in names)
     assert any(name.endswith("licenses/LICENSE") for name in names)

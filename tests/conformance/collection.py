@@ -46,6 +46,7 @@ def refined(name, levels, scheme="pns"):
 
 @cache
 def _model():
+    # What is promised of a file holds for any model: the one that most files will meet.
     return load_model()
 
 

@@ -55,7 +55,7 @@ def nan_bytes():
     return model_bytes(nodes, {"last": np.array([1]), "one": 1.0})
 
 
-def test_the_bundled_model_passes():
+def test_the_default_model_passes():
     verdict = certify_model_file(None, (), 0, quiet, valences=(3, 7))
     assert verdict.passed, failures(verdict)
     theorems = {one.theorem for one in verdict.certificates}
@@ -136,8 +136,8 @@ def test_double_precision_is_the_same_network():
     np.testing.assert_allclose(double(rows, 0.5), Float64Model(layers)(rows, 0.5), atol=1e-14)
 
 
-def test_double_precision_of_the_bundled_model():
-    model, rows = load_model(), sample_features(5)
+def test_double_precision_of_the_paper_model():
+    model, rows = load_model("paper"), sample_features(5)
     double = double_model(model, read_bytes("paper"))
     apart = np.abs(model(rows[:2000], 1.0) - double(rows[:2000], 1.0)).max()
     assert 1e-9 < apart < 1e-5

@@ -38,12 +38,13 @@ def test_draws_reach_far_outside_the_training_set(support):
 
 
 @pytest.mark.parametrize("name", ["Fox", "alien", "RiggedFigure", "low-poly-tree"])
-def test_the_bundled_model_tears_no_low_poly_asset(name):
+def test_the_paper_model_tears_no_low_poly_asset(name):
     """Right angles and few faces: far from any ridge that the model was trained on."""
     scene = trimesh.load(shared_path(f"assets/{name}.glb"), process=False, force="mesh")
     welded = weld(scene.vertices.astype(np.float32), np.array(scene.faces))
     mesh = clean(Mesh(welded.points, welded.faces)).mesh
-    report, base = (refine(mesh, scheme, 2).report for scheme in (pns(load_model()), loop()))
+    schemes = pns(load_model("paper")), loop()
+    report, base = (refine(mesh, scheme, 2).report for scheme in schemes)
     assert [level["flipped_faces"] for level in report["levels"]] == [0, 0]
     jumps = [r["levels"][-1]["normal_jump_max"] for r in (report, base)]
     assert jumps[0] < 1.25 * jumps[1]
