@@ -6,7 +6,7 @@ from onnx import NodeProto, TensorProto, ValueInfoProto, helper, numpy_helper
 from torch import Tensor
 
 from pns_common.model_card import CARD_KEY, ModelCard
-from train.networks import BoundedNet, SymmetricNet
+from train.networks import BoundedNet, Hush, SymmetricNet
 
 OPSET = 17
 """New enough for every operator here; runtimes of the last years all read it."""
@@ -76,7 +76,7 @@ def _perceptron(graph: _Graph, network: BoundedNet, value: str) -> str:
     return value
 
 
-def _symmetric_perceptron(graph: _Graph, network: BoundedNet, value: str) -> str:
+def _symmetric_perceptron(graph: _Graph, network: BoundedNet, features: str) -> str:
     """Add the layers for all G images of the features at once, and return the mean of D_g z(g φ).
 
     The images are made by the first layer's weights: W (g φ) = W_g φ, columns of W permuted and
@@ -90,13 +90,22 @@ def _symmetric_perceptron(graph: _Graph, network: BoundedNet, value: str) -> str
     for g in range(count):
         images[g][:, group.order[g]] = first * group.signs[g]
     stacked, bias = images.reshape(count * width, -1), np.tile(_array(layers[0].bias), count)
-    value = _layer(graph, network, 0, value, stacked, bias)
+    value = _layer(graph, network, 0, features, stacked, bias)
     value = graph.apply("Reshape", value, graph.shape("row_an_image", [-1, width]))
     for index, layer in enumerate(layers[1:], start=1):
         value = _layer(graph, network, index, value, _array(layer.weight), _array(layer.bias))
     value = graph.apply("Reshape", value, graph.shape("row_an_edge", [-1, 3 * count]))
     signed_mean = np.concatenate([np.diag(local) for local in group.local]) / count
-    return graph.apply("MatMul", value, graph.constant("signed_mean", signed_mean))
+    z = graph.apply("MatMul", value, graph.constant("signed_mean", signed_mean))
+    return z if network.hush is None else _hushed(graph, network.hush, z, features)
+
+
+def _hushed(graph: _Graph, hush: Hush, z: str, features: str) -> str:
+    """Multiply z by U² / (U² + ε²)."""
+    columns = graph.apply("Gather", features, graph.shape("hush", list(hush.columns)), axis=1)
+    square = graph.apply("ReduceSumSquare", columns, axes=[1], keepdims=1)
+    wider = graph.apply("Add", square, graph.constant("hush_width", hush.width**2))
+    return graph.apply("Mul", z, graph.apply("Div", square, wider))
 
 
 def _layer(

@@ -25,12 +25,19 @@ def namespace(*arrays: Array) -> Any:
     return array_namespace(*arrays)
 
 
+def beside(values: Array, constant: np.ndarray, dtype: Any = None) -> Array:
+    """A numpy array as one of the kind of ``values``, and on its device."""
+    if type(values) is np.ndarray:
+        return constant if dtype is None else constant.astype(dtype, copy=False)
+    return namespace(values).asarray(constant, dtype=dtype, device=values.device)
+
+
 def gather(values: Array, indices: Int[np.ndarray, "..."]) -> Array:
     """Rows of ``values`` at ``indices``: shape ``indices.shape + values.shape[1:]``."""
     xp = namespace(values)
     if is_torch_array(values):
         # torch refuses to look at read-only memory: "W" copies only that.
-        flat = xp.asarray(np.require(indices.reshape(-1), requirements="W"))
+        flat = beside(values, np.require(indices.reshape(-1), requirements="W"))
         rows = xp.take(values, flat, axis=0)
         return xp.reshape(rows, indices.shape + tuple(values.shape[1:]))
     # np.take is four times as fast as fancy indexing on rows of three.
@@ -44,7 +51,7 @@ def segment_sum(
     if is_torch_array(values):
         xp = namespace(values)
         zeros = xp.zeros((count, values.shape[1]), dtype=values.dtype, device=values.device)
-        return zeros.index_add(0, xp.asarray(np.require(segments, requirements="W")), values)
+        return zeros.index_add(0, beside(values, np.require(segments, requirements="W")), values)
     columns = [np.bincount(segments, column, count) for column in values.T]
     return np.stack(columns, axis=1).astype(values.dtype, copy=False)
 

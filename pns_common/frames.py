@@ -7,7 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.arrays import Array, cross, dot, gather, namespace, norm, unit, unit_longer_than
+from pns_common.arrays import (
+    Array,
+    beside,
+    cross,
+    dot,
+    gather,
+    namespace,
+    norm,
+    unit,
+    unit_longer_than,
+)
 
 # Faces are antiparallel where n1 · n2 ≤ −1 + ANTIPARALLEL (the paper's ε, section 3.2).
 ANTIPARALLEL = 1e-6
@@ -95,7 +105,7 @@ def edge_frames(at: EdgeStencil) -> EdgeFrames:
     cosine = dot(at.n1, at.n2)
     undefined = (length == 0) | (dot(at.n1, at.n1) == 0) | (dot(at.n2, at.n2) == 0)
     degenerate = undefined | (cosine <= -1 + ANTIPARALLEL)
-    triad = xp.asarray(np.eye(3), dtype=at.a.dtype)
+    triad = beside(at.a, np.eye(3), at.a.dtype)
 
     tangent = unit(edge)
     mean_normal = xp.where(degenerate[:, None], triad[1], at.n1 + at.n2)

@@ -20,10 +20,10 @@ from types import MappingProxyType
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.arrays import Array, cross, dot, gather, namespace, segment_sum, unit
+from pns_common.arrays import Array, beside, cross, dot, gather, namespace, segment_sum, unit
 from pns_common.orientation import left_face_order
 from pns_common.symmetry import Feature, Generator, Symmetries, symmetries
-from pns_common.topology import Topology
+from pns_common.topology import Topology, sharp_edge_count
 from pns_common.vertex_fields import divided, mean_normals, neighbour_mean, ring_square, spokes
 
 # Turned-over faces: the mean normal changes sign, sums of spokes do not.
@@ -106,7 +106,9 @@ def ring_features(rings: Rings) -> Float[Array, "V 10"]:
     """The features of ``ring-10``, in the order of RING_10."""
     xp = namespace(rings.normal)
     reach = rings.reach
-    height = divided(dot(rings.umbrella, rings.normal)[:, None], reach)
+    # An open ring leans to one side: its umbrella says nothing of curvature.
+    closed = beside(reach, sharp_edge_count(rings.topology) == 0)[:, None]
+    height = xp.where(closed, divided(dot(rings.umbrella, rings.normal)[:, None], reach), 0.0)
     length = xp.sqrt(xp.where(_square(rings.spokes) > 0, _square(rings.spokes), 1e-300))
     tilt = rings.of_neighbour(rings.normal) - rings.of_centre(rings.normal)
     opening = rings.mean(dot(tilt, rings.spokes)[:, None])

@@ -16,11 +16,11 @@ from __future__ import annotations
 
 from jaxtyping import Float
 
-from pns_common.arrays import Array, cross, dot, namespace
+from pns_common.arrays import Array, beside, cross, dot, namespace
 from pns_common.feature_set import Block
 from pns_common.frames import EdgeFrames, EdgeStencil
 from pns_common.symmetry import Feature
-from pns_common.topology import Topology
+from pns_common.topology import Topology, sharp_edge_count
 from pns_common.vertex_fields import divided, mean_normals, ring_square, umbrellas
 
 
@@ -30,10 +30,12 @@ def normal_fields(points: Float[Array, "V 3"], topology: Topology) -> Float[Arra
 
 
 def vertex_fields(points: Float[Array, "V 3"], topology: Topology) -> Float[Array, "V 4"]:
-    """m_v and u_v · m_v / r_v."""
+    """m_v and u_v · m_v / r_v; the latter 0 on boundary, irregular and crease edges."""
     xp = namespace(points)
     normals = mean_normals(points, topology.faces)
-    height = dot(umbrellas(points, topology), normals)[:, None]
+    # An open ring leans to one side: its umbrella says nothing of curvature.
+    closed = beside(points, sharp_edge_count(topology) == 0)[:, None]
+    height = xp.where(closed, dot(umbrellas(points, topology), normals)[:, None], 0.0)
     square = ring_square(points, topology)
     # No gradient at a root of 0: there the height is 0 too.
     reach = xp.sqrt(xp.where(square > 0, square, 1.0))

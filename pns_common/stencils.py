@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.arrays import Array, gather, namespace, segment_sum
+from pns_common.arrays import Array, beside, gather, namespace, segment_sum
 from pns_common.topology import EdgeClass, Topology, sharp_edge_count
 
 EDGE_ENDPOINT, EDGE_OPPOSITE = 3 / 8, 1 / 8
@@ -42,7 +42,7 @@ def loop_edge_vertices(
     # A missing opposite (−1) is read as the endpoint a and its result thrown away.
     c, d = np.where(c < 0, a, c), np.where(d < 0, a, d)
     pa, pb = gather(points, a), gather(points, b)
-    interior = xp.asarray(topology.edge_class[rows] == EdgeClass.INTERIOR)
+    interior = beside(points, topology.edge_class[rows] == EdgeClass.INTERIOR)
     return xp.where(
         interior[:, None],
         loop_edge_point(pa, pb, gather(points, c), gather(points, d)),
@@ -67,11 +67,11 @@ def loop_vertex_vertices(points: Float[Array, "V K"], topology: Topology) -> Flo
     smooth = sharp < 2
     beta = np.where(smooth, loop_beta(valence), np.where(sharp == 2, CURVE_NEIGHBOUR, 0.0))
     centre = np.where(smooth, 1 - valence * beta, np.where(sharp == 2, CURVE_CENTRE, 1.0))
-    on_curve = xp.asarray(~smooth)[:, None]
+    on_curve = beside(points, ~smooth)[:, None]
     neighbours = ring_sum
     if len(sharp_edges):
         neighbours = xp.where(on_curve, _neighbour_sum(points, sharp_edges), ring_sum)
-    beta, centre = xp.asarray(beta, dtype=points.dtype), xp.asarray(centre, dtype=points.dtype)
+    beta, centre = (beside(points, weight, points.dtype) for weight in (beta, centre))
     return centre[:, None] * points + beta[:, None] * neighbours
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.arrays import Array, cross, dot, gather, namespace, norm, segment_sum
+from pns_common.arrays import Array, beside, cross, dot, gather, namespace, norm, segment_sum
 from pns_common.topology import Topology
 
 
@@ -50,7 +50,7 @@ def neighbour_mean(values: Float[Array, "S K"], topology: Topology) -> Float[Arr
     ends = topology.edges.reshape(-1)
     valence = np.maximum(np.bincount(ends, minlength=topology.vertex_count), 1)
     total = segment_sum(values, ends, topology.vertex_count)
-    return total / namespace(values).asarray(valence, dtype=values.dtype)[:, None]
+    return total / beside(values, valence, values.dtype)[:, None]
 
 
 def divided(values: Float[Array, "N K"], by: Float[Array, "N 1"]) -> Float[Array, "N K"]:

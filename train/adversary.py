@@ -24,7 +24,12 @@ from train.determinism import deterministic
 from train.grid import grid_faces, jittered_grid
 from train.networks import BoundedNet
 from train.one_step import Step, refine_once
-from train.recipe_operator import initial_network, recipe_operator
+from train.recipe_operator import (
+    initial_network,
+    initial_vertex_network,
+    recipe_operator,
+    vertex_rule_operator,
+)
 from train.recipes import Recipe
 
 OnStep = Callable[[int, float], None]
@@ -41,8 +46,9 @@ class Attack:
     Attributes:
         cap: what the theorem lets the value reach.
         values: after each step.
-        network: the weights in the end, double precision.
+        network: the edge weights in the end, double precision.
         mesh: the mesh in the end.
+        vertex_network: likewise, where the recipe has a vertex rule.
     """
 
     name: str
@@ -50,6 +56,7 @@ class Attack:
     values: tuple[float, ...]
     network: BoundedNet
     mesh: Mesh
+    vertex_network: BoundedNet | None = None
 
     @property
     def worst(self) -> float:
@@ -68,16 +75,29 @@ class Operator:
 
     network: BoundedNet
     recipe: Recipe
+    vertex_network: BoundedNet | None = None
 
     def __call__(self, points: Float[Tensor, "V 3"], topology: Topology) -> Step:
         """Refine by one step at reference length 1."""
         operator = recipe_operator(self.recipe, self.network)
-        return refine_once(points, topology, operator, self.recipe.budget)
+        vertices = None
+        if self.recipe.vertex is not None and self.vertex_network is not None:
+            vertices = vertex_rule_operator(self.recipe.vertex, self.vertex_network)
+        return refine_once(points, topology, operator, self.recipe.budget, vertices)
+
+    @property
+    def weights(self) -> list[Tensor]:
+        """All that an adversary may change about it."""
+        networks = [one for one in (self.network, self.vertex_network) if one is not None]
+        return [weight for network in networks for weight in network.parameters()]
 
 
 def initial_operator(recipe: Recipe) -> Operator:
     """Return the recipe's operator before training, in double precision."""
-    return Operator(initial_network(recipe).double(), recipe)
+    vertices = initial_vertex_network(recipe)
+    return Operator(
+        initial_network(recipe).double(), recipe, None if vertices is None else vertices.double()
+    )
 
 
 def ascend(
@@ -109,13 +129,13 @@ def proximity_attack(recipe: Recipe, steps: int, on_step: OnStep) -> Attack:
     def look() -> tuple[Tensor, float]:
         step = operator(points, topology)
         # A soft maximum: every edge gets a gradient, the leading ones the most.
-        objective = torch.logsumexp(20 * step.ratio, dim=0)
+        objective = torch.logsumexp(20 * _ratios(step), dim=0)
         control, refined = _mesh(points, mesh), step.points.detach().numpy()
         ratio, _ = worst_ratio(control, refined, recipe.budget)
         return objective, ratio
 
-    values = ascend([points, *operator.network.parameters()], look, steps, on_step)
-    return Attack("proximity ratio", AT_MOST, values, operator.network, _mesh(points, mesh))
+    values = ascend([points, *operator.weights], look, steps, on_step)
+    return _attack("proximity ratio", AT_MOST, values, operator, _mesh(points, mesh))
 
 
 def equivariance_attack(recipe: Recipe, steps: int, on_step: OnStep) -> Attack:
@@ -139,8 +159,8 @@ def equivariance_attack(recipe: Recipe, steps: int, on_step: OnStep) -> Attack:
         # Scaled up, or its square would be lost below Adam's own ε.
         return ((kept / EXACT) ** 2).sum(), value
 
-    values = ascend([points, *operator.network.parameters()], look, steps, on_step)
-    return Attack("equivariance", EXACT, values, operator.network, _mesh(points, mesh))
+    values = ascend([points, *operator.weights], look, steps, on_step)
+    return _attack("equivariance", EXACT, values, operator, _mesh(points, mesh))
 
 
 def affine_attack(
@@ -164,17 +184,12 @@ def affine_attack(
     def look() -> tuple[Tensor, float]:
         points = lay()
         # ‖δ‖ / (C h²), where h² is not zero: the ratio resolves what positions would round away.
-        ratio = operator(points, topology).ratio
+        ratio = _ratios(operator(points, topology))
         return (ratio / TURNED).sum(), recipe.budget * float(ratio.detach().max())
 
-    values = ascend([slide, *operator.network.parameters()], look, steps, on_step)
-    return Attack(
-        "affine reproduction",
-        cap,
-        values,
-        operator.network,
-        Mesh(lay().detach().numpy(), grid_faces()),
-    )
+    values = ascend([slide, *operator.weights], look, steps, on_step)
+    plane_mesh = Mesh(lay().detach().numpy(), grid_faces())
+    return _attack("affine reproduction", cap, values, operator, plane_mesh)
 
 
 def folding(mesh: Mesh) -> float:
@@ -184,6 +199,17 @@ def folding(mesh: Mesh) -> float:
     faces = topology.edge_faces[topology.interior]
     at = edge_stencil(mesh.vertices, normals, topology.stencil[topology.interior], faces)
     return float((1 - (at.n1 * at.n2).sum(axis=1)).max())
+
+
+def _ratios(step: Step) -> Float[Tensor, " N"]:
+    """Return the proximity ratios of all vertices that a rule may move."""
+    return step.ratio if step.vertex_ratio is None else torch.cat([step.ratio, step.vertex_ratio])
+
+
+def _attack(
+    name: str, cap: float, values: tuple[float, ...], operator: Operator, mesh: Mesh
+) -> Attack:
+    return Attack(name, cap, values, operator.network, mesh, operator.vertex_network)
 
 
 def _mesh(points: Float[Tensor, "V 3"], like: Mesh) -> Mesh:

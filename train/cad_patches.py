@@ -56,7 +56,18 @@ def patch(
     sight: Float[np.ndarray, " 3"],
     seed: int,
 ) -> Mesh:
-    """Return a 9 × 9 patch: a grid round `centre`, across `sight`, marched onto the surface.
+    """Return a 9 × 9 patch: a grid round `centre`, across `sight`, marched onto the surface."""
+    plane = jittered_grid(seed, JITTER).double().numpy()
+    return Mesh(marched(surface, plane, centre, sight), grid_faces())
+
+
+def marched(
+    surface: Surface,
+    plane: Float[np.ndarray, "P 2"],
+    centre: Float[np.ndarray, " 3"],
+    sight: Float[np.ndarray, " 3"],
+) -> Float[np.ndarray, "P 3"]:
+    """Return points of the plane across `sight` round `centre`, moved along it onto the surface.
 
     `surface.value` must be a distance: each march goes as far as is surely free.
     """
@@ -65,11 +76,10 @@ def patch(
     u = np.cross(seed_axis, w)
     u /= np.linalg.norm(u)
     v = np.cross(w, u)
-    plane = jittered_grid(seed, JITTER).double().numpy()
     points = centre + plane[:, :1] * u + plane[:, 1:] * v + START * w
     for _ in range(MARCHES):
         points = points - surface.value(points)[:, None] * w
-    return Mesh(points, grid_faces())
+    return points
 
 
 def _instance(surface: Surface, centre: np.ndarray, sight: np.ndarray, seed: int) -> Instance:

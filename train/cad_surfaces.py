@@ -97,7 +97,8 @@ class Fillet:
         return xp.stack([xp.zeros_like(inward[:, 0]), inward[:, 0], inward[:, 1]], axis=-1)
 
     def _inward(self, points: Points) -> Points:
-        return self.radius - points[:, 1:]
+        y, z = self.radius - points[:, 1], self.radius - points[:, 2]
+        return array_namespace(points).stack([y, z], axis=-1)
 
 
 def _box_value(q: Points) -> Scalars:

@@ -14,6 +14,7 @@ from pns_common.schemes import pns
 from pns_common.topology import build_topology
 from train.adversary import OnStep, Operator, ascend, initial_operator
 from train.certificates.lifted_star import LIFTS
+from train.margin_gradient import margin_gradient
 from train.networks import BoundedNet
 from train.recipes import Recipe
 from train.spectrum import (
@@ -69,7 +70,7 @@ def gap_attack(recipe: Recipe, valence: int, steps: int, on_step: OnStep) -> Gap
     the search.
     """
     operator = initial_operator(recipe)
-    scheme = pns(recipe_model(recipe, operator.network))
+    scheme = pns(recipe_model(recipe, operator.network, operator.vertex_network))
     spectrum = follow_lift(scheme, valence, LIFTS)[-1]
     before = spectrum.margin
     at = closed_star(scheme, valence)(LIFTS[-1])
@@ -84,23 +85,9 @@ def gap_attack(recipe: Recipe, valence: int, steps: int, on_step: OnStep) -> Gap
         slope = torch.from_numpy(basis @ margin_gradient(spectrum) @ basis.T)
         return -(slope * matrix).sum(), spectrum.margin
 
-    margins = ascend([sway, *operator.network.parameters()], look, steps, on_step)
+    margins = ascend([sway, *operator.weights], look, steps, on_step)
     after = copies.follow(operator, SWAY * SPOKE * torch.tanh(sway.detach()), basis).margin
     return GapAttack(valence, recipe.budget, before, after, margins, operator.network)
-
-
-def margin_gradient(spectrum: Spectrum) -> Float[np.ndarray, "L L"]:
-    """Return the derivative of the margin by each entry of the matrix.
-
-    dλ = l dJ r for the left and right eigenvectors of a simple eigenvalue, l r = 1.
-    """
-
-    def of_size(index: int) -> Float[np.ndarray, "L L"]:
-        value = spectrum.values[index]
-        phase = np.conj(value) / max(abs(value), 1e-300)
-        return np.real(phase * np.outer(spectrum.left[index], spectrum.right[:, index]))
-
-    return of_size(spectrum.least_tangent) - of_size(spectrum.largest_other)
 
 
 class _Copies:

@@ -1,6 +1,7 @@
 """The correction network: edge features to a vector in the ball of radius C."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
 
@@ -62,10 +63,24 @@ class BoundedNet(nn.Module):
         return [layer for layer in self.net if isinstance(layer, nn.Linear)]
 
 
+@dataclass(frozen=True, slots=True)
+class Hush:
+    """Which features keep a network silent where they vanish, and ε: how small counts as that.
+
+    The columns must be a set that the group maps to itself, up to signs.
+    """
+
+    columns: tuple[int, ...]
+    width: float
+
+
 class SymmetricNet(BoundedNet):
     """The same perceptron averaged over a group: z ← mean over g of D_g z(g φ), then projected.
 
     η(g φ) = D_g η(φ) then holds for any weights, and ‖η‖ ≤ C as before.
+
+    Given a hush, z is multiplied by U² / (U² + ε²) before it is projected: silent where the
+    features that U sums, squared, all vanish.
     """
 
     def __init__(
@@ -74,9 +89,11 @@ class SymmetricNet(BoundedNet):
         hidden: tuple[int, ...],
         activation: str,
         generator: torch.Generator,
+        hush: Hush | None = None,
     ):
         super().__init__(group.order.shape[1], hidden, activation, generator)
         self.group = group
+        self.hush = hush
         self.register_buffer("order", torch.from_numpy(group.order), persistent=False)
         self.register_buffer("signs", _single(group.signs), persistent=False)
         self.register_buffer("local", _single(group.local), persistent=False)
@@ -84,7 +101,11 @@ class SymmetricNet(BoundedNet):
     def raw(self, features: Float[Tensor, "E K"]) -> Float[Tensor, "E 3"]:
         """Return the averaged z, of any length."""
         images = features[:, self.order] * self.signs
-        return (self.net(images) * self.local).mean(dim=1)
+        z = (self.net(images) * self.local).mean(dim=1)
+        if self.hush is None:
+            return z
+        square = (features[:, list(self.hush.columns)] ** 2).sum(dim=1, keepdim=True)
+        return z * (square / (square + self.hush.width**2))
 
 
 def unit_correction(network: BoundedNet) -> Callable[[Tensor], Tensor]:

@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from pns_common.arrays import cross, gather, segment_sum, unit
+from pns_common.arrays import beside, cross, gather, segment_sum, unit
 from pns_common.correction import proximity_ratio
 from pns_common.edge_operator import EdgeOperator
 from pns_common.frames import face_normals
@@ -53,7 +53,7 @@ def refine_once(
     moved = np.flatnonzero(smooth_vertices(topology))
     rings = look_around(points, normals, topology)
     at_vertices = vertex_operator.correct(rings, moved, budget)
-    refined = step.points.index_add(0, torch.from_numpy(moved), at_vertices.displacement)
+    refined = step.points.index_add(0, beside(points, moved), at_vertices.displacement)
     return replace(step, points=refined, vertex_ratio=proximity_ratio(at_vertices))
 
 
@@ -65,7 +65,7 @@ def displaced(
 ) -> Step:
     """Refine by one step of Loop and move the interior edge vertices."""
     edge_vertices = loop_edge_vertices(points, topology).index_add(
-        0, torch.from_numpy(topology.interior), displacement
+        0, beside(points, topology.interior), displacement
     )
     return Step(torch.cat([loop_vertex_vertices(points, topology), edge_vertices]), ratio)
 

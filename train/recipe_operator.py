@@ -1,5 +1,7 @@
 """What a recipe makes of edges and vertices: its untrained networks, and their rules."""
 
+from collections.abc import Sequence
+
 import torch
 
 from pns_common.correction import curvature_gate
@@ -7,9 +9,13 @@ from pns_common.edge_operator import EdgeOperator
 from pns_common.features import FEATURE_SETS
 from pns_common.orientation import ORIENTATIONS
 from pns_common.ring_features import RING_FEATURE_SETS
+from pns_common.symmetry import Feature
 from pns_common.vertex_operator import VertexOperator
-from train.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_correction
+from train.networks import INPUT_COUNT, BoundedNet, Hush, SymmetricNet, unit_correction
 from train.recipes import Recipe, VertexRule
+
+UMBRELLA_HEIGHTS = ("umbrella", "umbrella height", "neighbours' umbrella height")
+"""Kinds of features, of edges and of rings."""
 
 # The vertex network's draw is not the edge network's.
 VERTEX_SEED = 1 << 20
@@ -19,8 +25,9 @@ def initial_network(recipe: Recipe) -> BoundedNet:
     """Return the untrained edge network of a recipe."""
     generator = torch.Generator().manual_seed(recipe.seed)
     if recipe.orientation == "symmetric":
-        group = FEATURE_SETS[recipe.features].symmetries
-        return SymmetricNet(group, recipe.hidden, recipe.activation, generator)
+        seen = FEATURE_SETS[recipe.features]
+        hush = umbrella_hush(seen.features, recipe.hush)
+        return SymmetricNet(seen.symmetries, recipe.hidden, recipe.activation, generator, hush)
     return BoundedNet(INPUT_COUNT[recipe.features], recipe.hidden, recipe.activation, generator)
 
 
@@ -29,8 +36,16 @@ def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
     if recipe.vertex is None:
         return None
     generator = torch.Generator().manual_seed(VERTEX_SEED + recipe.seed)
-    group = RING_FEATURE_SETS[recipe.vertex.features].symmetries
-    return SymmetricNet(group, recipe.vertex.hidden, recipe.activation, generator)
+    seen = RING_FEATURE_SETS[recipe.vertex.features]
+    hush = umbrella_hush(seen.features, recipe.hush)
+    return SymmetricNet(seen.symmetries, recipe.vertex.hidden, recipe.activation, generator, hush)
+
+
+def umbrella_hush(features: Sequence[Feature], width: float | None) -> Hush | None:
+    """Return the hush over all umbrella heights among some features; None without a width."""
+    if width is None:
+        return None
+    return Hush(tuple(k for k, one in enumerate(features) if one.kind in UMBRELLA_HEIGHTS), width)
 
 
 def recipe_operator(recipe: Recipe, network: BoundedNet) -> EdgeOperator:

@@ -58,10 +58,13 @@ def train(
     began = time.perf_counter()
     trained = _fit_with_progress(chosen, console)
     held_out = ridge_held_out()
-    scheme = pns(recipe_model(chosen, trained.network), chosen.budget)
+    scheme = pns(recipe_model(chosen, trained.network, trained.vertex_network), chosen.budget)
     improvements = compare_with_loop(scheme, held_out)
     metrics = {held_out.name: improvements_as_data(improvements)}
-    save_checkpoint(path, Checkpoint(chosen, trained.network, metrics, machine_fingerprint()))
+    made = Checkpoint(
+        chosen, trained.network, metrics, machine_fingerprint(), trained.vertex_network
+    )
+    save_checkpoint(path, made)
     console.print(improvement_table(f"{held_out.name}, recipe {chosen.name}", improvements))
     console.print(f"{path} written in {time.perf_counter() - began:.1f} s", soft_wrap=True)
 

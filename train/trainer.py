@@ -9,17 +9,16 @@ from jaxtyping import Float
 from torch import Tensor
 
 from pns_common.arrays import gather
-from pns_common.correction import curvature_gate
-from pns_common.edge_operator import EdgeOperator
 from pns_common.features import FEATURE_SETS
-from pns_common.orientation import ORIENTATIONS
 from train.batch import Batch, disjoint_union
 from train.datasets import DATASETS, Instance
 from train.determinism import deterministic
+from train.level_trainer import fit_through_levels
 from train.losses import weighted_loss
-from train.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_correction
+from train.networks import BoundedNet
 from train.one_step import Step, refine_once, vertex_normals
 from train.quiet import quiet_term
+from train.recipe_operator import initial_network, recipe_operator
 from train.recipes import Recipe
 from train.surfaces import signed_distance, unit_normal
 
@@ -31,23 +30,21 @@ Loss = Callable[[BoundedNet, Batch], Float[Tensor, ""]]
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A trained float32 network and the loss before each step."""
+    """Trained float32 networks and the loss before each step.
+
+    `vertex_network` is None where the recipe has no vertex rule.
+    """
 
     network: BoundedNet
     losses: tuple[float, ...]
-
-
-def initial_network(recipe: Recipe) -> BoundedNet:
-    """Return the untrained network of a recipe."""
-    generator = torch.Generator().manual_seed(recipe.seed)
-    if recipe.orientation == "symmetric":
-        group = FEATURE_SETS[recipe.features].symmetries
-        return SymmetricNet(group, recipe.hidden, recipe.activation, generator)
-    return BoundedNet(INPUT_COUNT[recipe.features], recipe.hidden, recipe.activation, generator)
+    vertex_network: BoundedNet | None = None
 
 
 def fit(recipe: Recipe, on_step: OnStep) -> Fit:
-    """Train the operator with Adam on the recipe's data set."""
+    """Train the operator with Adam: through levels on the stream, or by one step on a data set."""
+    if recipe.stream is not None:
+        network, vertex_network, losses = fit_through_levels(recipe, on_step)
+        return Fit(network, losses, vertex_network)
     loss = with_quiet(recipe, lambda network, batch: batch_loss(recipe, network, batch))
     return optimise(recipe, loss, on_step)
 
@@ -92,16 +89,6 @@ def batch_loss(recipe: Recipe, network: BoundedNet, batch: Batch) -> Float[Tenso
     operator = recipe_operator(recipe, network)
     step = refine_once(batch.points, batch.topology, operator, recipe.budget)
     return step_loss(recipe, batch, step)
-
-
-def recipe_operator(recipe: Recipe, network: BoundedNet) -> EdgeOperator:
-    """Return what a recipe makes of interior edges, with a network at budget 1."""
-    return EdgeOperator(
-        FEATURE_SETS[recipe.features],
-        ORIENTATIONS[recipe.orientation],
-        unit_correction(network),
-        curvature_gate(recipe.gate_sharpness),
-    )
 
 
 def step_loss(recipe: Recipe, batch: Batch, step: Step) -> Float[Tensor, ""]:

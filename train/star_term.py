@@ -1,0 +1,130 @@
+"""The star term: a margin of the Reif gap on lifted stars, asked for while training.
+
+One step of the operator around a lifted star is differentiated as `train.spectrum` does, but by
+torch, and its eigenvalues' slopes follow from the left and right eigenvectors: dλ = l dA r.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from pns_common.edge_operator import EdgeOperator
+from pns_common.mesh import Mesh
+from pns_common.schemes import loop
+from pns_common.topology import Topology, build_topology
+from pns_common.vertex_operator import VertexOperator
+from train.margin_gradient import margin_gradient
+from train.one_step import refine_once
+from train.spectrum import (
+    SPOKE,
+    Spectrum,
+    continued_spectrum,
+    flat_spectrum,
+    jacobian,
+    perturbed_stars,
+    refined_inner,
+    translation_quotient,
+    without_translations,
+)
+from train.stars import Star, star
+
+RINGS, INNER_RINGS = 4, 3
+"""As far as one step with signed features and a vertex rule sees."""
+
+MANY = 7
+"""From this valence on the stars have a ring less: a fifth of the work for nearly the same."""
+
+STEP = 3e-3
+"""Of the central differences, in spokes: a network in single precision needs it so large."""
+
+SHARES: Mapping[int, float] = {3: 0.28, 4: 0.28, 5: 0.15, 6: 0.09, 8: 0.08, 10: 0.06, 12: 0.06}
+"""How often each valence is drawn: Loop's own gap is narrow at the low ones."""
+
+LOWEST_LIFT, HIGHEST_LIFT = 0.05, 0.45
+HALF_WAY = 0.2
+"""Above this lift the tangents are followed in two strides."""
+
+
+@dataclass(frozen=True, eq=False)
+class StarCopies:
+    """A flat star, and its copies with each inner coordinate moved up and down.
+
+    Attributes:
+        count: inner coordinates M.
+        topology: of the 2 M copies.
+        quotient: basis of what is orthogonal to translations.
+        flat: Loop's spectrum.
+    """
+
+    star: Star
+    count: int
+    topology: Topology
+    quotient: Float[np.ndarray, "M L"]
+    flat: Spectrum
+
+
+def star_copies(valence: int) -> StarCopies:
+    """Return the copies of the star of one valence."""
+    less = 1 if valence >= MANY else 0
+    at = star(valence, RINGS - less, SPOKE, inner_rings=INNER_RINGS - less)
+    mesh, count = perturbed_stars(at, STEP * SPOKE)
+    flat = flat_spectrum(without_translations(jacobian(loop(), at)), valence)
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    return StarCopies(at, count, topology, translation_quotient(count), flat)
+
+
+class StarTerm:
+    """Draws a valence and a lift at each call, from a generator of its own."""
+
+    def __init__(self, seed: int, wanted: float):
+        self._rng = np.random.default_rng(seed)
+        self._wanted = wanted
+        self._stars = {valence: star_copies(valence) for valence in SHARES}
+
+    def __call__(
+        self, operator: EdgeOperator, budget: float, vertex_operator: VertexOperator | None
+    ) -> Float[Tensor, ""]:
+        """Return by how much the margin of a random lifted star falls short of what is wanted."""
+        valence = int(self._rng.choice(list(SHARES), p=list(SHARES.values())))
+        lift = self._rng.uniform(LOWEST_LIFT, HIGHEST_LIFT)
+        copies = self._stars[valence]
+        before = copies.flat
+        if lift > HALF_WAY:
+            with torch.no_grad():
+                half = star_jacobian(copies, lift / 2, operator, budget, vertex_operator)
+            before = continued_spectrum(_quotient(copies, half), before)
+        matrix = star_jacobian(copies, lift, operator, budget, vertex_operator)
+        spectrum = continued_spectrum(_quotient(copies, matrix.detach()), before)
+        if spectrum.margin >= self._wanted:
+            return torch.zeros((), dtype=matrix.dtype)
+        basis = copies.quotient
+        slope = torch.from_numpy(basis @ margin_gradient(spectrum) @ basis.T)
+        # The margin's value, with the slope that eigenvectors give it.
+        moving = (slope * matrix).sum()
+        return self._wanted - spectrum.margin - (moving - moving.detach())
+
+
+def star_jacobian(
+    copies: StarCopies,
+    lift: float,
+    operator: EdgeOperator,
+    budget: float,
+    vertex_operator: VertexOperator | None,
+) -> Float[Tensor, "M M"]:
+    """Differentiate one step at a lifted star, inner rings to inner rings."""
+    points = copies.star.mesh.vertices.copy()
+    points[0, 2] = lift * SPOKE
+    lifted = replace(copies.star, mesh=Mesh(points, copies.star.mesh.faces))
+    mesh, count = perturbed_stars(lifted, STEP * SPOKE)
+    at = torch.from_numpy(mesh.vertices.copy())
+    refined = refine_once(at, copies.topology, operator, budget, vertex_operator).points
+    moved = refined_inner(copies.star, refined, 2 * count)
+    return (moved[:count] - moved[count:]).T / (2 * STEP * SPOKE)
+
+
+def _quotient(copies: StarCopies, matrix: Float[Tensor, "M M"]) -> Float[np.ndarray, "L L"]:
+    return copies.quotient.T @ matrix.numpy() @ copies.quotient
