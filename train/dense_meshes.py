@@ -1,6 +1,5 @@
 """Dense meshes to simplify: files in a folder, subdivided control meshes, and CAD-like parts."""
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,17 +76,17 @@ def dense_asset(path: Path) -> DenseMesh | LeftOut:
     try:
         part = largest_part(_read(path))
     except MeshError as error:
-        return LeftOut(path.name, str(error))
-    if path.stem.endswith(CONTROL_ENDING):
-        name = path.stem.removesuffix(CONTROL_ENDING)
-        return DenseMesh(name, CONTROL, refine(part, loop(), CONTROL_LEVELS).mesh)
+        return LeftOut(path.name, error.reason)
+    name, kind = path.stem.removesuffix(CONTROL_ENDING), ASSET
+    if name != path.stem:
+        kind, part = CONTROL, refine(part, loop(), CONTROL_LEVELS, threads=1).mesh
     if not is_manifold(part):
         return LeftOut(path.name, "its largest part is no manifold")
     if len(part.faces) < FEWEST_FACES:
         return LeftOut(path.name, f"its largest part has {len(part.faces)} faces")
     if np.linalg.matrix_rank(part.vertices - part.vertices[0]) < 3:
         return LeftOut(path.name, "it lies in a plane, where every scheme stays")
-    return DenseMesh(path.stem, ASSET, part)
+    return DenseMesh(name, kind, part)
 
 
 def welded(mesh: Mesh) -> Mesh:
@@ -120,9 +119,15 @@ def is_manifold(mesh: Mesh) -> bool:
 
 
 def _read(path: Path) -> Mesh:
-    """Return all triangles of a file, in its scene's coordinates, welded."""
-    with warnings.catch_warnings():
-        # Readers warn of materials and textures, which do not matter here.
-        warnings.simplefilter("ignore")
-        scene = trimesh.load_scene(path, process=False, skip_materials=True).to_mesh()
+    """Return all triangles of a file, in its scene's coordinates, welded.
+
+    Raises:
+        MeshError: it cannot be read, or has no triangles.
+    """
+    try:
+        # Coordinates that are no numbers are refused just below.
+        with np.errstate(invalid="ignore"):
+            scene = trimesh.load_scene(path, process=False, skip_materials=True).to_mesh()
+    except Exception as error:  # on a broken file these readers fail as it comes
+        raise MeshError("it cannot be read", element="file") from error
     return welded(Mesh(scene.vertices, scene.faces))

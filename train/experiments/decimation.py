@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from pns_common.onnx_model import BUNDLED, DEFAULT_MODEL, bundled_models, load_model
-from pns_common.schemes import Scheme, loop, pns
+from pns_common.schemes import Scheme, loop
 from train.baselines.butterfly import modified_butterfly
 from train.decimation import (
     COARSE_FACES,
@@ -32,6 +31,7 @@ from train.dense_meshes import (
 from train.experiments.decimation_figures import gains_figure, picture_figure, pictured
 from train.experiments.experiment import Cell, Column, Experiment, Outcome, Table
 from train.experiments.laboratory import Laboratory
+from train.experiments.models import bundled_schemes, model_files
 from train.experiments.style import TITLES
 from train.surface_distance import SURFACE_METRICS, SurfaceErrors
 
@@ -76,7 +76,7 @@ ALL_COLUMNS = (
 NOTES = (
     "The test of Neural Subdivision (Liu et al. 2020). A dense mesh is simplified by quadric edge "
     f"collapses (fast-simplification) to {COARSE_FACES} faces, about 400 vertices as there, "
-    f"or to a {LEAST_REDUCTION}th of its faces if that is less; the coarse mesh is refined, and "
+    f"or to 1/{LEAST_REDUCTION} of its faces if that is less; the coarse mesh is refined, and "
     "the result compared with the dense mesh. Where their collapses are drawn at random, these are "
     "fixed. Each coarse mesh is a manifold with its dense mesh's Euler characteristic; faces that "
     "the collapses pinch off are cut off and counted. Reference length `auto`, each model's own "
@@ -104,11 +104,10 @@ FROM_FILES = (
 
 def methods() -> dict[str, Scheme]:
     """Return Loop, Modified Butterfly and PNS with every bundled model, the default last."""
-    models = sorted(bundled_models(), key=lambda name: (name == DEFAULT_MODEL, name))
     return {
         TITLES["loop"]: loop(),
         TITLES["butterfly"]: modified_butterfly(),
-        **{f"{TITLES['pns']} `{name}`": pns(load_model(name)) for name in models},
+        **{f"{TITLES['pns']} `{name}`": scheme for name, scheme in bundled_schemes().items()},
     }
 
 
@@ -156,11 +155,9 @@ def collected(laboratory: Laboratory) -> tuple[list[DenseMesh], list[LeftOut]]:
 
 def read_files(laboratory: Laboratory) -> list[Path]:
     """Return the bundled models, and the files in the folder of dense meshes."""
-    models = [Path(str(BUNDLED / f"{name}.onnx")) for name in bundled_models()]
-    if laboratory.assets is None:
-        return models
     # All files, not meshes alone: a glTF file may keep its arrays in another one.
-    return models + [path for path in laboratory.assets.iterdir() if path.is_file()]
+    folder = () if laboratory.assets is None else laboratory.assets.iterdir()
+    return [*model_files(laboratory), *(path for path in folder if path.is_file())]
 
 
 def _summary_rows(found: list[Summary]) -> tuple[tuple[Cell, ...], ...]:

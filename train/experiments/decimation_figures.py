@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -19,14 +20,19 @@ from train.experiments.render import ASPECT, CENTRE, HALF_WIDTH, Camera, shaded_
 from train.experiments.style import COLOURS, MARKERS, SEQUENTIAL, TITLES, panels
 from train.point_mesh import box_tree, nearest
 
-CAMERA = Camera(azimuth=-60.0, elevation=25.0)
+ELEVATION = 25.0
 FILLED = 0.95
 """How much of the view a mesh fills, across or upright."""
 
 LARGEST = 6.0
 """End of the colour scale, in thousandths of the diagonal."""
 
-PICTURED = ("spot", "penguin", "fuze", "pipe", "pulley")
+AZIMUTH = -60.0
+PICTURED = MappingProxyType(
+    {"fuze": AZIMUTH, "penguin": AZIMUTH, "spot": 50.0, "pipe": AZIMUTH, "pulley": AZIMUTH}
+)
+"""The meshes of the figure, and from which side each shows most."""
+
 FALLBACK = 2
 """How many pictures there are where none of those is in the test."""
 
@@ -78,15 +84,16 @@ def _views(pair: Pair, schemes: Mapping[str, Scheme], level: int) -> list[View]:
     dense = pair.dense.mesh
     tree, diagonal = box_tree(dense), np.linalg.norm(np.ptp(dense.vertices, axis=0))
     turn = np.eye(3) if pair.dense.kind == CAD else UPRIGHT
-    seen = dense.vertices @ turn.T @ CAMERA.axes().T
+    camera = Camera(PICTURED.get(pair.dense.name, AZIMUTH), ELEVATION)
+    seen = dense.vertices @ turn.T @ camera.axes().T
     low, high = seen.min(axis=0), seen.max(axis=0)
     half = (high - low)[:2] / 2 / (HALF_WIDTH * np.array([1, ASPECT]))
-    middle = (low + high) / 2 @ CAMERA.axes()
+    middle = (low + high) / 2 @ camera.axes()
 
     def view(title: str, mesh: Mesh, distance: Float[np.ndarray, " V"]) -> View:
         placed = CENTRE + FILLED / half.max() * (mesh.vertices @ turn.T - middle)
         values = 1000 * distance / diagonal
-        image = shaded_image(Mesh(placed, mesh.faces), values, LARGEST, CAMERA)
+        image = shaded_image(Mesh(placed, mesh.faces), values, LARGEST, camera)
         return View(title, pair.dense.name, image)
 
     found = [
