@@ -49,7 +49,7 @@ def pipe(around: int = 320, across: int = 24) -> Mesh:
     return Mesh(points.reshape(-1, 3), closed_grid_faces(around, across))
 
 
-def rounded_cylinder() -> Mesh:
+def rounded_cylinder(around: int = 112) -> Mesh:
     """Return a cylinder of radius 0.7 and height 1.4 whose rims are rounded with radius 0.2."""
     return lathe(
         _joined(
@@ -58,7 +58,8 @@ def rounded_cylinder() -> Mesh:
             _line((0.7, -0.5), (0.7, 0.5), 20),
             _arc((0.5, 0.5), 0.2, 0, 90, 10),
             _line((0.5, 0.7), (0, 0.7), 12),
-        )
+        ),
+        around,
     )
 
 
@@ -98,9 +99,9 @@ def pulley() -> Mesh:
     )
 
 
-def knob(around: int = 144) -> Mesh:
+def knob(around: int = 160) -> Mesh:
     """Return a rounded cylinder whose radius is waved eight times round it by a tenth."""
-    part = rounded_cylinder()
+    part = rounded_cylinder(around)
     angle = np.arctan2(part.vertices[:, 1], part.vertices[:, 0])
     waved = part.vertices * np.array([1.0, 1.0, 0.8])
     waved[:, :2] *= (1 + 0.1 * np.cos(8 * angle))[:, None]

@@ -31,13 +31,18 @@ class DenseMesh:
     """A dense mesh: one manifold part without degenerate faces.
 
     Attributes:
-        name: the file's stem, or the part's name.
+        name: the file's name, or the part's.
         kind: ASSET, CONTROL or CAD.
     """
 
     name: str
     kind: str
     mesh: Mesh
+
+    @property
+    def title(self) -> str:
+        """What the mesh is called in figures."""
+        return self.name.partition(".")[0].removesuffix(CONTROL_ENDING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,16 +82,16 @@ def dense_asset(path: Path) -> DenseMesh | LeftOut:
         part = largest_part(_read(path))
     except MeshError as error:
         return LeftOut(path.name, error.reason)
-    name, kind = path.stem.removesuffix(CONTROL_ENDING), ASSET
-    if name != path.stem:
-        kind, part = CONTROL, refine(part, loop(), CONTROL_LEVELS, threads=1).mesh
+    kind = CONTROL if path.stem.endswith(CONTROL_ENDING) else ASSET
+    if kind == CONTROL:
+        part = refine(part, loop(), CONTROL_LEVELS, threads=1).mesh
     if not is_manifold(part):
         return LeftOut(path.name, "its largest part is no manifold")
     if len(part.faces) < FEWEST_FACES:
-        return LeftOut(path.name, f"its largest part has {len(part.faces)} faces")
+        return LeftOut(path.name, f"faces of its largest part: {len(part.faces)}")
     if np.linalg.matrix_rank(part.vertices - part.vertices[0]) < 3:
         return LeftOut(path.name, "it lies in a plane, where every scheme stays")
-    return DenseMesh(name, kind, part)
+    return DenseMesh(path.name, kind, part)
 
 
 def welded(mesh: Mesh) -> Mesh:

@@ -24,8 +24,8 @@ class SurfaceErrors:
         mean: mean distance of a surface's points from the other surface, mean of both ways.
         p95: 95th percentile of that distance, mean of both ways.
         hausdorff: the largest distance of a sample point or a vertex, of both ways.
-        normal: mean angle between the faces at a point and at its nearest point, mean of both
-            ways, radians.
+        normal: mean angle between the faces at a point and at its nearest point (on an edge, one
+            of its faces), mean of both ways, radians.
     """
 
     mean: float

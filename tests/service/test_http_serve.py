@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import json
 import os
 import re
 import signal
@@ -16,6 +17,7 @@ from pathlib import Path
 import pytest
 
 from service.example import part_glb
+from tests.service.packages import served_file
 
 PNS = Path(sys.executable).with_name("pns")
 ADDRESS = re.compile(r"running on http://([\d.]+):(\d+)")
@@ -151,3 +153,15 @@ def test_options_win_over_the_environment() -> None:
     with serving("--host", "127.0.0.2", PNS_HOST="127.0.0.3", PNS_WORKERS="1") as server:
         assert server.host == "127.0.0.2"
         assert server.status("/healthz") == 200
+
+
+def test_the_served_model_is_a_name_or_a_file(tmp_path: Path) -> None:
+    for given in ("paper", served_file(tmp_path / "mine.onnx")):
+        arguments = ("--model", given)
+        with serving(*arguments, PNS_WORKERS="1", PNS_MODEL="missing.onnx") as server:
+            server.wait_until_ready()
+            with closing(server.connect()) as connection:
+                connection.request("GET", "/models")
+                listed = json.loads(connection.getresponse().read())
+        default = [entry["name"] for entry in listed if entry["default"]]
+        assert default == [Path(given).stem]

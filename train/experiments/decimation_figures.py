@@ -56,7 +56,7 @@ class View:
 
 def pictured(pairs: Sequence[Pair]) -> list[Pair]:
     """Return the pairs that the figure shows."""
-    return [one for one in pairs if one.dense.name in PICTURED] or list(pairs[:FALLBACK])
+    return [one for one in pairs if one.dense.title in PICTURED] or list(pairs[:FALLBACK])
 
 
 def picture_figure(pairs: Sequence[Pair], schemes: Mapping[str, Scheme], level: int) -> Figure:
@@ -84,7 +84,7 @@ def _views(pair: Pair, schemes: Mapping[str, Scheme], level: int) -> list[View]:
     dense = pair.dense.mesh
     tree, diagonal = box_tree(dense), np.linalg.norm(np.ptp(dense.vertices, axis=0))
     turn = np.eye(3) if pair.dense.kind == CAD else UPRIGHT
-    camera = Camera(PICTURED.get(pair.dense.name, AZIMUTH), ELEVATION)
+    camera = Camera(PICTURED.get(pair.dense.title, AZIMUTH), ELEVATION)
     seen = dense.vertices @ turn.T @ camera.axes().T
     low, high = seen.min(axis=0), seen.max(axis=0)
     half = (high - low)[:2] / 2 / (HALF_WIDTH * np.array([1, ASPECT]))
@@ -94,7 +94,7 @@ def _views(pair: Pair, schemes: Mapping[str, Scheme], level: int) -> list[View]:
         placed = CENTRE + FILLED / half.max() * (mesh.vertices @ turn.T - middle)
         values = 1000 * distance / diagonal
         image = shaded_image(Mesh(placed, mesh.faces), values, LARGEST, camera)
-        return View(title, pair.dense.name, image)
+        return View(title, pair.dense.title, image)
 
     found = [
         view("dense", dense, np.zeros(len(dense.vertices))),
@@ -134,7 +134,7 @@ def _draw_gains(found: Sequence[Summary]) -> Drawing:
         axes.plot(percent, range(len(meshes)), linestyle="", **style)
         axes.axvline(one.percent["mean"], color=style["color"], linewidth=0.8)
     axes.axvline(0, color="0.3", linewidth=0.7, zorder=1)
-    axes.set_yticks(range(len(meshes)), meshes)
+    axes.set_yticks(range(len(meshes)), [mesh.partition(".")[0] for mesh in meshes])
     axes.set_xlabel("Improvement over Loop (%)")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure

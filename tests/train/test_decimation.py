@@ -1,0 +1,176 @@
+"""Simplified meshes: what they keep, and how methods are compared on them."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from pns_common import Mesh, load_model, loop, pns, refine
+from tests.meshes import bent, bumpy_sphere, grid, icosphere
+from tests.shared import shared_path
+from train.baselines.butterfly import modified_butterfly
+from train.cad_parts import torus
+from train.decimation import (
+    COARSE_FACES,
+    NotSimplified,
+    Pair,
+    Row,
+    collapsed,
+    compare,
+    euler_characteristic,
+    gain,
+    simplified_pairs,
+    simplify,
+    summaries,
+)
+from train.dense_meshes import CAD, DenseMesh, asset_meshes, is_manifold
+from train.surface_distance import SurfaceErrors
+
+SPHERE = DenseMesh("sphere", CAD, Mesh(*bumpy_sphere(subdivisions=3, bump=0.02)))
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return simplify(SPHERE)
+
+
+def test_a_large_mesh_comes_down_to_the_count_of_the_source():
+    found = simplify(DenseMesh("torus", CAD, torus()))
+    assert len(found.coarse.faces) == COARSE_FACES
+    assert len(found.coarse.vertices) == 400
+
+
+def test_a_small_mesh_comes_down_to_a_fifth(pair):
+    assert len(pair.coarse.faces) == pytest.approx(1280 / 5, abs=4)
+
+
+@pytest.mark.parametrize("shape", [icosphere(3), grid(30, bent)], ids=["sphere", "patch"])
+def test_the_coarse_mesh_is_a_manifold_of_the_same_kind(shape):
+    dense = Mesh(*shape)
+    found = simplify(DenseMesh("it", CAD, dense))
+    assert is_manifold(found.coarse)
+    ours, theirs = (
+        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False) for mesh in (found.coarse, dense)
+    )
+    assert ours.euler_number == theirs.euler_number == euler_characteristic(found.coarse)
+    assert ours.is_watertight == theirs.is_watertight
+    assert ours.is_winding_consistent
+
+
+def test_the_coarse_mesh_is_near_the_dense_one(pair):
+    size = np.linalg.norm(pair.coarse.vertices, axis=1)
+    assert np.abs(size - 1).max() < 0.05
+
+
+def test_simplification_is_the_same_every_time(pair):
+    again = simplify(SPHERE)
+    np.testing.assert_array_equal(again.coarse.vertices, pair.coarse.vertices)
+    np.testing.assert_array_equal(again.coarse.faces, pair.coarse.faces)
+
+
+def test_what_hangs_together_by_an_edge_alone_is_cut_off(monkeypatch):
+    """Two faces back to back on an edge: what the library leaves of a thin limb."""
+    vertices, faces = bumpy_sphere()
+    a, b = faces[0][:2]
+    tip = len(vertices)
+    limbed = np.concatenate([faces, [[a, b, tip], [b, a, tip]]])
+    points = np.concatenate([vertices, [[2.0, 2, 2]]])
+    assert not is_manifold(Mesh(points, limbed))
+    monkeypatch.setattr("train.decimation.collapsed", lambda mesh, count: Mesh(points, limbed))
+    found = simplify(SPHERE)
+    assert found.cut_off == 2
+    assert len(found.coarse.faces) == len(faces)
+    assert len(found.coarse.vertices) == len(vertices)
+
+
+def test_where_no_count_gives_a_manifold_alike_there_is_no_pair(monkeypatch):
+    counts = []
+
+    def always_open(mesh, count):
+        counts.append(count)
+        return Mesh(*grid())
+
+    monkeypatch.setattr("train.decimation.collapsed", always_open)
+    found = simplify(SPHERE)
+    assert isinstance(found, NotSimplified)
+    assert found.dense is SPHERE
+    assert counts[:5] == [256, 258, 254, 260, 252]
+    assert len(set(counts)) == len(counts)
+
+
+def test_a_large_piece_is_not_cut_off(monkeypatch):
+    vertices, faces = icosphere(1)
+    two = np.concatenate([faces, faces + len(vertices)])
+    points = np.concatenate([vertices, vertices + 5])
+    monkeypatch.setattr("train.decimation.collapsed", lambda mesh, count: Mesh(points, two))
+    assert isinstance(simplify(SPHERE), NotSimplified)
+
+
+def test_collapses_leave_no_unused_vertices():
+    found = collapsed(SPHERE.mesh, 100)
+    np.testing.assert_array_equal(np.unique(found.faces), np.arange(len(found.vertices)))
+
+
+@pytest.fixture(scope="module")
+def rows(pair):
+    schemes = {"loop": loop(), "butterfly": modified_butterfly()}
+    schemes |= {"no budget": pns(load_model("paper"), 0.0), "paper": pns(load_model("paper"))}
+    return compare([pair], schemes, (1, 2), samples=500)
+
+
+def test_every_method_is_measured_on_every_level(rows):
+    assert [(row.method, row.level) for row in rows] == [
+        (method, level)
+        for method in ("loop", "butterfly", "no budget", "paper")
+        for level in (1, 2)
+    ]
+    assert {row.mesh for row in rows} == {"sphere"}
+
+
+def test_without_budget_the_operator_is_loop(rows):
+    by = {(row.method, row.level): row.errors for row in rows}
+    for level in (1, 2):
+        assert by["no budget", level] == by["loop", level]
+        assert by["paper", level] != by["loop", level]
+
+
+def test_on_a_sphere_interpolation_is_nearer_than_loop(rows):
+    """Loop draws a convex mesh inwards; what keeps its vertices does not."""
+    by = {(row.method, row.level): row.errors for row in rows}
+    for level in (1, 2):
+        assert by["butterfly", level].mean < by["loop", level].mean
+
+
+def test_a_dense_mesh_that_is_its_own_refinement_has_no_error():
+    coarse = Mesh(*bumpy_sphere())
+    dense = refine(coarse, loop(), 2, threads=1).mesh
+    (row,) = compare([Pair(DenseMesh("own", CAD, dense), coarse, 0)], {"loop": loop()}, (2,), 500)
+    assert row.errors.hausdorff == pytest.approx(0, abs=1e-12)
+
+
+def test_a_gain_is_the_share_that_the_error_lost():
+    found = gain(SurfaceErrors(1, 2, 4, 8), SurfaceErrors(0.5, 2, 5, 0))
+    assert found == {"mean": 50, "p95": 0, "hausdorff": -25, "normal": 100}
+
+
+def test_a_summary_is_the_mean_over_meshes_and_names_the_worst():
+    def row(mesh, method, mean):
+        return Row(mesh, 2, method, SurfaceErrors(mean, 1.0, 1.0, 1.0))
+
+    rows = [row("a", "loop", 1.0), row("a", "ours", 0.5), row("b", "loop", 2.0)]
+    rows += [row("b", "ours", 2.1), row("c", "loop", 1.0), row("c", "ours", 1.005)]
+    (found,) = summaries(rows)
+    assert (found.method, found.level) == ("ours", 2)
+    assert found.percent["mean"] == pytest.approx((50 - 5 - 0.5) / 3)
+    assert found.percent["hausdorff"] == 0
+    assert found.worst == "b"
+    assert found.by_mesh["b"] == pytest.approx(-5)
+    assert found.worse == 1
+
+
+def test_all_shared_meshes_and_parts_can_be_simplified():
+    folder = shared_path("assets")
+    dense = [one for one in asset_meshes(folder) if isinstance(one, DenseMesh)]
+    found = simplified_pairs(folder)
+    assert [one.dense.name for one in found][: len(dense)] == [one.name for one in dense]
+    assert len(found) == len(dense) + 7
+    assert all(is_manifold(one.coarse) for one in found)
