@@ -1,6 +1,7 @@
 """Bit-reproducible torch on one machine, and a fingerprint that says whether it is the same one."""
 
 import hashlib
+import os
 import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,6 +17,8 @@ THREADS = 1
 @contextmanager
 def deterministic() -> Iterator[None]:
     """Run torch with deterministic algorithms on a fixed number of threads; then restore both."""
+    # A GPU's matrix products are deterministic only with a workspace of fixed size.
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
     algorithms, threads = torch.are_deterministic_algorithms_enabled(), torch.get_num_threads()
     torch.use_deterministic_algorithms(True)
     torch.set_num_threads(THREADS)

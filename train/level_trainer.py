@@ -14,7 +14,7 @@ from train.recipe_operator import (
     recipe_operator,
     vertex_rule_operator,
 )
-from train.recipes import Recipe
+from train.recipes import LevelWeights, Recipe, StreamTraining
 from train.rollout import level_batch, rollout
 from train.star_term import StarTerm
 from train.stream import random_instance
@@ -23,6 +23,13 @@ WARM_UP = 0.1
 """Share of the steps in which the learning rate rises."""
 
 LONGEST_GRADIENT = 1.0
+
+
+def depth(plan: StreamTraining, batch_size: int, step: int) -> tuple[tuple[LevelWeights, ...], int]:
+    """Return the levels of a training step, and how many instances it takes through them."""
+    if step % plan.deepest_every:
+        return plan.levels[:-1], batch_size
+    return plan.levels, max(1, batch_size // 4)
 
 
 def fit_through_levels(
@@ -46,14 +53,14 @@ def fit_through_levels(
             if recipe.vertex is None or vertex_network is None
             else vertex_rule_operator(recipe.vertex, vertex_network)
         )
-        star_term = StarTerm(recipe.seed, plan.star_margin)
+        star_term = StarTerm(recipe.seed, plan.star_margin, device)
         rng = np.random.default_rng(recipe.seed)
         losses: list[float] = []
         for step in range(recipe.steps):
-            instances = [random_instance(rng) for _ in range(recipe.batch_size)]
-            batch = level_batch(instances, len(plan.levels), device)
+            levels, size = depth(plan, recipe.batch_size, step)
+            batch = level_batch([random_instance(rng) for _ in range(size)], len(levels), device)
             points = rollout(batch, operator, recipe.budget, vertex_operator)
-            loss = rollout_loss(plan.levels, batch, points, references(batch))
+            loss = rollout_loss(levels, batch, points, references(batch))
             if plan.star > 0 and step % plan.star_every == 0:
                 short = star_term(operator, recipe.budget, vertex_operator)
                 loss = loss + plan.star * short.to(loss)

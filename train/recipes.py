@@ -51,12 +51,15 @@ class StreamTraining:
 
     Attributes:
         levels: weights after one step, two steps, …; as many steps are taken.
+        deepest_every: the last level (of two at least), which costs as much as four of the one
+            before, is taken at every so manyth step alone, on a quarter of the batch.
         star: weight of the star term (train/star_term.py), which is added at every `star_every`th
             step.
         star_margin: the Reif margin that lifted stars are asked for.
     """
 
     levels: tuple[LevelWeights, ...]
+    deepest_every: int
     star: float
     star_every: int
     star_margin: float
@@ -180,7 +183,7 @@ def full(seed: int = 0) -> Recipe:
         jump=0.3,
         worse=2.0,
     )
-    second = replace(first, inserted=0.0, inserted_peak=0.0, jump=5.0)
+    further = replace(first, inserted=0.0, inserted_peak=0.0, jump=8.0)
     return Recipe(
         name="full",
         features="signed-18",
@@ -197,7 +200,13 @@ def full(seed: int = 0) -> Recipe:
         seed=seed,
         orientation="symmetric",
         vertex=VertexRule("ring-10", hidden=(32, 32), gate_sharpness=1e3),
-        stream=StreamTraining((first, second), star=2.0, star_every=2, star_margin=0.06),
+        stream=StreamTraining(
+            levels=(first, further, further),
+            deepest_every=4,
+            star=4.0,
+            star_every=2,
+            star_margin=0.08,
+        ),
         hush=0.02,
     )
 

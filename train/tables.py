@@ -13,6 +13,7 @@ METRIC_TITLES: Mapping[str, str] = {
     "hausdorff": "Hausdorff, all",
     "normal_near": "Normal error, near",
     "normal": "Normal error, all",
+    "jump": "Largest normal jump",
 }
 
 

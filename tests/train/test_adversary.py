@@ -16,7 +16,7 @@ from train.certificates.bodies import bumpy_sphere, synthetic_bodies
 from train.certificates.displacement import bounded_displacement
 from train.certificates.subject import subject_of_network
 from train.gap_collapse import gap_attack
-from train.recipes import ridge
+from train.recipes import full, ridge
 from train.torch_model import recipe_model
 
 
@@ -76,3 +76,28 @@ def test_a_smaller_budget_leaves_the_adversary_a_wider_margin():
     assert narrow.after > wide.after
     assert wide.after < wide.before
     assert narrow.after > 0.1
+
+
+def test_with_the_vertex_rule_the_caps_are_found_and_held():
+    """Weights of both networks and the mesh are searched at once."""
+    recipe = full(0)
+    proximity = proximity_attack(recipe, 40, quiet)
+    assert proximity.held
+    assert 0.999 < proximity.worst
+    model = recipe_model(recipe, proximity.network, proximity.vertex_network)
+    assert bounded_displacement(subject_of_network(model), synthetic_bodies(0), levels=1).passed
+
+    equivariance = equivariance_attack(recipe, 15, quiet)
+    assert equivariance.held
+    assert 0 < equivariance.worst
+
+    on_axes = affine_attack(recipe, np.eye(3), 0.0, 10, quiet)
+    turned = affine_attack(recipe, rotation(np.random.default_rng(0)), TURNED, 10, quiet)
+    assert on_axes.worst == 0.0
+    assert turned.held
+
+
+def test_the_adversary_moves_the_vertex_network_too():
+    before, after = (proximity_attack(full(0), steps, quiet) for steps in (1, 8))
+    weights = (one.vertex_network.linear_layers[0].weight.detach() for one in (before, after))
+    assert float(abs(next(weights) - next(weights)).max()) > 0.01

@@ -2,12 +2,17 @@ import numpy as np
 import pytest
 import torch
 
+from train.smooth_surfaces import Bump, Crossing, CurvedRidge, LumpySphere
 from train.surfaces import Ridge, Saddle, SphereRidge, signed_distance, unit_normal
 
 SURFACES = [
     Ridge(amplitude=0.6, sharpness=7.0, angle=0.7, centre_x=0.05, centre_y=-0.02),
     Saddle(amplitude=0.5, centre_x=0.05, centre_y=-0.02),
     SphereRidge(radius=1.0, amplitude=0.1, sharpness=30.0, angle=2.9),
+    CurvedRidge(amplitude=0.5, sharpness=6.0, radius=0.9, centre_x=-0.3, centre_y=0.1),
+    Crossing(0.5, 6.0, 0.4, 0.3, 4.0, 1.7),
+    Bump(amplitude=0.5, sharpness=4.0, elongation=0.3, angle=0.8, centre_x=0.4, centre_y=0.3),
+    LumpySphere(0.8, amplitude=0.1, frequency=4.0, phase_x=0.3, phase_y=1.1, phase_z=2.0),
 ]
 BY_NAME = [pytest.param(surface, id=type(surface).__name__) for surface in SURFACES]
 
