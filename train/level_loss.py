@@ -22,10 +22,10 @@ from train.surfaces import signed_distance, unit_normal
 PEAK = 8
 """Exponent of the soft maximum."""
 
-ALLOWED_JUMP = 1.3
+ALLOWED_JUMP = 1.15
 """Times Loop's: at level 4 the jump is a little further from Loop's than at those trained on."""
 
-LARGEST_ALLOWED = 2.0
+LARGEST_ALLOWED = 1.5
 """Times Loop's, where the surface itself would have more: at a border that no rule may move."""
 
 PROJECTIONS = 3

@@ -203,9 +203,9 @@ def full(seed: int = 0) -> Recipe:
         stream=StreamTraining(
             levels=(first, further, further),
             deepest_every=4,
-            star=4.0,
-            star_every=2,
-            star_margin=0.08,
+            star=3.0,
+            star_every=1,
+            star_margin=0.07,
         ),
         hush=0.02,
     )

@@ -2,16 +2,18 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Bool, Complex, Float, Int
 
 from pns_common.errors import ParameterError
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
 from pns_common.schemes import Scheme
+from train.star_symmetry import Block, keeps_blocks, symmetry_blocks
 from train.stars import Star, star
 
 SPOKE = 0.25
@@ -26,6 +28,12 @@ RINGS = ((2, 2), (3, 2), (4, 3), (6, 4))
 VALENCES = tuple(range(3, 13))
 TANGENT_COUNT = 6
 """Loop's tangent eigenvalue is double, once for each of three coordinates."""
+
+DISTINCT = 2.0
+"""Tangents are told apart where the least of the six is so many times nearer than the next."""
+
+FINEST = 1 / 80
+"""Stride of the lift below which eigenvalues that cannot be told apart are left so."""
 
 
 def loop_eigenvalue(valence: int, frequency: int = 1) -> float:
@@ -128,6 +136,16 @@ def translation_quotient(size: int) -> Float[np.ndarray, "M L"]:
     return np.linalg.qr(translations, mode="complete").Q[:, 3:]
 
 
+def quotient_blocks(at: Star, valence: int) -> tuple[Block, ...]:
+    """Return a star's symmetry blocks on the quotient by translations."""
+    basis, found = translation_quotient(3 * len(at.inner)), []
+    for block in symmetry_blocks(at, valence):
+        left, size, _ = np.linalg.svd(basis.T @ block, full_matrices=False)
+        # Translations lie within blocks and leave a direction of length 0.
+        found.append(left[:, size > 1 / 2])
+    return tuple(found)
+
+
 def without_translations(matrix: Float[np.ndarray, "M M"]) -> Float[np.ndarray, "L L"]:
     """Return the matrix on the quotient by translations."""
     basis = translation_quotient(len(matrix))
@@ -141,12 +159,18 @@ class Spectrum:
     Attributes:
         right, left: eigenvectors as columns of one and rows of the other, its inverse.
         tangent: the six eigenvalues continued from Loop's tangent pair.
+        blocks: invariant subspaces, eigenvalues of which are followed apart.
+        block: which of them each eigenvalue belongs to.
+        distinct: how much nearer any of the six is to the tangents before than any other.
     """
 
     values: Complex[np.ndarray, " L"]
     right: Complex[np.ndarray, "L L"]
     left: Complex[np.ndarray, "L L"]
     tangent: Bool[np.ndarray, " L"]
+    blocks: tuple[Block, ...]
+    block: Int[np.ndarray, " L"]
+    distinct: float = math.inf
 
     @property
     def least_tangent(self) -> int:
@@ -170,41 +194,106 @@ class Spectrum:
         return float(np.abs(self.values).max())
 
 
-def flat_spectrum(matrix: Float[np.ndarray, "L L"], valence: int) -> Spectrum:
-    """Return the spectrum of a flat star: the tangents are the six nearest Loop's."""
-    values, right = np.linalg.eig(matrix)
-    return _spectrum(values, right, -np.abs(values - loop_eigenvalue(valence)))
+def flat_spectrum(
+    matrix: Float[np.ndarray, "L L"], valence: int, blocks: tuple[Block, ...] = ()
+) -> Spectrum:
+    """Return the spectrum of a flat star: the tangents are the six nearest Loop's.
+
+    Args:
+        blocks: invariant subspaces of all matrices that will follow; without any, the whole space.
+    """
+    found = _decomposed(matrix, blocks or (np.eye(len(matrix)),))
+    nearest = np.argsort(np.abs(found.values - loop_eigenvalue(valence)), kind="stable")
+    return replace(found, tangent=_among(len(found.values), nearest[:TANGENT_COUNT]))
 
 
 def continued_spectrum(matrix: Float[np.ndarray, "L L"], before: Spectrum) -> Spectrum:
     """Return the spectrum of a star a little different from the one before.
 
-    The tangents are the six whose eigenvectors lie most in the tangent space before, by its
-    spectral projector: an oblique one, because the matrix is not normal.
+    The tangents of each block are as many as before, those whose eigenvectors lie most in the
+    tangent space before, by its spectral projector: an oblique one, because the matrix is not
+    normal.
     """
-    values, right = np.linalg.eig(matrix)
+    found = _decomposed(matrix, before.blocks)
     projector = before.right[:, before.tangent] @ before.left[before.tangent]
-    return _spectrum(values, right, np.linalg.norm(projector @ right, axis=0))
+    nearness = np.linalg.norm(projector @ found.right, axis=0)
+    tangents, distinct = [], math.inf
+    for block in range(len(before.blocks)):
+        count = int(before.tangent[before.block == block].sum())
+        own = np.flatnonzero(found.block == block)
+        nearest = own[np.argsort(-nearness[own], kind="stable")]
+        tangents.append(nearest[:count])
+        if 0 < count < len(own):
+            least, next_one = nearest[count - 1 : count + 1]
+            # Which of a conjugate pair is the tangent has no answer in any stride.
+            if not _conjugate(found.values[least], found.values[next_one]):
+                distinct = min(distinct, nearness[least] / max(nearness[next_one], 1e-300))
+    return replace(
+        found, tangent=_among(len(found.values), np.concatenate(tangents)), distinct=distinct
+    )
 
 
 def follow_lift(scheme: Scheme, valence: int, lifts: Sequence[float]) -> list[Spectrum]:
     """Follow the spectrum of a star while its centre is lifted; the first lift is 0.
 
+    The strides between lifts are halved where the tangents are not told apart.
+
     Lifted stars are no fixed points, so the margin is a diagnostic, not Reif's condition.
     """
     build = closed_star(scheme, valence)
-    matrices = [without_translations(jacobian(scheme, build(lift))) for lift in lifts]
-    found = [flat_spectrum(matrices[0], valence)]
-    for matrix in matrices[1:]:
-        found.append(continued_spectrum(matrix, found[-1]))
+
+    def matrix(lift: float) -> Float[np.ndarray, "L L"]:
+        return without_translations(jacobian(scheme, build(lift)))
+
+    blocks = quotient_blocks(build(0.0), valence)
+    # A rule that depends on the numbering of vertices does not keep the star's symmetries.
+    blocks = blocks if keeps_blocks(matrix(lifts[-1]), blocks) else ()
+    found = [flat_spectrum(matrix(lifts[0]), valence, blocks)]
+    for start, end in pairwise(lifts):
+        found.append(followed(matrix, found[-1], start, end))
     return found
 
 
-def _spectrum(
-    values: Complex[np.ndarray, " L"],
-    right: Complex[np.ndarray, "L L"],
-    nearness: Float[np.ndarray, " L"],
+def followed(
+    matrix: Callable[[float], Float[np.ndarray, "L L"]],
+    before: Spectrum,
+    start: float,
+    end: float,
+    finest: float = FINEST,
 ) -> Spectrum:
-    tangent = np.zeros(len(values), dtype=bool)
-    tangent[np.argsort(-nearness, kind="stable")[:TANGENT_COUNT]] = True
-    return Spectrum(values, right, np.linalg.inv(right), tangent)
+    """Follow from one lift to another, in half the stride where tangents are not told apart."""
+    found = continued_spectrum(matrix(end), before)
+    if found.distinct >= DISTINCT or end - start <= finest:
+        return found
+    middle = (start + end) / 2
+    half_way = followed(matrix, before, start, middle, finest)
+    return followed(matrix, half_way, middle, end, finest)
+
+
+def _decomposed(matrix: Float[np.ndarray, "L L"], blocks: tuple[Block, ...]) -> Spectrum:
+    """Return the eigenvalues of every block; which are tangents is still open."""
+    values, right, left = [], [], []
+    for block in blocks:
+        own, vectors = np.linalg.eig(block.T @ matrix @ block)
+        values.append(own)
+        right.append(block @ vectors)
+        # Where two eigenvalues just meet there is no inverse.
+        left.append(np.linalg.pinv(vectors) @ block.T)
+    return Spectrum(
+        values=np.concatenate(values),
+        right=np.concatenate(right, axis=1),
+        left=np.concatenate(left),
+        tangent=np.zeros(len(matrix), dtype=bool),
+        blocks=blocks,
+        block=np.repeat(np.arange(len(blocks)), [len(own) for own in values]),
+    )
+
+
+def _conjugate(first: complex, second: complex) -> bool:
+    return bool(first.imag != 0 and abs(first - np.conj(second)) <= 1e-9 * abs(first))
+
+
+def _among(count: int, chosen: Int[np.ndarray, " S"]) -> Bool[np.ndarray, " L"]:
+    marked = np.zeros(count, dtype=bool)
+    marked[chosen] = True
+    return marked

@@ -17,15 +17,16 @@ from pns_common.mesh import Mesh
 from pns_common.schemes import loop
 from pns_common.topology import Topology, build_topology
 from pns_common.vertex_operator import VertexOperator
-from train.margin_gradient import margin_gradient
+from train.margin_gradient import separation
 from train.one_step import refine_once
 from train.spectrum import (
     SPOKE,
     Spectrum,
-    continued_spectrum,
     flat_spectrum,
+    followed,
     jacobian,
     perturbed_stars,
+    quotient_blocks,
     refined_inner,
     translation_quotient,
     without_translations,
@@ -44,9 +45,9 @@ STEP = 3e-3
 SHARES: Mapping[int, float] = {3: 0.24, 4: 0.24, 5: 0.12, 6: 0.09, 8: 0.09, 10: 0.10, 12: 0.12}
 """How often each valence is drawn: Loop's own gap is narrow at the low ones."""
 
-LOWEST_LIFT, HIGHEST_LIFT = 0.05, 0.45
-HALF_WAY = 0.2
-"""Above this lift the tangents are followed in two strides."""
+LOWEST_LIFT, HIGHEST_LIFT = 0.03, 0.45
+FINEST = 1 / 20
+"""Stride of the lift below which eigenvalues that cannot be told apart are left so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ class StarCopies:
         count: inner coordinates M.
         topology: of the 2 M copies.
         quotient: basis of what is orthogonal to translations.
-        flat: Loop's spectrum.
+        flat: Loop's spectrum, in the blocks that symmetric rules keep.
     """
 
     star: Star
@@ -72,8 +73,9 @@ def star_copies(valence: int) -> StarCopies:
     less = 1 if valence >= MANY else 0
     at = star(valence, RINGS - less, SPOKE, inner_rings=INNER_RINGS - less)
     mesh, count = perturbed_stars(at, STEP * SPOKE)
-    flat = flat_spectrum(without_translations(jacobian(loop(), at)), valence)
     topology = build_topology(mesh.faces, len(mesh.vertices))
+    matrix = without_translations(jacobian(loop(), at))
+    flat = flat_spectrum(matrix, valence, quotient_blocks(at, valence))
     return StarCopies(at, count, topology, translation_quotient(count), flat)
 
 
@@ -93,31 +95,23 @@ class StarTerm:
         valence = int(self._rng.choice(list(SHARES), p=list(SHARES.values())))
         lift = self._rng.uniform(LOWEST_LIFT, HIGHEST_LIFT)
         copies = self._stars[valence]
-        before = copies.flat
-        if lift > HALF_WAY:
-            with torch.no_grad():
-                half = self._jacobian(copies, lift / 2, operator, budget, vertex_operator)
-            before = continued_spectrum(_quotient(copies, half), before)
-        matrix = self._jacobian(copies, lift, operator, budget, vertex_operator)
-        spectrum = continued_spectrum(_quotient(copies, matrix.detach()), before)
-        if spectrum.margin >= self._wanted:
-            return torch.zeros((), dtype=matrix.dtype, device=matrix.device)
         basis = copies.quotient
-        slope = torch.from_numpy(basis @ margin_gradient(spectrum) @ basis.T).to(matrix)
-        # The margin's value, with the slope that eigenvectors give it.
-        moving = (slope * matrix).sum()
-        return self._wanted - spectrum.margin - (moving - moving.detach())
 
-    def _jacobian(
-        self,
-        copies: StarCopies,
-        lift: float,
-        operator: EdgeOperator,
-        budget: float,
-        vertex_operator: VertexOperator | None,
-    ) -> Float[Tensor, "M M"]:
-        points = perturbed_points(copies, lift).to(self._device)
-        return star_jacobian(copies, points, operator, budget, vertex_operator)
+        def jacobian_at(lift: float) -> Float[Tensor, "M M"]:
+            points = perturbed_points(copies, lift).to(self._device)
+            return star_jacobian(copies, points, operator, budget, vertex_operator)
+
+        def matrix_at(lift: float) -> Float[np.ndarray, "L L"]:
+            with torch.no_grad():
+                return basis.T @ jacobian_at(lift).cpu().numpy() @ basis
+
+        apart, slope = separation(followed(matrix_at, copies.flat, 0.0, lift, FINEST))
+        if apart >= self._wanted:
+            return torch.zeros(())
+        matrix = jacobian_at(lift)
+        # The value, with the slope that eigenvectors give it.
+        moving = (torch.from_numpy(basis @ slope @ basis.T).to(matrix) * matrix).sum()
+        return self._wanted - apart - (moving - moving.detach())
 
 
 def perturbed_points(copies: StarCopies, lift: float) -> Float[Tensor, "P 3"]:
@@ -141,7 +135,3 @@ def star_jacobian(
     refined = refine_once(points, copies.topology, operator, budget, vertex_operator).points
     moved = refined_inner(copies.star, refined, 2 * count)
     return (moved[:count] - moved[count:]).T / (2 * STEP * SPOKE)
-
-
-def _quotient(copies: StarCopies, matrix: Float[Tensor, "M M"]) -> Float[np.ndarray, "L L"]:
-    return copies.quotient.T @ matrix.cpu().numpy() @ copies.quotient

@@ -83,13 +83,13 @@ def test_with_the_vertex_rule_the_caps_are_found_and_held():
     recipe = full(0)
     proximity = proximity_attack(recipe, 40, quiet)
     assert proximity.held
-    assert 0.999 < proximity.worst
+    assert proximity.worst > 0.999
     model = recipe_model(recipe, proximity.network, proximity.vertex_network)
     assert bounded_displacement(subject_of_network(model), synthetic_bodies(0), levels=1).passed
 
     equivariance = equivariance_attack(recipe, 15, quiet)
     assert equivariance.held
-    assert 0 < equivariance.worst
+    assert equivariance.worst > 0
 
     on_axes = affine_attack(recipe, np.eye(3), 0.0, 10, quiet)
     turned = affine_attack(recipe, rotation(np.random.default_rng(0)), TURNED, 10, quiet)

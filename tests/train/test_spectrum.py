@@ -11,17 +11,20 @@ from pns_common.errors import ParameterError
 from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule
 from pns_common.topology import build_topology
 from train.adversary import Operator
-from train.gap_collapse import margin_gradient
+from train.margin_gradient import margin_gradient, separation
 from train.networks import BoundedNet
 from train.operator_jacobian import operator_jacobian
 from train.recipes import ridge
 from train.spectrum import (
+    DISTINCT,
     SPOKE,
     VALENCES,
+    Spectrum,
     closed_star,
     continued_spectrum,
     flat_spectrum,
     follow_lift,
+    followed,
     jacobian,
     loop_gap,
     without_translations,
@@ -153,6 +156,65 @@ def test_the_margins_gradient_is_its_derivative():
     up, down = (continued_spectrum(matrix + s * 1e-7 * change, found).margin for s in (1, -1))
     expected = (margin_gradient(found) * change).sum()
     assert (up - down) / 2e-7 == pytest.approx(expected, rel=1e-4)
+
+
+def turning(angle):
+    """Six tangents of size 0.5, a seventh of 0.3; the sixth's eigenvector turns into its."""
+    c, s = np.cos(angle), np.sin(angle)
+    frame = np.eye(7)
+    frame[5:, 5:] = [[c, -s], [s, c]]
+    return frame @ np.diag([0.5] * 6 + [0.3]) @ frame.T
+
+
+def test_strides_are_halved_where_eigenvectors_turn_far():
+    start = continued_spectrum(turning(0), flat_spectrum(np.diag([0.5] * 6 + [0.3]), 6))
+    end = np.deg2rad(60)
+    assert continued_spectrum(turning(end), start).margin == pytest.approx(-0.2)
+    found = followed(turning, start, 0.0, end)
+    assert found.margin == pytest.approx(0.2)
+    assert found.distinct >= DISTINCT
+
+
+def test_strides_have_a_finest():
+    seen = []
+
+    def never_told_apart(lift):
+        seen.append(lift)
+        return turning(np.deg2rad(45) * len(seen))
+
+    start = flat_spectrum(np.diag([0.5] * 6 + [0.3]), 6)
+    followed(never_told_apart, start, 0.0, 1.0, finest=1 / 4)
+    assert len(seen) <= 7
+
+
+def test_a_pair_that_left_the_real_line_is_led_back():
+    """A tangent and another eigenvalue have met: their sizes are one, whatever one does to them."""
+    rng = np.random.default_rng(0)
+    base = np.diag([0.9, 0.8, 0.7, 0.6, 0.55, 0.5, 0.5, 0.2])
+    base[5, 6], base[6, 5] = 0.1, -0.1
+    mixed = rng.standard_normal((8, 8))
+    matrix, change = mixed @ base @ np.linalg.inv(mixed), rng.standard_normal((8, 8))
+
+    def spectrum(moved):
+        values, right = np.linalg.eig(moved)
+        tangent = (np.abs(values) > 0.52) | (values.imag > 0)
+        whole = (np.eye(8),), np.zeros(8, dtype=int)
+        return Spectrum(values, right, np.linalg.inv(right), tangent, *whole)
+
+    found = spectrum(matrix)
+    assert found.margin == pytest.approx(0, abs=1e-9)
+    value, slope = separation(found)
+    assert value == pytest.approx(-0.2)
+    up, down = (separation(spectrum(matrix + s * 1e-6 * change))[0] for s in (1, -1))
+    assert (up - down) / 2e-6 == pytest.approx((slope * change).sum(), rel=1e-4)
+
+
+def test_apart_from_such_pairs_the_separation_is_the_margin():
+    scheme = pns(recipe_model(ridge(), steep_network(scale=2.0)))
+    found = follow_lift(scheme, 6, np.linspace(0, 0.4, 9))[-1]
+    value, slope = separation(found)
+    assert value == found.margin
+    np.testing.assert_array_equal(slope, margin_gradient(found))
 
 
 def test_tangents_of_a_flat_star_are_those_nearest_loops():
