@@ -62,7 +62,12 @@ def check_parity(
 
     Raises:
         ParityError: they differ by more than `tolerance` of a budget.
+        ModelError: only one of the two has a rule for old vertices.
     """
+    if (vertex_network is None) != (model.card.vertex_features is None):
+        raise ModelError(
+            "file", expected="a vertex rule where the checkpoint has one, and only there"
+        )
     seen = FEATURE_SETS[model.card.features].features
     edges = _compare(model, network, seen, tolerance)
     if vertex_network is None or model.card.vertex_features is None:
@@ -102,13 +107,14 @@ def within(rows: Float[np.ndarray, "N K"], features: Sequence[Feature]) -> Float
 
 
 def sample_features(count: int) -> Float[np.ndarray, "N K"]:
-    """Return 10,000 seeded feature rows: common ones, then wide ones, then the extremes.
+    """Return 10,000 seeded feature rows: small and common ones, wide ones, then the extremes.
 
-    The first feature is a curvature in [0, 2], the others are logarithms of length ratios; the
-    extremes hold slivers with ratios of e^±30 and folded or exactly planar edges.
+    The first feature is a curvature in [0, 2], the others are drawn around 0, as signed features
+    and logarithms of length ratios are; the extremes hold slivers with ratios of e^±30 and folded
+    or exactly planar edges.
     """
     rng = np.random.default_rng(0)
-    scale = np.repeat([0.3, 3.0, 30.0], [ROWS // 2, ROWS // 4, ROWS - ROWS // 2 - ROWS // 4])
+    scale = np.repeat([0.03, 0.3, 3.0, 30.0], ROWS // 4)
     rows = rng.uniform(-1, 1, size=(ROWS, count)) * scale[:, None]
     rows[:, 0] = rng.uniform(0, 2, size=ROWS) ** 2 / 2
     rows[-3:, 0] = [0.0, 1.0, 2.0]

@@ -1,4 +1,4 @@
-"""The exporter's entry: `python export/run.py` makes the bundled model from its checkpoint.
+"""The exporter's entry: `python export/run.py` makes a bundled model from its checkpoint.
 
 With `--published DIR` it makes one model file of each of the author's PNS networks instead.
 """
@@ -13,8 +13,22 @@ from export.model_file import Exported, export_model
 from export.published import export_published
 from pns_common.errors import PnsError
 from train.checkpoint import load_checkpoint
+from train.recipes import RECIPES, Recipe
 
-BUNDLED = Path(__file__).resolve().parents[1] / "pns_common" / "models" / "paper.onnx"
+MODELS = Path(__file__).resolve().parents[1] / "pns_common" / "models"
+FILE_OF_RECIPE = {
+    "ridge": MODELS / "paper.onnx",
+    "signed": MODELS / "signed.onnx",
+    "full": MODELS / "full.onnx",
+}
+"""The bundled file of a recipe with its own seed."""
+
+
+def bundled_file(recipe: Recipe) -> Path | None:
+    """Return where a recipe's bundled model lies; None for recipes and seeds without one."""
+    bundled = recipe.name in FILE_OF_RECIPE and recipe == RECIPES[recipe.name](0)
+    return FILE_OF_RECIPE[recipe.name] if bundled else None
+
 
 PUBLISHED_MODELS = Path("checkpoints/published")
 
@@ -31,7 +45,10 @@ def main(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(help="Model file to write, or with --published the folder of the files."),
+        typer.Option(
+            help="Model file to write, if not the bundled one of the recipe; with --published the "
+            "folder of the files."
+        ),
     ] = None,
 ) -> None:
     """Write model files, after checking that each says what its network says."""
@@ -41,8 +58,9 @@ def main(
         if published is not None:
             written = export_published(published, output or PUBLISHED_MODELS)
         else:
-            path = output or BUNDLED
-            written = {path: export_model(load_checkpoint(checkpoint), path)}
+            made = load_checkpoint(checkpoint)
+            path = output or bundled_file(made.recipe) or checkpoint.with_suffix(".onnx")
+            written = {path: export_model(made, path)}
     except PnsError as error:
         console.print(str(error), style="red", soft_wrap=True)
         raise typer.Exit(1) from error

@@ -17,7 +17,7 @@ from pns_common.model_card import ModelCard
 from pns_common.model_check import ALLOWED_OPERATORS, answer_to, check_file, feature_inputs
 from pns_common.model_shapes import ROWS
 
-DEFAULT_MODEL = "paper"
+DEFAULT_MODEL = "full"
 LARGEST_FILE = 64 * 2**20
 BUNDLED = resources.files("pns_common") / "models"
 

@@ -6,7 +6,6 @@ simplified meshes). They simplify at random; here the simplification is fixed.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import fast_simplification
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
 from pns_common.schemes import Scheme
-from train.dense_meshes import DenseMesh, asset_meshes, cad_meshes, is_manifold, largest_part
+from train.dense_meshes import DenseMesh, is_manifold, largest_part
 from train.surface_distance import SAMPLES, SURFACE_METRICS, SurfaceErrors, prepared, surface_errors
 
 COARSE_FACES = 800
@@ -89,13 +88,6 @@ class Summary:
     def worse(self) -> int:
         """Meshes whose mean distance is above the reference's by more than 1 %."""
         return sum(percent < -WORSE for percent in self.by_mesh.values())
-
-
-def simplified_pairs(assets: Path | None = None) -> list[Pair]:
-    """Return all pairs of the test: those of a folder's files, if given, and the CAD-like parts."""
-    dense = [] if assets is None else list(asset_meshes(assets))
-    taken = [one for one in dense if isinstance(one, DenseMesh)] + cad_meshes()
-    return [pair for pair in map(simplify, taken) if isinstance(pair, Pair)]
 
 
 def simplify(dense: DenseMesh) -> Pair | NotSimplified:

@@ -30,7 +30,7 @@ def deterministic() -> Iterator[None]:
 
 
 def machine_fingerprint() -> str:
-    """Return a short hash of what may change the last bits: processor, vector units, libraries."""
+    """Return a short hash of what may change the last bits: processor, GPU and libraries."""
     facts = [
         platform.machine(),
         _processor_model(),
@@ -38,6 +38,8 @@ def machine_fingerprint() -> str:
         torch.__version__,
         np.__version__,
     ]
+    if torch.cuda.is_available():
+        facts.append(torch.cuda.get_device_name())
     return hashlib.sha256("\n".join(facts).encode()).hexdigest()[:16]
 
 

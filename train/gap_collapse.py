@@ -24,7 +24,6 @@ from train.spectrum import (
     closed_star,
     continued_spectrum,
     flat_spectrum,
-    follow_lift,
     perturbed_stars,
     refined_inner,
     translation_quotient,
@@ -71,12 +70,13 @@ def gap_attack(recipe: Recipe, valence: int, steps: int, on_step: OnStep) -> Gap
     """
     operator = initial_operator(recipe)
     scheme = pns(recipe_model(recipe, operator.network, operator.vertex_network))
-    spectrum = follow_lift(scheme, valence, LIFTS)[-1]
-    before = spectrum.margin
     at = closed_star(scheme, valence)(LIFTS[-1])
     sway = torch.zeros(at.mesh.vertices.shape, dtype=torch.float64, requires_grad=True)
     copies = _Copies(at, valence)
     basis = translation_quotient(3 * len(at.inner))
+    # Not in the blocks of a symmetric star, which it will not stay.
+    spectrum = copies.follow(operator, torch.zeros_like(sway), basis)
+    before = spectrum.margin
 
     def look() -> tuple[Tensor, float]:
         nonlocal spectrum

@@ -4,7 +4,6 @@ They are lifted onto analytic surfaces: a regular grid has interior valence 6 al
 diagonals has 4 … 8, a Delaunay triangulation of scattered points what comes.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +17,6 @@ class PlaneMesh:
 
     points: Float[np.ndarray, "V 2"]
     faces: Int[np.ndarray, "F 3"]
-
-
-PlaneMaker = Callable[[np.random.Generator, int, float], PlaneMesh]
-"""From a generator, the vertices along a side, and the jitter as a share of the spacing."""
 
 
 def regular_grid(rng: np.random.Generator, side: int, jitter: float) -> PlaneMesh:

@@ -28,6 +28,8 @@ def initial_network(recipe: Recipe) -> BoundedNet:
         seen = FEATURE_SETS[recipe.features]
         hush = umbrella_hush(seen.features, recipe.hush)
         return SymmetricNet(seen.symmetries, recipe.hidden, recipe.activation, generator, hush)
+    if recipe.hush is not None and recipe.vertex is None:
+        raise ParameterError("hush", recipe.hush, expected="the orientation symmetric")
     return BoundedNet(INPUT_COUNT[recipe.features], recipe.hidden, recipe.activation, generator)
 
 
@@ -42,10 +44,17 @@ def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
 
 
 def umbrella_hush(features: Sequence[Feature], width: float | None) -> Hush | None:
-    """Return the hush over all umbrella heights among some features; None without a width."""
+    """Return the hush over all umbrella heights among some features; None without a width.
+
+    Raises:
+        ParameterError: there is no umbrella height among them: the network would always be silent.
+    """
     if width is None:
         return None
-    return Hush(tuple(k for k, one in enumerate(features) if one.kind in UMBRELLA_HEIGHTS), width)
+    columns = tuple(k for k, one in enumerate(features) if one.kind in UMBRELLA_HEIGHTS)
+    if not columns:
+        raise ParameterError("hush", width, expected="features with umbrella heights")
+    return Hush(columns, width)
 
 
 def recipe_operator(recipe: Recipe, network: BoundedNet) -> EdgeOperator:

@@ -13,11 +13,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from pns_common.schemes import pns
+from train.card_metrics import card_metrics
 from train.certify_command import certify_command
 from train.checkpoint import Checkpoint, save_checkpoint
-from train.datasets import ridge_held_out
 from train.determinism import machine_fingerprint
-from train.evaluation import compare_with_loop
 from train.experiments.command import reproduce_command
 from train.metrics import improvements_as_data
 from train.recipes import RECIPES, Recipe
@@ -57,15 +56,15 @@ def train(
     path = output or CHECKPOINTS / f"{chosen.name}.safetensors"
     began = time.perf_counter()
     trained = _fit_with_progress(chosen, console)
-    held_out = ridge_held_out()
     scheme = pns(recipe_model(chosen, trained.network, trained.vertex_network), chosen.budget)
-    improvements = compare_with_loop(scheme, held_out)
-    metrics = {held_out.name: improvements_as_data(improvements)}
+    found = card_metrics(chosen, scheme)
+    metrics = {name: improvements_as_data(rows) for name, rows in found.items()}
     made = Checkpoint(
         chosen, trained.network, metrics, machine_fingerprint(), trained.vertex_network
     )
     save_checkpoint(path, made)
-    console.print(improvement_table(f"{held_out.name}, recipe {chosen.name}", improvements))
+    for name, rows in found.items():
+        console.print(improvement_table(f"{name}, recipe {chosen.name}", rows))
     console.print(f"{path} written in {time.perf_counter() - began:.1f} s", soft_wrap=True)
 
 

@@ -29,11 +29,8 @@ VALENCES = tuple(range(3, 13))
 TANGENT_COUNT = 6
 """Loop's tangent eigenvalue is double, once for each of three coordinates."""
 
-DISTINCT = 2.0
-"""Tangents are told apart where the least of the six is so many times nearer than the next."""
-
-FINEST = 1 / 80
-"""Stride of the lift below which eigenvalues that cannot be told apart are left so."""
+FIRST_LIFT, GROWTH = 0.006, 1.3
+"""Eigenvalues are followed in growing strides: gates open at small lifts, where most moves."""
 
 
 def loop_eigenvalue(valence: int, frequency: int = 1) -> float:
@@ -161,7 +158,6 @@ class Spectrum:
         tangent: the six eigenvalues continued from Loop's tangent pair.
         blocks: invariant subspaces, eigenvalues of which are followed apart.
         block: which of them each eigenvalue belongs to.
-        distinct: how much nearer any of the six is to the tangents before than any other.
     """
 
     values: Complex[np.ndarray, " L"]
@@ -170,7 +166,6 @@ class Spectrum:
     tangent: Bool[np.ndarray, " L"]
     blocks: tuple[Block, ...]
     block: Int[np.ndarray, " L"]
-    distinct: float = math.inf
 
     @property
     def least_tangent(self) -> int:
@@ -217,26 +212,19 @@ def continued_spectrum(matrix: Float[np.ndarray, "L L"], before: Spectrum) -> Sp
     found = _decomposed(matrix, before.blocks)
     projector = before.right[:, before.tangent] @ before.left[before.tangent]
     nearness = np.linalg.norm(projector @ found.right, axis=0)
-    tangents, distinct = [], math.inf
+    tangents = []
     for block in range(len(before.blocks)):
         count = int(before.tangent[before.block == block].sum())
         own = np.flatnonzero(found.block == block)
         nearest = own[np.argsort(-nearness[own], kind="stable")]
         tangents.append(nearest[:count])
-        if 0 < count < len(own):
-            least, next_one = nearest[count - 1 : count + 1]
-            # Which of a conjugate pair is the tangent has no answer in any stride.
-            if not _conjugate(found.values[least], found.values[next_one]):
-                distinct = min(distinct, nearness[least] / max(nearness[next_one], 1e-300))
-    return replace(
-        found, tangent=_among(len(found.values), np.concatenate(tangents)), distinct=distinct
-    )
+    return replace(found, tangent=_among(len(found.values), np.concatenate(tangents)))
 
 
 def follow_lift(scheme: Scheme, valence: int, lifts: Sequence[float]) -> list[Spectrum]:
     """Follow the spectrum of a star while its centre is lifted; the first lift is 0.
 
-    The strides between lifts are halved where the tangents are not told apart.
+    Between two lifts they are followed in smaller strides.
 
     Lifted stars are no fixed points, so the margin is a diagnostic, not Reif's condition.
     """
@@ -250,24 +238,20 @@ def follow_lift(scheme: Scheme, valence: int, lifts: Sequence[float]) -> list[Sp
     blocks = blocks if keeps_blocks(matrix(lifts[-1]), blocks) else ()
     found = [flat_spectrum(matrix(lifts[0]), valence, blocks)]
     for start, end in pairwise(lifts):
-        found.append(followed(matrix, found[-1], start, end))
+        spectrum = found[-1]
+        for lift in strides(start, end):
+            spectrum = continued_spectrum(matrix(lift), spectrum)
+        found.append(spectrum)
     return found
 
 
-def followed(
-    matrix: Callable[[float], Float[np.ndarray, "L L"]],
-    before: Spectrum,
-    start: float,
-    end: float,
-    finest: float = FINEST,
-) -> Spectrum:
-    """Follow from one lift to another, in half the stride where tangents are not told apart."""
-    found = continued_spectrum(matrix(end), before)
-    if found.distinct >= DISTINCT or end - start <= finest:
-        return found
-    middle = (start + end) / 2
-    half_way = followed(matrix, before, start, middle, finest)
-    return followed(matrix, half_way, middle, end, finest)
+def strides(start: float, end: float, growth: float = GROWTH) -> list[float]:
+    """Return the lifts after `start` up to `end`, each `growth` times the one before."""
+    found, lift = [], max(start * growth, FIRST_LIFT)
+    while lift < end:
+        found.append(lift)
+        lift *= growth
+    return [*found, end]
 
 
 def _decomposed(matrix: Float[np.ndarray, "L L"], blocks: tuple[Block, ...]) -> Spectrum:
@@ -287,10 +271,6 @@ def _decomposed(matrix: Float[np.ndarray, "L L"], blocks: tuple[Block, ...]) -> 
         blocks=blocks,
         block=np.repeat(np.arange(len(blocks)), [len(own) for own in values]),
     )
-
-
-def _conjugate(first: complex, second: complex) -> bool:
-    return bool(first.imag != 0 and abs(first - np.conj(second)) <= 1e-9 * abs(first))
 
 
 def _among(count: int, chosen: Int[np.ndarray, " S"]) -> Bool[np.ndarray, " L"]:

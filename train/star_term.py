@@ -4,7 +4,8 @@ One step of the operator around a lifted star is differentiated as `train.spectr
 torch, and its eigenvalues' slopes follow from the left and right eigenvectors: dλ = l dA r.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,12 +23,13 @@ from train.one_step import refine_once
 from train.spectrum import (
     SPOKE,
     Spectrum,
+    continued_spectrum,
     flat_spectrum,
-    followed,
     jacobian,
     perturbed_stars,
     quotient_blocks,
     refined_inner,
+    strides,
     translation_quotient,
     without_translations,
 )
@@ -39,15 +41,11 @@ RINGS, INNER_RINGS = 4, 3
 MANY = 7
 """From this valence on the stars have a ring less: a fifth of the work for nearly the same."""
 
-STEP = 3e-3
+STEP = 1e-3
 """Of the central differences, in spokes: a network in single precision needs it so large."""
 
-SHARES: Mapping[int, float] = {3: 0.24, 4: 0.24, 5: 0.12, 6: 0.09, 8: 0.09, 10: 0.10, 12: 0.12}
-"""How often each valence is drawn: Loop's own gap is narrow at the low ones."""
-
-LOWEST_LIFT, HIGHEST_LIFT = 0.03, 0.45
-FINEST = 1 / 20
-"""Stride of the lift below which eigenvalues that cannot be told apart are left so."""
+HIGHEST_LIFT, GROWTH = 0.45, 1.5
+"""Lifts are looked at from small ones on, each so many times the one before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,18 +80,27 @@ def star_copies(valence: int) -> StarCopies:
 class StarTerm:
     """Draws a valence and a lift at each call, from a generator of its own."""
 
-    def __init__(self, seed: int, wanted: float, device: torch.device | str = "cpu"):
+    def __init__(
+        self,
+        seed: int,
+        wanted: float,
+        shares: Sequence[tuple[int, float]],
+        device: torch.device | str = "cpu",
+    ):
         self._rng = np.random.default_rng(seed)
         self._wanted = wanted
         self._device = device
-        self._stars = {valence: star_copies(valence) for valence in SHARES}
+        self._valences, self._shares = map(list, zip(*shares, strict=True))
+        self._stars = {valence: star_copies(valence) for valence in self._valences}
 
     def __call__(
         self, operator: EdgeOperator, budget: float, vertex_operator: VertexOperator | None
     ) -> Float[Tensor, ""]:
-        """Return by how much the margin of a random lifted star falls short of what is wanted."""
-        valence = int(self._rng.choice(list(SHARES), p=list(SHARES.values())))
-        lift = self._rng.uniform(LOWEST_LIFT, HIGHEST_LIFT)
+        """Return by how much the margin falls short of what is wanted, where it is least.
+
+        A star of random valence is lifted to a random height, and looked at all the way.
+        """
+        valence = int(self._rng.choice(self._valences, p=self._shares))
         copies = self._stars[valence]
         basis = copies.quotient
 
@@ -105,7 +112,13 @@ class StarTerm:
             with torch.no_grad():
                 return basis.T @ jacobian_at(lift).cpu().numpy() @ basis
 
-        apart, slope = separation(followed(matrix_at, copies.flat, 0.0, lift, FINEST))
+        spectrum, least = copies.flat, (math.inf, 0.0, np.zeros(0))
+        for lift in strides(0.0, HIGHEST_LIFT * self._rng.uniform(1 / GROWTH, 1), GROWTH):
+            spectrum = continued_spectrum(matrix_at(lift), spectrum)
+            apart, slope = separation(spectrum)
+            if apart < least[0]:
+                least = (apart, lift, slope)
+        apart, lift, slope = least
         if apart >= self._wanted:
             return torch.zeros(())
         matrix = jacobian_at(lift)

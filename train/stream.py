@@ -43,7 +43,10 @@ def ridge(rng: np.random.Generator) -> Drawn:
 
 
 def curved_ridge(rng: np.random.Generator) -> Drawn:
-    """Ridges along a circle whose centre is near the patch or outside it."""
+    """Ridges along an arc or a whole circle, its centre in the patch.
+
+    Where the circle is small, the surface comes to a faint tip at its centre.
+    """
     surface = CurvedRidge(
         amplitude=rng.uniform(0.2, 0.7),
         sharpness=rng.uniform(3, 10),
@@ -55,7 +58,7 @@ def curved_ridge(rng: np.random.Generator) -> Drawn:
 
 
 def bump(rng: np.random.Generator) -> Drawn:
-    """Bumps from round to five times as long as wide."""
+    """Bumps from round to twice as long as wide."""
     surface = Bump(
         amplitude=rng.uniform(0.2, 0.7),
         sharpness=rng.uniform(1.5, 7),
@@ -74,7 +77,7 @@ def saddle(rng: np.random.Generator) -> Drawn:
 
 
 def lumpy_sphere(rng: np.random.Generator) -> Drawn:
-    """A third of a sphere with waves; the patch is laid on it by central projection."""
+    """A part of a sphere with waves; the patch is laid on it by central projection."""
     radius = rng.uniform(1.2, 2.5)
     surface = LumpySphere(
         radius,

@@ -18,11 +18,10 @@ from train.decimation import (
     compare,
     euler_characteristic,
     gain,
-    simplified_pairs,
     simplify,
     summaries,
 )
-from train.dense_meshes import CAD, DenseMesh, asset_meshes, is_manifold
+from train.dense_meshes import CAD, DenseMesh, asset_meshes, cad_meshes, is_manifold
 from train.surface_distance import SurfaceErrors
 
 SPHERE = DenseMesh("sphere", CAD, Mesh(*bumpy_sphere(subdivisions=3, bump=0.02)))
@@ -169,8 +168,7 @@ def test_a_summary_is_the_mean_over_meshes_and_names_the_worst():
 
 def test_all_shared_meshes_and_parts_can_be_simplified():
     folder = shared_path("assets")
-    dense = [one for one in asset_meshes(folder) if isinstance(one, DenseMesh)]
-    found = simplified_pairs(folder)
-    assert [one.dense.name for one in found][: len(dense)] == [one.name for one in dense]
-    assert len(found) == len(dense) + 7
-    assert all(is_manifold(one.coarse) for one in found)
+    dense = [one for one in asset_meshes(folder) if isinstance(one, DenseMesh)] + cad_meshes()
+    found = [simplify(one) for one in dense]
+    assert len(found) > 7
+    assert all(isinstance(one, Pair) and is_manifold(one.coarse) for one in found)

@@ -16,7 +16,8 @@ from train.networks import BoundedNet
 from train.operator_jacobian import operator_jacobian
 from train.recipes import ridge
 from train.spectrum import (
-    DISTINCT,
+    FIRST_LIFT,
+    GROWTH,
     SPOKE,
     VALENCES,
     Spectrum,
@@ -24,9 +25,9 @@ from train.spectrum import (
     continued_spectrum,
     flat_spectrum,
     follow_lift,
-    followed,
     jacobian,
     loop_gap,
+    strides,
     without_translations,
 )
 from train.stars import star
@@ -166,25 +167,15 @@ def turning(angle):
     return frame @ np.diag([0.5] * 6 + [0.3]) @ frame.T
 
 
-def test_strides_are_halved_where_eigenvectors_turn_far():
-    start = continued_spectrum(turning(0), flat_spectrum(np.diag([0.5] * 6 + [0.3]), 6))
-    end = np.deg2rad(60)
-    assert continued_spectrum(turning(end), start).margin == pytest.approx(-0.2)
-    found = followed(turning, start, 0.0, end)
-    assert found.margin == pytest.approx(0.2)
-    assert found.distinct >= DISTINCT
-
-
-def test_strides_have_a_finest():
-    seen = []
-
-    def never_told_apart(lift):
-        seen.append(lift)
-        return turning(np.deg2rad(45) * len(seen))
-
-    start = flat_spectrum(np.diag([0.5] * 6 + [0.3]), 6)
-    followed(never_told_apart, start, 0.0, 1.0, finest=1 / 4)
-    assert len(seen) <= 7
+def test_strides_grow_from_small_lifts_and_end_where_asked():
+    found = strides(0.0, 0.4)
+    assert found[0] == FIRST_LIFT
+    assert found[-1] == 0.4
+    ratios = np.array(found[1:]) / found[:-1]
+    assert ratios[:-1] == pytest.approx(GROWTH)
+    assert ratios.max() <= GROWTH * (1 + 1e-12)
+    assert strides(0.3, 0.35) == [0.35]
+    assert strides(0.0, FIRST_LIFT / 2) == [FIRST_LIFT / 2]
 
 
 def test_a_pair_that_left_the_real_line_is_led_back():

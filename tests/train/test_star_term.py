@@ -14,7 +14,7 @@ from train.recipe_operator import (
 )
 from train.recipes import full
 from train.spectrum import continued_spectrum, follow_lift, loop_gap
-from train.star_term import SHARES, StarTerm, perturbed_points, star_copies, star_jacobian
+from train.star_term import StarTerm, perturbed_points, star_copies, star_jacobian
 from train.torch_model import recipe_model
 
 RECIPE = full(1)
@@ -55,17 +55,17 @@ def test_its_slope_is_the_margins():
     network, vertex_network = networks(1.5)
 
     class OneStar(StarTerm):
-        """Always the same star."""
+        """Always the same star, lifted up to a third of the highest."""
 
         def __init__(self):
-            super().__init__(0, wanted=1.0)
+            super().__init__(0, wanted=1.0, shares=((4, 1.0),))
             self._rng = self
 
         def choice(self, valences, p):
             return 4
 
         def uniform(self, low, high):
-            return 0.15
+            return 1 / 3
 
     term = OneStar()
     weight = network.linear_layers[-1].weight
@@ -92,10 +92,12 @@ def _pair(found):
 
 def test_a_wide_margin_costs_nothing():
     network, vertex_network = networks(0.0)
-    term = StarTerm(0, wanted=min(loop_gap(k) for k in SHARES) - 0.02)
-    assert all(float(term(*_pair(rules(network, vertex_network))).detach()) == 0 for _ in range(4))
+    term = StarTerm(0, loop_gap(3) - 0.02, ((3, 0.5), (4, 0.5)))
+    assert all(float(term(*_pair(rules(network, vertex_network))).detach()) == 0 for _ in range(3))
 
 
 def test_every_drawn_valence_has_its_share():
-    assert sum(SHARES.values()) == pytest.approx(1)
-    assert {3, 4, 5, 6, 12} <= set(SHARES)
+    for plan in (RECIPE.stream, RECIPE.polish.stream):
+        shares = dict(plan.star_shares)
+        assert sum(shares.values()) == pytest.approx(1)
+        assert {3, 4, 5, 6, 12} <= set(shares)

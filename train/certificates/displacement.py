@@ -1,7 +1,7 @@
 """T1, bounded displacement: no vertex leaves Loop's by more than C h² / R.
 
-h is the edge's length at an edge vertex and the longest edge around an old vertex; boundary and
-irregular edges, and the vertices on them, are not moved at all.
+h is the edge's length at an edge vertex and the root mean square edge around an old vertex;
+boundary and irregular edges, and the vertices on them, are not moved at all.
 """
 
 from collections.abc import Sequence

@@ -14,9 +14,8 @@ from jaxtyping import Float
 from pns_common.features import FEATURE_SETS
 from pns_common.ring_features import RING_FEATURE_SETS
 from pns_common.schemes import Model, VertexModel, pns
+from train.card_metrics import MEASURES
 from train.certificates.certificate import Certificate
-from train.datasets import DATASETS
-from train.evaluation import compare_with_loop
 
 BUDGETS = (1e-6, 0.1, 0.5, 1.0, 1e3)
 SINGLE_PRECISION = 1 + 1e-6
@@ -81,10 +80,10 @@ def _metrics(model: Model) -> Certificate:
     name, unknown = "the card's metrics come out again", []
     worst, where = 0.0, "no metrics on the card"
     for dataset, claimed in model.card.metrics.items():
-        if dataset not in DATASETS:
+        if dataset not in MEASURES:
             unknown.append(dataset)
             continue
-        measured = compare_with_loop(pns(model), DATASETS[dataset]())
+        measured = MEASURES[dataset](pns(model))
         for metric, row in measured.items():
             off = abs(_claimed_percent(claimed, metric) - row.percent)
             if not off <= worst:

@@ -17,9 +17,9 @@ class PlainLoop:
 
     Attributes:
         positions: where Loop puts them.
-        reach: how long the displacement's h is there: the edge's length at an interior edge, the
-            longest edge around an old vertex with interior edges only, and 0 where no correction
-            is allowed.
+        reach: the displacement's h there: the edge's length at an interior edge, the root mean
+            square length of the edges around an old vertex with interior edges only, and 0 where
+            no correction is allowed.
         labels: what each vertex is, for messages.
     """
 
@@ -66,7 +66,8 @@ def plain_loop(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
             keep = (3 / 8 + math.cos(2 * math.pi / len(ring)) / 4) ** 2 + 3 / 8
             moved.append(keep * point + (1 - keep) * vertices[ring].mean(axis=0))
         smooth = bool(ring) and not sharp[v]
-        reach.append(max(math.dist(point, vertices[n]) for n in ring) if smooth else 0.0)
+        squares = [math.dist(point, vertices[n]) ** 2 for n in ring]
+        reach.append(math.sqrt(sum(squares) / len(ring)) if smooth else 0.0)
 
     positions = np.array([*moved, *edge_positions])
     return PlainLoop(positions, np.array([*reach, *edge_reach]), labels)

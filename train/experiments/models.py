@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-import pns_common
-from pns_common.onnx_model import DEFAULT_MODEL, bundled_models, load_model
+from pns_common.onnx_model import BUNDLED, DEFAULT_MODEL, bundled_models, load_model
 from pns_common.schemes import Scheme, loop, pns
 from train.datasets import Dataset
 from train.evaluation import compare_with_loop
@@ -39,7 +38,7 @@ COLUMNS = (
 
 def model_files(_: Laboratory) -> Iterable[Path]:
     """Return the bundled model files: what an experiment that measures them reads."""
-    return (Path(pns_common.__file__).parent / "models").glob("*.onnx")
+    return [Path(str(BUNDLED / f"{name}.onnx")) for name in bundled_models()]
 
 
 def bundled_schemes() -> dict[str, Scheme]:

@@ -5,6 +5,7 @@ from types import MappingProxyType
 
 from train.experiments import (
     ablation,
+    both_rules,
     budget,
     c_sweep,
     cad,
@@ -12,16 +13,20 @@ from train.experiments import (
     cross_section,
     decimation,
     extended,
+    families,
     features,
     headline,
     hero,
     lifted_stars,
+    models,
     published,
     repeated,
     saddle,
     spectral,
     sphere_ridge,
+    stability,
     structural,
+    trade,
 )
 from train.experiments.experiment import Experiment
 
@@ -45,6 +50,11 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
             extended,
             lifted_stars,
             cad,
+            models,
+            families,
+            both_rules,
+            stability,
+            trade,
             decimation,
             published,
         )

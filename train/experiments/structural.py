@@ -101,7 +101,7 @@ def run(laboratory: Laboratory) -> Outcome:
                 "structural",
                 "Certificates T1–T8",
                 CERTIFICATE_COLUMNS,
-                tuple(_certificate_row(one) for one in zip(*found, strict=True)),
+                tuple(certificate_row(one) for one in zip(*found, strict=True)),
             ),
             Table(
                 "structural_removed",
@@ -113,7 +113,7 @@ def run(laboratory: Laboratory) -> Outcome:
                 "structural_adversarial",
                 "Adversaries over weights and mesh",
                 ATTACK_COLUMNS,
-                tuple(_attack_row(one) for one in attacks),
+                tuple(attack_row(one) for one in attacks),
             ),
         ),
         notes=NOTES,
@@ -168,7 +168,8 @@ def scaled(network: BoundedNet, factor: float) -> BoundedNet:
     return larger
 
 
-def _certificate_row(row: tuple[Certificate, ...]) -> tuple[Cell, ...]:
+def certificate_row(row: tuple[Certificate, ...]) -> tuple[Cell, ...]:
+    """Return a row of `CERTIFICATE_COLUMNS`: one certificate of several subjects."""
     first = row[0]
     published, paper = PUBLISHED_STRUCTURAL.get(first.name, (None, None))
     passed = all(one.passed for one in row)
@@ -192,7 +193,8 @@ def _removed_row(name: str, found: tuple[Certificate, ...]) -> tuple[Cell, ...]:
     return (REMOVED_TITLES[name], *marks, "; ".join(one.name for one in failed))
 
 
-def _attack_row(attack: Attack) -> tuple[Cell, ...]:
+def attack_row(attack: Attack) -> tuple[Cell, ...]:
+    """Return a row of `ATTACK_COLUMNS`."""
     published = PUBLISHED_ADVERSARIAL[attack.name] if attack.cap != TURNED else None
     name = f"{attack.name}, any plane" if attack.cap == TURNED else attack.name
     first, count = attack.values[0], len(attack.values)

@@ -12,7 +12,8 @@ from train.experiments.reproduce import reproduce
 
 NAMES = (
     "structural, spectral, ablation, headline, cross-section, repeated, c-sweep, budget, capacity, "
-    "saddle, sphere-ridge, features, extended, lifted-stars, cad, hero, published"
+    "saddle, sphere-ridge, features, extended, lifted-stars, cad, models, families, both-rules, "
+    "stability, trade, decimation, hero, published"
 )
 
 
