@@ -115,6 +115,7 @@ def _draw(
     found: Mapping[str, WholeSurface], reference: WholeSurface, surface: np.ndarray
 ) -> Drawing:
     figure, (distance, jump) = panels(2, height=2.6)
+    jump.set_yscale("log")
     shown = [name for name in found if name not in ("Loop", "Unconstrained")]
     for place, name in enumerate(shown):
         one = found[name]
