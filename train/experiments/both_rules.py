@@ -32,6 +32,8 @@ NOTES = (
     "vertices: *trained* is the bundled file as the product runs it, the others are networks of "
     "its recipe. Vertices and edges count alike: displacements are recomputed from positions, each "
     "against its own envelope, C h² of the edge or of the ring.",
+    "T5 is measured and no theorem's. Weights that spend the whole envelope at random turn faces "
+    "of this coarse torus over at the first level, and a fold stays a fold; trained ones do not.",
     "Far from the plane nothing is promised; how the eigenvalues of lifted stars move is in "
     "*Stars of the bundled models*.",
 )

@@ -75,6 +75,6 @@ EXPERIMENT = Experiment(
     title="Families of surfaces",
     source="Beyond the paper.",
     run=run,
-    seconds=90,
+    seconds=240,
     reads=model_files,
 )

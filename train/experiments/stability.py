@@ -85,6 +85,6 @@ EXPERIMENT = Experiment(
     title="Stars of the bundled models",
     source="Beyond the paper.",
     run=run,
-    seconds=240,
+    seconds=300,
     reads=model_files,
 )

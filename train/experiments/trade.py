@@ -142,5 +142,5 @@ EXPERIMENT = Experiment(
     title="The choice of C and c",
     source="Beyond the paper.",
     run=run,
-    seconds=700,
+    seconds=900,
 )
