@@ -29,15 +29,16 @@ def beside(values: Array, constant: np.ndarray, dtype: Any = None) -> Array:
     """A numpy array as one of the kind of ``values``, and on its device."""
     if type(values) is np.ndarray:
         return constant if dtype is None else constant.astype(dtype, copy=False)
-    return namespace(values).asarray(constant, dtype=dtype, device=values.device)
+    # torch refuses to look at memory that is read-only or runs backwards: only that is copied.
+    kept = np.require(constant, requirements=["C", "W"])
+    return namespace(values).asarray(kept, dtype=dtype, device=values.device)
 
 
 def gather(values: Array, indices: Int[np.ndarray, "..."]) -> Array:
     """Rows of ``values`` at ``indices``: shape ``indices.shape + values.shape[1:]``."""
     xp = namespace(values)
     if is_torch_array(values):
-        # torch refuses to look at read-only memory: "W" copies only that.
-        flat = beside(values, np.require(indices.reshape(-1), requirements="W"))
+        flat = beside(values, indices.reshape(-1))
         rows = xp.take(values, flat, axis=0)
         return xp.reshape(rows, indices.shape + tuple(values.shape[1:]))
     # np.take is four times as fast as fancy indexing on rows of three.
@@ -51,7 +52,7 @@ def segment_sum(
     if is_torch_array(values):
         xp = namespace(values)
         zeros = xp.zeros((count, values.shape[1]), dtype=values.dtype, device=values.device)
-        return zeros.index_add(0, beside(values, np.require(segments, requirements="W")), values)
+        return zeros.index_add(0, beside(values, segments), values)
     columns = [np.bincount(segments, column, count) for column in values.T]
     return np.stack(columns, axis=1).astype(values.dtype, copy=False)
 

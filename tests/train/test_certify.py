@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import train.run
 from pns_common import pns
-from pns_common.onnx_model import load_model, model_from_bytes
+from pns_common.onnx_model import DEFAULT_MODEL, load_model, model_from_bytes
 from tests.networks import (
     CARD,
     Float64Model,
@@ -21,9 +21,12 @@ from tests.networks import (
     perceptron_bytes,
     random_layers,
 )
+from train.certificates.affine import affine_reproduction
+from train.certificates.bodies import flat_bodies, synthetic_bodies
+from train.certificates.displacement import bounded_displacement
 from train.certificates.double_precision import double_model, read_bytes
 from train.certificates.model_file import keeps_its_word, sample_features
-from train.certificates.subject import subject_of_scheme
+from train.certificates.subject import subject_of_model, subject_of_scheme
 from train.certify import certify_model_file, certify_scheme, verdict_json, write_atomically
 
 
@@ -55,11 +58,22 @@ def nan_bytes():
     return model_bytes(nodes, {"last": np.array([1]), "one": 1.0})
 
 
-def test_the_default_model_passes():
-    verdict = certify_model_file(None, (), 0, quiet, valences=(3, 7))
+def test_the_papers_model_passes():
+    verdict = certify_model_file("paper", (), 0, quiet, valences=(3, 7))
     assert verdict.passed, failures(verdict)
     theorems = {one.theorem for one in verdict.certificates}
     assert theorems == {"file", "stars", *(f"T{number}" for number in range(1, 9))}
+
+
+def test_the_default_model_keeps_its_envelope_and_its_planes():
+    """The whole certificate of a model with a vertex rule takes minutes: here what is quick."""
+    model = load_model()
+    subject = subject_of_model(model, double_model(model, read_bytes(DEFAULT_MODEL)))
+    found = [
+        bounded_displacement(subject, synthetic_bodies(0), levels=1),
+        *affine_reproduction(subject, flat_bodies(0), seed=0),
+    ]
+    assert all(one.passed for one in found), found
 
 
 def test_a_model_that_returns_nan_fails_by_name(tmp_path):

@@ -129,7 +129,7 @@ def _draw(
         axes.set_xlim(-0.5, len(shown) - 0.5)
     jump.axhline(JUMP_LIMIT, color="0.3", linewidth=0.8, linestyle="--")
     distance.set(title="Distance over Loop's", ylim=(0, None))
-    jump.set(title="Largest jump over Loop's", ylim=(0, None))
+    jump.set(title="Largest jump over Loop's")
     return figure
 
 
