@@ -37,7 +37,7 @@ def run(laboratory: Laboratory) -> Outcome:
     """Follow every bundled model's spectrum in the lift."""
     found: dict[str, dict[int, list[Spectrum]]] = {}
     valences = VALENCES[: laboratory.scale.instances]
-    names = list(bundled_schemes())
+    names = list(bundled_schemes())[: laboratory.scale.instances]
     for number, name in enumerate(names):
         model = load_model(name)
         scheme = subject_of_model(model, double_model(model, read_bytes(name))).exact
