@@ -1,33 +1,53 @@
-# Build: a virtual environment with the pinned inference dependencies; no torch, no compiler.
-FROM python:3.11-slim-bookworm AS build
-ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_CONSTRAINT=/src/constraints.txt
+# The base image; a release gives it by digest: make image BASE=python:3.11-slim-bookworm@sha256:…
+ARG BASE=python:3.11-slim-bookworm
+
+# Build: a virtual environment with nothing that is not pinned by hash; no torch, no compiler.
+FROM ${BASE} AS build
+ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
 WORKDIR /src
-RUN python -m venv /opt/pns
-COPY constraints.txt pyproject.toml README.md LICENSE ./
+RUN python3 -m venv /opt/pns && python3 -m venv /opt/build
 COPY requirements requirements
+RUN /opt/build/bin/python -m pip install --require-hashes -r requirements/build.txt \
+ && /opt/pns/bin/python -m pip install --require-hashes --no-deps -r requirements/meshopt.txt -r requirements/service.txt
+COPY pyproject.toml setup.py README.md LICENSE ./
 COPY pns_common pns_common
 COPY service service
-RUN /opt/pns/bin/python -m pip install --no-deps --require-hashes -r requirements/meshopt.txt \
- && /opt/pns/bin/python -m pip install .
+# Our own package alone has no hash: it is built here, from these files, by what is pinned above.
+RUN (cd pns_common/models && sha256sum --check --strict SHA256SUMS) \
+ && /opt/build/bin/python -m pip wheel --no-build-isolation --no-deps --no-index --wheel-dir /src/dist . \
+ && /opt/pns/bin/python -m pip install --no-deps --no-index dist/*.whl \
+ && /opt/pns/bin/python -m pip check \
+ && /opt/build/bin/cyclonedx-py environment /opt/pns/bin/python --output-reproducible --of JSON -o /opt/pns/sbom.cdx.json \
+ && /opt/pns/bin/python -m pip uninstall --yes --quiet setuptools pip
+# Kernels for any processor of the architecture, not only the one that builds.
+ENV NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=
+# From elsewhere than /src, whose package would be compiled instead of the installed one.
+# A layer keeps whole seconds of a file's time, and numba compiles again where it differs.
+RUN find /opt/pns -path '*/pns_common/fused/*' -name '*.py' -exec touch -d '2000-01-01 00:00:00' {} + \
+ && cd / && /opt/pns/bin/python -m pns_common.fused
 
 # Run: the environment alone, as a user without a name, on a root that may be read-only.
-FROM python:3.11-slim-bookworm
+FROM ${BASE}
 COPY --from=build /opt/pns /opt/pns
 # One thread a library: the workers are the parallelism, and a pids limit counts threads.
-# For 1 GiB: two workers of PNS_MEMORY each, four bodies of 64 MiB, and what all take at rest.
-# With a larger --memory, raise both.
+# For 1 GiB: at rest three workers take 146 MiB each and the server 55; two jobs of PNS_MEMORY beside
+# them fill the rest but for bodies. With a larger --memory, raise it and PNS_QUEUE.
 ENV PATH=/opt/pns/bin:$PATH \
+    NUMBA_CPU_NAME=generic \
+    NUMBA_CPU_FEATURES= \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
     OMP_NUM_THREADS=1 \
     OPENBLAS_NUM_THREADS=1 \
     PNS_HOST=0.0.0.0 \
     PNS_PORT=8000 \
-    PNS_MEMORY=320MiB \
+    PNS_METRICS_HOST=0.0.0.0 \
+    PNS_METRICS_PORT=9000 \
+    PNS_MEMORY=256MiB \
     PNS_QUEUE=2
 USER 10001:10001
 WORKDIR /tmp
-EXPOSE 8000
+EXPOSE 8000 9000
 STOPSIGNAL SIGTERM
 HEALTHCHECK --interval=30s --timeout=5s --start-period=20s --retries=3 \
   CMD ["python", "-c", "import os, urllib.request as u; u.urlopen(f'http://127.0.0.1:{os.environ[\"PNS_PORT\"]}/healthz', timeout=4)"]

@@ -4,14 +4,20 @@ PYTHON ?= python3
 SERVE  := .venv-serve
 DEV    := .venv
 BLENDER := .venv-blender
+CLIENTS := .venv-clients
+PEERS := .venv-bench
 # Pins what is installed, and what builds it.
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 # What has one maintainer is pinned by hash, and first.
 HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.txt
 
-.PHONY: serve test lint unit fuzz models constraints clean blender
+PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n 2 --dist loadgroup
 
+.PHONY: bench bench-answers scale image hashes soak manifest serve test lint unit quick verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures paper-hero web
+
+# The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
+	@$(SERVE)/bin/python -m pns_common.fused
 	$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
 
 test: lint unit
@@ -22,45 +28,145 @@ lint: $(DEV)/.ready
 	$(DEV)/bin/pyright
 	$(DEV)/bin/lint-imports
 
-unit: $(DEV)/.ready
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n 2 --dist loadgroup
+# First with the shapes of arrays checked, on few examples; then all.
+unit: $(DEV)/.ready $(CLIENTS)/.ready
+	$(PYTEST) tests/pns_common
+	$(PYTEST) tests
+
+# What neither trains, nor starts programs, nor reads the whole collection of assets.
+quick: $(DEV)/.ready
+	$(PYTEST) -m 'not (spawning or training or conformance or retrain)' tests
+
+# The recipes of the quick models give the bundled files again, byte for byte on the machine they were
+# made on; else of the same quality.
+verify-models: $(DEV)/.ready
+	$(PYTEST) -m retrain tests/export
+
+# The site, from docs/ to build/docs: no network, and a warning is an error.
+docs: $(DEV)/.ready
+	$(DEV)/bin/python -m sphinx -W --keep-going -q -b html docs build/docs
 
 # Malformed files by the thousand: FUZZ='--count 1000', or --seconds 60, for less.
 FUZZ ?= --count 100000
 fuzz: $(DEV)/.ready
 	$(DEV)/bin/python -m tests.fuzz $(FUZZ)
 
-# Train and export the bundled models again; the same machine gives the same bytes. MODELS=ridge, the
-# recipe of `paper`, takes half a minute; full takes half an hour.
-MODELS ?= ridge signed full
+# Train and export the bundled models again; the same machine gives the same bytes. MODELS=paper
+# takes half a minute; general takes some minutes.
+MODELS ?= paper signed general
 models: $(DEV)/.ready
 	set -e; for recipe in $(MODELS); do \
 	  $(DEV)/bin/python train/run.py train --recipe $$recipe; \
 	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors; \
 	done
 
-# Blender imports, animates and renders a skinned and a morphed result: docs/blender-*.png. bpy is
-# large, for Python 3.11 alone, and wants an older numpy: it has a venv of its own, without our pins.
-blender: $(DEV)/.ready $(BLENDER)/.ready
-	$(DEV)/bin/python -m tests.blender.run $(BLENDER)/bin/python
+# Honest and hostile clients at one service: SOAK='--minutes 1440' for a day.
+SOAK ?= --minutes 10
+soak: $(DEV)/.ready
+	$(DEV)/bin/python -m tests.soak $(SOAK)
 
-$(BLENDER)/.ready: tests/blender/requirements.txt
-	$(PYTHON) -m venv $(BLENDER)
-	PIP_CONSTRAINT= $(BLENDER)/bin/python -m pip install --quiet --requirement tests/blender/requirements.txt
+# The image of a release: make image BASE=python:3.11-slim-bookworm@sha256:… (docker buildx imagetools
+# inspect python:3.11-slim-bookworm says which). TAG names it.
+TAG ?= pns:latest
+image:
+	@case '$(BASE)' in *@sha256:*) ;; *) echo 'BASE must name the base image by digest: IMAGE@sha256:…' >&2; exit 2;; esac
+	docker build --build-arg BASE='$(BASE)' --tag $(TAG) .
+
+# What the image installs, by hash: after a change of constraints.txt. It needs pip-tools.
+PIP_COMPILE := pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe --no-header --no-annotate --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --constraint constraints.txt
+hashes:
+	$(PIP_COMPILE) --extra service --unsafe-package meshopt --output-file requirements/service.new pyproject.toml
+	$(PYTHON) requirements/without_ourselves.py requirements/service.new requirements/service.txt
+	$(PIP_COMPILE) --output-file requirements/build.txt requirements/build.in
+
+# After a bundled model was put in its place by hand.
+manifest: $(DEV)/.ready
+	$(DEV)/bin/python -c "from pathlib import Path; from pns_common.model_manifest import write_manifest; write_manifest(Path('pns_common/models'))"
+
+# Blender as a module, a version each in an environment of its own: 350 MB, and each for one version of
+# Python. 4.2 has the numpy that Blender 4.2 comes with. A missing Python leaves its version out.
+BPY := addons/blender/requirements
+$(BLENDER)-4.2/.ready: PYTHON := python3.11
+$(BLENDER)-5.0/.ready: PYTHON := python3.11
+$(BLENDER)-5.2/.ready: PYTHON := python3.13
+$(BLENDER)-%/.ready: $(BPY)-%.txt
+	$(PYTHON) -m venv $(BLENDER)-$*
+	PIP_CONSTRAINT= $(BLENDER)-$*/bin/python -m pip install --quiet --requirement $(BPY)-$*.txt
+	touch $@
+
+# It imports, animates and renders a skinned and a morphed result: docs/blender-*.png.
+blender: $(DEV)/.ready $(BLENDER)-5.0/.ready
+	$(DEV)/bin/python -m tests.blender.run $(BLENDER)-5.0/bin/python
+
+# Sheets of control mesh, Loop, an untrained control and PNS: docs/blender-*.png. Blender's Python gets what
+# the library needs from a folder, as its environment is to stay as Blender has it.
+blender-pictures: paper-hero $(DEV)/.ready $(BLENDER)-5.0/.ready build/blender-site/.ready
+	$(DEV)/bin/pns example build/part.glb
+	$(DEV)/bin/python -m addons.blender.gallery $(BLENDER)-5.0/bin/python build/part.glb
+
+# The paper's first figure, rendered: docs/blender-paper.png. Its two networks are trained where they are not
+# kept from an earlier run.
+paper-hero: $(DEV)/.ready $(BLENDER)-5.0/.ready build/blender-site/.ready
+	$(DEV)/bin/python -m train.experiments.paper.hero_panels build/paper-hero
+	PYTHONPATH=build/blender-site $(BLENDER)-5.0/bin/python addons/blender/panels.py build/paper-hero \
+	  -o docs/blender-paper.png --field distance --highest 0.1 --label 'Distance from the ridge' > /dev/null
+
+build/blender-site/.ready: $(DEV)/.ready constraints.txt
+	$(DEV)/bin/python -m pip install --quiet --no-deps --upgrade --target build/blender-site array-api-compat jaxtyping wadler-lindig
+	touch $@
+
+# The Blender extension: dist/pns_refine-VERSION.zip, packed and validated by Blender's own tool.
+addon: $(DEV)/.ready $(BLENDER)-5.0/.ready
+	$(DEV)/bin/python -m addons.blender.build $(BLENDER)-5.0/bin/python
+
+# What the extension costs on 100,000 vertices, beside the library alone.
+blender-measure: addon
+	$(BLENDER)-5.0/bin/python addons/blender/measure.py $(CURDIR)/dist/pns_refine-*.zip
+
+# It is installed from the zip into each of these, and every property that it keeps is looked at.
+BPY_VERSIONS ?= 4.2 5.0 $(if $(shell python3.13 --version 2>/dev/null),5.2)
+blender-test: addon $(foreach version,$(BPY_VERSIONS),$(BLENDER)-$(version)/.ready)
+	set -e; zip=$$(echo $(CURDIR)/dist/pns_refine-*.zip); cd tests/addons/blender/in_blender; \
+	for version in $(BPY_VERSIONS); do \
+	  PNS_ADDON=$$zip OMP_NUM_THREADS=1 $(CURDIR)/$(BLENDER)-$$version/bin/python -m pytest -c pytest.ini --confcutdir .; \
+	done
+
+# The page: from web/ to the bundle in service/web, which is committed. Only who changes it needs node.
+web: web/node_modules/.ready
+	cd web && node node_modules/typescript/bin/tsc --noEmit && node build.mjs
+
+# The page in Chromium against a real server; without chromium its tests are skipped, by name.
+web-test: $(DEV)/.ready web/node_modules/.ready
+	cd web && PNS=$(CURDIR)/$(DEV)/bin/pns node --test --test-concurrency=1 test/*.test.mjs
+
+# The pictures of README and docs, and how fast the page is on this machine.
+web-pictures web-measure: web-%: $(DEV)/.ready web/node_modules/.ready
+	cd web && PNS=$(CURDIR)/$(DEV)/bin/pns node $*.mjs
+
+web/node_modules/.ready: web/package-lock.json
+	cd web && npm ci --ignore-scripts --no-audit --no-fund
 	touch $@
 
 # Inference only: no torch.
-$(SERVE)/.ready: pyproject.toml constraints.txt
+$(SERVE)/.ready: pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv $(SERVE)
 	$(SERVE)/bin/python -m pip install $(HASHED)
-	$(SERVE)/bin/python -m pip install --quiet --editable .
+	$(SERVE)/bin/python -m pip install --quiet --editable '.[service]'
 	touch $@
 
-$(DEV)/.ready: pyproject.toml constraints.txt
+# The generator of Python clients, for their test.
+$(CLIENTS)/.ready: requirements/clients.txt
+	$(PYTHON) -m venv $(CLIENTS)
+	PIP_CONSTRAINT= $(CLIENTS)/bin/python -m pip install --quiet --requirement requirements/clients.txt
+	touch $@
+
+$(DEV)/.ready: pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv $(DEV)
 	$(DEV)/bin/python -m pip install $(HASHED)
 	$(DEV)/bin/python -m pip install --quiet torch==2.13.0
 	$(DEV)/bin/python -m pip install --quiet --editable '.[dev]'
+	# The laboratory is no part of the package: its commands import it from here.
+	echo $(CURDIR) > "$$($(DEV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/pns-checkout.pth"
 	touch $@
 
 # Resolve every dependency anew within pyproject's ranges and write the pins.
@@ -74,5 +180,46 @@ constraints:
 	mv constraints.txt.new constraints.txt
 	rm -rf .venv-constraints
 
+# Refinement beside other libraries' Loop: numbers into benchmarks/results.json, and the plot. The C++
+# peers are built where Debian's packages can be had; a peer that cannot be set up is left out by name.
+# Ours runs in the environment of `make serve`, as users have it; BENCH holds further options.
+bench: $(DEV)/.ready $(SERVE)/.ready $(PEERS)/.ready build/bench/.ready
+	$(SERVE)/bin/python -m pns_common.fused
+	$(DEV)/bin/python -m benchmarks --python $(SERVE)/bin/python $(BENCH)
+
+# Files answered a second on one core, beside other programs: half a minute for each of six rows.
+bench-answers: $(DEV)/.ready $(SERVE)/.ready $(PEERS)/.ready build/bench/node/.ready
+	$(SERVE)/bin/python -m pns_common.fused
+	$(DEV)/bin/python -m benchmarks.answers --python $(SERVE)/bin/python $(BENCH)
+
+build/bench/node/.ready: benchmarks/peers/package.json
+	mkdir -p $(@D)
+	cp $< $(@D)
+	cd $(@D) && npm install --ignore-scripts --no-audit --no-fund
+	touch $@
+
+# Growth of `pns large` and `pns batch` with faces, parts and files, and its plot in docs/: half an hour,
+# 6 GB of disk. What benchmarks/scale.json holds is not measured again.
+scale: $(DEV)/.ready
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m benchmarks.scale
+
+# One by one: a library without a build for this machine keeps no other away.
+$(PEERS)/.ready: benchmarks/peers/requirements.txt
+	$(PYTHON) -m venv $(PEERS)
+	grep -v '^#' $< | while read peer; do \
+	  PIP_CONSTRAINT= $(PEERS)/bin/python -m pip install --quiet $$peer || echo "left out: $$peer"; \
+	done
+	touch $@
+
+DRIVER := $(CXX) -std=c++17 -O3 -march=native -DNDEBUG
+build/bench/.ready: $(wildcard benchmarks/peers/*.cpp benchmarks/peers/*.hpp)
+	mkdir -p $(@D)
+	-command -v apt-get > /dev/null && test "$$(id -u)" = 0 && \
+	  apt-get install -qq --yes libosd-dev libcgal-dev libopenmesh-dev
+	-$(DRIVER) benchmarks/peers/opensubdiv.cpp -o $(@D)/opensubdiv -losdCPU
+	-$(DRIVER) benchmarks/peers/cgal.cpp -o $(@D)/cgal
+	-$(DRIVER) benchmarks/peers/openmesh.cpp -o $(@D)/openmesh -lOpenMeshTools -lOpenMeshCore
+	touch $@
+
 clean:
-	rm -rf $(SERVE) $(DEV) $(BLENDER) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis tests/node/node_modules results/cache
+	rm -rf $(SERVE) $(DEV) $(CLIENTS) $(PEERS) $(BLENDER)-* build dist *.egg-info .pytest_cache .ruff_cache .hypothesis tests/node/node_modules web/node_modules results/cache

@@ -1,98 +1,114 @@
-"""`python -m benchmarks`: seconds and peak memory by stage, beside trimesh's Loop in the same run.
+"""`python -m benchmarks`: our refinement beside other libraries' Loop, in the same minutes.
 
-python -m benchmarks                         # generated meshes, 20k to 1.3M faces
-python -m benchmarks --assets FOLDER         # also every glTF file in a folder
-python -m benchmarks --model paper           # another model than the default
+python -m benchmarks                   # all cases; results.json and the plot beside this file
+python -m benchmarks --largest 80000   # small meshes only, nothing written
+make bench                             # sets the peers up first
 """
 
 from __future__ import annotations
 
+import json
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.files import STAGES, MeasuredFile, measure_file, measure_generated
-from benchmarks.operator import METHODS, measure_operator
-from pns_common.onnx_model import DEFAULT_MODEL
+from benchmarks.contest import OURS, Case, contest, ours
+from benchmarks.peers.available import available_peers
+from benchmarks.plot import plot_results
+from pns_common.onnx_model import DEFAULT_MODEL, bundled_models
+from pns_common.whole_file import replace_file
 
-SIZES = (20_000, 80_000, 320_000, 1_300_000)
-# In a file or a pipe tables are not squeezed.
+HERE = Path(__file__).parent
+RESULTS, PICTURE = HERE / "results.json", HERE / "speed.png"
+CASES = (
+    *(Case("closed", faces) for faces in (5_000, 20_000, 80_000)),
+    *(Case(order, 320_000) for order in ("closed", "open", "shuffled")),
+    *(Case(order, 20_000, levels=3) for order in ("closed", "open", "shuffled")),
+    *(Case(order, 1_300_000) for order in ("closed", "open", "shuffled")),
+)
+THIS = sys.executable
+# Not one word wider than needed in a file or a pipe.
 FILE_WIDTH = 150
-# A file's output is held as bytes too: these are input faces.
-FILE_SIZES = (20_000, 60_000, 320_000)
 
 
 def main(
-    assets: Annotated[Path | None, typer.Option(help="folder of .glb and .gltf files")] = None,
-    levels: Annotated[int, typer.Option(help="levels for files")] = 1,
-    runs: Annotated[int, typer.Option(help="runs of each operator measurement; the median")] = 5,
-    largest: Annotated[int, typer.Option(help="leave out generated meshes above this")] = SIZES[-1],
-    model: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="bundled model, or model file")
-    ] = DEFAULT_MODEL,
+    runs: Annotated[int, typer.Option(help="runs of each method on each mesh")] = 6,
+    largest: Annotated[int, typer.Option(help="leave out meshes above this")] = CASES[-1].faces,
+    model: Annotated[list[str] | None, typer.Option(help="bundled models to measure")] = None,
+    write: Annotated[bool, typer.Option(help="write results.json and the plot")] = True,
+    python: Annotated[str, typer.Option(help="of the environment that ours runs in")] = THIS,
 ) -> None:
-    """Measure the operator and the whole path of a file, each case in a process of its own."""
+    """Measure every case, with the first call apart from the warm ones."""
     console = Console()
     if not console.is_terminal:
         console = Console(width=FILE_WIDTH)
-    console.print(f"model: {model}")
-    console.print(operator_table([size for size in SIZES if size <= largest], runs, model))
-    named = {
-        f"torus, {size:,} faces": measure_generated(size, levels, model)
-        for size in FILE_SIZES
-        if size <= largest
-    }
-    for path in sorted(assets.glob("*.gl*")) if assets else []:
-        named[path.name] = measure_file(path, levels, model)
-    console.print(file_table(named, levels))
-    for name, file in named.items():
-        if file.refused is not None:
-            console.print(f"{name} was refused: {file.refused}")
-
-
-def operator_table(sizes: list[int], runs: int, model: str) -> Table:
-    """One level on generated meshes: seconds, MiB, and trimesh's Loop over ours."""
-    table = Table(title=f"One level in memory, median of {runs} runs")
-    table.add_column("faces", justify="right")
-    for method in METHODS:
-        table.add_column(f"{method} s", justify="right")
-        table.add_column("MiB", justify="right")
-    table.add_column("trimesh / pns", justify="right")
-    for size in sizes:
-        measured = [measure_operator(size, method, runs, model) for method in METHODS]
-        cells = [cell for m in measured for cell in (f"{m.seconds:.3f}", f"{m.mib:.0f}")]
-        ratio = measured[2].seconds / measured[1].seconds
-        table.add_row(f"{size:,}", *cells, f"{ratio:.1f}")
-    return table
-
-
-def file_table(measured: dict[str, MeasuredFile], levels: int) -> Table:
-    """Files by stage: milliseconds, MiB, and what reading and writing cost beside refining."""
-    table = Table(title=f"Files, levels = {levels}: milliseconds, and peak MiB, by stage")
-    table.add_column("file", no_wrap=True)
-    table.add_column("faces out", justify="right")
-    for stage in STAGES:
-        table.add_column(f"{stage} ms", justify="right")
-        table.add_column("MiB", justify="right")
-    table.add_column("others / refine", justify="right")
-    for name, file in measured.items():
-        if file.refused is not None:
+    peers, missing = available_peers()
+    for name, reason in missing.items():
+        console.print(f"left out: {name} ({reason})")
+    names = ["loop", *(model or [DEFAULT_MODEL])]
+    assert set(names) <= {"loop", *bundled_models()}, f"bundled: {bundled_models()}"
+    # With the report that no other library makes, and without.
+    methods = [f"{name}{report}" for name in names for report in ("", "+report")]
+    commands = {f"pns {method}": ours(method, python) for method in methods} | peers
+    done: list[dict[str, Any]] = []
+    speed: dict[str, float] = {}
+    for case in CASES:
+        if case.faces > largest:
             continue
-        cells = [
-            cell
-            for stage in STAGES
-            for cell in (
-                f"{1000 * file.seconds.get(stage, 0):.0f}",
-                f"{file.mib.get(stage, 0):.0f}",
-            )
-        ]
-        total, refining = sum(file.seconds.values()), file.seconds.get("refine", 0.0)
-        ratio = f"{(total - refining) / refining:.2f}" if refining else "–"
-        table.add_row(name, f"{file.faces:,}", *cells, ratio)
+        outputs = case.faces * 4**case.levels
+        expected = {name: rate * outputs for name, rate in speed.items()}
+        contested = contest(case, commands, runs, expected)
+        for name, method in contested["methods"].items():
+            speed[name] = method["processor"] / method["made_faces"]
+        done.append(contested)
+        console.print(case_table(contested))
+        if write:
+            result = {"machine": machine(), "missing": missing, "cases": done}
+            replace_file(RESULTS, (json.dumps(result, indent=1) + "\n").encode())
+            plot_results(result, PICTURE)
+
+
+def case_table(contested: dict[str, Any]) -> Table:
+    """One case: seconds of every method, and ours beside the fastest peer."""
+    peers = {n: m for n, m in contested["methods"].items() if not n.startswith(OURS)}
+    title = f"{contested['order']}, {contested['faces']:,} faces × {contested['levels']}"
+    table = Table(title=f"{title} (load {contested['load']})")
+    columns = ("method", "cold s", "first s", "median s", "least", "most", "processor s", "MiB")
+    for column in columns:
+        table.add_column(column, justify="left" if column == "method" else "right")
+    table.add_column("fastest peer / it", justify="right")
+    table.add_column("by processor", justify="right")
+    fastest = min((m["median"] for m in peers.values()), default=None)
+    least = min((m["processor"] for m in peers.values()), default=None)
+    for name, m in contested["methods"].items():
+        ratio = f"{fastest / m['median']:.2f}" if fastest else "–"
+        keys = ("cold", "first", "median", "least", "most", "processor")
+        effort = f"{least / m['processor']:.2f}" if least else "–"
+        table.add_row(name, *(f"{m[k]:.3f}" for k in keys), f"{m['mib']:.0f}", ratio, effort)
+    for name, reason in contested["left_out"].items():
+        table.add_row(name, *["–"] * 7, reason)
     return table
+
+
+def machine() -> dict[str, Any]:
+    """What the numbers were measured on."""
+    import os
+    import platform
+
+    import numpy as np
+
+    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
+    names = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
+    return {
+        "processor": names[0] if names else platform.processor(),
+        "threads": len(os.sched_getaffinity(0)),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
 
 
 if __name__ == "__main__":

@@ -8,28 +8,28 @@ from pathlib import Path
 from benchmarks.generated import torus
 from benchmarks.memory import in_fresh_process, peak_mib, reset_peak
 from pns_common import load_model
+from service.bodies.folder import folder_of
+from service.bodies.sibling_files import ALONE, SiblingFiles
+from service.course import Course
 from service.errors import ServiceError
-from service.folder import folder_of
-from service.gltf.neighbours import ALONE, Neighbours
+from service.gltf.subdivide import subdivide_gltf
+from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Limits, Options
-from service.soup import TriangleSoup
-from service.soup_glb import soup_glb
-from service.stopwatch import Stopwatch
-from service.subdivide import subdivide_gltf
 
 STAGES = ("read", "weld", "refine", "attributes", "write")
 
 
 @dataclass
-class MemoryStopwatch(Stopwatch):
+class MemoryCourse(Course):
     """Also keeps each stage's peak memory, in MiB above what stood at the start."""
 
     mib: dict[str, float] = field(default_factory=dict)
     base: float = 0.0
 
-    def lap(self, stage: str) -> None:
-        """Book the time and the peak since the last lap."""
-        super().lap(stage)
+    def book(self, stage: str, seconds: float) -> None:
+        """Book the time, and the peak since anything was booked."""
+        super().book(stage, seconds)
         self.mib[stage] = max(self.mib.get(stage, 0.0), peak_mib() - self.base)
         reset_peak()
 
@@ -52,22 +52,22 @@ def measure_file(path: Path, levels: int, model: str | None = None) -> MeasuredF
 def measure_generated(faces: int, levels: int, model: str | None = None) -> MeasuredFile:
     """Refine a generated GLB of about so many faces in a process of its own."""
     mesh = torus(faces)
-    data = soup_glb(TriangleSoup(mesh.vertices, mesh.faces, None))
+    data = triangles_glb(IndexedTriangles(mesh.vertices, mesh.faces, None))
     return in_fresh_process(_measure, data, levels, model)
 
 
 def _measure(
-    data: bytes, levels: int, source: str | None, neighbours: Neighbours = ALONE
+    data: bytes, levels: int, source: str | None, siblings: SiblingFiles = ALONE
 ) -> MeasuredFile:
     model, limits = load_model(source), Limits(max_faces=10**8, max_memory_bytes=10**11)
     media = "glb" if data[:4] == b"glTF" else "gltf"
     try:
-        subdivide_gltf(data, media, Options(levels), model, limits, neighbours=neighbours)  # warm
+        subdivide_gltf(data, media, Options(levels), model, limits, siblings=siblings)  # warm
         reset_peak()
-        clock = MemoryStopwatch(base=peak_mib())
+        course = MemoryCourse(base=peak_mib())
         done = subdivide_gltf(
-            data, media, Options(levels), model, limits, clock=clock, neighbours=neighbours
+            data, media, Options(levels), model, limits, course=course, siblings=siblings
         )
     except ServiceError as error:
         return MeasuredFile(refused=f"{error.code}: {error.detail}")
-    return MeasuredFile(done.report["totals"]["faces"], clock.seconds, clock.mib)
+    return MeasuredFile(done.report["totals"]["faces"], course.seconds, course.mib)

@@ -1,4 +1,4 @@
-"""Meshes of any size for benchmarks: closed, with ridges, numbered as an exporter would."""
+"""Meshes of any size for benchmarks: with ridges, numbered as an exporter would or at random."""
 
 from __future__ import annotations
 
@@ -22,3 +22,31 @@ def torus(faces: int) -> Mesh:
     up, beyond = u * rows + (v + 1) % rows, (u + 1) % columns * rows + (v + 1) % rows
     quads = [np.stack([here, right, beyond], axis=-1), np.stack([here, beyond, up], axis=-1)]
     return Mesh(points.reshape(-1, 3), np.stack(quads, axis=-2).reshape(-1, 3))
+
+
+def patch(faces: int) -> Mesh:
+    """An open patch over [−1, 1]² with ridges, of about so many faces."""
+    n = round((faces / 2) ** 0.5) + 1
+    x, y = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
+    z = 0.2 * np.exp(-30 * (x + 0.3 * np.sin(2 * y)) ** 2) + 0.05 * np.sin(5 * y)
+    i, j = np.meshgrid(np.arange(n - 1), np.arange(n - 1), indexing="ij")
+    v = i * n + j
+    pairs = [np.stack([v, v + n, v + n + 1], axis=-1), np.stack([v, v + n + 1, v + 1], axis=-1)]
+    triangles = np.stack(pairs, axis=-2).reshape(-1, 3)
+    return Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), triangles)
+
+
+def shuffled(mesh: Mesh, seed: int = 0) -> Mesh:
+    """The same mesh with its vertices and faces in random order: the worst case for caches."""
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(mesh.vertices))
+    vertices = np.empty_like(mesh.vertices)
+    vertices[order] = mesh.vertices
+    return Mesh(vertices, order[mesh.faces][rng.permutation(len(mesh.faces))])
+
+
+ORDERS = {
+    "closed": torus,
+    "open": patch,
+    "shuffled": lambda faces: shuffled(torus(faces)),
+}

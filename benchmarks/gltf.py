@@ -12,8 +12,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from benchmarks.__main__ import file_table
 from benchmarks.files import MeasuredFile, measure_file
+from benchmarks.stages import file_table
 from pns_common.onnx_model import DEFAULT_MODEL
 
 LARGE = 5000

@@ -17,8 +17,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from pns_common import Mesh, Refinement, load_model, pns, refine
-from service.example import part
-from service.weld import weld
+from service.meshes.weld import weld
+from service.meshfiles.example import part
 
 OUTPUT = Path(__file__).with_name("picture.png")
 LEVELS = 2
@@ -29,11 +29,14 @@ STEEL = np.array([0.62, 0.68, 0.76])
 
 def main() -> None:
     """Refine the part and draw all three."""
-    soup = part()
-    welded = weld(soup.vertices, soup.faces)
+    triangles = part()
+    welded = weld(triangles.vertices, triangles.faces)
     coarse = Mesh(welded.points, welded.faces)
-    refined = refine(coarse, pns(load_model()), LEVELS)
-    ratio = face_ratio(refined)
+    scheme = pns(load_model())
+    refined = refine(coarse, scheme, LEVELS)
+    # Later levels are Loop's: a face shows what was spent on the one that it was cut from.
+    learned = min(scheme.learned_levels or LEVELS, LEVELS)
+    ratio = np.repeat(face_ratio(refine(coarse, scheme, learned)), 4 ** (LEVELS - learned))
 
     figure = Figure(figsize=(12, 4.2), dpi=150, layout="constrained")
     left, middle, right = figure.subplots(1, 3)
@@ -42,10 +45,10 @@ def main() -> None:
     faces = refined.mesh.faces
     draw(middle, refined.mesh.vertices, faces, np.tile(STEEL, (len(faces), 1)), 0)
     middle.set_title(f"Refined by {LEVELS} levels, {len(faces):,} faces")
-    palette = ScalarMappable(colors.Normalize(0, 1), mpl.colormaps["cividis"])
+    palette = ScalarMappable(colors.Normalize(0, ratio.max()), mpl.colormaps["cividis"])
     draw(right, refined.mesh.vertices, faces, palette.to_rgba(ratio)[:, :3], 0)
     right.set_title("Where the budget is spent")
-    figure.colorbar(palette, ax=right, label="proximity ratio  ‖q − q0‖ / (C h²)", shrink=0.8)
+    figure.colorbar(palette, ax=right, label="proximity ratio  ‖q − q0‖ R / (C h²)", shrink=0.8)
     temporary = OUTPUT.with_suffix(".tmp.png")
     figure.savefig(temporary)
     temporary.replace(OUTPUT)

@@ -1,15 +1,20 @@
 """Checkpoint to model file: card, graph, parity, and only then the file."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
+
+import msgspec
 
 from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, Parity, check_parity
-from pns_common.model_card import FORMAT, VERTEX_FORMAT, ModelCard
+from pns_common.model_card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
 from pns_common.onnx_model import model_from_bytes
-from train.checkpoint import Checkpoint
-from train.networks import BoundedNet
+from pns_common.whole_file import replace_file
+from train.models.checkpoint import Checkpoint
+from train.models.networks import BoundedNet
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,28 +52,55 @@ def write_model(
     model = model_from_bytes(data, name=path.stem)
     parity = check_parity(model, network, tolerance, vertex_network)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".tmp")
-    temporary.write_bytes(data)
-    temporary.replace(path)
+    replace_file(path, data)
     return Exported(model.hash, parity)
+
+
+ORDER = (
+    "recipe",
+    "hidden",
+    "activation",
+    "dataset",
+    "weights",
+    "steps",
+    "batch_size",
+    "faces",
+    "pool",
+    "reuse",
+    "learning_rate",
+    "final_learning_rate",
+    "seed",
+    "quiet",
+    "vertex",
+    "machine",
+)
+"""What stands on a card about training, and in what order."""
+
+RECORDED: Mapping[str, str] = MappingProxyType({"paper": "ridge"})
+"""What cards call a recipe that had another name when its bundled file was made: the bytes stay."""
 
 
 def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:
     """Return the model card of a checkpoint: the whole recipe, its machine and its metrics."""
-    recipe: dict[str, Any] = asdict(checkpoint.recipe)
+    recipe: dict[str, Any] = msgspec.to_builtins(checkpoint.recipe)
     on_card = {
         name: recipe.pop(name) for name in ("features", "gate_sharpness", "budget", "orientation")
     }
-    vertex = checkpoint.recipe.vertex
+    vertex, form = checkpoint.recipe.vertex, checkpoint.recipe.scale_free
     if vertex is not None:
         on_card["vertex_features"] = recipe["vertex"].pop("features")
         on_card["vertex_gate_sharpness"] = recipe["vertex"].pop("gate_sharpness")
-    # What a recipe leaves out its card does not mention.
-    given = {name: value for name, value in recipe.items() if value is not None}
-    training = {"recipe": given.pop("name"), **given, "machine": checkpoint.machine}
+    if form is not None:
+        on_card |= recipe.pop("scale_free")
+    # One level of names: how it was trained stands beside the rest.
+    name = recipe.pop("name")
+    facts = {"recipe": RECORDED.get(name, name), **recipe, **recipe.pop("training")}
+    facts["machine"] = checkpoint.machine
+    # In the order of the first models' cards; what a recipe leaves out its card does not mention.
+    given = {name: facts[name] for name in ORDER if facts.get(name) is not None}
     return ModelCard(
-        format=FORMAT if vertex is None else VERTEX_FORMAT,
-        training=training,
+        format=FORMAT if vertex is None else VERTEX_FORMAT if form is None else SCALE_FREE_FORMAT,
+        training=given,
         metrics=checkpoint.metrics,
         **on_card,
     )

@@ -1,12 +1,14 @@
 """The model file's graph, built node by node: the same network always gives the same bytes."""
 
+from typing import Any
+
 import numpy as np
 import onnx
 from onnx import NodeProto, TensorProto, ValueInfoProto, helper, numpy_helper
 from torch import Tensor
 
 from pns_common.model_card import CARD_KEY, ModelCard
-from train.networks import BoundedNet, Hush, SymmetricNet
+from train.models.networks import BoundedNet, SymmetricNet
 
 OPSET = 17
 """New enough for every operator here; runtimes of the last years all read it."""
@@ -57,7 +59,7 @@ class _Graph:
             self.constants.append(numpy_helper.from_array(array, name))
         return name
 
-    def apply(self, operator: str, *inputs: str, output: str = "", **attributes: object) -> str:
+    def apply(self, operator: str, *inputs: str, output: str = "", **attributes: Any) -> str:
         """Add a node and return its output's name."""
         name = output or f"{operator.lower()}_{len(self.nodes)}"
         self.nodes.append(helper.make_node(operator, inputs, [name], **attributes))
@@ -96,16 +98,7 @@ def _symmetric_perceptron(graph: _Graph, network: BoundedNet, features: str) -> 
         value = _layer(graph, network, index, value, _array(layer.weight), _array(layer.bias))
     value = graph.apply("Reshape", value, graph.shape("row_an_edge", [-1, 3 * count]))
     signed_mean = np.concatenate([np.diag(local) for local in group.local]) / count
-    z = graph.apply("MatMul", value, graph.constant("signed_mean", signed_mean))
-    return z if network.hush is None else _hushed(graph, network.hush, z, features)
-
-
-def _hushed(graph: _Graph, hush: Hush, z: str, features: str) -> str:
-    """Multiply z by U² / (U² + ε²)."""
-    columns = graph.apply("Gather", features, graph.shape("hush", list(hush.columns)), axis=1)
-    square = graph.apply("ReduceSumSquare", columns, axes=[1], keepdims=1)
-    wider = graph.apply("Add", square, graph.constant("hush_width", hush.width**2))
-    return graph.apply("Mul", z, graph.apply("Div", square, wider))
+    return graph.apply("MatMul", value, graph.constant("signed_mean", signed_mean))
 
 
 def _layer(
@@ -128,10 +121,11 @@ def _array(tensor: Tensor) -> np.ndarray:
 
 
 def _gelu(graph: _Graph, x: str) -> str:
-    root_half = graph.constant("root_half", np.sqrt(0.5))
-    one, half = graph.constant("one", 1.0), graph.constant("half", 0.5)
-    erf = graph.apply("Erf", graph.apply("Mul", x, root_half))
-    return graph.apply("Mul", graph.apply("Mul", x, half), graph.apply("Add", erf, one))
+    # In these operators onnxruntime knows it, and computes it in one of its own.
+    root, unit = graph.constant("root_two", np.sqrt(2.0)), graph.constant("one", 1.0)
+    half = graph.constant("half", 0.5)
+    erf = graph.apply("Erf", graph.apply("Div", x, root))
+    return graph.apply("Mul", graph.apply("Mul", x, half), graph.apply("Add", erf, unit))
 
 
 def _tanh(graph: _Graph, x: str) -> str:

@@ -8,18 +8,19 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from pns_common.errors import PnsError
-from pns_common.features import FEATURE_SETS
+from pns_common.edge.features import FEATURE_SETS
+from pns_common.errors import ModelError, PnsError
 from pns_common.onnx_model import OnnxModel
-from pns_common.ring_features import RING_FEATURE_SETS
 from pns_common.symmetry import Feature
-from train.networks import BoundedNet
+from pns_common.vertex.rings import RING_FEATURE_SETS
+from train.models.networks import BoundedNet
 
-TOLERANCE = 1e-6
+TOLERANCE = 3e-6
 """Largest difference allowed, as a fraction of the budget and of the row's largest feature.
 
 Single precision rounds what the layers add up: a sliver whose features are 30 in size rounds 30
-times as much as a triangle, in torch as in the file. Features below 1 count as 1.
+times as much as a triangle, in torch as in the file. Features below 1 count as 1. Of the bundled
+networks the default's rounds most, by 1.4e-6: it was trained longest, and its weights are largest.
 """
 
 ROWS = 10_000
@@ -66,7 +67,9 @@ def check_parity(
     """
     if (vertex_network is None) != (model.card.vertex_features is None):
         raise ModelError(
-            "file", expected="a vertex rule where the checkpoint has one, and only there"
+            model.name,
+            expected="a vertex rule where the checkpoint has one, and only there",
+            found=f"vertex features {model.card.vertex_features}",
         )
     seen = FEATURE_SETS[model.card.features].features
     edges = _compare(model, network, seen, tolerance)
@@ -90,20 +93,20 @@ def _compare(
     for budget in BUDGETS:
         with torch.no_grad():
             expected = exact(torch.from_numpy(features).double(), budget).numpy()
-        found = np.asarray(answers(features, budget))
-        difference = float((np.abs(found - expected) / size).max()) / budget
+        answered = np.asarray(answers(features, budget))
+        difference = float((np.abs(answered - expected) / size).max()) / budget
         # Written so that NaN fails it too.
         if not difference <= tolerance:
             raise ParityError(budget=budget, difference=difference, tolerance=tolerance)
         largest = max(largest, difference)
-        longest = max(longest, float(np.linalg.norm(found, axis=1).max()) / budget)
+        longest = max(longest, float(np.linalg.norm(answered, axis=1).max()) / budget)
     return Parity(largest, longest)
 
 
 def within(rows: Float[np.ndarray, "N K"], features: Sequence[Feature]) -> Float[np.ndarray, "N K"]:
     """Return rows cut to the ranges of their features: no mesh has others."""
-    limits = [feature.limit for feature in features]
-    return np.clip(rows, -np.float32(limits), np.float32(limits))
+    limits = np.array([feature.limit for feature in features], dtype=np.float32)
+    return np.clip(rows, -limits, limits)
 
 
 def sample_features(count: int) -> Float[np.ndarray, "N K"]:

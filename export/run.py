@@ -12,14 +12,15 @@ from rich.console import Console
 from export.model_file import Exported, export_model
 from export.published import export_published
 from pns_common.errors import PnsError
-from train.checkpoint import load_checkpoint
-from train.recipes import RECIPES, Recipe
+from pns_common.model_manifest import write_manifest
+from train.models.checkpoint import load_checkpoint
+from train.models.recipes import RECIPES, Recipe
 
 MODELS = Path(__file__).resolve().parents[1] / "pns_common" / "models"
 FILE_OF_RECIPE = {
-    "ridge": MODELS / "paper.onnx",
+    "paper": MODELS / "paper.onnx",
     "signed": MODELS / "signed.onnx",
-    "full": MODELS / "full.onnx",
+    "general": MODELS / "general.onnx",
 }
 """The bundled file of a recipe with its own seed."""
 
@@ -38,7 +39,7 @@ app = typer.Typer(help="Turn a checkpoint into a model file.", pretty_exceptions
 @app.command()
 def main(
     checkpoint: Annotated[Path, typer.Option(help="What `train/run.py` wrote.")] = Path(
-        "checkpoints/ridge.safetensors"
+        "checkpoints/paper.safetensors"
     ),
     published: Annotated[
         Path | None, typer.Option(help="The author's published data: export its networks.")
@@ -61,6 +62,8 @@ def main(
             made = load_checkpoint(checkpoint)
             path = output or bundled_file(made.recipe) or checkpoint.with_suffix(".onnx")
             written = {path: export_model(made, path)}
+            if path.parent == MODELS:
+                write_manifest(MODELS)
     except PnsError as error:
         console.print(str(error), style="red", soft_wrap=True)
         raise typer.Exit(1) from error

@@ -7,6 +7,7 @@ refined.mesh.vertices, refined.mesh.faces, refined.report
 """
 
 from pns_common.errors import MeshError, ModelError, ParameterError, PnsError
+from pns_common.interop.subdivide import subdivide
 from pns_common.mesh import Mesh, clean
 from pns_common.onnx_model import load_model
 from pns_common.refine import Refinement, refine
@@ -25,4 +26,5 @@ __all__ = [
     "loop",
     "pns",
     "refine",
+    "subdivide",
 ]

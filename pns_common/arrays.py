@@ -6,12 +6,12 @@ int64 numpy, because topology is built once per connectivity and never different
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, TypeAlias
 
-import array_api_compat.numpy
 import numpy as np
 from array_api_compat import array_namespace, is_torch_array
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Shaped
 
 # A numpy array or a torch tensor: no static type covers both.
 Array: TypeAlias = Any
@@ -21,8 +21,18 @@ def namespace(*arrays: Array) -> Any:
     """The array-API namespace that the arrays share."""
     # Looking the namespace up costs as much as arithmetic on a hundred rows.
     if all(type(array) is np.ndarray for array in arrays):
-        return array_api_compat.numpy
+        return _of_numpy()
     return array_namespace(*arrays)
+
+
+@cache
+def _of_numpy() -> Any:
+    """Return numpy: a namespace itself from 2.1 on, before that with what stands in for one."""
+    if np.lib.NumpyVersion(np.__version__) >= "2.1.0":
+        return np
+    import array_api_compat.numpy
+
+    return array_api_compat.numpy
 
 
 def beside(values: Array, constant: np.ndarray, dtype: Any = None) -> Array:
@@ -55,6 +65,29 @@ def segment_sum(
         return zeros.index_add(0, beside(values, segments), values)
     columns = [np.bincount(segments, column, count) for column in values.T]
     return np.stack(columns, axis=1).astype(values.dtype, copy=False)
+
+
+def scatter(
+    values: Shaped[Array, " N *K"], rows: Int[np.ndarray, " N"], count: int
+) -> Shaped[Array, " S *K"]:
+    """An array of ``count`` rows: ``values`` at ``rows``, each named once, and 0 elsewhere."""
+    shape = (count, *values.shape[1:])
+    if is_torch_array(values):
+        zeros = values.new_zeros(shape)
+        return zeros.index_copy(0, beside(values, rows), values)
+    spread = np.zeros(shape, dtype=values.dtype)
+    spread[rows] = values
+    return spread
+
+
+def detached(values: Array) -> Array:
+    """The same numbers, through which no gradient passes."""
+    return values.detach() if is_torch_array(values) else values
+
+
+def as_numpy(values: Array) -> np.ndarray:
+    """The same numbers as a numpy array, without a gradient."""
+    return values.detach().cpu().numpy() if is_torch_array(values) else values
 
 
 def dot(u: Float[Array, "N 3"], v: Float[Array, "N 3"]) -> Float[Array, " N"]:

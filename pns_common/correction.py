@@ -1,8 +1,13 @@
-"""The learned correction δ = h² γ F η(φ), the whole of what PNS adds to Loop (equation 1).
+"""What PNS adds to Loop's edge vertices, and the bound that it never leaves.
 
-    q = q0 + h² · γ · F · η(φ)        ‖η‖ ≤ C,  γ = tanh(c x²),  x = 1 − n1 · n2
+    format 3    q = q0 + γ Π_ρ(D + τ h F z(φ))      ‖z‖ ≤ 1,       ρ = C h² / R
+    format 1    q = q0 + h² γ F η(φ)                ‖η‖ ≤ C / R    (the paper's equation 1)
 
-The bound is enforced here, in float64 and whatever the network returns: ‖δ‖ ≤ C h² for any weights.
+    γ = tanh(c x²),  x = 1 − n1 · n2
+
+Old vertices get the like of it (vertex_operator.py): p' = p0 + γ_v Π_ρ(D + τ h_v Σ z_i e_i), and in
+format 2 p' = p0 + h_v² γ_v (C / R) v. R is the unit of length (refine.py), h the edge's length. The
+bound is enforced here, in float64 and whatever the network returns: ‖δ‖ ≤ C h² / R for any weights.
 """
 
 from __future__ import annotations
@@ -10,11 +15,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 from jaxtyping import Bool, Float
 
-from pns_common.arrays import Array, namespace, norm
+from pns_common.arrays import Array, as_numpy, namespace, norm
+from pns_common.edge.frames import EdgeFrames, EdgeStencil, edge_frames, rotate
 from pns_common.errors import ModelError
-from pns_common.frames import EdgeFrames, EdgeStencil, edge_frames, rotate
 
 # Features (N, K) -> local corrections (N, 3) for a budget of 1.
 Network = Callable[[Array], Array]
@@ -22,6 +28,8 @@ Network = Callable[[Array], Array]
 Features = Callable[[EdgeStencil, EdgeFrames], Array]
 # Curvature x and frames -> γ ∈ [0, 1].
 Gate = Callable[[EdgeFrames], Array]
+# C / R, per unit of length: one number, or one for each row where parts have their own R.
+BudgetPerLength = float | Float[np.ndarray, " N"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +37,8 @@ class Correction:
     """What N interior edges add to Loop's edge vertices.
 
     Attributes:
-        displacement: δ = h² γ F η, world coordinates.
-        envelope: C h², the largest length that δ may have.
+        displacement: δ, world coordinates.
+        envelope: C h² / R, the largest length that δ may have.
         gate: γ ∈ [0, 1].
         degenerate: edges whose frame is the fallback.
     """
@@ -41,11 +49,11 @@ class Correction:
     degenerate: Bool[Array, " N"]
 
 
-def curvature_gate(sharpness: float) -> Gate:
+def curvature_gate(gate_sharpness: float) -> Gate:
     """γ = tanh(c x²): 0, with derivative 0, where the two faces are coplanar (equation 4)."""
 
     def gate(frames: EdgeFrames) -> Array:
-        return namespace(frames.curvature).tanh(sharpness * frames.curvature**2)
+        return namespace(frames.curvature).tanh(gate_sharpness * frames.curvature**2)
 
     return gate
 
@@ -62,25 +70,77 @@ def project_to_ball(vectors: Float[Array, "N 3"], radius: float = 1.0) -> Float[
 
 
 def correct(
-    at: EdgeStencil,
+    stencil: EdgeStencil,
     features: Features,
     network: Network,
     gate: Gate,
-    budget: float,
+    budget_per_length: BudgetPerLength,
     frames_of: Callable[[EdgeStencil], EdgeFrames] = edge_frames,
 ) -> Correction:
-    """δ = h² γ F η(φ) for interior edges; ``budget`` is C / R, per unit of length.
+    """δ = h² γ F η(φ) for interior edges; ``budget_per_length`` is C / R.
 
     Raises:
         ModelError: the network returned something that is not finite.
     """
-    frames = frames_of(at)
+    frames = frames_of(stencil)
     gamma = gate(frames)
-    eta = network(features(at, frames))
-    envelope = budget * frames.length**2
-    local = project_to_ball(finite(eta, like=at.a))
+    eta = where_open(network, features(stencil, frames), gamma, like=stencil.a)
+    envelope = budget_per_length * frames.length**2
+    local = project_to_ball(eta)
     displacement = (envelope * gamma)[:, None] * rotate(frames, local)
     return Correction(displacement, envelope, gamma, frames.degenerate)
+
+
+def shortened(vectors: Float[Array, "N 3"], longest: Float[Array, " N"]) -> Float[Array, "N 3"]:
+    """Π_ρ: vectors longer than ρ = ``longest`` shortened to it; none is lengthened."""
+    xp = namespace(vectors)
+    length = norm(vectors)
+    long = length > longest
+    return vectors * xp.where(long, longest / xp.where(long, length, 1.0), 1.0)[:, None]
+
+
+def correct_scale_free(
+    stencil: EdgeStencil,
+    features: Features,
+    network: Network,
+    gate: Gate,
+    budget_per_length: BudgetPerLength,
+    frames_of: Callable[[EdgeStencil], EdgeFrames],
+    network_scale: float,
+    prior: Float[Array, "N 3"],
+) -> Correction:
+    """δ = γ Π_ρ(D + τ h F z(φ)), ρ = h² C / R; ``budget`` is C / R, ``network_scale`` is τ.
+
+    It is equation 1 with η = Π_C(R (Fᵀ D + τ h z) / h²) / R: the bound is the same, and the network
+    speaks in units of h, so what it says holds at every resolution. ``prior`` is D.
+
+    Raises:
+        ModelError: the network returned something that is not finite.
+    """
+    frames = frames_of(stencil)
+    gamma = gate(frames)
+    z = project_to_ball(where_open(network, features(stencil, frames), gamma, like=stencil.a))
+    wanted = prior + (network_scale * frames.length)[:, None] * rotate(frames, z)
+    envelope = budget_per_length * frames.length**2
+    displacement = gamma[:, None] * shortened(wanted, envelope)
+    return Correction(displacement, envelope, gamma, frames.degenerate)
+
+
+def where_open(
+    network: Network, features: Array, gate: Float[Array, " N"], like: Float[Array, "N 3"]
+) -> Array:
+    """The network's answers, ``finite``; 0 in rows whose gate is shut, for which it is not run.
+
+    Nothing is added there whatever it says, and no other row is changed by their absence. Tensors,
+    which may keep a gradient, are all run.
+    """
+    rows = np.flatnonzero(as_numpy(gate))
+    if len(rows) == gate.shape[0] or as_numpy(like) is not like:
+        return finite(network(features), like)
+    answers = np.zeros(like.shape)
+    if len(rows):
+        answers[rows] = finite(network(features[rows]), like[rows])
+    return answers
 
 
 def finite(eta: Array, like: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
@@ -96,7 +156,7 @@ def finite(eta: Array, like: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
 
 
 def proximity_ratio(correction: Correction) -> Float[Array, " N"]:
-    """‖δ‖ / (C h²) ∈ [0, 1]; 0 where the envelope is empty."""
+    """‖δ‖ R / (C h²) ∈ [0, 1]; 0 where the envelope is empty."""
     xp = namespace(correction.envelope)
     open_ = correction.envelope > 0
     return xp.where(

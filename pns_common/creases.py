@@ -17,25 +17,45 @@ def with_creases(topology: Topology, creases: Int[np.ndarray, "N 2"]) -> Topolog
     Raises:
         ParameterError: a pair is no edge of the mesh.
     """
-    count = np.int64(topology.vertex_count)
-    keys = topology.edges[:, 0] * count + topology.edges[:, 1]
-    named = _checked(creases, topology.vertex_count)
-    named = named.min(axis=1) * count + named.max(axis=1)
-    lost = named[~np.isin(named, keys)]
-    if len(lost):
-        raise ParameterError("creases", divmod(int(lost[0]), int(count)), expected="edges")
-    edge_class = topology.edge_class.copy()
-    edge_class[np.isin(keys, named) & (edge_class == EdgeClass.INTERIOR)] = EdgeClass.CREASE
+    edge_class = crease_classes(topology.edges, topology.edge_class, topology.vertex_count, creases)
     interior = np.flatnonzero(edge_class == EdgeClass.INTERIOR)
     return replace(topology, edge_class=edge_class, interior=interior)
 
 
+def crease_classes(
+    edges: Int[np.ndarray, "E 2"],
+    edge_class: Int[np.ndarray, " E"],
+    vertex_count: int,
+    creases: Int[np.ndarray, "N 2"],
+) -> Int[np.ndarray, " E"]:
+    """The classes of the edges, with those interior ones as creases that the vertex pairs name.
+
+    Raises:
+        ParameterError: a pair is no edge.
+    """
+    count = np.int64(vertex_count)
+    keys = edges[:, 0] * count + edges[:, 1]
+    named = _checked(creases, vertex_count)
+    named = named.min(axis=1) * count + named.max(axis=1)
+    lost = named[~np.isin(named, keys)]
+    if len(lost):
+        raise ParameterError("creases", divmod(int(lost[0]), int(count)), expected="edges")
+    kept = np.isin(keys, named) & (edge_class == EdgeClass.INTERIOR)
+    return np.where(kept, np.int8(EdgeClass.CREASE), edge_class)
+
+
 def crease_children(topology: Topology) -> Int[np.ndarray, "N 2"]:
     """The halves of the crease edges, as vertex pairs of the split mesh."""
-    edges = np.flatnonzero(topology.edge_class == EdgeClass.CREASE)
-    middle = topology.vertex_count + edges
-    ends = topology.edges[edges]
-    return np.stack([ends, np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
+    return crease_halves(topology.edges, topology.edge_class, topology.vertex_count)
+
+
+def crease_halves(
+    edges: Int[np.ndarray, "E 2"], edge_class: Int[np.ndarray, " E"], vertex_count: int
+) -> Int[np.ndarray, "N 2"]:
+    """The same from the arrays."""
+    creases = np.flatnonzero(edge_class == EdgeClass.CREASE)
+    middle = vertex_count + creases
+    return np.stack([edges[creases], np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
 
 
 def _checked(creases: Int[np.ndarray, "N 2"], vertex_count: int) -> Int[np.ndarray, "N 2"]:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NotRequired, TypedDict
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
-from pns_common.arrays import dot, gather
+from pns_common.arrays import dot, gather, norm
 from pns_common.blocks import Blocks
-from pns_common.frames import triangle_normals
-from pns_common.schemes import Placement
-from pns_common.topology import CHILDREN, EdgeClass, Topology, children_across
+from pns_common.edge.frames import triangle_normals
+from pns_common.placement import Placement
+from pns_common.step import LevelStep
+from pns_common.topology import CHILDREN, Connectivity, EdgeClass, Topology, children_across
 
 # A gate above this counts as active.
 GATE_ACTIVE = 0.01
@@ -28,7 +30,7 @@ class EdgeCounts(TypedDict):
 
 
 class RatioSummary(TypedDict):
-    """Proximity ratio ‖δ‖ / (C h²) over the level's interior edges; above 1 by rounding only."""
+    """Proximity ratio ‖δ‖ R / (C h²) over the level's interior edges; above 1 by rounding only."""
 
     max: float
     mean: float
@@ -44,7 +46,7 @@ class GateSummary(TypedDict):
 
 
 class VertexSummary(TypedDict):
-    """The vertex rule: how many old vertices it may move, ‖δ‖ / (C h_v²) and γ_v over them."""
+    """The vertex rule: how many old vertices it may move, ‖δ‖ R / (C h_v²) and γ_v."""
 
     vertices: int
     proximity_ratio: RatioSummary
@@ -55,7 +57,11 @@ class LevelReport(TypedDict):
     """One level: counts of the mesh it made and diagnostics of the step that made it.
 
     ``vertex_rule`` stands only where the model has one; ``proximity_ratio`` and ``gate`` are the
-    interior edges'.
+    interior edges'. Of learned levels alone: ``displacement_max``, the longest δ, and
+    ``envelope_max``, the longest that the budget allows (None where the rules name no bound), both
+    in the mesh's units; ``shut``, at how many interior edges and movable vertices the gate is 0, so
+    that the network was not run for them; and ``guarded``, how many vertices the fold guard scaled,
+    where there is one.
     """
 
     vertices: int
@@ -67,22 +73,39 @@ class LevelReport(TypedDict):
     gate: GateSummary
     normal_jump_max: float
     vertex_rule: NotRequired[VertexSummary]
+    displacement_max: NotRequired[float]
+    envelope_max: NotRequired[float | None]
+    shut: NotRequired[int]
+    guarded: NotRequired[int]
+
+
+class LimitDistances(TypedDict):
+    """How far all levels together left Loop; see ``refine.Report``."""
+
+    learned_levels: int
+    limit_distance: float
+    limit_distance_bound: float | None
 
 
 @dataclass(frozen=True, eq=False)
-class ChildFaces:
-    """The faces that a step made.
+class ChildAngles:
+    """How the faces that a step made stand to each other, and to Loop's.
 
     Attributes:
-        normals: unit normals, 0 where a face has no area.
         flipped: number of faces whose normal opposes that of their Loop counterpart.
         normal_jump_max: largest angle (radians, 0 … π) between the normals of two faces that share
             an interior edge; faces without area are left out.
     """
 
-    normals: Float[np.ndarray, "F 3"]
     flipped: int
     normal_jump_max: float
+
+
+@dataclass(frozen=True, eq=False)
+class ChildFaces(ChildAngles):
+    """The same with their unit ``normals``, 0 where a face has no area."""
+
+    normals: Float[np.ndarray, "F 3"]
 
 
 def child_faces(
@@ -128,15 +151,15 @@ def child_faces(
         pairs = children_across(topology, topology.interior[rows])
         across[blocks.number(rows)] = max(
             _largest_chord(
-                gather(normals, one), gather(normals, other), defined[one] & defined[other]
+                gather(normals, left), gather(normals, right), defined[left] & defined[right]
             )
-            for one, other in pairs.transpose(0, 2, 1)
+            for left, right in pairs.transpose(0, 2, 1)
         )
 
     blocks.run(len(topology.interior), look_across)
     chord = np.sqrt(max(inside.max(initial=0), across.max(initial=0)))
     # The chord keeps small angles that 1 − cos would round away.
-    return ChildFaces(normals, int(flipped.sum()), float(2 * np.arcsin(min(1.0, chord / 2))))
+    return ChildFaces(int(flipped.sum()), float(2 * np.arcsin(min(1.0, chord / 2))), normals)
 
 
 def _largest_chord(
@@ -147,23 +170,14 @@ def _largest_chord(
     return float(np.max(dot(chord, chord), initial=0, where=defined))
 
 
-def level_report(
-    topology: Topology, vertices: Placement, edges: Placement, children: ChildFaces
-) -> LevelReport:
+def level_report(topology: Connectivity, step: LevelStep, children: ChildAngles) -> LevelReport:
     """Summarise the step that refined ``topology``."""
+    vertices, edges = step.vertices, step.edges
     interior = topology.interior
-    classes = np.bincount(topology.edge_class, minlength=len(EdgeClass))
-    counts: EdgeCounts = {
-        "interior": int(classes[EdgeClass.INTERIOR]),
-        "boundary": int(classes[EdgeClass.BOUNDARY]),
-        "irregular": int(classes[EdgeClass.IRREGULAR]),
-    }
-    if classes[EdgeClass.CREASE]:
-        counts["crease"] = int(classes[EdgeClass.CREASE])
     report: LevelReport = {
-        "vertices": topology.vertex_count + len(topology.edges),
+        "vertices": topology.vertex_count + len(topology.edge_class),
         "faces": 4 * len(topology.faces),
-        "edges": counts,
+        "edges": edge_counts(topology.edge_class),
         "degenerate_frames": int(edges.degenerate.sum() + vertices.degenerate.sum()),
         "flipped_faces": children.flipped,
         "proximity_ratio": _ratio_summary(edges.ratio[interior]),
@@ -176,7 +190,65 @@ def level_report(
             "proximity_ratio": _ratio_summary(vertices.ratio[vertices.corrected]),
             "gate": _gate_summary(vertices.gate[vertices.corrected]),
         }
+    if step.learned:
+        rules = (vertices, edges)
+        report["displacement_max"] = max(_longest(rule.displacement) for rule in rules)
+        envelopes = [_largest(rule) for rule in rules]
+        bounds = [bound for bound in envelopes if bound is not None]
+        report["envelope_max"] = max(bounds) if len(bounds) == len(rules) else None
+        report["shut"] = _shut(edges, interior) + _shut(vertices, vertices.corrected)
+    if step.guard is not None:
+        report["guarded"] = int((step.guard < 1).sum())
     return report
+
+
+def limit_distances(levels: Sequence[LevelReport]) -> LimitDistances:
+    """Sum what the levels' displacements may add up to.
+
+    Loop's masks and limit masks are non-negative and sum to 1, so a displacement at one level moves
+    no later vertex, and no point of the limit, by more than its own length.
+    """
+    distances = [level["displacement_max"] for level in levels if "displacement_max" in level]
+    bounds = [level["envelope_max"] for level in levels if "envelope_max" in level]
+    known = [bound for bound in bounds if bound is not None]
+    return {
+        "learned_levels": len(distances),
+        "limit_distance": float(sum(distances)),
+        "limit_distance_bound": float(sum(known)) if len(known) == len(bounds) else None,
+    }
+
+
+def _longest(displacement: Float[np.ndarray, "N 3"] | None) -> float:
+    return 0.0 if displacement is None else float(norm(displacement).max(initial=0))
+
+
+def _largest(rule: Placement) -> float | None:
+    """The largest displacement that a rule may make; None where it may make any."""
+    if rule.displacement is None:
+        return 0.0
+    return None if rule.envelope is None else float(rule.envelope.max(initial=0))
+
+
+def _shut(rule: Placement, rows: np.ndarray | None) -> int:
+    """Of some vertices, how many have a gate of 0."""
+    return 0 if rows is None else int(np.count_nonzero(rule.gate[rows] == 0))
+
+
+def edge_counts(edge_class: Int[np.ndarray, " E"]) -> EdgeCounts:
+    """How many edges there are of each class."""
+
+    def count(kind: EdgeClass) -> int:
+        return int(np.count_nonzero(edge_class == kind))
+
+    counts: EdgeCounts = {
+        "interior": count(EdgeClass.INTERIOR),
+        "boundary": count(EdgeClass.BOUNDARY),
+        "irregular": count(EdgeClass.IRREGULAR),
+    }
+    rest = len(edge_class) - counts["interior"] - counts["boundary"] - counts["irregular"]
+    if rest:
+        counts["crease"] = rest
+    return counts
 
 
 def _ratio_summary(ratio: Float[np.ndarray, " N"]) -> RatioSummary:
@@ -184,8 +256,20 @@ def _ratio_summary(ratio: Float[np.ndarray, " N"]) -> RatioSummary:
     return {
         "max": float(ratio.max(initial=0)),
         "mean": float(ratio.mean()) if some else 0.0,
-        "p99": float(np.percentile(ratio, 99)) if some else 0.0,
+        "p99": _p99(ratio) if some else 0.0,
     }
+
+
+def _p99(values: Float[np.ndarray, " N"]) -> float:
+    """``np.percentile(values, 99)``, whose checks would take longest of all in a small mesh."""
+    position = (len(values) - 1) * 0.99
+    below = int(position)
+    above = min(below + 1, len(values) - 1)
+    ordered = np.partition(values, [below, above])
+    low, high = ordered[below], ordered[above]
+    t = position - below
+    # From the nearer side, as numpy does it.
+    return float(high - (high - low) * (1 - t) if t >= 0.5 else low + (high - low) * t)
 
 
 def _gate_summary(gate: Float[np.ndarray, " N"]) -> GateSummary:

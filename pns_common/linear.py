@@ -7,11 +7,13 @@ is no part of it, so the result is linear in the columns.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.creases import crease_children, with_creases
+from pns_common.limit import refined_limit_positions
 from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
 from pns_common.topology import Topology, build_topology, split
 
@@ -42,3 +44,27 @@ def refine_linear(
         vertices = loop_vertex_vertices(columns, topology)
         columns = np.concatenate([vertices, loop_edge_vertices(columns, topology)])
     return columns
+
+
+@dataclass(frozen=True, eq=False)
+class LinearRefinement:
+    """What happens to columns when a mesh is refined, on its way to the limit surface or not.
+
+    Attributes:
+        topologies: those of the steps, control mesh first.
+        limit: whether the last level's vertices are put on the limit surface.
+    """
+
+    topologies: Sequence[Topology]
+    limit: bool
+
+    @property
+    def count(self) -> int:
+        """How many refined vertices there are."""
+        last = self.topologies[-1]
+        return last.vertex_count + len(last.edges)
+
+    def __call__(self, columns: Float[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
+        """Columns at the refined vertices."""
+        refined = refine_linear(columns, self.topologies)
+        return refined_limit_positions(refined, self.topologies[-1]) if self.limit else refined

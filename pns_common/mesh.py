@@ -43,8 +43,8 @@ class Mesh:
         if faces.dtype.kind not in "iu":
             raise MeshError(f"type {faces.dtype}, expected integers", element="faces")
         # Before the cast: an index of 2⁶⁴ − 1 would become −1.
-        inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
-        if not inside.all():
+        if not (faces.min() >= 0 and faces.max() < len(vertices)):
+            inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
             worst = int(np.argmin(inside))
             raise MeshError(
                 f"indices {faces[worst].tolist()}, expected 0 … {len(vertices) - 1}",
@@ -52,17 +52,18 @@ class Mesh:
                 index=worst,
             )
         vertices, faces = _frozen(vertices, np.float64), _frozen(faces, np.int64)
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
         # Written so that NaN fails it too.
-        fits = (np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1)
-        if not fits.all():
+        if not ((low >= -LARGEST_COORDINATE) & (high <= LARGEST_COORDINATE)).all():
+            fits = (np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1)
             worst = int(np.argmin(fits))
-            found = vertices[worst].tolist()
+            coordinates = vertices[worst].tolist()
             raise MeshError(
-                f"coordinates {found}, expected finite numbers up to {LARGEST_COORDINATE:g}",
+                f"coordinates {coordinates}, expected finite numbers up to {LARGEST_COORDINATE:g}",
                 element="vertex",
                 index=worst,
             )
-        extent = np.ptp(vertices, axis=0).max()
+        extent = (high - low).max()
         if 0 < extent < SMALLEST_EXTENT:
             raise MeshError(
                 f"extent {extent:g}, expected at least {SMALLEST_EXTENT:g}: scale the mesh up",

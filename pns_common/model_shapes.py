@@ -14,15 +14,7 @@ from typing import Any
 import onnx
 
 from pns_common.errors import ModelError
-
-# Rows that one call of the runtime sees. Always the same shape, so that a row's bits depend neither
-# on how many rows there are nor on how they are divided.
-ROWS = 1024
-# Bytes of all tensors that a call makes, as if none were freed before its end.
-LARGEST_CALL = 256 * 2**20
-
-# (name, element type, shape) with "*" for a free dimension.
-Signature = tuple[str, str, list[str | int]]
+from pns_common.model_contract import LARGEST_CALL, ROWS, Signature
 
 
 def signature(value: onnx.ValueInfoProto) -> Signature:
@@ -89,8 +81,8 @@ def _inferred(proto: onnx.ModelProto, name: str) -> Iterator[onnx.ValueInfoProto
         # Without data_prop, which would compute the tensors that are to be measured.
         graph = inference.infer_shapes(proto, check_type=True, strict_mode=True).graph
     except (ValueError, inference.InferenceError) as error:
-        found = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ModelError(name, expected="shapes that fit together", found=found) from error
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise ModelError(name, expected="shapes that fit together", found=reason) from error
     yield from graph.value_info
     yield from graph.output
 

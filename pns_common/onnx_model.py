@@ -1,39 +1,66 @@
-"""A model file as a callable η: loaded from the package or a path, and called in pieces."""
+"""A model file as a callable η: loaded from the package or a path, and called in pieces.
+
+onnxruntime runs it where it and the package onnx are installed, numpy where they are not: the same
+files are taken and refused, and the answers differ by the rounding of single precision.
+"""
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import resources
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
-import onnxruntime
 from jaxtyping import Float
 
 from pns_common.errors import ModelError
 from pns_common.model_card import ModelCard
-from pns_common.model_check import ALLOWED_OPERATORS, answer_to, check_file, feature_inputs
-from pns_common.model_shapes import ROWS
+from pns_common.model_contract import ROWS, answer_to, feature_inputs
+from pns_common.model_manifest import check_listed
 
-DEFAULT_MODEL = "full"
+DEFAULT_MODEL = "general"
 LARGEST_FILE = 64 * 2**20
 BUNDLED = resources.files("pns_common") / "models"
 
 __all__ = [
-    "ALLOWED_OPERATORS",
     "BUNDLED",
     "DEFAULT_MODEL",
     "LARGEST_FILE",
-    "ROWS",
+    "Network",
     "OnnxModel",
     "bundled_models",
-    "feature_inputs",
     "load_model",
     "model_from_bytes",
     "model_name",
 ]
+
+
+@runtime_checkable
+class Network(Protocol):
+    """A checked graph that something runs."""
+
+    def run(self, output: str, inputs: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return one output of the graph. Raises what its runtime raises."""
+        ...
+
+
+# The bytes of a file and what errors call it -> its card and its network; raises ModelError.
+Runtime = Callable[[bytes, str], tuple[ModelCard, Network]]
+
+
+def installed_runtime() -> Runtime:
+    """Return what opens model files here: onnxruntime where it is installed, else numpy."""
+    if find_spec("onnxruntime") is not None and find_spec("onnx") is not None:
+        from pns_common.onnx_session import open_session
+
+        return open_session
+    from pns_common.numpy_network import open_network
+
+    return open_network
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +79,10 @@ class OnnxModel:
     hash: str
     size: int
     _data: bytes = field(repr=False)
-    _session: Any = field(repr=False)  # onnxruntime ships no types
+    _network: Network = field(repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # A session cannot travel to a worker process; the file it was made from can.
+        # A network cannot travel to a worker process; the file it was made from can.
         return model_from_bytes, (self._data, self.name)
 
     def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
@@ -81,21 +108,20 @@ class OnnxModel:
         inputs["budget"] = np.asarray(budget, dtype=np.float32)
         for start in range(0, len(rows), ROWS):
             piece = rows[start : start + ROWS]
-            padded = np.zeros((ROWS, rows.shape[1]), dtype=np.float32)
-            padded[: len(piece)] = piece
-            answer = self._run(answer_to(given), inputs | {given: padded})
-            corrections[start : start + ROWS] = answer[: len(piece)]
+            if len(piece) < ROWS:
+                piece = np.concatenate([piece, np.zeros((ROWS - len(piece), piece.shape[1]), "f4")])
+            answer = self._run(answer_to(given), inputs | {given: piece})
+            corrections[start : start + ROWS] = answer[: len(rows) - start]
         return corrections
 
     def _run(self, output: str, inputs: dict[str, np.ndarray]) -> np.ndarray:
         try:
-            (answer,) = self._session.run([output], inputs)
+            answer = np.asarray(self._network.run(output, inputs))
         except Exception as error:  # onnxruntime's errors share no base below Exception
-            found = str(error).splitlines()[0]
+            reason = [*str(error).splitlines(), type(error).__name__][0]
             raise ModelError(
-                self.name, expected="a graph that runs to its end", found=found
+                self.name, expected="a graph that runs to its end", found=reason
             ) from error
-        answer = np.asarray(answer)
         if answer.shape != (ROWS, 3):
             raise ModelError(
                 self.name, expected=f"corrections of shape ({ROWS}, 3)", found=f"{answer.shape}"
@@ -125,11 +151,13 @@ def load_model(source: str | Path | None = None) -> OnnxModel:
             file that is called the same: "./paper" and Path("paper") are files.
 
     Raises:
-        ModelError: there is no such file, or it breaks the contract; says which part.
+        ModelError: there is no such file, it breaks the contract (says which part), or it is not
+            the bundled one that its name stands for.
     """
     source = DEFAULT_MODEL if source is None else source
     if _is_bundled(source):
         data = (BUNDLED / f"{source}.onnx").read_bytes()
+        check_listed(BUNDLED, source, data)
         return model_from_bytes(data, model_name(source))
     path = Path(source)
     if not path.is_file():
@@ -147,24 +175,17 @@ def _is_bundled(source: str | Path) -> TypeGuard[str]:
     return isinstance(source, str) and source in bundled_models()
 
 
-def model_from_bytes(data: bytes, name: str) -> OnnxModel:
+def model_from_bytes(data: bytes, name: str, runtime: Runtime | None = None) -> OnnxModel:
     """Check the bytes of a model file and make it callable.
+
+    Args:
+        data: the file.
+        name: what the model is called.
+        runtime: what opens it; None for the one that is installed.
 
     Raises:
         ModelError: the file breaks the contract.
     """
-    card = check_file(data, name)
-    runtime: Any = onnxruntime
-    options = runtime.SessionOptions()
-    # The caller divides the work; one thread here keeps the bits the same everywhere.
-    options.intra_op_num_threads = 1
-    options.inter_op_num_threads = 1
-    options.log_severity_level = 4
-    try:
-        session = runtime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime's errors share no base below Exception
-        raise ModelError(
-            name, expected="a graph that onnxruntime runs", found=str(error)
-        ) from error
+    card, network = (runtime or installed_runtime())(data, name)
     digest = hashlib.sha256(data).hexdigest()
-    return OnnxModel(name, card, digest, len(data), data, session)
+    return OnnxModel(name, card, digest, len(data), data, network)

@@ -5,27 +5,39 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
 from typing import TypedDict
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common.array_steps import array_steps
 from pns_common.arrays import norm
-from pns_common.blocks import Blocks, available_threads
-from pns_common.creases import crease_children, with_creases
-from pns_common.diagnostics import LevelReport, child_faces, level_report
-from pns_common.errors import MeshError, ParameterError
-from pns_common.frames import face_normals
-from pns_common.mesh import LARGEST_COORDINATE, Mesh
+from pns_common.blocks import ROWS, Blocks, available_threads
+from pns_common.deferred import Deferred
+from pns_common.diagnostics import LevelReport, level_report, limit_distances
+from pns_common.errors import ParameterError
+from pns_common.fused import KERNEL_ROWS, fits, kernels_available, kernels_loaded, kernels_pay
+from pns_common.fused.known import kernels_know
+from pns_common.levels import AfterLevel, LevelsReport, RefinedLevels, check_coordinates
+from pns_common.limit import refined_limit_normals, refined_limit_positions
+from pns_common.mesh import Mesh
 from pns_common.parameters import is_number, is_whole
-from pns_common.schemes import ControlLevel, Placement, Scheme
-from pns_common.topology import build_topology, multi_fan_vertices, split
+from pns_common.progress import RefinementProgress
+from pns_common.schemes import Scheme
 
 HIGHEST_LEVELS = 16
 
 
 class Report(TypedDict):
-    """What a refinement did and how near to Loop it stayed. No times: same input, same report."""
+    """What a refinement did and how near to Loop it stayed. No times: same input, same report.
+
+    ``learned_levels`` are those at which the scheme's own rules acted. ``limit_distance`` is the
+    sum over them of the largest displacement, in the mesh's units: no vertex, and no point of the
+    limit surface that Loop makes of the result, is farther than that from where Loop would have had
+    it. ``limit_distance_bound`` is the same sum of the largest displacements that the budget
+    allows; None where the scheme names no bound.
+    """
 
     scheme: str
     budget: float | None
@@ -33,6 +45,9 @@ class Report(TypedDict):
     model_hash: str | None
     reference_length: float
     multi_fan_vertices: int
+    learned_levels: int
+    limit_distance: float
+    limit_distance_bound: float | None
     levels: list[LevelReport]
 
 
@@ -40,13 +55,27 @@ class Report(TypedDict):
 class Refinement:
     """A refined mesh, its report, and the last level's diagnostics at each of its vertices.
 
+    The report is made when it is first read, from the levels, which are kept until then.
     ``ratio`` and ``gate`` are 0 at old vertices, but where the model has a vertex rule.
+    ``normals`` are the limit surface's, exact, where the vertices were put on it; on creases the
+    mean of both sides'. Without ``limit=True`` they are None.
     """
 
     mesh: Mesh
-    report: Report
+    make_report: Deferred[Report]
     ratio: Float[np.ndarray, " V"]
     gate: Float[np.ndarray, " V"]
+    normals: Float[np.ndarray, "V 3"] | None = None
+
+    @property
+    def report(self) -> Report:
+        """What the refinement did, and how near to Loop it stayed."""
+        return self.make_report()
+
+    def __repr__(self) -> str:
+        scheme, levels = self.report["scheme"], len(self.report["levels"])
+        vertices, faces = len(self.mesh.vertices), len(self.mesh.faces)
+        return f"Refinement({scheme!r}, levels={levels}, vertices={vertices}, faces={faces})"
 
 
 def refine(
@@ -55,6 +84,7 @@ def refine(
     levels: int = 1,
     reference_length: float | str = "auto",
     *,
+    limit: bool = False,
     creases: Int[np.ndarray, "N 2"] | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -68,11 +98,15 @@ def refine(
         reference_length: R, the unit of length of the budget: the largest curvature that the
             budget C can represent is 8 C / R. "auto" measures the mesh; 1 is the paper's absolute
             unit. It is fixed here for all levels: pass the first call's R when calling again.
+        limit: put the last level's vertices where Loop's rules would take them if they went on for
+            ever, and give the limit surface's normals there. The report is that of the levels.
         creases: edges to keep sharp, as pairs of vertices: no correction, and the rules of Hoppe
             et al. 1994. Their children are creases too; boundary and irregular edges stay what
             they are.
         threads: worker threads, default all processors; the result does not depend on it.
-        progress: called after each level with (faces made so far, faces made in the end).
+        progress: called as the work goes on, inside levels too, with (faces made so far, faces made
+            in the end). It may be called from another thread, one at a time; what it raises ends
+            the refinement, and is raised here.
 
     Raises:
         ParameterError: levels, reference_length or threads out of range, a crease that is no edge.
@@ -81,51 +115,94 @@ def refine(
     """
     _check_levels(levels)
     length = _reference_length(mesh, reference_length)
-    blocks = Blocks(threads=_threads(threads))
-    done, total = 0, sum(len(mesh.faces) * 4**level for level in range(1, levels + 1))
-
-    points, faces = mesh.vertices, mesh.faces
-    normals = _face_normals(points, faces, blocks)
-    reports: list[LevelReport] = []
-    several_fans = 0
-    sharp, vertices, edges = creases, None, None
-    for level in range(levels):
-        topology = build_topology(faces, len(points))
-        if level == 0:
-            several_fans = int(multi_fan_vertices(topology).sum())
-        if sharp is not None:
-            topology = with_creases(topology, sharp)
-            sharp = crease_children(topology)
-        control = ControlLevel(points, topology, normals, length, blocks)
-        # What overflows under an absurd budget is caught just below.
-        with np.errstate(over="ignore", invalid="ignore"):
-            vertices, edges = scheme.vertex_rule(control), scheme.edge_rule(control)
-            points = np.concatenate([vertices.positions, edges.positions])
-        if not np.abs(points).max() <= LARGEST_COORDINATE:  # also where one is NaN
-            raise MeshError("refined coordinates are too large", element="vertices")
-        faces = split(topology)
-        children = child_faces(topology, points, _loop_points(vertices, edges), blocks)
-        normals = children.normals
-        reports.append(level_report(topology, vertices, edges, children))
-        done += len(faces)
-        if progress is not None:
-            progress(done, total)
-    assert vertices is not None  # levels ≥ 1
-    assert edges is not None
-    return Refinement(
-        mesh=Mesh.of_refined(points, faces),
-        report={
-            "scheme": scheme.name,
-            "budget": scheme.budget,
-            "model": scheme.model,
-            "model_hash": scheme.model_hash,
-            "reference_length": length,
-            "multi_fan_vertices": several_fans,
-            "levels": reports,
-        },
-        ratio=np.concatenate([vertices.ratio, edges.ratio]),
-        gate=np.concatenate([vertices.gate, edges.gate]),
+    workers = _threads(threads)
+    work = RefinementProgress(
+        len(mesh.faces), levels, scheme.learned_levels, limit, progress or _nobody_listens
     )
+    total = sum(len(mesh.faces) * 4**level for level in range(1, levels + 1))
+    arguments = (mesh, scheme, levels, length, creases)
+    if kernels_can_serve(*arguments) and kernels_pay(total):
+        # Loads the compiler's runtime, which whoever only imports the package does not need.
+        from pns_common.fused.refine import refine_fused
+
+        made = refine_fused(*arguments, Blocks(workers, KERNEL_ROWS, work.rows), work.level_ends)
+    else:
+        made = refine_arrays(*arguments, Blocks(workers, ROWS, work.rows), work.level_ends)
+    points, normals = made.points, None
+    if limit:
+        topology, blocks = made.split_topology(), Blocks(workers, ROWS, work.rows)
+        points = refined_limit_positions(made.points, topology, blocks)
+        normals = refined_limit_normals(made.points, topology, blocks)
+        work.level_ends()
+    return Refinement(
+        mesh=Mesh.of_refined(points, made.faces),
+        make_report=Deferred(lambda: report_of(scheme, length, made.several_fans, made.reports)),
+        ratio=made.ratio,
+        gate=made.gate,
+        normals=normals,
+    )
+
+
+def report_of(
+    scheme: Scheme, reference_length: float, several_fans: int, levels: list[LevelReport]
+) -> Report:
+    """The report of a refinement, from those of its levels."""
+    return {
+        "scheme": scheme.name,
+        "budget": scheme.budget,
+        "model": scheme.model,
+        "model_hash": scheme.model_hash,
+        "reference_length": reference_length,
+        "multi_fan_vertices": several_fans,
+        **limit_distances(levels),
+        "levels": levels,
+    }
+
+
+def refine_arrays(
+    mesh: Mesh,
+    scheme: Scheme,
+    levels: int,
+    reference_length: float,
+    creases: Int[np.ndarray, "N 2"] | None,
+    blocks: Blocks,
+    after_level: AfterLevel,
+) -> RefinedLevels:
+    """Go through the levels with the array kernels, which serve every scheme.
+
+    Raises:
+        ParameterError: a crease is no edge.
+        ModelError: the network returned something that is not finite, or of another shape.
+        MeshError: the refined coordinates are too large.
+    """
+    steps = array_steps(mesh.vertices, mesh.faces, creases, scheme, reference_length, blocks)
+    reports: list[LevelReport] = []
+    several_fans, last = 0, None
+    for last in islice(steps, levels):
+        if last.several_fans is not None:
+            several_fans = int(last.several_fans.sum())
+        check_coordinates(np.abs(last.placed.points).max())
+        reports.append(level_report(last.topology, last.placed, last.children))
+        after_level()
+    assert last is not None  # levels ≥ 1
+    placed, topology = last.placed, last.topology
+    ratio = np.concatenate([placed.vertices.ratio, placed.edges.ratio])
+    gate = np.concatenate([placed.vertices.gate, placed.edges.gate])
+    looked_at = Deferred(lambda: LevelsReport(reports, several_fans))
+    return RefinedLevels(placed.points, last.faces, ratio, gate, looked_at, lambda: topology)
+
+
+def kernels_can_serve(
+    mesh: Mesh,
+    scheme: Scheme,
+    levels: int,
+    reference_length: float,
+    creases: Int[np.ndarray, "N 2"] | None,
+) -> bool:
+    """Whether the compiled kernels can take the place of the array kernels, with the same bits."""
+    if not (kernels_available() and fits(len(mesh.vertices), len(mesh.faces), levels)):
+        return False
+    return scheme.learned_levels == 0 or (reference_length > 0 and kernels_know(scheme))
 
 
 def measure_reference_length(
@@ -141,23 +218,8 @@ def measure_reference_length(
     return float(norm(referenced - referenced.mean(axis=0)).max()) / math.sqrt(2)
 
 
-def _loop_points(vertices: Placement, edges: Placement) -> Float[np.ndarray, "V 3"] | None:
-    """Where Loop would have put all vertices; None if they are there."""
-    if vertices.displacement is None and edges.displacement is None:
-        return None
-    return np.concatenate([vertices.loop, edges.loop])
-
-
-def _face_normals(
-    points: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"], blocks: Blocks
-) -> Float[np.ndarray, "F 3"]:
-    normals = np.empty((len(faces), 3))
-
-    def measure(rows: slice) -> None:
-        normals[rows] = face_normals(points, faces[rows])
-
-    blocks.run(len(faces), measure)
-    return normals
+def _nobody_listens(done: int, total: int) -> None:
+    pass
 
 
 def _threads(given: int | None) -> int:
@@ -175,6 +237,10 @@ def _check_levels(levels: int) -> None:
 
 def _reference_length(mesh: Mesh, given: float | str) -> float:
     if given == "auto":
+        if kernels_available() and kernels_loaded():
+            from pns_common.fused.extent import reference_length
+
+            return reference_length(mesh.vertices, mesh.faces)
         return measure_reference_length(mesh.vertices, mesh.faces)
     if not (is_number(given) and float(given) > 0):
         raise ParameterError("reference_length", given, expected='"auto" or a number > 0')

@@ -11,6 +11,8 @@ from pns_common.topology import EdgeClass, Topology, sharp_edge_count
 EDGE_ENDPOINT, EDGE_OPPOSITE = 3 / 8, 1 / 8
 MIDPOINT = 1 / 2
 CURVE_CENTRE, CURVE_NEIGHBOUR = 3 / 4, 1 / 8
+# The limit of a vertex on a cubic B-spline.
+CURVE_LIMIT_CENTRE, CURVE_LIMIT_NEIGHBOUR = 4 / 6, 1 / 6
 
 ALL = slice(None)
 
@@ -23,6 +25,15 @@ def loop_beta(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
     k = np.maximum(valence, 1)
     beta = (5 / 8 - (3 / 8 + np.cos(2 * np.pi / k) / 4) ** 2) / k
     return np.where(valence > 0, beta, 0.0)
+
+
+def limit_ring_weight(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+    """w_k = 1 / (1 + 3 / (8 k β_k)): all neighbours' weight in Loop's limit mask; 0 for valence 0.
+
+    The limit of a vertex is (1 − w_k) p + w_k (mean of its neighbours).
+    """
+    ring = valence * loop_beta(valence)
+    return ring / (ring + 3 / 8)
 
 
 def loop_edge_point(

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Int
@@ -57,6 +59,43 @@ class Topology:
     def edge_faces(self) -> Int[np.ndarray, "E 2"]:
         """The two faces of interior and crease edges, lower index first; −1 at other edges."""
         return self.half_edges // 3
+
+    @cached_property
+    def smooth_vertices(self) -> Bool[np.ndarray, " V"]:
+        """Vertices with one closed ring of interior edges: those that a learned rule may move."""
+        used = np.zeros(self.vertex_count, dtype=bool)
+        used[self.edges.reshape(-1)] = True
+        return used & (sharp_edge_count(self) == 0) & ~multi_fan_vertices(self)
+
+    @cached_property
+    def valence(self) -> Int[np.ndarray, " V"]:
+        """The number of edges at each vertex."""
+        return np.bincount(self.edges.reshape(-1), minlength=self.vertex_count)
+
+
+@runtime_checkable
+class Connectivity(Protocol):
+    """What a report reads of a topology."""
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices."""
+        ...
+
+    @property
+    def faces(self) -> Int[np.ndarray, "F 3"]:
+        """Vertices of each face."""
+        ...
+
+    @property
+    def edge_class(self) -> Int[np.ndarray, " E"]:
+        """EdgeClass values."""
+        ...
+
+    @property
+    def interior(self) -> Int[np.ndarray, " I"]:
+        """Indices of the interior edges."""
+        ...
 
 
 def build_topology(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Topology:

@@ -75,6 +75,14 @@ class MediaTypeError(ServiceError):
     title = "The content type is not supported"
 
 
+class UnauthorizedError(ServiceError):
+    """There is no key, or it is not one of ours."""
+
+    status = 401
+    code = "unauthorized"
+    title = "A key is needed"
+
+
 class GltfError(ServiceError):
     """The file reads, but breaks its own promises: an accessor, an index, a node tree, a NaN."""
 
@@ -134,6 +142,17 @@ class BusyError(ServiceError):
         self.retry_after = retry_after
 
 
+class NoStorageError(ServiceError):
+    """There is no room for a body or a result: the disk or the memory is full, or not writable.
+
+    Nothing of what did not fit is kept.
+    """
+
+    status = 503
+    code = "no-storage"
+    title = "There is no room to store this"
+
+
 class NoModelError(ServiceError):
     """The PNS scheme was asked for and no model is loaded."""
 
@@ -158,10 +177,10 @@ class WorkerDied(ServiceError):  # noqa: N818
     title = "The worker process ended unexpectedly"
 
 
-def check_limit(limit: str, found: int, allowed: int, text: str) -> None:
-    """Raise LimitError where `found` is more than `allowed`; `text` says what has so much."""
-    if found > allowed:
-        raise LimitError(f"{text}, more than {allowed}", limit=limit, allowed=allowed, found=found)
+def check_limit(limit: str, asked: int, allowed: int, text: str) -> None:
+    """Raise LimitError where `asked` is more than `allowed`; `text` says what has so much."""
+    if asked > allowed:
+        raise LimitError(f"{text}, more than {allowed}", limit=limit, allowed=allowed, found=asked)
 
 
 def check_choice(name: str, value: str, choices: Sequence[str]) -> None:

@@ -75,7 +75,7 @@ def _vertex_rows(card: ModelCard) -> dict[str, Any]:
 def _headline(card: ModelCard) -> list[str]:
     """The improvements by which models are compared; a dash for what the card does not hold."""
     measured = card.metrics.get(HEADLINE)
-    if not _is_measured(measured):
+    if measured is None or not _is_measured(measured):
         return ["–"] * len(HEADLINE_COLUMNS)
     rows = [measured.get(metric) for metric in HEADLINE_COLUMNS]
     return ["–" if row is None else f"{row['percent']:+.1f}" for row in rows]

@@ -5,49 +5,59 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
-from service.errors import InvalidParameter, check_choice
+from .errors import InvalidParameter, check_choice
 
 MAX_LEVELS = 6
 
-SCHEMES = ("pns", "loop")
-DIAGNOSTICS = ("summary", "full", "none")
-COMPRESSIONS = ("none", "draco", "meshopt")
-UV_RULES = ("linear", "smooth")
+SchemeName = Literal["pns", "loop"]
+Diagnostics = Literal["summary", "full", "none"]
+UvRule = Literal["linear", "smooth"]
+NormalRule = Literal["keep", "smooth", "limit"]
+Compression = Literal["none", "draco", "meshopt"]
 # A weld further than a hundredth of R is a different tool: it would take features away.
 MAX_WELD_TOLERANCE = 0.01
 # `off`, `normals`, or `angle:` and degrees.
 CREASE_PATTERN = r"off|normals|angle:\d{1,3}(\.\d{1,6})?"
 
+# The upload, its decoded JSON, and its bytes again in the answer.
+BYTES_PER_INPUT_BYTE = 4
+
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """One request's parameters, valid once constructed.
+    """One request's parameters, valid once constructed: the command line's and HTTP's too.
 
     `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
-    mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R. Raises InvalidParameter.
+    mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
+    vertices on the limit surface. Raises InvalidParameter.
     """
 
     levels: int = 1
-    scheme: Literal["pns", "loop"] = "pns"
+    scheme: SchemeName = "pns"
     budget: float | None = None
     reference_length: float | Literal["auto"] = "auto"
-    diagnostics: Literal["summary", "full", "none"] = "summary"
-    uv: Literal["linear", "smooth"] = "linear"
+    diagnostics: Diagnostics = "summary"
+    uv: UvRule = "linear"
+    normals: NormalRule = "keep"
     crease: str = "off"
     weld_tolerance: float = 0.0
-    compress: Literal["none", "draco", "meshopt"] = "none"
+    compress: Compression = "none"
+    limit: bool = False
 
     def __post_init__(self) -> None:
         if not 1 <= self.levels <= MAX_LEVELS:
             raise InvalidParameter(
                 "levels", f"levels is {self.levels}; it must be 1 to {MAX_LEVELS}"
             )
-        check_choice("scheme", self.scheme, SCHEMES)
-        check_choice("diagnostics", self.diagnostics, DIAGNOSTICS)
-        check_choice("compress", self.compress, COMPRESSIONS)
-        check_choice("uv", self.uv, UV_RULES)
+        check_choice("scheme", self.scheme, get_args(SchemeName))
+        check_choice("diagnostics", self.diagnostics, get_args(Diagnostics))
+        check_choice("compress", self.compress, get_args(Compression))
+        check_choice("uv", self.uv, get_args(UvRule))
+        check_choice("normals", self.normals, get_args(NormalRule))
+        if self.normals == "limit" and not self.limit:
+            raise InvalidParameter("normals", "normals=limit needs limit=true: they stand there")
         if self.budget is not None and not (math.isfinite(self.budget) and self.budget >= 0):
             raise InvalidParameter("budget", "budget must be a finite number, zero or more")
         if self.reference_length != "auto" and not (
@@ -75,6 +85,10 @@ class Options:
     def weld_unit(self) -> float | None:
         """The length that `weld_tolerance` counts in; None: each mesh's own R."""
         return None if self.reference_length == "auto" else self.reference_length
+
+
+DEFAULTS = Options()
+"""What a parameter is where it is not given."""
 
 
 @dataclass(frozen=True, slots=True)

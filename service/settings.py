@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import os
+from difflib import get_close_matches
+from ipaddress import IPv4Network, IPv6Network
+from pathlib import Path
+from typing import Annotated
 
-from pydantic import ByteSize, Field
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import BeforeValidator, ByteSize, Field, model_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-from service.options import MAX_LEVELS, Limits
+from .options import MAX_LEVELS, Limits
 
 MIB = 1024**2
+PREFIX = "PNS_"
+# Scheme, host and perhaps port, as browsers send it: no path, no slash at the end.
+ORIGIN = r"^(\*|https?://[a-z0-9.-]+(:[0-9]{1,5})?|https?://\[[0-9a-f:]+\](:[0-9]{1,5})?)$"
+Network = IPv4Network | IPv6Network
 
 
 def _worker_default() -> int:
@@ -17,16 +25,42 @@ def _worker_default() -> int:
     return min(2, os.cpu_count() or 1)
 
 
+def _comma_separated(value: object) -> object:
+    """A list as an environment variable holds it; blanks around a name are not part of it."""
+    if isinstance(value, str):
+        return [name.strip() for name in value.split(",") if name.strip()]
+    return value
+
+
 class Settings(BaseSettings):
     """The service's settings; sizes read as `64MiB`, durations are seconds.
 
-    Raises pydantic.ValidationError where a value is out of range.
+    Raises pydantic.ValidationError where a value is out of range, or where the environment holds a
+    `PNS_…` that is none of them: a limit that is misspelt would be lost without a word.
     """
 
-    model_config = SettingsConfigDict(env_prefix="PNS_", frozen=True, extra="forbid")
+    model_config = SettingsConfigDict(
+        env_prefix=PREFIX, frozen=True, extra="forbid", allow_inf_nan=False
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown(cls, values: object) -> object:
+        known = {f"{PREFIX}{name.upper()}" for name in cls.model_fields}
+        for name in os.environ:
+            if name.upper().startswith(PREFIX) and name.upper() not in known:
+                near = get_close_matches(name.upper(), known, n=1)
+                hint = f"; is it {near[0]}?" if near else ""
+                raise ValueError(f"there is no setting {name}{hint}")
+        return values
 
     host: str = "127.0.0.1"
     port: int = Field(default=8000, ge=0, le=65535)
+    prefix: str = Field(
+        default="",
+        pattern=r"^(/[A-Za-z0-9._~-]+)*$",
+        description="path under which a proxy shows the service, and which it takes away",
+    )
     model: str | None = Field(
         default=None, description="bundled name or model file; none: the default bundled one"
     )
@@ -43,15 +77,87 @@ class Settings(BaseSettings):
 
     workers: int = Field(default_factory=_worker_default, ge=1, description="worker processes")
     queue: int = Field(default=8, ge=0, description="requests that may wait beside those that run")
-    uploads: int = Field(default=64, gt=0, description="bodies that may arrive at the same time")
+    queue_seconds: float = Field(
+        default=600, gt=0, description="longest wait of a job that nobody holds a connection for"
+    )
+    short_seconds: float = Field(
+        default=0.5,
+        gt=0,
+        description="jobs predicted to take no longer have a worker to themselves",
+    )
+    faces_per_minute: float | None = Field(
+        default=20_000_000,
+        gt=0,
+        description="refined faces that one client may ask for in a minute",
+    )
+    result_seconds: float = Field(
+        default=900, gt=0, description="how long the result of a job is kept"
+    )
+    result_bytes: ByteSize = Field(
+        default=ByteSize(1024 * MIB), gt=0, description="what the results that are kept may take"
+    )
+    results: int = Field(
+        default=64, gt=0, description="jobs that are kept after their end, with or without a result"
+    )
+    result_folder: Path | None = Field(
+        default=None, description="where results are kept; none: the system's temporary folder"
+    )
+    answer_bytes: ByteSize = Field(
+        default=ByteSize(1024 * MIB), gt=0, description="answers in memory that clients are taking"
+    )
+    uploads: int = Field(default=512, gt=0, description="bodies that may arrive at the same time")
+
+    connections: int = Field(default=512, gt=0, description="open connections in all")
+    connections_of_address: int = Field(
+        default=48, gt=0, description="open connections of one address (IPv6: of one /64)"
+    )
+    proxies: Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_comma_separated)] = Field(
+        default=(),
+        description="addresses and networks whose Forwarded headers are believed, with commas",
+    )
+
+    keys_file: Path | None = Field(
+        default=None, description="who may ask: a file of keys' hashes; none: everybody"
+    )
+    cors_origins: Annotated[
+        tuple[Annotated[str, Field(pattern=ORIGIN)], ...],
+        NoDecode,
+        BeforeValidator(_comma_separated),
+    ] = Field(default=(), description="origins whose pages may ask, with commas; `*`: any")
+    metrics_host: str = "127.0.0.1"
+    metrics_port: int | None = Field(
+        default=None, ge=0, le=65535, description="where /metrics is served; none: nowhere"
+    )
 
     job_seconds: float = Field(default=60, gt=0, description="longest job")
     upload_seconds: float = Field(default=120, gt=0, description="longest upload of one body")
     idle_seconds: float = Field(
         default=10, gt=0, description="longest wait for the next piece of a body"
     )
+    head_seconds: float = Field(
+        default=10, gt=0, description="longest wait for a request line and its headers"
+    )
+    keep_alive_seconds: float = Field(
+        default=5, gt=0, description="how long a connection may rest between requests"
+    )
+    linger_seconds: float = Field(
+        default=5,
+        gt=0,
+        description="how long a client is listened to that is answered before its body is whole",
+    )
+    answer_seconds: float = Field(
+        default=600, gt=0, description="longest wait in all for a client to take its answer"
+    )
     stall_seconds: float = Field(
-        default=30, gt=0, description="longest wait for a client to take one piece of its answer"
+        default=30, gt=0, description="longest wait for a client to take more of its answer"
+    )
+    grace_seconds: float = Field(
+        default=10, gt=0, description="how far a client may fall behind `rate`"
+    )
+    rate: ByteSize = Field(
+        default=ByteSize(8 * 1024),
+        gt=0,
+        description="bytes a second that a body, and an answer, must move on average",
     )
     drain_seconds: float = Field(
         default=75, gt=0, description="longest wait for running requests after SIGTERM"

@@ -1,28 +1,72 @@
-"""Every test runs with the operator's array annotations enforced: shapes, kinds and all."""
+"""What every test runs with; tests of pns_common alone also with its array annotations enforced.
+
+Shapes and kinds are checked at run time in a run over tests/pns_common and nothing else. It takes
+five times as long, and a shape does not hang on the numbers: few examples serve. A run over all
+tests takes the properties of pns_common with all examples.
+"""
 
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, settings
 from jaxtyping import install_import_hook
 
-import tests.typecheck  # noqa: F401  (the hook finds it by name)
+import tests.support.typecheck  # noqa: F401  (the hook finds it by name)
 
-PACKAGE = Path(__file__).resolve().parents[1] / "pns_common"
+TESTS = Path(__file__).resolve().parent
+PACKAGE = TESTS.parent / "pns_common"
 # These check their own input and raise errors of their own: the edge where values come in.
 FRONT_DOORS = {"mesh", "refine", "parameters"}
 CHECKED = [
     f"pns_common.{path.stem}" for path in PACKAGE.glob("*.py") if path.stem not in FRONT_DOORS
 ]
-
-# Must come before anything imports pns_common.
-install_import_hook(CHECKED, "tests.typecheck.check")
+# Kernels are compiled from their source, and have their types from that.
+for room in ("edge", "vertex", "fused", "limit", "pieces"):
+    CHECKED += [f"pns_common.{room}.{path.stem}" for path in (PACKAGE / room).glob("*.py")]
 
 # Derandomised: the same examples on every machine. Timings are never asserted.
 settings.register_profile(
     "ci",
     derandomize=True,
     deadline=None,
-    max_examples=50,
+    max_examples=40,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )
+settings.register_profile("shapes", settings.get_profile("ci"), max_examples=6)
 settings.load_profile("ci")
+
+# Which tests are of a kind that `make quick` leaves out, by where they stand.
+KINDS = {
+    "spawning": (
+        "addons",
+        "docs/test_site.py",
+        "fuzz",
+        "service/http",
+        "service/scale",
+        "service/test_assets.py",
+        "service/cli",
+        "service/web",
+        "service/workers",
+        "test_architecture.py",
+        "test_wheel.py",
+        "web",
+    ),
+    "training": ("export", "train"),
+}
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Check annotations in a run over tests of pns_common; nothing has imported it yet."""
+    here = config.invocation_params.dir
+    given = [(here / argument.partition("::")[0]).resolve() for argument in config.args]
+    if given and all(path.is_relative_to(TESTS / "pns_common") for path in given):
+        install_import_hook(CHECKED, "tests.support.typecheck.check")
+        settings.load_profile("shapes")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark tests by where they stand."""
+    for item in items:
+        for kind, places in KINDS.items():
+            if any(item.path.is_relative_to(TESTS / place) for place in places):
+                item.add_marker(kind)

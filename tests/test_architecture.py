@@ -17,7 +17,7 @@ def loaded_by(module):
     return set(done.stdout.split())
 
 
-@pytest.mark.parametrize("module", ["pns_common", "service.app", "service.cli"])
+@pytest.mark.parametrize("module", ["pns_common", "service.http.app", "service.cli"])
 def test_the_product_never_loads_torch(module):
     assert not loaded_by(module) & {"torch", "train", "export"}
 

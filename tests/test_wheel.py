@@ -1,56 +1,155 @@
-"""The wheel holds what a user needs, and works without the checkout."""
+"""The wheel holds what a user needs and no more, and README's commands work where it is alone."""
 
-import os
+import json
+import re
+import struct
 import subprocess
 import sys
 import zipfile
-from pathlib import Path
+from contextlib import contextmanager
 
 import pytest
 
 from pns_common.onnx_model import DEFAULT_MODEL
+from pns_common.version import VERSION
+from tests.support.installed import ROOT, checkout, environment, run
 
-ROOT = Path(__file__).resolve().parents[1]
-
-
-def run(*arguments, **options):
-    done = subprocess.run(arguments, capture_output=True, text=True, check=False, **options)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+README = (ROOT / "README.md").read_text()
+ADDRESS = re.compile(r"running on (http://[\d.]+:\d+)")
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
-    # Only what git knows, so that a file that was never added is missed here and not by a user.
-    names = run("git", "ls-files", "-z", cwd=ROOT).split("\0")
-    for name in filter(None, names):
-        if (ROOT / name).is_file():
-            target = source / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes((ROOT / name).read_bytes())
-    run(sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", out, source)
-    (path,) = out.glob("*.whl")
-    return path
+def distributions(tmp_path_factory):
+    """The source distribution and the wheel."""
+    source, out = checkout(tmp_path_factory.mktemp("source")), tmp_path_factory.mktemp("dist")
+    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", out, source)
+    (wheel,), (archive,) = out.glob("*.whl"), out.glob("*.tar.gz")
+    return archive, wheel
 
 
-def test_the_wheel_holds_packages_models_and_licence(wheel):
+@pytest.fixture(scope="module")
+def wheel(distributions):
+    return distributions[1]
+
+
+@pytest.fixture(scope="module")
+def library(wheel, tmp_path_factory):
+    """Programs of an environment with the library alone."""
+    return environment(tmp_path_factory.mktemp("library"), wheel, set())
+
+
+@pytest.fixture(scope="module")
+def service(wheel, tmp_path_factory):
+    """Programs of an environment with the service too."""
+    return environment(tmp_path_factory.mktemp("service"), wheel, {"service"})
+
+
+def commands(*programs):
+    """README's lines of shell that run one of these programs, without their comments."""
+    blocks = re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
+    lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
+    plain = [re.sub(r"\s#\s.*", "", line).replace(".venv-serve/bin/", "") for line in lines]
+    return [line.strip() for line in plain if line.startswith(programs)]
+
+
+def test_both_distributions_are_fit_to_publish(distributions):
+    out = run(sys.executable, "-m", "twine", "check", "--strict", *distributions)
+    assert out.count("PASSED") == 2
+
+
+def test_the_wheel_holds_two_packages_models_page_and_licence(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
-    wanted = {"pns_common/py.typed", "service/cli.py", "train/run.py", "export/run.py"}
+    wanted = {"pns_common/py.typed", "pns_common/numpy_network/wire.py"}
+    wanted |= {"pns_service/cli/commands.py", "pns_service/http/routes.py"}
+    wanted |= {"pns_service/web/index.html"}
     wanted |= {f"pns_common/models/{name}.onnx" for name in ("paper", DEFAULT_MODEL)}
     assert wanted <= names
-    assert not any(name.startswith(("tests/", "docs/", "benchmarks/")) for name in names)
+    tops = {name.partition("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"pns_common", "pns_service"}
     assert any(name.endswith("licenses/LICENSE") for name in names)
 
 
-def test_the_installed_wheel_refines_a_file(wheel, tmp_path):
-    site = tmp_path / "site"
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index"]
-    run(*pip, "--target", site, wheel)
-    environment = os.environ | {"PYTHONPATH": str(site)}
-    where = "import pns_common; print(pns_common.__file__)"
-    found = run(sys.executable, "-c", where, cwd=tmp_path, env=environment)
-    assert Path(found.strip()).is_relative_to(site)
-    for command in (["example", "a.glb"], ["subdivide", "a.glb", "-o", "b.glb"]):
-        run(sys.executable, site / "bin" / "pns", *command, cwd=tmp_path, env=environment)
-    assert (tmp_path / "b.glb").stat().st_size > (tmp_path / "a.glb").stat().st_size
+def test_nothing_of_the_service_is_left_out(wheel):
+    names = zipfile.ZipFile(wheel).namelist()
+    installed = {n.removeprefix("pns_service/") for n in names if n.startswith("pns_service/")}
+    known = run("git", "ls-files", "service", cwd=ROOT).split()
+    assert {name.removeprefix("service/") for name in known} - installed == set()
+
+
+def test_the_library_asks_for_numpy_and_two_small_packages(wheel, tmp_path):
+    (metadata,) = [n for n in zipfile.ZipFile(wheel).namelist() if n.endswith("METADATA")]
+    text = zipfile.ZipFile(wheel).read(metadata).decode()
+    asked = [line for line in text.splitlines() if line.startswith("Requires-Dist")]
+    base = sorted(line.split()[1].partition(">")[0] for line in asked if "extra ==" not in line)
+    assert base == ["array-api-compat", "jaxtyping", "numpy"]
+
+
+def test_readmes_python_runs_with_the_library_alone(library, tmp_path):
+    (snippet,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    mesh = "import numpy as np\nvertices, faces = np.eye(3), np.array([[0, 1, 2]])\n"
+    script = tmp_path / "readme.py"
+    script.write_text(f"{mesh}{snippet}\nprint(refined)\n")
+    out = run(library / "python", "-W", "error", script, cwd=tmp_path)
+    assert out.startswith("Refinement(")
+    assert len(out.splitlines()) == 1
+
+
+def test_the_command_says_what_to_install_where_the_service_is_not(library, tmp_path):
+    done = subprocess.run(
+        [library / "pns", "--version"], capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    assert done.returncode == 1
+    assert "pip install 'pns-subdivision[service]'" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_the_command_knows_its_version(service, tmp_path):
+    assert run(service / "pns", "--version", cwd=tmp_path) == f"pns {VERSION}\n"
+
+
+def test_readmes_commands_run(service, tmp_path):
+    lines = commands("pns ")
+    assert {line.split()[1] for line in lines} >= {"example", "subdivide", "info"}
+    for line in lines:
+        run("bash", "-ec", f"{service}/{line}", cwd=tmp_path)
+    assert (tmp_path / "part2.glb").stat().st_size > (tmp_path / "part.glb").stat().st_size
+
+
+def unpack(glb, gltf, binary):
+    """Write a GLB as JSON with a file beside it."""
+    data = glb.read_bytes()
+    (size,) = struct.unpack_from("<I", data, 12)
+    document = json.loads(data[20 : 20 + size])
+    document["buffers"][0]["uri"] = binary.name
+    gltf.write_text(json.dumps(document))
+    binary.write_bytes(data[28 + size :])
+
+
+@contextmanager
+def serving(service, folder):
+    """The address of a server of that environment."""
+    command = [service / "pns", "serve", "--port", "0"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=folder) as process:
+        try:
+            yield next(told[1] for line in process.stderr if (told := ADDRESS.search(line)))
+        finally:
+            process.terminate()
+            process.stderr.read()
+
+
+def test_readmes_requests_are_answered(service, tmp_path):
+    run(service / "pns", "example", "part.glb", cwd=tmp_path)
+    unpack(tmp_path / "part.glb", tmp_path / "a.gltf", tmp_path / "a.bin")
+    lines = commands("curl ")
+    assert len(lines) >= 4
+    with serving(service, tmp_path) as address:
+        for line in lines:
+            # A fresh service compiles its kernels first; until then it answers 503.
+            here = line.replace("http://127.0.0.1:8000", address)
+            run(
+                "bash",
+                "-ec",
+                here.replace("curl ", "curl --fail --silent --show-error --retry 9 ", 1),
+                cwd=tmp_path,
+            )
+    assert (tmp_path / "part2.glb").stat().st_size > (tmp_path / "part.glb").stat().st_size

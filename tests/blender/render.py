@@ -4,42 +4,42 @@ python render.py OUT.png FRAME FILE.glb...     # prints what Blender made of eac
 """
 
 import json
-import math
 import sys
 from pathlib import Path
 
 import bpy
-from mathutils import Vector
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from addons.blender.pictures import stage
 
 SAMPLES = 24
 WIDTH, HEIGHT = 840, 420
-GAP = 0.15
-# From the scene towards the eye, z up.
-VIEW = Vector((0.8, -1.0, 0.45))
+GAP, MARGIN = 0.15, 1.08
 
 
 def main(output, frame, files):
     """Render `files` from left to right."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    stage.clear()
     groups = [imported(path) for path in files]
     scene = bpy.context.scene
     scene.frame_set(frame)
-    right = VIEW.cross(Vector((0, 0, -1))).normalized()
-    place, found = 0.0, []
+    place, descriptions = 0.0, []
     for objects in groups:
         corners = evaluated(objects)
-        along = [corner.dot(right) for corner in corners]
-        shift = right * (place - min(along))
+        along = [corner.dot(stage.RIGHT) for corner in corners]
+        shift = stage.RIGHT * (place - min(along))
         for root in (o for o in objects if o.parent is None):
             root.matrix_world.translation += shift
         place += (max(along) - min(along)) * (1 + GAP)
-        found.append(described(objects))
+        descriptions.append(described(objects))
     bpy.context.view_layer.update()
     scene.frame_set(frame)
-    look_at([corner for objects in groups for corner in evaluated(objects)], right)
-    light()
-    render(Path(output))
-    print(json.dumps(found))
+    look_at([corner for objects in groups for corner in evaluated(objects)])
+    stage.light()
+    stage.prepare(WIDTH, HEIGHT, stage.Quality(samples=SAMPLES))
+    stage.picture(Path(output))
+    print(json.dumps(descriptions))
 
 
 def imported(path):
@@ -77,54 +77,14 @@ def described(objects):
     }
 
 
-def look_at(corners, right):
-    """An orthographic camera that sees all corners."""
-    toward = VIEW.normalized()
-    up = toward.cross(right)
-    spans = [(min(c.dot(a) for c in corners), max(c.dot(a) for c in corners)) for a in (right, up)]
-    across, along = (sum(span) / 2 for span in spans)
-    centre = right * across + up * along
-    depth = max(c.dot(toward) for c in corners)
-    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-    camera.data.type = "ORTHO"
+def look_at(corners):
+    """Let the camera see all corners."""
+    axes = (stage.RIGHT, stage.UP)
+    spans = [(min(c.dot(a) for c in corners), max(c.dot(a) for c in corners)) for a in axes]
     wide, tall = (high - low for low, high in spans)
-    camera.data.ortho_scale = 1.08 * max(wide, tall * WIDTH / HEIGHT)
-    reach = wide + tall
-    camera.location = centre + toward * (depth + reach)
-    camera.data.clip_end = 10 * reach
-    camera.rotation_euler = toward.to_track_quat("Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(camera)
-    bpy.context.scene.camera = camera
-
-
-def light():
-    """A sun over the left shoulder, and a grey sky."""
-    sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
-    sun.data.energy, sun.data.angle = 1.6, math.radians(3)
-    sun.rotation_euler = (math.radians(50), 0, math.radians(15))
-    bpy.context.scene.collection.objects.link(sun)
-    world = bpy.data.worlds.new("sky")
-    world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs[0].default_value = (0.8, 0.85, 0.9, 1)
-    world.node_tree.nodes["Background"].inputs[1].default_value = 0.35
-    bpy.context.scene.world = world
-
-
-def render(output):
-    """One frame by Cycles on the processor: the only engine that needs no graphics card."""
-    bpy.ops.preferences.addon_enable(module="cycles")
-    scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    scene.cycles.device = "CPU"
-    scene.cycles.samples, scene.cycles.seed = SAMPLES, 0
-    scene.cycles.use_denoising = True
-    scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
-    scene.view_settings.view_transform = "Standard"
-    scene.render.image_settings.file_format = "PNG"
-    scene.render.image_settings.color_mode = "RGB"
-    scene.render.image_settings.compression = 100
-    scene.render.filepath = str(output)
-    bpy.ops.render.render(write_still=True)
+    middle = [sum(span) / 2 for span in spans]
+    size = MARGIN * max(wide, tall * WIDTH / HEIGHT)
+    stage.camera(size, size * HEIGHT / WIDTH, stage.at(*middle))
 
 
 if __name__ == "__main__":

@@ -10,9 +10,9 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
-from service.subdivide import subdivide_gltf
-from tests.shared import SHARED
+from tests.support.shared import SHARED
 
 ROOT = Path(__file__).resolve().parents[2]
 RENDER = Path(__file__).with_name("render.py")

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from pns_common import load_model
-from service.folder import folder_of
+from service.bodies.folder import folder_of
+from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
-from service.subdivide import subdivide_gltf
-from tests import node_tools
-from tests.shared import SHARED
+from tests.support import node_tools
+from tests.support.shared import SHARED
 
 LEVELS = (1, 2)
 # Files that break their promises, or have nothing to refine; tests/service has their refusals.
@@ -40,7 +40,7 @@ def refined(name, levels, scheme="pns"):
     options = Options(levels=levels, scheme=scheme)
     media = path.suffix.removeprefix(".")
     return subdivide_gltf(
-        path.read_bytes(), media, options, _model(), Limits(), neighbours=folder_of(path)
+        path.read_bytes(), media, options, _model(), Limits(), siblings=folder_of(path)
     )
 
 
@@ -50,29 +50,59 @@ def _model():
     return load_model()
 
 
+# Batches: each is refined, validated and loaded in one go, by one test process.
+BATCHES = 8
+
+
+def batch_of(name):
+    """The batch that an asset belongs to."""
+    return NAMES.index(name) % BATCHES
+
+
 class Conformance:
-    """All refined assets as files, and one run each of the validator and of three.js over them."""
+    """Refined assets as files, and one run each of the validator and of three.js over a batch."""
 
     def __init__(self, folder):
-        self.paths, self._meshes = {}, {}
-        for name in NAMES:
-            self.paths[name, 0, None] = ROWS[name]["path"]
+        self.folder, self.paths, self._meshes = folder, {}, {}
+        self._messages, self._loaded, self._ready = {}, {}, set()
+
+    def prepare(self, batch):
+        """Refine, validate and load a batch, once."""
+        if batch in self._ready:
+            return
+        self._ready.add(batch)
+        paths = {}
+        for name in NAMES[batch::BATCHES]:
+            paths[name, 0, None] = ROWS[name]["path"]
             for levels in LEVELS:
                 for scheme in ("pns", "loop"):
-                    path = folder / f"{Path(name).stem}-{levels}-{scheme}.glb"
+                    path = self.folder / f"{Path(name).stem}-{levels}-{scheme}.glb"
                     path.write_bytes(refined(name, levels, scheme).glb)
-                    self.paths[name, levels, scheme] = path
-        checked = [path for (_, _, scheme), path in self.paths.items() if scheme != "loop"]
-        self._messages = node_tools.run("validate.mjs", checked)
-        self._loaded = node_tools.run("load.mjs", self.paths.values())
+                    paths[name, levels, scheme] = path
+        checked = [path for (_, _, scheme), path in paths.items() if scheme != "loop"]
+        self.paths |= paths
+        self._messages |= node_tools.run("validate.mjs", checked)
+        self._loaded |= node_tools.run("load.mjs", paths.values())
+
+    def originals(self):
+        """The meshes of all assets as they are."""
+        paths = [ROWS[name]["path"] for name in NAMES]
+        loaded = node_tools.run("load.mjs", paths)
+        return [
+            [_arrays(p) for p in mesh if p["triangles"]]
+            for path in paths
+            for mesh in loaded[str(path)]["meshes"]
+        ]
 
     def errors(self, name, levels, scheme):
         """The validator's error codes."""
+        self.prepare(batch_of(name))
         messages = self._messages[str(self.paths[name, levels, scheme])]
         return {message["code"] for message in messages if message["severity"] == 0}
 
     def loaded(self, name, levels, scheme):
         """What three.js made of the file."""
+        self.prepare(batch_of(name))
         return self._loaded[str(self.paths[name, levels, scheme])]
 
     def meshes(self, name, levels, scheme):

@@ -44,8 +44,8 @@ def loop_step(points, faces):
     """
     expected, sure = np.full((len(faces), 6, 3), np.nan), np.zeros(len(faces), dtype=bool)
     edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    _, at, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    crowded = (count[at.reshape(-1)] > 1).reshape(-1, 3).any(axis=1)
+    _, number, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    crowded = (count[number.reshape(-1)] > 1).reshape(-1, 3).any(axis=1)
     component = _components(faces, len(points))
     sound = ~np.isin(component[faces[:, 0]], component[faces[crowded, 0]]) & proper(faces)
     if not sound.any():

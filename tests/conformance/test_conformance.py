@@ -5,19 +5,25 @@ import json
 import numpy as np
 import pytest
 
+from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
-from service.subdivide import subdivide_gltf
-from tests.conformance.collection import LEVELS, NAMES, ROWS, Conformance, refined
+from tests.conformance.collection import LEVELS, NAMES, ROWS, Conformance, batch_of, refined
 from tests.conformance.surfaces import loop_step, open_edges, proper, welded
-from tests.service.gltf import files
+from tests.support.gltf import files
 
 pytestmark = [
     pytest.mark.skipif(not NAMES, reason="needs the assets of the shared data"),
-    # The collection is refined, validated and loaded once: on one worker.
-    pytest.mark.xdist_group("conformance"),
+    pytest.mark.conformance,
 ]
 
-ASSET = pytest.mark.parametrize("name", NAMES)
+# What a batch of assets becomes is made once: by one test process.
+ASSET = pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.xdist_group(f"conformance {batch_of(name)}"))
+        for name in NAMES
+    ],
+)
 LEVEL = pytest.mark.parametrize("levels", LEVELS)
 # Their values may change: geometry, and what says where it is.
 GEOMETRY = {"accessors", "bufferViews", "buffers", "meshes"}
@@ -58,7 +64,7 @@ def test_three_js_loads_it_with_its_skins_and_targets(conformance, name, levels)
 @ASSET
 @LEVEL
 def test_each_face_becomes_four_at_each_level(conformance, name, levels):
-    before, after = (conformance.meshes(name, *at) for at in ((0, None), (levels, "pns")))
+    before, after = (conformance.meshes(name, *setting) for setting in ((0, None), (levels, "pns")))
     dropped = 0
     for old, new in zip(before, after, strict=True):
         _, faces = welded(old)
@@ -75,8 +81,8 @@ def test_each_face_becomes_four_at_each_level(conformance, name, levels):
 @LEVEL
 def test_seams_do_not_crack_and_watertight_stays_watertight(conformance, name, levels):
     rims = [
-        [open_edges(welded(mesh)[1]) for mesh in conformance.meshes(name, *at)]
-        for at in ((0, None), (levels, "pns"))
+        [open_edges(welded(mesh)[1]) for mesh in conformance.meshes(name, *setting)]
+        for setting in ((0, None), (levels, "pns"))
     ]
     assert rims[1] == [rim * 2**levels for rim in rims[0]]
     tight, meshes = ROWS[name]["watertight"].split("/")
@@ -99,17 +105,15 @@ def test_loop_equals_an_independent_implementation(conformance, name, levels):
             if not len(kept):
                 continue
             corners = p["points"][p["faces"].reshape(-1, 4, 3)]
-            found = np.concatenate([corners[:, :3, 0], corners[:, 3]], axis=1)
+            surface = np.concatenate([corners[:, :3, 0], corners[:, 3]], axis=1)
             size = np.ptp(points, axis=0).max()
             np.testing.assert_allclose(
-                found[sure[kept]], expected[kept][sure[kept]], atol=1e-6 * size
+                surface[sure[kept]], expected[kept][sure[kept]], atol=1e-6 * size
             )
 
 
 def test_the_independent_loop_covers_most_of_the_collection(conformance):
-    sure = [
-        loop_step(*welded(mesh))[1] for name in NAMES for mesh in conformance.meshes(name, 0, None)
-    ]
+    sure = [loop_step(*welded(mesh))[1] for mesh in conformance.originals()]
     assert np.concatenate(sure).mean() > 0.6
 
 
@@ -143,19 +147,21 @@ def test_at_morph_weight_zero_it_is_the_base_pose(name):
     ).glb
     for number, mesh in enumerate(tree["meshes"]):
         for place in range(len(mesh["primitives"])):
-            (faces, expected), (own, found) = (
+            (faces, expected), (own, posed) = (
                 files.primitive_of(glb, number, place)
                 for glb in (plain, refined(name, 2, "loop").glb)
             )
             for key in expected:
-                np.testing.assert_array_equal(found[key][own], expected[key][faces])
+                np.testing.assert_array_equal(posed[key][own], expected[key][faces])
 
 
 @ASSET
 @LEVEL
 def test_animated_it_stays_beside_the_original(conformance, name, levels):
     # Loop's surface lies inside the control mesh's hull in every pose of a rig, or nearly so.
-    poses = [conformance.loaded(name, *at)["poses"] for at in ((0, None), (levels, "loop"))]
+    poses = [
+        conformance.loaded(name, *setting)["poses"] for setting in ((0, None), (levels, "loop"))
+    ]
     for before, after in zip(*poses, strict=True):
         if before[0][0] is None:
             assert after == before

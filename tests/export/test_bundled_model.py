@@ -6,31 +6,35 @@ import pytest
 from typer.testing import CliRunner
 
 import export.run
-from export.model_file import checkpoint_card
+from export.model_file import RECORDED, checkpoint_card
 from export.run import FILE_OF_RECIPE
 from pns_common import load_model, pns
 from pns_common.onnx_model import DEFAULT_MODEL, bundled_models
-from train.card_metrics import MEASURES, card_metrics
-from train.checkpoint import Checkpoint, save_checkpoint
-from train.datasets import ridge_held_out
-from train.determinism import machine_fingerprint
-from train.envelope import envelope_limit
-from train.metrics import improvements_as_data
-from train.recipe_operator import initial_network
-from train.recipes import RECIPES, ridge
-from train.torch_model import recipe_model
-from train.trainer import fit
+from tests.support.recipes import tiny
+from train.data.datasets import ridge_held_out
+from train.fitting.determinism import machine_fingerprint
+from train.fitting.trainer import fit
+from train.metrics.card import MEASURES, card_metrics
+from train.metrics.envelope import envelope_limit
+from train.metrics.one_step import improvements_as_data
+from train.models.checkpoint import Checkpoint, save_checkpoint
+from train.models.from_recipe import initial_network
+from train.models.recipes import RECIPES, paper, signed
+from train.models.torch_model import recipe_model
 
 PERCENT_POINTS = 0.01
 BY_MODEL = {path.stem: recipe for recipe, path in FILE_OF_RECIPE.items()}
 QUICK = ("paper", "signed")
 """Models that are trained within seconds: tests train them again."""
 
+OLDER = ("full",)
+"""Models that stay readable and exact; what trained them is gone."""
+
 each_model = pytest.mark.parametrize("name", sorted(BY_MODEL))
 
 
 def test_every_bundled_model_has_a_recipe_and_every_file_is_there():
-    assert sorted(BY_MODEL) == bundled_models()
+    assert sorted([*BY_MODEL, *OLDER]) == bundled_models()
     assert DEFAULT_MODEL in BY_MODEL
 
 
@@ -38,9 +42,9 @@ def test_every_bundled_model_has_a_recipe_and_every_file_is_there():
 def test_card_holds_what_a_fresh_evaluation_finds(name):
     model = load_model(name)
     for measured, card in model.card.metrics.items():
-        found = improvements_as_data(MEASURES[measured](pns(model)))
-        assert set(card) == set(found)
-        for metric, row in found.items():
+        measured_again = improvements_as_data(MEASURES[measured](pns(model)))
+        assert set(card) == set(measured_again)
+        for metric, row in measured_again.items():
             for column, value in row.items():
                 tolerance = PERCENT_POINTS if column in ("percent", "low", "high") else 2e-6
                 assert value == pytest.approx(card[metric][column], abs=tolerance), (metric, column)
@@ -48,66 +52,80 @@ def test_card_holds_what_a_fresh_evaluation_finds(name):
 
 def test_the_papers_model_reaches_the_papers_gain():
     card = load_model("paper").card
-    found = card.metrics["ridge-held-out"]
+    gains = card.metrics["ridge-held-out"]
     assert (card.budget, card.gate_sharpness) == (0.5, 10.0)
-    assert found["distance_near"]["percent"] >= 20
-    assert found["distance"]["percent"] >= 12
+    assert gains["distance_near"]["percent"] >= 20
+    assert gains["distance"]["percent"] >= 12
 
 
 def test_the_signed_model_reaches_the_limit_of_the_papers_envelope():
     card = load_model("signed").card
-    found, held_out = card.metrics["ridge-held-out"], ridge_held_out()
+    gains, held_out = card.metrics["ridge-held-out"], ridge_held_out()
     limit = envelope_limit(held_out, card.budget, card.gate_sharpness)
     assert (card.budget, card.gate_sharpness) == (0.5, 10.0)
     for metric in ("distance_near", "distance", "hausdorff"):
-        assert found[metric]["percent"] >= 0.95 * limit[metric].percent
-    assert found["normal_near"]["percent"] > 0
-    assert found["normal"]["percent"] > 0
+        assert gains[metric]["percent"] >= 0.95 * limit[metric].percent
+    assert gains["normal_near"]["percent"] > 0
+    assert gains["normal"]["percent"] > 0
 
 
-def test_the_full_model_gains_at_every_level_and_loses_nowhere():
-    found = load_model("full").card.metrics
-    step, whole = found["ridge-held-out"], found["ridge-held-out after 4 levels"]
-    for metric, least in (("distance_near", 50), ("distance", 42), ("hausdorff", 30)):
-        assert step[metric]["percent"] >= least
-    assert min(step["normal_near"]["percent"], step["normal"]["percent"]) > 0
-    assert whole["distance"]["percent"] >= 45
-    assert whole["normal"]["percent"] > 0
-    assert found["saddle-held-out"]["distance"]["percent"] >= -1
-    assert found["sphere-ridge-held-out"]["distance"]["percent"] > 0
+def test_the_general_model_gains_on_ridges_after_four_levels():
+    whole = load_model("general").card.metrics["ridge-held-out after 4 levels"]
+    assert whole["distance"]["percent"] >= 40
+    assert whole["normal"]["percent"] >= 35
 
 
+def recipe_on_card(training):
+    (name,) = (name for name in RECIPES if RECORDED.get(name, name) == training["recipe"])
+    return RECIPES[name](training["seed"])
+
+
+@pytest.mark.retrain
 @pytest.mark.parametrize("name", QUICK)
 def test_recipe_makes_the_bundled_file_again(name, tmp_path):
     bundled = load_model(name)
     training = bundled.card.training
-    recipe = RECIPES[training["recipe"]](training["seed"])
+    recipe = recipe_on_card(training)
     network = fit(recipe, lambda done, loss: None).network
-    found = card_metrics(recipe, pns(recipe_model(recipe, network)))
+    again = card_metrics(recipe, pns(recipe_model(recipe, network)))
     if training["machine"] != machine_fingerprint():
         # Another processor or library rounds otherwise: the same quality is all that can be asked.
         for metric, row in bundled.card.metrics["ridge-held-out"].items():
-            measured = found["ridge-held-out"][metric].percent
+            measured = again["ridge-held-out"][metric].percent
             assert measured == pytest.approx(row["percent"], abs=1.0), metric
         return
-    metrics = {measured: improvements_as_data(rows) for measured, rows in found.items()}
+    metrics = {measured: improvements_as_data(rows) for measured, rows in again.items()}
     path = tmp_path / "made.safetensors"
     save_checkpoint(path, Checkpoint(recipe, network, metrics, machine_fingerprint()))
     assert export_command(path, tmp_path / "made.onnx").exit_code == 0
     assert (tmp_path / "made.onnx").read_bytes() == FILE_OF_RECIPE[recipe.name].read_bytes()
 
 
+def test_a_recipe_makes_the_same_file_twice(tmp_path):
+    """The way of the bundled files, in a few steps: train, measure, keep, export."""
+    files = []
+    for number in range(2):
+        recipe = tiny(signed(3))
+        network = fit(recipe, lambda done, loss: None).network
+        metrics = {"ridge-held-out": {"distance": {"percent": 1.0}}}
+        path = tmp_path / f"{number}.safetensors"
+        save_checkpoint(path, Checkpoint(recipe, network, metrics, machine_fingerprint()))
+        assert export_command(path, tmp_path / f"{number}.onnx").exit_code == 0
+        files.append((tmp_path / f"{number}.onnx").read_bytes())
+    assert files[0] == files[1]
+
+
 @each_model
 def test_card_holds_the_recipe_as_it_stands(name):
     training = load_model(name).card.training
-    recipe = RECIPES[training["recipe"]](training["seed"])
+    recipe = recipe_on_card(training)
     checkpoint = Checkpoint(recipe, initial_network(recipe), {}, training["machine"])
     assert as_json(checkpoint_card(checkpoint).training) == as_json(training)
 
 
 def test_export_command_writes_the_same_bytes_twice(tmp_path):
     path = tmp_path / "c.safetensors"
-    save_checkpoint(path, Checkpoint(ridge(), initial_network(ridge()), {}, "machine"))
+    save_checkpoint(path, Checkpoint(paper(), initial_network(paper()), {}, "machine"))
     for name in ("one.onnx", "two.onnx"):
         outcome = export_command(path, tmp_path / name)
         assert outcome.exit_code == 0

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import onnx
+import onnxruntime
 import pytest
 import torch
 
@@ -9,12 +10,12 @@ from export.model_file import checkpoint_card, export_model, write_model
 from export.onnx_graph import OPSET, model_bytes
 from export.parity import BUDGETS, ROWS, TOLERANCE, ParityError, check_parity, sample_features
 from pns_common.onnx_model import load_model, model_from_bytes
-from train.checkpoint import Checkpoint
-from train.recipe_operator import initial_network
-from train.recipes import paper_text, ridge
-from train.torch_model import recipe_model
+from train.models.checkpoint import Checkpoint
+from train.models.from_recipe import initial_network
+from train.models.recipes import paper, paper_text
+from train.models.torch_model import recipe_model
 
-RECIPES = [pytest.param(recipe, id=recipe.name) for recipe in (ridge(), paper_text())]
+RECIPES = [pytest.param(recipe, id=recipe.name) for recipe in (paper(), paper_text())]
 
 
 def card_of(recipe):
@@ -52,8 +53,8 @@ def test_file_against_a_float64_network_in_numpy(recipe):
         if index < len(layers) - 1:
             z = np.tanh(z) if recipe.activation == "tanh" else gelu(z)
     expected = 0.5 * z / np.maximum(1, np.linalg.norm(z, axis=1, keepdims=True))
-    found = model_from_bytes(model_bytes(network, card_of(recipe)), "test")(features, 0.5)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=0.5e-6)
+    answered = model_from_bytes(model_bytes(network, card_of(recipe)), "test")(features, 0.5)
+    np.testing.assert_allclose(answered, expected, rtol=0, atol=0.5e-6)
 
 
 def gelu(x):
@@ -70,11 +71,31 @@ def test_same_network_same_bytes(recipe):
 
 
 def test_graph_has_one_operator_set_and_nothing_from_this_machine():
-    proto = onnx.load_from_string(model_bytes(initial_network(ridge()), card_of(ridge())))
+    proto = onnx.load_from_string(model_bytes(initial_network(paper()), card_of(paper())))
     assert [(entry.domain, entry.version) for entry in proto.opset_import] == [("", OPSET)]
     assert not proto.producer_version
     assert not proto.doc_string
     assert not any(node.doc_string for node in proto.graph.node)
+
+
+def test_onnxruntime_computes_the_gelu_in_one_operator(tmp_path):
+    options = onnxruntime.SessionOptions()
+    options.optimized_model_filepath = str(tmp_path / "optimised.onnx")
+    data = model_bytes(initial_network(paper()), card_of(paper()))
+    onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+    operators = [node.op_type for node in onnx.load(tmp_path / "optimised.onnx").graph.node]
+    assert operators.count("Gelu") == len(paper().hidden)
+    assert "Erf" not in operators
+
+
+@pytest.mark.parametrize("recipe", RECIPES)
+def test_a_rows_bits_do_not_depend_on_where_it_stands(recipe):
+    model = model_from_bytes(model_bytes(initial_network(recipe), card_of(recipe)), "test")
+    features = sample_features(5)[:3000]
+    whole = model(features, 0.5)
+    for cut in (1, 7, 1021, 2999):
+        parts = np.concatenate([model(features[:cut], 0.5), model(features[cut:], 0.5)])
+        np.testing.assert_array_equal(parts, whole)
 
 
 def test_samples_hold_the_extremes():
@@ -89,20 +110,21 @@ def test_samples_hold_the_extremes():
 
 
 def test_card_holds_the_whole_recipe():
-    recipe = ridge(4)
+    recipe = paper(4)
     metrics = {"ridge-held-out": {"distance": {"percent": 12.0}}}
     card = checkpoint_card(Checkpoint(recipe, initial_network(recipe), metrics, "machine"))
     assert (card.features, card.gate_sharpness, card.budget) == ("paper-5", 10.0, 0.5)
     assert card.orientation == "first-face"
     assert card.metrics == metrics
-    assert card.training["recipe"] == "ridge"
+    assert card.training["recipe"] == "ridge"  # As the bundled file has it.
     assert card.training["machine"] == "machine"
-    for name in ("seed", "steps", "hidden", "learning_rate", "batch_size"):
+    for name in ("seed", "steps", "hidden", "learning_rate"):
         assert card.training[name] == getattr(recipe, name)
+    assert card.training["batch_size"] == recipe.training.batch_size
 
 
 def test_written_file_loads_with_its_card(tmp_path):
-    checkpoint = Checkpoint(ridge(), initial_network(ridge()), {"x": {"y": 1}}, "machine")
+    checkpoint = Checkpoint(paper(), initial_network(paper()), {"x": {"y": 1}}, "machine")
     exported = export_model(checkpoint, tmp_path / "models" / "mine.onnx")
     model = load_model(tmp_path / "models" / "mine.onnx")
     assert model.hash == exported.sha256
@@ -112,7 +134,7 @@ def test_written_file_loads_with_its_card(tmp_path):
 
 @pytest.mark.parametrize("damage", [1e-5, float("nan")])
 def test_a_file_that_differs_is_not_written(tmp_path, monkeypatch, damage):
-    network, other = initial_network(ridge()), initial_network(ridge())
+    network, other = initial_network(paper()), initial_network(paper())
     with torch.no_grad():
         other.linear_layers[-1].bias += damage
     path = tmp_path / "model.onnx"
@@ -121,7 +143,7 @@ def test_a_file_that_differs_is_not_written(tmp_path, monkeypatch, damage):
         "export.model_file.model_bytes", lambda _, card, *rest: model_bytes(other, card)
     )
     with pytest.raises(ParityError, match="differ") as caught:
-        write_model(network, card_of(ridge()), path)
+        write_model(network, card_of(paper()), path)
     assert caught.value.budget in BUDGETS
     assert not caught.value.difference <= TOLERANCE
     assert path.read_bytes() == b"the old file"

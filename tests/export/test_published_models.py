@@ -9,9 +9,9 @@ from export.published import export_published
 from pns_common import load_model, refine
 from pns_common.errors import ModelError
 from pns_common.schemes import pns
-from tests.networks import published_model
-from tests.shared import published, shared_path
-from train.datasets import ridge_held_out
+from tests.support.networks import published_model
+from tests.support.shared import published, shared_path
+from train.data.datasets import ridge_held_out
 
 BUDGETS = {
     "ablation_PNS_full_trained": 0.5,
@@ -44,11 +44,11 @@ def test_a_file_refines_as_the_published_weights_do(tmp_path):
     ours = load_model(tmp_path / "pns_headline_C0.5.onnx")
     theirs = published_model(published("weights.npz"), "pns_headline_C0.5")
     mesh = ridge_held_out().instances[0].mesh
-    found, expected = (
+    refined, expected = (
         refine(mesh, pns(model), levels=2, reference_length=1.0).mesh.vertices
         for model in (ours, theirs)
     )
-    np.testing.assert_allclose(found, expected, atol=1e-7)
+    np.testing.assert_allclose(refined, expected, atol=1e-7)
 
 
 def test_a_folder_without_networks_of_the_operator_is_refused(tmp_path):

@@ -10,24 +10,27 @@ import torch
 from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, check_parity
 from pns_common import Mesh, pns, refine
-from pns_common.features import FEATURE_SETS
-from pns_common.onnx_model import ALLOWED_OPERATORS, model_from_bytes
+from pns_common.edge.features import FEATURE_SETS
+from pns_common.model_contract import ALLOWED_OPERATORS
+from pns_common.onnx_model import model_from_bytes
 from pns_common.topology import build_topology
-from tests.meshes import bent, bumpy_sphere, grid
-from tests.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
+from tests.support.meshes import bent, bumpy_sphere, grid
+from tests.support.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
 from train.certificates.equivariance import well_conditioned
-from train.recipe_operator import initial_network
-from train.recipes import ridge
-from train.torch_model import recipe_model
+from train.models.from_recipe import initial_network
+from train.models.recipes import paper
+from train.models.torch_model import recipe_model
 
 BUDGET = 0.5
 SINGLE = 1e-6
-SIGNED = sorted(name for name, one in FEATURE_SETS.items() if len(one.symmetries.order) == 8)
+SIGNED = sorted(
+    name for name, features in FEATURE_SETS.items() if len(features.symmetries.order) == 8
+)
 feature_sets = pytest.mark.parametrize("features", sorted(FEATURE_SETS))
 
 
 def network_and_file(features, scale=3.0):
-    recipe = replace(ridge(), features=features, orientation="symmetric")
+    recipe = replace(paper(), features=features, orientation="symmetric")
     network = initial_network(recipe)
     with torch.no_grad():
         network.linear_layers[-1].weight *= scale
@@ -67,5 +70,5 @@ def test_numbering_and_mirrors_change_nothing_through_a_file(features, name):
     allowed = 1e-12 + SINGLE * BUDGET * np.concatenate([np.zeros(len(mesh.vertices)), square])
     kept = np.concatenate([np.ones(len(mesh.vertices), dtype=bool), well_conditioned(mesh)])
     for twin, expected in twins:
-        found = refine(twin.mesh, scheme, reference_length=1.0).mesh.vertices[twin.place]
-        assert (np.linalg.norm(found - expected, axis=1) <= allowed)[kept].all()
+        positions = refine(twin.mesh, scheme, reference_length=1.0).mesh.vertices[twin.place]
+        assert (np.linalg.norm(positions - expected, axis=1) <= allowed)[kept].all()

@@ -14,23 +14,24 @@ from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, ParityError, check_parity
 from pns_common import Mesh, ModelError, load_model, pns, refine
 from pns_common.model_card import ModelCard
-from pns_common.onnx_model import ALLOWED_OPERATORS, ROWS, model_from_bytes
-from pns_common.ring_features import RING_10
+from pns_common.model_contract import ALLOWED_OPERATORS, ROWS
+from pns_common.onnx_model import model_from_bytes
 from pns_common.schemes import vertex_operator
 from pns_common.topology import build_topology
-from tests.meshes import bent, bumpy_sphere, grid
-from tests.networks import perceptron_bytes, random_layers
+from pns_common.vertex.rings import RING_10
+from tests.support.meshes import bent, bumpy_sphere, grid
+from tests.support.networks import perceptron_bytes, random_layers
+from train.certificates.certify import certify_scheme
 from train.certificates.double_precision import double_model
 from train.certificates.model_file import keeps_its_word
 from train.certificates.subject import in_double, subject_of_model, subject_of_network
-from train.certify import certify_scheme
-from train.networks import SymmetricNet
-from train.one_step import refine_once
-from train.recipe_operator import initial_network, recipe_operator
-from train.recipes import ridge
-from train.torch_model import TorchModel, recipe_model
+from train.fitting.one_step import refine_once
+from train.models.from_recipe import initial_network, recipe_operator
+from train.models.networks import SymmetricNet
+from train.models.recipes import paper
+from train.models.torch_model import TorchModel, recipe_model
 
-RECIPE = replace(ridge(), features="signed-18", orientation="symmetric")
+RECIPE = replace(paper(), features="signed-18", orientation="symmetric")
 FIELDS = {"format": 2, "vertex_features": "ring-10", "vertex_gate_sharpness": 10.0}
 
 
@@ -40,8 +41,8 @@ def two_networks(scale=3.0):
     generator = torch.Generator().manual_seed(1)
     vertices = SymmetricNet(RING_10.symmetries, (16, 16), "gelu", generator)
     with torch.no_grad():
-        for one in (network, vertices):
-            one.linear_layers[-1].weight *= scale
+        for net in (network, vertices):
+            net.linear_layers[-1].weight *= scale
     card = replace(recipe_model(RECIPE, network).card, **FIELDS)
     return TorchModel("two", card, network, vertices)
 
@@ -76,12 +77,12 @@ def test_written_file_loads_and_refines_as_the_networks_do(tmp_path):
     loaded = load_model(path)
     assert loaded.card == model.card
     mesh = Mesh(*grid(7, bent))
-    found = refine(mesh, pns(loaded), 2, 1.0)
+    refined = refine(mesh, pns(loaded), 2, 1.0)
     expected = refine(mesh, pns(model), 2, 1.0)
-    np.testing.assert_allclose(found.mesh.vertices, expected.mesh.vertices, rtol=0, atol=1e-6)
-    assert found.report["levels"][0]["vertex_rule"]["proximity_ratio"]["max"] > 0.01
+    np.testing.assert_allclose(refined.mesh.vertices, expected.mesh.vertices, rtol=0, atol=1e-6)
+    assert refined.report["levels"][0]["vertex_rule"]["proximity_ratio"]["max"] > 0.01
     again = refine(mesh, pns(pickle.loads(pickle.dumps(loaded))), 2, 1.0)
-    np.testing.assert_array_equal(again.mesh.vertices, found.mesh.vertices)
+    np.testing.assert_array_equal(again.mesh.vertices, refined.mesh.vertices)
 
 
 def test_a_second_network_that_differs_is_not_written(tmp_path):
@@ -108,7 +109,7 @@ def test_a_model_without_a_vertex_rule_says_so():
     with pytest.raises(ModelError, match="a vertex rule"):
         loaded.vertex_correction(np.zeros((1, RING_10.count)), 1.0)
     with pytest.raises(ModelError, match="a vertex rule"):
-        recipe_model(ridge(), initial_network(ridge())).vertex_correction(np.zeros((1, 10)), 1.0)
+        recipe_model(paper(), initial_network(paper())).vertex_correction(np.zeros((1, 10)), 1.0)
 
 
 def card_text(**changes):
@@ -121,7 +122,8 @@ def card_text(**changes):
     ("changes", "says"),
     [
         ({"format": 1}, "vertex fields in format 1"),
-        ({"format": 3}, "format 3, not 1 or 2"),
+        ({"format": 4}, "format 4, not 1 or 2 or 3"),
+        ({"format": 3}, "format 3 without learned_levels"),
         ({"vertex_features": "ring-99"}, "ring-99"),
         ({"vertex_features": None}, "without the other"),
         ({"vertex_gate_sharpness": None}, "without the other"),
@@ -134,7 +136,7 @@ def test_a_wrong_card_is_named(changes, says):
 
 
 def test_vertex_fields_stand_on_the_card_only_where_there_are_some():
-    plain = recipe_model(ridge(), initial_network(ridge())).card
+    plain = recipe_model(paper(), initial_network(paper())).card
     assert "vertex" not in plain.to_json()
     assert ModelCard.from_json(two_networks().card.to_json()) == two_networks().card
     assert ModelCard.from_json(card_text(vertex_features=None, vertex_gate_sharpness=None))
@@ -171,9 +173,9 @@ def test_training_step_is_the_products_step():
     step = refine_once(
         points, topology, recipe_operator(RECIPE, exact.network), RECIPE.budget, differentiable
     )
-    found = refine(mesh, pns(exact), reference_length=1.0)
-    np.testing.assert_allclose(step.points.detach(), found.mesh.vertices, rtol=0, atol=1e-14)
-    inner = found.ratio[: topology.vertex_count]
+    refined = refine(mesh, pns(exact), reference_length=1.0)
+    np.testing.assert_allclose(step.points.detach(), refined.mesh.vertices, rtol=0, atol=1e-14)
+    inner = refined.ratio[: topology.vertex_count]
     np.testing.assert_allclose(step.vertex_ratio.detach(), inner[inner > 0], rtol=0, atol=1e-13)
     step.points.sum().backward()
     assert torch.isfinite(points.grad).all()
@@ -188,9 +190,9 @@ def test_the_file_in_double_precision_is_the_network_in_double_precision():
     rows = np.random.default_rng(0).uniform(-1, 1, (20, RING_10.count))
     with torch.no_grad():
         expected = in_double(model.vertex_network)(torch.from_numpy(rows), 0.5).numpy()
-    found = double_model(loaded, data).vertex_correction(rows, 0.5)
-    # The file holds √½ of the GELU in single precision.
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7)
+    answered = double_model(loaded, data).vertex_correction(rows, 0.5)
+    # The file holds √2 of the GELU in single precision.
+    np.testing.assert_allclose(answered, expected, rtol=0, atol=1e-7)
 
 
 def test_every_certificate_passes_with_the_vertex_rule_on():
@@ -198,9 +200,9 @@ def test_every_certificate_passes_with_the_vertex_rule_on():
     subject = subject_of_network(model)
     verdict = certify_scheme(subject, (), 0, lambda *_: None, valences=(3, 6, 9))
     failed = [
-        (one.theorem, one.name, one.value, one.where)
-        for one in verdict.certificates
-        if one.counts and not one.passed
+        (certificate.theorem, certificate.name, certificate.value, certificate.where)
+        for certificate in verdict.certificates
+        if certificate.counts and not certificate.passed
     ]
     assert not failed
 
@@ -209,8 +211,8 @@ def test_the_file_keeps_its_word_for_vertices_too():
     model = two_networks(1e3)
     data = file_bytes(model)
     rows = keeps_its_word(model_from_bytes(data, "two"))
-    assert all(one.passed for one in rows)
-    assert sum("vertex" in one.name for one in rows) == 2
+    assert all(row.passed for row in rows)
+    assert sum("vertex" in row.name for row in rows) == 2
     subject = subject_of_model(
         model_from_bytes(data, "two"), double_model(model_from_bytes(data, "two"), data)
     )

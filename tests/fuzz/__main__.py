@@ -16,7 +16,7 @@ import typer
 
 from tests.fuzz.processes import in_processes
 from tests.fuzz.run import ALLOWANCE, LIMITS, MIB
-from tests.shared import SHARED
+from tests.support.shared import SHARED
 
 
 def main(
@@ -37,8 +37,8 @@ def main(
         ]
         tallies = in_processes(jobs)
     outcomes = sum((tally.outcomes for tally in tallies), Counter[str]())
-    for code, found in outcomes.most_common():
-        typer.echo(f"{found:>9,}  {code}")
+    for code, count_of_code in outcomes.most_common():
+        typer.echo(f"{count_of_code:>9,}  {code}")
     peak = max(tally.peak for tally in tallies)
     limit = LIMITS.max_memory_bytes / MIB
     typer.echo(

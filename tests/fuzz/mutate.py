@@ -34,8 +34,8 @@ def _flipped(body: bytes, rng: random.Random) -> bytes:
 def _overwritten(body: bytes, rng: random.Random) -> bytes:
     data = bytearray(body)
     number = rng.choice([0, 1, 2**31 - 1, 2**32 - 1, rng.getrandbits(32)])
-    at = rng.randrange(max(1, len(data) - 4))
-    data[at : at + 4] = struct.pack("<I", number)
+    byte = rng.randrange(max(1, len(data) - 4))
+    data[byte : byte + 4] = struct.pack("<I", number)
     return bytes(data)
 
 
@@ -46,8 +46,8 @@ def _cut(body: bytes, rng: random.Random) -> bytes:
 def _doubled(body: bytes, rng: random.Random) -> bytes:
     start = rng.randrange(len(body))
     end = min(len(body), start + rng.choice([1, 4, 64, 1024]))
-    at = rng.randrange(len(body))
-    return body[:at] + body[start:end] + body[at:]
+    byte = rng.randrange(len(body))
+    return body[:byte] + body[start:end] + body[byte:]
 
 
 def _binary_only(body: bytes, rng: random.Random) -> bytes:

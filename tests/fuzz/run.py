@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.memory import peak_mib, reset_peak
+from service.bodies.uploads import sent
 from service.errors import ServiceError
+from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
-from service.subdivide import subdivide_gltf
-from service.upload_body import sent
 from tests.fuzz.mutate import mutated
 from tests.fuzz.seeds import Seed
 
@@ -62,12 +62,12 @@ def run(seeds: list[Seed], count: int, seconds: float, start: int, kept: Path | 
         if kept is not None:
             kept.write_bytes(body)
         try:
-            found = outcome(seed, body, rng.choice(COMPRESS))
+            code = outcome(seed, body, rng.choice(COMPRESS))
         except Exception as error:
-            found = "fault"
+            code = "fault"
             tally.faults.append((seed.name, number, repr(error)))
         tally.run += 1
-        tally.outcomes[found] += 1
+        tally.outcomes[code] += 1
         used = peak_mib() - base
         if used > tally.peak:
             tally.peak = used
@@ -82,9 +82,7 @@ def outcome(seed: Seed, body: bytes, compress: str = "none") -> str:
     options = Options(levels=1, scheme="loop", compress=compress)
     try:
         upload = sent(body, seed.content_type, LIMITS)
-        subdivide_gltf(
-            upload.data, upload.kind, options, None, LIMITS, neighbours=upload.neighbours
-        )
+        subdivide_gltf(upload.data, upload.kind, options, None, LIMITS, siblings=upload.siblings)
     except ServiceError as refusal:
         if not 400 <= refusal.status < 500:
             raise

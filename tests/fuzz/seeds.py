@@ -13,8 +13,8 @@ import DracoPy
 import meshopt
 import numpy as np
 
-from tests.service.gltf import files
-from tests.service.gltf.shapes import box, octahedron
+from tests.support.gltf import files
+from tests.support.gltf.shapes import box, octahedron
 
 # Larger files say nothing that smaller ones do not, and take the time of a hundred of them.
 LARGEST = 64 * 1024
@@ -34,12 +34,12 @@ GLB, GLTF = "model/gltf-binary", "model/gltf+json"
 
 def seeds(folder: Path | None) -> list[Seed]:
     """Everything that a run starts from."""
-    found = made()
+    all_seeds = made()
     for path in sorted(folder.rglob("*.gl*")) if folder is not None else []:
         if path.stat().st_size <= LARGEST:
             kind = GLB if path.suffix == ".glb" else GLTF
-            found.append(Seed(path.name, kind, path.read_bytes()))
-    return found
+            all_seeds.append(Seed(path.name, kind, path.read_bytes()))
+    return all_seeds
 
 
 def made() -> list[Seed]:
@@ -53,11 +53,11 @@ def made() -> list[Seed]:
         "draco": draco(),
         "skinned": skinned(),
     }
-    found = [
+    gathered = [
         Seed(name, GLB, files.pack(tree, bytes(binary))) for name, (tree, binary) in trees.items()
     ]
-    found += [Seed(f"{name}.gltf", GLTF, embedded(*trees[name])) for name in trees]
-    return [*found, zipped(*trees["plain"]), multipart(*trees["plain"])]
+    gathered += [Seed(f"{name}.gltf", GLTF, embedded(*trees[name])) for name in trees]
+    return [*gathered, zipped(*trees["plain"]), multipart(*trees["plain"])]
 
 
 def sparse():

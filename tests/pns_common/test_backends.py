@@ -5,11 +5,11 @@ import torch
 from hypothesis import given
 
 from pns_common.correction import correct, curvature_gate
-from pns_common.features import paper_features
-from pns_common.frames import edge_stencil, face_normals
+from pns_common.edge.features import paper_features
+from pns_common.edge.frames import edge_stencil, face_normals
 from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
 from pns_common.topology import build_topology
-from tests.meshes import bumpy_sphere, manifolds, soups
+from tests.support.meshes import bumpy_sphere, manifolds, soups
 
 WEIGHTS = np.random.default_rng(0).standard_normal((5, 3))
 
@@ -19,8 +19,10 @@ def step(points, topology, xp):
     weights = xp.asarray(WEIGHTS)
     rows = topology.interior
     normals = face_normals(points, topology.faces)
-    at = edge_stencil(points, normals, topology.stencil[rows], topology.edge_faces[rows])
-    result = correct(at, paper_features, lambda f: xp.tanh(f @ weights), curvature_gate(10.0), 0.5)
+    stencil = edge_stencil(points, normals, topology.stencil[rows], topology.edge_faces[rows])
+    result = correct(
+        stencil, paper_features, lambda f: xp.tanh(f @ weights), curvature_gate(10.0), 0.5
+    )
     old, new = loop_vertex_vertices(points, topology), loop_edge_vertices(points, topology)
     return result.displacement, result.gate, old, new
 
@@ -31,8 +33,8 @@ def test_numpy_and_torch_agree(mesh):
     ours = step(mesh.vertices, topology, np)
     theirs = step(torch.tensor(mesh.vertices), topology, torch)
     scale = max(1.0, np.abs(mesh.vertices).max()) ** 2
-    for one, other in zip(ours, theirs, strict=True):
-        np.testing.assert_allclose(one, other.numpy(), rtol=1e-12, atol=1e-12 * scale)
+    for own, twin in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(own, twin.numpy(), rtol=1e-12, atol=1e-12 * scale)
 
 
 def test_torch_differentiates_through_the_step():

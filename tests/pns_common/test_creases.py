@@ -6,8 +6,8 @@ import pytest
 from pns_common import Mesh, ParameterError, loop, pns, refine
 from pns_common.linear import level_topologies
 from pns_common.topology import EdgeClass, build_topology
-from tests.meshes import bent, bumpy_sphere, grid
-from tests.networks import random_model
+from tests.support.meshes import bent, bumpy_sphere, grid
+from tests.support.networks import random_model
 
 
 def halves():

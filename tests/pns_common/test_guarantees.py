@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, pns, refine
 from pns_common.correction import curvature_gate, project_to_ball
-from pns_common.frames import edge_frames, edge_stencil, face_normals
+from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
 from pns_common.topology import EdgeClass, build_topology
-from tests.meshes import bent, bumpy_sphere, grid, manifolds, rotation, soups
-from tests.networks import Float64Model, huge_model, random_layers, random_model
+from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, rotation, soups
+from tests.support.networks import Float64Model, huge_model, random_layers, random_model
+from train.certificates.plain_loop import plain_loop
 
 MODELS = [random_model(0), random_model(1, scale=30.0), huge_model(2)]
 models = st.sampled_from(MODELS)
@@ -19,9 +20,15 @@ ROUNDING = 1 + 1e-12
 
 @given(soups() | manifolds(), models, st.floats(1e-3, 1e3), st.sampled_from(["auto", 0.3, 1.0]))
 def test_displacement_within_budget(mesh, model, budget, reference_length):
-    """‖q − q0‖ ≤ C h² / R, from the output positions and an independent Loop step."""
+    """‖q − q0‖ ≤ C h² / R, from the output positions and an independent Loop step.
+
+    That step knows no faces that name a vertex twice.
+    """
+    proper = mesh.faces[(mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1)]
+    assume(len(proper))
+    mesh = Mesh(mesh.vertices, proper)
     refined = refine(mesh, pns(model, budget), reference_length=reference_length)
-    base = refine(mesh, loop()).mesh.vertices
+    base = plain_loop(mesh.vertices, mesh.faces).positions
     length = refined.report["reference_length"]
     topology = build_topology(mesh.faces, len(mesh.vertices))
     a, b = (mesh.vertices[topology.edges[:, end]] for end in (0, 1))
@@ -31,7 +38,7 @@ def test_displacement_within_budget(mesh, model, budget, reference_length):
     rounding = 1e-15 * np.abs(mesh.vertices).max() * 8
     scale = np.maximum(envelope, np.abs(mesh.vertices).max())
     assert (apart[len(mesh.vertices) :] <= envelope + rounding + 1e-14 * scale).all()
-    assert (apart[: len(mesh.vertices)] == 0).all()
+    assert (apart[: len(mesh.vertices)] <= rounding).all()
     assert refined.ratio.max() <= ROUNDING
 
 
@@ -81,8 +88,8 @@ def test_planar_input_gives_loop_exactly_on_axis_aligned_planes(model):
         plane[:, 2] = rng.uniform(-5, 5)
         mesh = Mesh(np.roll(plane, axis, axis=1), faces)
         for levels in (1, 3):
-            found, base = refine(mesh, pns(model), levels), refine(mesh, loop(), levels)
-            np.testing.assert_array_equal(found.mesh.vertices, base.mesh.vertices)
+            refined, base = refine(mesh, pns(model), levels), refine(mesh, loop(), levels)
+            np.testing.assert_array_equal(refined.mesh.vertices, base.mesh.vertices)
 
 
 @given(models, st.integers(0, 2**31))
@@ -94,13 +101,13 @@ def test_planar_input_gives_loop_in_any_orientation(model, seed):
     scheme = pns(model)
     refined = refine(mesh, scheme)
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    at = edge_stencil(
+    stencil = edge_stencil(
         mesh.vertices,
         face_normals(mesh.vertices, mesh.faces),
         topology.stencil[topology.interior],
         topology.edge_faces[topology.interior],
     )
-    length = edge_frames(at).length
+    length = edge_frames(stencil).length
     delta = refined.ratio[len(vertices) :][topology.interior] * model.card.budget * length**2
     assert (delta < 1e-28 * length**2).all()
 
@@ -117,9 +124,9 @@ def test_scaling_a_mesh_scales_the_result(mesh, power):
 def test_halving_the_reference_length_doubles_the_correction():
     mesh = Mesh(*bumpy_sphere())
     base = refine(mesh, loop()).mesh.vertices
-    one = refine(mesh, pns(MODELS[0]), reference_length=1.0).mesh.vertices - base
+    whole = refine(mesh, pns(MODELS[0]), reference_length=1.0).mesh.vertices - base
     half = refine(mesh, pns(MODELS[0]), reference_length=0.5).mesh.vertices - base
-    np.testing.assert_allclose(half, 2 * one, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(half, 2 * whole, rtol=0, atol=1e-15)
 
 
 @given(soups())
@@ -127,13 +134,13 @@ def test_degenerate_frames_are_rotations_and_features_finite(mesh):
     topology = build_topology(mesh.faces, len(mesh.vertices))
     if not len(topology.interior):
         return
-    at = edge_stencil(
+    stencil = edge_stencil(
         mesh.vertices,
         face_normals(mesh.vertices, mesh.faces),
         topology.stencil[topology.interior],
         topology.edge_faces[topology.interior],
     )
-    frames = edge_frames(at)
+    frames = edge_frames(stencil)
     columns = np.stack([frames.tangent, frames.normal, frames.binormal], axis=-1)
     identity = np.einsum("eij,eik->ejk", columns, columns)
     np.testing.assert_allclose(identity, np.broadcast_to(np.eye(3), identity.shape), atol=1e-9)
@@ -145,9 +152,9 @@ def test_faces_without_area_do_not_disturb_a_plane():
     vertices = np.array([[0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0], [1, -1, 0]], dtype=float)
     faces = np.array([[0, 1, 2], [0, 3, 1], [0, 4, 3], [3, 4, 1]])
     mesh = Mesh(vertices, faces)
-    found = refine(mesh, pns(MODELS[2]))
-    np.testing.assert_array_equal(found.mesh.vertices, refine(mesh, loop()).mesh.vertices)
-    assert found.report["levels"][0]["degenerate_frames"] == 3
+    refined = refine(mesh, pns(MODELS[2]))
+    np.testing.assert_array_equal(refined.mesh.vertices, refine(mesh, loop()).mesh.vertices)
+    assert refined.report["levels"][0]["degenerate_frames"] == 3
 
 
 def degenerate_frames(points, faces=((0, 1, 2), (1, 0, 3))):
@@ -177,13 +184,13 @@ def test_gate_and_its_slope_vanish_at_coplanar_faces():
         points = vertices.copy()
         points[0, 2] = lift
         topology = build_topology(faces, 4)
-        at = edge_stencil(
+        stencil = edge_stencil(
             points,
             face_normals(points, faces),
             topology.stencil[topology.interior],
             topology.edge_faces[topology.interior],
         )
-        return curvature_gate(10.0)(edge_frames(at))[0]
+        return curvature_gate(10.0)(edge_frames(stencil))[0]
 
     assert gamma(0.0) == 0
     # x ~ lift², γ ~ x² ~ lift⁴: halving the lift divides the gate by 16.
@@ -193,13 +200,13 @@ def test_gate_and_its_slope_vanish_at_coplanar_faces():
 
 @given(st.lists(st.floats(-1e300, 1e300), min_size=3, max_size=3), st.floats(1e-3, 10))
 def test_projection_never_leaves_the_ball_and_keeps_what_is_inside(vector, radius):
-    (found,) = project_to_ball(np.array([vector]), radius)
-    length = np.linalg.norm(found)
+    (projected,) = project_to_ball(np.array([vector]), radius)
+    length = np.linalg.norm(projected)
     assert length <= radius * ROUNDING
     if np.linalg.norm(np.array(vector) / max(1.0, *map(abs, vector))) * max(
         1.0, *map(abs, vector)
     ) < radius * (1 - 1e-12):
-        np.testing.assert_array_equal(found, vector)
+        np.testing.assert_array_equal(projected, vector)
 
 
 def test_zero_reference_length_switches_the_correction_off():

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, refine
 from pns_common.linear import level_topologies, refine_linear
-from tests.meshes import manifolds, soups
+from tests.support.meshes import manifolds, soups
 
 MESHES = st.one_of(manifolds(), soups())
 
@@ -18,8 +18,8 @@ def topologies(mesh, levels):
 @given(MESHES, st.integers(1, 2))
 def test_positions_as_columns_give_loop(mesh, levels):
     expected = refine(mesh, loop(), levels).mesh.vertices
-    found = refine_linear(mesh.vertices, topologies(mesh, levels))
-    np.testing.assert_array_equal(found, expected)
+    refined = refine_linear(mesh.vertices, topologies(mesh, levels))
+    np.testing.assert_array_equal(refined, expected)
 
 
 @given(MESHES, st.integers(1, 7))

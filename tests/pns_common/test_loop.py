@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pns_common import Mesh, loop, refine
 from pns_common.stencils import loop_beta
 from pns_common.topology import EdgeClass, build_topology
-from tests.meshes import (
+from tests.support.meshes import (
     TETRAHEDRON,
     bent,
     bow_tie,
@@ -20,12 +20,12 @@ from tests.meshes import (
     soups,
     three_pages,
 )
-from tests.shared import shared_path
+from tests.support.shared import shared_path
 
 
-def match(found, expected):
+def match(positions, expected):
     """Largest distance from a point of one set to the nearest of the other, both ways."""
-    apart = np.linalg.norm(found[:, None] - expected[None], axis=-1)
+    apart = np.linalg.norm(positions[:, None] - expected[None], axis=-1)
     return max(apart.min(axis=0).max(), apart.min(axis=1).max())
 
 
@@ -153,8 +153,10 @@ def test_relabelling_permutes_output(mesh):
     moved = np.empty_like(mesh.vertices)
     moved[order] = mesh.vertices
     other = Mesh(moved, order[mesh.faces])
-    one, two = refine(mesh, loop()).mesh, refine(other, loop()).mesh
-    np.testing.assert_allclose(two.vertices[two.faces], one.vertices[one.faces], rtol=0, atol=1e-14)
+    refined, relabelled = refine(mesh, loop()).mesh, refine(other, loop()).mesh
+    np.testing.assert_allclose(
+        relabelled.vertices[relabelled.faces], refined.vertices[refined.faces], rtol=0, atol=1e-14
+    )
 
 
 def test_isolated_vertices_stay():

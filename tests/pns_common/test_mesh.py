@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 
 from pns_common import Mesh, MeshError, clean
-from tests.meshes import soups
+from tests.support.meshes import soups
 
 POINTS = np.eye(3)
 FACE = np.array([[0, 1, 2]])

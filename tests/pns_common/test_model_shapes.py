@@ -7,9 +7,11 @@ from onnx import TensorProto, helper
 
 from benchmarks.memory import peak_mib, reset_peak
 from pns_common import ModelError
-from pns_common.model_shapes import LARGEST_CALL, ROWS
+from pns_common.model_contract import LARGEST_CALL, ROWS
+from pns_common.numpy_network import open_network
 from pns_common.onnx_model import load_model, model_from_bytes
-from tests.networks import model_bytes, perceptron_bytes, random_layers
+from pns_common.onnx_session import open_session
+from tests.support.networks import model_bytes, perceptron_bytes, random_layers
 
 node = helper.make_node
 CUT = {"from": np.array([0]), "to": np.array([3]), "axis": np.array([1])}
@@ -19,14 +21,18 @@ PLAIN = [THREE, node("Mul", ["three", "budget"], ["correction"])]
 WIDEST = LARGEST_CALL // (4 * ROWS * 2) - 3
 
 
-def refused(data):
-    """The refusal of a file, which takes little memory."""
-    reset_peak()
-    before = peak_mib()
-    with pytest.raises(ModelError) as caught:
-        model_from_bytes(data, "bad")
-    assert peak_mib() - before < 64
-    return caught.value
+def refused(data, *, in_numpy=None):
+    """The refusal of a file, which takes little memory; the one in numpy expects the same."""
+    errors = []
+    for runtime in (open_session, open_network):
+        reset_peak()
+        before = peak_mib()
+        with pytest.raises(ModelError) as caught:
+            model_from_bytes(data, "bad", runtime)
+        assert peak_mib() - before < 64
+        errors.append(caught.value)
+    assert errors[1].expected == (in_numpy or errors[0].expected)
+    return errors[0]
 
 
 def two_wide(width):
@@ -83,7 +89,9 @@ def test_what_grows_inside_a_small_file_is_refused_before_it_does(nodes, weights
 
 def test_lengths_that_no_number_holds_are_refused():
     nodes = [*PLAIN, *doubled("seed", 0, 70)]
-    assert "fit together" in refused(model_bytes(nodes, CUT | {"seed": np.zeros(2)})).expected
+    data = model_bytes(nodes, CUT | {"seed": np.zeros(2)})
+    error = refused(data, in_numpy=f"at most {LARGEST_CALL} bytes in one call")
+    assert "fit together" in error.expected
 
 
 def test_a_shape_that_follows_from_values_is_refused_by_name():
@@ -99,7 +107,14 @@ def test_a_shape_that_follows_from_values_is_refused_by_name():
 
 def test_text_is_no_number():
     nodes = [*PLAIN, node("Cast", ["three"], ["words"], to=TensorProto.STRING)]
-    assert refused(model_bytes(nodes, CUT)).found == "words"
+    error = refused(model_bytes(nodes, CUT), in_numpy="shapes that fit together")
+    assert error.found == "words"
+
+
+def test_a_split_into_other_parts_than_its_outputs_is_refused():
+    """onnxruntime would end the process."""
+    nodes = [*PLAIN, node("Split", ["features"], ["a", "b", "c"], axis=1, num_outputs=2)]
+    assert "fit together" in refused(model_bytes(nodes, CUT)).expected
 
 
 def test_what_a_file_says_of_its_own_tensors_is_not_believed():

@@ -13,9 +13,12 @@ from onnx import helper
 
 from pns_common import Mesh, ModelError, load_model, pns, refine
 from pns_common.model_card import ModelCard
-from pns_common.onnx_model import ROWS, bundled_models, model_from_bytes
-from tests.meshes import bumpy_sphere
-from tests.networks import (
+from pns_common.model_contract import ROWS
+from pns_common.numpy_network import open_network
+from pns_common.onnx_model import bundled_models, model_from_bytes
+from pns_common.onnx_session import open_session
+from tests.support.meshes import bumpy_sphere
+from tests.support.networks import (
     CARD,
     breaking_off_bytes,
     model_bytes,
@@ -40,10 +43,16 @@ def changed_card(**changes):
 
 
 def refused(data):
-    with pytest.raises(ModelError) as caught:
-        model_from_bytes(data, "bad")
-    assert "bad" in str(caught.value)
-    return caught.value
+    """The refusal of a file; the one in numpy is checked to say the same of what it expects."""
+    errors = []
+    for runtime in (open_session, open_network):
+        with pytest.raises(ModelError) as caught:
+            model_from_bytes(data, "bad", runtime)
+        assert "bad" in str(caught.value)
+        errors.append(caught.value)
+    with_onnx, in_numpy = errors
+    assert in_numpy.expected == with_onnx.expected
+    return with_onnx
 
 
 def test_a_good_file_loads_with_card_and_hash():
@@ -62,7 +71,10 @@ def test_bytes_that_are_no_onnx_file(data):
     ("card", "says"),
     [
         (None, "0"),
-        ("{", "truncated"),
+        ("{", "Expecting"),
+        ("[]", "not an object"),
+        ('{"format": NaN}', "no number"),
+        ("[" * 100_000, "nested"),
         (changed_card(format=3), "format 3"),
         (changed_card(features="paper-9"), "paper-9"),
         (changed_card(orientation="left"), "left"),
@@ -161,10 +173,10 @@ def test_answers_of_another_shape_are_refused():
 
 def test_a_runtime_that_answers_otherwise_than_the_file_says_is_an_error():
     class Short:
-        def run(self, outputs, inputs):
-            return [np.zeros((1, 3), dtype=np.float32)]
+        def run(self, output, inputs):
+            return np.zeros((1, 3), dtype=np.float32)
 
-    model = replace(random_model(0), _session=Short())
+    model = replace(random_model(0), _network=Short())
     with pytest.raises(ModelError, match="shape"):
         refine(Mesh(*bumpy_sphere()), pns(model))
 

@@ -5,18 +5,18 @@ import pytest
 
 from pns_common import Mesh, loop, pns, refine
 from pns_common.correction import correct, curvature_gate
-from pns_common.features import paper_features
-from pns_common.frames import edge_frames, edge_stencil, face_normals
+from pns_common.edge.features import paper_features
+from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
 from pns_common.stencils import loop_edge_point
 from pns_common.topology import build_topology
-from tests.networks import (
+from tests.support.networks import (
     PUBLISHED_BUDGET,
-    PUBLISHED_SHARPNESS,
+    PUBLISHED_GATE_SHARPNESS,
     float64_network,
     published_layers,
     published_model,
 )
-from tests.shared import published
+from tests.support.shared import published
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +37,10 @@ def sphere(steps):
     position = {tuple(edge): e for e, edge in enumerate(topology.edges.tolist())}
     order = np.array([position[tuple(edge)] for edge in steps["bumpy_sphere/edges"].tolist()])
     normals = face_normals(mesh.vertices, mesh.faces)
-    at = edge_stencil(mesh.vertices, normals, topology.stencil[order], topology.edge_faces[order])
-    return topology, order, at
+    stencil = edge_stencil(
+        mesh.vertices, normals, topology.stencil[order], topology.edge_faces[order]
+    )
+    return topology, order, stencil
 
 
 def test_edges_faces_and_opposites_are_the_published_ones(steps, sphere):
@@ -49,15 +51,15 @@ def test_edges_faces_and_opposites_are_the_published_ones(steps, sphere):
 
 
 def test_every_intermediate_equals_the_published_one(steps, weights, sphere):
-    _, _, at = sphere
+    _, _, stencil = sphere
     network = float64_network(published_layers(weights, "pns_headline_C0.5"))
-    gate = curvature_gate(PUBLISHED_SHARPNESS)
-    frames = edge_frames(at)
-    phi = paper_features(at, frames)
-    correction = correct(at, paper_features, network, gate, PUBLISHED_BUDGET)
-    q0 = loop_edge_point(at.a, at.b, at.c, at.d)
+    gate = curvature_gate(PUBLISHED_GATE_SHARPNESS)
+    frames = edge_frames(stencil)
+    phi = paper_features(stencil, frames)
+    correction = correct(stencil, paper_features, network, gate, PUBLISHED_BUDGET)
+    q0 = loop_edge_point(stencil.a, stencil.b, stencil.c, stencil.d)
     columns = np.stack([frames.tangent, frames.normal, frames.binormal], axis=-1)
-    found = {
+    own = {
         "frames": columns,
         "e_len": frames.length,
         "phi": phi,
@@ -66,7 +68,7 @@ def test_every_intermediate_equals_the_published_one(steps, weights, sphere):
         "q0": q0,
         "q": q0 + correction.displacement,
     }
-    for name, value in found.items():
+    for name, value in own.items():
         np.testing.assert_allclose(
             value, steps[f"bumpy_sphere/{name}"], rtol=0, atol=1e-10, err_msg=name
         )

@@ -1,5 +1,6 @@
 """refine: parameters, the report, determinism, and levels that compose."""
 
+import itertools
 import json
 import sys
 
@@ -9,13 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pns_common
-from pns_common import Mesh, MeshError, ParameterError, loop, pns, refine
+from pns_common import Mesh, MeshError, ParameterError, load_model, loop, pns, refine
 from pns_common.blocks import Blocks, available_threads
+from pns_common.progress import LEARNED_COST, LIMIT_COST
 from pns_common.refine import measure_reference_length
 from pns_common.schemes import Model
 from pns_common.topology import build_topology
-from tests.meshes import bent, bow_tie, bumpy_sphere, grid, icosphere, soups, three_pages
-from tests.networks import random_model
+from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid, icosphere, soups, three_pages
+from tests.support.networks import random_model
 
 MODEL = random_model(0, scale=30.0)
 
@@ -63,9 +65,9 @@ def test_coordinates_that_outgrow_the_operator_are_an_error():
 
 def test_zero_budget_is_loop():
     mesh = Mesh(*bumpy_sphere())
-    found, base = refine(mesh, pns(MODEL, 0.0), 2), refine(mesh, loop(), 2)
-    np.testing.assert_array_equal(found.mesh.vertices, base.mesh.vertices)
-    assert found.ratio.max() == 0
+    refined, base = refine(mesh, pns(MODEL, 0.0), 2), refine(mesh, loop(), 2)
+    np.testing.assert_array_equal(refined.mesh.vertices, base.mesh.vertices)
+    assert refined.ratio.max() == 0
 
 
 def test_report_is_json_and_counts_what_was_made():
@@ -112,8 +114,8 @@ def slow_normal_jump(vertices, faces):
 def test_normal_jump_is_the_largest_angle_across_an_edge(shape):
     refined = refine(Mesh(*shape), pns(MODEL), 2)
     expected = slow_normal_jump(refined.mesh.vertices, refined.mesh.faces)
-    found = refined.report["levels"][-1]["normal_jump_max"]
-    assert found == pytest.approx(expected, rel=1e-9)
+    reported = refined.report["levels"][-1]["normal_jump_max"]
+    assert reported == pytest.approx(expected, rel=1e-9)
 
 
 def test_summaries_are_the_percentile_and_the_share_that_they_name():
@@ -160,11 +162,11 @@ def test_bits_do_not_depend_on_threads_or_block_size(monkeypatch):
     expected = refine(mesh, pns(MODEL), 2, threads=1)
     module = sys.modules["pns_common.refine"]
     for threads, rows in [(2, 8192), (3, 300), (1, 77)]:
-        monkeypatch.setattr(module, "Blocks", lambda threads, rows=rows: Blocks(threads, rows))
-        found = refine(mesh, pns(MODEL), 2, threads=threads)
-        np.testing.assert_array_equal(found.mesh.vertices, expected.mesh.vertices)
-        np.testing.assert_array_equal(found.ratio, expected.ratio)
-        assert found.report == expected.report
+        monkeypatch.setattr(module, "Blocks", lambda threads, *_, rows=rows: Blocks(threads, rows))
+        refined = refine(mesh, pns(MODEL), 2, threads=threads)
+        np.testing.assert_array_equal(refined.mesh.vertices, expected.mesh.vertices)
+        np.testing.assert_array_equal(refined.ratio, expected.ratio)
+        assert refined.report == expected.report
 
 
 def test_two_calls_with_the_first_ones_length_are_two_levels():
@@ -184,11 +186,61 @@ def test_reference_length_is_one_on_the_papers_patch_and_follows_scale_only():
     assert measure_reference_length(unused, faces) == pytest.approx(1, rel=1e-12)
 
 
-def test_progress_ends_at_all_faces():
+@pytest.mark.parametrize(
+    "scheme", [loop(), pns(MODEL), pns(load_model())], ids=["loop", "all levels", "one level"]
+)
+@pytest.mark.parametrize("limit", [False, True])
+@pytest.mark.parametrize("compiled", [False, True])
+def test_progress_moves_inside_every_level_and_ends_at_all_faces(
+    scheme, limit, compiled, monkeypatch
+):
+    """Level by level the faces are known: what is told between their ends is inside a level."""
+    module = sys.modules["pns_common.refine"]
+    monkeypatch.setattr(module, "kernels_pay", lambda faces: compiled)
+    mesh = Mesh(*grid(11))
     calls = []
-    refine(Mesh(*grid(3)), loop(), 3, progress=lambda done, total: calls.append((done, total)))
-    total = 8 * (4 + 16 + 64)
-    assert calls == [(32, total), (160, total), (total, total)]
+    told = lambda done, total: calls.append((done, total))  # noqa: E731
+    seen = refine(mesh, scheme, 3, limit=limit, threads=2, progress=told)
+    shares = [done / total for done, total in calls]
+    assert {total for _, total in calls} == {200 * (4 + 16 + 64)}
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+    costs = [
+        200 * 4**level * (LEARNED_COST if level <= _learned(scheme, 3) else 1)
+        for level in range(1, 4)
+    ]
+    costs += [200 * 64 * LIMIT_COST] * limit
+    ends = np.cumsum([0, *costs]) / sum(costs)
+    for start, end in itertools.pairwise(ends):
+        assert any(start + 1e-3 < share < end - 1e-3 for share in shares), (start, end)
+    plain = refine(mesh, scheme, 3, limit=limit)
+    np.testing.assert_array_equal(seen.mesh.vertices, plain.mesh.vertices)
+    assert seen.report == plain.report
+
+
+def _learned(scheme, levels):
+    return levels if scheme.learned_levels is None else scheme.learned_levels
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("at", [0.1, 0.6, 0.99])
+def test_what_progress_raises_ends_the_refinement_before_the_next_block(at, compiled, monkeypatch):
+    module = sys.modules["pns_common.refine"]
+    monkeypatch.setattr(module, "kernels_pay", lambda faces: compiled)
+    calls = []
+
+    def enough(done, total):
+        calls.append(done)
+        if done >= at * total:
+            raise StopRefiningError
+
+    with pytest.raises(StopRefiningError):
+        refine(Mesh(*grid(11)), loop(), 3, threads=1, progress=enough)
+    assert [done >= at * 200 * 84 for done in calls] == [False] * (len(calls) - 1) + [True]
+
+
+class StopRefiningError(Exception):
+    """Nobody wants it."""
 
 
 def test_an_error_in_a_block_reaches_the_caller():
@@ -198,6 +250,23 @@ def test_an_error_in_a_block_reaches_the_caller():
     with pytest.raises(ValueError, match="rows"):
         Blocks(threads=2, rows=3).run(10, fail)
     assert available_threads() >= 1
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_after_an_error_no_more_blocks_are_begun(threads):
+    begun = []
+
+    def refuse(count):
+        begun.append(count)
+        raise StopRefiningError
+
+    with pytest.raises(StopRefiningError):
+        Blocks(threads, 1, refuse).run(10_000, lambda rows: None)
+    assert len(begun) <= threads
+    begun.clear()
+    with pytest.raises(StopRefiningError):
+        Blocks(threads, 5, refuse).gather(3, lambda rows: (np.zeros(3),))
+    assert begun == [3]
 
 
 def test_public_names_exist():

@@ -13,16 +13,16 @@ from pns_common.topology import (
     split,
     stable_sort,
 )
-from tests.meshes import bow_tie, icosphere, manifolds, one_way_pair, soups, three_pages
+from tests.support.meshes import bow_tie, icosphere, manifolds, one_way_pair, soups, three_pages
 
 
 def slow_edges(faces):
     """Edge -> list of (face, from, to, opposite), in order of first appearance."""
-    found = {}
+    sides = {}
     for face, (a, b, c) in enumerate(faces.tolist()):
         for s, t, o in [(a, b, c), (b, c, a), (c, a, b)]:
-            found.setdefault((min(s, t), max(s, t)), []).append((face, s, t, o))
-    return found
+            sides.setdefault((min(s, t), max(s, t)), []).append((face, s, t, o))
+    return sides
 
 
 def slow_class(uses, faces):
@@ -75,21 +75,21 @@ def test_children_inside_and_across_are_the_interior_edges_of_the_split_mesh(mes
     centres = 4 * np.arange(len(mesh.faces)) + 3
     inside = [[centre, centre - i] for centre in centres.tolist() for i in (1, 2, 3)]
     across = np.concatenate(children_across(topology, topology.interior)).tolist()
-    found = sorted(map(sorted, inside + across))
+    listed = sorted(map(sorted, inside + across))
     proper = all(len(set(face)) == 3 for face in mesh.faces.tolist())
     if proper:
-        assert found == expected
+        assert listed == expected
 
 
 def slow_fans(faces, vertex):
     """Number of components of the faces at a vertex, joined across interior edges there."""
     slow = slow_edges(faces)
-    at = [f for f, face in enumerate(faces.tolist()) if vertex in face]
-    group = {f: {f} for f in at}
+    incident = [f for f, face in enumerate(faces.tolist()) if vertex in face]
+    group = {f: {f} for f in incident}
     for edge, uses in slow.items():
         if vertex in edge and slow_class(uses, faces) == EdgeClass.INTERIOR:
-            one, two = uses[0][0], uses[1][0]
-            merged = group[one] | group[two]
+            first, second = uses[0][0], uses[1][0]
+            merged = group[first] | group[second]
             for f in merged:
                 group[f] = merged
     return len({frozenset(g) for g in group.values()})
@@ -99,16 +99,16 @@ def slow_fans(faces, vertex):
 def test_vertices_with_several_fans_are_found(mesh):
     if any(len(set(face)) < 3 for face in mesh.faces.tolist()):
         return
-    found = multi_fan_vertices(build_topology(mesh.faces, len(mesh.vertices)))
+    marked = multi_fan_vertices(build_topology(mesh.faces, len(mesh.vertices)))
     expected = [slow_fans(mesh.faces, v) > 1 for v in range(len(mesh.vertices))]
-    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(marked, expected)
 
 
 def test_two_closed_fans_on_one_vertex_are_two():
     vertices, faces = icosphere(0)
     both = np.concatenate([faces, np.where(faces == 0, 0, faces + len(vertices))])
-    found = multi_fan_vertices(build_topology(both, 2 * len(vertices)))
-    assert np.flatnonzero(found).tolist() == [0]
+    marked = multi_fan_vertices(build_topology(both, 2 * len(vertices)))
+    assert np.flatnonzero(marked).tolist() == [0]
 
 
 @pytest.mark.parametrize(

@@ -9,14 +9,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, ModelError, loop, pns, refine
-from pns_common.frames import face_normals
-from pns_common.ring_features import RING_10, look_around, ring_vectors
+from pns_common.edge.frames import face_normals
 from pns_common.schemes import VertexModel, vertex_operator
 from pns_common.topology import EdgeClass, build_topology, split
-from pns_common.vertex_operator import smooth_vertices
-from tests.meshes import bent, bow_tie, bumpy_sphere, grid, icosphere, manifolds, rotation, soups
-from tests.networks import CARD, Float64Model, float64_network, random_layers
-from tests.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
+from pns_common.vertex.operator import smooth_vertices
+from pns_common.vertex.rings import RING_10, look_around, ring_vectors
+from tests.support.meshes import (
+    bent,
+    bow_tie,
+    bumpy_sphere,
+    grid,
+    icosphere,
+    manifolds,
+    rotation,
+    soups,
+)
+from tests.support.networks import CARD, Float64Model, float64_network, random_layers
+from tests.support.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
 
 ROUNDING = 1 + 1e-12
 VERTEX_CARD = replace(CARD, format=2, vertex_features="ring-10", vertex_gate_sharpness=10.0)
@@ -64,10 +73,10 @@ models = st.sampled_from(MODELS)
 
 def departure(mesh, model, reference_length=1.0, budget=None):
     """How far the old vertices are from Loop's."""
-    found = refine(mesh, pns(model, budget), reference_length=reference_length)
+    refined = refine(mesh, pns(model, budget), reference_length=reference_length)
     base = refine(mesh, loop(), reference_length=reference_length)
     count = len(mesh.vertices)
-    return found.mesh.vertices[:count] - base.mesh.vertices[:count]
+    return refined.mesh.vertices[:count] - base.mesh.vertices[:count]
 
 
 def ring_lengths(mesh):
@@ -142,8 +151,8 @@ def test_planar_input_gives_loop_exactly_on_axis_aligned_planes(model):
         plane[:, 2] = rng.uniform(-5, 5)
         mesh = Mesh(np.roll(plane, axis, axis=1), faces)
         for levels in (1, 3):
-            found, base = refine(mesh, pns(model), levels), refine(mesh, loop(), levels)
-            np.testing.assert_array_equal(found.mesh.vertices, base.mesh.vertices)
+            refined, base = refine(mesh, pns(model), levels), refine(mesh, loop(), levels)
+            np.testing.assert_array_equal(refined.mesh.vertices, base.mesh.vertices)
 
 
 @given(models, st.integers(0, 2**31))
@@ -161,8 +170,8 @@ def test_faces_without_area_do_not_disturb_a_plane():
     vertices, faces = grid(4)
     vertices[5] = vertices[6]  # two faces collapse
     mesh = Mesh(vertices, faces)
-    found = refine(mesh, pns(MODELS[2])).mesh.vertices
-    np.testing.assert_array_equal(found, refine(mesh, loop()).mesh.vertices)
+    positions = refine(mesh, pns(MODELS[2])).mesh.vertices
+    np.testing.assert_array_equal(positions, refine(mesh, loop()).mesh.vertices)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -174,11 +183,11 @@ def test_scaling_slopes_are_two_and_one(model):
     for scale in scales:
         mesh = Mesh(scale * vertices, faces)
         distances.append(np.linalg.norm(departure(mesh, model), axis=1).max())
-        found, base = (
+        corrected, base = (
             refine(mesh, scheme, reference_length=1.0).mesh.vertices
             for scheme in (pns(model), loop())
         )
-        apart = face_normals(found, split(topology)) - face_normals(base, split(topology))
+        apart = face_normals(corrected, split(topology)) - face_normals(base, split(topology))
         turns.append(np.linalg.norm(apart, axis=1).max())
     assert np.polyfit(np.log(scales), np.log(distances), 1)[0] == pytest.approx(2, abs=1e-3)
     assert np.polyfit(np.log(scales), np.log(turns), 1)[0] == pytest.approx(1, abs=2e-2)
@@ -265,8 +274,8 @@ def test_numpy_and_torch_agree(mesh):
 
     ours, theirs = step(mesh.vertices, np), step(torch.tensor(mesh.vertices), torch)
     scale = max(1.0, np.abs(mesh.vertices).max()) ** 2
-    for one, other in zip(ours, theirs, strict=True):
-        np.testing.assert_allclose(one, other.numpy(), rtol=1e-10, atol=1e-12 * scale)
+    for own, twin in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(own, twin.numpy(), rtol=1e-10, atol=1e-12 * scale)
 
 
 def test_torch_differentiates_through_the_vertex_rule():

@@ -5,14 +5,14 @@ import pytest
 import trimesh
 
 from pns_common.topology import EdgeClass, build_topology
+from service.bodies.folder import folder_of
 from service.errors import ServiceError
-from service.folder import folder_of
+from service.gltf.subdivide import subdivide_gltf
+from service.meshes.weld import weld
 from service.options import Limits, Options
-from service.subdivide import subdivide_gltf
-from service.weld import weld
-from tests.networks import random_model
-from tests.service.gltf import files, validator
-from tests.shared import shared_path
+from tests.support.gltf import files, validator
+from tests.support.networks import random_model
+from tests.support.shared import shared_path
 
 # Faces of all meshes before refinement, and of these the degenerate ones.
 REFINED = {
@@ -62,14 +62,16 @@ def refine_asset(name, **options):
         Options(**options),
         random_model(0),
         Limits(),
-        neighbours=folder_of(path),
+        siblings=folder_of(path),
     )
 
 
 def test_every_asset_has_an_expected_outcome():
     folder = shared_path("assets")
-    found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.suffix in (".glb", ".gltf")}
-    assert found == {*ALL, *WRONG}
+    listed = {
+        str(p.relative_to(folder)) for p in folder.rglob("*") if p.suffix in (".glb", ".gltf")
+    }
+    assert listed == {*ALL, *WRONG}
 
 
 @pytest.mark.parametrize("name", ALL)

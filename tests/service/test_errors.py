@@ -18,7 +18,9 @@ EXAMPLES = [
     errors.UnrefinableError("no face"),
     errors.InvalidParameter("model", "model must be one of a, b", choices=["a", "b"]),
     errors.BusyError(retry_after=7),
+    errors.UnauthorizedError("no key"),
     errors.NoModelError("none"),
+    errors.NoStorageError("5 bytes do not fit"),
     errors.JobTimeout("60 s"),
     errors.WorkerDied("signal 9"),
 ]
@@ -51,9 +53,9 @@ def test_a_limit_allows_what_it_says_and_refuses_one_more():
     errors.check_limit("faces", 5, 5, "there are 5 faces")
     with pytest.raises(errors.LimitError) as refusal:
         errors.check_limit("faces", 6, 5, "there are 6 faces")
-    found = refusal.value
-    assert (found.limit, found.found, found.allowed) == ("faces", 6, 5)
-    assert str(found) == "there are 6 faces, more than 5"
+    error = refusal.value
+    assert (error.limit, error.found, error.allowed) == ("faces", 6, 5)
+    assert str(error) == "there are 6 faces, more than 5"
 
 
 def test_a_choice_is_one_of_what_there_is_or_lists_it():

@@ -9,7 +9,7 @@ import pytest
 
 from pns_common.onnx_model import DEFAULT_MODEL, OnnxModel, load_model, model_from_bytes
 from service.model_info import print_model, print_models
-from tests.networks import vertex_model_bytes
+from tests.support.networks import vertex_model_bytes
 
 NESTED = {
     "ridge-held-out": {

@@ -1,11 +1,16 @@
 """Options are valid once constructed."""
 
+import inspect
 import math
+from dataclasses import asdict
+from typing import get_args, get_type_hints
 
 import pytest
 
+from service.cli.commands import subdivide
 from service.errors import InvalidParameter
-from service.options import Options
+from service.http.parameters import Parameters
+from service.options import DEFAULTS, Options
 
 WRONG = [
     ("levels", 0),
@@ -21,6 +26,8 @@ WRONG = [
     ("reference_length", math.nan),
     ("reference_length", math.inf),
     ("uv", "cubic"),
+    ("normals", "hard"),
+    ("normals", "limit"),
     ("crease", "on"),
     ("crease", "angle"),
     ("crease", "angle:"),
@@ -50,6 +57,7 @@ def test_a_value_outside_its_range_is_refused_by_name(name, value):
         {"budget": 0.0, "reference_length": 1.0},
         {"uv": "smooth", "crease": "angle:180", "weld_tolerance": 0.01},
         {"crease": "normals"},
+        {"normals": "limit", "limit": True},
     ],
 )
 def test_values_in_range_are_taken(options):
@@ -61,3 +69,24 @@ def test_angles_are_in_degrees_and_other_creases_have_none():
     assert Options(crease="angle:37.5").crease_angle == math.radians(37.5)
     assert Options(crease="normals").crease_angle is None
     assert Options().crease_angle is None
+
+
+def test_the_command_line_and_http_take_these_options_with_their_defaults():
+    own = asdict(DEFAULTS)
+    over_http = {name: field.default for name, field in Parameters.model_fields.items()}
+    assert over_http == {**own, "model": None}
+    on_the_line = {n: p.default for n, p in inspect.signature(subdivide).parameters.items()}
+    assert {name: on_the_line[name] for name in own} == own
+
+
+def test_the_command_line_and_http_offer_the_same_choices():
+    choices = {
+        name: get_args(hint) for name, hint in get_type_hints(Options).items() if get_args(hint)
+    }
+    by_name = {
+        name: choices[name] for name in ("scheme", "diagnostics", "uv", "normals", "compress")
+    }
+    on_the_line = get_type_hints(subdivide)
+    for name, expected in by_name.items():
+        assert get_args(Parameters.model_fields[name].annotation) == expected
+        assert get_args(on_the_line[name]) == expected

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from ipaddress import ip_network
+from pathlib import Path
+
 import pytest
 from pydantic import ValidationError
 
@@ -10,6 +13,7 @@ from service.settings import Settings
 EXAMPLES = {
     "host": ("0.0.0.0", "0.0.0.0"),
     "port": ("8080", 8080),
+    "prefix": ("/tools/pns", "/tools/pns"),
     "model": ("/models/mine.onnx", "/models/mine.onnx"),
     "body": ("8MiB", 8 * 2**20),
     "faces": ("1000", 1000),
@@ -20,10 +24,34 @@ EXAMPLES = {
     "queue": ("0", 0),
     "uploads": ("7", 7),
     "job_seconds": ("7.5", 7.5),
+    "connections": ("100", 100),
+    "connections_of_address": ("5", 5),
+    "proxies": ("10.0.0.0/8, 192.0.2.1", (ip_network("10.0.0.0/8"), ip_network("192.0.2.1"))),
+    "keys_file": ("/keys.toml", Path("/keys.toml")),
+    "cors_origins": (
+        "https://a.example,http://[::1]:80",
+        ("https://a.example", "http://[::1]:80"),
+    ),
+    "metrics_host": ("0.0.0.0", "0.0.0.0"),
+    "metrics_port": ("9000", 9000),
+    "head_seconds": ("3", 3),
+    "keep_alive_seconds": ("4", 4),
+    "linger_seconds": ("1.5", 1.5),
+    "answer_seconds": ("100", 100),
+    "grace_seconds": ("6", 6),
+    "rate": ("1KiB", 1024),
     "upload_seconds": ("20", 20),
     "idle_seconds": ("2.5", 2.5),
     "stall_seconds": ("5", 5),
     "drain_seconds": ("9", 9),
+    "queue_seconds": ("90", 90),
+    "short_seconds": ("0.2", 0.2),
+    "faces_per_minute": ("1000", 1000),
+    "result_seconds": ("60", 60),
+    "result_bytes": ("1MiB", 2**20),
+    "results": ("3", 3),
+    "result_folder": ("/var/tmp", Path("/var/tmp")),
+    "answer_bytes": ("2MiB", 2 * 2**20),
 }
 
 
@@ -72,6 +100,20 @@ def test_job_limits_are_the_settings() -> None:
         ("upload_seconds", -1),
         ("stall_seconds", 0),
         ("drain_seconds", 0),
+        ("head_seconds", 0),
+        ("keep_alive_seconds", 0),
+        ("linger_seconds", 0),
+        ("answer_seconds", 0),
+        ("grace_seconds", 0),
+        ("rate", 0),
+        ("connections", 0),
+        ("connections_of_address", 0),
+        ("proxies", "10.0.0.1/8"),
+        ("proxies", "localhost"),
+        ("cors_origins", "https://a.example/"),
+        ("cors_origins", "https://a.example/page"),
+        ("cors_origins", "a.example"),
+        ("metrics_port", 65536),
         ("bodies", 1),
     ],
 )
@@ -83,3 +125,33 @@ def test_out_of_range_is_refused(name: str, value: object) -> None:
 def test_settings_do_not_change() -> None:
     with pytest.raises(ValidationError, match="frozen"):
         Settings().port = 1
+
+
+SECONDS = [name for name in Settings.model_fields if name.endswith("_seconds")]
+
+
+@pytest.mark.parametrize("value", ["inf", "nan", "-inf", "Infinity", "1e999"])
+@pytest.mark.parametrize("name", SECONDS)
+def test_a_time_without_end_is_refused(
+    name: str, value: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(f"PNS_{name.upper()}", value)
+    with pytest.raises(ValidationError, match=name):
+        Settings()
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("PNS_BODDY", "there is no setting PNS_BODDY; is it PNS_BODY?"),
+        ("pns_job_second", "is it PNS_JOB_SECONDS?"),
+        ("PNS_X", "there is no setting PNS_X"),
+    ],
+)
+def test_a_misspelt_setting_is_refused(
+    name: str, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(name, "1")
+    with pytest.raises(ValidationError) as refused:
+        Settings()
+    assert text in str(refused.value)

@@ -6,32 +6,32 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 import train.run
-from train.checkpoint import load_checkpoint
-from train.recipes import ridge
+from train.models.checkpoint import load_checkpoint
+from train.models.recipes import paper
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def quick_ridge(seed=0):
-    return replace(ridge(seed), steps=2)
+def quick_paper(seed=0):
+    return replace(paper(seed), steps=2)
 
 
 def test_no_command_trains_the_default_recipe(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(train.run, "RECIPES", {"ridge": quick_ridge})
+    monkeypatch.setattr(train.run, "RECIPES", {"paper": quick_paper})
     outcome = CliRunner().invoke(train.run.app, [], catch_exceptions=False)
     assert outcome.exit_code == 0
     for shown in ("2/2", "Distance RMSE", "Hausdorff", "Normal error", "95 % interval"):
         assert shown in outcome.output
-    checkpoint = load_checkpoint(tmp_path / "checkpoints" / "ridge.safetensors")
-    assert checkpoint.recipe == quick_ridge()
+    checkpoint = load_checkpoint(tmp_path / "checkpoints" / "paper.safetensors")
+    assert checkpoint.recipe == quick_paper()
     assert set(checkpoint.metrics) == {"ridge-held-out"}
 
 
 def test_seed_and_output_can_be_chosen(tmp_path, monkeypatch):
-    monkeypatch.setattr(train.run, "RECIPES", {"ridge": quick_ridge})
+    monkeypatch.setattr(train.run, "RECIPES", {"paper": quick_paper})
     path = tmp_path / "other.safetensors"
-    arguments = ["train", "--recipe", "ridge", "--seed", "5", "--output", str(path)]
+    arguments = ["train", "--recipe", "paper", "--seed", "5", "--output", str(path)]
     assert CliRunner().invoke(train.run.app, arguments, catch_exceptions=False).exit_code == 0
     assert load_checkpoint(path).recipe.seed == 5
 

@@ -7,15 +7,15 @@ vertices follow Loop's rule, as they do in PNS. Source: paper, Setup, baselines,
 import numpy as np
 
 from pns_common.correction import curvature_gate
-from pns_common.frames import edge_frames, edge_stencil
+from pns_common.edge.frames import edge_frames, edge_stencil
 from pns_common.schemes import ControlLevel, Placement, Scheme, loop_edge_rule, loop_vertex_rule
 from train.baselines.butterfly import butterfly_edge_vertices
 from train.baselines.placement import placed_edges
 
 
-def curvature_adaptive(sharpness: float) -> Scheme:
+def curvature_adaptive(gate_sharpness: float) -> Scheme:
     """Return the scheme; boundary and irregular edges are Loop's."""
-    gate = curvature_gate(sharpness)
+    gate = curvature_gate(gate_sharpness)
 
     def edge_rule(level: ControlLevel) -> Placement:
         topology = level.topology

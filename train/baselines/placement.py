@@ -34,17 +34,6 @@ def kept_vertices(level: ControlLevel) -> Placement:
     return Placement(base.loop, level.points - base.loop, base.ratio, base.gate, base.degenerate)
 
 
-def vertex_normals(level: ControlLevel) -> Float[np.ndarray, "V 3"]:
-    """Return unit vertex normals, faces weighted by area; zero where there is none."""
-    from_points = level.points[level.topology.faces]
-    area = np.cross(from_points[:, 1] - from_points[:, 0], from_points[:, 2] - from_points[:, 0])
-    summed = np.zeros_like(level.points)
-    for corner in range(3):
-        np.add.at(summed, level.topology.faces[:, corner], area)
-    length = norm(summed)[:, None]
-    return summed / np.where(length > 0, length, 1)
-
-
 def midpoints(level: ControlLevel) -> Float[np.ndarray, "E 3"]:
     """Return the midpoint of every edge."""
     return level.points[level.topology.edges].mean(axis=1)

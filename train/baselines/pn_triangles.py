@@ -10,7 +10,8 @@ from jaxtyping import Float
 from pns_common.arrays import dot
 from pns_common.schemes import ControlLevel, Placement, Scheme
 from pns_common.topology import EdgeClass
-from train.baselines.placement import kept_vertices, midpoints, placed_edges, vertex_normals
+from train.baselines.placement import kept_vertices, midpoints, placed_edges
+from train.surfaces.quasi_interpolation import vertex_normals
 
 
 def pn_triangles() -> Scheme:

@@ -15,8 +15,8 @@ from train.baselines.placement import (
     kept_vertices,
     midpoints,
     placed_edges,
-    vertex_normals,
 )
+from train.surfaces.quasi_interpolation import vertex_normals
 
 # Of the normal equations in ring units, so of squared condition: below it a direction is not seen.
 SMALLEST_SINGULAR = 1e-10

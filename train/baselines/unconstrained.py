@@ -5,9 +5,9 @@ weights. It is a control that shows what the envelope is for, and no method to u
 """
 
 from pns_common.schemes import Scheme
-from train.ablations import UNCONSTRAINED, variant_scheme
-from train.networks import BoundedNet
-from train.recipes import Recipe
+from train.ablations.variants import UNCONSTRAINED, variant_scheme
+from train.models.networks import BoundedNet
+from train.models.recipes import Recipe
 
 
 def unconstrained(network: BoundedNet, recipe: Recipe) -> Scheme:

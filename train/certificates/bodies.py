@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from pns_common.errors import MeshError
 from pns_common.mesh import Mesh, clean
 from pns_common.refine import measure_reference_length
-from train.datasets import draw_ridges
-from train.grid import grid_faces, jittered_grid
-from train.stars import star
+from train.data.datasets import draw_ridges
+from train.data.grid import grid_faces, jittered_grid
+from train.spectra.stars import star
 
 MESH_ENDINGS = (".obj", ".off", ".ply", ".stl")
 
@@ -62,10 +62,10 @@ def bumpy_torus(seed: int, around: int = 12, across: int = 6) -> Mesh:
     ring = 1 + tube * np.cos(beta)
     points = np.stack([ring * np.cos(alpha), ring * np.sin(alpha), tube * np.sin(beta)], axis=-1)
 
-    def at(i: Int[np.ndarray, " N"], j: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+    def number(i: Int[np.ndarray, " N"], j: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
         return (i % around) * across + j % across
 
-    quad = [at(u, v), at(u + 1, v), at(u + 1, v + 1), at(u, v + 1)]
+    quad = [number(u, v), number(u + 1, v), number(u + 1, v + 1), number(u, v + 1)]
     faces = [np.stack([quad[0], quad[1], quad[2]], -1), np.stack([quad[0], quad[2], quad[3]], -1)]
     return Mesh(points, np.concatenate(faces).astype(np.int64))
 
@@ -102,7 +102,7 @@ def random_motion(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 def _read(path: Path) -> Mesh:
     # Vertices at one place are one vertex: a seam would be a boundary.
-    loaded = trimesh.load(path, force="mesh", process=False)
+    loaded = trimesh.load_mesh(path, process=False)
     loaded.merge_vertices(merge_tex=True, merge_norm=True)
     mesh = clean(Mesh(np.asarray(loaded.vertices), np.asarray(loaded.faces))).mesh
     centred = mesh.vertices - mesh.vertices.mean(axis=0)

@@ -55,15 +55,15 @@ class Certificate:
         return f"{self.low:g} … {self.high:g}"
 
 
-def worst(found: list[tuple[float, str]]) -> tuple[float, str]:
+def worst(measured: list[tuple[float, str]]) -> tuple[float, str]:
     """The largest value with its place; a NaN is worse than any number."""
-    return max(found, key=lambda entry: math.inf if math.isnan(entry[0]) else entry[0])
+    return max(measured, key=lambda entry: math.inf if math.isnan(entry[0]) else entry[0])
 
 
-def farthest(found: list[tuple[float, str]], expected: float) -> tuple[float, str]:
+def farthest(measured: list[tuple[float, str]], expected: float) -> tuple[float, str]:
     """The value farthest from the expected one, with its place; a NaN is farther than any."""
     return max(
-        found, key=lambda entry: math.inf if math.isnan(entry[0]) else abs(entry[0] - expected)
+        measured, key=lambda entry: math.inf if math.isnan(entry[0]) else abs(entry[0] - expected)
     )
 
 

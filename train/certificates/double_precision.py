@@ -18,7 +18,8 @@ from onnx.reference.op_run import OpRun
 
 from pns_common.errors import ModelError
 from pns_common.model_card import ModelCard
-from pns_common.onnx_model import BUNDLED, OnnxModel, bundled_models, feature_inputs
+from pns_common.model_contract import feature_inputs
+from pns_common.onnx_model import BUNDLED, OnnxModel, bundled_models
 
 
 class Erf(OpRun):

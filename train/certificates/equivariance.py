@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pns_common.frames import edge_stencil, face_normals
+from pns_common.edge.frames import edge_stencil, face_normals
 from pns_common.mesh import Mesh
 from pns_common.schemes import Scheme
 from pns_common.topology import Topology, build_topology
@@ -42,15 +42,15 @@ def _certify(
     subject: Subject, scheme: Scheme, bodies: Sequence[Body], seed: int, how: str, single: float
 ) -> Certificate:
     rng = np.random.default_rng(seed)
-    found, left_out = [], 0
+    measured, left_out = [], 0
     for body in bodies:
         apart, kept = discrepancy(scheme, body.mesh, *random_motion(rng))
         reach = plain_loop(body.mesh.vertices, body.mesh.faces).reach
         # In units of what rounding allows, so that one number serves every mesh.
         share = apart / (EXACT + single * subject.budget * reach**2) * (single or EXACT)
-        found.append((float(np.max(share[kept], initial=0)), body.name))
+        measured.append((float(np.max(share[kept], initial=0)), body.name))
         left_out += int((~kept).sum())
-    value, place = worst(found)
+    value, place = worst(measured)
     where = f"{place}; {left_out} ill-conditioned edges left out" if left_out else place
     return Certificate("T2", f"equivariance, {how}", value, high=single or EXACT, where=where)
 
@@ -81,8 +81,8 @@ def _open(mesh: Mesh, topology: Topology) -> Bool[np.ndarray, " I"]:
     interior = topology.interior
     normals = face_normals(mesh.vertices, mesh.faces)
     faces = topology.edge_faces[interior]
-    at = edge_stencil(mesh.vertices, normals, topology.stencil[interior], faces)
-    return np.linalg.norm(at.n1 + at.n2, axis=1) > WELL_SHAPED
+    stencil = edge_stencil(mesh.vertices, normals, topology.stencil[interior], faces)
+    return np.linalg.norm(stencil.n1 + stencil.n2, axis=1) > WELL_SHAPED
 
 
 def _smallest_sine(mesh: Mesh) -> Float[np.ndarray, " F"]:

@@ -6,19 +6,19 @@ import numpy as np
 
 from train.certificates.certificate import Certificate, Kind
 from train.certificates.subject import Subject
-from train.spectrum import VALENCES, follow_lift
+from train.spectra.spectrum import VALENCES, follow_lift
 
 HIGHEST = 0.4
 """Lift, in spokes."""
 
-LIFTS = np.linspace(0, HIGHEST, 9)
+LIFTS = tuple(np.linspace(0, HIGHEST, 9).tolist())
 
 
 def lifted_stars(subject: Subject, valences: Sequence[int] = VALENCES) -> list[Certificate]:
     """Measure the least margin over valences at lift 0.4, and the largest |λ|, which 1 bounds."""
-    found = [(follow_lift(subject.exact, valence, LIFTS)[-1], valence) for valence in valences]
-    least, at_least = min(found, key=lambda entry: entry[0].margin)
-    largest, at_largest = max(found, key=lambda entry: entry[0].largest)
+    followed = [(follow_lift(subject.exact, valence, LIFTS)[-1], valence) for valence in valences]
+    least, at_least = min(followed, key=lambda entry: entry[0].margin)
+    largest, at_largest = max(followed, key=lambda entry: entry[0].largest)
     below_one = float(np.nextafter(1, 0))
     return [
         Certificate(

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.features import FEATURE_SETS
-from pns_common.ring_features import RING_FEATURE_SETS
+from pns_common.edge.features import FEATURE_SETS
 from pns_common.schemes import Model, VertexModel, pns
-from train.card_metrics import MEASURES
+from pns_common.vertex.rings import RING_FEATURE_SETS
 from train.certificates.certificate import Certificate
+from train.metrics.card import MEASURES
 
 BUDGETS = (1e-6, 0.1, 0.5, 1.0, 1e3)
 SINGLE_PRECISION = 1 + 1e-6
@@ -50,13 +50,13 @@ def _answers(
     model: Callable[[np.ndarray, float], np.ndarray], count: int, what: str
 ) -> list[Certificate]:
     features = sample_features(count)
-    not_finite, longest, at = 0, 0.0, BUDGETS[0]
+    not_finite, longest, budget_of_longest = 0, 0.0, BUDGETS[0]
     for budget in BUDGETS:
-        found = np.asarray(model(features, budget), dtype=np.float64)
-        finite = np.isfinite(found).all(axis=1)
+        answers = np.asarray(model(features, budget), dtype=np.float64)
+        finite = np.isfinite(answers).all(axis=1)
         not_finite += int((~finite).sum())
-        share = np.linalg.norm(found[finite], axis=1).max(initial=0) / budget
-        longest, at = max((longest, at), (float(share), budget))
+        share = np.linalg.norm(answers[finite], axis=1).max(initial=0) / budget
+        longest, budget_of_longest = max((longest, budget_of_longest), (float(share), budget))
     return [
         Certificate(
             "file",
@@ -71,7 +71,7 @@ def _answers(
             f"{what} within the budget given",
             longest,
             high=SINGLE_PRECISION,
-            where=f"budget {at:g}",
+            where=f"budget {budget_of_longest:g}",
         ),
     ]
 

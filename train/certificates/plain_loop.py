@@ -20,11 +20,15 @@ class PlainLoop:
         reach: the displacement's h there: the edge's length at an interior edge, the root mean
             square length of the edges around an old vertex with interior edges only, and 0 where
             no correction is allowed.
+        boundary_reach: the same where a rule for boundaries may move what lies on them: a boundary
+            edge's length, and the root mean square of both at a vertex on two of them and no other
+            sharp edge; 0 elsewhere.
         labels: what each vertex is, for messages.
     """
 
     positions: Float[np.ndarray, "N 3"]
     reach: Float[np.ndarray, " N"]
+    boundary_reach: Float[np.ndarray, " N"]
     labels: list[str]
 
 
@@ -38,23 +42,29 @@ def plain_loop(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
 
     neighbours: list[list[int]] = [[] for _ in vertices]
     sharp: list[list[int]] = [[] for _ in vertices]
-    edge_positions, edge_reach, labels = [], [], [f"vertex {v}" for v in range(len(vertices))]
+    borders: list[list[int]] = [[] for _ in vertices]
+    edge_positions, edge_reach, border_reach = [], [], []
+    labels = [f"vertex {v}" for v in range(len(vertices))]
     for (a, b), sides in opposites.items():
-        for one, other in ((a, b), (b, a)):
-            neighbours[one].append(other)
+        for vertex, neighbour in ((a, b), (b, a)):
+            neighbours[vertex].append(neighbour)
         labels.append(f"edge ({a}, {b})")
         if len(sides) == 2 and sides[0][1] != sides[1][1]:
             (c, _), (d, _) = sides
             ends, wings = vertices[a] + vertices[b], vertices[c] + vertices[d]
             edge_positions.append((3 * ends + wings) / 8)
             edge_reach.append(math.dist(vertices[a], vertices[b]))
+            border_reach.append(0.0)
         else:
             edge_positions.append((vertices[a] + vertices[b]) / 2)
             edge_reach.append(0.0)
-            for one, other in ((a, b), (b, a)):
-                sharp[one].append(other)
+            border_reach.append(math.dist(vertices[a], vertices[b]) if len(sides) == 1 else 0.0)
+            for vertex, neighbour in ((a, b), (b, a)):
+                sharp[vertex].append(neighbour)
+                if len(sides) == 1:
+                    borders[vertex].append(neighbour)
 
-    moved, reach = [], []
+    moved, reach, on_border = [], [], []
     for v, point in enumerate(vertices):
         ring = neighbours[v]
         if len(sharp[v]) > 2 or not ring:
@@ -68,6 +78,13 @@ def plain_loop(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
         smooth = bool(ring) and not sharp[v]
         squares = [math.dist(point, vertices[n]) ** 2 for n in ring]
         reach.append(math.sqrt(sum(squares) / len(ring)) if smooth else 0.0)
+        two = [math.dist(point, vertices[n]) ** 2 for n in borders[v]]
+        on_border.append(math.sqrt(sum(two) / 2) if len(two) == len(sharp[v]) == 2 else 0.0)
 
     positions = np.array([*moved, *edge_positions])
-    return PlainLoop(positions, np.array([*reach, *edge_reach]), labels)
+    return PlainLoop(
+        positions,
+        np.array([*reach, *edge_reach]),
+        np.array([*on_border, *border_reach]),
+        labels,
+    )

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pns_common.blocks import Blocks
-from pns_common.frames import face_normals
+from pns_common.level import control_level
 from pns_common.mesh import Mesh
-from pns_common.schemes import ControlLevel, Placement, Scheme, loop
+from pns_common.placement import Placement
+from pns_common.schemes import Scheme, loop
+from pns_common.step import level_step
 from pns_common.topology import Topology, build_topology
 
 
@@ -29,11 +30,10 @@ class Step:
 
 
 def step(scheme: Scheme, mesh: Mesh, reference_length: float = 1.0) -> Step:
-    """Apply a scheme's two rules once."""
+    """Apply a scheme once, as at the control mesh."""
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    normals = face_normals(mesh.vertices, mesh.faces)
-    level = ControlLevel(mesh.vertices, topology, normals, reference_length, Blocks(threads=1))
-    placed = (scheme.vertex_rule(level), scheme.edge_rule(level))
+    made = level_step(control_level(mesh.vertices, topology, reference_length), scheme)
+    placed = (made.vertices, made.edges)
     return Step(
         positions=np.concatenate([rule.positions for rule in placed]),
         displacement=np.concatenate([_displacement(rule) for rule in placed]),
@@ -48,11 +48,11 @@ def departure(scheme: Scheme, mesh: Mesh, reference_length: float = 1.0) -> Step
     The difference of positions sees everything; where it is below their rounding, what the scheme
     says it has added is finer.
     """
-    found, base = step(scheme, mesh, reference_length), step(loop(), mesh, reference_length)
-    apart = found.positions - base.positions
-    lost = np.abs(apart - found.displacement).max(axis=1) <= rounding(mesh)
-    displacement = np.where(lost[:, None], found.displacement, apart)
-    return Step(found.positions, displacement, found.degenerate, found.topology)
+    ours, base = step(scheme, mesh, reference_length), step(loop(), mesh, reference_length)
+    apart = ours.positions - base.positions
+    lost = np.abs(apart - ours.displacement).max(axis=1) <= rounding(mesh)
+    displacement = np.where(lost[:, None], ours.displacement, apart)
+    return Step(ours.positions, displacement, ours.degenerate, ours.topology)
 
 
 def rounding(mesh: Mesh) -> float:

@@ -4,8 +4,8 @@ import copy
 from dataclasses import dataclass
 
 from pns_common.schemes import Model, Scheme, pns
-from train.networks import BoundedNet
-from train.torch_model import TorchModel
+from train.models.networks import BoundedNet
+from train.models.torch_model import TorchModel
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,11 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from pns_common.errors import PnsError
-from train.experiments.experiment import Experiment
-from train.experiments.laboratory import FULL, Laboratory, Scale
-from train.experiments.page import markdown_page
+from train.experiments.harness.experiment import Experiment
+from train.experiments.harness.laboratory import FULL, Laboratory, Scale
+from train.experiments.harness.page import markdown_page
+from train.experiments.harness.reproduce import Record, read_record, reproduce
 from train.experiments.registry import EXPERIMENTS
-from train.experiments.reproduce import Record, read_record, reproduce
 
 
 def reproduce_command(
@@ -36,7 +36,7 @@ def reproduce_command(
     """Make the paper's tables and figures again, and those that it leaves open."""
     console = Console()
     try:
-        chosen = _chosen(name, published)
+        chosen = _chosen(name, published, assets)
         run_all(chosen, FULL, console, checkpoints, published, assets, output, force=force)
     except PnsError as error:
         console.print(str(error), style="red", soft_wrap=True)
@@ -57,7 +57,7 @@ def run_all(
     """Run experiments one after another and write the page of everything found so far."""
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as progress:
-        total = sum(one.seconds for one in experiments)
+        total = sum(experiment.seconds for experiment in experiments)
         minutes = max(1, round(total / 60))
         progress.print(f"{len(experiments)} experiments, up to about {minutes} min on two cores")
         overall = progress.add_task("all", total=total)
@@ -79,18 +79,22 @@ def run_all(
     console.print(f"{page} written", soft_wrap=True)
 
 
-def _chosen(name: str | None, published: Path | None) -> list[Experiment]:
+def _chosen(name: str | None, published: Path | None, assets: Path | None) -> list[Experiment]:
+    def lacks(experiment: Experiment) -> str | None:
+        if experiment.needs_published and published is None:
+            return "--published DIR"
+        return "--assets DIR" if experiment.needs_assets and assets is None else None
+
     if name is None:
-        return [
-            one for one in EXPERIMENTS.values() if published is not None or not one.needs_published
-        ]
+        return [experiment for experiment in EXPERIMENTS.values() if lacks(experiment) is None]
     if name not in EXPERIMENTS:
         raise typer.BadParameter(f"no experiment {name!r}; there are {', '.join(EXPERIMENTS)}")
-    if EXPERIMENTS[name].needs_published and published is None:
-        raise typer.BadParameter(f"{name} needs --published DIR")
+    missing = lacks(EXPERIMENTS[name])
+    if missing is not None:
+        raise typer.BadParameter(f"{name} needs {missing}")
     return [EXPERIMENTS[name]]
 
 
 def _records(output: Path) -> dict[str, Record]:
-    found = {name: read_record(output / "cache" / f"{name}.json") for name in EXPERIMENTS}
-    return {name: record for name, record in found.items() if record is not None}
+    records = {name: read_record(output / "cache" / f"{name}.json") for name in EXPERIMENTS}
+    return {name: record for name, record in records.items() if record is not None}

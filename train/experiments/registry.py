@@ -3,60 +3,74 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from train.experiments import (
-    ablation,
-    both_rules,
-    budget,
-    c_sweep,
+from train.experiments.beyond import (
     cad,
-    capacity,
-    cross_section,
     decimation,
-    extended,
+    fairness,
     families,
     features,
-    headline,
-    hero,
+    form_sweep,
+    fresh_ridges,
     lifted_stars,
     models,
+    real_meshes,
+    shading,
+    spheres,
+    stability,
+    whole_levels,
+    whole_meshes,
+)
+from train.experiments.harness.experiment import Experiment
+from train.experiments.paper import (
+    ablation,
+    budget,
+    c_sweep,
+    capacity,
+    cross_section,
+    extended,
+    headline,
+    hero,
     published,
     repeated,
     saddle,
     spectral,
     sphere_ridge,
-    stability,
     structural,
-    trade,
 )
-from train.experiments.experiment import Experiment
+
+ORDERED: tuple[Experiment, ...] = (
+    structural.EXPERIMENT,
+    spectral.EXPERIMENT,
+    ablation.EXPERIMENT,
+    headline.EXPERIMENT,
+    cross_section.EXPERIMENT,
+    repeated.EXPERIMENT,
+    c_sweep.EXPERIMENT,
+    budget.EXPERIMENT,
+    capacity.EXPERIMENT,
+    saddle.EXPERIMENT,
+    sphere_ridge.EXPERIMENT,
+    features.EXPERIMENT,
+    hero.EXPERIMENT,
+    extended.EXPERIMENT,
+    lifted_stars.EXPERIMENT,
+    cad.EXPERIMENT,
+    models.EXPERIMENT,
+    families.EXPERIMENT,
+    stability.EXPERIMENT,
+    decimation.EXPERIMENT,
+    real_meshes.TEST,
+    real_meshes.VALIDATION,
+    form_sweep.EXPERIMENT,
+    whole_meshes.EXPERIMENT,
+    whole_levels.EXPERIMENT,
+    spheres.EXPERIMENT,
+    fresh_ridges.EXPERIMENT,
+    fairness.EXPERIMENT,
+    shading.EXPERIMENT,
+    published.EXPERIMENT,
+)
 
 EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
-    {
-        module.EXPERIMENT.name: module.EXPERIMENT
-        for module in (
-            structural,
-            spectral,
-            ablation,
-            headline,
-            cross_section,
-            repeated,
-            c_sweep,
-            budget,
-            capacity,
-            saddle,
-            sphere_ridge,
-            features,
-            hero,
-            extended,
-            lifted_stars,
-            cad,
-            models,
-            families,
-            both_rules,
-            stability,
-            trade,
-            decimation,
-            published,
-        )
-    }
+    {experiment.name: experiment for experiment in ORDERED}
 )

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from service.errors import ServiceError
+from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
-from service.subdivide import subdivide_gltf
-from tests.service.gltf import files
-from tests.service.gltf.shapes import box, octahedron
+from tests.support.gltf import files
+from tests.support.gltf.shapes import box, octahedron
 
 LIMITS = Limits(max_faces=20_000, max_memory_bytes=64 * 2**20)
 BINARY_MUTANTS, JSON_MUTANTS, TRUNCATIONS = 1500, 1500, 1000

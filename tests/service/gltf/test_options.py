@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
-from service.subdivide import subdivide_gltf
-from tests.networks import random_model
-from tests.service.gltf import files
-from tests.service.gltf.shapes import box, octahedron
+from tests.support.gltf import files
+from tests.support.gltf.shapes import box, octahedron
+from tests.support.networks import random_model
 
 
 def subdivide(*meshes, **options):

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from pns_common.mesh import Mesh, clean
 from pns_common.refine import refine
 from pns_common.schemes import loop
+from service.gltf.subdivide import subdivide_gltf
+from service.meshes.weld import weld
 from service.options import Limits, Options
-from service.subdivide import subdivide_gltf
-from service.weld import weld
-from tests.networks import random_model
-from tests.service.gltf import files
+from tests.support.gltf import files
+from tests.support.networks import random_model
 
 MODEL = random_model(0)
 # Positions from a small grid: coincident vertices, flat faces and zero lengths are common.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from service.gltf.report import total_level
+from service.report import total_level
 
 
 def level(weight, ratio, gate, **edges):

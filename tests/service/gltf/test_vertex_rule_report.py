@@ -3,9 +3,9 @@
 import pytest
 
 from pns_common import Mesh, loop, pns, refine
-from service.gltf.report import total_level
-from tests.meshes import bent, bumpy_sphere, grid
+from service.report import total_level
 from tests.pns_common.test_vertex_rule import MODELS
+from tests.support.meshes import bent, bumpy_sphere, grid
 
 
 def levels(scheme):
@@ -14,9 +14,9 @@ def levels(scheme):
 
 
 def test_totals_weigh_by_the_vertices_that_may_move():
-    one, other = levels(pns(MODELS[0]))
-    total = total_level([one, other])["vertex_rule"]
-    first, second = one["vertex_rule"], other["vertex_rule"]
+    open_grid, sphere = levels(pns(MODELS[0]))
+    total = total_level([open_grid, sphere])["vertex_rule"]
+    first, second = open_grid["vertex_rule"], sphere["vertex_rule"]
     assert total["vertices"] == first["vertices"] + second["vertices"] == 9 + 42
     mean = (9 * first["gate"]["mean"] + 42 * second["gate"]["mean"]) / 51
     assert total["gate"]["mean"] == pytest.approx(mean, rel=1e-12)

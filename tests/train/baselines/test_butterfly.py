@@ -3,7 +3,7 @@ import pytest
 
 from pns_common import Mesh, refine
 from pns_common.topology import EdgeClass, build_topology
-from tests.meshes import bent, grid
+from tests.support.meshes import bent, grid
 from train.baselines.butterfly import butterfly_edge_vertices, modified_butterfly, star_weights
 
 
@@ -61,8 +61,8 @@ def star(valence, height):
     j = np.arange(valence)
     inner, following = 1 + j, 1 + (j + 1) % valence
     first = 1 + valence
-    at, between, after = first + 2 * j, first + 2 * j + 1, first + (2 * j + 2) % (2 * valence)
-    faces = [(np.zeros_like(j), inner, following), (inner, at, between)]
+    opposite, between, after = first + 2 * j, first + 2 * j + 1, first + (2 * j + 2) % (2 * valence)
+    faces = [(np.zeros_like(j), inner, following), (inner, opposite, between)]
     faces += [(inner, between, following), (following, between, after)]
     vertices = np.concatenate([np.zeros((1, 3)), rim, outer])
     return vertices, np.concatenate([np.stack(face, axis=1) for face in faces])

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 
 from pns_common import Mesh, loop, refine
 from pns_common.topology import EdgeClass, build_topology
-from tests.meshes import bent, bumpy_sphere, grid, manifolds, rotation, soups, three_pages
-from tests.train.baselines.methods import BASELINES, INTERPOLATING
+from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, rotation, soups, three_pages
+from tests.support.methods import BASELINES, INTERPOLATING
 
 each_baseline = pytest.mark.parametrize("name", BASELINES)
 
@@ -62,8 +62,8 @@ def test_approximating_methods_move_old_vertices_as_loop_does(name):
     vertices, faces = grid(6, bent)
     mesh = Mesh(vertices, faces)
     expected = refine(mesh, loop(), threads=1).mesh.vertices[: len(vertices)]
-    found = refine(mesh, BASELINES[name], threads=1).mesh.vertices[: len(vertices)]
-    np.testing.assert_array_equal(found, expected)
+    moved = refine(mesh, BASELINES[name], threads=1).mesh.vertices[: len(vertices)]
+    np.testing.assert_array_equal(moved, expected)
 
 
 def test_the_ratio_is_the_distance_from_loop_in_envelopes_of_half_a_curvature():

@@ -3,13 +3,13 @@ import pytest
 
 from pns_common import Mesh, loop, refine
 from pns_common.topology import build_topology
-from tests.meshes import bent, grid, icosphere
+from tests.support.meshes import bent, grid, icosphere
 from train.baselines.butterfly import modified_butterfly
 from train.baselines.curvature_adaptive import curvature_adaptive
 from train.baselines.normal_displacement import fit_scalar, normal_displacement
-from train.datasets import Dataset, Instance, ridge_training
-from train.evaluation import one_step_table
-from train.surfaces import SphereRidge
+from train.data.datasets import Dataset, Instance, ridge_training
+from train.metrics.evaluation import one_step_table
+from train.surfaces.implicit import SphereRidge
 
 
 def test_on_an_icosahedron_the_scalar_that_reaches_the_sphere_is_the_missing_sagitta():
@@ -51,9 +51,9 @@ def test_the_blend_ends_at_loop_and_at_butterfly(sharpness, limit):
     rng = np.random.default_rng(0)
     mesh = Mesh(vertices * rng.uniform(0.8, 1.2, (len(vertices), 1)), faces)
     old = len(vertices)
-    found = refine(mesh, curvature_adaptive(sharpness), threads=1).mesh.vertices[old:]
+    inserted = refine(mesh, curvature_adaptive(sharpness), threads=1).mesh.vertices[old:]
     expected = refine(mesh, limit, threads=1).mesh.vertices[old:]
-    np.testing.assert_allclose(found, expected, atol=1e-12)
+    np.testing.assert_allclose(inserted, expected, atol=1e-12)
 
 
 def test_the_blend_lies_between_loop_and_butterfly():

@@ -3,7 +3,7 @@ import pytest
 
 from pns_common import Mesh, refine
 from pns_common.topology import build_topology
-from tests.meshes import grid
+from tests.support.meshes import grid
 from train.baselines.quadric import quadric_edge_points, quadric_fit
 
 

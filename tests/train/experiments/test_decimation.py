@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import trimesh
 
-import train.experiments.decimation as experiment
+import train.experiments.beyond.decimation as experiment
 from pns_common import load_model, loop, pns
-from tests.meshes import bumpy_sphere, grid
-from train.dense_meshes import ASSET, CAD, CONTROL
-from train.experiments.decimation import EXPERIMENT, collected, methods
-from train.experiments.decimation_figures import pictured
-from train.experiments.laboratory import FULL, SMALL, Laboratory
-from train.experiments.reproduce import content_key, reproduce
+from tests.support.meshes import bumpy_sphere, grid
+from train.data.dense_meshes import ASSET, CAD, CONTROL
+from train.experiments.beyond.decimation import EXPERIMENT, collected, methods
+from train.experiments.beyond.decimation_figures import pictured
+from train.experiments.harness.laboratory import FULL, SMALL, Laboratory
+from train.experiments.harness.reproduce import content_key, reproduce
 
 
 def laboratory(folder, assets=None, scale=SMALL):
@@ -98,8 +98,8 @@ def test_each_bundled_model_is_one_method_and_the_default_is_last():
 
 
 def test_two_models_are_two_rows_and_two_markers(tmp_path, monkeypatch):
-    one, other = (pns(load_model("paper"), budget) for budget in (0.2, 0.5))
-    schemes = {"Loop": loop(), "Modified Butterfly": loop(), "PNS `a`": one, "PNS `b`": other}
+    weak, strong = (pns(load_model("paper"), budget) for budget in (0.2, 0.5))
+    schemes = {"Loop": loop(), "Modified Butterfly": loop(), "PNS `a`": weak, "PNS `b`": strong}
     monkeypatch.setattr(experiment, "methods", lambda: schemes)
     outcome = experiment.run(laboratory(tmp_path))
     assert [row[0] for row in outcome.tables[0].rows] == list(schemes)[1:]
@@ -124,7 +124,7 @@ def test_other_files_and_another_model_make_it_run_again(tmp_path, assets, monke
 
 def test_the_figure_shows_chosen_meshes_or_the_first(tmp_path):
     dense, _ = collected(laboratory(tmp_path, scale=FULL))
-    pairs = [experiment.Pair(one, one.mesh, 0) for one in dense]
-    assert [one.dense.name for one in pictured(pairs)] == ["pipe", "pulley"]
-    others = [one for one in pairs if one.dense.name not in ("pipe", "pulley")]
+    pairs = [experiment.Pair(mesh, mesh.mesh, 0) for mesh in dense]
+    assert [pair.dense.name for pair in pictured(pairs)] == ["pipe", "pulley"]
+    others = [pair for pair in pairs if pair.dense.name not in ("pipe", "pulley")]
     assert pictured(others) == others[:2]

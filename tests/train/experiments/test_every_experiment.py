@@ -4,16 +4,17 @@ import csv
 
 import pytest
 
-from tests.shared import shared_path
-from train.experiments.laboratory import SMALL, Laboratory
-from train.experiments.page import markdown_page
+from tests.support.shared import shared_path
+from train.experiments.harness.laboratory import SMALL, Laboratory
+from train.experiments.harness.page import markdown_page
+from train.experiments.harness.reproduce import reproduce
 from train.experiments.registry import EXPERIMENTS
-from train.experiments.reproduce import reproduce
 
 NAMES = (
     "structural, spectral, ablation, headline, cross-section, repeated, c-sweep, budget, capacity, "
-    "saddle, sphere-ridge, features, extended, lifted-stars, cad, models, families, both-rules, "
-    "stability, trade, decimation, hero, published"
+    "saddle, sphere-ridge, features, extended, lifted-stars, cad, models, families, stability, "
+    "decimation, real-meshes, real-validation, form-sweep, whole-meshes, whole-levels, spheres, "
+    "fresh-ridges, fairness, shading, hero, published"
 )
 
 
@@ -24,7 +25,9 @@ def output(tmp_path_factory):
 
 def laboratory_for(experiment, output):
     published = shared_path("published") if experiment.needs_published else None
-    return Laboratory(SMALL, output / "cache" / "networks", None, published, lambda *_: None)
+    assets = shared_path("assets") if experiment.needs_assets else None
+    networks = output / "cache" / "networks"
+    return Laboratory(SMALL, networks, None, published, lambda *_: None, assets)
 
 
 def test_there_is_an_experiment_for_each_table_and_figure():
@@ -59,6 +62,6 @@ def test_writes_its_tables_and_figures(name, output):
 def test_ratios_of_pns_never_pass_one(output):
     experiment = EXPERIMENTS["c-sweep"]
     table = reproduce(experiment, laboratory_for(experiment, output), output).tables[0]
-    at = [column.name for column in table.columns].index("max_ratio")
+    column = [column.name for column in table.columns].index("max_ratio")
     for row in table.rows:
-        assert 0 < row[at] <= 1 + 1e-12
+        assert 0 < row[column] <= 1 + 1e-12

@@ -2,10 +2,10 @@
 
 import pytest
 
-from tests.shared import shared_path
-from train.determinism import deterministic
-from train.experiments.laboratory import FULL, Laboratory
-from train.experiments.published import COLUMNS, run
+from tests.support.shared import shared_path
+from train.experiments.harness.laboratory import FULL, Laboratory
+from train.experiments.paper.published import COLUMNS, run
+from train.fitting.determinism import deterministic
 
 POINTS = 0.02
 # Angles of 1.6e-3 radians in float32: the published 0.59 % is rounding (see the page's note).

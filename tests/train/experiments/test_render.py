@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
-from tests.meshes import bent, grid
-from train.experiments.render import HEIGHT, WIDTH, Camera, by_matplotlib, by_pyvista
+from tests.support.meshes import bent, grid
+from train.experiments.harness.render import HEIGHT, WIDTH, Camera, by_matplotlib, by_pyvista
 
 CAMERA = Camera(azimuth=-62.0, elevation=42.0)
 
@@ -36,5 +36,7 @@ def test_the_mesh_fills_the_middle_and_leaves_the_corners_white():
 
 @pytest.mark.skipif(importlib.util.find_spec("pyvista") is None, reason="needs the extra render")
 def test_pyvista_sees_the_same_outline():
-    ours, theirs = ((picture(one) < 250).any(axis=-1) for one in (by_matplotlib, by_pyvista))
+    ours, theirs = (
+        (picture(renderer) < 250).any(axis=-1) for renderer in (by_matplotlib, by_pyvista)
+    )
     assert (ours != theirs).mean() < 0.03

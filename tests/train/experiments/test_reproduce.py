@@ -7,15 +7,15 @@ from typer.testing import CliRunner
 
 import train.experiments.command as command
 import train.run
-from train.checkpoint import Checkpoint, save_checkpoint
-from train.datasets import DATASETS
-from train.experiments.experiment import Column, Experiment, Figure, Outcome, Table
-from train.experiments.laboratory import FULL, SMALL, Laboratory
-from train.experiments.page import markdown_page
-from train.experiments.reproduce import content_key, read_record, reproduce
-from train.experiments.style import panels
-from train.recipe_operator import initial_network
-from train.recipes import ridge
+from train.data.datasets import DATASETS
+from train.experiments.harness.experiment import Column, Experiment, Figure, Outcome, Table
+from train.experiments.harness.laboratory import FULL, SMALL, Laboratory
+from train.experiments.harness.page import markdown_page
+from train.experiments.harness.reproduce import content_key, read_record, reproduce
+from train.experiments.harness.style import panels
+from train.models.checkpoint import Checkpoint, save_checkpoint
+from train.models.from_recipe import initial_network
+from train.models.recipes import paper
 
 COLUMNS = (Column("name", "Name"), Column("value", "Value", "+.2f"), Column("paper", "Paper"))
 
@@ -43,7 +43,7 @@ class Counting:
 
 
 # The key reads the source of the module that the experiment's function lives in.
-Counting.__module__ = "train.experiments.headline"
+Counting.__module__ = "train.experiments.paper.headline"
 
 
 @pytest.fixture
@@ -89,7 +89,7 @@ def test_other_inputs_make_it_run_again(tmp_path, counting, experiment):
     checkpoints = tmp_path / "given"
     checkpoints.mkdir()
     key = content_key(experiment, laboratory(tmp_path, checkpoints=checkpoints))
-    (checkpoints / "ridge.safetensors").write_bytes(b"other weights")
+    (checkpoints / "paper.safetensors").write_bytes(b"other weights")
     assert content_key(experiment, laboratory(tmp_path, checkpoints=checkpoints)) != key
     needing = replace(experiment, needs_published=True)
     key = content_key(needing, laboratory(tmp_path, published=checkpoints))
@@ -128,10 +128,10 @@ def test_figures_are_the_same_bytes_every_time(tmp_path, experiment):
 
 
 def test_a_given_checkpoint_is_taken_as_it_is(tmp_path):
-    recipe = replace(ridge(seed=7), hidden=(8,))
+    recipe = replace(paper(seed=7), hidden=(8,))
     network = initial_network(recipe)
-    save_checkpoint(tmp_path / "ridge.safetensors", Checkpoint(recipe, network, {}, "here"))
-    taken = laboratory(tmp_path, checkpoints=tmp_path).network(ridge())
+    save_checkpoint(tmp_path / "paper.safetensors", Checkpoint(recipe, network, {}, "here"))
+    taken = laboratory(tmp_path, checkpoints=tmp_path).network(paper())
     for ours, given in zip(taken.parameters(), network.parameters(), strict=True):
         assert ours.equal(given)
     assert not (tmp_path / "networks").exists()
@@ -140,12 +140,12 @@ def test_a_given_checkpoint_is_taken_as_it_is(tmp_path):
 def test_a_trained_network_is_kept_between_runs(tmp_path):
     seen = []
     lab = replace(laboratory(tmp_path), progress=lambda *step: seen.append(step))
-    first = lab.network(ridge())
-    assert seen == [("training ridge", 1, 2), ("training ridge", 2, 2)]
-    second = lab.network(ridge())
+    first = lab.network(paper())
+    assert seen == [("training paper", 1, 2), ("training paper", 2, 2)]
+    second = lab.network(paper())
     assert len(seen) == 2
-    for one, other in zip(first.parameters(), second.parameters(), strict=True):
-        assert one.equal(other)
+    for trained, kept in zip(first.parameters(), second.parameters(), strict=True):
+        assert trained.equal(kept)
 
 
 def test_full_scale_cuts_nothing(tmp_path):
@@ -170,14 +170,14 @@ def test_the_command_refuses_what_it_cannot_do(tmp_path, monkeypatch, counting, 
     needing = replace(experiment, name="needing", needs_published=True)
     monkeypatch.setattr(command, "EXPERIMENTS", {"counting": experiment, "needing": needing})
     monkeypatch.setattr(command, "FULL", SMALL)
-    runner, at = CliRunner(), ["--output", str(tmp_path)]
-    unknown = runner.invoke(train.run.app, ["reproduce", "nothing", *at])
+    runner, output = CliRunner(), ["--output", str(tmp_path)]
+    unknown = runner.invoke(train.run.app, ["reproduce", "nothing", *output])
     assert unknown.exit_code == 2
     assert "counting, needing" in " ".join(unknown.output.split())
-    lacking = runner.invoke(train.run.app, ["reproduce", "needing", *at])
+    lacking = runner.invoke(train.run.app, ["reproduce", "needing", *output])
     assert lacking.exit_code == 2
     assert "--published" in lacking.output
     assert counting.runs == 0
-    everything = runner.invoke(train.run.app, ["reproduce", *at])
+    everything = runner.invoke(train.run.app, ["reproduce", *output])
     assert everything.exit_code == 0
     assert counting.runs == 1

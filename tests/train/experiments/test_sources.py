@@ -1,4 +1,4 @@
-from train.experiments.sources import ROOT, sources_of
+from train.experiments.harness.sources import ROOT, code_of, sources_of
 
 
 def names(module):
@@ -6,19 +6,41 @@ def names(module):
 
 
 def test_sources_are_all_that_is_imported_at_any_depth():
-    found = names("train.experiments.headline")
-    assert {"train/experiments/headline.py", "train/experiments/comparison.py"} <= found
-    assert {"train/trainer.py", "train/surfaces.py", "pns_common/frames.py"} <= found
+    sources = names("train.experiments.paper.headline")
+    assert {
+        "train/experiments/paper/headline.py",
+        "train/experiments/harness/comparison.py",
+    } <= sources
+    assert {
+        "train/fitting/trainer.py",
+        "train/surfaces/implicit.py",
+        "pns_common/edge/frames.py",
+    } <= sources
 
 
 def test_other_experiments_are_no_source_unless_they_are_imported():
-    assert "train/experiments/hero.py" not in names("train.experiments.headline")
-    assert "train/experiments/ablation.py" in names("train.experiments.published")
+    assert "train/experiments/paper/hero.py" not in names("train.experiments.paper.headline")
+    assert "train/experiments/paper/ablation.py" in names("train.experiments.paper.published")
 
 
 def test_modules_named_in_a_from_import_are_found():
-    assert "train/experiments/hero.py" in names("train.experiments.registry")
+    assert "train/experiments/paper/hero.py" in names("train.experiments.registry")
 
 
 def test_other_packages_are_left_out():
-    assert all(one.startswith(("train/", "pns_common/")) for one in names("train.run"))
+    assert all(source.startswith(("train/", "pns_common/")) for source in names("train.run"))
+
+
+def test_code_is_what_a_file_does_and_not_what_it_says(tmp_path):
+    def code(text):
+        path = tmp_path / f"{len(list(tmp_path.iterdir()))}.py"
+        path.write_text(text)
+        return code_of(path)
+
+    plain = code("A = 1\ndef f(x):\n    return x + A\n")
+    told = code(
+        '"""What."""\nA = 1\n"""A."""\n\ndef f(x):  # why\n    """How."""\n    return (x + A)\n'
+    )
+    assert plain == told
+    assert plain != code("A = 2\ndef f(x):\n    return x + A\n")
+    assert plain != code("A = 1\ndef f(x):\n    return 'how'\n")

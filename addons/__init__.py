@@ -1,0 +1,1 @@
+"""What brings the operator into other programs."""

@@ -1,0 +1,1 @@
+"""The Blender extension, how it is built, and pictures rendered with Blender."""

@@ -1,0 +1,103 @@
+"""Build the extension: the wheels it needs beside it, packed and checked by Blender's own tool.
+
+python -m addons.blender.build PYTHON     # PYTHON has bpy (`make addon`)
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = Path(__file__).with_name("pns_refine")
+CORE = Path(__file__).with_name("core.toml")
+DIST = ROOT / "dist"
+# What the library imports, and Blender does not have; pinned by constraints.txt.
+REQUIRED = ("array-api-compat", "jaxtyping", "wadler-lindig")
+TOOL = """
+import bpy
+from pathlib import Path
+scripts = Path(bpy.utils.resource_path("LOCAL")) / "scripts"
+print(next(scripts.glob("addons_core/bl_pkg/cli/blender_ext.py")))
+"""
+
+
+def main(python: str) -> None:
+    """Build the zip, and let Blender validate what was packed."""
+    tool = said(python, "-c", TOOL).splitlines()[-1]
+    with tempfile.TemporaryDirectory() as folder:
+        stage, packed = Path(folder) / "pns_refine", Path(folder) / "packed"
+        packed.mkdir()
+        staged(stage)
+        print(said(python, tool, "build", "--source-dir", stage, "--output-dir", packed))
+        (built,) = packed.glob("*.zip")
+        print(said(python, tool, "validate", built))
+        DIST.mkdir(exist_ok=True)
+        # Written beside, then renamed: nobody sees half a file.
+        temporary = DIST / f"{built.name}.tmp"
+        shutil.copyfile(built, temporary)
+        temporary.rename(DIST / built.name)
+    print(f"{DIST / built.name}: {(DIST / built.name).stat().st_size:,} bytes")
+
+
+def staged(stage: Path) -> None:
+    """The extension's folder as it is packed: sources, licence, wheels, and a manifest of them."""
+    shutil.copytree(SOURCE, stage, ignore=shutil.ignore_patterns("__pycache__"))
+    wheels = stage / "wheels"
+    collect_wheels(wheels)
+    manifest = stage / "blender_manifest.toml"
+    manifest.write_text(with_wheels(manifest.read_text(), sorted(p.name for p in wheels.iterdir())))
+
+
+def with_wheels(manifest: str, names: Sequence[str]) -> str:
+    """The manifest with a list of wheels at its end."""
+    listed = "".join(f'  "./wheels/{name}",\n' for name in names)
+    return f"{manifest.rstrip()}\nwheels = [\n{listed}]\n"
+
+
+def collect_wheels(folder: Path) -> None:
+    """The wheels that the extension brings: the library alone, and what it needs as published."""
+    folder.mkdir(parents=True)
+    pip = (sys.executable, "-m", "pip", "--quiet")
+    said(
+        *pip,
+        "download",
+        "--no-deps",
+        "--only-binary=:all:",
+        "--dest",
+        folder,
+        "--constraint",
+        ROOT / "constraints.txt",
+        *REQUIRED,
+    )
+    with tempfile.TemporaryDirectory() as copy:
+        source = clean_copy(Path(copy) / "source")
+        shutil.copy(CORE, source / "pyproject.toml")
+        (source / "setup.py").unlink()
+        said(*pip, "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, source)
+
+
+def clean_copy(folder: Path) -> Path:
+    """The project without what builds leave in it, which would find its way into the wheel."""
+    listed = said("git", "-C", ROOT, "ls-files", "-z", "--cached", "--others", "--exclude-standard")
+    for name in filter(None, listed.split("\0")):
+        if (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, folder / name)
+    return folder
+
+
+def said(*command: object) -> str:
+    """What a command prints; what it complains of is shown if it fails."""
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"{' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
+    return done.stdout.strip()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

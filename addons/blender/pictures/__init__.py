@@ -1,0 +1,1 @@
+"""Pictures of what the operator does. All but `variants` needs Blender."""

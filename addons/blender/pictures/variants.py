@@ -1,0 +1,90 @@
+"""What one control mesh becomes: itself, Loop, an untrained control, and the learned operator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common import Mesh, Refinement, load_model, loop, pns, refine
+from pns_common.arrays import norm
+from pns_common.edge.frames import face_normals
+from pns_common.prior import normal_pushes
+from pns_common.topology import build_topology
+from pns_common.vertex.rings import Rings
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A mesh to show, and what is known at its vertices; ``smooth`` says how it is shaded."""
+
+    title: str
+    vertices: Float[np.ndarray, "V 3"]
+    faces: Int[np.ndarray, "F 3"]
+    smooth: bool
+    fields: dict[str, Float[np.ndarray, " V"]]
+
+
+def control(mesh: Mesh, levels: int, model: str | None) -> Shape:
+    """The control mesh, its faces flat."""
+    return Shape("Control mesh", mesh.vertices, mesh.faces, False, {})
+
+
+def loop_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
+    """Loop subdivision."""
+    return _smooth("Loop", refine(mesh, loop(), levels), {})
+
+
+def pushed_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
+    """N1: each vertex pushed once along its normal by as much as Loop takes it in; then Loop."""
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    rings = Rings(topology, mesh.vertices, face_normals(mesh.vertices, mesh.faces))
+    pushed = Mesh(mesh.vertices + normal_pushes(rings), mesh.faces)
+    return _beside_loop("N1, untrained", refine(pushed, loop(), levels), mesh, levels, {})
+
+
+def learned_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
+    """The learned operator, with the proximity ratio of its last learned level."""
+    scheme = pns(load_model(model))
+    made = refine(mesh, scheme, levels)
+    learned = min(levels, scheme.learned_levels or levels)
+    at = made if learned == levels else refine(mesh, scheme, learned)
+    # Later levels are Loop's: a ratio stays with the vertices that it was measured at.
+    ratio = spread(at.ratio, at, levels - learned)
+    return _beside_loop("PNS", made, mesh, levels, {"ratio": ratio})
+
+
+def spread(
+    values: Float[np.ndarray, " V"], made: Refinement, levels: int
+) -> Float[np.ndarray, " W"]:
+    """Values at vertices, and at those of later levels the mean of the edge's ends."""
+    faces, count = made.mesh.faces, len(made.mesh.vertices)
+    mesh = made.mesh
+    for _ in range(levels):
+        topology = build_topology(faces, count)
+        values = np.concatenate([values, values[topology.edges].mean(axis=1)])
+        mesh = refine(mesh, loop(), 1).mesh
+        faces, count = mesh.faces, len(mesh.vertices)
+    return values
+
+
+VARIANTS: dict[str, Callable[[Mesh, int, str | None], Shape]] = {
+    "control": control,
+    "loop": loop_surface,
+    "n1": pushed_surface,
+    "pns": learned_surface,
+}
+
+
+def _smooth(title: str, made: Refinement, fields: dict[str, np.ndarray]) -> Shape:
+    return Shape(title, made.mesh.vertices, made.mesh.faces, True, fields)
+
+
+def _beside_loop(
+    title: str, made: Refinement, mesh: Mesh, levels: int, fields: dict[str, np.ndarray]
+) -> Shape:
+    plain = refine(mesh, loop(), levels)
+    distance = norm(made.mesh.vertices - plain.mesh.vertices)
+    return _smooth(title, made, {"distance": distance, **fields})

@@ -1,0 +1,116 @@
+"""Blender's attributes as layers of arrays: what each type holds, and how it is refined."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from .refining.snapshot import Domain, Layer, Rule
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How an attribute of one type is read: the field, its width and its type."""
+
+    field: str
+    width: int
+    dtype: type
+    rule: Rule
+    unit: bool = False
+
+
+KINDS = {
+    "FLOAT": Kind("value", 1, np.float32, Rule.BLEND),
+    "FLOAT2": Kind("vector", 2, np.float32, Rule.BLEND),
+    "FLOAT_VECTOR": Kind("vector", 3, np.float32, Rule.BLEND),
+    "FLOAT_COLOR": Kind("color", 4, np.float32, Rule.BLEND),
+    "BYTE_COLOR": Kind("color", 4, np.float32, Rule.BLEND),
+    "QUATERNION": Kind("value", 4, np.float32, Rule.BLEND, unit=True),
+    "FLOAT4X4": Kind("value", 16, np.float32, Rule.BLEND),
+    "INT": Kind("value", 1, np.int32, Rule.VOTE),
+    "INT8": Kind("value", 1, np.int32, Rule.VOTE),
+    "INT16_2D": Kind("value", 2, np.int32, Rule.VOTE),
+    "INT32_2D": Kind("value", 2, np.int32, Rule.VOTE),
+    "BOOLEAN": Kind("value", 1, np.bool_, Rule.VOTE),
+    "STRING": Kind("value", 1, np.int64, Rule.VOTE),
+}
+# What the mesh is made of, and what is read and written in other ways.
+STRUCTURE = {
+    "position",
+    ".edge_verts",
+    ".corner_vert",
+    ".corner_edge",
+    "crease_edge",
+    "custom_normal",
+    "pns_ratio",
+    "pns_gate",
+    "pns_distance",
+}
+# What is selected: of no use on other elements.
+PASSING = (".select_", ".vs.", ".es.", ".uv_select")
+# Weights of single vertices, which must not spread to those around them.
+OF_ONE_VERTEX = {"crease_vert", "bevel_weight_vert"}
+ROWS = 20_000
+
+
+def read_layers(mesh: bpy.types.Mesh) -> Iterator[Layer | None]:
+    """Yield all attributes of a mesh, and None between pieces of long work."""
+    names = [a.name for a in mesh.attributes if is_carried(a.name) and a.data_type in KINDS]
+    for name in names:
+        attribute = mesh.attributes[name]
+        kind, domain = KINDS[attribute.data_type], Domain(attribute.domain)
+        texts: tuple[str | bytes, ...] = ()
+        if attribute.data_type == "STRING":
+            strings = []
+            for start in range(0, len(attribute.data), ROWS):
+                strings += [row.value for row in attribute.data[start : start + ROWS]]
+                yield None
+            texts, values = _numbered(strings)
+        else:
+            values = np.zeros(len(attribute.data) * kind.width, kind.dtype)
+            attribute.data.foreach_get(kind.field, values)
+        rule = Rule.KEEP if domain in (Domain.EDGE, Domain.FACE) else kind.rule
+        if name in OF_ONE_VERTEX:
+            rule = Rule.KEEP
+        values = values.reshape(-1, kind.width)
+        if rule is Rule.BLEND:
+            values = values.astype(np.float64)
+        yield Layer(name, attribute.data_type, domain, rule, values, texts, kind.unit)
+
+
+def write_layer(mesh: bpy.types.Mesh, layer: Layer) -> Iterator[None]:
+    """Add an attribute to a mesh, in pieces.
+
+    Raises:
+        RuntimeError: Blender refuses it.
+    """
+    kind = KINDS[layer.kind]
+    attribute = mesh.attributes.get(layer.name)
+    if attribute is None:
+        attribute = mesh.attributes.new(layer.name, layer.kind, layer.domain.value)
+    if (attribute.name, attribute.data_type) != (layer.name, layer.kind):
+        raise RuntimeError("Blender has something else of this name")
+    if layer.kind == "STRING":
+        for start in range(0, len(layer.values), ROWS):
+            rows = layer.values[start : start + ROWS, 0]
+            for row, code in zip(mesh.attributes[layer.name].data[start:], rows, strict=False):
+                row.value = layer.names[code]
+            yield
+        return
+    # Blender copies whole buffers where the types agree, and reads number by number where not.
+    attribute.data.foreach_set(kind.field, np.ascontiguousarray(layer.values, kind.dtype).ravel())
+
+
+def is_carried(name: str) -> bool:
+    """Whether an attribute is one that goes through refinement as such."""
+    return name not in STRUCTURE and not name.startswith(PASSING)
+
+
+def _numbered(texts: list[str | bytes]) -> tuple[tuple[str | bytes, ...], np.ndarray]:
+    """Different texts, and which of them stands in each row; the first is that of new elements."""
+    places: dict[str | bytes, int] = {type(texts[0])(): 0} if texts else {}
+    rows = np.array([places.setdefault(text, len(places)) for text in texts], dtype=np.int64)
+    return tuple(places), rows

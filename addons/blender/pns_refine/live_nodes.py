@@ -1,0 +1,73 @@
+"""The modifier of live mode: it shows the cached result in place of the mesh it is given."""
+
+from __future__ import annotations
+
+import bpy
+
+MODIFIER = "PNS Live"
+GROUP = ".PNS Live"
+INFO = "Result"
+
+
+def modifier_of(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
+    """The live modifier of an object."""
+    return obj.modifiers.get(MODIFIER)
+
+
+def add_modifier(obj: bpy.types.Object) -> None:
+    """Add it, before all others: an armature then bends the result."""
+    if modifier_of(obj) is not None:
+        return
+    obj.modifiers.new(MODIFIER, "NODES")
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+
+
+def remove_modifier(obj: bpy.types.Object) -> None:
+    """Take it away, and its nodes when nothing has them any more."""
+    modifier = modifier_of(obj)
+    if modifier is None:
+        return
+    group = modifier.node_group
+    obj.modifiers.remove(modifier)
+    _drop(group)
+
+
+def point_at(obj: bpy.types.Object, cache: bpy.types.Object) -> None:
+    """Show this result; objects that showed the same one before go on doing so."""
+    modifier = modifier_of(obj)
+    if modifier is None or result_of(modifier.node_group) == cache:
+        obj.update_tag()
+        return
+    before = modifier.node_group
+    modifier.node_group = _group(cache)
+    _drop(before)
+
+
+def result_of(group: bpy.types.NodeTree | None) -> bpy.types.Object | None:
+    """The result that a group of nodes gives."""
+    return None if group is None else group.nodes[INFO].inputs["Object"].default_value
+
+
+def _group(cache: bpy.types.Object) -> bpy.types.NodeTree:
+    """The nodes that give the geometry of an object, as it lies in its own space.
+
+    The object stands in the node and is no input of the modifier: how such inputs are set has
+    changed between versions of Blender.
+    """
+    for group in bpy.data.node_groups:
+        if group.name.startswith(GROUP) and result_of(group) == cache:
+            return group
+    group = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")
+    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    out = group.nodes.new("NodeGroupOutput")
+    info = group.nodes.new("GeometryNodeObjectInfo")
+    info.name, info.transform_space = INFO, "ORIGINAL"
+    info.inputs["Object"].default_value = cache
+    group.links.new(info.outputs["Geometry"], out.inputs["Geometry"])
+    return group
+
+
+def _drop(group: bpy.types.NodeTree | None) -> None:
+    if group is not None and group.users == 0:
+        bpy.data.node_groups.remove(group)

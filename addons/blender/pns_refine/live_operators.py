@@ -1,0 +1,105 @@
+"""The operators of live mode."""
+
+from __future__ import annotations
+
+import bpy
+
+from pns_common import PnsError
+
+from . import live
+from .run import Run, Share
+
+
+class _OfLive:
+    """An operator on the active object, if that is shown live."""
+
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """With an active object that is shown live."""
+        obj = context.object
+        if obj is None or obj.type != "MESH" or live.modifier_of(obj) is None:
+            cls.poll_message_set("Start live mode first")
+            return False
+        return True
+
+
+class OBJECT_OT_pns_live_add(bpy.types.Operator):  # noqa: N801 (Blender's names)
+    """Show the active mesh refined, and keep it editable"""
+
+    bl_idname = "object.pns_live_add"
+    bl_label = "Start Live Mode"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """With an active mesh that is not live yet, and has no shape keys."""
+        obj = context.object
+        if obj is None or obj.type != "MESH":
+            cls.poll_message_set("Select a mesh first")
+            return False
+        if live.modifier_of(obj) is not None:
+            cls.poll_message_set("The object is shown live already")
+            return False
+        if obj.data.shape_keys is not None:
+            cls.poll_message_set(
+                "Live mode shows one mesh, and shape keys need one each: refine a copy instead"
+            )
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Start, and refine for the first time."""
+        live.enable(context.object)
+        result = refresh(self, context.object)
+        if result == {"CANCELLED"}:
+            live.remove(context.object)
+        return result
+
+
+class OBJECT_OT_pns_live_refresh(_OfLive, bpy.types.Operator):  # noqa: N801 (Blender's names)
+    """Refine the base mesh again"""
+
+    bl_idname = "object.pns_live_refresh"
+    bl_label = "Refresh"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Refine again."""
+        return refresh(self, context.object)
+
+
+class OBJECT_OT_pns_live_apply(_OfLive, bpy.types.Operator):  # noqa: N801 (Blender's names)
+    """Give the object the refined mesh for good"""
+
+    bl_idname = "object.pns_live_apply"
+    bl_label = "Apply"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Refresh a last time, and apply."""
+        result = refresh(self, context.object)
+        if result == {"FINISHED"}:
+            live.apply(context.object)
+        return result
+
+
+class OBJECT_OT_pns_live_remove(_OfLive, bpy.types.Operator):  # noqa: N801 (Blender's names)
+    """Show the base mesh again"""
+
+    bl_idname = "object.pns_live_remove"
+    bl_label = "Remove"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Take live mode away."""
+        live.remove(context.object)
+        return {"FINISHED"}
+
+
+def refresh(operator: bpy.types.Operator, obj: bpy.types.Object) -> set[str]:
+    """Refresh an object at once, and report what is wrong."""
+    try:
+        Run(live.refreshed(obj, Share())).finish()
+    except PnsError as error:
+        operator.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+    return {"FINISHED"}

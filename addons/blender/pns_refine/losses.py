@@ -1,0 +1,131 @@
+"""What does not come through refinement unchanged, in words: for the report panel."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from .attributes import KINDS, STRUCTURE
+from .reading import Reading
+from .refining.snapshot import Domain, Refined, Rule
+from .words import listed
+
+# Modifiers that remember the mesh they were bound to, by the name of the flag that says so.
+BOUND = {
+    "SURFACE_DEFORM": "is_bound",
+    "MESH_DEFORM": "is_bound",
+    "LAPLACIANDEFORM": "is_bind",
+    "CORRECTIVE_SMOOTH": "is_bind",
+}
+SIMULATED = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT", "OCEAN"}
+
+
+def losses(obj: bpy.types.Object, reading: Reading, *, quads: bool) -> list[str]:
+    """Sentences on all that an object's mesh loses, or has only in part, when it is refined."""
+    mesh: bpy.types.Mesh = obj.data
+    return [
+        *_of_faces(reading, quads),
+        *_of_attributes(mesh, reading),
+        *_of_creases(mesh),
+        *_of_normals(mesh),
+        *_of_groups(reading),
+        *_of_keys(mesh),
+        *_of_modifiers(obj),
+    ]
+
+
+def _of_faces(reading: Reading, quads: bool) -> list[str]:
+    said = []
+    largest = reading.largest_polygon
+    if largest > 3 and not quads:
+        said.append("Faces of more than three corners became triangles")
+    elif largest > 4:
+        said.append("Faces of more than four corners became triangles")
+    loose = int((~reading.snapshot.edge_used).sum())
+    if loose:
+        said.append(f"{loose:,} edges without faces are kept as they are, not refined")
+    return said
+
+
+def _of_attributes(mesh: bpy.types.Mesh, reading: Reading) -> list[str]:
+    said = []
+    layers = [layer for layer in reading.snapshot.layers if not layer.name.startswith(".")]
+    voted = [layer.name for layer in layers if layer.rule is Rule.VOTE]
+    if voted:
+        said.append(f"New points and corners have the value of most parents: {listed(voted)}")
+    own = {"sharp_edge", "bevel_weight_edge", "uv_seam", "freestyle_edge"}
+    edges = [x.name for x in layers if x.domain is Domain.EDGE and x.name not in own]
+    if edges:
+        said.append(f"Edges new inside faces have the value zero: {listed(edges)}")
+    unknown = [
+        attribute.name
+        for attribute in mesh.attributes
+        if attribute.data_type not in KINDS and attribute.name not in STRUCTURE
+    ]
+    if unknown:
+        said.append(f"Lost, of types that are not known: {listed(unknown)}")
+    if len(mesh.skin_vertices):
+        said.append("Lost: radii of the Skin modifier")
+    return said
+
+
+def _of_creases(mesh: bpy.types.Mesh) -> list[str]:
+    crease = mesh.attributes.get("crease_vert")
+    if crease is None:
+        return []
+    values = np.zeros(len(crease.data), np.float32)
+    crease.data.foreach_get("value", values)
+    count = int((values > 0).sum())
+    return [f"{count:,} vertex creases are kept, and do not sharpen"] if count else []
+
+
+def _of_normals(mesh: bpy.types.Mesh) -> list[str]:
+    if not mesh.has_custom_normals:
+        return []
+    return ["Custom normals are rebuilt from those of the corners around"]
+
+
+def _of_groups(reading: Reading) -> list[str]:
+    if not reading.empty_members:
+        return []
+    return [f"{reading.empty_members:,} members of vertex groups with weight 0 are none any more"]
+
+
+def _of_keys(mesh: bpy.types.Mesh) -> list[str]:
+    key = mesh.shape_keys
+    if key is None:
+        return []
+    said = ["Shape keys are refined by Loop's masks; the correction is the basis's"]
+    if not key.use_relative:
+        said.append("Absolute shape keys are evenly spaced in time again")
+    return said
+
+
+def _of_modifiers(obj: bpy.types.Object) -> list[str]:
+    said = []
+    bound = [m.name for m in obj.modifiers if m.type in BOUND and getattr(m, BOUND[m.type])]
+    if bound:
+        said.append(f"To be bound again: {listed(bound)}")
+    if any(m.type == "MULTIRES" for m in obj.modifiers):
+        said.append("Lost: what was sculpted with the Multiresolution modifier")
+    hooks = [m.name for m in obj.modifiers if m.type == "HOOK"]
+    if hooks:
+        said.append(f"Hooks move the old vertices alone: {listed(hooks)}")
+    if obj.particle_systems:
+        said.append("Particles and hair are to be placed again")
+    simulated = [m.name for m in obj.modifiers if m.type in SIMULATED]
+    if simulated:
+        said.append(f"To be baked again: {listed(simulated)}")
+    return said
+
+
+def irregularities(refined: Refined) -> list[str]:
+    """What was found of the mesh when it was refined."""
+    said = []
+    edges = refined.report["levels"][0]["edges"]["irregular"]
+    if edges:
+        said.append(f"{edges:,} edges join more than two faces, or turned ones, and are sharp")
+    split = refined.split_vertices
+    if split:
+        said.append(f"{split:,} border vertices lie on others: Merge by Distance would join them")
+    return said

@@ -1,0 +1,189 @@
+"""The operator: refine the selected meshes, at once or while the interface goes on."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty
+
+from pns_common import PnsError
+
+from .animation import redirect_drivers
+from .run import Made, Run, Share, refine_meshes
+from .settings import Settings, choice_of
+from .words import forecast, too_many
+
+# Above so many triangles the work goes on beside the interface, and there is no redo panel.
+AT_ONCE = 60_000
+# What still reaches the viewport while a run goes on.
+PASSED_ON = {
+    "MIDDLEMOUSE",
+    "WHEELUPMOUSE",
+    "WHEELDOWNMOUSE",
+    "TRACKPADPAN",
+    "TRACKPADZOOM",
+    "MOUSEROTATE",
+    "NDOF_MOTION",
+    "TIMER",
+}
+
+
+def triangle_count(mesh: bpy.types.Mesh) -> int:
+    """How many triangles a mesh's faces are cut into."""
+    return len(mesh.loops) - 2 * len(mesh.polygons)
+
+
+def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected meshes with faces; the active one alone if nothing is selected."""
+    objects = list(context.selected_objects) or [context.object]
+    return [o for o in objects if o is not None and o.type == "MESH" and len(o.data.polygons)]
+
+
+class Refining(Settings):
+    """What both forms of the operator have."""
+
+    keep_original: BoolProperty(
+        name="Keep Original",
+        description="Make new objects, and leave those that are refined as they are",
+        default=True,
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """In object mode, with some mesh that has faces."""
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Leave the present mode for Object Mode first")
+            return False
+        if not chosen_objects(context):
+            cls.poll_message_set("Select a mesh with faces first")
+            return False
+        return True
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """The properties, and how many faces there will be."""
+        layout = self.layout
+        layout.use_property_split = True
+        self.draw_settings(layout)
+        layout.prop(self, "keep_original")
+        draw_forecast(layout, chosen_objects(context), self.levels)
+
+    def begin(self, context: bpy.types.Context) -> Run:
+        """A run for the selected meshes.
+
+        Raises:
+            PnsError: the model cannot be used.
+        """
+        self.objects = [obj.name for obj in chosen_objects(context)]
+        self.share = Share()
+        objects = [bpy.data.objects[name] for name in self.objects]
+        return Run(refine_meshes(objects, choice_of(self), self.share))
+
+    def place(self, context: bpy.types.Context, made: dict[str, Made]) -> None:
+        """Give the refined meshes to objects, and say how it went."""
+        objects = [bpy.data.objects[name] for name in self.objects if name in bpy.data.objects]
+        placed = [place(obj, made[obj.data.name], self.keep_original) for obj in objects]
+        if self.keep_original:
+            for obj in context.selected_objects:
+                obj.select_set(False)
+            for obj in placed:
+                obj.select_set(True)
+            if placed:
+                context.view_layer.objects.active = placed[-1]
+        faces = sum(len(refined.mesh.polygons) for refined in made.values())
+        self.report({"INFO"}, f"{faces:,} faces; what is kept and what not: sidebar, PNS")
+
+
+class OBJECT_OT_pns_refine(Refining, bpy.types.Operator):  # noqa: N801 (Blender's names)
+    """Refine the selected meshes: Loop subdivision with a small, bounded, learned correction"""
+
+    bl_idname = "object.pns_refine"
+    bl_label = "Refine with PNS"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Refine at once what is small, and the rest beside the interface."""
+        count = sum(triangle_count(o.data) for o in chosen_objects(context)) * 4**self.levels
+        if count <= AT_ONCE:
+            return self.execute(context)
+        chosen = {name: getattr(self, name) for name in self.as_keywords()}
+        bpy.ops.object.pns_refine_large("INVOKE_DEFAULT", **chosen)
+        return {"CANCELLED"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Refine at once."""
+        try:
+            run = self.begin(context)
+            self.place(context, run.finish())
+        except PnsError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class OBJECT_OT_pns_refine_large(Refining, bpy.types.Operator):  # noqa: N801 (Blender's names)
+    """Refine the selected meshes beside the interface; Escape stops"""
+
+    bl_idname = "object.pns_refine_large"
+    bl_label = "Refine with PNS (Large)"
+    # Not REGISTER: a redo panel would do all the work again at each change.
+    bl_options = {"UNDO"}  # noqa: RUF012
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Begin, and come back with every tick of a timer."""
+        try:
+            self.run = self.begin(context)
+        except PnsError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.timer = context.window_manager.event_timer_add(0.02, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Go on a little at each tick; Escape stops."""
+        if event.type == "ESC":
+            self.run.cancel()
+            self.end(context)
+            self.report({"INFO"}, "Stopped; nothing was changed")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"} if event.type in PASSED_ON else {"RUNNING_MODAL"}
+        try:
+            if not self.run.advance():
+                text = f"{self.share.text}: {100 * self.share.value:.0f} %   Escape stops"
+                context.workspace.status_text_set(text)
+                return {"PASS_THROUGH"}
+            self.place(context, self.run.value)
+        except PnsError as error:
+            self.end(context)
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.end(context)
+        return {"FINISHED"}
+
+    def end(self, context: bpy.types.Context) -> None:
+        """Take away the timer and the status line."""
+        context.window_manager.event_timer_remove(self.timer)
+        context.workspace.status_text_set(None)
+
+
+def place(obj: bpy.types.Object, made: Made, keep_original: bool) -> bpy.types.Object:
+    """Give a refined mesh to a copy of an object, or to itself; the object that has it."""
+    if not keep_original:
+        obj.data = made.mesh
+        return obj
+    new = obj.copy()
+    new.name = f"{obj.name} refined"
+    new.data = made.mesh
+    for collection in obj.users_collection:
+        collection.objects.link(new)
+    redirect_drivers(made.mesh.shape_keys, obj, new)
+    return new
+
+
+def draw_forecast(layout: bpy.types.UILayout, objects: list[bpy.types.Object], levels: int) -> None:
+    """How many faces there will be, and whether that is wise."""
+    count = sum(triangle_count(o.data) for o in objects)
+    layout.label(text=forecast(count, levels), icon="INFO")
+    warning = too_many(count, levels)
+    if warning:
+        layout.label(text=warning, icon="ERROR")

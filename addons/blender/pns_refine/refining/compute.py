@@ -1,0 +1,268 @@
+"""A snapshot and what is asked of it in, the refined mesh with all that hangs on it out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common import Mesh, Scheme, loop, pns
+from pns_common.arrays import norm
+from pns_common.edge.frames import face_normals
+from pns_common.limit import limit_positions
+from pns_common.schemes import VertexModel
+from pns_common.topology import EdgeClass, Topology, build_topology
+
+from .corners import refine_corners
+from .edges import edge_parents
+from .faces import (
+    FacePlan,
+    diagonal_children,
+    quad_diagonals,
+    quad_faces,
+    triangle_faces,
+    used_edges,
+)
+from .positions import Positions, refine_positions
+from .snapshot import Faces, Layer, Refined, Rule, Snapshot, edge_keys
+from .steps import Steps, edge_numbers, level_steps, refine_columns
+from .votes import vote_at_corners, vote_at_points
+from .watched import WatchedModel
+
+# How much of the work the positions are; Loop's own are needed for the distance.
+SHARES = {"positions": 0.6, "loop": 0.15, "columns": 0.15, "corners": 0.1}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is asked for.
+
+    ``model`` is the learned correction and ``budget`` its C; without a model it is Loop.
+    ``crease_angle`` (radians) makes edges sharp whose faces meet at a larger angle; None makes
+    none. ``quads`` joins the triangles of quads again.
+    """
+
+    model: VertexModel | None
+    levels: int
+    budget: float | None = None
+    limit: bool = False
+    crease_angle: float | None = None
+    quads: bool = False
+
+
+def compute(
+    snapshot: Snapshot, choice: Choice, progress: Callable[[float], None] = lambda share: None
+) -> Refined:
+    """Refine all of a snapshot; ``progress`` is told the share that is done, and may raise to stop.
+
+    Raises:
+        PnsError: the mesh cannot be refined, or the model fails.
+    """
+    bar = _Bar(progress)
+    scheme = loop()
+    if choice.model is not None:
+        scheme = pns(WatchedModel(choice.model, bar.look_up), choice.budget)
+    mesh = Mesh(snapshot.points, snapshot.triangles)
+    pairs, crease_sharpness = all_creases(snapshot, choice.crease_angle)
+    steps = level_steps(mesh.faces, len(mesh.vertices), choice.levels, pairs, crease_sharpness)
+    positions = refine_positions(
+        mesh, scheme, steps, limit=choice.limit, progress=bar.within("positions")
+    )
+    distance = _distance_from_loop(mesh, choice, steps, positions, bar)
+
+    ratio, gate = _where_it_acted(mesh, scheme, steps, positions, bar)
+
+    offsets = snapshot.offsets
+    moved = np.concatenate([snapshot.groups, *offsets], axis=1)
+    columns = refine_columns(moved, steps)
+    bar.reach("columns")
+    group_count = snapshot.groups.shape[1]
+    moves = columns[:, group_count:]
+    if choice.limit:
+        moves = limit_positions(moves, steps.at_last) if moves.shape[1] else moves
+
+    parents = np.repeat(snapshot.polygons, 4**choice.levels)
+    plan = _plan(snapshot, choice, steps, parents)
+    edge_parent = edge_parents(steps, snapshot)
+    used = used_edges(plan.faces, len(steps.final.edges))
+    loose = np.flatnonzero(~snapshot.edge_used)
+    carry = _Carry(snapshot, choice.levels, steps, plan, np.r_[edge_parent[used], loose])
+    layers = []
+    for number, layer in enumerate(snapshot.layers):
+        layers.append(layer.of(carry(layer)))
+        bar.reach("corners", (number + 1) / len(snapshot.layers))
+    renumbered = np.cumsum(used) - 1
+    faces = plan.faces
+    return Refined(
+        points=positions.points,
+        faces=Faces(faces.starts, faces.vertices, renumbered[faces.edges], faces.parents),
+        edges=np.concatenate([steps.final.edges[used], snapshot.edges[loose]]),
+        crease_sharpness=np.r_[
+            _final_crease_sharpness(steps)[used], snapshot.crease_sharpness[loose]
+        ],
+        groups=np.clip(columns[:, :group_count], 0, 1),
+        offsets=moves.reshape(len(columns), len(offsets), 3).transpose(1, 0, 2),
+        layers=tuple(layers),
+        ratio=ratio,
+        gate=gate,
+        distance=distance,
+        normals=positions.normals,
+        report=positions.report,
+        split_vertices=split_vertices(snapshot, steps.steps[0].topology),
+    )
+
+
+def all_creases(
+    snapshot: Snapshot, angle: float | None
+) -> tuple[Int[np.ndarray, "N 2"], Float[np.ndarray, " N"]]:
+    """Sharp edges, and for how many levels: marked ones, and those bent by more than ``angle``."""
+    marked = (snapshot.crease_sharpness > 0) & snapshot.edge_used
+    pairs, crease_sharpness = snapshot.edges[marked], snapshot.crease_sharpness[marked]
+    if angle is not None:
+        bent = bent_edges(snapshot, angle)
+        pairs = np.concatenate([bent, pairs])
+        crease_sharpness = np.concatenate([np.full(len(bent), np.inf), crease_sharpness])
+    # An edge that is both is sharp for good: the first of equals stays.
+    _, first = np.unique(edge_keys(pairs), return_index=True)
+    return pairs[first], crease_sharpness[first]
+
+
+def split_vertices(snapshot: Snapshot, topology: Topology) -> int:
+    """How many vertices on borders lie where another does: the surface will come apart there."""
+    border = topology.edges[topology.edge_class == EdgeClass.BOUNDARY]
+    places = snapshot.points[np.unique(border)]
+    if len(places) == 0:
+        return 0
+    order = np.lexsort(places.T)
+    same = (np.diff(places[order], axis=0) == 0).all(axis=1)
+    return int((np.r_[False, same] | np.r_[same, False]).sum())
+
+
+def bent_edges(snapshot: Snapshot, angle: float) -> Int[np.ndarray, "N 2"]:
+    """Interior edges whose faces' normals are more than ``angle`` apart."""
+    topology = build_topology(snapshot.triangles, len(snapshot.points))
+    interior = topology.edges[topology.interior]
+    normals = face_normals(snapshot.points, snapshot.triangles)
+    first, second = (normals[side] for side in topology.edge_faces[topology.interior].T)
+    # The chord keeps small angles that 1 − cos would round away.
+    chord = norm(first - second)
+    has_area = (norm(first) > 0) & (norm(second) > 0)
+    return interior[has_area & (chord > 2 * np.sin(min(angle, np.pi) / 2))]
+
+
+def _distance_from_loop(
+    mesh: Mesh, choice: Choice, steps: Steps, positions: Positions, bar: _Bar
+) -> Float[np.ndarray, " W"]:
+    """How far each vertex lies from where Loop alone would have it."""
+    if choice.model is None:
+        return np.zeros(len(positions.points))
+    plain = refine_positions(mesh, loop(), steps, limit=choice.limit, progress=bar.within("loop"))
+    return norm(positions.points - plain.points)
+
+
+def _where_it_acted(
+    mesh: Mesh, scheme: Scheme, steps: Steps, positions: Positions, bar: _Bar
+) -> tuple[Float[np.ndarray, " W"], Float[np.ndarray, " W"]]:
+    """Ratio and gate of the last level that is learned; at vertices made later, the ends' mean."""
+    learned = scheme.learned_levels
+    if not learned or learned >= len(steps.steps):
+        return positions.ratio, positions.gate
+    first = replace(steps, steps=steps.steps[:learned])
+    at = refine_positions(mesh, scheme, first, limit=False, progress=bar.within("loop"))
+    ratio, gate = at.ratio, at.gate
+    for step in steps.steps[learned:]:
+        ends = step.topology.edges
+        ratio = np.concatenate([ratio, ratio[ends].mean(axis=1)])
+        gate = np.concatenate([gate, gate[ends].mean(axis=1)])
+    return ratio, gate
+
+
+def _plan(
+    snapshot: Snapshot, choice: Choice, steps: Steps, parents: Int[np.ndarray, " T"]
+) -> FacePlan:
+    if not choice.quads:
+        return triangle_faces(steps.final, parents)
+    diagonal = diagonal_children(quad_diagonals(snapshot), choice.levels)
+    return quad_faces(steps.final, parents, diagonal)
+
+
+def _final_crease_sharpness(steps: Steps) -> Float[np.ndarray, " E"]:
+    """What is left of each final edge's sharpness."""
+    crease_sharpness = np.zeros(len(steps.final.edges))
+    numbers = edge_numbers(steps.final, steps.pairs)
+    crease_sharpness[numbers] = steps.crease_sharpness
+    return crease_sharpness
+
+
+@dataclass(frozen=True, eq=False)
+class _Carry:
+    """What becomes of a layer: its values at the new points, edges, faces or corners."""
+
+    snapshot: Snapshot
+    levels: int
+    steps: Steps
+    plan: FacePlan
+    edge_parent: Int[np.ndarray, " E"]
+
+    def __call__(self, layer: Layer) -> np.ndarray:
+        values = getattr(self, f"_{layer.domain.name.lower()}")(layer)
+        return _unit(values) if layer.unit else values
+
+    def _point(self, layer: Layer) -> np.ndarray:
+        if layer.rule is Rule.BLEND:
+            return refine_columns(layer.values, self.steps)
+        if layer.rule is Rule.VOTE:
+            return vote_at_points(layer.values, self.steps)
+        count = self.steps.final.vertex_count
+        kept = np.zeros((count, layer.values.shape[1]), dtype=layer.values.dtype)
+        kept[: len(layer.values)] = layer.values
+        return kept
+
+    def _edge(self, layer: Layer) -> np.ndarray:
+        if len(layer.values) == 0:
+            return np.zeros((len(self.edge_parent), layer.values.shape[1]), layer.values.dtype)
+        known = self.edge_parent >= 0
+        values = layer.values[np.where(known, self.edge_parent, 0)]
+        return np.where(known[:, None], values, np.zeros_like(values))
+
+    def _face(self, layer: Layer) -> np.ndarray:
+        return layer.values[self.plan.faces.parents]
+
+    def _corner(self, layer: Layer) -> np.ndarray:
+        values = layer.values[self.snapshot.corners.reshape(-1)]
+        if layer.rule is Rule.BLEND:
+            # Directions are stored roughly: what differs by less than that is no seam.
+            same = np.round(values, 3) if layer.unit else None
+            creases = self.steps.steps[0].creases
+            values = refine_corners(values, self.snapshot.triangles, self.levels, creases, same)
+        else:
+            values = vote_at_corners(values, self.levels)
+        return values[self.plan.corner]
+
+
+def _unit(values: Float[np.ndarray, "N K"]) -> Float[np.ndarray, "N K"]:
+    """Rows of length 1; a row without length stays."""
+    length = np.linalg.norm(values, axis=1, keepdims=True)
+    return values / np.where(length > 0, length, 1)
+
+
+class _Bar:
+    """The share of the work that is done, over its stages."""
+
+    def __init__(self, progress: Callable[[float], None]) -> None:
+        self._progress, self._share = progress, 0.0
+        self._begins = dict(
+            zip(SHARES, np.cumsum([0, *SHARES.values()])[:-1].tolist(), strict=True)
+        )
+
+    def reach(self, stage: str, share: float = 1.0) -> None:
+        self._share = max(self._share, self._begins[stage] + SHARES[stage] * share)
+        self._progress(self._share)
+
+    def look_up(self) -> None:
+        self._progress(self._share)
+
+    def within(self, stage: str) -> Callable[[int, int], None]:
+        return lambda done, total: self.reach(stage, done / max(total, 1))

@@ -1,0 +1,73 @@
+"""What corners carry, UV maps among it: smooth within a patch, and whole along its seams."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.creases import crease_children, with_creases
+from pns_common.topology import Topology, build_topology, sharp_edge_count, split
+
+from .snapshot import edge_keys
+from .steps import one_level
+
+
+def refine_corners(
+    values: Float[np.ndarray, "C K"],
+    faces: Int[np.ndarray, "F 3"],
+    levels: int,
+    creases: Int[np.ndarray, "N 2"],
+    same: Float[np.ndarray, "C J"] | None = None,
+) -> Float[np.ndarray, "D K"]:
+    """Values at three corners a face, in faces' order, at the corners of the faces' children.
+
+    Corners of a vertex that agree are one point of a patch, and a seam runs where they differ.
+    Inside a patch Loop's masks are used, as for the vertices; on its border the values stay and
+    edges get their midpoints: so both sides of a seam keep meeting (Blender calls this "keep
+    boundaries"). ``same`` are the values that say whether corners agree, if not ``values``.
+    """
+    patch = patch_points(faces.reshape(-1), values if same is None else same)
+    first = np.zeros(int(patch.max(initial=-1)) + 1, dtype=np.int64)
+    first[patch[::-1]] = np.arange(len(patch))[::-1]
+    columns, vertex_of = values[first], faces.reshape(-1)[first]
+    patches = patch.reshape(-1, 3)
+    sharp: Int[np.ndarray, "N 2"] | None = None
+    for level in range(levels):
+        topology = build_topology(patches, len(columns))
+        if level == 0 and len(creases):
+            named = np.isin(edge_keys(vertex_of[topology.edges]), edge_keys(creases))
+            sharp = topology.edges[named]
+        # Where the border begins is seen before creases are: they are no border.
+        border = _border(topology)
+        if sharp is not None:
+            topology = with_creases(topology, sharp)
+            sharp = crease_children(topology)
+        finer = one_level(columns, topology)
+        finer[: len(columns)][border] = columns[border]
+        columns = finer
+        patches = split(topology)
+    return columns[patches.reshape(-1)]
+
+
+def patch_points(
+    vertices: Int[np.ndarray, " C"], values: Float[np.ndarray, "C K"]
+) -> Int[np.ndarray, " C"]:
+    """A number for each corner; the same for corners of one vertex that have the same values."""
+    first = np.zeros(int(vertices.max(initial=-1)) + 1, dtype=np.int64)
+    first[vertices[::-1]] = np.arange(len(vertices))[::-1]
+    # Corners that agree with their vertex's first are found without sorting: on most meshes, all.
+    odd = (values != values[first[vertices]]).any(axis=1)
+    number = vertices.astype(np.int64)
+    if odd.any():
+        code = number[odd]
+        for column in values[odd].T:
+            _, rank = np.unique(column, return_inverse=True)
+            _, code = np.unique(code * (int(rank.max()) + 1) + rank, return_inverse=True)
+        number = number.copy()
+        number[odd] = len(first) + code
+    _, number = np.unique(number, return_inverse=True)
+    return number.reshape(-1)
+
+
+def _border(topology: Topology) -> np.ndarray:
+    return sharp_edge_count(topology) > 0

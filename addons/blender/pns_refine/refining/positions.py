@@ -1,0 +1,115 @@
+"""Where the vertices go: `pns_common.refine`, with creases that may wear off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common import Mesh, Refinement, Scheme, loop, refine
+from pns_common.limit import limit_normals, limit_positions
+from pns_common.refine import measure_reference_length
+
+from .steps import Steps
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Positions:
+    """Refined vertices with the operator's diagnostics and report."""
+
+    points: Float[np.ndarray, "W 3"]
+    ratio: Float[np.ndarray, " W"]
+    gate: Float[np.ndarray, " W"]
+    normals: Float[np.ndarray, "W 3"] | None
+    report: dict[str, Any]
+
+
+def refine_positions(
+    mesh: Mesh, scheme: Scheme, steps: Steps, *, limit: bool, progress: Progress
+) -> Positions:
+    """Refine the vertices of a mesh; ``limit`` puts them where Loop's rules would end.
+
+    A crease of which something is left is then sharp for good.
+
+    Raises:
+        PnsError: the mesh cannot be refined, or the model fails; and whatever ``progress`` raises.
+    """
+    if steps.wears_off:
+        return _level_by_level(mesh, scheme, steps, limit=limit, progress=progress)
+    creases, levels = _or_none(steps.steps[0].creases), len(steps.steps)
+    made = refine(mesh, scheme, levels, creases=creases, limit=limit, progress=progress)
+    return Positions(made.mesh.vertices, made.ratio, made.gate, made.normals, dict(made.report))
+
+
+def _level_by_level(
+    mesh: Mesh, scheme: Scheme, steps: Steps, *, limit: bool, progress: Progress
+) -> Positions:
+    """Each level with the creases it has; where some are half sharp, two readings are mixed.
+
+    Both readings lie within the budget of Loop's, so their mixture lies within the budget of the
+    mixture of Loop's. Such a level's report is the sharper reading's.
+    """
+    length = measure_reference_length(mesh.vertices, mesh.faces)
+    counter = _Counter(progress, steps)
+    reports: list[Any] = []
+    for depth, step in enumerate(steps.steps):
+        rule = scheme if _is_learned(scheme, depth) else loop()
+        smooth = made = counter.reading(mesh, rule, length, step.creases)
+        points = made.mesh.vertices
+        if step.mixture is not None:
+            made = counter.reading(mesh, rule, length, step.mixture.creases)
+            points = step.mixture.of(smooth.mesh.vertices, made.mesh.vertices)
+        reports.append(made.report)
+        mesh = Mesh(points, made.mesh.faces)
+    points, normals = mesh.vertices, None
+    if limit:
+        points = limit_positions(mesh.vertices, steps.at_last)
+        normals = limit_normals(mesh.vertices, steps.at_last).vertices
+    return Positions(points, made.ratio, made.gate, normals, _one_report(reports))
+
+
+def _one_report(reports: list[Any]) -> dict[str, Any]:
+    """The report of all levels, from those of each; what is a sum over levels is added up."""
+    report = dict(reports[0]) | {"levels": [level for part in reports for level in part["levels"]]}
+    for name in ("learned_levels", "limit_distance", "limit_distance_bound"):
+        values = [part[name] for part in reports if part["learned_levels"]]
+        report[name] = None if None in values else sum(values)
+    return report
+
+
+class _Counter:
+    """Refines by one level, and counts the faces made over all of them."""
+
+    def __init__(self, progress: Progress, steps: Steps) -> None:
+        self._progress, self._done = progress, 0
+        self._total = sum(
+            4 * len(step.topology.faces) * (1 if step.mixture is None else 2)
+            for step in steps.steps
+        )
+
+    def reading(
+        self,
+        mesh: Mesh,
+        scheme: Scheme,
+        length: float,
+        creases: Int[np.ndarray, "N 2"],
+    ) -> Refinement:
+        made = refine(mesh, scheme, 1, length, creases=_or_none(creases), progress=self._tell)
+        self._done += len(made.mesh.faces)
+        return made
+
+    def _tell(self, done: int, total: int) -> None:
+        self._progress(self._done + done, self._total)
+
+
+def _is_learned(scheme: Scheme, depth: int) -> bool:
+    return scheme.learned_levels is None or depth < scheme.learned_levels
+
+
+def _or_none(creases: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, "N 2"] | None:
+    return creases if len(creases) else None

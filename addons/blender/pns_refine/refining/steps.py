@@ -1,0 +1,168 @@
+"""The levels of a refinement as topologies, with creases that wear off.
+
+A crease of sharpness s is sharp for s levels; its decimal part mixes the sharp with the smooth rule
+at the level where it ends (DeRose, Kass, Truong 1998). Blender's crease c is the sharpness 10 c²,
+and 1 is sharp for good, as in its own Subdivision Surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.creases import with_creases
+from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
+from pns_common.topology import Topology, build_topology, split
+
+from .snapshot import edge_keys
+
+SHARPEST = 10.0
+# How many columns, and rows, are worked on at a time.
+COLUMNS, ROWS = 4, 8192
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """A second reading of a level, with more sharp edges, and each new vertex's share of it."""
+
+    topology: Topology
+    creases: Int[np.ndarray, "N 2"]
+    share: Float[np.ndarray, "W 1"]
+
+    def of(self, smooth: Float[np.ndarray, "W K"], sharp: Float[np.ndarray, "W K"]) -> np.ndarray:
+        """Smooth and sharp rows, mixed."""
+        return smooth + self.share * (sharp - smooth)
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One level: its topology with the creases that are sharp throughout, and what is between."""
+
+    topology: Topology
+    creases: Int[np.ndarray, "N 2"]
+    mixture: Mixture | None
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """All levels, and what is left at the end: faces, and the sharpness of edges."""
+
+    steps: tuple[Step, ...]
+    final: Topology
+    pairs: Int[np.ndarray, "N 2"]
+    crease_sharpness: Float[np.ndarray, " N"]
+
+    @cached_property
+    def at_last(self) -> Topology:
+        """The final topology with the creases that are left."""
+        return with_creases(self.final, self.pairs) if len(self.pairs) else self.final
+
+    @property
+    def wears_off(self) -> bool:
+        """Whether some crease is not sharp for good."""
+        first, last = self.steps[0], self.steps[-1]
+        if any(step.mixture is not None for step in self.steps):
+            return True
+        return len(last.creases) != len(first.creases) * 2 ** (len(self.steps) - 1)
+
+
+def crease_sharpness_of(crease: Float[np.ndarray, " E"]) -> Float[np.ndarray, " E"]:
+    """Blender's crease, 0 … 1, as a number of levels."""
+    return np.where(crease >= 1, np.inf, SHARPEST * np.clip(crease, 0, 1) ** 2)
+
+
+def crease_of(crease_sharpness: Float[np.ndarray, " E"]) -> Float[np.ndarray, " E"]:
+    """The crease that is sharp for so many levels."""
+    return np.sqrt(np.clip(crease_sharpness / SHARPEST, 0, 1))
+
+
+def level_steps(
+    faces: Int[np.ndarray, "F 3"],
+    vertex_count: int,
+    levels: int,
+    pairs: Int[np.ndarray, "N 2"],
+    crease_sharpness: Float[np.ndarray, " N"],
+) -> Steps:
+    """The topologies of ``levels`` levels; ``pairs`` of vertices name edges of this sharpness."""
+    steps = []
+    kept = crease_sharpness > 0
+    pairs, crease_sharpness = pairs[kept], crease_sharpness[kept]
+    for _ in range(levels):
+        plain = build_topology(faces, vertex_count)
+        sharp = pairs[crease_sharpness >= 1]
+        topology = with_creases(plain, sharp) if len(sharp) else plain
+        steps.append(Step(topology, sharp, _mixture(plain, pairs, crease_sharpness)))
+        pairs, crease_sharpness = _worn(plain, pairs, crease_sharpness)
+        faces, vertex_count = split(plain), vertex_count + len(plain.edges)
+    return Steps(tuple(steps), build_topology(faces, vertex_count), pairs, crease_sharpness)
+
+
+def refine_columns(columns: Float[np.ndarray, "V K"], steps: Steps) -> Float[np.ndarray, "W K"]:
+    """Columns at the refined vertices: Loop's masks, level by level."""
+    if columns.shape[1] == 0:
+        return np.zeros((steps.final.vertex_count, 0))
+    for step in steps.steps:
+        smooth = one_level(columns, step.topology)
+        mixture = step.mixture
+        columns = (
+            smooth if mixture is None else mixture.of(smooth, one_level(columns, mixture.topology))
+        )
+    return columns
+
+
+def edge_numbers(topology: Topology, pairs: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, " N"]:
+    """Which edge of the topology each pair is; −1 where it is none."""
+    if len(topology.edges) == 0 or len(pairs) == 0:
+        return np.full(len(pairs), -1, dtype=np.int64)
+    keys = edge_keys(topology.edges)
+    order = np.argsort(keys)
+    wanted = edge_keys(pairs)
+    place = np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)
+    nearest = order[place]
+    return np.where(keys[nearest] == wanted, nearest, -1)
+
+
+def one_level(columns: Float[np.ndarray, "V K"], topology: Topology) -> np.ndarray:
+    """Columns at the vertices of the next level, in pieces that stay in the processor's cache."""
+    old, width = columns.shape
+    made = np.empty((old + len(topology.edges), width))
+    for start in range(0, width, COLUMNS):
+        some = slice(start, start + COLUMNS)
+        made[:old, some] = loop_vertex_vertices(np.ascontiguousarray(columns[:, some]), topology)
+    for start in range(0, len(topology.edges), ROWS):
+        rows = slice(start, min(start + ROWS, len(topology.edges)))
+        made[old + rows.start : old + rows.stop] = loop_edge_vertices(columns, topology, rows)
+    return made
+
+
+def _mixture(
+    plain: Topology, pairs: Int[np.ndarray, "N 2"], crease_sharpness: Float[np.ndarray, " N"]
+) -> Mixture | None:
+    """Edges of less than a level left: sharp by that share, and their ends by their mean."""
+    ending = crease_sharpness < 1
+    if not ending.any():
+        return None
+    edges, share = edge_numbers(plain, pairs[ending]), crease_sharpness[ending]
+    at_edges = np.zeros(len(plain.edges))
+    at_edges[edges] = share
+    ends = pairs[ending].reshape(-1)
+    total = np.bincount(ends, np.repeat(share, 2), plain.vertex_count)
+    count = np.bincount(ends, minlength=plain.vertex_count)
+    at_vertices = total / np.maximum(count, 1)
+    return Mixture(
+        with_creases(plain, pairs), pairs, np.concatenate([at_vertices, at_edges])[:, None]
+    )
+
+
+def _worn(
+    plain: Topology, pairs: Int[np.ndarray, "N 2"], crease_sharpness: Float[np.ndarray, " N"]
+) -> tuple[Int[np.ndarray, "M 2"], Float[np.ndarray, " M"]]:
+    """The halves of sharp edges, a level less sharp; without those that are smooth now."""
+    lasting = crease_sharpness > 1
+    edges = edge_numbers(plain, pairs[lasting])
+    middle = plain.vertex_count + edges
+    halves = np.stack([pairs[lasting], np.stack([middle, middle], axis=1)], axis=-1)
+    return halves.reshape(-1, 2), np.repeat(crease_sharpness[lasting] - 1, 2)

@@ -1,0 +1,45 @@
+"""A model that looks up from its work: between two blocks of rows it asks whether to go on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.model_card import ModelCard
+from pns_common.schemes import VertexModel
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedModel:
+    """The same model; ``look_up`` is called before each block, and may raise to stop the work."""
+
+    model: VertexModel
+    look_up: Callable[[], None]
+
+    @property
+    def card(self) -> ModelCard:
+        """What the model says of itself."""
+        return self.model.card
+
+    @property
+    def name(self) -> str:
+        """How reports call it."""
+        return self.model.name
+
+    @property
+    def hash(self) -> str:
+        """The sha256 of the model file."""
+        return self.model.hash
+
+    def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
+        """Corrections of a block of edges."""
+        self.look_up()
+        return self.model(features, budget)
+
+    def vertex_correction(self, features: Float[np.ndarray, "N L"], budget: float) -> np.ndarray:
+        """Corrections of a block of vertices."""
+        self.look_up()
+        return self.model.vertex_correction(features, budget)

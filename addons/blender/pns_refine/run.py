@@ -1,0 +1,120 @@
+"""Reading, computing and writing as one run that can be driven in small steps, and stopped."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import bpy
+
+from .losses import irregularities, losses
+from .reading import Reading, read_mesh
+from .refining.compute import Choice, compute
+from .refining.job import Job, StoppedError
+from .refining.snapshot import Refined
+from .result import remember
+from .writing import write_mesh
+
+# What one call of `advance` takes at most, but for a single piece that takes longer.
+SLICE = 0.02
+WAITING = object()
+Steps = Generator[object, None, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A refined mesh, and what it came from."""
+
+    source: bpy.types.Mesh
+    mesh: bpy.types.Mesh
+    refined: Refined
+
+
+class Run:
+    """Drives a generator a slice of time at a time; between slices the interface may draw."""
+
+    def __init__(self, steps: Steps) -> None:
+        self._steps = steps
+        self.value: Any = None
+        self.done = False
+
+    def advance(self, seconds: float = SLICE) -> bool:
+        """Go on for so long, or until there is something to wait for; whether it is done.
+
+        Raises:
+            PnsError: the mesh cannot be refined, or the model fails.
+        """
+        end = time.monotonic() + seconds
+        while not self.done:
+            try:
+                state = next(self._steps)
+            except StopIteration as finished:
+                self.done, self.value = True, finished.value
+                break
+            if state is WAITING or time.monotonic() >= end:
+                break
+        return self.done
+
+    def finish(self) -> Any:
+        """Go on to the end; what came of it."""
+        while not self.advance(60.0):
+            time.sleep(0.001)
+        return self.value
+
+    def cancel(self) -> None:
+        """Stop, and leave nothing behind."""
+        self._steps.close()
+        self.done = True
+
+
+@dataclass
+class Share:
+    """How much of a run is done, for whoever shows it."""
+
+    value: float = 0.0
+    text: str = ""
+
+
+def refine_meshes(
+    objects: Iterable[bpy.types.Object], choice: Choice, share: Share
+) -> Generator[object, None, dict[str, Made]]:
+    """Refined copies of the meshes of these objects, by the name of the old mesh."""
+    holders = {obj.data.name: obj for obj in objects}
+    made: dict[str, Made] = {}
+    finished = False
+    try:
+        for number, (name, obj) in enumerate(holders.items()):
+            share.text = f"Refining {obj.name}"
+            made[name] = yield from refine_mesh(obj, choice, share, number, len(holders))
+        finished = True
+    finally:
+        if not finished:
+            for unfinished in made.values():
+                bpy.data.meshes.remove(unfinished.mesh)
+    return made
+
+
+def refine_mesh(
+    obj: bpy.types.Object, choice: Choice, share: Share, number: int = 0, count: int = 1
+) -> Generator[object, None, Made]:
+    """A refined copy of an object's mesh; the computation runs in a thread of its own."""
+    mesh: bpy.types.Mesh = obj.data
+    reading: Reading = yield from read_mesh(mesh)
+    job = Job(partial(compute, reading.snapshot, choice)).start()
+    try:
+        while job.running:
+            share.value = (number + job.share) / count
+            yield WAITING
+        refined = job.answer()
+    finally:
+        job.cancel()
+    new, refused = yield from write_mesh(refined, reading, mesh)
+    notes = losses(obj, reading, quads=choice.quads) + irregularities(refined) + refused
+    remember(new, refined, notes)
+    return Made(mesh, new, refined)
+
+
+__all__ = ["Made", "Run", "Share", "StoppedError", "refine_mesh", "refine_meshes"]

@@ -1,0 +1,132 @@
+"""What the user chooses, for the operator and for live mode alike."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from pns_common import load_model
+from pns_common.onnx_model import DEFAULT_MODEL, OnnxModel, bundled_models
+
+from .refining.compute import Choice
+
+NO_ANGLE = math.pi
+BUDGET = load_model(DEFAULT_MODEL).card.budget
+
+
+@lru_cache(maxsize=4)
+def _loaded(source: str, stamp: float) -> OnnxModel:
+    """A model, read once; ``stamp`` changes where its file does."""
+    return load_model(Path(source) if stamp else source)
+
+
+def model_of(name: str, file: str) -> OnnxModel:
+    """The model of a file, or the bundled one of this name.
+
+    Raises:
+        ModelError: there is no such file, or it is no model.
+    """
+    if not file:
+        return _loaded(name, 0.0)
+    path = Path(bpy.path.abspath(file))
+    return _loaded(str(path), path.stat().st_mtime) if path.is_file() else load_model(path)
+
+
+def _model_changed(settings: bpy.types.bpy_struct, context: bpy.types.Context) -> None:
+    if not settings.model_file:
+        settings.budget = model_of(settings.model, "").card.budget
+
+
+class Settings:
+    """The properties; a class with them is registered with Blender as an operator or a group."""
+
+    levels: IntProperty(
+        name="Levels",
+        description="How often each triangle is cut into four",
+        default=2,
+        min=1,
+        max=6,
+    )
+    scheme: EnumProperty(
+        name="Scheme",
+        description="How new vertices are placed",
+        items=(
+            ("PNS", "PNS", "Loop's positions with a learned correction that is bounded"),
+            ("LOOP", "Loop", "Loop subdivision without correction"),
+        ),
+        default="PNS",
+    )
+    model: EnumProperty(
+        name="Model",
+        description="The learned correction",
+        items=[(name, name, f"The bundled model {name}") for name in bundled_models()],
+        default=DEFAULT_MODEL,
+        update=_model_changed,
+    )
+    model_file: StringProperty(
+        name="Model File",
+        description="A model file to use instead of a bundled model",
+        subtype="FILE_PATH",
+    )
+    budget: FloatProperty(
+        name="Budget C",
+        description="How large the correction may be; 0 is Loop",
+        default=BUDGET,
+        min=0.0,
+        soft_max=max(4.0, 1.25 * BUDGET),
+        max=1000.0,
+        precision=3,
+    )
+    limit: BoolProperty(
+        name="On Limit Surface",
+        description="Put the vertices where further levels would take them in the end",
+        default=False,
+    )
+    crease_angle: FloatProperty(
+        name="Crease Angle",
+        description="Keep edges sharp whose faces meet at a larger angle; 180° keeps none",
+        subtype="ANGLE",
+        default=NO_ANGLE,
+        min=0.0,
+        max=NO_ANGLE,
+    )
+    quads: BoolProperty(
+        name="Join Quads",
+        description="Join the triangles that come of a quad to quads again",
+        default=False,
+    )
+
+    def draw_settings(self, layout: bpy.types.UILayout) -> None:
+        """Show the properties."""
+        layout.prop(self, "levels")
+        layout.prop(self, "scheme")
+        column = layout.column()
+        column.enabled = self.scheme == "PNS"
+        column.prop(self, "model")
+        column.prop(self, "model_file")
+        column.prop(self, "budget", slider=True)
+        layout.prop(self, "limit")
+        layout.prop(self, "crease_angle")
+        layout.prop(self, "quads")
+
+
+def choice_of(settings: Settings) -> Choice:
+    """What was chosen, without Blender.
+
+    Raises:
+        PnsError: the model cannot be used.
+    """
+    learned = settings.scheme == "PNS"
+    angle = settings.crease_angle
+    return Choice(
+        model=model_of(settings.model, settings.model_file) if learned else None,
+        levels=settings.levels,
+        budget=settings.budget,
+        limit=settings.limit,
+        crease_angle=None if angle >= NO_ANGLE else angle,
+        quads=settings.quads,
+    )

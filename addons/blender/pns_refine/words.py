@@ -1,0 +1,48 @@
+"""What the interface says in sentences. Knows no Blender: lengths come as texts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+MANY = 1_000_000
+
+
+def forecast(triangles: int, levels: int) -> str:
+    """How many faces there will be."""
+    return f"{triangles * 4**levels:,} triangles from {triangles:,}"
+
+
+def too_many(triangles: int, levels: int) -> str | None:
+    """A warning where there will be more faces than work well."""
+    if triangles * 4**levels <= MANY:
+        return None
+    return f"More than {MANY:,} triangles: this takes long, and much memory"
+
+
+def certificate(
+    report: dict[str, Any], farthest: float, length: Callable[[float], str]
+) -> list[str]:
+    """What a report promises and measured; ``length`` words a length of the mesh's own units."""
+    levels = report["levels"]
+    steps = f"{len(levels)} level" + ("s" if len(levels) > 1 else "")
+    if report["scheme"] == "loop":
+        return [f"{steps} of Loop, without correction"]
+    lines = [f"{steps} of PNS, model {report['model']}, C = {report['budget']:.3g}"]
+    lines.append(f"No vertex is farther than {length(farthest)} from Loop's,")
+    lines.append(f"no point of the limit surface farther than {length(report['limit_distance'])}")
+    bound = report["limit_distance_bound"]
+    if bound is not None:
+        lines.append(f"The budget allows {length(bound)}")
+    worst = max(level["proximity_ratio"]["max"] for level in levels)
+    lines.append(f"At most {100 * worst:.0f} % of the allowed correction was used")
+    flipped = sum(level["flipped_faces"] for level in levels)
+    lines.append("No face is flipped" if not flipped else f"{flipped:,} faces are flipped")
+    return lines
+
+
+def listed(names: Sequence[str], most: int = 4) -> str:
+    """Names in a row; those that are too many are counted."""
+    if len(names) <= most:
+        return ", ".join(names)
+    return ", ".join(names[:most]) + f" and {len(names) - most} more"

@@ -1,0 +1,81 @@
+"""Render a mesh as a sheet: control, Loop, an untrained control and PNS, in several looks.
+
+PYTHON addons/blender/render.py MESH… -o SHEET.png [--looks clay zebra] [--levels 3]
+PYTHON addons/blender/render.py MESH… -o TURN.mp4 --frames 48      # a turntable
+
+PYTHON has bpy and the project's library. Several meshes make several rows of each look. The camera,
+the light and the scale of a row are fixed, so its cells can be compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from addons.blender.pictures import files, sheet, stage
+from addons.blender.pictures.looks import LOOKS
+from addons.blender.pictures.variants import VARIANTS
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Read, refine, set the stage, and render."""
+    asked = parser().parse_args(arguments)
+    stage.clear()
+    rows = []
+    for path in asked.meshes:
+        mesh = files.read(path)
+        for look in asked.looks:
+            # The last level's edges are too many to be seen.
+            levels = max(1, asked.levels - 1) if look == "wire" else asked.levels
+            shapes = [VARIANTS[name](mesh, levels, asked.model) for name in asked.variants]
+            rows.append(sheet.Row(look, shapes))
+    count = asked.frames or 1
+    layout = sheet.build(rows, [asked.turn + 360 * frame / count for frame in range(count)])
+    width = round(asked.cell * layout.width)
+    # Encoders want even numbers.
+    height = 2 * round(asked.cell * layout.height / 2)
+    stage.prepare(width, height, stage.Quality(asked.engine.upper(), asked.samples))
+    if asked.frames:
+        turn(asked.frames)
+        stage.film(asked.output, asked.frames)
+    else:
+        stage.picture(asked.output)
+    print(f"{asked.output}: {width} × {height}")
+
+
+def turn(frames: int) -> None:
+    """Let every mesh go round once."""
+    for pivot in (o for o in bpy.data.objects if o.name.startswith("pivot")):
+        start = pivot.rotation_euler.z
+        for frame in range(1, frames + 1):
+            pivot.rotation_euler.z = start + 2 * math.pi * (frame - 1) / frames
+            pivot.keyframe_insert("rotation_euler", index=2, frame=frame)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command's arguments."""
+    made = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    made.add_argument("meshes", nargs="+", type=Path, metavar="MESH")
+    made.add_argument("-o", "--output", type=Path, required=True)
+    made.add_argument("--variants", nargs="+", choices=VARIANTS, default=list(VARIANTS))
+    made.add_argument(
+        "--looks", nargs="+", choices=[*LOOKS, *sheet.FIELDS], default=[*LOOKS, *sheet.FIELDS]
+    )
+    made.add_argument("--levels", type=int, default=3)
+    made.add_argument("--model", help="a bundled model or a file; the default if left out")
+    made.add_argument("--turn", type=float, default=0.0, help="degrees about the vertical axis")
+    made.add_argument("--cell", type=int, default=320, help="pixels of a cell's width")
+    made.add_argument("--samples", type=int, default=32)
+    made.add_argument("--engine", choices=["cycles", "eevee"], default="cycles")
+    made.add_argument("--frames", type=int, default=0, help="frames of a turntable; 0: a picture")
+    return made
+
+
+if __name__ == "__main__":
+    main()

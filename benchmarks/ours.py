@@ -1,0 +1,36 @@
+"""`python -m benchmarks.ours NAME MESH LEVELS`: our refinement behind the peers' protocol.
+
+NAME is loop or the name of a bundled model. The report is made when it is first read: NAME+report
+reads it, with all its diagnostics, in every run.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from benchmarks.peers.protocol import read_mesh, serve
+from pns_common import Mesh, load_model, loop, pns, refine
+from pns_common.fused import load_kernels
+
+
+def main(name: str, path: str, levels: str) -> None:
+    """Serve runs on one mesh."""
+    points, faces = read_mesh(path)
+    wide = faces.astype(np.int64)
+    method, _, report = name.partition("+")
+    scheme = loop() if method == "loop" else pns(load_model(method))
+
+    def run() -> tuple[np.ndarray, np.ndarray]:
+        refined = refine(Mesh(points, wide), scheme, int(levels))
+        if report:
+            assert len(refined.report["levels"]) == int(levels)
+        return refined.mesh.vertices, refined.mesh.faces
+
+    # Warm from the second run on, whatever the first did without.
+    serve(run, after_first=load_kernels)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,46 @@
+"""`python -m benchmarks.profile`: where a refinement spends its time, on one thread."""
+
+from __future__ import annotations
+
+import cProfile
+import pstats
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.generated import ORDERS
+from pns_common import load_model, loop, pns, refine
+from pns_common.fused import load_kernels
+
+ROWS = 24
+
+
+def main(
+    model: Annotated[str, typer.Option(help="bundled model, or loop")] = "loop",
+    faces: Annotated[int, typer.Option(help="about so many")] = 320_000,
+    order: Annotated[str, typer.Option(help=", ".join(ORDERS))] = "closed",
+    levels: Annotated[int, typer.Option(help="depth")] = 1,
+) -> None:
+    """Profile a warm call by processor time."""
+    load_kernels()
+    mesh = ORDERS[order](faces)
+    scheme = loop() if model == "loop" else pns(load_model(model))
+    refine(mesh, scheme, levels, threads=1)  # warm
+    profile = cProfile.Profile(time.process_time)
+    profile.runcall(refine, mesh, scheme, levels, threads=1)
+    entries = pstats.Stats(profile).get_stats_profile().func_profiles.items()
+    own = sorted(((e.tottime, name, Path(e.file_name).stem) for name, e in entries), reverse=True)
+    total = sum(seconds for seconds, *_ in own)
+    title = f"{model}, {len(mesh.faces):,} {order} faces × {levels}: {1000 * total:.0f} ms"
+    table = Table("ms", "share", "function", "of", title=title)
+    for seconds, name, file in own[:ROWS]:
+        table.add_row(f"{1000 * seconds:.1f}", f"{seconds / total:.0%}", name, file)
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    typer.run(main)

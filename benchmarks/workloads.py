@@ -1,0 +1,62 @@
+"""`python -m benchmarks.workloads NAME SECONDS`: one run again and again, for a profiler."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+
+from benchmarks.generated import torus
+from pns_common import load_model, loop, pns, refine
+from pns_common.fused import load_kernels
+
+
+def plain_loop() -> Callable[[], object]:
+    """One level of Loop from 320,000 faces."""
+    mesh = torus(320_000)
+    return lambda: refine(mesh, loop())
+
+
+def learned_level() -> Callable[[], object]:
+    """One level of the default model from 320,000 faces, with its report."""
+    mesh, scheme = torus(320_000), pns(load_model())
+    return lambda: refine(mesh, scheme).report
+
+
+def three_levels() -> Callable[[], object]:
+    """Three levels of the default model from 20,000 faces, with the report."""
+    mesh, scheme = torus(20_000), pns(load_model())
+    return lambda: refine(mesh, scheme, 3).report
+
+
+def file() -> Callable[[], object]:
+    """A GLB of 60,000 faces refined twice, from bytes to bytes."""
+    from service.gltf.subdivide import subdivide_gltf
+    from service.meshfiles.indexed_triangles import IndexedTriangles
+    from service.meshfiles.triangles_glb import triangles_glb
+    from service.options import Limits, Options
+
+    mesh, model = torus(60_000), load_model()
+    data = triangles_glb(IndexedTriangles(mesh.vertices, mesh.faces, None))
+    limits = Limits(max_faces=10**8, max_memory_bytes=10**11)
+    return lambda: subdivide_gltf(data, "glb", Options(2), model, limits)
+
+
+WORKLOADS = {work.__name__: work for work in (plain_loop, learned_level, three_levels, file)}
+
+
+def repeat(work: Callable[[], object], seconds: float) -> None:
+    """Call it again and again: the frame that a flame graph grows from."""
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end:
+        work()
+
+
+def main(name: str, seconds: str) -> None:
+    """Load what the run needs, and repeat it."""
+    load_kernels()
+    repeat(WORKLOADS[name](), float(seconds))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,1 @@
+"""What an interior edge sees, and what is learned about it."""

@@ -1,0 +1,102 @@
+"""What a learned level adds to Loop's vertices, and what it reads of the level for that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.blocks import ROWS, Blocks
+from pns_common.fused.boundary import NO_RULE, Boundary
+from pns_common.fused.mesh_edges import MeshEdges
+from pns_common.fused.rings import (
+    FaceMeasures,
+    RingMeasures,
+    measure_bends,
+    measure_normals,
+    measure_pushes,
+    measure_rings,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """A level's mesh with what the rules ask of it: each part computed once, if it is asked for.
+
+    ``reference_length`` is R > 0, the unit of length of the budget: of the whole mesh, or of each
+    vertex, where parts that share no vertex have their own.
+    """
+
+    points: Float[np.ndarray, "V 3"]
+    mesh: MeshEdges
+    several_fans: Bool[np.ndarray, " V"]
+    reference_length: float | Float[np.ndarray, " V"]
+    blocks: Blocks
+    boundary: Boundary = NO_RULE
+
+    def budget_per_length(
+        self, vertices: Int[np.ndarray, " N"], budget: float
+    ) -> Float[np.ndarray, " N"]:
+        """C / R at each of some vertices."""
+        if isinstance(self.reference_length, np.ndarray):
+            return budget / self.reference_length[vertices]
+        return np.full(len(vertices), budget / self.reference_length)
+
+    @cached_property
+    def faces(self) -> FaceMeasures:
+        """Normals and areas."""
+        return measure_normals(self.points, self.mesh, self.blocks)
+
+    @cached_property
+    def rings(self) -> RingMeasures:
+        """The rings of all vertices."""
+        return measure_rings(self.points, self.mesh, self.faces, self.several_fans, self.blocks)
+
+    @cached_property
+    def pushes(self) -> Float[np.ndarray, "V 3"]:
+        """The prior's d_v at s = 1."""
+        return measure_pushes(self.rings, self.blocks)
+
+    @cached_property
+    def bends(self) -> Float[np.ndarray, " F"]:
+        """b of the gates that read sides."""
+        return measure_bends(self.faces, self.mesh, self.blocks)
+
+    @property
+    def network_blocks(self) -> Blocks:
+        """How rows are divided that a network sees: as the array kernels divide them."""
+        return self.blocks.of_rows(min(ROWS, self.blocks.rows))
+
+
+@dataclass(frozen=True, eq=False)
+class Additions:
+    """What is added to N of Loop's vertices; see ``placement.Placement``."""
+
+    displacement: Float[np.ndarray, "N 3"]
+    ratio: Float[np.ndarray, " N"]
+    gate: Float[np.ndarray, " N"]
+    envelope: Float[np.ndarray, " N"]
+    degenerate: Bool[np.ndarray, " N"]
+
+    @classmethod
+    def nothing(cls, count: int) -> Additions:
+        """Zeros, to be written into."""
+        ratio, gate, envelope = (np.zeros(count) for _ in range(3))
+        return cls(np.zeros((count, 3)), ratio, gate, envelope, np.zeros(count, dtype=bool))
+
+    def part(self, rows: slice) -> Additions:
+        """Some of the rows, as views."""
+        return Additions(
+            self.displacement[rows],
+            self.ratio[rows],
+            self.gate[rows],
+            self.envelope[rows],
+            self.degenerate[rows],
+        )
+
+    def scale(self, by: Float[np.ndarray, " N"]) -> None:
+        """Take s δ in place of δ."""
+        self.displacement[:] *= by[:, None]
+        self.ratio[:] *= by

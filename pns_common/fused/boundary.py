@@ -1,0 +1,143 @@
+"""The boundary's prior beside the kernels: its rule is the array kernels', on the few it moves.
+
+The rule knows a boundary alone, so it is given a level of the vertices on sharp edges, and of those
+edges: what it makes of them is what it makes of them in the whole mesh, bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.boundary_prior import on_boundary
+from pns_common.boundary_rule import BoundaryRule
+from pns_common.fused.mesh_edges import MeshEdges, has_boundary
+from pns_common.level import ControlLevel
+from pns_common.placement import Placement
+from pns_common.topology import Topology
+
+Move = Callable[[ControlLevel, Placement], Placement]
+
+
+@dataclass(frozen=True, eq=False)
+class SharpLevel:
+    """A level's sharp edges by themselves.
+
+    Attributes:
+        level: their vertices and themselves, numbered on their own in the same order.
+        vertices, edges: which they are in the whole mesh.
+    """
+
+    level: ControlLevel
+    vertices: Int[np.ndarray, " N"]
+    edges: Int[np.ndarray, " S"]
+
+    @classmethod
+    def of(
+        cls,
+        points: Float[np.ndarray, "V 3"],
+        mesh: MeshEdges,
+        length: float | Float[np.ndarray, " V"],
+    ) -> SharpLevel:
+        """Those of a mesh; ``length`` is R, or each vertex's own."""
+        edges = mesh.sharp_edges
+        ends = mesh.edges[edges].astype(np.int64)
+        vertices = np.unique(ends)
+        pairs = np.searchsorted(vertices, ends)
+        no_faces, no_normals = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3))
+        nothing = np.full((len(edges), 2), -1)
+        topology = Topology(
+            vertex_count=len(vertices),
+            faces=no_faces,
+            edges=pairs,
+            face_edges=no_faces,
+            half_edges=nothing,
+            stencil=np.concatenate([pairs, nothing], axis=1),
+            edge_class=mesh.edge_class[edges],
+            interior=np.zeros(0, dtype=np.int64),
+        )
+        own = length[vertices] if isinstance(length, np.ndarray) else length
+        return cls(ControlLevel(points[vertices], topology, no_normals, own), vertices, edges)
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """What a rule makes of a level's boundary.
+
+    Attributes:
+        rule, sharp: None where there is no rule, or no boundary.
+        pushes: of all vertices; (0, 3) where there are none.
+        nothing: what is added in their place: 0, or −0 where there is no rule.
+    """
+
+    rule: BoundaryRule | None
+    sharp: SharpLevel | None
+    pushes: Float[np.ndarray, "P 3"]
+    nothing: float
+
+    def move_vertices(self, placed: Placement) -> None:
+        """Move boundary vertices, in a placement's own arrays."""
+        if self.rule is not None and self.sharp is not None:
+            _move(self.rule.move_vertices, self.sharp.level, self.sharp.vertices, placed)
+        elif self.rule is not None:
+            _drop_minus_zero(placed)
+
+    def move_edges(self, placed: Placement) -> None:
+        """Move boundary edges likewise."""
+        if self.rule is not None and self.sharp is not None:
+            _move(self.rule.move_edges, self.sharp.level, self.sharp.edges, placed)
+        elif self.rule is not None:
+            _drop_minus_zero(placed)
+
+    def first(self, vertex_count: int, edge_count: int) -> Bool[np.ndarray, " W"] | None:
+        """What the fold guard settles first; None where that is nothing."""
+        if self.sharp is None:
+            return None
+        alone = on_boundary(self.sharp.level.topology)
+        first = np.zeros(vertex_count + edge_count, dtype=bool)
+        first[self.sharp.vertices] = alone[: len(self.sharp.vertices)]
+        first[vertex_count + self.sharp.edges] = alone[len(self.sharp.vertices) :]
+        return first
+
+
+NO_RULE = Boundary(None, None, np.zeros((0, 3)), -0.0)
+
+
+def boundary_of(
+    rule: BoundaryRule | None,
+    points: Float[np.ndarray, "V 3"],
+    mesh: MeshEdges,
+    length: float | Float[np.ndarray, " V"],
+) -> Boundary:
+    """What ``rule`` makes of a level; ``length`` is R, or each vertex's own."""
+    if rule is None:
+        return NO_RULE
+    if not has_boundary(mesh):
+        return Boundary(rule, None, np.zeros((0, 3)), 0.0)
+    sharp = SharpLevel.of(points, mesh, length)
+    pushes = np.zeros_like(points)
+    pushes[sharp.vertices] = rule.pushes(sharp.level)
+    return Boundary(rule, sharp, pushes, 0.0)
+
+
+def _move(move: Move, level: ControlLevel, rows: Int[np.ndarray, " N"], placed: Placement) -> None:
+    """Write what ``move`` makes of some rows into a placement of arrays."""
+    _drop_minus_zero(placed)
+    moved = move(level, placed.rows(rows))
+    for into, values in (
+        (placed.displacement, moved.displacement),
+        (placed.ratio, moved.ratio),
+        (placed.envelope, moved.envelope),
+        (placed.corrected, moved.corrected),
+    ):
+        if into is not None and values is not None:
+            into[rows] = values
+
+
+def _drop_minus_zero(placed: Placement) -> None:
+    """Leave no −0, as adding nothing but zeros does."""
+    assert placed.displacement is not None
+    np.add(placed.displacement, 0.0, out=placed.displacement)

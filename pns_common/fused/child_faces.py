@@ -1,0 +1,53 @@
+"""The faces that a step made: how many are flipped, and the largest jump, as in diagnostics.py."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.blocks import Blocks
+from pns_common.diagnostics import ChildAngles
+from pns_common.fused.kernels.normals import (
+    flipped_children,
+    largest_jump_across,
+    largest_jump_inside,
+)
+from pns_common.fused.mesh_edges import MeshEdges
+
+
+def look_at_children(
+    parent: MeshEdges,
+    points: Float[np.ndarray, "W 3"],
+    loop_points: Float[np.ndarray, "W 3"] | None,
+    blocks: Blocks,
+) -> ChildAngles:
+    """Look at the faces that ``parent`` was split into (see ``diagnostics.child_faces``)."""
+    count, edge_count = len(parent.faces), len(parent.edges)
+    inside, across = np.zeros(blocks.count(count)), np.zeros(blocks.count(edge_count))
+    flipped, largest_yet = np.zeros(blocks.count(count), dtype=np.int64), np.zeros(1)
+    faces, vertices = (parent.faces, parent.face_edges), parent.vertex_count
+    edges = parent.half_edges, parent.edge_class
+
+    def look_inside(rows: slice) -> None:
+        block, bounds = blocks.number(rows), (vertices, rows.start, rows.stop)
+        inside[block] = largest_jump_inside(points, *faces, *bounds, largest_yet)
+        if loop_points is not None:
+            flipped[block] = flipped_children(points, loop_points, *faces, *bounds)
+
+    def look_across(rows: slice) -> None:
+        bounds = vertices, rows.start, rows.stop
+        across[blocks.number(rows)] = largest_jump_across(
+            points, *faces, *edges, *bounds, largest_yet
+        )
+
+    blocks.run(count, look_inside)
+    blocks.run(edge_count, look_across)
+    chord = max(inside.max(initial=0), across.max(initial=0))
+    return ChildAngles(int(flipped.sum()), jump_of(chord))
+
+
+def jump_of(chord: float) -> float:
+    """The angle between two unit normals, from their squared distance."""
+    return float(2 * np.arcsin(min(1.0, math.sqrt(chord) / 2)))

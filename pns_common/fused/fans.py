@@ -1,0 +1,25 @@
+"""Vertices whose faces form more than one fan, as ``topology.multi_fan_vertices`` finds them."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool
+
+from pns_common.blocks import Blocks
+from pns_common.fused.kernels.fans import count_corners, several_fans
+from pns_common.fused.mesh_edges import MeshEdges
+
+
+def multi_fan_vertices(mesh: MeshEdges, blocks: Blocks) -> Bool[np.ndarray, " V"]:
+    """Whether the faces of each vertex form more than one fan."""
+    corner, count = (np.zeros(mesh.vertex_count, dtype=np.int32) for _ in range(2))
+    count_corners(mesh.faces, corner, count)
+    several = np.empty(mesh.vertex_count, dtype=bool)
+    args = mesh.face_edges, mesh.half_edges, mesh.edge_class, corner, count
+    known = mesh.sharp, int(mesh.plain)
+
+    def walk(rows: slice) -> None:
+        several_fans(*args, *known, rows.start, rows.stop, several)
+
+    blocks.run(mesh.vertex_count, walk)
+    return several

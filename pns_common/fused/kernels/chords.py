@@ -1,0 +1,50 @@
+"""The largest angle between some children, and how many are flipped: with diagnostics.py's bits."""
+
+from __future__ import annotations
+
+import numba
+from numba import float64, njit
+
+from pns_common.fused.kernels.compiled import INDICES, POINTS, SIZE, kernel
+from pns_common.fused.kernels.normals import squared_chord, unit_normal
+
+ROWS = numba.types.Array(numba.int64, 1, "C", readonly=True)
+
+
+@njit(inline="always")
+def _normal(points, children, f):
+    return unit_normal(points, children[f, 0], children[f, 1], children[f, 2])
+
+
+@kernel(float64, POINTS, INDICES, ROWS)
+def chords_inside(points, children, faces):
+    """The largest squared chord between the middle child and the others of some faces."""
+    largest = 0.0
+    for f in faces:
+        middle = _normal(points, children, 4 * f + 3)
+        for i in range(3):
+            chord = squared_chord(middle, _normal(points, children, 4 * f + i))
+            largest = max(largest, chord)
+    return largest
+
+
+@kernel(float64, POINTS, INDICES, ROWS, ROWS)
+def chords_between(points, children, first, second):
+    """The same between pairs of children."""
+    largest = 0.0
+    for e in range(first.shape[0]):
+        n = _normal(points, children, first[e])
+        largest = max(largest, squared_chord(n, _normal(points, children, second[e])))
+    return largest
+
+
+@kernel(SIZE, POINTS, POINTS, INDICES, ROWS)
+def flipped_among(points, loop_points, children, faces):
+    """How many children of some faces have a normal that opposes Loop's."""
+    flipped = 0
+    for f in faces:
+        for i in range(4):
+            n = _normal(points, children, 4 * f + i)
+            m = _normal(loop_points, children, 4 * f + i)
+            flipped += n[0] * m[0] + n[1] * m[1] + n[2] * m[2] < 0
+    return flipped

@@ -1,0 +1,272 @@
+"""What interior edges see and what is added there, with the bits of correction.py."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pns_common.edge.features import SHORTEST
+from pns_common.edge.frames import ANTIPARALLEL
+from pns_common.fused.kernels.compiled import (
+    FLAGS_OUT,
+    INDEX,
+    INDICES,
+    NUMBERS,
+    NUMBERS_OUT,
+    POINTS,
+    POINTS_OUT,
+    REAL,
+    SIZE,
+    kernel,
+)
+from pns_common.fused.kernels.masks import opposite
+from pns_common.fused.kernels.rings import HEIGHT, between, cross, dot, norm, row
+from pns_common.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
+
+# Feature columns: curvature, four log ratios, then those with a sign.
+LOGS, DIHEDRAL, ENDS, WINGS, UMBRELLAS = 1, 5, 6, 10, 14
+# How many lengths have their logarithms taken: the four sides, then h.
+LENGTHS = 5
+
+
+@njit(inline="always")
+def _unit(v):
+    square = dot(v, v)
+    length = math.sqrt(square) if square > 0 else math.inf
+    return v[0] / length, v[1] / length, v[2] / length
+
+
+@njit(inline="always")
+def _no_shorter(length):
+    return length if length > SHORTEST else SHORTEST
+
+
+@kernel(
+    SIZE,
+    *(POINTS, POINTS, POINTS, INDICES, INDICES, INDICES, INDEX, SIZE, SIZE, SIZE),
+    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, FLAGS_OUT, POINTS_OUT, POINTS_OUT),
+)
+def look(
+    points,
+    normals,
+    fields,
+    faces,
+    edges,
+    half_edges,
+    interior,
+    begin,
+    end,
+    symmetric,
+    frame,
+    length,
+    curvature,
+    degenerate,
+    lengths,
+    features,
+):
+    """Frames and features of the interior edges begin … end − 1; row 0 is for edge ``begin``.
+
+    Args:
+        fields: (V, 4) mean normal and umbrella height; read where ``features`` has signed columns.
+        symmetric: 1 where c lies to the left of a → b and degenerate edges have x = 0, else 0.
+        frame: (N, 9) out: T, N, B.
+        length, curvature, degenerate: out: h, x, and whether the frame is the fallback.
+        lengths: (5, N) out: of which the logarithms are to be taken.
+        features: (N, K) out: all columns but those of the log ratios.
+    """
+    wide = features.shape[1]
+    for i in range(end - begin):
+        e = interior[begin + i]
+        a, b = edges[e, 0], edges[e, 1]
+        h1, h2 = half_edges[e, 0], half_edges[e, 1]
+        if symmetric and faces[h1 // 3, h1 % 3] != a:
+            h1, h2 = h2, h1
+        c, d = opposite(faces, h1), opposite(faces, h2)
+        n1, n2 = row(normals, h1 // 3), row(normals, h2 // 3)
+
+        edge = between(points, a, b)
+        h = norm(edge)
+        cosine = dot(n1, n2)
+        undefined = h == 0 or dot(n1, n1) == 0 or dot(n2, n2) == 0
+        fallback = undefined or cosine <= -1 + ANTIPARALLEL
+        if fallback:
+            tangent, mean = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+        else:
+            tangent = _unit(edge)
+            mean = n1[0] + n2[0], n1[1] + n2[1], n1[2] + n2[2]
+        along = dot(mean, tangent)
+        normal = _unit(
+            (
+                mean[0] - along * tangent[0],
+                mean[1] - along * tangent[1],
+                mean[2] - along * tangent[2],
+            )
+        )
+        binormal = cross(tangent, normal)
+        x = 0.0 if undefined or (symmetric and fallback) else 1 - cosine
+        for k in range(3):
+            frame[i, k], frame[i, 3 + k], frame[i, 6 + k] = tangent[k], normal[k], binormal[k]
+        length[i], curvature[i], degenerate[i] = h, x, fallback
+
+        features[i, 0] = x
+        lengths[0, i] = _no_shorter(norm(between(points, a, c)))
+        lengths[1, i] = _no_shorter(norm(between(points, b, c)))
+        lengths[2, i] = _no_shorter(norm(between(points, a, d)))
+        lengths[3, i] = _no_shorter(norm(between(points, b, d)))
+        lengths[4, i] = _no_shorter(h)
+        if wide > DIHEDRAL:
+            features[i, DIHEDRAL] = dot(cross(n1, n2), tangent)
+            features[i, ENDS] = dot(row(fields, a), tangent)
+            features[i, ENDS + 1] = dot(row(fields, b), tangent)
+            features[i, ENDS + 2] = dot(row(fields, a), binormal)
+            features[i, ENDS + 3] = dot(row(fields, b), binormal)
+            features[i, WINGS] = dot(row(fields, c), tangent)
+            features[i, WINGS + 1] = dot(row(fields, d), tangent)
+            features[i, WINGS + 2] = dot(row(fields, c), binormal)
+            features[i, WINGS + 3] = dot(row(fields, d), binormal)
+        if wide > UMBRELLAS:
+            features[i, UMBRELLAS] = fields[a, HEIGHT]
+            features[i, UMBRELLAS + 1] = fields[b, HEIGHT]
+            features[i, UMBRELLAS + 2] = fields[c, HEIGHT]
+            features[i, UMBRELLAS + 3] = fields[d, HEIGHT]
+    return 0
+
+
+@kernel(SIZE, POINTS, POINTS_OUT)
+def fill_log_ratios(logs, features):
+    """The log ratios of the sides, from the logarithms of ``lengths``."""
+    for i in range(features.shape[0]):
+        for k in range(LENGTHS - 1):
+            features[i, LOGS + k] = logs[k, i] - logs[LENGTHS - 1, i]
+    return 0
+
+
+@njit(inline="always")
+def in_ball(z):
+    """A vector shortened to length 1, as ``correction.project_to_ball`` does."""
+    largest = max(max(abs(z[0]), abs(z[1])), abs(z[2]))
+    scale = largest if largest > 1 else 1.0
+    length = norm((z[0] / scale, z[1] / scale, z[2] / scale)) * scale
+    factor = 1.0 / (length if length > 1 else 1.0)
+    return z[0] * factor, z[1] * factor, z[2] * factor
+
+
+@njit(inline="always")
+def _rotated(frame, i, z):
+    return (
+        z[0] * frame[i, 0] + z[1] * frame[i, 3] + z[2] * frame[i, 6],
+        z[0] * frame[i, 1] + z[1] * frame[i, 4] + z[2] * frame[i, 7],
+        z[0] * frame[i, 2] + z[1] * frame[i, 5] + z[2] * frame[i, 8],
+    )
+
+
+@njit(inline="always")
+def shortened(v, longest):
+    """A vector shortened to ``longest``, as ``correction.shortened`` does."""
+    length = norm(v)
+    factor = longest / length if length > longest else 1.0
+    return v[0] * factor, v[1] * factor, v[2] * factor
+
+
+@njit(inline="always")
+def ratio_of(v, envelope):
+    """‖δ‖ / ρ; 0 where the envelope is empty."""
+    return norm(v) / envelope if envelope > 0 else 0.0
+
+
+@kernel(
+    SIZE,
+    *(POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS, INDEX, SIZE),
+    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+)
+def correct(
+    eta,
+    frame,
+    length,
+    gate,
+    budget_per_length,
+    interior,
+    begin,
+    displacement,
+    ratio,
+    gates,
+    envelopes,
+):
+    """δ = h² γ F η into the rows of the edges (``correction.correct``)."""
+    for i in range(eta.shape[0]):
+        e = interior[begin + i]
+        envelope = budget_per_length[i] * (length[i] * length[i])
+        turned = _rotated(frame, i, in_ball(row(eta, i)))
+        size = envelope * gate[i]
+        delta = size * turned[0], size * turned[1], size * turned[2]
+        for k in range(3):
+            displacement[e, k] = delta[k]
+        ratio[e], gates[e], envelopes[e] = ratio_of(delta, envelope), gate[i], envelope
+    return 0
+
+
+@njit(inline="always")
+def _at_edge(pushes, a, b, c, d, k):
+    """A coordinate of what Loop's edge mask makes of pushes."""
+    ends, sides = pushes[a, k] + pushes[b, k], pushes[c, k] + pushes[d, k]
+    return EDGE_ENDPOINT * ends + EDGE_OPPOSITE * sides
+
+
+@njit(inline="always")
+def _prior(pushes, of_boundary, nothing, a, b, c, d, k, strength):
+    """A coordinate of D_e, with the boundary's part."""
+    part = _at_edge(of_boundary, a, b, c, d, k) if len(of_boundary) else nothing
+    return strength * _at_edge(pushes, a, b, c, d, k) + part
+
+
+@kernel(
+    SIZE,
+    *(POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS, INDEX, SIZE),
+    *(POINTS, POINTS, REAL, INDICES, INDICES, INDICES, REAL, REAL),
+    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+)
+def correct_scale_free(
+    z,
+    frame,
+    length,
+    gate,
+    budget_per_length,
+    interior,
+    begin,
+    pushes,
+    of_boundary,
+    nothing,
+    faces,
+    edges,
+    half_edges,
+    strength,
+    scale,
+    displacement,
+    ratio,
+    gates,
+    envelopes,
+):
+    """δ = γ Π_ρ(D + τ h F z) into the rows of the edges (``correction.correct_scale_free``).
+
+    ``of_boundary`` are the boundary's pushes; (0, 3) where there are none. Then ``nothing`` is
+    added in their place: 0, or −0 where there is no rule for boundaries, which changes no −0.
+    """
+    for i in range(z.shape[0]):
+        e = interior[begin + i]
+        a, b = edges[e, 0], edges[e, 1]
+        c, d = opposite(faces, half_edges[e, 0]), opposite(faces, half_edges[e, 1])
+        envelope = budget_per_length[i] * (length[i] * length[i])
+        turned = _rotated(frame, i, in_ball(row(z, i)))
+        asked = scale * length[i]
+        wanted = (
+            _prior(pushes, of_boundary, nothing, a, b, c, d, 0, strength) + asked * turned[0],
+            _prior(pushes, of_boundary, nothing, a, b, c, d, 1, strength) + asked * turned[1],
+            _prior(pushes, of_boundary, nothing, a, b, c, d, 2, strength) + asked * turned[2],
+        )
+        allowed = shortened(wanted, envelope)
+        delta = gate[i] * allowed[0], gate[i] * allowed[1], gate[i] * allowed[2]
+        for k in range(3):
+            displacement[e, k] = delta[k]
+        ratio[e], gates[e], envelopes[e] = ratio_of(delta, envelope), gate[i], envelope
+    return 0

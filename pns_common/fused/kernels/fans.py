@@ -1,0 +1,87 @@
+"""Fans of corners around vertices, with the counts of ``topology.multi_fan_vertices``."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from pns_common.fused.kernels.compiled import (
+    CLASSES,
+    FLAGS_OUT,
+    INDEX,
+    INDEX_OUT,
+    INDICES,
+    SIZE,
+    kernel,
+)
+from pns_common.fused.kernels.edges import CREASE, INTERIOR
+
+# The fewest faces that close around a vertex.
+SMALLEST_RING = 3
+
+
+@njit(inline="always")
+def _across(face_edges, half_edges, edge_class, half_edge):
+    """The other half-edge of an interior or crease edge, else −1: a crease parts no fan."""
+    f = half_edge // 3
+    e = face_edges[f, half_edge - 3 * f]
+    if edge_class[e] != INTERIOR and edge_class[e] != CREASE:
+        return -1
+    first = half_edges[e, 0]
+    return half_edges[e, 1] if first == half_edge else first
+
+
+@kernel(SIZE, INDICES, INDEX_OUT, INDEX_OUT)
+def count_corners(faces, corner, count):
+    """One corner of each vertex, and how many it has; ``count`` is 0 on entry."""
+    for f in range(faces.shape[0]):
+        for i in range(3):
+            corner[faces[f, i]] = 3 * f + i
+            count[faces[f, i]] += 1
+    return 0
+
+
+@kernel(SIZE, INDICES, INDICES, CLASSES, INDEX, INDEX, INDEX, SIZE, SIZE, SIZE, FLAGS_OUT)
+def several_fans(
+    face_edges, half_edges, edge_class, corner, count, sharp, plain, begin, end, several
+):
+    """Whether the vertices begin … end − 1 have corners outside the fan of their ``corner``.
+
+    Args:
+        sharp: how many edges at each vertex are not interior; (0,) where there are none at all.
+        plain: 1 where no face repeats a vertex and no two faces have the same three. Then where all
+            edges are interior every fan is closed and has three corners or more: what is fewer
+            cannot be another.
+    """
+    for v in range(begin, end):
+        several[v] = False
+        if count[v] == 0:
+            continue
+        start = corner[v]
+        closed = plain and (len(sharp) == 0 or sharp[v] == 0)
+        enough = count[v] - SMALLEST_RING if closed else count[v]
+        seen, h = 1, start
+        if seen > enough:
+            continue
+        while True:
+            # Across the half-edge that leaves the corner; the next corner is where the other ends.
+            twin = _across(face_edges, half_edges, edge_class, h)
+            if twin < 0:
+                break
+            h = twin + 1 if twin % 3 < 2 else twin - 2
+            if h == start:
+                break
+            seen += 1
+            if seen > enough:
+                break
+        if seen > enough:
+            continue
+        if twin < 0:
+            h = start
+            while True:
+                twin = _across(face_edges, half_edges, edge_class, h - 1 if h % 3 > 0 else h + 2)
+                if twin < 0:
+                    break
+                h = twin
+                seen += 1
+        several[v] = seen != count[v]
+    return 0

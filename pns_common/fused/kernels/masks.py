@@ -1,0 +1,130 @@
+"""Loop's masks on arrays, with the bits of ``pns_common.stencils``.
+
+Sums around a vertex run over its edges in ascending order, whoever computes them: each thread owns
+a range of vertices and reads all edges.
+"""
+
+from __future__ import annotations
+
+from numba import float64, njit
+
+from pns_common.fused.kernels.compiled import (
+    CLASSES,
+    INDEX,
+    INDEX_OUT,
+    INDICES,
+    NUMBERS,
+    POINTS,
+    POINTS_OUT,
+    SIZE,
+    kernel,
+)
+from pns_common.fused.kernels.edges import INTERIOR
+from pns_common.stencils import (
+    CURVE_CENTRE,
+    CURVE_NEIGHBOUR,
+    EDGE_ENDPOINT,
+    EDGE_OPPOSITE,
+    MIDPOINT,
+)
+
+
+@njit(inline="always")
+def opposite(faces, half_edge):
+    """The vertex of a half-edge's face that is not on it."""
+    f = half_edge // 3
+    i = half_edge - 3 * f
+    return faces[f, i - 1 if i > 0 else 2]
+
+
+@kernel(SIZE, POINTS, INDICES, INDICES, INDICES, CLASSES, SIZE, SIZE, POINTS_OUT)
+def place_edges(points, faces, edges, half_edges, edge_class, begin, end, placed):
+    """Loop's vertices of edges begin … end − 1 (equation 2); midpoints where not interior."""
+    for e in range(begin, end):
+        a, b = edges[e, 0], edges[e, 1]
+        if edge_class[e] == INTERIOR:
+            c, d = opposite(faces, half_edges[e, 0]), opposite(faces, half_edges[e, 1])
+            for k in range(3):
+                ends, sides = points[a, k] + points[b, k], points[c, k] + points[d, k]
+                placed[e, k] = EDGE_ENDPOINT * ends + EDGE_OPPOSITE * sides
+        else:
+            for k in range(3):
+                placed[e, k] = MIDPOINT * (points[a, k] + points[b, k])
+    return 0
+
+
+@kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
+def sum_rings(points, edges, begin, end, sums, valence):
+    """Sums of neighbours and valences of vertices begin … end − 1; both 0 on entry."""
+    for e in range(edges.shape[0]):
+        a, b = edges[e, 0], edges[e, 1]
+        if begin <= a < end:
+            valence[a] += 1
+            for k in range(3):
+                sums[a, k] += points[b, k]
+        if begin <= b < end:
+            valence[b] += 1
+            for k in range(3):
+                sums[b, k] += points[a, k]
+    return 0
+
+
+@kernel(SIZE, POINTS, INDICES, INDEX, INDEX, POINTS_OUT)
+def sum_along_curves(points, edges, sharp_edges, sharp, sums):
+    """Where a vertex has two or more sharp edges, sum over these alone.
+
+    Args:
+        sharp_edges: (S,) the edges that are not interior, ascending.
+        sharp: (V,) how many there are at each vertex.
+        sums: (V, 3) in and out: sums over rings, replaced where they do not count.
+    """
+    for e in sharp_edges:
+        for v in edges[e]:
+            if sharp[v] >= 2:
+                for k in range(3):
+                    sums[v, k] = 0.0
+    for e in sharp_edges:
+        a, b = edges[e, 0], edges[e, 1]
+        if sharp[a] >= 2:
+            for k in range(3):
+                sums[a, k] += points[b, k]
+        if sharp[b] >= 2:
+            for k in range(3):
+                sums[b, k] += points[a, k]
+    return 0
+
+
+@kernel(SIZE, POINTS, INDEX, INDEX, NUMBERS, SIZE, SIZE, POINTS_OUT)
+def blend_vertices(points, valence, sharp, beta, begin, end, sums):
+    """Sums of neighbours become the moved old vertices begin … end − 1 (equation 3).
+
+    Args:
+        sharp: (V,) sharp edges at each vertex, or (0,) where there are none at all.
+        beta: Loop's weight of one neighbour, for each valence that occurs.
+    """
+    for v in range(begin, end):
+        count = sharp[v] if len(sharp) else 0
+        if count < 2:
+            weight = beta[valence[v]]
+            centre = 1 - valence[v] * weight
+        elif count == 2:
+            weight, centre = CURVE_NEIGHBOUR, CURVE_CENTRE
+        else:
+            weight, centre = 0.0, 1.0
+        for k in range(3):
+            sums[v, k] = centre * points[v, k] + weight * sums[v, k]
+    return 0
+
+
+@kernel(float64, POINTS, SIZE, SIZE)
+def largest_coordinate(points, begin, end):
+    """The largest absolute coordinate of rows begin … end − 1; NaN where one is."""
+    largest = 0.0
+    for v in range(begin, end):
+        for k in range(3):
+            size = abs(points[v, k])
+            if not size <= largest:
+                largest = size
+                if size != size:
+                    return size
+    return largest

@@ -1,0 +1,218 @@
+"""Normals of the children of faces and the angles between them, with diagnostics.py's bits.
+
+What decides is compared without a root or a division wherever that is safe, by area vectors; only
+what may be the largest angle, or may be a flipped face, is computed as diagnostics.py does it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pns_common.edge.frames import NO_AREA
+from pns_common.fused.kernels.compiled import (
+    CLASSES,
+    INDICES,
+    NUMBERS_OUT,
+    POINTS,
+    REAL,
+    SIZE,
+    kernel,
+)
+from pns_common.fused.kernels.edges import INTERIOR
+
+# Far more than the cosine of two computed area vectors is wrong by, and what it counts for.
+COSINE_MARGIN = 1e-14
+CLEARLY_SAME_SIDE = 1e-20
+# Products above this have all their digits.
+NORMAL_NUMBERS = 1e-300
+
+
+@njit(inline="always")
+def unit_normal(points, a, b, c):
+    """The unit normal of a triangle; zeros where it has no area (``frames.triangle_normals``)."""
+    u0, u1, u2 = (
+        points[b, 0] - points[a, 0],
+        points[b, 1] - points[a, 1],
+        points[b, 2] - points[a, 2],
+    )
+    v0, v1, v2 = (
+        points[c, 0] - points[a, 0],
+        points[c, 1] - points[a, 1],
+        points[c, 2] - points[a, 2],
+    )
+    x, y, z = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
+    square = x * x + y * y + z * z
+    shortest = NO_AREA * ((u0 * u0 + u1 * u1 + u2 * u2) + (v0 * v0 + v1 * v1 + v2 * v2))
+    if square > shortest * shortest:
+        length = math.sqrt(square)
+        return x / length, y / length, z / length
+    return 0.0, 0.0, 0.0
+
+
+@njit(inline="always")
+def squared_chord(n, m):
+    """The squared distance between two unit normals; 0 where one is undefined."""
+    if n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0 and m[0] * m[0] + m[1] * m[1] + m[2] * m[2] > 0:
+        x, y, z = n[0] - m[0], n[1] - m[1], n[2] - m[2]
+        return x * x + y * y + z * z
+    return 0.0
+
+
+@njit(inline="always")
+def _after(i):
+    return i + 1 if i < 2 else 0
+
+
+@njit(inline="always")
+def _before(i):
+    return i - 1 if i > 0 else 2
+
+
+@njit(inline="always")
+def _row(points, i):
+    return points[i, 0], points[i, 1], points[i, 2]
+
+
+@njit
+def _child_normal(points, vertex_count, faces, face_edges, f, i):
+    """The normal of the child at corner i; of the one in the middle for i = 3."""
+    if i == 3:
+        return unit_normal(
+            points,
+            vertex_count + face_edges[f, 0],
+            vertex_count + face_edges[f, 1],
+            vertex_count + face_edges[f, 2],
+        )
+    return unit_normal(
+        points,
+        faces[f, i],
+        vertex_count + face_edges[f, i],
+        vertex_count + face_edges[f, _before(i)],
+    )
+
+
+@njit(inline="always")
+def area(p, q, r):
+    """Twice the area vector of a triangle, and its square."""
+    u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    v0, v1, v2 = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+    x, y, z = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
+    return x, y, z, x * x + y * y + z * z
+
+
+@njit(inline="always")
+def clearly_less(n, m, bound):
+    """Whether the angle of two area vectors has a cosine above √bound; False where in doubt."""
+    inner, squares = n[0] * m[0] + n[1] * m[1] + n[2] * m[2], n[3] * m[3]
+    return inner > 0 and squares > NORMAL_NUMBERS and inner * inner > bound * squares
+
+
+@njit(inline="always")
+def _bound(chord):
+    """What ``clearly_less`` takes for angles below that of a squared chord."""
+    cosine = max(1 - chord / 2 + COSINE_MARGIN, 0.0)
+    return cosine * cosine
+
+
+@njit
+def _chord_inside(points, vertex_count, faces, face_edges, f):
+    """The largest squared chord between the child in the middle of face f and the others."""
+    centre, largest = _child_normal(points, vertex_count, faces, face_edges, f, 3), 0.0
+    for i in range(3):
+        corner = _child_normal(points, vertex_count, faces, face_edges, f, i)
+        largest = max(largest, squared_chord(centre, corner))
+    return largest
+
+
+@kernel(REAL, POINTS, INDICES, INDICES, SIZE, SIZE, SIZE, NUMBERS_OUT)
+def largest_jump_inside(points, faces, face_edges, vertex_count, begin, end, largest_yet):
+    """The largest squared chord between normals of children of one face, in faces begin … end − 1.
+
+    Args:
+        largest_yet: (1,) in and out: the largest found anywhere. It only spares work: threads may
+            overwrite each other's, so the answer is the largest that any call returns.
+    """
+    largest, bound = 0.0, _bound(largest_yet[0])
+    for f in range(begin, end):
+        a, b, c = _row(points, faces[f, 0]), _row(points, faces[f, 1]), _row(points, faces[f, 2])
+        ab = _row(points, vertex_count + face_edges[f, 0])
+        bc = _row(points, vertex_count + face_edges[f, 1])
+        ca = _row(points, vertex_count + face_edges[f, 2])
+        centre = area(ab, bc, ca)
+        if (
+            clearly_less(centre, area(a, ab, ca), bound)
+            and clearly_less(centre, area(b, bc, ab), bound)
+            and clearly_less(centre, area(c, ca, bc), bound)
+        ):
+            continue
+        largest = max(largest, _chord_inside(points, vertex_count, faces, face_edges, f))
+        largest_yet[0] = max(largest, largest_yet[0])
+        bound = _bound(largest_yet[0])
+    return largest
+
+
+@njit
+def _chord_across(points, vertex_count, faces, face_edges, f, i, g, j):
+    """The larger squared chord across corner i's edge of face f, which is corner j's of face g."""
+    return max(
+        squared_chord(
+            _child_normal(points, vertex_count, faces, face_edges, f, i),
+            _child_normal(points, vertex_count, faces, face_edges, g, _after(j)),
+        ),
+        squared_chord(
+            _child_normal(points, vertex_count, faces, face_edges, f, _after(i)),
+            _child_normal(points, vertex_count, faces, face_edges, g, j),
+        ),
+    )
+
+
+@kernel(REAL, POINTS, INDICES, INDICES, INDICES, CLASSES, SIZE, SIZE, SIZE, NUMBERS_OUT)
+def largest_jump_across(
+    points, faces, face_edges, half_edges, edge_class, vertex_count, begin, end, largest_yet
+):
+    """The same between children across interior edges begin … end − 1."""
+    largest, bound = 0.0, _bound(largest_yet[0])
+    for e in range(begin, end):
+        if edge_class[e] != INTERIOR:
+            continue
+        # The two faces run along their edge in opposite directions.
+        f, g = half_edges[e, 0] // 3, half_edges[e, 1] // 3
+        i, j = half_edges[e, 0] - 3 * f, half_edges[e, 1] - 3 * g
+        start, stop = _row(points, faces[f, i]), _row(points, faces[g, j])
+        middle = _row(points, vertex_count + e)
+        left_start = _row(points, vertex_count + face_edges[f, _before(i)])
+        left_stop = _row(points, vertex_count + face_edges[f, _after(i)])
+        right_start = _row(points, vertex_count + face_edges[g, _after(j)])
+        right_stop = _row(points, vertex_count + face_edges[g, _before(j)])
+        if clearly_less(
+            area(start, middle, left_start), area(start, right_start, middle), bound
+        ) and clearly_less(area(stop, left_stop, middle), area(stop, middle, right_stop), bound):
+            continue
+        chord = _chord_across(points, vertex_count, faces, face_edges, f, i, g, j)
+        largest = max(largest, chord)
+        largest_yet[0] = max(largest, largest_yet[0])
+        bound = _bound(largest_yet[0])
+    return largest
+
+
+@kernel(SIZE, POINTS, POINTS, INDICES, INDICES, SIZE, SIZE, SIZE)
+def flipped_children(points, loop_points, faces, face_edges, vertex_count, begin, end):
+    """How many children of faces begin … end − 1 have a normal that opposes Loop's."""
+    flipped = 0
+    for f in range(begin, end):
+        for i in range(4):
+            b, c = vertex_count + face_edges[f, 0], vertex_count + face_edges[f, 1]
+            a = vertex_count + face_edges[f, 2]
+            if i < 3:
+                a, b = faces[f, i], vertex_count + face_edges[f, i]
+                c = vertex_count + face_edges[f, _before(i)]
+            n = area(_row(points, a), _row(points, b), _row(points, c))
+            m = area(_row(loop_points, a), _row(loop_points, b), _row(loop_points, c))
+            if clearly_less(n, m, CLEARLY_SAME_SIDE):
+                continue
+            n = _child_normal(points, vertex_count, faces, face_edges, f, i)
+            m = _child_normal(loop_points, vertex_count, faces, face_edges, f, i)
+            flipped += n[0] * m[0] + n[1] * m[1] + n[2] * m[2] < 0
+    return flipped

@@ -1,0 +1,254 @@
+"""Sums around vertices, with the bits of ring_features.py and vertex_fields.py.
+
+A sum runs over its faces or edges in ascending order: each thread owns the vertices begin … end − 1
+and reads all faces or edges.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pns_common.fused.kernels.compiled import (
+    CLASSES,
+    INDEX,
+    INDEX_OUT,
+    INDICES,
+    NUMBERS,
+    NUMBERS_OUT,
+    POINTS,
+    POINTS_OUT,
+    REAL,
+    SIZE,
+    kernel,
+)
+from pns_common.fused.kernels.edges import INTERIOR
+from pns_common.fused.kernels.normals import squared_chord, unit_normal
+from pns_common.prior import CLEAR_NORMAL
+
+# Columns of an edge's row.
+SPOKE, SQUARE, JUMP, BEND = 0, 3, 4, 5
+EDGE_COLUMNS = 6
+# Columns of a vertex's sums, which become means.
+UMBRELLA, RING_SQUARE, MEAN_JUMP, MEAN_BEND, BEND_SQUARE, LENGTH, PULL = 0, 3, 4, 5, 6, 7, 8
+OPENING, NEAR_HEIGHT, NEAR_JUMP = 11, 12, 13
+VERTEX_COLUMNS = 14
+# Of a face: twice its area vector, and the length of that.
+AREA = 3
+# Of a vertex: mean normal and umbrella height.
+HEIGHT = 3
+
+
+@njit(inline="always")
+def dot(u, v):
+    """The inner product, summed in the order of ``arrays.dot``."""
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+@njit(inline="always")
+def cross(u, v):
+    """The cross product, as ``arrays.cross`` has it."""
+    return (
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    )
+
+
+@njit(inline="always")
+def between(points, a, b):
+    """The vector from row a to row b."""
+    return points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
+
+
+@njit(inline="always")
+def norm(v):
+    """The length of a vector, 0 for zero vectors and NaN, as in ``arrays.norm``."""
+    square = dot(v, v)
+    return math.sqrt(square) if square > 0 else 0.0
+
+
+@njit(inline="always")
+def row(values, i):
+    """The first three columns of a row."""
+    return values[i, 0], values[i, 1], values[i, 2]
+
+
+@kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, POINTS_OUT)
+def measure_faces(points, faces, begin, end, normals, areas):
+    """Unit normals (F, 3) and area vectors with their lengths (F, 4) of faces begin … end − 1."""
+    for f in range(begin, end):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        normal = unit_normal(points, a, b, c)
+        vector = cross(between(points, a, b), between(points, a, c))
+        for k in range(3):
+            normals[f, k] = normal[k]
+            areas[f, k] = vector[k]
+        areas[f, AREA] = norm(vector)
+    return 0
+
+
+@kernel(SIZE, INDICES, POINTS, SIZE, SIZE, POINTS_OUT)
+def mean_normals(faces, areas, begin, end, fields):
+    """m_v in the first three columns of ``fields`` (V, 4), all 0 on entry."""
+    for f in range(faces.shape[0]):
+        for i in range(3):
+            v = faces[f, i]
+            if begin <= v < end:
+                for k in range(4):
+                    fields[v, k] += areas[f, k]
+    for v in range(begin, end):
+        area = fields[v, AREA]
+        for k in range(3):
+            fields[v, k] = fields[v, k] / area if area > 0 else 0.0
+        fields[v, HEIGHT] = 0.0
+    return 0
+
+
+@kernel(SIZE, POINTS, POINTS, INDICES, INDICES, INDICES, CLASSES, SIZE, SIZE, POINTS_OUT)
+def measure_edges(points, normals, faces, edges, half_edges, edge_class, begin, end, measured):
+    """Spoke b − a, its square, x and s of edges begin … end − 1; ``measured`` is (E, 6)."""
+    for e in range(begin, end):
+        spoke = between(points, edges[e, 0], edges[e, 1])
+        square = dot(spoke, spoke)
+        for k in range(3):
+            measured[e, SPOKE + k] = spoke[k]
+        measured[e, SQUARE] = square
+        measured[e, JUMP] = measured[e, BEND] = 0.0
+        if edge_class[e] != INTERIOR:
+            continue
+        f, g = half_edges[e, 0] // 3, half_edges[e, 1] // 3
+        if faces[f, half_edges[e, 0] - 3 * f] != edges[e, 0]:
+            f, g = g, f  # f is the face to the left of a → b
+        n, m = row(normals, f), row(normals, g)
+        if dot(n, n) > 0 and dot(m, m) > 0:
+            chord = n[0] - m[0], n[1] - m[1], n[2] - m[2]
+            measured[e, JUMP] = dot(chord, chord) / 2 + 0.0
+        length = math.sqrt(square) if square > 0 else math.inf
+        direction = spoke[0] / length, spoke[1] / length, spoke[2] / length
+        # Beside 0 there is no −0 in the array kernels' sums either.
+        measured[e, BEND] = dot(cross(n, m), direction) + 0.0
+    return 0
+
+
+@kernel(
+    SIZE,
+    *(POINTS, INDICES, INDICES, CLASSES, REAL, REAL, SIZE, SIZE, NUMBERS_OUT),
+)
+def face_bends(normals, face_edges, half_edges, edge_class, gentle, sharp, begin, end, bends):
+    """b of faces begin … end − 1 (``side_gate.face_bends``); x counts between gentle and sharp."""
+    for f in range(begin, end):
+        total = 0.0
+        for i in range(3):
+            e = face_edges[f, i]
+            if edge_class[e] == INTERIOR:
+                x = (
+                    squared_chord(
+                        row(normals, half_edges[e, 0] // 3), row(normals, half_edges[e, 1] // 3)
+                    )
+                    / 2
+                )
+                total += x * min(max((sharp - x) / (sharp - gentle), 0.0), 1.0)
+        bends[f] = total / 3
+    return 0
+
+
+@njit(inline="always")
+def _add_spoke(sums, v, sign, measured, e, length):
+    for k in range(3):
+        spoke = sign * measured[e, SPOKE + k]
+        sums[v, UMBRELLA + k] += spoke
+        sums[v, PULL + k] += measured[e, JUMP] / 2 * spoke
+    bend = measured[e, BEND]
+    sums[v, RING_SQUARE] += measured[e, SQUARE]
+    sums[v, MEAN_JUMP] += measured[e, JUMP]
+    sums[v, MEAN_BEND] += bend
+    sums[v, BEND_SQUARE] += bend * bend
+    sums[v, LENGTH] += length
+
+
+@kernel(SIZE, INDICES, POINTS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
+def mean_spokes(edges, measured, begin, end, means, valence):
+    """Means over the spokes of vertices begin … end − 1; ``means`` (V, 14), 0 on entry."""
+    for e in range(edges.shape[0]):
+        a, b = edges[e, 0], edges[e, 1]
+        mine, theirs = begin <= a < end, begin <= b < end
+        if mine or theirs:
+            square = measured[e, SQUARE]
+            length = math.sqrt(square if square > 0 else 1e-300)
+            if mine:
+                valence[a] += 1
+                _add_spoke(means, a, 1.0, measured, e, length)
+            if theirs:
+                valence[b] += 1
+                _add_spoke(means, b, -1.0, measured, e, length)
+    for v in range(begin, end):
+        count = float(max(valence[v], 1))
+        for k in range(OPENING):
+            means[v, k] = means[v, k] / count
+    return 0
+
+
+@kernel(SIZE, POINTS, INDEX, SIZE, SIZE, POINTS_OUT)
+def umbrella_heights(means, sharp, begin, end, fields):
+    """u_v · m_v / r_v into ``fields``; 0 where a sharp edge ends.
+
+    ``sharp`` counts the sharp edges at each vertex; (0,) where there are none at all.
+    """
+    for v in range(begin, end):
+        fields[v, HEIGHT] = 0.0
+        if len(sharp) and sharp[v]:
+            continue
+        square = means[v, RING_SQUARE]
+        reach = math.sqrt(square) if square > 0 else 0.0
+        if reach > 0:
+            fields[v, HEIGHT] = dot(row(means, v), row(fields, v)) / reach
+    return 0
+
+
+@kernel(SIZE, POINTS, POINTS, INDEX, INDEX, NUMBERS, SIZE, SIZE, POINTS_OUT)
+def prior_pushes(means, fields, valence, smooth, ring_weight, begin, end, pushes):
+    """d_v of the prior at s = 1 (``prior.normal_pushes``).
+
+    Args:
+        smooth: 1 where the vertex may move, else 0.
+        ring_weight: w_k for each valence that occurs.
+    """
+    for v in range(begin, end):
+        mean = row(fields, v)
+        agreement = norm(mean)
+        clear = agreement if agreement > CLEAR_NORMAL else CLEAR_NORMAL
+        normal = mean[0] / clear, mean[1] / clear, mean[2] / clear
+        weight = ring_weight[valence[v]] * smooth[v]
+        inwards = weight * dot(row(means, v), normal)
+        for k in range(3):
+            pushes[v, k] = -inwards * normal[k]
+    return 0
+
+
+@kernel(SIZE, INDICES, POINTS, POINTS, INDEX, SIZE, SIZE, POINTS_OUT)
+def mean_neighbours(edges, measured, fields, valence, begin, end, means):
+    """Means of what lies at the far ends of spokes: opening, umbrella heights, mean jump.
+
+    Reads MEAN_JUMP of all vertices, and writes the last three columns of its own.
+    """
+    for e in range(edges.shape[0]):
+        a, b = edges[e, 0], edges[e, 1]
+        mine, theirs = begin <= a < end, begin <= b < end
+        if mine or theirs:
+            tilt = between(fields, a, b)
+            opening = dot(tilt, row(measured, e))
+            if mine:
+                means[a, OPENING] += opening
+                means[a, NEAR_HEIGHT] += fields[b, HEIGHT]
+                means[a, NEAR_JUMP] += means[b, MEAN_JUMP]
+            if theirs:
+                means[b, OPENING] += opening
+                means[b, NEAR_HEIGHT] += fields[a, HEIGHT]
+                means[b, NEAR_JUMP] += means[a, MEAN_JUMP]
+    for v in range(begin, end):
+        count = float(max(valence[v], 1))
+        for k in range(OPENING, VERTEX_COLUMNS):
+            means[v, k] = means[v, k] / count
+    return 0

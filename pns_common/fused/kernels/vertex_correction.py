@@ -1,0 +1,163 @@
+"""What old vertices see and what is added there, with the bits of vertex_operator.py."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pns_common.fused.kernels.compiled import (
+    INDEX,
+    NUMBERS,
+    NUMBERS_OUT,
+    POINTS,
+    POINTS_OUT,
+    REAL,
+    SIZE,
+    kernel,
+)
+from pns_common.fused.kernels.edge_correction import in_ball, ratio_of, shortened
+from pns_common.fused.kernels.rings import (
+    BEND_SQUARE,
+    HEIGHT,
+    LENGTH,
+    MEAN_BEND,
+    MEAN_JUMP,
+    NEAR_HEIGHT,
+    NEAR_JUMP,
+    OPENING,
+    PULL,
+    RING_SQUARE,
+    UMBRELLA,
+    dot,
+    row,
+)
+
+
+@njit(inline="always")
+def _divided(value, by):
+    return value / by if by > 0 else 0.0
+
+
+@njit(inline="always")
+def _reach(means, v):
+    square = means[v, RING_SQUARE]
+    return math.sqrt(square) if square > 0 else 0.0
+
+
+@kernel(SIZE, POINTS, POINTS, INDEX, SIZE, SIZE, POINTS_OUT, NUMBERS_OUT)
+def look_around(means, fields, vertices, begin, end, features, mean_jump):
+    """The features of ``ring-10`` and x_v of vertices[begin:end]."""
+    for i in range(end - begin):
+        v = vertices[begin + i]
+        normal, umbrella, reach = row(fields, v), row(means, v), _reach(means, v)
+        features[i, 0] = means[v, MEAN_JUMP]
+        features[i, 1] = means[v, MEAN_BEND]
+        features[i, 2] = means[v, BEND_SQUARE]
+        features[i, 3] = fields[v, HEIGHT]
+        features[i, 4] = _divided(dot(umbrella, umbrella), means[v, RING_SQUARE])
+        features[i, 5] = dot(normal, normal)
+        features[i, 6] = means[v, NEAR_HEIGHT]
+        features[i, 7] = _divided(means[v, OPENING], reach)
+        features[i, 8] = _divided(means[v, LENGTH], reach)
+        features[i, 9] = means[v, NEAR_JUMP]
+        mean_jump[i] = means[v, MEAN_JUMP]
+    return 0
+
+
+@njit(inline="always")
+def _component(z, means, fields, v, reach, k):
+    umbrella, pull = means[v, UMBRELLA + k], means[v, PULL + k]
+    return z[0] * fields[v, k] + z[1] * _divided(umbrella, reach) + z[2] * _divided(pull, reach)
+
+
+@njit(inline="always")
+def _combined(z, means, fields, v):
+    """Σ z_i e_i over the ring's three vectors."""
+    reach = _reach(means, v)
+    x = _component(z, means, fields, v, reach, 0)
+    y = _component(z, means, fields, v, reach, 1)
+    return x, y, _component(z, means, fields, v, reach, 2)
+
+
+@kernel(
+    SIZE,
+    *(POINTS, NUMBERS, POINTS, POINTS, NUMBERS, INDEX, SIZE),
+    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+)
+def correct(
+    z,
+    gate,
+    means,
+    fields,
+    budget_per_length,
+    vertices,
+    begin,
+    displacement,
+    ratio,
+    gates,
+    envelopes,
+):
+    """δ = h_v² γ_v (C / R) v into the rows of the vertices (``VertexOperator.correct``)."""
+    for i in range(z.shape[0]):
+        v = vertices[begin + i]
+        envelope = budget_per_length[i] * means[v, RING_SQUARE]
+        vector = in_ball(_combined(in_ball(row(z, i)), means, fields, v))
+        size = envelope * gate[i]
+        delta = size * vector[0], size * vector[1], size * vector[2]
+        for k in range(3):
+            displacement[v, k] = delta[k]
+        ratio[v], gates[v], envelopes[v] = ratio_of(delta, envelope), gate[i], envelope
+    return 0
+
+
+@njit(inline="always")
+def _prior(pushes, of_boundary, nothing, v, k, strength):
+    """A coordinate of D_v, with the boundary's part."""
+    part = of_boundary[v, k] if len(of_boundary) else nothing
+    return strength * pushes[v, k] + part
+
+
+@kernel(
+    SIZE,
+    *(POINTS, NUMBERS, POINTS, POINTS, NUMBERS, INDEX, SIZE, POINTS, POINTS, REAL, REAL, REAL),
+    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+)
+def correct_scale_free(
+    z,
+    gate,
+    means,
+    fields,
+    budget_per_length,
+    vertices,
+    begin,
+    pushes,
+    of_boundary,
+    nothing,
+    strength,
+    scale,
+    displacement,
+    ratio,
+    gates,
+    envelopes,
+):
+    """δ = γ_v Π_ρ(D + τ h_v Σ z_i e_i) likewise.
+
+    ``pushes`` are Loop's vertex mask of d, ``of_boundary`` and ``nothing`` as at edges.
+    """
+    for i in range(z.shape[0]):
+        v = vertices[begin + i]
+        envelope = budget_per_length[i] * means[v, RING_SQUARE]
+        learned = _combined(in_ball(row(z, i)), means, fields, v)
+        asked = scale * _reach(means, v)
+        wanted = (
+            _prior(pushes, of_boundary, nothing, v, 0, strength) + asked * learned[0],
+            _prior(pushes, of_boundary, nothing, v, 1, strength) + asked * learned[1],
+            _prior(pushes, of_boundary, nothing, v, 2, strength) + asked * learned[2],
+        )
+        allowed = shortened(wanted, envelope)
+        delta = gate[i] * allowed[0], gate[i] * allowed[1], gate[i] * allowed[2]
+        for k in range(3):
+            displacement[v, k] = delta[k]
+        ratio[v], gates[v], envelopes[v] = ratio_of(delta, envelope), gate[i], envelope
+    return 0

@@ -1,0 +1,32 @@
+"""Which schemes have compiled kernels: asked before these are loaded."""
+
+from __future__ import annotations
+
+from pns_common.boundary_rule import BoundaryRule
+from pns_common.edge.features import FEATURE_SETS
+from pns_common.edge.orientation import FIRST_FACE, SYMMETRIC
+from pns_common.learned_rules import LearnedEdgeRule, LearnedVertexRule
+from pns_common.loop_rules import loop_vertex_rule
+from pns_common.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
+from pns_common.schemes import Rule, Scheme
+from pns_common.vertex.rings import RING_10
+
+
+def kernels_know(scheme: Scheme) -> bool:
+    """Whether the kernels have the features and the form of a scheme's own rules."""
+    edges, vertices = scheme.edge_rule, scheme.vertex_rule
+    if not isinstance(edges, LearnedEdgeRule | ScaleFreeEdgeRule):
+        return False
+    if _boundary(edges) != _boundary(vertices):
+        return False
+    if isinstance(vertices, LearnedVertexRule | ScaleFreeVertexRule):
+        if vertices.operator.features is not RING_10:
+            return False
+    elif vertices is not loop_vertex_rule:
+        return False
+    known = any(edges.operator.features is features for features in FEATURE_SETS.values())
+    return known and edges.operator.orientation in (FIRST_FACE, SYMMETRIC)
+
+
+def _boundary(rule: Rule) -> BoundaryRule | None:
+    return rule.boundary if isinstance(rule, ScaleFreeEdgeRule | ScaleFreeVertexRule) else None

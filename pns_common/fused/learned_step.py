@@ -1,0 +1,122 @@
+"""A learned level: Loop's vertices, what both rules add, the fold guard, and the report."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.blocks import Blocks
+from pns_common.boundary_rule import BoundaryRule
+from pns_common.diagnostics import LevelReport, level_report
+from pns_common.fused.additions import Additions, Surroundings
+from pns_common.fused.boundary import boundary_of
+from pns_common.fused.child_faces import look_at_children
+from pns_common.fused.edge_rule import add_at_edges
+from pns_common.fused.guard import guard_scale
+from pns_common.fused.level import FusedLevel, FusedStep
+from pns_common.fused.loop_points import largest_size, loop_points
+from pns_common.fused.vertex_rule import add_at_vertices
+from pns_common.learned_rules import LearnedEdgeRule, LearnedVertexRule
+from pns_common.placement import Placement
+from pns_common.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
+from pns_common.schemes import Scheme
+from pns_common.step import LevelStep
+
+# Far above rounding, and the cosine of more than any useful fold angle.
+CLEAR_COSINE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedPoints:
+    """What a learned level made, before anybody looks at its children.
+
+    ``counterpart`` is where Loop would have put the points; None where no child can be flipped.
+    """
+
+    points: Float[np.ndarray, "W 3"]
+    counterpart: Float[np.ndarray, "W 3"] | None
+    step: LevelStep
+    added: Additions
+
+
+def learned_step(level: FusedLevel, scheme: Scheme, length: float, blocks: Blocks) -> FusedStep:
+    """Place a level's vertices by the scheme's own rules; ``length`` is R > 0.
+
+    The kernels must know the scheme (known.py).
+
+    Raises:
+        ModelError: a network returned something that is not finite, or of another shape.
+    """
+    made = learned_points(level, scheme, length, blocks)
+    mesh = level.mesh
+
+    def report() -> LevelReport:
+        children = look_at_children(mesh, made.points, made.counterpart, blocks.unheard())
+        return level_report(mesh, made.step, children)
+
+    return FusedStep(made.points, largest_size(made.points, blocks), report, made.added)
+
+
+def learned_points(
+    level: FusedLevel, scheme: Scheme, length: float | Float[np.ndarray, " V"], blocks: Blocks
+) -> LearnedPoints:
+    """The same, without a look at the children; ``length`` may be each vertex's own.
+
+    Raises:
+        ModelError: a network returned something that is not finite, or of another shape.
+    """
+    mesh, count = level.mesh, level.mesh.vertex_count
+    boundary = boundary_of(_boundary_rule(scheme), level.points, mesh, length)
+    seen = Surroundings(level.points, mesh, level.several_fans, length, blocks, boundary)
+    loop = loop_points(level.points, mesh, blocks)
+    added = Additions.nothing(len(loop))
+    at_vertices, at_edges = added.part(slice(0, count)), added.part(slice(count, None))
+    edge_rule, vertex_rule = scheme.edge_rule, scheme.vertex_rule
+    moves = isinstance(vertex_rule, LearnedVertexRule | ScaleFreeVertexRule)
+    assert isinstance(edge_rule, LearnedEdgeRule | ScaleFreeEdgeRule)
+    if moves:
+        add_at_vertices(vertex_rule, seen, at_vertices)
+    add_at_edges(edge_rule, seen, at_edges)
+    # A placement's arrays are those of ``added``: what changes the one changes the other.
+    smooth = seen.rings.smooth.copy() if moves else None
+    vertices = _placement(loop[:count], at_vertices, smooth)
+    edges = _placement(loop[count:], at_edges, None)
+    boundary.move_vertices(vertices)
+    boundary.move_edges(edges)
+    scale = None
+    if scheme.guard is not None:
+        first = boundary.first(count, len(at_edges.ratio))
+        scale = guard_scale(scheme.guard, mesh, loop, added.displacement, blocks, first)
+        if scale.min() < 1:
+            added.scale(scale)
+
+    points = loop.copy()
+    # Where Loop's rule stands nothing is added: not even 0, which would make 0 of −0.
+    moved = slice(None) if moves else slice(count, None)
+    points[moved] += added.displacement[moved]
+    # What the guard lets stand is at clearly less than a right angle to Loop's: none is flipped.
+    guarded = scheme.guard is not None and math.cos(scheme.guard.angle) > CLEAR_COSINE
+    step = LevelStep(vertices, edges, learned=True, guard=scale)
+    return LearnedPoints(points, None if guarded else loop, step, added)
+
+
+def _boundary_rule(scheme: Scheme) -> BoundaryRule | None:
+    rule = scheme.edge_rule
+    return rule.boundary if isinstance(rule, ScaleFreeEdgeRule) else None
+
+
+def _placement(
+    loop: Float[np.ndarray, "N 3"], added: Additions, corrected: np.ndarray | None
+) -> Placement:
+    return Placement(
+        loop,
+        added.displacement,
+        added.ratio,
+        added.gate,
+        added.degenerate,
+        corrected,
+        added.envelope,
+    )

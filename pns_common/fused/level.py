@@ -1,0 +1,121 @@
+"""A level as the compiled kernels see it, and its Loop step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.blocks import Blocks
+from pns_common.creases import crease_classes, crease_halves
+from pns_common.diagnostics import LevelReport, edge_counts
+from pns_common.fused.additions import Additions
+from pns_common.fused.child_faces import look_at_children
+from pns_common.fused.fans import multi_fan_vertices
+from pns_common.fused.loop_points import largest_size, loop_points
+from pns_common.fused.mesh_edges import MeshEdges, build_edges, split_mesh_edges
+from pns_common.topology import EdgeClass, Topology
+
+
+@dataclass(frozen=True, eq=False)
+class FusedLevel:
+    """One level's mesh, before refinement."""
+
+    points: Float[np.ndarray, "V 3"]
+    mesh: MeshEdges
+    blocks: Blocks
+
+    @cached_property
+    def several_fans(self) -> Bool[np.ndarray, " V"]:
+        """Whether the faces of each vertex form more than one fan."""
+        return multi_fan_vertices(self.mesh, self.blocks.unheard())
+
+    def topology(self) -> Topology:
+        """The same connectivity as the array kernels keep it."""
+        mesh = self.mesh
+        faces, edges = mesh.faces.astype(np.int64), mesh.edges.astype(np.int64)
+        opposed = (mesh.edge_class == EdgeClass.INTERIOR) | (mesh.edge_class == EdgeClass.CREASE)
+        half_edges = np.where(opposed[:, None], mesh.half_edges, np.int64(-1))
+        stencil = np.full((len(edges), 4), -1, dtype=np.int64)
+        stencil[:, :2] = edges
+        rows = np.flatnonzero(opposed)
+        # The vertex of a triangle that is on neither end: all three less those two.
+        three, two = faces.sum(axis=1)[half_edges[rows] // 3], edges[rows].sum(axis=1)
+        stencil[rows, 2:] = three - two[:, None]
+        return Topology(
+            vertex_count=mesh.vertex_count,
+            faces=faces,
+            edges=edges,
+            face_edges=mesh.face_edges.astype(np.int64),
+            half_edges=half_edges,
+            stencil=stencil,
+            edge_class=mesh.edge_class,
+            interior=mesh.interior.astype(np.int64),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class FusedStep:
+    """What a step made of a level; the faces follow from the level's edges.
+
+    ``largest`` is the largest absolute coordinate, NaN where one is; ``added`` is None for Loop.
+    ``report`` looks at the step when it is called.
+    """
+
+    points: Float[np.ndarray, "W 3"]
+    largest: float
+    report: Callable[[], LevelReport]
+    added: Additions | None
+
+
+def control_level(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    creases: Int[np.ndarray, "N 2"] | None,
+    blocks: Blocks,
+) -> FusedLevel:
+    """The level of a control mesh.
+
+    Raises:
+        ParameterError: a crease is no edge of the mesh.
+    """
+    mesh = build_edges(faces.astype(np.int32), len(points), blocks)
+    return FusedLevel(points, _with_creases(mesh, creases), blocks)
+
+
+def next_level(level: FusedLevel, points: Float[np.ndarray, "W 3"], blocks: Blocks) -> FusedLevel:
+    """The level whose points a step has placed; the children of creases are creases."""
+    mesh, made = level.mesh, split_mesh_edges(level.mesh, blocks)
+    # Where the edges were split by arithmetic their classes were too.
+    creases = None if mesh.plain else crease_halves(mesh.edges, mesh.edge_class, mesh.vertex_count)
+    return FusedLevel(points, _with_creases(made, creases), blocks)
+
+
+def loop_step(level: FusedLevel, blocks: Blocks) -> FusedStep:
+    """Place a level's vertices where Loop does."""
+    points = loop_points(level.points, level.mesh, blocks)
+    largest = largest_size(points, blocks)
+    return FusedStep(points, largest, lambda: _loop_report(level.mesh, points, blocks), None)
+
+
+def _loop_report(mesh: MeshEdges, points: Float[np.ndarray, "W 3"], blocks: Blocks) -> LevelReport:
+    return {
+        "vertices": len(points),
+        "faces": 4 * len(mesh.faces),
+        "edges": edge_counts(mesh.edge_class),
+        "degenerate_frames": 0,
+        "flipped_faces": 0,
+        "proximity_ratio": {"max": 0.0, "mean": 0.0, "p99": 0.0},
+        "gate": {"mean": 0.0, "max": 0.0, "active": 0.0},
+        "normal_jump_max": look_at_children(mesh, points, None, blocks.unheard()).normal_jump_max,
+    }
+
+
+def _with_creases(mesh: MeshEdges, creases: Int[np.ndarray, "N 2"] | None) -> MeshEdges:
+    if creases is None:
+        return mesh
+    classes = crease_classes(mesh.edges, mesh.edge_class, mesh.vertex_count, creases)
+    return replace(mesh, edge_class=classes)

@@ -1,0 +1,84 @@
+"""Where Loop puts a level's vertices, with the bits of ``pns_common.stencils``."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.blocks import Blocks
+from pns_common.fused.kernels.masks import (
+    blend_vertices,
+    largest_coordinate,
+    place_edges,
+    sum_along_curves,
+    sum_rings,
+)
+from pns_common.fused.mesh_edges import MeshEdges
+from pns_common.stencils import loop_beta
+
+
+def loop_points(
+    points: Float[np.ndarray, "V 3"], mesh: MeshEdges, blocks: Blocks
+) -> Float[np.ndarray, "W 3"]:
+    """Old vertices, then edge vertices, where Loop puts them."""
+    count, edge_count = mesh.vertex_count, len(mesh.edges)
+    placed = np.empty((count + edge_count, 3))
+    edge_points = placed[count:]
+
+    def edges(rows: slice) -> None:
+        place_edges(
+            points,
+            mesh.faces,
+            mesh.edges,
+            mesh.half_edges,
+            mesh.edge_class,
+            rows.start,
+            rows.stop,
+            edge_points,
+        )
+
+    blocks.run(edge_count, edges)
+    place_vertices(points, mesh, blocks, placed[:count])
+    return placed
+
+
+def owners(blocks: Blocks, count: int) -> Blocks:
+    """Blocks for sums around vertices: each reads all edges, so no more of them than threads."""
+    return blocks.of_rows(max(blocks.rows, -(-count // blocks.threads)))
+
+
+def largest_size(points: Float[np.ndarray, "V 3"], blocks: Blocks) -> float:
+    """The largest absolute coordinate; NaN where one is."""
+    sizes = np.zeros(blocks.count(len(points)))
+
+    def measure(rows: slice) -> None:
+        sizes[blocks.number(rows)] = largest_coordinate(points, rows.start, rows.stop)
+
+    blocks.run(len(points), measure)
+    return float(sizes.max(initial=0))
+
+
+def place_vertices(
+    points: Float[np.ndarray, "V 3"],
+    mesh: MeshEdges,
+    blocks: Blocks,
+    placed: Float[np.ndarray, "V 3"],
+) -> None:
+    """Loop's old vertices, into ``placed``."""
+    count = mesh.vertex_count
+    placed[:] = 0
+    valence = np.zeros(count, dtype=np.int32)
+
+    def rings(rows: slice) -> None:
+        sum_rings(points, mesh.edges, rows.start, rows.stop, placed, valence)
+
+    owners(blocks, count).run(count, rings)
+    sharp = mesh.sharp
+    if len(sharp):
+        sum_along_curves(points, mesh.edges, mesh.sharp_edges, sharp, placed)
+    beta = loop_beta(np.arange(int(valence.max(initial=0)) + 1))
+
+    def blend(rows: slice) -> None:
+        blend_vertices(points, valence, sharp, beta, rows.start, rows.stop, placed)
+
+    blocks.run(count, blend)

@@ -1,0 +1,177 @@
+"""The connectivity that a level's kernels read, in int32: built once, then split by arithmetic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Int
+
+from pns_common.blocks import Blocks
+from pns_common.fused.kernels.children import number_halves, split_edges, split_faces
+from pns_common.fused.kernels.edges import (
+    INTERIOR,
+    NONE,
+    SEVERAL,
+    TOO_LONG,
+    chain_edges,
+    classify,
+)
+from pns_common.mesh import repeated_vertex
+from pns_common.topology import EdgeClass, build_topology
+
+# Steps along chains that an edge may take on average: more, and a sort is as fast.
+STEPS = 32
+
+
+@dataclass(frozen=True, eq=False)
+class MeshEdges:
+    """Edges of a face list, as ``topology.Topology`` has them, in int32.
+
+    Attributes:
+        half_edges: of every edge its first half-edge, and its second: −1 where there is none, −2
+            where there are more than two.
+        plain: no face repeats a vertex and no two faces have the same three.
+    """
+
+    vertex_count: int
+    faces: Int[np.ndarray, "F 3"]
+    edges: Int[np.ndarray, "E 2"]
+    face_edges: Int[np.ndarray, "F 3"]
+    half_edges: Int[np.ndarray, "E 2"]
+    edge_class: Int[np.ndarray, " E"]
+    plain: bool
+
+    @property
+    def interior(self) -> Int[np.ndarray, " I"]:
+        """Indices of the interior edges."""
+        return self._interior
+
+    @cached_property
+    def _interior(self) -> Int[np.ndarray, " I"]:
+        return np.flatnonzero(self.edge_class == INTERIOR).astype(np.int32)
+
+    @cached_property
+    def sharp_edges(self) -> Int[np.ndarray, " S"]:
+        """Indices of the edges that are not interior."""
+        return np.flatnonzero(self.edge_class != INTERIOR).astype(np.int32)
+
+    @cached_property
+    def sharp(self) -> Int[np.ndarray, " N"]:
+        """How many sharp edges each vertex has; none at all is (0,)."""
+        if len(self.sharp_edges) == 0:
+            return np.zeros(0, dtype=np.int32)
+        ends = self.edges[self.sharp_edges].reshape(-1)
+        return np.bincount(ends, minlength=self.vertex_count).astype(np.int32)
+
+
+def build_edges(faces: Int[np.ndarray, "F 3"], vertex_count: int, blocks: Blocks) -> MeshEdges:
+    """Edges of int32 faces."""
+    count = len(faces)
+    # As many as there could be: what is not written is not in memory.
+    head = np.full(vertex_count, -1, dtype=np.int32)
+    low, links = np.empty(3 * count, dtype=np.int32), np.empty((3 * count, 4), dtype=np.int32)
+    face_edges, plain = np.empty((count, 3), dtype=np.int32), np.empty(1, dtype=np.int32)
+    edge_count = chain_edges(faces, 3 * STEPS * count, head, low, links, face_edges, plain)
+    if edge_count == TOO_LONG:
+        return _sorted_edges(faces, vertex_count)
+    edges, half_edges = (np.empty((edge_count, 2), dtype=np.int32) for _ in range(2))
+    edge_class = np.empty(edge_count, dtype=np.int8)
+
+    def run(rows: slice) -> None:
+        classify(faces, low, links, rows.start, rows.stop, edges, half_edges, edge_class)
+
+    blocks.run(edge_count, run)
+    return MeshEdges(
+        vertex_count, faces, edges, face_edges, half_edges, edge_class, plain=bool(plain[0])
+    )
+
+
+def split_mesh_edges(parent: MeshEdges, blocks: Blocks) -> MeshEdges:
+    """Edges of the split mesh; creases stay creases only where the parent is plain."""
+    count, vertices = len(parent.faces), parent.vertex_count + len(parent.edges)
+    faces = split_mesh_faces(parent, np.int32, blocks)
+    if not parent.plain:
+        return build_edges(faces, vertices, blocks)
+    halves = np.empty((len(parent.edges), 2), dtype=np.int32)
+
+    def number(rows: slice) -> None:
+        number_halves(
+            parent.faces,
+            parent.face_edges,
+            parent.edges,
+            parent.half_edges,
+            rows.start,
+            rows.stop,
+            halves,
+        )
+
+    blocks.run(count, number)
+    made = 2 * len(parent.edges) + 3 * count
+    edges, half_edges = (np.empty((made, 2), dtype=np.int32) for _ in range(2))
+    edge_class, face_edges = np.empty(made, dtype=np.int8), np.empty((4 * count, 3), dtype=np.int32)
+
+    def fill(rows: slice) -> None:
+        split_edges(
+            parent.faces,
+            parent.face_edges,
+            parent.half_edges,
+            parent.edge_class,
+            halves,
+            parent.vertex_count,
+            rows.start,
+            rows.stop,
+            face_edges,
+            edges,
+            half_edges,
+            edge_class,
+        )
+
+    blocks.run(count, fill)
+    return MeshEdges(vertices, faces, edges, face_edges, half_edges, edge_class, plain=True)
+
+
+def has_boundary(mesh: MeshEdges) -> bool:
+    """Whether an edge has a single face."""
+    return bool((mesh.edge_class == EdgeClass.BOUNDARY).any())
+
+
+def split_mesh_faces(
+    parent: MeshEdges, dtype: type[np.int32] | type[np.int64], blocks: Blocks
+) -> Int[np.ndarray, "C 3"]:
+    """The children of the faces, as ``topology.split`` orders them."""
+    faces = np.empty((4 * len(parent.faces), 3), dtype=dtype)
+
+    def fill(rows: slice) -> None:
+        split_faces(
+            parent.faces, parent.face_edges, parent.vertex_count, rows.start, rows.stop, faces
+        )
+
+    blocks.run(len(parent.faces), fill)
+    return faces
+
+
+def _sorted_edges(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> MeshEdges:
+    """The same by sorting, for meshes whose hubs make chains long."""
+    topology = build_topology(faces.astype(np.int64), vertex_count)
+    edge_of = topology.face_edges.reshape(-1)
+    half_edges = topology.half_edges.astype(np.int32)
+    lone = np.bincount(edge_of) == 1
+    half_edges[:, 1] = np.where(
+        lone, NONE, np.where(half_edges[:, 1] < 0, SEVERAL, half_edges[:, 1])
+    )
+    half_edges[:, 0] = np.unique(edge_of, return_index=True)[1]
+    # Two faces with two edges in common have all three.
+    three = np.sort(topology.face_edges, axis=1)
+    pairs = np.sort(three[:, 0] * len(half_edges) + three[:, 1])
+    repeated = bool((pairs[1:] == pairs[:-1]).any() or repeated_vertex(faces).any())
+    return MeshEdges(
+        vertex_count,
+        faces,
+        topology.edges.astype(np.int32),
+        topology.face_edges.astype(np.int32),
+        half_edges,
+        topology.edge_class,
+        plain=not repeated,
+    )

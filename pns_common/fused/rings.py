@@ -1,0 +1,125 @@
+"""What a learned level reads of every vertex's ring, with the bits of ring_features.py."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.blocks import Blocks
+from pns_common.fused.kernels.rings import (
+    EDGE_COLUMNS,
+    VERTEX_COLUMNS,
+    face_bends,
+    mean_neighbours,
+    mean_normals,
+    mean_spokes,
+    measure_edges,
+    measure_faces,
+    prior_pushes,
+    umbrella_heights,
+)
+from pns_common.fused.loop_points import owners
+from pns_common.fused.mesh_edges import MeshEdges
+from pns_common.side_gate import GENTLE_TO_SHARP
+from pns_common.stencils import limit_ring_weight
+
+
+@dataclass(frozen=True, eq=False)
+class FaceMeasures:
+    """Unit normals of the faces, and area vectors with their lengths."""
+
+    normals: Float[np.ndarray, "F 3"]
+    areas: Float[np.ndarray, "F 4"]
+
+
+@dataclass(frozen=True, eq=False)
+class RingMeasures:
+    """The rings of all vertices; columns are named in kernels/rings.py.
+
+    Attributes:
+        fields: mean normal and umbrella height.
+        means: over the spokes of each vertex.
+        smooth: vertices with one closed ring of interior edges.
+    """
+
+    fields: Float[np.ndarray, "V 4"]
+    means: Float[np.ndarray, "V M"]
+    valence: Int[np.ndarray, " V"]
+    smooth: Bool[np.ndarray, " V"]
+
+
+def measure_normals(
+    points: Float[np.ndarray, "V 3"], mesh: MeshEdges, blocks: Blocks
+) -> FaceMeasures:
+    """Look at the faces of a level."""
+    count = len(mesh.faces)
+    normals, areas = np.empty((count, 3)), np.empty((count, 4))
+
+    def measure(rows: slice) -> None:
+        measure_faces(points, mesh.faces, rows.start, rows.stop, normals, areas)
+
+    blocks.run(count, measure)
+    return FaceMeasures(normals, areas)
+
+
+def measure_bends(
+    at_faces: FaceMeasures, mesh: MeshEdges, blocks: Blocks
+) -> Float[np.ndarray, " F"]:
+    """b of all faces, as ``side_gate.face_bends`` has it."""
+    bends, (gentle, sharp) = np.empty(len(mesh.faces)), GENTLE_TO_SHARP
+    args = at_faces.normals, mesh.face_edges, mesh.half_edges, mesh.edge_class
+
+    def measure(rows: slice) -> None:
+        face_bends(*args, gentle, sharp, rows.start, rows.stop, bends)
+
+    blocks.run(len(bends), measure)
+    return bends
+
+
+def measure_rings(
+    points: Float[np.ndarray, "V 3"],
+    mesh: MeshEdges,
+    at_faces: FaceMeasures,
+    several_fans: Bool[np.ndarray, " V"],
+    blocks: Blocks,
+) -> RingMeasures:
+    """Look around every vertex of a level."""
+    count, by_owner = mesh.vertex_count, owners(blocks, mesh.vertex_count)
+    fields, measured = np.zeros((count, 4)), np.empty((len(mesh.edges), EDGE_COLUMNS))
+    means, valence = np.zeros((count, VERTEX_COLUMNS)), np.zeros(count, dtype=np.int32)
+    args = mesh.faces, mesh.edges, mesh.half_edges, mesh.edge_class
+
+    def edges(rows: slice) -> None:
+        measure_edges(points, at_faces.normals, *args, rows.start, rows.stop, measured)
+
+    def around(rows: slice) -> None:
+        mean_normals(mesh.faces, at_faces.areas, rows.start, rows.stop, fields)
+        mean_spokes(mesh.edges, measured, rows.start, rows.stop, means, valence)
+        umbrella_heights(means, mesh.sharp, rows.start, rows.stop, fields)
+
+    def beyond(rows: slice) -> None:
+        mean_neighbours(mesh.edges, measured, fields, valence, rows.start, rows.stop, means)
+
+    blocks.run(len(mesh.edges), edges)
+    by_owner.run(count, around)
+    by_owner.run(count, beyond)
+    smooth = (valence > 0) & ~several_fans
+    if len(mesh.sharp):
+        smooth &= mesh.sharp == 0
+    return RingMeasures(fields, means, valence, smooth)
+
+
+def measure_pushes(rings: RingMeasures, blocks: Blocks) -> Float[np.ndarray, "V 3"]:
+    """d_v of the prior at s = 1."""
+    pushes = np.empty((len(rings.valence), 3))
+    weight = limit_ring_weight(np.arange(int(rings.valence.max(initial=0)) + 1))
+    smooth = rings.smooth.astype(np.int32)
+    args = rings.means, rings.fields, rings.valence, smooth, weight
+
+    def push(rows: slice) -> None:
+        prior_pushes(*args, rows.start, rows.stop, pushes)
+
+    blocks.run(len(pushes), push)
+    return pushes

@@ -1,0 +1,117 @@
+"""A mesh with data on its vertices, corners and faces, and what refinement makes of them.
+
+The surface is refined as one: vertices at the same position are joined for it, so that the seam of
+a texture is no boundary. The mesh that comes out has the seams of the one that went in, and its
+data are interpolated linearly along each edge, which leaves them where they were at old vertices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
+from pns_common.linear import level_topologies
+from pns_common.mesh import Mesh
+from pns_common.refine import Refinement, refine
+from pns_common.schemes import Scheme
+from pns_common.topology import CHILDREN, split
+
+Data = Mapping[str, np.ndarray]
+
+
+def _nothing() -> Data:
+    return {}
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedMesh:
+    """A triangle mesh of another library.
+
+    Attributes:
+        vertices: (V, 3) positions; several may be equal where other data differ.
+        faces: (F, 3) vertices of each face.
+        points: data of vertices by name, (V, …) each.
+        corners: data of face corners by name, (F, 3, …) each.
+        cells: data of faces by name, (F, …) each.
+    """
+
+    vertices: Float[np.ndarray, "V 3"]
+    faces: Int[np.ndarray, "F 3"]
+    points: Data = field(default_factory=_nothing)
+    corners: Data = field(default_factory=_nothing)
+    cells: Data = field(default_factory=_nothing)
+
+
+def refine_carried(
+    mesh: CarriedMesh, scheme: Scheme, levels: int, options: Mapping[str, Any]
+) -> tuple[CarriedMesh, Refinement]:
+    """Return the refined mesh with its data, and the refinement of the joined surface.
+
+    ``options`` are further arguments of ``refine``; creases name vertices of ``mesh``. Raises what
+    ``refine`` and ``Mesh`` raise.
+    """
+    given = Mesh(mesh.vertices, mesh.faces)
+    joined, first = join_by_position(given.vertices)
+    options = dict(options)
+    if options.get("creases") is not None:
+        options["creases"] = joined[np.asarray(options["creases"])]
+    refinement = refine(Mesh(given.vertices[first], joined[given.faces]), scheme, levels, **options)
+
+    topologies = level_topologies(given.faces, len(given.vertices), levels)
+    points, corners, cells = dict(mesh.points), dict(mesh.corners), dict(mesh.cells)
+    for topology in topologies:
+        for name, values in points.items():
+            points[name] = np.concatenate([values, between(*_ends(values, topology.edges))])
+    for _ in topologies:
+        corners = {name: corner_children(values) for name, values in corners.items()}
+    cells = {name: np.repeat(values, 4**levels, axis=0) for name, values in cells.items()}
+
+    last = topologies[-1]
+    faces = split(last)
+    # Both meshes have their faces in one order, so their corners correspond.
+    surface = np.zeros(last.vertex_count + len(last.edges), dtype=np.int64)
+    surface[: len(joined)] = joined
+    surface[faces.reshape(-1)] = refinement.mesh.faces.reshape(-1)
+    positions = refinement.mesh.vertices[surface]
+    return CarriedMesh(positions, faces, points, corners, cells), refinement
+
+
+def join_by_position(
+    vertices: Float[np.ndarray, "V 3"],
+) -> tuple[Int[np.ndarray, " V"], Int[np.ndarray, " W"]]:
+    """Return the joined vertex of each vertex, and the first vertex of each joined one.
+
+    They are numbered by first appearance: a mesh without equal positions keeps its numbers.
+    """
+    # Adding 0 makes −0 the 0 that it equals.
+    _, first, group = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    number = np.empty_like(order)
+    number[order] = np.arange(len(order))
+    return number[group.reshape(-1)], first[order]
+
+
+def corner_children(corners: Shaped[np.ndarray, " F 3 *K"]) -> Shaped[np.ndarray, " G 3 *K"]:
+    """Return the corners' data of the four children of each face."""
+    edges = between(corners, np.roll(corners, -1, axis=1))
+    six = np.concatenate([corners, edges], axis=1)
+    return six[:, CHILDREN].reshape(-1, *corners.shape[1:])
+
+
+def between(
+    a: Shaped[np.ndarray, " N *K"], b: Shaped[np.ndarray, " N *K"]
+) -> Shaped[np.ndarray, " N *K"]:
+    """Return the data halfway: the mean of numbers and colours (uint8), the first of labels."""
+    if a.dtype.kind in "fc":
+        return ((a + b) / 2).astype(a.dtype)
+    if a.dtype == np.uint8:
+        return ((a.astype(np.uint16) + b + 1) // 2).astype(np.uint8)
+    return a
+
+
+def _ends(values: np.ndarray, edges: Int[np.ndarray, "E 2"]) -> tuple[np.ndarray, np.ndarray]:
+    return values[edges[:, 0]], values[edges[:, 1]]

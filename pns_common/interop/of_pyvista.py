@@ -1,0 +1,45 @@
+"""pyvista.PolyData of triangles: point, cell and field data are kept, but for normals."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+
+from pns_common.errors import MeshError
+from pns_common.interop.carried import CarriedMesh
+
+
+def read_pyvista(mesh: Any) -> CarriedMesh:
+    """Return the arrays of a PolyData.
+
+    Raises:
+        MeshError: it has faces with more corners, or lines or points of their own.
+    """
+    if not mesh.is_all_triangles or mesh.n_lines or mesh.n_verts:
+        raise MeshError("not triangles alone; triangulate() it first", element="faces")
+    # Normals are those of the old surface: they are computed again where they are wanted.
+    normals = {mesh.point_data.active_normals_name, mesh.cell_data.active_normals_name}
+    points = {k: np.asarray(v) for k, v in mesh.point_data.items() if k not in normals}
+    cells = {k: np.asarray(v) for k, v in mesh.cell_data.items() if k not in normals}
+    faces = np.asarray(mesh.regular_faces, dtype=np.int64)
+    return CarriedMesh(np.asarray(mesh.points, dtype=np.float64), faces, points, cells=cells)
+
+
+def write_pyvista(refined: CarriedMesh, given: Any) -> Any:
+    """Return a PolyData of the class of ``given``."""
+    kind = cast(Any, type(given))
+    made = kind.from_regular_faces(refined.vertices, refined.faces)
+    for name, values in refined.points.items():
+        made.point_data[name] = values
+    for name, values in refined.cells.items():
+        made.cell_data[name] = values
+    for name, values in given.field_data.items():
+        made.field_data[name] = values
+    for here, there in ((made.point_data, given.point_data), (made.cell_data, given.cell_data)):
+        if there.active_scalars_name in here:
+            here.active_scalars_name = there.active_scalars_name
+    texture = given.point_data.active_texture_coordinates_name
+    if texture is not None:
+        made.point_data.active_texture_coordinates_name = texture
+    return made

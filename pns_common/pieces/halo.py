@@ -1,0 +1,82 @@
+"""How many rings of faces a piece needs around its own, so that it makes them as the whole does.
+
+A ring of faces is all faces that share a vertex with those within. Let w be the *reach* of a
+level's rules: a child of face f has its bits as soon as all faces within w rings of f are there,
+with theirs.
+
+- Loop: w = 1. An edge vertex reads the two faces of its edge; an old vertex the faces at it; all of
+  these touch f.
+- Learned rules: w = 2. The edge (a, b) of f reads mean normals, umbrella heights and pushes at the
+  vertex d opposite f, so the faces at d, which is a neighbour of f's corners; an old vertex reads
+  its neighbours' heights, mean jumps and pushes, so the faces at these. What they count (valence,
+  sharp edges, fans) is of the same faces, and boundaries' pushes are of neighbours along them.
+- Edge rules that read no fields and leave old vertices to Loop (``paper-5``): w = 1: two faces.
+- The fold guard then halves displacements round after round, and a round reaches a child's ring. It
+  reaches nowhere through a face that no scales in [0, 1] could fold (see exact.py). One ring for it
+  is two of children: the outermost, whose neighbours are not known, and one to spare.
+
+Splitting turns a ring into two rings of children: all faces within two rings of f's children lie
+in children of faces within one ring of f (each has a corner at, or on an edge from, a corner of f).
+So with r rings needed at the next level, w + ⌈r / 2⌉ are needed at this one; at the last level one
+more than w, for the angle between a piece's children and their neighbours. Loop alone needs two
+rings at any depth.
+"""
+
+from __future__ import annotations
+
+from pns_common.edge.features import paper_features
+from pns_common.errors import ParameterError, PnsError
+from pns_common.learned_rules import LearnedEdgeRule, LearnedVertexRule
+from pns_common.loop_rules import loop_vertex_rule
+from pns_common.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
+from pns_common.schemes import Scheme
+
+LOOP_REACH, FIELDS_REACH = 1, 2
+# Rings for the fold guard, where nothing is known yet of how far it goes.
+GUARD_RINGS = 1
+
+
+class ThinHaloError(PnsError):
+    """A piece has too few rings around it to be sure of its own faces; more of them will do."""
+
+    def __init__(self, level: int, faces: int):
+        super().__init__(f"level {level}: {faces} of the piece's faces are not certain")
+        self.level, self.faces = level, faces
+
+
+def halo_rings(scheme: Scheme, levels: int, guard_rings: int = GUARD_RINGS) -> int:
+    """Rings of control faces that a piece needs for so many levels.
+
+    The guard may go further than ``guard_rings``; refining the piece then says so (ThinHaloError).
+    """
+    needed = 0
+    for level in reversed(range(levels)):
+        guarded = scheme.guard is not None and is_learned(scheme, level)
+        own = reach(scheme, level) + guarded * guard_rings
+        needed = own + (1 if level == levels - 1 else -(-needed // 2))
+    return needed
+
+
+def reach(scheme: Scheme, level: int) -> int:
+    """w: rings that the rules of a level read, without the guard.
+
+    Raises:
+        ParameterError: a scheme of other rules than Loop's and a model's.
+    """
+    if not is_learned(scheme, level):
+        return LOOP_REACH
+    edges, vertices = scheme.edge_rule, scheme.vertex_rule
+    if isinstance(edges, ScaleFreeEdgeRule) and isinstance(vertices, ScaleFreeVertexRule):
+        return FIELDS_REACH
+    if isinstance(edges, LearnedEdgeRule):
+        if isinstance(vertices, LearnedVertexRule):
+            return FIELDS_REACH
+        if vertices is loop_vertex_rule:
+            plain = edges.operator.features is paper_features
+            return LOOP_REACH if plain else FIELDS_REACH
+    raise ParameterError("scheme", scheme.name, expected="loop() or pns(model)")
+
+
+def is_learned(scheme: Scheme, level: int) -> bool:
+    """Whether the scheme's own rules act at a level."""
+    return scheme.learned_levels is None or level < scheme.learned_levels

@@ -1,0 +1,167 @@
+"""Refine a piece of a mesh with its halo: its own faces as the whole mesh's refinement has them.
+
+The whole's bits depend on its orders: sums around a vertex run over edges in the order in which
+these first appear in faces, and stencils start at lower vertices and faces. So a piece keeps its
+faces, and the numbers of its vertices, in the whole's order; then everything whose surroundings are
+there has the same order too, at all levels. Which that is is checked: see exact.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.blocks import Blocks
+from pns_common.fused import fits, kernels_available
+from pns_common.fused.known import kernels_know
+from pns_common.levels import check_coordinates
+from pns_common.pieces.exact import guarded_exact, shrunk
+from pns_common.pieces.halo import ThinHaloError, is_learned, reach
+from pns_common.pieces.steps import Links, Step, array_steps, fused_steps
+from pns_common.pieces.tally import LevelTally
+from pns_common.pieces.tally_of_step import tally_of
+from pns_common.schemes import Scheme
+from pns_common.step import LevelStep
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Some faces of a mesh, in its order, and vertices numbered in its order.
+
+    Attributes:
+        points: (V, 3).
+        faces: (F, 3) rows of ``points``, int64.
+        own: the faces to be refined; the others are the halo.
+        whole: vertices whose faces are all here.
+        creases: edges of the piece to keep sharp; None without.
+    """
+
+    points: Float[np.ndarray, "V 3"]
+    faces: Int[np.ndarray, "F 3"]
+    own: Bool[np.ndarray, " F"]
+    whole: Bool[np.ndarray, " V"]
+    creases: Int[np.ndarray, "N 2"] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedPiece:
+    """A refined piece, halo included: only what is of its own faces has the whole's bits.
+
+    Attributes:
+        points: (W, 3): the piece's vertices, then those of each level's edges.
+        faces: (F 4^L, 3) rows of ``points``; face f became F 4^L rows from 4^L f on.
+        openers: of each level the face that an edge is first in, counted in faces of the control
+            piece, in the order of the edges.
+        own_vertices: the vertices that are this piece's to write, and no other's.
+        tallies: of each level.
+        several_fans: own vertices of the control mesh whose faces form more than one fan.
+    """
+
+    points: Float[np.ndarray, "W 3"]
+    faces: Int[np.ndarray, "C 3"]
+    openers: list[Int[np.ndarray, "..."]]
+    own_vertices: Bool[np.ndarray, " W"]
+    tallies: list[LevelTally]
+    several_fans: int
+
+
+def refine_piece(
+    piece: Piece, scheme: Scheme, levels: int, length: float, blocks: Blocks
+) -> RefinedPiece:
+    """Refine a piece; ``length`` is R of the whole mesh.
+
+    Raises:
+        ThinHaloError: the halo is too thin to be sure of all own faces.
+        ParameterError: a crease is no edge of the piece, or the scheme is not known.
+        ModelError: the network returned something that is not finite, or of another shape.
+        MeshError: the refined coordinates are too large.
+    """
+    own, rim = piece.own, ~piece.whole
+    exact: Bool[np.ndarray, " F"] = np.ones(len(piece.faces), dtype=bool)
+    own_vertices = np.zeros(0, dtype=bool)
+    openers: list[Int[np.ndarray, "..."]] = []
+    tallies: list[LevelTally] = []
+    several_fans = 0
+    step = None
+    for level, step in zip(
+        range(levels), steps_of(piece, scheme, levels, length, blocks), strict=False
+    ):
+        links = step.links
+        if level == 0:
+            own_vertices = first_at_own(links, own)
+            assert links.several_fans is not None
+            several_fans = int((links.several_fans & own_vertices).sum())
+        own_edges = own[links.first // 3]
+        for _ in range(reach(scheme, level)):
+            exact = shrunk(exact, links.faces, rim)
+        exact = np.repeat(exact, 4)
+        if scheme.guard is not None and is_learned(scheme, level) and not exact.all():
+            asked = _asked(step.placed)
+            if asked is not None and step.loop is not None:
+                angle = scheme.guard.angle
+                exact = guarded_exact(exact, step.children, step.loop, asked, angle)
+        _check_own(level, links, own, own_edges, exact)
+        own_vertices = np.concatenate([own_vertices, own_edges])
+        check_coordinates(float(np.abs(step.points[own_vertices]).max(initial=0)))
+        tallies.append(tally_of(step, own, own_vertices, own_edges))
+        openers.append(links.first // (3 * 4**level))
+        own = np.repeat(own, 4)
+        rim = np.zeros(len(step.points), dtype=bool)
+    assert step is not None  # levels ≥ 1
+    return RefinedPiece(step.points, step.children, openers, own_vertices, tallies, several_fans)
+
+
+def steps_of(
+    piece: Piece, scheme: Scheme, levels: int, length: float, blocks: Blocks
+) -> Iterator[Step]:
+    """The steps of a piece, one after the other as they are asked for."""
+    known = scheme.learned_levels == 0 or (length > 0 and kernels_know(scheme))
+    fused = known and kernels_available() and fits(len(piece.points), len(piece.faces), levels)
+    steps = fused_steps if fused else array_steps
+    return steps(piece.points, piece.faces, piece.creases, scheme, length, blocks)
+
+
+def first_at_own(links: Links, own: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " V"]:
+    """The vertices that first appear in an own face; of those around own faces alone it is sure."""
+    first = np.full(links.vertex_count, -1, dtype=np.int64)
+    corners = links.faces.reshape(-1)
+    # Written backwards, so that the earliest corner is the one that remains.
+    first[corners[::-1]] = np.arange(len(corners) - 1, -1, -1)
+    return (first >= 0) & own[first // 3]
+
+
+def _check_own(
+    level: int,
+    links: Links,
+    own: Bool[np.ndarray, " F"],
+    own_edges: Bool[np.ndarray, " E"],
+    exact: Bool[np.ndarray, " C"],
+) -> None:
+    """Own faces' children must be exact, and those that they meet across own edges.
+
+    Raises:
+        ThinHaloError: some are not.
+    """
+    needed = own.copy()
+    across = links.second[own_edges]
+    needed[across[across >= 0] // 3] = True
+    lacking = np.repeat(needed, 4) & ~exact
+    if lacking.any():
+        raise ThinHaloError(level, int(lacking.sum()))
+
+
+def _asked(placed: LevelStep | None) -> Float[np.ndarray, "W 3"] | None:
+    """What was to be added before the guard scaled it; not finite where it took all."""
+    if placed is None or placed.guard is None:
+        return None
+    added = [
+        np.zeros_like(rule.loop) if rule.displacement is None else rule.displacement
+        for rule in (placed.vertices, placed.edges)
+    ]
+    scale = placed.guard[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Scales are powers of 2: dividing by them gives back what was there.
+        return np.where(scale > 0, np.concatenate(added) / scale, np.inf)

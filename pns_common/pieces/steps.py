@@ -1,0 +1,123 @@
+"""The steps of a piece through the levels, by compiled kernels or by array kernels: same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.array_steps import array_steps as all_steps
+from pns_common.blocks import Blocks
+from pns_common.schemes import Scheme
+from pns_common.step import LevelStep
+from pns_common.topology import Topology
+
+
+@dataclass(frozen=True, eq=False)
+class Links:
+    """What is asked of a level's connectivity beside its step.
+
+    Attributes:
+        first, second: of each edge its first half-edge, and its second where it is interior or a
+            crease, else −1; half-edge 3 f + i is of face f.
+        several_fans: of the control mesh the vertices with more than one fan; None later.
+    """
+
+    vertex_count: int
+    faces: Int[np.ndarray, "F 3"]
+    edge_class: Int[np.ndarray, " E"]
+    interior: Int[np.ndarray, " I"]
+    first: Int[np.ndarray, " E"]
+    second: Int[np.ndarray, " E"]
+    several_fans: Bool[np.ndarray, " V"] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One level of a piece: what it split, what it made.
+
+    Attributes:
+        placed: what the rules placed; None where it is Loop's and was not kept.
+        loop: where Loop puts the vertices; None where they are there.
+        may_flip: whether a child can have turned over against Loop's.
+    """
+
+    links: Links
+    points: Float[np.ndarray, "W 3"]
+    children: Int[np.ndarray, "C 3"]
+    placed: LevelStep | None
+    loop: Float[np.ndarray, "W 3"] | None
+    may_flip: bool
+
+
+def array_steps(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    creases: Int[np.ndarray, "N 2"] | None,
+    scheme: Scheme,
+    length: float,
+    blocks: Blocks,
+) -> Iterator[Step]:
+    """The steps of ``array_steps``, with what is asked of them here."""
+    for step in all_steps(points, faces, creases, scheme, length, blocks):
+        links, loop = _links(step.topology, step.several_fans), step.placed.loop_points
+        kept = step.placed if step.placed.learned else None
+        yield Step(links, step.placed.points, step.faces, kept, loop, loop is not None)
+
+
+def fused_steps(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    creases: Int[np.ndarray, "N 2"] | None,
+    scheme: Scheme,
+    length: float,
+    blocks: Blocks,
+) -> Iterator[Step]:
+    """The same with compiled kernels, which must know the scheme (``fused.known``)."""
+    from pns_common.fused.learned_step import learned_points
+    from pns_common.fused.level import control_level, next_level
+    from pns_common.fused.loop_points import loop_points
+    from pns_common.fused.mesh_edges import split_mesh_faces
+
+    level, depth = control_level(points, faces, creases, blocks), 0
+    while True:
+        mesh = level.mesh
+        placed, loop, may_flip = None, None, False
+        if scheme.learned_levels is not None and depth >= scheme.learned_levels:
+            made = loop_points(level.points, mesh, blocks)
+        else:
+            with np.errstate(over="ignore", invalid="ignore"):
+                learned = learned_points(level, scheme, length, blocks)
+            made, placed = learned.points, learned.step
+            loop = np.concatenate([placed.vertices.loop, placed.edges.loop])
+            may_flip = learned.counterpart is not None
+        links = Links(
+            mesh.vertex_count,
+            mesh.faces,
+            mesh.edge_class,
+            mesh.interior,
+            mesh.half_edges[:, 0],
+            mesh.half_edges[:, 1],
+            level.several_fans if depth == 0 else None,
+        )
+        children = split_mesh_faces(mesh, np.int32, blocks)
+        yield Step(links, made, children, placed, loop, may_flip)
+        level, depth = next_level(level, made, blocks), depth + 1
+
+
+def _links(topology: Topology, several_fans: Bool[np.ndarray, " V"] | None) -> Links:
+    first = np.empty(len(topology.edges), dtype=np.int64)
+    # Written backwards, so that the earliest half-edge is the one that remains.
+    half_edges = topology.face_edges.reshape(-1)
+    first[half_edges[::-1]] = np.arange(len(half_edges) - 1, -1, -1)
+    return Links(
+        topology.vertex_count,
+        topology.faces,
+        topology.edge_class,
+        topology.interior,
+        first,
+        topology.half_edges[:, 1],
+        several_fans,
+    )

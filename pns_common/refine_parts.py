@@ -1,0 +1,111 @@
+"""Refine many meshes at once: for scenes of thousands, where each alone would cost its overhead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.blocks import ROWS, Blocks
+from pns_common.errors import ParameterError
+from pns_common.fused import KERNEL_ROWS
+from pns_common.limit import refined_limit_normals, refined_limit_positions
+from pns_common.mesh import Mesh
+from pns_common.refine import (
+    Report,
+    available_threads,
+    kernels_can_serve,
+    measure_reference_length,
+    report_of,
+)
+from pns_common.schemes import Scheme
+
+
+@dataclass(frozen=True, eq=False)
+class PartsRefinement:
+    """A refined mesh of several parts, with the report of each; see ``refine.Refinement``."""
+
+    mesh: Mesh
+    reports: list[Report]
+    ratio: Float[np.ndarray, " V"]
+    gate: Float[np.ndarray, " V"]
+    normals: Float[np.ndarray, "V 3"] | None = None
+
+
+def refine_parts(
+    mesh: Mesh,
+    part_faces: Int[np.ndarray, " Q"],
+    scheme: Scheme,
+    levels: int = 1,
+    reference_length: float | str = "auto",
+    *,
+    limit: bool = False,
+    creases: Int[np.ndarray, "N 2"] | None = None,
+    threads: int | None = None,
+) -> PartsRefinement | None:
+    """Refine the parts of a mesh, each as if it were alone: same positions, same report, same bits.
+
+    Needs the compiled kernels; None where they cannot serve, and each part must go alone.
+
+    Args:
+        mesh: the parts one after the other. No two share a vertex, and their vertices are numbered
+            in their order.
+        part_faces: where the faces of each of the P parts begin, and where the last one's end.
+        scheme, levels, limit, creases, threads: as for ``refine``.
+        reference_length: as for ``refine``; "auto" measures each part.
+
+    Raises:
+        ParameterError: the parts are not as they must be, or as for ``refine``.
+        ModelError: as for ``refine``.
+        MeshError: the refined coordinates of any part are too large.
+    """
+    first = _first_vertices(mesh, part_faces)
+    if reference_length == "auto":
+        lengths = np.array(
+            [
+                measure_reference_length(
+                    mesh.vertices[first[part] : first[part + 1]],
+                    mesh.faces[part_faces[part] : part_faces[part + 1]] - first[part],
+                )
+                for part in range(len(part_faces) - 1)
+            ]
+        )
+    else:
+        lengths = np.full(len(part_faces) - 1, float(reference_length))
+    if not kernels_can_serve(mesh, scheme, levels, float(lengths.min()), creases):
+        return None
+    from pns_common.fused.refine_parts import refine_parts_fused
+
+    workers = available_threads() if threads is None else threads
+    blocks = Blocks(workers, KERNEL_ROWS)
+    made = refine_parts_fused(mesh, part_faces, scheme, levels, lengths, creases, blocks)
+    points, normals = made.points, None
+    if limit:
+        topology, blocks = made.split_topology(), Blocks(workers, ROWS)
+        points = refined_limit_positions(made.points, topology, blocks)
+        normals = refined_limit_normals(made.points, topology, blocks)
+    return PartsRefinement(
+        mesh=Mesh.of_refined(points, made.faces),
+        reports=[
+            report_of(scheme, float(length), several_fans, reports)
+            for length, several_fans, reports in zip(
+                lengths, made.several_fans, made.reports, strict=True
+            )
+        ],
+        ratio=made.ratio,
+        gate=made.gate,
+        normals=normals,
+    )
+
+
+def _first_vertices(mesh: Mesh, part_faces: Int[np.ndarray, " Q"]) -> Int[np.ndarray, " Q"]:
+    """Where the vertices of each part begin, and where the last one's end."""
+    whole = len(part_faces) > 1 and part_faces[0] == 0 and part_faces[-1] == len(mesh.faces)
+    if not (whole and (np.diff(part_faces) > 0).all()):
+        raise ParameterError("part_faces", part_faces, expected="ascending, from 0 to all faces")
+    low = np.minimum.reduceat(mesh.faces.min(axis=1), part_faces[:-1])
+    high = np.maximum.reduceat(mesh.faces.max(axis=1), part_faces[:-1])
+    if not (low[1:] == high[:-1] + 1).all() or low[0] != 0 or high[-1] != len(mesh.vertices) - 1:
+        raise ParameterError("part_faces", part_faces, expected="parts that share no vertex")
+    return np.append(low, len(mesh.vertices))

@@ -1,0 +1,28 @@
+"""The numbers of the scale-free rule."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ScaleFreeForm:
+    """The numbers of the rule, as they stand on a card of format 3.
+
+    Attributes:
+        budget: C ≥ 0; C / R bounds the displacement per squared edge length.
+        prior_strength: s ≥ 0 of the prior D; 1 is full quasi-interpolation.
+        network_scale: τ > 0, the longest that the network may ask for, in edge lengths.
+        fold_angle: θ of the fold guard in degrees, 0 < θ < 90.
+        learned_levels: K ≥ 1.
+        boundary_strength: b ≥ 0 of the boundary's prior; 1 is full quasi-interpolation.
+        side_gates: whether an edge's gate reads the sides of its two faces beside their normals.
+    """
+
+    budget: float
+    prior_strength: float
+    network_scale: float
+    fold_angle: float
+    learned_levels: int
+    boundary_strength: float = 0.0
+    side_gates: bool = False

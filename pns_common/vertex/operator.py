@@ -1,0 +1,102 @@
+"""The learned vertex rule: what PNS adds to Loop's old vertices, where a model has it.
+
+    format 3    p' = p0 + γ_v Π_ρ(D + τ h_v Σ z_i e_i)      ‖z‖ ≤ 1,  ρ = C h_v² / R
+    format 2    p' = p0 + h_v² γ_v (C / R) v                ‖v‖ ≤ 1,  γ_v = tanh(c x_v)
+
+h_v² is the mean of the squared lengths of the ring's edges, so h_v is no longer than the longest.
+x_v is the mean over the ring's edges of ‖n − n'‖² / 2: O(ε²) for a bump of height ε on a plane, so
+that γ_v and its derivative vanish there. v = Σ z_i e_i is a sum of three equivariant vectors of
+length ≤ 1 (see ring_features.py) with the network's z as weights, shortened to the unit ball where
+it is longer. So ‖p' − p0‖ ≤ (C / R) h_v² for any weights, and each factor is Lipschitz.
+
+The rule is off at vertices on boundary, irregular or crease edges, where several fans meet, and at
+isolated ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.arrays import Array, gather, namespace
+from pns_common.correction import (
+    BudgetPerLength,
+    Correction,
+    Network,
+    project_to_ball,
+    shortened,
+    where_open,
+)
+from pns_common.topology import Topology
+from pns_common.vertex.rings import RingFeatureSet, Rings, ring_vectors
+
+
+@dataclass(frozen=True)
+class VertexOperator:
+    """The learned rule for old vertices.
+
+    Attributes:
+        features: of the ring.
+        network: features (N, K) to weights z (N, 3), ‖z‖ ≤ 1.
+        gate_sharpness: c of the gate tanh(c x_v).
+    """
+
+    features: RingFeatureSet
+    network: Network
+    gate_sharpness: float
+
+    def correct(
+        self, rings: Rings, vertices: Int[np.ndarray, " N"], budget_per_length: BudgetPerLength
+    ) -> Correction:
+        """What is added at some vertices; ``budget_per_length`` is C / R.
+
+        Raises:
+            ModelError: the network returned something that is not finite.
+        """
+        xp = namespace(rings.normal)
+        gamma, envelope, learned = self._evaluated(rings, vertices, budget_per_length)
+        return Correction(
+            displacement=(envelope * gamma)[:, None] * project_to_ball(learned),
+            envelope=envelope,
+            gate=gamma,
+            degenerate=xp.zeros_like(gamma, dtype=xp.bool),
+        )
+
+    def correct_scale_free(
+        self,
+        rings: Rings,
+        vertices: Int[np.ndarray, " N"],
+        budget_per_length: BudgetPerLength,
+        network_scale: float,
+        prior: Float[Array, "N 3"],
+    ) -> Correction:
+        """δ = γ_v Π_ρ(D + τ h_v Σ z_i e_i), ρ = h_v² C / R; likewise, with τ and D.
+
+        Raises:
+            ModelError: the network returned something that is not finite.
+        """
+        xp = namespace(rings.normal)
+        gamma, envelope, learned = self._evaluated(rings, vertices, budget_per_length)
+        wanted = prior + network_scale * gather(rings.reach, vertices) * learned
+        displacement = gamma[:, None] * shortened(wanted, envelope)
+        degenerate = xp.zeros_like(gamma, dtype=xp.bool)
+        return Correction(displacement, envelope, gamma, degenerate)
+
+    def _evaluated(
+        self, rings: Rings, vertices: Int[np.ndarray, " N"], budget_per_length: BudgetPerLength
+    ) -> tuple[Float[Array, " N"], Float[Array, " N"], Float[Array, "N 3"]]:
+        """γ_v, ρ = h_v² C / R, and Σ z_i e_i."""
+        xp = namespace(rings.normal)
+        gamma = xp.tanh(self.gate_sharpness * gather(rings.mean_jump, vertices)[:, 0])
+        envelope = budget_per_length * gather(rings.square, vertices)[:, 0]
+        basis = gather(ring_vectors(rings), vertices)
+        features = gather(self.features(rings), vertices)
+        weights = project_to_ball(where_open(self.network, features, gamma, like=basis[:, 0]))
+        return gamma, envelope, xp.sum(weights[:, :, None] * basis, axis=1)
+
+
+def smooth_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
+    """Vertices with a closed ring of interior edges: those that the rule may move."""
+    return topology.smooth_vertices

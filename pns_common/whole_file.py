@@ -1,0 +1,40 @@
+"""Writing a file whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def replacing(path: Path) -> Generator[Path, None, None]:
+    """Yield the name of a new file beside `path`, and give it that place once it is written.
+
+    Nobody ever sees half a file; where writing fails, nothing is left of the new one.
+
+    Raises:
+        OSError: the folder is missing or cannot be written; `path` is then as it was.
+    """
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}.tmp")
+    try:
+        # The mode of any file that a user writes: the system takes the umask off.
+        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+    except OSError as error:
+        # Nobody asked for the temporary name.
+        error.filename = str(path)
+        raise
+    try:
+        yield temporary
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Write `data` in the place of `path`, whole or not at all: see `replacing`."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)

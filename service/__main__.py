@@ -1,0 +1,23 @@
+"""The command `pns`, also `python -m pns_service`."""
+
+from __future__ import annotations
+
+OURS = ("pns_common", __package__)
+
+
+def main() -> None:
+    """Run the command line, or say what to install."""
+    try:
+        from .cli import main as command_line
+
+        command_line()
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] in OURS:
+            raise
+        raise SystemExit(
+            f"pns: the package {error.name} is missing: pip install 'pns-subdivision[service]'"
+        ) from error
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""What a request sends: media types, parts, archives, and the files beside a document."""

@@ -1,0 +1,118 @@
+"""A .zip with one glTF in it, read without trusting a number that it holds.
+
+Nothing is extracted to disk, only files that the document names are unpacked, and every byte that
+comes out is counted.
+"""
+
+from __future__ import annotations
+
+import io
+import stat
+import zipfile
+import zlib
+from dataclasses import dataclass, field
+from functools import partial
+
+from ..errors import ServiceError, UnreadableError, check_limit
+from .sibling_files import File, SiblingFiles, relative_name
+
+MAX_ENTRIES = 1024
+# Bytes of the index: a name may be long, a thousand long ones are an attack.
+MAX_INDEX_BYTES = 2**20
+# Deflate reaches 1032; geometry and JSON seldom reach 20.
+MAX_RATIO = 200
+# Below this many bytes a ratio says nothing.
+RATIO_FLOOR = 2**20
+
+_INDEX_ENTRY = b"PK\x01\x02"
+_PIECE = 2**18
+_DOCUMENTS = (".glb", ".gltf")
+_ENCRYPTED = 1
+
+
+class ArchiveError(ServiceError):
+    """A .zip that reads, but is not one glTF with the files beside it."""
+
+    status = 422
+    code = "invalid-archive"
+    title = "The archive must hold one glTF and the files beside it"
+
+
+def open_archive(data: bytes, max_bytes: int) -> tuple[File, SiblingFiles]:
+    """The document in a .zip, and the files beside it; unpacked, they hold `max_bytes` at most.
+
+    Raises:
+        UnreadableError: no .zip.
+        ArchiveError: not one document; a name that leads out of the archive, a link, encryption.
+        LimitError: too many entries, or too much in them.
+    """
+    # Counted in the raw bytes before the library makes an object of each; chance adds hardly one.
+    count = data.count(_INDEX_ENTRY)
+    check_limit("archive-entries", count, MAX_ENTRIES, f"the archive has {count} entries")
+    try:
+        opened = zipfile.ZipFile(io.BytesIO(data))
+    except (zipfile.BadZipFile, NotImplementedError, ValueError, EOFError) as error:
+        raise UnreadableError(f"the archive cannot be read: {error}") from error
+    entries = _entries(opened)
+    documents = [name for name in entries if name.lower().endswith(_DOCUMENTS)]
+    if len(documents) != 1:
+        raise ArchiveError(f"the archive holds {len(documents)} glTF files")
+    main = documents[0]
+    folder = main.rpartition("/")[0]
+    unpacker = _Unpacker(opened, entries, len(data), max_bytes)
+    find = partial(_find, unpacker, f"{folder}/" if folder else "")
+    return unpacker.read(main), SiblingFiles(find, frozenset(entries) - {main})
+
+
+def _find(unpacker: _Unpacker, folder: str, name: str) -> File | None:
+    path = folder + name
+    return unpacker.read(path) if path in unpacker.entries else None
+
+
+def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+    """The files by name, each checked by what its entry says."""
+    index_bytes = 0
+    entries: dict[str, zipfile.ZipInfo] = {}
+    for entry in opened.infolist():
+        index_bytes += len(entry.orig_filename) + len(entry.extra) + len(entry.comment)
+        name = relative_name(entry.filename)
+        if name is None:
+            raise ArchiveError("a name leads out of the archive")
+        if stat.S_IFMT(entry.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
+            raise ArchiveError("the archive holds a link or a special file")
+        if entry.flag_bits & _ENCRYPTED:
+            raise ArchiveError("the archive is encrypted")
+        if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ArchiveError("the archive uses a compression other than deflate")
+        if entry.is_dir() or name.startswith("__MACOSX/") or name.endswith(".DS_Store"):
+            continue
+        if name in entries:
+            raise ArchiveError("two entries have the same name")
+        entries[name] = entry
+    text = f"the archive's index has {index_bytes} bytes"
+    check_limit("archive-index", index_bytes, MAX_INDEX_BYTES, text)
+    return entries
+
+
+@dataclass
+class _Unpacker:
+    opened: zipfile.ZipFile
+    entries: dict[str, zipfile.ZipInfo]
+    packed: int
+    max_bytes: int
+    unpacked: int = field(default=0)
+
+    def read(self, name: str) -> File:
+        """One file, unpacked piece by piece until it ends or a limit does."""
+        pieces: list[bytes] = []
+        allowed = min(self.max_bytes, max(RATIO_FLOOR, MAX_RATIO * self.packed))
+        try:
+            with self.opened.open(self.entries[name]) as file:
+                while piece := file.read(_PIECE):
+                    self.unpacked += len(piece)
+                    text = f"the archive unpacks to {self.unpacked} bytes or more"
+                    check_limit("archive-bytes", self.unpacked, allowed, text)
+                    pieces.append(piece)
+        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, ValueError) as error:
+            raise UnreadableError(f"the archive cannot be read: {error}") from error
+        return File(name, b"".join(pieces))

@@ -1,0 +1,77 @@
+"""Content types: which bodies are taken, and what a file is by its first bytes."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal
+
+from ..errors import MediaTypeError
+
+GLB = "model/gltf-binary"
+GLTF = "model/gltf+json"
+JSON = "application/json"
+MULTIPART = "multipart/form-data"
+ZIP = "application/zip"
+
+Kind = Literal["glb", "gltf", "obj", "ply", "stl", "off"]
+FORMATS: dict[str, Kind] = {
+    GLB: "glb",
+    GLTF: "gltf",
+    "model/obj": "obj",
+    "model/ply": "ply",
+    "model/stl": "stl",
+    "model/off": "off",
+}
+"""The pipeline's name of each file type. Only OBJ's and STL's beside glTF's are registered."""
+ACCEPTED = (*FORMATS, ZIP, MULTIPART)
+
+_MESH_KINDS: tuple[Kind, ...] = ("obj", "ply", "stl", "off")
+
+_WEIGHT = re.compile(r"q\s*=\s*(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)")
+
+GLB_MAGIC = b"glTF"
+ZIP_MAGIC = b"PK\x03\x04"
+BLANK = b" \t\r\n"
+
+
+def of_request(content_type: str) -> str:
+    """The media type that a Content-Type names, without its parameters. Raises MediaTypeError."""
+    media = content_type.partition(";")[0].strip().lower()
+    if media not in ACCEPTED:
+        named = f"{media!r} is not supported" if media else "the request has no Content-Type"
+        raise MediaTypeError(f"{named}; send one of {', '.join(ACCEPTED)}")
+    return media
+
+
+def quality(media: str, accept: str) -> float:
+    """How much an Accept header wants a media type, 0 to 1: its most specific range decides."""
+    wanted: dict[str, float] = {}
+    for entry in accept.split(","):
+        pattern, *parameters = (part.strip().lower() for part in entry.split(";"))
+        weight = next((weighted[1] for p in parameters if (weighted := _WEIGHT.fullmatch(p))), "1")
+        wanted[pattern] = float(weight)
+    for pattern in (media, f"{media.partition('/')[0]}/*", "*/*"):
+        if pattern in wanted:
+            return wanted[pattern]
+    return 0.0
+
+
+def sniff(data: bytes) -> str:
+    """GLB, glTF JSON or an archive, by the first bytes: form clients send application/octet-stream.
+
+    Raises MediaTypeError.
+    """
+    if data.startswith(GLB_MAGIC):
+        return GLB
+    if data.startswith(ZIP_MAGIC):
+        return ZIP
+    # A slice: a file of nothing but blanks is not to be copied to find that out.
+    if data[:4096].lstrip(b"\xef\xbb\xbf" + BLANK).startswith(b"{"):
+        return GLTF
+    raise MediaTypeError("the file is neither a GLB nor glTF JSON, nor a .zip of one")
+
+
+def mesh_kind_of(name: str) -> Kind | None:
+    """What the extension of a file name says, where the first bytes would not tell: no glTF."""
+    extension = name.rpartition(".")[2].lower()
+    return next((kind for kind in _MESH_KINDS if kind == extension), None)

@@ -1,0 +1,78 @@
+"""The files beside a glTF: found by a relative name among what came with it, never fetched."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from urllib.parse import unquote
+
+_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
+
+
+@dataclass(frozen=True)
+class File:
+    """A file that came with the document: what its sender calls it, and its bytes."""
+
+    name: str
+    content: bytes | memoryview
+
+
+@dataclass(frozen=True)
+class SiblingFiles:
+    """What lies beside a document.
+
+    Attributes:
+        find: the file of a safe relative name, None where there is none.
+        names: all files that came, where they are known.
+    """
+
+    find: Callable[[str], File | None]
+    names: frozenset[str] = frozenset()
+
+
+ALONE = SiblingFiles(lambda name: None)
+"""A document that came without any other file."""
+
+
+@dataclass
+class Opened:
+    """The siblings that a document names, each opened once."""
+
+    siblings: SiblingFiles
+    files: dict[str, File | None] = field(default_factory=dict)
+
+    def open(self, uri: str) -> File | None:
+        """The file behind a URI; None where it did not come, or the URI leads elsewhere."""
+        name = safe_name(uri)
+        if name is None:
+            return None
+        if name not in self.files:
+            self.files[name] = self.siblings.find(name)
+        return self.files[name]
+
+    @property
+    def size(self) -> int:
+        """Bytes of all that was opened."""
+        return sum(len(file.content) for file in self.files.values() if file is not None)
+
+    @property
+    def unused(self) -> list[str]:
+        """Files that came and that the document does not name."""
+        used = {file.name for file in self.files.values() if file is not None}
+        return sorted(self.siblings.names - used)
+
+
+def safe_name(uri: str) -> str | None:
+    """The name of a file below the document's folder; None for any other URI."""
+    return None if _SCHEME.match(uri) else relative_name(unquote(uri))
+
+
+def relative_name(path: str) -> str | None:
+    """A relative path in its shortest form; None for one that could lead out of its folder."""
+    if path.startswith("/") or "\\" in path or any(ord(letter) < 32 for letter in path):
+        return None
+    steps = [step for step in path.split("/") if step not in ("", ".")]
+    if not steps or ".." in steps or ":" in steps[0]:
+        return None
+    return "/".join(steps)

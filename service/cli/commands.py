@@ -1,0 +1,290 @@
+"""`pns`: refine files, serve, show what a model says of itself, write an example.
+
+Commands import what they need when they run, so that `pns --help` answers at once. What a command
+declares and does not read itself, `options_of` takes from the context.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..options import DEFAULTS
+from .errors import FAILURE, explained, printable
+from .parameters import (
+    AddressOption,
+    BudgetOption,
+    CompressOption,
+    CreaseOption,
+    DiagnosticsOption,
+    EngineOption,
+    LengthOption,
+    LevelsOption,
+    LimitOption,
+    MemoryOption,
+    ModelOption,
+    NormalsOption,
+    SchemeOption,
+    UvOption,
+    WeldOption,
+    WorkersOption,
+    options_of,
+)
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Proximity-Preserving Neural Subdivision of glTF, OBJ, PLY, STL and OFF files.",
+)
+
+
+def main() -> None:
+    """Run the command line; an error that a user can act on is one line, any other a traceback."""
+    try:
+        app()
+    except Exception as error:
+        known = explained(error)
+        if known is None:
+            raise
+        message, code = known
+        typer.echo(f"pns: {printable(' '.join(message.split()))}", err=True)
+        raise SystemExit(code) from error
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from pns_common.version import VERSION
+
+        typer.echo(f"pns {VERSION}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="show the version")
+    ] = False,
+) -> None:
+    """Take the options that come before a command."""
+
+
+@app.command()
+def subdivide(
+    context: typer.Context,
+    source: Annotated[Path, typer.Argument(metavar="IN", help="glb, gltf, obj, ply, stl or off")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="file to write")],
+    levels: LevelsOption = DEFAULTS.levels,
+    scheme: SchemeOption = DEFAULTS.scheme,
+    budget: BudgetOption = DEFAULTS.budget,
+    model: ModelOption = None,
+    reference_length: LengthOption = "auto",
+    diagnostics: DiagnosticsOption = DEFAULTS.diagnostics,
+    uv: UvOption = DEFAULTS.uv,
+    normals: NormalsOption = DEFAULTS.normals,
+    crease: CreaseOption = DEFAULTS.crease,
+    weld_tolerance: WeldOption = DEFAULTS.weld_tolerance,
+    compress: CompressOption = DEFAULTS.compress,
+    limit: LimitOption = DEFAULTS.limit,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="write the report too")
+    ] = None,
+) -> None:
+    """Refine IN and write OUT; the formats go by the files' extensions."""
+    from ..meshfiles.convert import convert
+    from ..settings import Settings
+
+    convert(source, output, options_of(context), model, report, Settings().job_limits())
+
+
+@app.command()
+def batch(
+    context: typer.Context,
+    source: Annotated[
+        str,
+        typer.Argument(help="folder, glob or manifest (.txt, .csv, .jsonl, .parquet); path or URL"),
+    ],
+    dest: Annotated[str, typer.Argument(help="folder for the results; path or URL")],
+    levels: LevelsOption = DEFAULTS.levels,
+    scheme: SchemeOption = DEFAULTS.scheme,
+    budget: BudgetOption = DEFAULTS.budget,
+    model: ModelOption = None,
+    reference_length: LengthOption = "auto",
+    diagnostics: DiagnosticsOption = DEFAULTS.diagnostics,
+    uv: UvOption = DEFAULTS.uv,
+    normals: NormalsOption = DEFAULTS.normals,
+    crease: CreaseOption = DEFAULTS.crease,
+    weld_tolerance: WeldOption = DEFAULTS.weld_tolerance,
+    compress: CompressOption = DEFAULTS.compress,
+    limit: LimitOption = DEFAULTS.limit,
+    to: Annotated[
+        str | None, typer.Option(metavar="FORMAT", help="format of the results; default: as read")
+    ] = None,
+    engine: EngineOption = "local",
+    address: AddressOption = None,
+    workers: WorkersOption = None,
+    report: Annotated[
+        Path, typer.Option(metavar="FILE", help="rows of all files: .parquet or .jsonl")
+    ] = Path("pns-batch.parquet"),
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="say what would be done; write nothing")
+    ] = False,
+) -> None:
+    """Refine a library of files; what was done is not done again when it runs again."""
+
+    from rich.console import Console
+
+    from ..scale.batch import Batch, batch_work, print_summary, run_batch
+    from ..scale.engines import engine_of
+    from ..settings import Settings
+
+    settings = Settings()
+    chosen = Batch(
+        source,
+        dest,
+        options_of(context),
+        settings.job_limits(),
+        report,
+        to,
+        model,
+        dry_run,
+    )
+    work = batch_work(settings.job_seconds)
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    where = engine_of(work, engine, address, workers, console.print)
+    summary = run_batch(chosen, where, console)
+    print_summary(summary, console)
+    if summary.failed:
+        raise typer.Exit(FAILURE)
+
+
+@app.command()
+def large(
+    context: typer.Context,
+    source: Annotated[
+        Path, typer.Argument(metavar="IN", help="ply, obj, stl, glb, or a folder of arrays")
+    ],
+    output: Annotated[
+        Path, typer.Argument(metavar="OUT", help=".ply, .3dtiles, or a folder of arrays")
+    ],
+    levels: LevelsOption = DEFAULTS.levels,
+    scheme: SchemeOption = DEFAULTS.scheme,
+    budget: BudgetOption = DEFAULTS.budget,
+    model: ModelOption = None,
+    reference_length: LengthOption = "auto",
+    crease: Annotated[
+        str, typer.Option(metavar="off|angle:DEG", help="edges to keep sharp")
+    ] = DEFAULTS.crease,
+    parts: Annotated[
+        int | None, typer.Option(min=1, help="how many parts; default: as --memory asks for")
+    ] = None,
+    memory: MemoryOption = "2GiB",
+    engine: EngineOption = "local",
+    address: AddressOption = None,
+    workers: WorkersOption = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="write the report")
+    ] = None,
+) -> None:
+    """Refine one mesh larger than memory, part by part; a run that was stopped goes on."""
+
+    from rich.console import Console
+
+    from ..scale.engines import engine_of
+    from ..scale.large.plan import Large, keep
+    from ..scale.large.run import large_work, run_large
+
+    chosen = Large(
+        source,
+        output,
+        options_of(context),
+        memory,
+        parts,
+        model,
+    )
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    where = engine_of(large_work(), engine, address, workers, console.print)
+    made, spent = run_large(chosen, where, console)
+    if report is not None:
+        keep(report, made)
+    stages = ", ".join(f"{name} {seconds:.1f}" for name, seconds in spent.seconds.items())
+    console.print(
+        f"{output}: {made['levels'][-1]['faces']:,} faces in {sum(spent.seconds.values()):.1f} s "
+        f"({stages}); largest worker {spent.peak_bytes / 2**20:,.0f} MiB",
+        markup=False,
+    )
+
+
+@app.command()
+def serve(
+    host: Annotated[str | None, typer.Option(help="default: PNS_HOST, else 127.0.0.1")] = None,
+    port: Annotated[int | None, typer.Option(help="default: PNS_PORT, else 8000")] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="the model of requests that name none. Default: PNS_MODEL, else the default model",
+        ),
+    ] = None,
+) -> None:
+    """Serve HTTP; every other setting is an environment variable PNS_…."""
+    from ..http.server import serve as run
+    from ..settings import Settings
+
+    given = {"host": host, "port": port, "model": model}
+    run(Settings(**{name: value for name, value in given.items() if value is not None}))
+
+
+@app.command()
+def info(
+    model: Annotated[
+        str | None,
+        typer.Argument(metavar="NAME|FILE", help="a bundled model, else a model file"),
+    ] = None,
+) -> None:
+    """List the bundled models; with a name or a file, show what that model says of itself."""
+    from pns_common.onnx_model import bundled_models, load_model
+
+    from ..model_info import print_model, print_models
+
+    if model is None:
+        print_models(load_model(name) for name in bundled_models())
+    else:
+        print_model(load_model(model))
+
+
+@app.command()
+def example(
+    output: Annotated[Path, typer.Argument(metavar="OUT.glb", help="file to write")],
+) -> None:
+    """Write a small mechanical part with ridges, fillets and UVs, to try the other commands on."""
+    from pns_common.whole_file import replace_file
+
+    from ..errors import InvalidParameter
+    from ..meshfiles.example import part_glb
+
+    if output.suffix.lower() != ".glb":
+        raise InvalidParameter("output", f"{output}: the example is a .glb file")
+    replace_file(output, part_glb())
+
+
+@app.command()
+def key(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="a-z, 0-9 and -")],
+    faces_per_minute: Annotated[
+        float | None, typer.Option(help="its budget of refined faces; default: the service's")
+    ] = None,
+) -> None:
+    """Make a key for a client of the service.
+
+    The key goes to stderr, for its bearer and shown only now; the entry, for the file that
+    PNS_KEYS_FILE names, to stdout: pns key studio >> keys.toml
+    """
+    from ..http.access.keys import Entry, hash_of, new_key, toml_entry
+
+    fresh = new_key(name)
+    entry = Entry(name=name, hash=hash_of(fresh), faces_per_minute=faces_per_minute)
+    typer.echo(f"{toml_entry(entry)}\n")
+    typer.echo(fresh, err=True)

@@ -1,0 +1,47 @@
+"""Errors as the command line says them: one line and an exit code."""
+
+from __future__ import annotations
+
+USAGE_ERROR = 2
+"""Exit code for a parameter out of its range, as the command line's own parser uses it."""
+FAILURE = 1
+"""Exit code for a file or a model that cannot be used."""
+
+_SETTING_OF_LIMIT = {
+    "faces": "PNS_FACES",
+    "memory": "PNS_MEMORY",
+    "json-items": "PNS_JSON_ITEMS",
+}
+
+
+def explained(error: Exception) -> tuple[str, int] | None:
+    """The line and the exit code of an error that is not our fault; None for one that is."""
+    from pydantic import ValidationError
+
+    from pns_common.errors import ParameterError, PnsError
+
+    from ..errors import InvalidParameter, LimitError, ServiceError
+    from ..http.access.keys import KeysError
+    from ..http.watch.tracing import TracingError
+
+    match error:
+        case InvalidParameter() | ParameterError():
+            return str(error), USAGE_ERROR
+        case ValidationError():
+            first = error.errors()[0]
+            name = ".".join(str(part) for part in first["loc"])
+            text = first["msg"].removeprefix("Value error, ")
+            return f"setting {name}: {text}" if name else text, USAGE_ERROR
+        case LimitError(limit=limit) if limit in _SETTING_OF_LIMIT:
+            return f"{error}; {_SETTING_OF_LIMIT[limit]} allows more", FAILURE
+        case ServiceError() | PnsError() | KeysError() | TracingError():
+            return str(error), FAILURE
+        case OSError():
+            return f"{error.filename or 'output'}: {error.strerror}", FAILURE
+        case _:
+            return None
+
+
+def printable(text: str) -> str:
+    """A text as a terminal may show it: a file's name or content may hold its commands."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

@@ -1,0 +1,83 @@
+"""The parameters that commands share, and the `Options` that they give."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Annotated, Any, Literal
+
+import typer
+
+from ..options import Compression, Diagnostics, NormalRule, Options, SchemeName, UvRule
+
+
+def options_of(context: typer.Context) -> Options:
+    """What a command was given of the parameters that every way of refining shares.
+
+    Raises:
+        InvalidParameter: one is out of its range.
+    """
+    names = {field.name for field in fields(Options)}
+    return Options(**{name: value for name, value in context.params.items() if name in names})
+
+
+def _reference_length(text: str) -> float | Literal["auto"]:
+    if text == "auto":
+        return "auto"
+    try:
+        return float(text)
+    except ValueError as error:
+        raise typer.BadParameter("it must be 'auto' or a number") from error
+
+
+def _size(text: str) -> int:
+    from pydantic import ByteSize, TypeAdapter, ValidationError
+
+    try:
+        return int(TypeAdapter(ByteSize).validate_python(text))
+    except ValidationError as error:
+        raise typer.BadParameter("it must be a size, as 4GiB") from error
+
+
+LevelsOption = Annotated[int, typer.Option(help="depth: four faces of one at each level")]
+SchemeOption = Annotated[SchemeName, typer.Option(help="the rules")]
+BudgetOption = Annotated[float | None, typer.Option(metavar="C", help="default: the model's own")]
+ModelOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|FILE",
+        help="a bundled model (see pns info), else a model file; ./NAME is always a file. "
+        "Default: the default model",
+    ),
+]
+LengthOption = Annotated[
+    # What the parser returns: typer takes no union of two types.
+    Any,
+    typer.Option(metavar="auto|X", parser=_reference_length, help="unit of length of the budget"),
+]
+MemoryOption = Annotated[
+    # What the parser returns; its default is text, as it is shown.
+    Any,
+    typer.Option(metavar="SIZE", parser=_size, help="what a worker may take, as 4GiB"),
+]
+DiagnosticsOption = Annotated[Diagnostics, typer.Option(help="what a glTF carries of the report")]
+UvOption = Annotated[UvRule, typer.Option(help="smooth: Loop's stencil inside charts")]
+NormalsOption = Annotated[
+    NormalRule,
+    typer.Option(help="smooth: new ones in a glTF, but across creases"),
+]
+CreaseOption = Annotated[
+    str, typer.Option(metavar="off|normals|angle:DEG", help="edges to keep sharp")
+]
+WeldOption = Annotated[float, typer.Option(metavar="X", help="join vertices nearer than X times R")]
+CompressOption = Annotated[Compression, typer.Option(help="how a glTF's geometry is written")]
+EngineOption = Annotated[
+    Literal["local", "ray"], typer.Option(help="processes of this machine, or a Ray cluster")
+]
+AddressOption = Annotated[
+    str | None,
+    typer.Option(help="a Ray cluster, or auto; implies --engine ray. Default: one started here"),
+]
+WorkersOption = Annotated[
+    int | None, typer.Option(min=1, help="workers at a time; default: one for each processor")
+]
+LimitOption = Annotated[bool, typer.Option("--limit", help="put the vertices on the limit surface")]

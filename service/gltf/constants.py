@@ -1,0 +1,25 @@
+"""The numbers of glTF 2.0: component types (§3.6.2.2), targets (§5.11.5), words of a GLB (§4.4)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+BYTE, UNSIGNED_BYTE, SHORT, UNSIGNED_SHORT = 5120, 5121, 5122, 5123
+UNSIGNED_INT, FLOAT = 5125, 5126
+# What an index may be.
+UNSIGNED_INTEGERS = (UNSIGNED_BYTE, UNSIGNED_SHORT, UNSIGNED_INT)
+COMPONENT_TYPES = {
+    BYTE: np.dtype("<i1"),
+    UNSIGNED_BYTE: np.dtype("<u1"),
+    SHORT: np.dtype("<i2"),
+    UNSIGNED_SHORT: np.dtype("<u2"),
+    UNSIGNED_INT: np.dtype("<u4"),
+    FLOAT: np.dtype("<f4"),
+}
+COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+COLUMNS = {"MAT2": 2, "MAT3": 3, "MAT4": 4}
+
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+
+GLB_MAGIC, GLB_VERSION = b"glTF", 2
+JSON_CHUNK, BIN_CHUNK = b"JSON", b"BIN\0"

@@ -1,0 +1,1 @@
+"""From bytes to a checked document and its arrays."""

@@ -1,0 +1,72 @@
+"""The bytes behind `buffers[]`: BIN, base64 data URIs, and files that came with the document."""
+
+from __future__ import annotations
+
+import base64
+import re
+
+from ...bodies.sibling_files import Opened, safe_name
+from ...errors import GltfError
+from .meshopt import placeholders
+from .schema import Buffer, Document
+
+_DATA_URI = re.compile(r"data:[^,]*;base64,", re.IGNORECASE)
+
+
+def resolve_buffers(
+    document: Document, binary: memoryview | None, opened: Opened
+) -> list[memoryview]:
+    """The bytes of each buffer, exactly `byteLength` long.
+
+    A data URI's bytes are fewer than its characters, so the body's limit bounds them too.
+
+    Raises:
+        GltfError: no bytes, or fewer than `byteLength` says; a file that did not come, or a URI
+            that leads elsewhere.
+    """
+    resolved: list[memoryview] = []
+    without = placeholders(document)
+    for number, buffer in enumerate(document.buffers):
+        pointer = f"/buffers/{number}"
+        is_binary = number == 0 and binary is not None
+        if buffer.uri is None and not is_binary and number in without:
+            resolved.append(memoryview(b""))
+            continue
+        content = _content(buffer, binary if number == 0 else None, opened, pointer)
+        if len(content) < buffer.byte_length:
+            raise GltfError(
+                f"byteLength is {buffer.byte_length}, but there are {len(content)} bytes",
+                pointer=f"{pointer}/byteLength",
+            )
+        resolved.append(content[: buffer.byte_length])
+    return resolved
+
+
+def _content(buffer: Buffer, binary: memoryview | None, opened: Opened, pointer: str) -> memoryview:
+    if buffer.uri is None:
+        if binary is None:
+            raise GltfError("the buffer has neither a URI nor a BIN chunk", pointer=pointer)
+        return binary
+    if buffer.uri[:5].lower() != "data:":
+        return _neighbour(buffer.uri, opened, f"{pointer}/uri")
+    scheme = _DATA_URI.match(buffer.uri)
+    if scheme is None:
+        raise GltfError("the data URI is not base64", pointer=f"{pointer}/uri")
+    encoded = buffer.uri[scheme.end() :]
+    try:
+        return memoryview(base64.b64decode(encoded + "=" * (-len(encoded) % 4), validate=True))
+    except ValueError as error:
+        raise GltfError(f"the data URI: {error}", pointer=f"{pointer}/uri") from error
+
+
+def _neighbour(uri: str, opened: Opened, pointer: str) -> memoryview:
+    if safe_name(uri) is None:
+        raise GltfError(
+            "only files that come with the document are read", pointer=pointer, code="unsafe-uri"
+        )
+    file = opened.open(uri)
+    if file is None:
+        raise GltfError(
+            "the buffer's file did not come with the document", pointer=pointer, code="missing-file"
+        )
+    return memoryview(file.content).cast("B")

@@ -1,0 +1,102 @@
+"""The GLB container (glTF 2.0 §4): a header and chunks, read with exact bounds, and written."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...errors import UnreadableError, check_limit
+from ..constants import BIN_CHUNK, GLB_MAGIC, GLB_VERSION, JSON_CHUNK
+
+_HEADER = struct.Struct("<4sII")
+_CHUNK = struct.Struct("<I4s")
+_LARGEST = 2**32 - 1
+# JSON, BIN and one for each extension that has its own: a file of nothing but chunk headers is an
+# attack.
+MAX_CHUNKS = 64
+
+
+@dataclass(frozen=True)
+class Container:
+    """A GLB's chunks.
+
+    Attributes:
+        text: the JSON chunk.
+        binary: the BIN chunk, None where the file has none.
+        others: (type, data) of the chunks that follow, which belong to extensions and are kept.
+    """
+
+    text: bytes
+    binary: memoryview | None = None
+    others: tuple[tuple[bytes, memoryview], ...] = ()
+
+
+def read_glb(data: bytes) -> Container:
+    """Split a GLB into its chunks, without copying BIN.
+
+    Raises:
+        UnreadableError: not a GLB of version 2, or its lengths disagree with the bytes.
+        LimitError: more than MAX_CHUNKS chunks.
+    """
+    if len(data) < _HEADER.size:
+        raise UnreadableError("the file is shorter than a GLB header")
+    magic, version, length = _HEADER.unpack_from(data)
+    if magic != GLB_MAGIC:
+        raise UnreadableError("the file does not begin with the GLB magic 'glTF'")
+    if version != GLB_VERSION:
+        raise UnreadableError(f"GLB version {version}, expected {GLB_VERSION}")
+    if length != len(data):
+        raise UnreadableError(f"the GLB header says {length} bytes, the file has {len(data)}")
+    chunks = _chunks(memoryview(data))
+    if not chunks or chunks[0][0] != JSON_CHUNK:
+        raise UnreadableError("the first chunk of the GLB is not JSON")
+    rest = chunks[1:]
+    binary = rest[0][1] if rest and rest[0][0] == BIN_CHUNK else None
+    others = rest if binary is None else rest[1:]
+    return Container(text=bytes(chunks[0][1]), binary=binary, others=tuple(others))
+
+
+def write_glb(
+    text: bytes, binary: Sequence[bytes | memoryview], others: Sequence[tuple[bytes, memoryview]]
+) -> bytes:
+    """A GLB of the JSON `text`, the BIN chunk made of the pieces `binary`, and further chunks.
+
+    Raises:
+        LimitError: the result would pass the 4 GiB that a GLB can hold.
+    """
+    pieces = [*_padded_chunk(JSON_CHUNK, [text], b" ")]
+    if binary:
+        pieces += _padded_chunk(BIN_CHUNK, binary, b"\0")
+    for kind, data in others:
+        pieces += _padded_chunk(kind, [data], b"\0")
+    length = _HEADER.size + sum(len(piece) for piece in pieces)
+    check_limit("glb-bytes", length, _LARGEST, f"the refined GLB would have {length} bytes")
+    return b"".join([_HEADER.pack(GLB_MAGIC, GLB_VERSION, length), *pieces])
+
+
+def _chunks(data: memoryview) -> list[tuple[bytes, memoryview]]:
+    chunks: list[tuple[bytes, memoryview]] = []
+    offset = _HEADER.size
+    while offset < len(data):
+        if offset + _CHUNK.size > len(data):
+            raise UnreadableError(f"the chunk header at byte {offset} is cut off")
+        length, kind = _CHUNK.unpack_from(data, offset)
+        start = offset + _CHUNK.size
+        if start + length > len(data):
+            raise UnreadableError(
+                f"the chunk at byte {offset} says {length} bytes, {len(data) - start} are left"
+            )
+        count = len(chunks) + 1
+        check_limit("glb-chunks", count, MAX_CHUNKS, f"the GLB has {count} chunks or more")
+        chunks.append((kind, data[start : start + length]))
+        offset = start + length
+    return chunks
+
+
+def _padded_chunk(
+    kind: bytes, pieces: Sequence[bytes | memoryview], filler: bytes
+) -> list[bytes | memoryview]:
+    length = sum(len(piece) for piece in pieces)
+    padding = -length % 4
+    return [_CHUNK.pack(min(length + padding, _LARGEST), kind), *pieces, filler * padding]

@@ -1,0 +1,125 @@
+"""Where a document names accessors and buffer views by number, extensions included."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+INSTANCING = "EXT_mesh_gpu_instancing"
+# Extensions that name no accessor or buffer view, or name them where `references` looks.
+KNOWN = frozenset(
+    {
+        INSTANCING,
+        "EXT_meshopt_compression",
+        "EXT_texture_avif",
+        "EXT_texture_webp",
+        "KHR_animation_pointer",
+        "KHR_draco_mesh_compression",
+        "KHR_lights_punctual",
+        "KHR_materials_anisotropy",
+        "KHR_materials_clearcoat",
+        "KHR_materials_diffuse_transmission",
+        "KHR_materials_dispersion",
+        "KHR_materials_emissive_strength",
+        "KHR_materials_ior",
+        "KHR_materials_iridescence",
+        "KHR_materials_pbrSpecularGlossiness",
+        "KHR_materials_sheen",
+        "KHR_materials_specular",
+        "KHR_materials_transmission",
+        "KHR_materials_unlit",
+        "KHR_materials_variants",
+        "KHR_materials_volume",
+        "KHR_mesh_quantization",
+        "KHR_meshopt_compression",
+        "KHR_node_hoverability",
+        "KHR_node_selectability",
+        "KHR_node_visibility",
+        "KHR_texture_basisu",
+        "KHR_texture_transform",
+        "KHR_xmp_json_ld",
+    }
+)
+
+
+@dataclass(slots=True)
+class Reference:
+    """A number at `holder[key]`; there are many, and a frozen one takes three times as long."""
+
+    holder: dict[str, Any]
+    key: str
+
+    @property
+    def index(self) -> int:
+        """What it points at."""
+        return self.holder[self.key]
+
+    def point_at(self, index: int) -> None:
+        """Change it."""
+        self.holder[self.key] = index
+
+
+def unknown_extensions(tree: dict[str, Any], text: bytes) -> list[str]:
+    """The extensions in use that may hold numbers which `references` does not see.
+
+    `text` is the JSON that the tree came from: most files have no extension, and a search tells.
+    """
+    names = {name for key in ("extensionsUsed", "extensionsRequired") for name in tree.get(key, [])}
+    # An escape could spell the word too.
+    pending: list[Any] = [tree] if b'"extensions"' in text or b"\\u" in text else []
+    while pending:
+        value = pending.pop()
+        if isinstance(value, dict):
+            if isinstance(value.get("extensions"), dict):
+                names |= value["extensions"].keys()
+            # What applications keep in extras is theirs, and no part of the document's structure.
+            pending += [part for key, part in value.items() if key != "extras"]
+        elif isinstance(value, list):
+            pending += value
+    return sorted(names - KNOWN)
+
+
+def accessor_references(tree: dict[str, Any]) -> Iterator[Reference]:
+    """Every place that names an accessor."""
+    for mesh in tree.get("meshes", []):
+        for primitive in mesh.get("primitives", []):
+            for attributes in (primitive["attributes"], *primitive.get("targets", [])):
+                yield from (Reference(attributes, name) for name in attributes)
+            yield from _at(primitive, "indices")
+    for skin in tree.get("skins", []):
+        yield from _at(skin, "inverseBindMatrices")
+    for animation in tree.get("animations", []):
+        for sampler in animation["samplers"]:
+            yield from (Reference(sampler, key) for key in ("input", "output"))
+    for node in tree.get("nodes", []):
+        instances = node.get("extensions", {}).get(INSTANCING, {})
+        if isinstance(instances, dict) and isinstance(instances.get("attributes"), dict):
+            attributes = instances["attributes"]
+            yield from (
+                Reference(attributes, name)
+                for name, index in attributes.items()
+                if isinstance(index, int)
+            )
+
+
+def view_references(tree: dict[str, Any], accessors: list[dict[str, Any]]) -> Iterator[Reference]:
+    """Every place that names a buffer view: images, and those of the given accessors."""
+    for image in tree.get("images", []):
+        yield from _at(image, "bufferView")
+    for accessor in accessors:
+        yield from _at(accessor, "bufferView")
+        if "sparse" in accessor:
+            yield from (
+                Reference(accessor["sparse"][part], "bufferView") for part in ("indices", "values")
+            )
+    for mesh in tree.get("meshes", []):
+        for primitive in mesh.get("primitives", []):
+            draco = primitive.get("extensions", {}).get("KHR_draco_mesh_compression")
+            if draco is not None:
+                yield Reference(draco, "bufferView")
+
+
+def _at(holder: dict[str, Any], key: str) -> Iterator[Reference]:
+    if key in holder:
+        yield Reference(holder, key)

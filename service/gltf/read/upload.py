@@ -1,0 +1,104 @@
+"""From bytes to a document that has been checked from end to end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from ...bodies.sibling_files import ALONE, Opened, SiblingFiles
+from ...options import BYTES_PER_INPUT_BYTE, Limits
+from ...report import Change
+from .breaches import breaches
+from .buffers import resolve_buffers
+from .container import Container, read_glb
+from .draco import decode_primitives
+from .images import embed_images
+from .index_references import unknown_extensions
+from .json_text import decode_object, decoded_size
+from .meshopt import decode_views
+from .nodes import check_nodes
+from .plan import MeshPlan, check_cost, plan
+from .references import check_references
+from .refusals import refuse_features, refuse_version
+from .schema import Document, view
+from .spare import Spare, spare
+
+Media = Literal["glb", "gltf"]
+
+
+@dataclass(frozen=True, eq=False)
+class Upload:
+    """A file that may be refined.
+
+    Attributes:
+        container: the GLB's chunks; of a .gltf the text alone.
+        tree: the JSON, which may be edited.
+        document: a typed view of the JSON as it came.
+        buffers: the bytes of each buffer.
+        plans: the meshes to refine.
+        changes: what was joined and decoded on the way.
+        spare: what may leave the file once the meshes have been refined.
+    """
+
+    container: Container
+    tree: dict[str, Any]
+    document: Document
+    buffers: list[memoryview]
+    plans: list[MeshPlan]
+    changes: list[Change]
+    spare: Spare
+
+
+def read_upload(
+    data: bytes,
+    media: Media,
+    levels: int,
+    limits: Limits,
+    siblings: SiblingFiles = ALONE,
+    bytes_per_face: int = 0,
+) -> Upload:
+    """Check a file in the order in which its parts lean on each other; refine nothing yet.
+
+    `bytes_per_face` is what writing takes for each refined face, beside refining.
+
+    Raises:
+        ServiceError: the file is unreadable, wrong, over a limit, or cannot be refined yet.
+    """
+    container = read_glb(data) if media == "glb" else Container(text=data)
+    tree = decode_object(container.text, limits)
+    document = view(tree)
+    refuse_version(document)
+    opened = Opened(siblings)
+    buffers = resolve_buffers(document, container.binary, opened)
+    original = document
+    stored, files = len(buffers), sum(len(buffer) > 0 for buffer in buffers)
+    images = embed_images(tree, document, buffers, opened)
+    size = len(data) + opened.size
+    ranges = decode_views(tree, document, buffers, size, limits)
+    if ranges or len(buffers) > stored:
+        document = view(tree)
+    check_references(document, buffers)
+    draco_views = decode_primitives(tree, document, buffers, size, limits)
+    if draco_views:
+        document = view(tree)
+        check_references(document, buffers)
+    changes = [
+        Change(pointer, what, count)
+        for pointer, what, count in (
+            ("/buffers", "joined into one", files if files > 1 else 0),
+            ("/bufferViews", "meshopt compression decoded", len(ranges)),
+            ("/meshes", "Draco compression decoded", len(draco_views)),
+        )
+        if count
+    ]
+    changes += images
+    changes += [Change("", f"not used by the document: {name}", 1) for name in opened.unused]
+    changes += check_nodes(document)
+    changes += breaches(document)
+    refuse_features(document)
+    plans = plan(document)
+    size += sum(len(buffer) for buffer in buffers[stored:])
+    size += decoded_size(container.text) // BYTES_PER_INPUT_BYTE
+    check_cost(document, plans, size, levels, limits, bytes_per_face)
+    leavable = spare(original, draco_views, ranges, unknown_extensions(tree, container.text))
+    return Upload(container, tree, document, buffers, plans, changes, leavable)

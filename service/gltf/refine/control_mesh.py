@@ -1,0 +1,123 @@
+"""The control mesh of a glTF mesh: its triangle primitives, welded and cleaned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
+
+from ...meshes.weld import Weld, weld
+from ...meshes.weld_tolerance import WHOLE, weld_within
+from ..read.primitives import TrianglePrimitive
+from .skin_and_morph import SkinAndMorph, read_skin_and_morph
+
+if TYPE_CHECKING:
+    from .union import Parts
+
+
+@dataclass(frozen=True, eq=False)
+class ControlMesh:
+    """All triangle primitives of a mesh, joined by position and by what moves it.
+
+    Attributes:
+        primitives: in file order.
+        weld: the joined mesh over all their faces.
+        rows: which rows of `weld.vertex_of` are whose.
+        kept: for each primitive, which of its faces do not name a welded vertex twice.
+        cleaned: the mesh to refine; None where no face is left.
+        skin_and_morph: what follows the rows of all primitives.
+        near: for each part how many vertices were joined that are not equal.
+    """
+
+    primitives: Sequence[TrianglePrimitive]
+    weld: Weld
+    rows: list[slice]
+    kept: list[Bool[np.ndarray, " F"]]
+    cleaned: Cleaned | None
+    skin_and_morph: SkinAndMorph
+    near: Int[np.ndarray, " P"]
+
+    @property
+    def degenerate(self) -> int:
+        """Faces that name a welded vertex twice: they have no area and are dropped."""
+        return sum(int((~keep).sum()) for keep in self.kept)
+
+    @property
+    def copies(self) -> int:
+        """Faces with the same three vertices as an earlier one: refined once, kept each."""
+        return 0 if self.cleaned is None else self.cleaned.dropped_duplicate
+
+
+def control_mesh(
+    primitives: Sequence[TrianglePrimitive],
+    tolerance: float,
+    unit: float | None,
+    parts: Parts | None = None,
+) -> ControlMesh:
+    """Weld and clean the triangle primitives of one mesh; `tolerance` and `unit` as weld_within.
+
+    `parts` of a union are never joined, and come in their order in the mesh to refine; None: it is
+    one mesh.
+    """
+    rows = slices([len(primitive.attributes["POSITION"]) for primitive in primitives])
+    positions = np.concatenate([primitive.attributes["POSITION"] for primitive in primitives])
+    corners = [p.corners + part.start for p, part in zip(primitives, rows, strict=True)]
+    skin_and_morph = read_skin_and_morph(primitives)
+    movement, faces = skin_and_morph.labels, np.concatenate(corners)
+    order, starts = None, WHOLE
+    if parts is not None:
+        movement, order = parts.apart(movement), parts.order
+        faces, starts = faces[order], np.searchsorted(parts.of_face[order], np.arange(parts.count))
+    exact = weld(positions, faces, movement)
+    welded = weld_within(exact, tolerance, unit, movement, starts)
+    proper = ~repeated_vertex(welded.faces)
+    cleaned = clean(Mesh(welded.points, welded.faces)) if proper.any() else None
+    near = _vertex_counts(exact.faces, starts) - _vertex_counts(welded.faces, starts)
+    if order is not None:
+        # Back from the order of the parts to that of the primitives.
+        place = np.argsort(order)
+        proper, welded = proper[place], replace(welded, faces=welded.faces[place])
+        if cleaned is not None:
+            cleaned = replace(
+                cleaned,
+                face_map=cleaned.face_map[place],
+                representative=cleaned.representative[place],
+            )
+    return ControlMesh(
+        primitives=primitives,
+        weld=welded,
+        rows=rows,
+        kept=[proper[part] for part in slices([len(own) for own in corners])],
+        cleaned=cleaned,
+        skin_and_morph=skin_and_morph,
+        near=near,
+    )
+
+
+def _vertex_counts(
+    faces: Int[np.ndarray, "F 3"], starts: Int[np.ndarray, " P"]
+) -> Int[np.ndarray, " P"]:
+    """How many vertices each part has, numbered part by part as they first appear."""
+    if not len(faces):
+        return np.zeros(len(starts), dtype=np.int64)
+    return np.diff(np.maximum.reduceat(faces.max(axis=1), starts), prepend=-1)
+
+
+def vertex_rows(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, " V"]:
+    """For each vertex of the mesh to refine the first of the primitives' rows that are it."""
+    used = np.flatnonzero(control.weld.vertex_of >= 0)[::-1]
+    row = np.empty(len(control.weld.points), dtype=np.int64)
+    row[control.weld.vertex_of[used]] = used
+    return row[cleaned.vertex_map >= 0]
+
+
+def slices(lengths: Sequence[int]) -> list[slice]:
+    """Consecutive slices of the given lengths."""
+    ends = np.cumsum([0, *lengths]).tolist()
+    return [slice(start, end) for start, end in pairwise(ends)]

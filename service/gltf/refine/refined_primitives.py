@@ -1,0 +1,137 @@
+"""Hand each primitive its share of a refined mesh: its faces and all its attributes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
+from pns_common.mesh import Cleaned
+from pns_common.refine import Refinement
+
+from ...course import Course
+from ...meshes.barycentric_grid import BarycentricGrid
+from ...meshes.split_connectivity import split_connectivity
+from ...meshes.uv_charts import UvBlend
+from ...meshes.weld import Weld
+from ..read.primitives import TrianglePrimitive, distinct_corners
+from .attributes import RefinedVertices, refined_attributes
+from .control_mesh import ControlMesh, slices
+from .shading import Shading, shade
+from .skin_and_morph import SkinAndMorph
+from .targets import Deltas, refined_targets
+
+# The share of the work that normals are; what is left is for all other attributes.
+SHADING = 0.85
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedPrimitive:
+    """A primitive after refinement, in the types that it is written in."""
+
+    source: TrianglePrimitive
+    faces: Int[np.ndarray, "F 3"]
+    attributes: dict[str, Shaped[np.ndarray, "N K"]]
+    targets: list[Deltas]
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedMesh:
+    """What the operator made of a control mesh; all of it is given at the refined vertices.
+
+    `scalars` are further attributes by name; `limit_normals` are wanted in place of the faces' own.
+    """
+
+    refinement: Refinement
+    skin_and_morph: SkinAndMorph
+    scalars: dict[str, Float[np.ndarray, " V"]]
+    limit_normals: Float[np.ndarray, "V 3"] | None = None
+
+
+def refined_primitives(
+    control: ControlMesh,
+    cleaned: Cleaned,
+    refined: RefinedMesh,
+    grid: BarycentricGrid,
+    uv_blend: UvBlend,
+    course: Course,
+) -> list[RefinedPrimitive]:
+    """The refined primitives; one that has no face left is not among them."""
+    ids = refined_ids(control.weld, cleaned, refined.refinement, grid)
+    ends = slices([int(keep.sum()) for keep in control.kept])
+    points = refined.refinement.mesh.vertices
+    with course.part(0.0, SHADING):
+        shading = shade(
+            control,
+            [ids[rows] for rows in ends],
+            grid,
+            points,
+            refined.skin_and_morph,
+            refined.limit_normals,
+            course,
+        )
+    made: list[RefinedPrimitive] = []
+    with course.part(SHADING, 1.0):
+        for number, rows in enumerate(ends):
+            course.reach(rows.start / len(ids))
+            if rows.stop > rows.start:
+                made.append(
+                    _refined_primitive(control, number, ids[rows], grid, refined, shading, uv_blend)
+                )
+    return made
+
+
+def refined_ids(
+    welded: Weld, cleaned: Cleaned, refinement: Refinement, grid: BarycentricGrid
+) -> Int[np.ndarray, "P T"]:
+    """The refined vertex at each grid point of each face that is not degenerate.
+
+    Copies of a face (double-sided modelling, decals) take the vertices of the one that was refined,
+    in their own order of corners.
+    """
+    proper = cleaned.representative >= 0
+    leader = cleaned.representative[proper]
+    blocks = refinement.mesh.faces.reshape(len(cleaned.mesh.faces), -1)
+    ids = np.take(np.take(blocks, grid.slot, axis=1), leader, axis=0)
+    copies = np.flatnonzero(cleaned.face_map[proper] < 0)
+    if len(copies):
+        own = cleaned.vertex_map[welded.faces[proper][copies]]
+        same = own[:, :, None] == cleaned.mesh.faces[leader[copies]][:, None, :]
+        place = same.argmax(axis=2)
+        reorder = grid.reorder[3 * place[:, 0] + place[:, 1]]
+        ids[copies] = np.take_along_axis(ids[copies], reorder, axis=1)
+    return ids
+
+
+def _refined_primitive(
+    control: ControlMesh,
+    number: int,
+    ids: Int[np.ndarray, "F T"],
+    grid: BarycentricGrid,
+    refined: RefinedMesh,
+    shading: Shading | None,
+    uv_blend: UvBlend,
+) -> RefinedPrimitive:
+    primitive = control.primitives[number]
+    welded = control.weld.vertex_of[control.rows[number]]
+    corners, row = distinct_corners(primitive, primitive.corners[control.kept[number]], welded)
+    own = split_connectivity(corners, len(row), grid)
+    vertex = own.at_vertices(ids)
+    normals, morphed = None, (None,) * len(refined.skin_and_morph.deltas)
+    if shading is not None and number in shading.groups.ids:
+        normals, morphed = shading.take(own.at_vertices(shading.groups.ids[number]))
+    refined_vertices = RefinedVertices(
+        row=row,
+        welded=welded[row],
+        connectivity=own,
+        positions=refined.refinement.mesh.vertices[vertex],
+        normals=normals,
+        skin_and_morph=refined.skin_and_morph.take(vertex),
+        morphed_normals=morphed,
+    )
+    attributes = refined_attributes(primitive, refined_vertices, uv_blend)
+    targets = refined_targets(primitive, refined_vertices, attributes)
+    for name, values in refined.scalars.items():
+        attributes[name] = values[vertex, None].astype(np.float32)
+    return RefinedPrimitive(primitive, own.refined_faces, attributes, targets)

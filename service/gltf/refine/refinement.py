@@ -1,0 +1,127 @@
+"""Refine one control mesh, and all that follows its vertices."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from pns_common.errors import MeshError
+from pns_common.linear import LinearRefinement, level_topologies
+from pns_common.mesh import Cleaned
+from pns_common.refine import Refinement, refine
+from pns_common.schemes import Scheme
+
+from ...course import Course
+from ...errors import UnrefinableError
+from ...meshes.crease_angle import edges_sharper_than
+from ...options import Options
+from ...report import Change
+from .control_mesh import ControlMesh, vertex_rows
+from .hard_edges import hard_edges
+from .refined_primitives import RefinedMesh
+from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
+
+RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
+
+
+def creases_of(control: ControlMesh, options: Options) -> Int[np.ndarray, "N 2"] | None:
+    """The edges of the cleaned mesh that the options keep sharp; None where none are asked for."""
+    angle = options.crease_angle
+    if control.cleaned is None or (angle is None and options.crease != "normals"):
+        return None
+    if angle is None:
+        return hard_edges(control, control.cleaned)
+    return edges_sharper_than(control.cleaned.mesh, angle)
+
+
+def refine_control_mesh(
+    control: ControlMesh,
+    creases: Int[np.ndarray, "N 2"] | None,
+    scheme: Scheme,
+    options: Options,
+    pointer: str,
+    course: Course,
+) -> RefinedMesh | None:
+    """Refine a mesh whose positions will be written as float32; None if it has no face.
+
+    `creases` are edges of the cleaned mesh.
+
+    Raises:
+        UnrefinableError: the refined positions leave the range of float32.
+    """
+    if control.cleaned is None:
+        return None
+    mesh, length = control.cleaned.mesh, options.reference_length
+    try:
+        refinement = refine(
+            mesh,
+            scheme,
+            options.levels,
+            length,
+            limit=options.limit,
+            creases=creases,
+            progress=lambda done, total: course.reach(done / total),
+        )
+    except MeshError as error:
+        raise UnrefinableError(str(error), pointer=pointer) from error
+    if np.abs(refinement.mesh.vertices).max() > np.finfo(np.float32).max:
+        raise UnrefinableError("refined positions leave the range of float32", pointer=pointer)
+    return RefinedMesh(
+        refinement,
+        _followers(control, control.cleaned, options, creases),
+        _scalars(refinement, options),
+        refinement.normals if options.normals == "limit" else None,
+    )
+
+
+def changes_of_mesh(
+    control: ControlMesh, refined: RefinedMesh | None, pointer: str
+) -> list[Change]:
+    """What was joined, dropped or cut in a mesh."""
+    changes = [
+        change
+        for primitive, keep in zip(control.primitives, control.kept, strict=True)
+        for change in changes_of_primitive(primitive.number, keep, pointer)
+    ]
+    (near,) = control.near.tolist()
+    cut = 0 if refined is None else len(refined.skin_and_morph.cut)
+    return changes + changes_of_vertices(near, cut, pointer)
+
+
+def changes_of_vertices(near: int, cut: int, pointer: str) -> list[Change]:
+    """What was joined of a mesh's vertices, and how many refined ones lost a joint."""
+    changes: list[Change] = []
+    if near:
+        changes.append(Change(pointer, "vertices joined within weld_tolerance", near))
+    if cut:
+        changes.append(Change(pointer, "refined vertices that lost their lightest joints", cut))
+    return changes
+
+
+def changes_of_primitive(number: int, kept: Bool[np.ndarray, " F"], pointer: str) -> list[Change]:
+    """What was dropped of one primitive of the mesh at `pointer`."""
+    if kept.all():
+        return []
+    what = "degenerate faces dropped" if kept.any() else "left as it was: no face has an area"
+    return [Change(f"{pointer}/primitives/{number}", what, int((~kept).sum()))]
+
+
+def _followers(
+    control: ControlMesh,
+    cleaned: Cleaned,
+    options: Options,
+    creases: Int[np.ndarray, "N 2"] | None,
+) -> SkinAndMorph:
+    if not control.skin_and_morph.any:
+        return control.skin_and_morph
+    at_vertices = control.skin_and_morph.take(vertex_rows(control, cleaned))
+    faces, count = cleaned.mesh.faces, len(cleaned.mesh.vertices)
+    topologies = level_topologies(faces, count, options.levels, creases)
+    linear = LinearRefinement(topologies, options.limit)
+    return refine_skin_and_morph(at_vertices, linear)
+
+
+def _scalars(refinement: Refinement, options: Options) -> dict[str, np.ndarray]:
+    if options.diagnostics != "full":
+        return {}
+    return {RATIO: refinement.ratio, GATE: refinement.gate}

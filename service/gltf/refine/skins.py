@@ -1,0 +1,168 @@
+"""Skin bindings: which joints move a vertex, and by how much (glTF 2.0 §3.7.3.3).
+
+Joints are names, so they are never averaged: each joint's weights go through the stencil that moves
+the vertices, as one column, and the heaviest joints of each refined vertex are kept.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
+from pns_common.linear import LinearRefinement
+
+from ..read.primitives import TrianglePrimitive
+from ..read.quantization import as_float
+
+SLOTS = 4
+# Joints refined at a time: the memory does not grow with the skeleton.
+COLUMNS = 8
+# Integers up to here are exact in float32, and so are their sums: weights that are multiples of
+# 2⁻²⁴ add up to exactly 1 in any order.
+FLOAT_UNITS = 2**24
+# A cut that takes less than this from a vertex is rounding.
+NOTHING = 1e-9
+
+_SET = re.compile(r"WEIGHTS_([0-9]+)")
+_NO_JOINT = np.iinfo(np.int64).max
+
+
+@dataclass(frozen=True, eq=False)
+class Binding:
+    """The joints of N vertices, heaviest first.
+
+    Attributes:
+        joints: (N, K) distinct joints of each vertex; 0 where the weight is 0.
+        weights: (N, K) their weights, which sum to 1, or to 0 where a vertex has no joint.
+    """
+
+    joints: Int[np.ndarray, "N K"]
+    weights: Float[np.ndarray, "N K"]
+
+    def take(self, rows: Int[np.ndarray, " M"]) -> Binding:
+        """The binding of some of the vertices."""
+        return Binding(self.joints[rows], self.weights[rows])
+
+
+def skin_sets(primitive: TrianglePrimitive) -> list[int]:
+    """The numbers n of its attributes WEIGHTS_n, ascending; each has its JOINTS_n."""
+    matches = (_SET.fullmatch(name) for name in primitive.attributes)
+    return sorted(int(match[1]) for match in matches if match)
+
+
+def read_binding(primitives: Sequence[TrianglePrimitive]) -> Binding | None:
+    """The binding of all vertices of a mesh, one primitive after the other; None without any."""
+    width = SLOTS * max(len(skin_sets(primitive)) for primitive in primitives)
+    if width == 0:
+        return None
+    joints, weights = [], []
+    for primitive in primitives:
+        rows, own = len(primitive.attributes["POSITION"]), skin_sets(primitive)
+        padding = np.zeros((rows, width - SLOTS * len(own)))
+        names = [primitive.attributes[f"JOINTS_{n}"].astype(np.int64) for n in own]
+        parts = [_fractions(primitive.attributes[f"WEIGHTS_{n}"]) for n in own]
+        joints.append(np.hstack([*names, padding.astype(np.int64)]))
+        weights.append(np.hstack([*parts, padding]))
+    return _normalised(*_distinct_joints(np.concatenate(joints), np.concatenate(weights)))
+
+
+def refine_binding(
+    binding: Binding, linear: LinearRefinement
+) -> tuple[Binding, Int[np.ndarray, " V"]]:
+    """The binding at the refined vertices, and which of them lost a joint for want of slots."""
+    width = binding.weights.shape[1]
+    bound = binding.weights > 0
+    used = np.unique(binding.joints[bound])
+    row, slot = np.nonzero(bound)
+    column, value = np.searchsorted(used, binding.joints[row, slot]), binding.weights[row, slot]
+    shape = linear.count, width
+    joints, weights = np.zeros(shape, dtype=np.int64), np.zeros(shape)
+    cut = np.zeros(linear.count)
+    for start in range(0, len(used), COLUMNS):
+        block = used[start : start + COLUMNS]
+        here = (column >= start) & (column < start + COLUMNS)
+        dense = np.zeros((len(bound), len(block)))
+        dense[row[here], column[here] - start] = value[here]
+        part = linear(dense)
+        # Joints are local: most vertices have none of a block.
+        rows = np.flatnonzero(part.any(axis=1))
+        named = np.broadcast_to(block, (len(rows), len(block)))
+        heavy = np.hstack([weights[rows], part[rows]])
+        joints[rows], weights[rows] = _heaviest(np.hstack([joints[rows], named]), heavy, width)
+        cut[rows] += heavy.sum(axis=1) - weights[rows].sum(axis=1)
+    return _normalised(joints, weights), np.flatnonzero(cut > NOTHING)
+
+
+def skin_attributes(
+    primitive: TrianglePrimitive, binding: Binding
+) -> dict[str, Shaped[np.ndarray, "N 4"]]:
+    """JOINTS_n and WEIGHTS_n of refined vertices, in as many sets and the types that there were."""
+    sets = skin_sets(primitive)
+    kept = Binding(*(part[:, : SLOTS * len(sets)] for part in (binding.joints, binding.weights)))
+    attributes: dict[str, Shaped[np.ndarray, "N 4"]] = {}
+    if not sets:
+        return attributes
+    dtype = primitive.attributes[f"WEIGHTS_{sets[0]}"].dtype
+    total_units = FLOAT_UNITS if dtype.kind == "f" else int(np.iinfo(dtype).max)
+    units = whole_units(kept.weights, total_units)
+    joints = np.where(units > 0, kept.joints, 0)
+    # Another primitive's joints may reach across their common edge.
+    wide = np.uint16 if joints.max(initial=0) > np.iinfo(np.uint8).max else np.uint8
+    for place, number in enumerate(sets):
+        slots = slice(SLOTS * place, SLOTS * (place + 1))
+        old = primitive.attributes[f"JOINTS_{number}"].dtype
+        attributes[f"JOINTS_{number}"] = joints[:, slots].astype(np.promote_types(old, wide))
+        weights = units[:, slots] / total_units if dtype.kind == "f" else units[:, slots]
+        attributes[f"WEIGHTS_{number}"] = weights.astype(dtype)
+    return attributes
+
+
+def whole_units(weights: Float[np.ndarray, "N K"], total_units: int) -> Int[np.ndarray, "N K"]:
+    """Weights as integers that sum to `total_units` in each row: largest remainders are rounded up.
+
+    Rows without weight stay 0.
+    """
+    total = weights.sum(axis=1, keepdims=True)
+    exact = total_units * weights / np.where(total > 0, total, 1.0)
+    units = np.floor(exact).astype(np.int64)
+    missing = np.where(total[:, 0] > 0, total_units - units.sum(axis=1), 0)
+    rank = np.argsort(np.argsort(units - exact, axis=1, kind="stable"), axis=1)
+    return units + (rank < missing[:, None])
+
+
+def _fractions(weights: Shaped[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 4"]:
+    exact = weights if weights.dtype.kind == "f" else as_float(weights, normalized=True)
+    return exact.astype(np.float64)
+
+
+def _distinct_joints(
+    joints: Int[np.ndarray, "N K"], weights: Float[np.ndarray, "N K"]
+) -> tuple[Int[np.ndarray, "N K"], Float[np.ndarray, "N K"]]:
+    """Each row by ascending joint, with the weights of a joint that is named twice added up."""
+    joints = np.where(weights > 0, joints, _NO_JOINT)
+    order = np.argsort(joints, axis=1, kind="stable")
+    joints, weights = (np.take_along_axis(part, order, axis=1) for part in (joints, weights))
+    # A loop over slots, of which there are four a set.
+    for slot in range(1, joints.shape[1]):
+        again = joints[:, slot] == joints[:, slot - 1]
+        weights[again, slot] += weights[again, slot - 1]
+        weights[again, slot - 1] = 0
+    return _heaviest(joints, weights, joints.shape[1])
+
+
+def _heaviest(
+    joints: Int[np.ndarray, "N K"], weights: Float[np.ndarray, "N K"], count: int
+) -> tuple[Int[np.ndarray, "N k"], Float[np.ndarray, "N k"]]:
+    """The slots of most weight, heaviest first; of equals, the earlier."""
+    order = np.argsort(-weights, axis=1, kind="stable")[:, :count]
+    joints, weights = (np.take_along_axis(part, order, axis=1) for part in (joints, weights))
+    return np.where(weights > 0, joints, 0), weights
+
+
+def _normalised(joints: Int[np.ndarray, "N K"], weights: Float[np.ndarray, "N K"]) -> Binding:
+    total = weights.sum(axis=1, keepdims=True)
+    return Binding(joints, weights / np.where(total > 0, total, 1.0))

@@ -1,0 +1,137 @@
+"""Which corners share a normal: those that shared a position and a normal before refinement.
+
+The groups run over all primitives of a mesh, so that a change of material in a smooth surface does
+not become an edge in its shading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.arrays import dot, norm
+from pns_common.blocks import Blocks, available_threads
+
+from ...course import Course
+from ...meshes.barycentric_grid import BarycentricGrid
+from ...meshes.split_connectivity import SplitConnectivity, at_descendants, split_connectivity
+from ...meshes.weld import number_by_first_appearance
+from .control_mesh import ControlMesh, slices
+from .normals import angle_weighted_normals
+
+# Exporters compute the two sides of a UV seam apart and round differently: in real files up to
+# about 0.01°. Normals within 0.1° are one; an edge that is meant to be hard has degrees.
+SAME_NORMAL = np.radians(0.1)
+# A direction in which different normals hardly ever have equal coordinates.
+SCAN = np.array([1.0, np.sqrt(2), np.sqrt(3)])
+
+
+@dataclass(frozen=True, eq=False)
+class NormalGroups:
+    """The G groups of refined corners that share a normal.
+
+    Attributes:
+        vertices: (D, 3) the refined vertices of the faces that have normals.
+        groups: (D, 3) their corners' groups.
+        before: (G, 3) the old normals, blended linearly: what is left where faces have no area.
+        ids: by primitive the groups of its faces' grid points.
+    """
+
+    vertices: Int[np.ndarray, "D 3"]
+    groups: Int[np.ndarray, "D 3"]
+    before: Float[np.ndarray, "G 3"]
+    ids: dict[int, Int[np.ndarray, "F T"]]
+
+    def normals(
+        self,
+        points: Float[np.ndarray, "V 3"],
+        otherwise: Float[np.ndarray, "G 3"],
+        course: Course,
+    ) -> Float[np.ndarray, "G 3"]:
+        """The groups' unit normals over refined vertices; `otherwise` where they have none."""
+        blocks = Blocks(available_threads(), before=course.count(len(self.vertices)))
+        values = angle_weighted_normals(
+            points, self.vertices, self.groups, len(self.before), blocks
+        )
+        undefined = np.flatnonzero(~values.any(axis=1))
+        values[undefined] = otherwise[undefined]
+        return values
+
+    def with_limit(
+        self, values: Float[np.ndarray, "G 3"], limit: Float[np.ndarray, "V 3"]
+    ) -> Float[np.ndarray, "G 3"]:
+        """The limit surface's normals for the groups that are alone at their vertex.
+
+        Where several are (creases), the limit has a normal for each side, and one cannot serve.
+        """
+        vertex = np.empty(len(values), dtype=np.int64)
+        vertex[self.groups.reshape(-1)] = self.vertices.reshape(-1)
+        exact = limit[vertex]
+        alone = (np.bincount(vertex, minlength=len(limit))[vertex] == 1) & exact.any(axis=1)
+        # A face that is there turned over has the other side.
+        side = np.where(dot(exact, values) < 0, -1.0, 1.0)[:, None]
+        return np.where(alone[:, None], side * exact, values)
+
+
+def normal_groups(
+    control: ControlMesh, ids: Sequence[Int[np.ndarray, "F T"]], grid: BarycentricGrid
+) -> NormalGroups | None:
+    """The groups over the primitives that have normals; None where none has.
+
+    `ids` are, for each primitive, the refined vertices at the grid points of its faces.
+    """
+    chosen = [
+        number
+        for number, primitive in enumerate(control.primitives)
+        if "NORMAL" in primitive.attributes and len(ids[number])
+    ]
+    if not chosen:
+        return None
+    groups, before = _split_groups(control, chosen, grid)
+    used = np.concatenate([ids[number] for number in chosen])
+    shares = slices([len(ids[number]) for number in chosen])
+    return NormalGroups(
+        vertices=at_descendants(used, grid),
+        groups=groups.refined_faces,
+        before=groups.linear(before),
+        ids={number: groups.ids[part] for number, part in zip(chosen, shares, strict=True)},
+    )
+
+
+def _split_groups(
+    control: ControlMesh, chosen: Sequence[int], grid: BarycentricGrid
+) -> tuple[SplitConnectivity, Float[np.ndarray, "C 3"]]:
+    """The split connectivity of (welded vertex, old normal) pairs, and the pairs' normals."""
+    old = [control.primitives[number].attributes["NORMAL"] for number in chosen]
+    welded = [control.weld.vertex_of[control.rows[number]] for number in chosen]
+    starts = slices([len(normals) for normals in old])
+    rows = [
+        control.primitives[number].corners[control.kept[number]] + part.start
+        for number, part in zip(chosen, starts, strict=True)
+    ]
+    normals, flat = np.concatenate(old).astype(np.float64), np.concatenate(rows).reshape(-1)
+    corners = number_by_first_appearance(joined_normals(np.concatenate(welded), normals)[flat])
+    before = np.empty((corners.max() + 1, 3))
+    before[corners] = normals[flat]
+    return split_connectivity(corners.reshape(-1, 3), len(before), grid), before
+
+
+def joined_normals(
+    vertex: Int[np.ndarray, " N"], normals: Float[np.ndarray, "N 3"]
+) -> Int[np.ndarray, " N"]:
+    """Labels that rows share where they have the same vertex and, nearly, the same normal.
+
+    SiblingFiles along one direction are compared: rows with equal normals are always joined, rows
+    that nearly agree all but always, at the cost of one sort however many meet at a vertex.
+    """
+    # Not by matrix product, whose bits depend on where a row stands.
+    order = np.lexsort((*normals.T, dot(normals, SCAN[None]), vertex))
+    v, n = vertex[order], normals[order]
+    opens = np.ones(len(order), dtype=bool)
+    opens[1:] = (v[1:] != v[:-1]) | (norm(n[1:] - n[:-1]) > SAME_NORMAL)
+    labels = np.empty(len(order), dtype=np.int64)
+    labels[order] = np.cumsum(opens) - 1
+    return labels

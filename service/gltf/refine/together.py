@@ -1,0 +1,292 @@
+"""Small meshes of one kind, refined as parts of one: what a step costs beside rows is paid once.
+
+Scenes from CAD and building models hold thousands of meshes of a few faces. Each comes out as if it
+had been alone, bit for bit: positions are joined within a part only, and nothing is ever summed
+across parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from pns_common.deferred import Deferred
+from pns_common.errors import MeshError
+from pns_common.linear import LinearRefinement, level_topologies
+from pns_common.mesh import Cleaned
+from pns_common.refine import Refinement, Report
+from pns_common.refine_parts import PartsRefinement, refine_parts
+from pns_common.schemes import Scheme
+
+from ...course import Course
+from ...meshes.barycentric_grid import barycentric_grid
+from ...meshes.uv_charts import uv_blend
+from ...options import Options
+from ...report import Change
+from ..read.primitives import TrianglePrimitive
+from ..stage_shares import StageShares
+from .control_mesh import ControlMesh, control_mesh, slices, vertex_rows
+from .local_joints import local_joints
+from .refined_primitives import RefinedMesh, RefinedPrimitive, refined_primitives
+from .refinement import GATE, RATIO, changes_of_primitive, changes_of_vertices, creases_of
+from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
+from .smooth_normals import with_normal_accessor, with_smooth_normals
+from .union import Parts, divided, joined
+
+# More faces than this, refined, and a mesh's own work is more than what surrounds it.
+MOST_FACES = 2048
+# So much is refined at a time: the memory of a group is small beside that of a large mesh.
+GROUP_FACES = 2**17
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """What became of one mesh.
+
+    Attributes:
+        refined: its primitives that have a face left.
+        kept: for each of its primitives, which faces do not name a welded vertex twice.
+        copies: faces that follow another with the same vertices.
+        report: the operator's.
+        changes: what was joined, dropped or cut.
+    """
+
+    refined: list[RefinedPrimitive]
+    kept: list[Bool[np.ndarray, " F"]]
+    copies: int
+    report: Report
+    changes: list[Change]
+
+
+@dataclass(frozen=True, eq=False)
+class _Refined:
+    """What the operator made of a union: for each part its report, and how many lost a joint."""
+
+    mesh: RefinedMesh
+    reports: list[Report]
+    cut: Int[np.ndarray, " P"]
+
+
+def refine_together(
+    meshes: Sequence[Sequence[TrianglePrimitive]],
+    pointers: Sequence[str],
+    scheme: Scheme,
+    options: Options,
+    course: Course,
+    shares: StageShares,
+) -> list[Part | None]:
+    """Refine meshes of one kind, given by their primitives; `pointers` say where they stand.
+
+    None stands for one that must go alone: it has no face left or no extent, cannot be refined
+    (alone, it is told why), or there are no kernels that could serve.
+    """
+    primitives, parts = joined(meshes)
+    with course.stage("weld", shares.weld, shares.refine):
+        control = control_mesh(primitives, options.weld_tolerance, options.weld_unit, parts)
+    able = _able(control, parts)
+    if control.cleaned is None or not able.all():
+        return _chosen_together(able, meshes, pointers, scheme, options, course, shares)
+    with course.stage("weld", shares.weld, shares.refine):
+        creases = creases_of(control, options)
+        if options.normals != "keep":
+            control, parts = _smoothed(control, control.cleaned, parts, creases, options)
+    with course.stage("refine", shares.refine, shares.attributes):
+        try:
+            made = _refined(control, parts, creases, scheme, options)
+        except MeshError:
+            # Not to be told whose it is: the halves are asked, down to one.
+            if len(meshes) == 1:
+                return [None]
+            half = np.arange(len(meshes)) < len(meshes) // 2
+            rest = pointers, scheme, options, course, shares
+            return [
+                first or second
+                for first, second in zip(
+                    _chosen_together(half, meshes, *rest),
+                    _chosen_together(~half, meshes, *rest),
+                    strict=True,
+                )
+            ]
+    if made is None or control.cleaned is None:
+        return [None] * len(meshes)
+    with course.stage("attributes", shares.attributes, shares.write):
+        grid, blend = barycentric_grid(options.levels), uv_blend(options)
+        pieces = refined_primitives(control, control.cleaned, made.mesh, grid, blend, course)
+        return [*_divided(control, control.cleaned, parts, made, pieces, meshes, pointers, options)]
+
+
+def _able(control: ControlMesh, parts: Parts) -> Bool[np.ndarray, " P"]:
+    """Which parts have a face left, and an extent to measure by."""
+    proper = np.concatenate(control.kept)
+    points = control.weld.points[control.weld.faces]
+    low, high = np.full((parts.count, 3), np.inf), np.full((parts.count, 3), -np.inf)
+    np.minimum.at(low, parts.of_face[proper], points[proper].min(axis=1))
+    np.maximum.at(high, parts.of_face[proper], points[proper].max(axis=1))
+    extended: Bool[np.ndarray, " P"] = np.any(high > low, axis=1)
+    return extended
+
+
+def _smoothed(
+    control: ControlMesh,
+    cleaned: Cleaned,
+    parts: Parts,
+    creases: Int[np.ndarray, "N 2"] | None,
+    options: Options,
+) -> tuple[ControlMesh, Parts]:
+    """The union with new normals, for which vertices are split into more rows."""
+    primitives = with_smooth_normals(control, cleaned, creases)
+    of_row = np.concatenate(
+        [
+            parts.of_row[share][primitive.rows]
+            for share, primitive in zip(control.rows, primitives, strict=True)
+        ]
+    )
+    parts = replace(parts, of_row=of_row)
+    return control_mesh(primitives, options.weld_tolerance, options.weld_unit, parts), parts
+
+
+def _chosen_together(
+    chosen: Bool[np.ndarray, " P"],
+    meshes: Sequence[Sequence[TrianglePrimitive]],
+    pointers: Sequence[str],
+    scheme: Scheme,
+    options: Options,
+    course: Course,
+    shares: StageShares,
+) -> list[Part | None]:
+    """The same of some of the meshes; None for the others."""
+    made: list[Part | None] = [None] * len(meshes)
+    places = np.flatnonzero(chosen).tolist()
+    if places:
+        own, theirs = [meshes[place] for place in places], [pointers[place] for place in places]
+        parts = refine_together(own, theirs, scheme, options, course, shares)
+        for place, part in zip(places, parts, strict=True):
+            made[place] = part
+    return made
+
+
+def _refined(
+    control: ControlMesh,
+    parts: Parts,
+    creases: Int[np.ndarray, "N 2"] | None,
+    scheme: Scheme,
+    options: Options,
+) -> _Refined | None:
+    """Refine the union; None where the compiled kernels cannot.
+
+    Raises:
+        MeshError: the refined coordinates of any part are too large.
+    """
+    cleaned = control.cleaned
+    if cleaned is None:
+        return None
+    faces = parts.count_faces(cleaned.face_map >= 0)
+    made = refine_parts(
+        cleaned.mesh,
+        np.cumsum([0, *faces]),
+        scheme,
+        options.levels,
+        options.reference_length,
+        limit=options.limit,
+        creases=creases,
+    )
+    if made is None:
+        return None
+    if np.abs(made.mesh.vertices).max() > np.finfo(np.float32).max:
+        raise MeshError("refined positions leave the range of float32", element="vertices")
+    followers, cut = _followers(control, cleaned, parts, creases, made, options)
+    scalars = {RATIO: made.ratio, GATE: made.gate} if options.diagnostics == "full" else {}
+    refinement = Refinement(made.mesh, Deferred(lambda: made.reports[0]), made.ratio, made.gate)
+    normals = made.normals if options.normals == "limit" else None
+    return _Refined(RefinedMesh(refinement, followers, scalars, normals), made.reports, cut)
+
+
+def _followers(
+    control: ControlMesh,
+    cleaned: Cleaned,
+    parts: Parts,
+    creases: Int[np.ndarray, "N 2"] | None,
+    made: PartsRefinement,
+    options: Options,
+) -> tuple[SkinAndMorph, Int[np.ndarray, " P"]]:
+    """What follows the refined vertices, and how many of each part lost a joint."""
+    if not control.skin_and_morph.any:
+        return control.skin_and_morph, np.zeros(parts.count, dtype=np.int64)
+    rows = vertex_rows(control, cleaned)
+    own, before = control.skin_and_morph.take(rows), parts.of_row[rows]
+    table = None
+    if own.binding is not None:
+        table, binding = local_joints(own.binding, before, parts.count)
+        own = replace(own, binding=binding)
+    mesh = cleaned.mesh
+    topologies = level_topologies(mesh.faces, len(mesh.vertices), options.levels, creases)
+    after = refine_skin_and_morph(own, LinearRefinement(topologies, options.limit))
+    part_of = np.empty(len(made.mesh.vertices), dtype=np.int64)
+    # Descendants lie as their faces do.
+    part_of[made.mesh.faces] = np.repeat(
+        before[mesh.faces[:, 0]], len(made.mesh.faces) // len(mesh.faces)
+    )[:, None]
+    if table is not None and after.binding is not None:
+        after = replace(after, binding=table.named(after.binding, part_of))
+    return after, np.bincount(part_of[after.cut], minlength=parts.count)
+
+
+def _divided(
+    control: ControlMesh,
+    cleaned: Cleaned,
+    parts: Parts,
+    made: _Refined,
+    pieces: Sequence[RefinedPrimitive],
+    meshes: Sequence[Sequence[TrianglePrimitive]],
+    pointers: Sequence[str],
+    options: Options,
+) -> list[Part]:
+    """The union's refined primitives, cut into those of its parts."""
+    copied = (cleaned.representative >= 0) & (cleaned.face_map < 0)
+    copies = parts.count_faces(copied).tolist()
+    refined: list[list[RefinedPrimitive]] = [[] for _ in meshes]
+    # A primitive that has no face left in any part is not among the pieces.
+    for piece in pieces:
+        place = piece.source.number
+        own = [primitives[place] for primitives in meshes]
+        kept = _shares(control.kept[place], own)
+        counts = np.array([int(keep.sum()) for keep in kept]) * 4**options.levels
+        sources = own if options.normals == "keep" else [_with_normals(p) for p in own]
+        for into, cut in zip(refined, divided(piece, counts, sources), strict=True):
+            if len(cut.faces):
+                into.append(cut)
+    kept = [
+        _shares(keep, [primitives[place] for primitives in meshes])
+        for place, keep in enumerate(control.kept)
+    ]
+    return [
+        Part(
+            refined=refined[part],
+            kept=[keep[part] for keep in kept],
+            copies=copies[part],
+            report=made.reports[part],
+            changes=[
+                change
+                for primitive, keep in zip(primitives, kept, strict=True)
+                for change in changes_of_primitive(primitive.number, keep[part], pointers[part])
+            ]
+            + changes_of_vertices(int(control.near[part]), int(made.cut[part]), pointers[part]),
+        )
+        for part, primitives in enumerate(meshes)
+    ]
+
+
+def _shares(
+    kept: Bool[np.ndarray, " F"], primitives: Sequence[TrianglePrimitive]
+) -> list[Bool[np.ndarray, " f"]]:
+    """Each part's share of what says of a primitive's faces whether they were kept."""
+    return [kept[share] for share in slices([len(primitive.corners) for primitive in primitives])]
+
+
+def _with_normals(primitive: TrianglePrimitive) -> TrianglePrimitive:
+    """The primitive, described as one that has normals."""
+    accessors = with_normal_accessor(primitive.accessors, len(primitive.rows))
+    return replace(primitive, accessors=accessors)

@@ -1,0 +1,126 @@
+"""A glTF file in, a refined GLB and its report out: a function of bytes and options alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pns_common.schemes import Model, Scheme, loop, pns
+
+from ..bodies.sibling_files import ALONE, SiblingFiles
+from ..course import Course
+from ..errors import NoModelError
+from ..options import Limits, Options
+from ..report import Change, MeshResult, build_report
+from .read.container import write_glb
+from .read.extras import put_report, replaces_extras
+from .read.json_text import encode
+from .read.nodes import mesh_instances
+from .read.plan import BYTES_FOR_LIMIT, BYTES_FOR_NORMALS
+from .read.upload import Media, Upload, read_upload
+from .refine.meshes import refined_meshes
+from .stage_shares import PUT_TOGETHER, READ
+from .write.packing import BYTES_PER_FACE, WRITERS
+from .write.storage import remove_replaced, storage_changes, withdraw_unused
+from .write.unused import VertexUse
+
+
+@dataclass(frozen=True)
+class Subdivided:
+    """A refined file.
+
+    Attributes:
+        glb: the file, with the report in it unless diagnostics were not wanted.
+        report: the report.
+        timings: seconds by stage (read, weld, refine, attributes, write).
+    """
+
+    glb: bytes
+    report: dict[str, Any]
+    timings: dict[str, float]
+
+
+def subdivide_gltf(
+    data: bytes,
+    media: Media,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    course: Course | None = None,
+    siblings: SiblingFiles = ALONE,
+    losses: Sequence[Change] = (),
+) -> Subdivided:
+    """Refine every triangle mesh of a glTF file.
+
+    `course` is told how far it is. `siblings` are the files that the document may name; `losses` is
+    what it had already lost on its way to glTF, for the report.
+
+    Raises:
+        ServiceError: the upload is unreadable, wrong, over a limit, or cannot be refined yet.
+        pns_common.errors.ModelError: the model answered with something that is no correction.
+    """
+    course = Course() if course is None else course
+    with course.stage("read", 0.0, READ):
+        scheme = make_scheme(options, model)
+        packing = BYTES_PER_FACE[options.compress]
+        if options.normals != "keep":
+            packing += BYTES_FOR_NORMALS
+        if options.limit:
+            packing += BYTES_FOR_LIMIT
+        upload = read_upload(data, media, options.levels, limits, siblings, packing)
+        instances = mesh_instances(upload.document)
+        changes = [*losses, *_changes_of_container(upload, options)]
+        changes += upload.changes + storage_changes(upload.document, upload.plans)
+        writer = WRITERS[options.compress].start(upload.tree, upload.buffers)
+
+    results: list[MeshResult] = []
+    vertices = VertexUse(upload.document)
+    with course.part(READ, PUT_TOGETHER):
+        for mesh in refined_meshes(upload, scheme, options, course):
+            with course.stage("write"):
+                writer.replace_mesh(mesh.index, mesh.refined, course)
+                vertices.add(mesh.index, mesh.primitives, mesh.kept)
+            changes += mesh.changes
+            results.append(
+                MeshResult(
+                    index=mesh.index,
+                    instances=instances[mesh.index],
+                    primitives=len(mesh.refined),
+                    vertices=sum(len(p.attributes["POSITION"]) for p in mesh.refined),
+                    faces=sum(len(p.faces) for p in mesh.refined),
+                    degenerate=mesh.degenerate,
+                    copies=mesh.copies,
+                    report=mesh.report,
+                )
+            )
+
+    with course.stage("write", PUT_TOGETHER, 1.0):
+        withdraw_unused(upload.tree)
+        changes += remove_replaced(writer, upload.spare) + writer.changes()
+        report = build_report(scheme, options.levels, results, vertices.unused(), changes)
+        if options.diagnostics != "none":
+            put_report(upload.tree, report)
+        pieces = writer.finish()
+        glb = write_glb(encode(upload.tree), pieces, upload.container.others)
+    return Subdivided(glb=glb, report=report, timings=course.seconds)
+
+
+def make_scheme(options: Options, model: Model | None) -> Scheme:
+    """The scheme that the options name.
+
+    Raises:
+        NoModelError: the learned scheme without a model.
+    """
+    if options.scheme == "loop":
+        return loop()
+    if model is None:
+        raise NoModelError("no model is loaded; scheme=loop needs none")
+    return pns(model, options.budget)
+
+
+def _changes_of_container(upload: Upload, options: Options) -> list[Change]:
+    changes: list[Change] = []
+    if options.diagnostics != "none" and replaces_extras(upload.tree):
+        changes.append(Change("/asset/extras", "moved to /asset/extras/extras", 1))
+    return changes

@@ -1,0 +1,1 @@
+"""Refined primitives into the document: accessors, compression, what is no longer used."""

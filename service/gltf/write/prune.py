@@ -1,0 +1,138 @@
+"""Geometry that refinement has replaced leaves the file: accessors, buffer views and bytes.
+
+New entries take the places of old ones, so that numbers elsewhere (animations, skins, images) stay
+as they were. What the file carried without use stays too: it was not ours to judge.
+"""
+
+from __future__ import annotations
+
+import sys
+from bisect import bisect_right
+from collections.abc import Iterable, Sequence
+from operator import itemgetter
+from typing import Any
+
+from ..read.index_references import Reference, accessor_references, view_references
+from ..read.spare import Spare
+
+# Where no cut starts.
+NEVER = sys.maxsize
+
+
+def remove_unused(tree: dict[str, Any], spare: Spare) -> list[tuple[int, int]]:
+    """Take unused spare accessors and views out of the tree; (start, end) of views that went.
+
+    All buffers have been joined: every view lies in buffer 0, or is compressed.
+    """
+    accessors = tree.get("accessors", [])
+    named = list(accessor_references(tree))
+    used = {reference.index for reference in named}
+    kept = [
+        index in used or (index < spare.accessor_count and index not in spare.accessors)
+        for index in range(len(accessors))
+    ]
+    tree["accessors"] = _renumbered(accessors, kept, named)
+
+    views = tree.get("bufferViews", [])
+    named = list(view_references(tree, tree["accessors"]))
+    used = {reference.index for reference in named}
+    kept = [
+        index in used or (index < spare.view_count and index not in spare.views)
+        for index in range(len(views))
+    ]
+    gone = [view for view, keep in zip(views, kept, strict=True) if not keep]
+    tree["bufferViews"] = _renumbered(views, kept, named)
+    for key in ("accessors", "bufferViews"):
+        if not tree[key]:
+            del tree[key]
+    return [
+        (view.get("byteOffset", 0), view.get("byteOffset", 0) + view["byteLength"]) for view in gone
+    ]
+
+
+def _renumbered(
+    entries: list[dict[str, Any]], kept: list[bool], references: Iterable[Reference]
+) -> list[dict[str, Any]]:
+    """The kept entries: those beyond their number move into the places of those that went."""
+    count = sum(kept)
+    holes = [index for index in range(count) if not kept[index]]
+    movers = [index for index in range(count, len(entries)) if kept[index]]
+    place = dict(zip(movers, holes, strict=True))
+    result = entries[:count]
+    for old, new in place.items():
+        result[new] = entries[old]
+    for reference in references:
+        if reference.index in place:
+            reference.point_at(place[reference.index])
+    return result
+
+
+def cut(
+    pieces: Sequence[bytes | memoryview],
+    gone: Iterable[tuple[int, int]],
+    needed: Iterable[tuple[int, int]],
+) -> tuple[list[bytes | memoryview], list[tuple[int, int]]]:
+    """The pieces without the bytes of `gone` that nothing in `needed` covers.
+
+    Whole words go, so that what follows stays aligned. Also the (position, bytes before it that
+    went) of each cut, ascending, for `moved`.
+    """
+    cuts = [
+        (start + -start % 4, end - end % 4)
+        for start, end in _without(_merged(gone), _merged(needed))
+        if end - end % 4 > start + -start % 4
+    ]
+    result: list[bytes | memoryview] = []
+    shifts: list[tuple[int, int]] = []
+    removed, position, upcoming = 0, 0, iter([*cuts, (NEVER, NEVER)])
+    start, end = next(upcoming)
+    for piece in pieces:
+        data, offset = memoryview(piece), 0
+        while start < position + len(data):
+            lower, upper = max(start - position, 0), min(end - position, len(data))
+            if lower > offset:
+                result.append(data[offset:lower])
+            offset = upper
+            if end > position + len(data):
+                break
+            removed += end - start
+            shifts.append((end, removed))
+            start, end = next(upcoming)
+        if offset < len(data):
+            result.append(data[offset:] if offset else piece)
+        position += len(data)
+    return result, shifts
+
+
+def moved(offset: int, shifts: Sequence[tuple[int, int]]) -> int:
+    """Where a byte lies after the cuts."""
+    cuts = bisect_right(shifts, offset, key=itemgetter(0))
+    return offset - (shifts[cuts - 1][1] if cuts else 0)
+
+
+def _merged(ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    merged: list[tuple[int, int]] = []
+    for start, end in sorted(ranges):
+        if merged and start <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], end))
+        else:
+            merged.append((start, end))
+    return merged
+
+
+def _without(ranges: list[tuple[int, int]], others: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """What is left of disjoint ascending ranges without others of the same kind."""
+    left: list[tuple[int, int]] = []
+    place = 0
+    for start, end in ranges:
+        while place < len(others) and others[place][1] <= start:
+            place += 1
+        index = place
+        while index < len(others) and others[index][0] < end:
+            if others[index][0] > start:
+                left.append((start, others[index][0]))
+            start = max(start, others[index][1])
+            index += 1
+        if start < end:
+            left.append((start, end))
+    return left

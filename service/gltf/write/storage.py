@@ -1,0 +1,70 @@
+"""What is written otherwise than it was stored: sparse, quantised, strips and fans."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from ...report import Change
+from ..read.extensions import withdraw
+from ..read.modes import FAN, STRIP
+from ..read.plan import MeshPlan
+from ..read.quantization import EXTENSION, needs_extension, still_needed
+from ..read.schema import Document, Primitive
+from ..read.spare import Spare
+from .writer import Writer
+
+_MODES = {STRIP: "triangle strip written as triangles", FAN: "triangle fan written as triangles"}
+
+
+def storage_changes(document: Document, plans: Sequence[MeshPlan]) -> list[Change]:
+    """One change for each primitive and way of storing that refinement gives up."""
+    return [
+        change
+        for plan in plans
+        for number in plan.primitives
+        for change in _of_primitive(
+            document,
+            document.meshes[plan.mesh].primitives[number],
+            f"/meshes/{plan.mesh}/primitives/{number}",
+        )
+    ]
+
+
+def remove_replaced(writer: Writer, spare: Spare) -> list[Change]:
+    """Let the geometry that was replaced leave the file, unless something may still point at it."""
+    if not spare.unknown:
+        writer.remove(spare)
+        return []
+    names = ", ".join(spare.unknown)
+    return [Change("/bufferViews", f"replaced geometry kept: {names} may refer to it", 1)]
+
+
+def withdraw_unused(tree: dict[str, Any]) -> None:
+    """Take KHR_mesh_quantization off the lists where no primitive of the new file needs it."""
+    if not still_needed(tree):
+        withdraw(tree, EXTENSION)
+
+
+def _of_primitive(document: Document, primitive: Primitive, pointer: str) -> Iterator[Change]:
+    accessors = document.accessors
+    if primitive.mode in _MODES:
+        yield Change(f"{pointer}/mode", _MODES[primitive.mode], 1)
+    indices = [] if primitive.indices is None else [primitive.indices]
+    named = [
+        (name, index)
+        for attributes in (primitive.attributes, *primitive.targets)
+        for name, index in attributes.items()
+    ]
+    stored = [*indices, *(index for _, index in named)]
+    sparse = sum(accessors[index].sparse is not None for index in stored)
+    if sparse:
+        yield Change(pointer, "sparse accessors written dense", sparse)
+    quantised = sum(
+        needs_extension(
+            name, accessors[index].component_type, normalized=accessors[index].normalized
+        )
+        for name, index in named
+    )
+    if quantised:
+        yield Change(pointer, "quantised attributes written as float32", quantised)

@@ -1,0 +1,188 @@
+"""Put refined primitives into a document: new accessors at the end, the rest where it was."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Self
+
+import numpy as np
+from jaxtyping import Shaped
+
+from ...course import Course
+from ...report import Change
+from ..constants import ARRAY_BUFFER, COLUMNS, COMPONENT_TYPES, ELEMENT_ARRAY_BUFFER
+from ..read.modes import TRIANGLES
+from ..read.schema import Accessor
+from ..read.spare import Spare
+from ..refine.refined_primitives import RefinedPrimitive
+from .prune import cut, moved, remove_unused
+
+# The largest value of an index type restarts primitives, so it may not be used as an index.
+LARGEST_UINT16_INDEX = 65534
+
+_COMPONENT_TYPE_OF = {dtype: number for number, dtype in COMPONENT_TYPES.items()}
+
+
+@dataclass
+class Writer:
+    """A document being edited: the JSON tree, and the pieces of its one buffer to be."""
+
+    tree: dict[str, Any]
+    pieces: list[bytes | memoryview] = field(default_factory=list)
+    length: int = 0
+    starts: list[int] = field(default_factory=list)
+
+    @classmethod
+    def start(cls, tree: dict[str, Any], buffers: Sequence[memoryview]) -> Self:
+        """Take over the tree, with all its buffers one after the other as the first."""
+        writer = cls(tree)
+        writer.starts = [writer.append(buffer) for buffer in buffers]
+        for view in tree.get("bufferViews", []):
+            if view["buffer"]:
+                view["byteOffset"] = view.get("byteOffset", 0) + writer.starts[view["buffer"]]
+                view["buffer"] = 0
+        return writer
+
+    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], course: Course) -> None:
+        """Point the primitives of a mesh at their refined geometry."""
+        for number, primitive in enumerate(refined):
+            course.reach(number / len(refined))
+            self.replace(mesh, primitive)
+
+    def changes(self) -> list[Change]:
+        """What was not written as it was made."""
+        return []
+
+    def replace(self, mesh: int, refined: RefinedPrimitive) -> None:
+        """Point a primitive of the tree at its refined geometry."""
+        primitive = self.tree["meshes"][mesh]["primitives"][refined.source.number]
+        primitive["attributes"] = {
+            name: self._attribute(refined.source.accessors.get(name), name, values)
+            for name, values in refined.attributes.items()
+        }
+        if refined.targets:
+            primitive["targets"] = [
+                {name: self._attribute(before[name], name, values[name]) for name in before}
+                for before, values in zip(
+                    refined.source.target_accessors, refined.targets, strict=True
+                )
+            ]
+        if primitive.get("mode", TRIANGLES) != TRIANGLES:
+            primitive["mode"] = TRIANGLES
+        small = refined.faces.max() <= LARGEST_UINT16_INDEX
+        indices = refined.faces.astype(np.uint16 if small else np.uint32)
+        primitive["indices"] = self._accessor(
+            indices.reshape(-1, 1), ELEMENT_ARRAY_BUFFER, "SCALAR"
+        )
+
+    def remove(self, spare: Spare) -> None:
+        """Take what refinement has left without use out of the tree, and its bytes out of BIN."""
+        gone = remove_unused(self.tree, spare)
+        gone += [
+            (self.starts[buffer] + start, self.starts[buffer] + end)
+            for buffer, start, end in spare.ranges
+        ]
+        views = self.tree.get("bufferViews", [])
+        stored = [self.bytes_of(view) for view in views]
+        needed = [
+            (p.get("byteOffset", 0), p.get("byteOffset", 0) + p["byteLength"]) for p in stored
+        ]
+        self.pieces, shifts = cut(self.pieces, gone, needed)
+        for place in stored:
+            if "byteOffset" in place:
+                place["byteOffset"] = moved(place["byteOffset"], shifts)
+        self.length = sum(len(piece) for piece in self.pieces)
+
+    def bytes_of(self, view: dict[str, Any]) -> dict[str, Any]:
+        """The object that says where a view's bytes lie in BIN."""
+        return view
+
+    def finish(self) -> list[bytes | memoryview]:
+        """Write the buffer's length into the tree; the pieces of BIN."""
+        if not self.pieces:
+            return []
+        first = self.tree.get("buffers", [{}])[0]
+        rest = {key: value for key, value in first.items() if key not in ("uri", "byteLength")}
+        self.tree["buffers"] = [{"byteLength": self.length, **rest}]
+        return self.pieces
+
+    def _attribute(
+        self, before: Accessor | None, name: str, values: Shaped[np.ndarray, "N K"]
+    ) -> int:
+        kind = "SCALAR" if before is None else before.type
+        index = self._accessor(values, ARRAY_BUFFER, kind)
+        describe(self.tree["accessors"][index], before, name, values)
+        return index
+
+    def _accessor(self, values: Shaped[np.ndarray, "N K"], target: int, kind: str) -> int:
+        """Append the elements; their accessor's index."""
+        vertices = target == ARRAY_BUFFER
+        content = in_words(values, kind) if vertices else np.ascontiguousarray(values)
+        view = self.stored(content)
+        padded = vertices and content.shape[1] != values.shape[1] * values.itemsize
+        # A matrix is as long as its padded columns: its elements lie close.
+        if padded and kind not in COLUMNS:
+            view["byteStride"] = content.shape[1]
+        view["target"] = target
+        return self.add_accessor(values, kind, self.add_view(view))
+
+    def stored(self, content: Shaped[np.ndarray, "N B"]) -> dict[str, Any]:
+        """Append elements of a buffer view; the view."""
+        data = content.data.cast("B")
+        return {"buffer": 0, "byteOffset": self.append(data), "byteLength": len(data)}
+
+    def add_view(self, view: dict[str, Any]) -> int:
+        """A new buffer view's index."""
+        views = self.tree.setdefault("bufferViews", [])
+        views.append(view)
+        return len(views) - 1
+
+    def add_accessor(self, values: Shaped[np.ndarray, "N K"], kind: str, view: int | None) -> int:
+        """A new accessor's index; `view` None: its elements lie elsewhere."""
+        accessors = self.tree.setdefault("accessors", [])
+        place = {} if view is None else {"bufferView": view}
+        accessors.append(
+            {
+                **place,
+                "componentType": _COMPONENT_TYPE_OF[values.dtype],
+                "count": len(values),
+                "type": kind,
+            }
+        )
+        return len(accessors) - 1
+
+    def append(self, data: memoryview) -> int:
+        """Add bytes at the next multiple of four; where they begin."""
+        padding = -self.length % 4
+        if padding:
+            self.pieces.append(b"\0" * padding)
+        start = self.length + padding
+        self.pieces.append(data)
+        self.length = start + len(data)
+        return start
+
+
+def describe(
+    accessor: dict[str, Any], before: Accessor | None, name: str, values: Shaped[np.ndarray, "N K"]
+) -> None:
+    """Say of an attribute's accessor what its type does not, as the one before it did."""
+    if before is not None:
+        if before.normalized:
+            accessor["normalized"] = True
+        # Some readers name a morph target by its accessor.
+        given = {"name": before.name, "extras": before.extras}
+        accessor.update({key: value for key, value in given.items() if value is not None})
+    if name == "POSITION":
+        accessor["min"] = values.min(axis=0).tolist()
+        accessor["max"] = values.max(axis=0).tolist()
+
+
+def in_words(values: Shaped[np.ndarray, "N K"], kind: str) -> Shaped[np.ndarray, "N B"]:
+    """Rows as bytes, each column of a matrix and each row padded to whole words where needed."""
+    narrow = np.ascontiguousarray(values)
+    if narrow.itemsize == 4:
+        return narrow.view(np.uint8).reshape(len(values), -1)
+    columns = narrow.view(np.uint8).reshape(len(values), COLUMNS.get(kind, 1), -1)
+    padding = -columns.shape[2] % 4
+    return np.pad(columns, ((0, 0), (0, 0), (0, padding))).reshape(len(values), -1)

@@ -1,0 +1,1 @@
+"""The application: routes, admission, limits on bodies, problem documents, the server."""

@@ -1,0 +1,1 @@
+"""Who asks: the address behind a proxy, the name behind a key."""

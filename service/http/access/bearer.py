@@ -1,0 +1,108 @@
+"""Authorization: Bearer: the routes that cost something are for the bearers of keys."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import logging
+import re
+import time
+from collections import Counter
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from ...errors import BusyError, ServiceError, UnauthorizedError
+from .. import problems
+from ..addresses import site
+from ..clients import Client
+from .keys import NAME, PREFIX, Entry, hash_of, matches
+
+log = logging.getLogger("pns.service")
+
+_BEARER = re.compile(rf"(?i:bearer) +({PREFIX}_({NAME})_[\w-]{{43}})", re.A)
+# Routes that anybody may ask: they cost nothing and say nothing of anyone. A key that is sent to
+# them is checked all the same.
+OPEN = ("/", "/healthz", "/readyz", "/models", "/limits", "/docs", "/openapi.json")
+OPEN_FOLDERS = ("/assets/", "/docs/")
+# Each wrong key costs a scrypt; an address has so many a minute, and so many may wait.
+WRONG_A_MINUTE = 20
+MOST_WAITING = 8
+MINUTE = 60.0
+
+
+class TooManyWrongKeysError(BusyError):
+    """An address has sent one wrong key after another."""
+
+    status = 429
+    code = "too-many-wrong-keys"
+    title = "Too many wrong keys"
+
+
+class Bearer:
+    """ASGI layer that finds the client behind a key, and refuses those without one."""
+
+    def __init__(self, app: ASGIApp, keys: dict[str, Entry]) -> None:
+        self.app = app
+        self._keys = keys
+        # Of keys that were right, by their plain hash: scrypt is run once for each.
+        self._known: dict[bytes, Entry] = {}
+        self._nobody = hash_of("")
+        self._one = asyncio.Semaphore(1)
+        self._waiting = 0
+        self._wrong: Counter[str] = Counter()
+        self._wrong_since = time.monotonic()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if scope["type"] == "http":
+            try:
+                await self._admit(scope)
+            except ServiceError as error:
+                await problems.of_service_error(error)(scope, receive, send)
+                return
+        await self.app(scope, receive, send)
+
+    async def _admit(self, scope: Scope) -> None:
+        sent = [value for name, value in scope["headers"] if name == b"authorization"]
+        if not sent:
+            path = scope["path"].removeprefix(scope.get("root_path", ""))
+            if path in OPEN or path.startswith(OPEN_FOLDERS):
+                return
+            raise UnauthorizedError("send a key: Authorization: Bearer pns_…")
+        token = _BEARER.fullmatch(sent[0].decode("latin-1").strip()) if len(sent) == 1 else None
+        if token is None:
+            raise UnauthorizedError("the Authorization header holds no key: Bearer pns_…")
+        entry = await self._entry(token[1], token[2], scope)
+        client = Client(f"key:{entry.name}", entry.faces_per_minute, named=True)
+        scope.setdefault("state", {})["client"] = client
+
+    async def _entry(self, key: str, name: str, scope: Scope) -> Entry:
+        plain = hashlib.sha256(key.encode()).digest()
+        if plain in self._known:
+            return self._known[plain]
+        address = site(scope["client"][0] if scope.get("client") else "")
+        self._check_patience(address)
+        entry = self._keys.get(name)
+        self._waiting += 1
+        try:
+            async with self._one:
+                # Of a name that is not there, too: how long it takes tells nothing.
+                hashed = self._nobody if entry is None else entry.hash
+                right = await asyncio.to_thread(matches, key, hashed)
+        finally:
+            self._waiting -= 1
+        if entry is None or not right:
+            self._wrong[address] += 1
+            raise UnauthorizedError("the key is not known")
+        self._known[plain] = entry
+        return entry
+
+    def _check_patience(self, address: str) -> None:
+        now = time.monotonic()
+        if now - self._wrong_since > MINUTE:
+            self._wrong.clear()
+            self._wrong_since = now
+        if self._wrong[address] >= WRONG_A_MINUTE:
+            raise TooManyWrongKeysError("wait a minute", retry_after=int(MINUTE))
+        if self._waiting >= MOST_WAITING:
+            raise BusyError("too many keys are being checked")

@@ -1,0 +1,179 @@
+"""Admission: which requests are under way, whether new ones are taken, and how they are ended."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+
+from ..errors import BusyError
+
+
+class DrainingError(BusyError):
+    """The service shuts down: it finishes what it has and takes nothing new."""
+
+    code = "draining"
+    title = "The service is shutting down"
+
+
+class Admission:
+    """Counts uploads, jobs and answers apart: who only sends or reads slowly keeps nobody waiting.
+
+    Bodies and answers are memory, so their bytes are counted: `body_bytes` of all bodies, from
+    their first piece to the end of their jobs, and `answer_bytes` of all answers.
+    """
+
+    def __init__(self, *, uploads: int, body_bytes: int, answer_bytes: int) -> None:
+        self.draining = False
+        self._uploads = _Places("uploads", uploads)
+        self._jobs = _Places("jobs", None)
+        self._answers = _Answers(answer_bytes)
+        self._body_bytes = body_bytes
+        # By client; who holds nothing is not there.
+        self._bodies: Counter[str] = Counter()
+
+    @property
+    def admitted(self) -> int:
+        """Requests and jobs under way."""
+        return self._uploads.taken + self._jobs.taken
+
+    @asynccontextmanager
+    async def upload(self) -> AsyncIterator[None]:
+        """Hold a place while a body arrives.
+
+        Raises:
+            BusyError: no place is free.
+            DrainingError: the service shuts down, now or while the body arrives.
+        """
+        if self.draining:
+            raise DrainingError("no new request is taken", retry_after=5)
+        with self._uploads.place():
+            async with self._uploads.until_ended():
+                yield
+
+    @asynccontextmanager
+    async def working(self) -> AsyncIterator[None]:
+        """Be under way, until `end` says otherwise. Raises DrainingError."""
+        with self._jobs.place():
+            async with self._jobs.until_ended():
+                yield
+
+    @asynccontextmanager
+    async def answering(self, size: int) -> AsyncIterator[None]:
+        """Hold an answer of so many bytes while a client takes it.
+
+        Where memory runs short, whoever has had the longest is cut off. Raises CutOffError.
+        """
+        async with self._answers.held(size):
+            yield
+
+    @contextmanager
+    def body(self, client: str) -> Iterator[Callable[[int], None]]:
+        """Keep account of a body: call the value before each piece. It raises BusyError.
+
+        One client may hold three quarters of all bytes, so that it alone never locks out others.
+        """
+        held = 0
+
+        def grow(size: int) -> None:
+            nonlocal held
+            taken, mine = self._bodies.total(), self._bodies[client]
+            if taken + size > self._body_bytes or mine + size > self._body_bytes * 3 // 4:
+                raise BusyError("the bodies that are held leave no room for this one")
+            self._bodies[client] += size
+            held += size
+
+        try:
+            yield grow
+        finally:
+            self._bodies[client] -= held
+            if not self._bodies[client]:
+                del self._bodies[client]
+
+    def end_uploads(self) -> None:
+        """End what still sends its body."""
+        self._uploads.end()
+
+    def end(self) -> None:
+        """End everything that is under way."""
+        self._uploads.end()
+        self._jobs.end()
+
+
+class CutOffError(Exception):
+    """A client was too slow to take its answer, and the memory is needed."""
+
+
+class _Answers:
+    """The answers that are being taken, the oldest first."""
+
+    def __init__(self, max_bytes: int) -> None:
+        self._max_bytes = max_bytes
+        self._sizes: dict[asyncio.Timeout, int] = {}
+
+    @asynccontextmanager
+    async def held(self, size: int) -> AsyncIterator[None]:
+        self._make_room(size)
+        end = asyncio.timeout(None)
+        try:
+            async with end:
+                self._sizes[end] = size
+                try:
+                    yield
+                finally:
+                    self._sizes.pop(end, None)
+        except TimeoutError as error:
+            if not end.expired():
+                raise
+            raise CutOffError from error
+
+    def _make_room(self, size: int) -> None:
+        now = asyncio.get_running_loop().time()
+        while self._sizes and sum(self._sizes.values()) + size > self._max_bytes:
+            oldest = next(iter(self._sizes))
+            oldest.reschedule(now)
+            del self._sizes[oldest]
+
+
+class _Places:
+    """Places, a bounded number or (None) any, and those who would leave theirs when told to."""
+
+    def __init__(self, name: str, count: int | None) -> None:
+        self._name = name
+        self._count = count
+        self._ends: set[asyncio.Timeout] = set()
+        self.taken = 0
+
+    def check(self) -> None:
+        if self._count is not None and self.taken >= self._count:
+            raise BusyError(f"{self.taken} {self._name} are under way; no more fit")
+
+    @contextmanager
+    def place(self) -> Iterator[None]:
+        self.check()
+        self.taken += 1
+        try:
+            yield
+        finally:
+            self.taken -= 1
+
+    @asynccontextmanager
+    async def until_ended(self) -> AsyncIterator[None]:
+        end = asyncio.timeout(None)
+        try:
+            async with end:
+                self._ends.add(end)
+                try:
+                    yield
+                finally:
+                    self._ends.discard(end)
+        except TimeoutError as error:
+            if not end.expired():
+                raise
+            raise DrainingError("the request was ended", retry_after=5) from error
+
+    def end(self) -> None:
+        now = asyncio.get_running_loop().time()
+        while self._ends:
+            self._ends.pop().reschedule(now)

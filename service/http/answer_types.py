@@ -1,0 +1,21 @@
+"""What an answer is sent as: the file, the file as plain bytes, or its report."""
+
+from __future__ import annotations
+
+from fastapi import Request
+
+from ..bodies import media
+
+BYTES = "application/octet-stream"
+
+
+def answer_type(request: Request, *, report: bool = False) -> str:
+    """The media type that the client wants most; `report` where the route has nothing else.
+
+    Generated clients know a file by `application/octet-stream` alone, and may ask for that.
+    """
+    if report:
+        return media.JSON
+    accept = request.headers.get("accept", "*/*")
+    # In the order of preference among equals.
+    return max((media.GLB, media.JSON, BYTES), key=lambda kind: media.quality(kind, accept))

@@ -1,0 +1,152 @@
+"""The HTTP application."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from functools import partial
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+from fastapi import FastAPI
+from starlette.types import ASGIApp
+
+from ..settings import Settings
+from ..workers import jobs
+from ..workers.budget import FacesBudget
+from ..workers.catalogue import Catalogue
+from ..workers.costs import Cost
+from ..workers.desk import Desk
+from ..workers.jobs import Done, Work
+from ..workers.pool import Workers
+from ..workers.turns import Lane, Turns
+from . import docs_page, job_routes, layers, openapi, page, problems, routes
+from .access.keys import read_keys
+from .admission import Admission
+from .catalogue import ReadOnce
+from .job_book import JobBook
+from .service import Service
+from .watch.metrics import Metrics
+from .watch.tracing import tracer_from_environment
+
+log = logging.getLogger("pns.service")
+
+if TYPE_CHECKING:
+    from pns_common.schemes import Model
+
+
+def create_app(
+    settings: Settings | None = None,
+    model: Model | None = None,
+    *,
+    job: Callable[[Work], Done] = jobs.subdivide,
+    measure: Callable[[Work], Cost] = jobs.measure,
+    warm_up: Callable[[Model | str | None], None] = jobs.warm_up,
+    catalogue: Callable[[], Catalogue] = jobs.catalogue,
+) -> FastAPI:
+    """The application, with worker processes that live as long as its lifespan.
+
+    `settings` None reads the environment; `model` None loads `settings.model`. `job` is what a
+    worker calls for each job, `measure` what it calls to predict its cost, `warm_up` what it calls
+    once, before, `catalogue` what one of them calls once, later. A model that does not load leaves
+    the service up: /readyz says 503, scheme=loop and the other models work. Raises
+    KeysError where the file of keys cannot be used, TracingError where traces cannot be sent.
+    """
+    settings = settings or Settings()
+    source = model if model is not None else settings.model
+    warm = partial(warm_up, source)
+    workers = {
+        Lane.ANY: Workers(settings.workers, settings.job_seconds, warm),
+        Lane.SHORT: Workers(1, settings.job_seconds, warm),
+    }
+    desk = Desk(
+        workers,
+        Turns(settings.workers, settings.queue, settings.short_seconds),
+        FacesBudget(),
+        run=job,
+        measure=measure,
+        job_seconds=settings.job_seconds,
+    )
+    book = JobBook(
+        seconds=settings.result_seconds,
+        max_bytes=int(settings.result_bytes),
+        max_jobs=settings.results,
+    )
+    admission = Admission(
+        uploads=settings.uploads,
+        # Two at least: of which one client may hold one and a half.
+        body_bytes=max(settings.places, 2) * int(settings.body),
+        answer_bytes=int(settings.answer_bytes),
+    )
+
+    metrics = Metrics()
+    _show(metrics, desk, book)
+    tracer = tracer_from_environment()
+    keys = None if settings.keys_file is None else read_keys(settings.keys_file)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        if keys is None:
+            log.warning("open to everybody: no PNS_KEYS_FILE is set")
+        else:
+            log.info("open to the bearers of %d keys", len(keys))
+        for pool in workers.values():
+            pool.start()
+        try:
+            yield
+        finally:
+            await book.close()
+            for pool in workers.values():
+                await pool.stop()
+
+    app = _Layered(
+        title="PNS",
+        summary="Subdivision surfaces with a small, bounded, learned correction",
+        version=version("pns-subdivision"),
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        # Its spans would hold paths and queries; ours do not.
+        telemetry={"tracing": False, "metrics": False, "logs": False},
+        generate_unique_id_function=openapi.operation_id,
+    )
+    # Whoever names a route puts this before it; requests come without it.
+    app.root_path = settings.prefix
+    app.layers = lambda routes: layers.around(routes, settings, metrics, keys, tracer)
+    app.state.admission = admission
+    app.state.desk = desk
+    app.state.metrics = metrics
+    problems.install(app)
+    models = ReadOnce(workers[Lane.SHORT], admission, catalogue, metrics.catalogue)
+    service = Service(settings, workers[Lane.ANY], desk, admission, models, book)
+    app.include_router(routes.router(service))
+    app.include_router(job_routes.router(service))
+    app.include_router(docs_page.router())
+    app.openapi = openapi.Description(app)  # type: ignore[method-assign]
+    app.include_router(page.router(settings.prefix))
+    return app
+
+
+def _show(metrics: Metrics, desk: Desk, book: JobBook) -> None:
+    """What the metrics say of jobs."""
+    desk.watchers.append(
+        lambda job: metrics.job(
+            job.seconds,
+            0 if job.done is None else job.done.faces_in,
+            0 if job.done is None else job.done.faces,
+        )
+    )
+    metrics.gauge("pns_jobs_waiting", "Jobs that wait", lambda: desk.waiting)
+    metrics.gauge("pns_jobs_running", "Jobs that run or are measured", lambda: desk.running)
+    metrics.gauge("pns_result_bytes", "Results that are kept", lambda: book.bytes)
+    metrics.tally("pns_worker_restarts", "Workers replaced", "cause", lambda: desk.restarts)
+
+
+class _Layered(FastAPI):
+    """An application whose layers are outside of everything, its handler of last resort too."""
+
+    layers: Callable[[ASGIApp], ASGIApp]
+
+    def build_middleware_stack(self) -> ASGIApp:
+        return self.layers(super().build_middleware_stack())

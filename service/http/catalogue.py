@@ -1,0 +1,43 @@
+"""The catalogue of models as the server has it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..errors import check_choice
+from ..workers.catalogue import Catalogue
+from ..workers.pool import Workers
+from .admission import Admission
+
+
+class ReadOnce:
+    """The catalogue as the server has it: read in a worker when it is first wanted, then kept.
+
+    `heard` is called with it once.
+    """
+
+    def __init__(
+        self,
+        workers: Workers,
+        admission: Admission,
+        read: Callable[[], Catalogue],
+        heard: Callable[[Catalogue], None] = lambda catalogue: None,
+    ) -> None:
+        self._workers = workers
+        self._admission = admission
+        self._read = read
+        self._heard = heard
+        self._catalogue: Catalogue | None = None
+
+    async def get(self) -> Catalogue:
+        """The catalogue. Raises ServiceError where no worker can read it now."""
+        if self._catalogue is None:
+            async with self._admission.working():
+                self._catalogue = await self._workers.run(self._read)
+            self._heard(self._catalogue)
+        return self._catalogue
+
+    async def check(self, name: str | None) -> None:
+        """Raises InvalidParameter where there is no model of that name; None is always right."""
+        if name is not None:
+            check_choice("model", name, (await self.get()).names)

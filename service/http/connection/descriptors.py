@@ -1,0 +1,49 @@
+"""How many connections fit under the limit on open files, so that accepting never fails."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ...settings import Settings
+
+log = logging.getLogger("pns.service")
+
+# A worker takes pipes and a sentinel; the rest are libraries, models, logs and listening sockets.
+OF_WORKER = 16
+OF_PROCESS = 128
+# The body, the answer, the report and the page of a job.
+OF_REQUEST = 4
+# What is kept of one that is done: its answer and its report.
+OF_RESULT = 2
+
+
+def fitting(settings: Settings) -> int:
+    """`settings.connections`, or as many as there are descriptors for; raises the limit first.
+
+    Raises:
+        OSError: there are not descriptors enough for a single connection.
+    """
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit.
+        return settings.connections
+    # Short jobs have a worker and places of their own.
+    requests = settings.places + settings.queue + 1 + settings.uploads
+    reserved = OF_PROCESS + OF_WORKER * (settings.workers + 1) + OF_REQUEST * requests
+    reserved += OF_RESULT * settings.results
+    wanted = reserved + settings.connections
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    if soft == resource.RLIM_INFINITY or soft >= wanted:
+        return settings.connections
+    if soft <= reserved:
+        raise OSError(
+            f"{soft} open files are allowed and {reserved + 1} needed: raise the limit "
+            "(ulimit -n), or lower PNS_UPLOADS or PNS_QUEUE"
+        )
+    log.warning("%d open files allow %d connections at most", soft, soft - reserved)
+    return soft - reserved

@@ -1,0 +1,49 @@
+"""The writing side of a connection: what the client has taken, and an end that lets it read."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+
+class Outlet:
+    """A transport that counts what is written and leaves the manner of closing to `end`.
+
+    uvicorn closes a connection when the answer is written. Where the client is still sending, the
+    system then drops what it has not read and resets the connection, and the client never sees why.
+    """
+
+    def __init__(self, transport: asyncio.Transport, end: Callable[[], None]) -> None:
+        self.real = transport
+        self._end = end
+        self._closing = False
+        self._written = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.real, name)
+
+    @property
+    def taken(self) -> int:
+        """Bytes that have left for the client."""
+        return self._written - self.real.get_write_buffer_size()
+
+    def write(self, data: bytes) -> None:
+        """Write, unless the end has begun."""
+        if not self._closing:
+            self._written += len(data)
+            self.real.write(data)
+
+    def is_closing(self) -> bool:
+        """Whether the end has begun."""
+        return self._closing or self.real.is_closing()
+
+    def close(self) -> None:
+        """Begin the end, once."""
+        if not self._closing:
+            self._closing = True
+            self._end()
+
+    def forget(self) -> None:
+        """Do nothing at a close any more: there is nothing left to close."""
+        self._closing = True

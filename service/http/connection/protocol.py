@@ -1,0 +1,333 @@
+"""One connection: uvicorn's HTTP/1.1 protocol, with deadlines, shares and an end that is heard."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import select
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any
+
+import h11
+from starlette.types import Message, Receive, Scope, Send
+from uvicorn.config import Config
+from uvicorn.protocols.http.flow_control import CLOSE_HEADER, FlowControl
+from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.server import ServerState
+
+from .crowd import Crowd
+from .outlet import Outlet
+from .pace import Pace
+from .parser import FLOODED, Parser
+from .refusal import refusal
+from .taking import Taking
+from .turns import Turns
+
+log = logging.getLogger("pns.connection")
+
+# The longest head: request line and headers together.
+HEAD_BYTES = 16 * 1024
+# One read of a socket. asyncio's own reads are four times as long, and each connection may hold
+# two: one parsed, one that waits.
+READ_BYTES = 64 * 1024
+# What is parsed in one go; a request of ordinary clients is two or three events.
+EVENTS_A_TURN = 32
+# An upload's rate is not judged before.
+RATE_SECONDS = 2.0
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What one connection may take: seconds and bytes.
+
+    `head_seconds` for a request line and its headers, from the first byte on or from the
+    connection; `answer` for the client to take what is written; `linger_seconds` for a client that
+    still sends after its answer, and `body_bytes` for all that it sends, before and after.
+    """
+
+    head_seconds: float
+    answer: Pace
+    linger_seconds: float
+    body_bytes: int
+
+
+@dataclass
+class Shared:
+    """What the connections of one server have in common."""
+
+    bounds: Bounds
+    crowd: Crowd
+    turns: Turns = field(default_factory=Turns)
+    # Filled and emptied within one callback, so one is enough for all.
+    buffer: bytearray = field(default_factory=lambda: bytearray(READ_BYTES))
+
+
+class _Flow(FlowControl):
+    """Reading resumes only where nothing that was read waits for its turn."""
+
+    held = False
+
+    def resume_reading(self) -> None:
+        if not self.held:
+            super().resume_reading()
+
+
+class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
+    """The protocol that `uvicorn.Config(http=…)` is given, bound to a `Shared`.
+
+    What uvicorn does stays; on top of it:
+
+    - a connection has a place in the crowd or is refused with 503;
+    - a head must arrive within its time, and an answer be taken at a least rate;
+    - a body is parsed in short turns and may not come in countless pieces;
+    - an answer given before the body is whole ends the connection, after it has been heard.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        server_state: ServerState,
+        app_state: dict[str, Any],
+        _loop: asyncio.AbstractEventLoop | None = None,
+        *,
+        shared: Shared,
+    ) -> None:
+        super().__init__(config, server_state, app_state, _loop)
+        self.conn: Parser = Parser(config.h11_max_incomplete_event_size or HEAD_BYTES)
+        self.app = self._application
+        self._shared = shared
+        self._address: str | None = None
+        self._head_timer: asyncio.TimerHandle | None = None
+        self._end_timer: asyncio.TimerHandle | None = None
+        self._lingering = False
+        self._linger_left = 0
+        self._asked_at = self.loop.time()
+
+    # The connection's life
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take a place, or refuse."""
+        outlet = self._outlet = Outlet(transport, self._end)
+        self._taking = Taking(outlet, self._shared.bounds.answer, self._abort)
+        super().connection_made(outlet)  # type: ignore[arg-type]
+        self.flow: _Flow = _Flow(outlet)  # type: ignore[arg-type]
+        address = self.client[0] if self.client else ""
+        refusal = self._shared.crowd.enter(address)
+        if refusal is not None:
+            log.warning("a connection is refused: %s", refusal)
+            self._say(503, "too-many-connections", refusal, b"retry-after: 5\r\n")
+            return
+        self._address = address
+        self._shared.crowd.wait(self)
+        self._await_head()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Give back whatever it held."""
+        self._outlet.forget()
+        self._taking.forget()
+        for timer in (self._head_timer, self._end_timer):
+            if timer is not None:
+                timer.cancel()
+        self._shared.turns.remove(self._more)
+        if self._address is not None:
+            self._shared.crowd.leave(self, self._address)
+            self._address = None
+        super().connection_lost(exc)
+        self._unset_keepalive_if_required()
+
+    def shutdown(self) -> None:
+        """End it where it only lingers; else let uvicorn finish what is under way."""
+        if self.transport.is_closing():
+            self._abort()
+        else:
+            super().shutdown()
+
+    # Reading
+
+    def get_buffer(self, sizehint: int) -> bytearray:
+        """Where the next read goes."""
+        return self._shared.buffer
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """Take what was read."""
+        if self._lingering:
+            self._linger_left -= nbytes
+            if self._linger_left < 0:
+                self._abort()
+        elif not self.transport.is_closing():
+            self._await_head()
+            self.data_received(bytes(memoryview(self._shared.buffer)[:nbytes]))
+
+    def handle_events(self) -> None:
+        """Parse for one turn; what is left waits for the next."""
+        self.conn.breathe(EVENTS_A_TURN)
+        super().handle_events()
+        if self.conn.their_state is not h11.IDLE:
+            self._forget_head()
+            self._say_to_crowd()
+        if self.transport.is_closing():
+            return
+        if self.conn.flooded:
+            self.flow.pause_reading()
+            self.flow.held = True
+            self.cycle.message_event.set()
+        elif self.conn.out_of_breath:
+            self.flow.pause_reading()
+            self.flow.held = True
+            self._shared.turns.add(self._more)
+
+    def _more(self) -> None:
+        """A turn: parse on, and read again where all is parsed."""
+        if self.transport.is_closing():
+            return
+        self.flow.held = False
+        self.handle_events()
+        body_waits = self.cycle is not None and len(self.cycle.body) > READ_BYTES
+        if not (self.flow.held or body_waits or self.conn.our_state is h11.DONE):
+            self.flow.resume_reading()
+
+    def _say_to_crowd(self) -> None:
+        crowd = self._shared.crowd
+        if self.conn.their_state is h11.SEND_BODY:
+            crowd.send(self)
+        else:
+            crowd.work(self)
+
+    def is_idle(self) -> bool:
+        """Whether its client has said nothing: a head that waits in the socket is something."""
+        if self.conn.trailing_data[0]:
+            return True
+        readable = select.poll()
+        readable.register(self.transport.get_extra_info("socket").fileno(), select.POLLIN)
+        return not readable.poll(0)
+
+    def upload_rate(self) -> float:
+        """Bytes a second of its body, once there is time enough to tell."""
+        seconds = self.loop.time() - self._asked_at
+        return self.conn.body_bytes / seconds if seconds > RATE_SECONDS else inf
+
+    def give_way(self) -> None:
+        """End, for a new connection."""
+        self._abort()
+
+    def send_400_response(self, msg: str) -> None:
+        """Refuse what is no HTTP; a body that stops being HTTP, too, where nothing is said yet."""
+        if self.cycle is not None and not self.cycle.response_complete:
+            self.cycle.disconnected = True
+            self.cycle.message_event.set()
+        if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
+            self._say(self.conn.status_hint, "invalid-http", msg)
+        else:
+            self.transport.close()
+
+    def _unsupported_upgrade_warning(self) -> None:
+        """Say nothing: anyone may ask, and it is served as if it had not."""
+
+    # The head
+
+    def _await_head(self) -> None:
+        """Start the clock of a head, where it does not run and no request is under way."""
+        if self._head_timer is None and self.conn.their_state is h11.IDLE:
+            seconds = self._shared.bounds.head_seconds
+            self._head_timer = self.loop.call_later(seconds, self._head_is_late)
+
+    def _forget_head(self) -> None:
+        if self._head_timer is not None:
+            self._head_timer.cancel()
+            self._head_timer = None
+
+    def _head_is_late(self) -> None:
+        self._head_timer = None
+        if self.conn.trailing_data[0]:
+            seconds = self._shared.bounds.head_seconds
+            self._say(408, "head-timeout", f"no request within {seconds:g} seconds")
+        else:
+            self.transport.close()
+
+    def _say(self, status: int, code: str, detail: str, more: bytes = b"") -> None:
+        """Answer what never became a request, and end the connection."""
+        self.transport.write(refusal(status, code, detail, more))
+        self.transport.close()
+
+    # The answer
+
+    async def _application(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """The application; an answer before the body is whole says that the connection ends."""
+        parser = self.conn
+        self._taking.begin()
+        self._asked_at = self.loop.time()
+        scope.setdefault("extensions", {})[FLOODED] = lambda: parser.flooded
+
+        async def send_and_close(message: Message) -> None:
+            if message["type"] == "http.response.start" and parser.their_state is h11.SEND_BODY:
+                # A copy, and bytes: an application may reuse its list, and give any pairs.
+                headers = [pair for pair in message["headers"] if pair[0].lower() != b"connection"]
+                message = {**message, "headers": [*headers, CLOSE_HEADER]}
+            await send(message)
+
+        # Starlette and uvicorn name the same things by types of their own.
+        await self.config.loaded_app(scope, receive, send_and_close)  # pyright: ignore[reportArgumentType]
+
+    def on_response_complete(self) -> None:
+        """Rest, or go on with what has come meanwhile."""
+        super().on_response_complete()
+        if self.transport.is_closing():
+            return
+        if self.conn.their_state is h11.IDLE:
+            self._shared.crowd.wait(self)
+            if self.conn.trailing_data[0]:
+                self._await_head()
+
+    def pause_writing(self) -> None:
+        """The client has more to take than it takes: its clock runs."""
+        super().pause_writing()
+        self._taking.fall_behind()
+
+    def resume_writing(self) -> None:
+        """The client has caught up: its clock stands."""
+        self._taking.catch_up()
+        if self.transport.is_closing():
+            self._abort_after(self._shared.bounds.answer.idle)
+        super().resume_writing()
+
+    # The end
+
+    def _end(self) -> None:
+        """Close; where the client may still be sending, half, until it has heard."""
+        self._forget_head()
+        self._unset_keepalive_if_required()
+        self._shared.crowd.work(self)
+        real, bounds = self._outlet.real, self._shared.bounds
+        if self._is_heard():
+            real.close()
+            if not self._taking.waits:
+                self._abort_after(bounds.answer.idle)
+        elif not real.is_closing():
+            self._lingering = True
+            self._linger_left = bounds.body_bytes - self.conn.body_bytes
+            self._abort_after(bounds.linger_seconds)
+            if real.can_write_eof():
+                real.write_eof()
+            if not real.is_reading():
+                real.resume_reading()
+
+    def _is_heard(self) -> bool:
+        """Whether nothing more is expected of the client; of those without a place, nothing is."""
+        if self._address is None:
+            return True
+        if self.conn.their_state is h11.IDLE:
+            return not self.conn.trailing_data[0]
+        return self.conn.their_state in (h11.DONE, h11.MUST_CLOSE, h11.CLOSED)
+
+    def eof_received(self) -> None:
+        """The client sends no more; asyncio closes, once what is written is taken."""
+        if not self._taking.waits:
+            self._abort_after(self._shared.bounds.answer.idle)
+
+    def _abort_after(self, seconds: float) -> None:
+        if self._end_timer is None:
+            self._end_timer = self.loop.call_later(seconds, self._abort)
+
+    def _abort(self) -> None:
+        self._outlet.real.abort()

@@ -1,0 +1,71 @@
+"""How a client takes its answer: at a least rate, or not at all."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+from .outlet import Outlet
+from .pace import Pace
+
+log = logging.getLogger("pns.connection")
+
+# How often a client that takes its answer slowly is looked at.
+TICK_SECONDS = 0.5
+
+
+class Taking:
+    """Watches what leaves an outlet while it is full; `late` is called where the pace is not kept.
+
+    Only the time in which the client has more to take than it takes is counted.
+    """
+
+    def __init__(self, outlet: Outlet, pace: Pace, late: Callable[[], None]) -> None:
+        self._outlet = outlet
+        self._pace = pace
+        self._late = late
+        self._clock = asyncio.get_running_loop()
+        self._timer: asyncio.TimerHandle | None = None
+        self._waited = 0.0
+        self._full_since = 0.0
+        self._moved = (0, 0.0)
+        self._from = 0
+
+    @property
+    def waits(self) -> bool:
+        """Whether the client has more to take than it takes."""
+        return self._timer is not None
+
+    def begin(self) -> None:
+        """Another answer begins."""
+        self._waited, self._from = 0.0, self._outlet.taken
+
+    def fall_behind(self) -> None:
+        """The outlet is full: the client's clock runs."""
+        self._full_since = self._clock.time()
+        self._moved = (self._outlet.taken, self._full_since)
+        self._timer = self._clock.call_later(TICK_SECONDS, self._look)
+
+    def catch_up(self) -> None:
+        """The outlet has room: the client's clock stands."""
+        if self._timer is not None:
+            self.forget()
+            self._waited += self._clock.time() - self._full_since
+
+    def forget(self) -> None:
+        """There is nobody to watch any more."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _look(self) -> None:
+        now, taken = self._clock.time(), self._outlet.taken
+        if taken > self._moved[0]:
+            self._moved = (taken, now)
+        moved, waited = taken - self._from, self._waited + now - self._full_since
+        if now - self._moved[1] >= self._pace.idle or self._pace.patience(moved, waited) <= 0:
+            log.warning("an answer is cut off: %s", self._pace.excuse(moved, waited))
+            self._late()
+        else:
+            self._timer = self._clock.call_later(TICK_SECONDS, self._look)

@@ -1,0 +1,112 @@
+"""From a request to a job: its parameters are checked, its body is taken in."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from fastapi import Request
+
+from ..bodies import media
+from ..errors import InvalidParameter, MediaTypeError, check_limit
+from ..request_ids import REQUEST_ID
+from ..workers.job import Job
+from ..workers.jobs import Work
+from ..workers.memory_file import MemoryFile
+from ..workers.progress import ProgressPage
+from .clients import Client, client_of
+from .parameters import Parameters
+from .service import Service
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a request wants made, and where: in a `folder` on disk, or (None) in memory.
+
+    `patience` is how long its job may take from its admission, waiting included.
+    """
+
+    answer: bool
+    report: bool
+    folder: Path | None
+    patience: float
+
+
+@asynccontextmanager
+async def taken_in(
+    service: Service, request: Request, parameters: Parameters, wanted: Wanted
+) -> AsyncIterator[Job]:
+    """The job of a request, once its body is there. The body's bytes are counted until the end.
+
+    Whoever takes the job lets go of what is wanted; where this raises, nothing is left.
+
+    Raises:
+        ServiceError: the parameters are wrong, the body does not arrive, or there is no room.
+    """
+    settings = service.settings
+    _refuse_repeated(request)
+    options = parameters.options()
+    await service.models.check(parameters.model)
+    check_limit("levels", options.levels, settings.levels, f"levels is {options.levels}")
+    content_type = request.headers.get("content-type", "")
+    media.of_request(content_type)
+    if request.headers.get("content-encoding", "identity").lower() != "identity":
+        raise MediaTypeError("a compressed body (Content-Encoding) is not supported")
+    client = client_of(request, settings)
+    # It would be sent for nothing.
+    service.desk.turns.check_room(client.id)
+
+    async with AsyncExitStack() as held:
+        began = time.perf_counter()
+        grow = held.enter_context(service.admission.body(client.id))
+        with ExitStack() as files:
+            body = files.enter_context(MemoryFile())
+            async with service.admission.upload():
+                async for piece in request.stream():
+                    grow(len(piece))
+                    body.append(piece)
+            page = files.enter_context(ProgressPage())
+            answer = files.enter_context(MemoryFile(wanted.folder)) if wanted.answer else None
+            report = files.enter_context(MemoryFile(wanted.folder)) if wanted.report else None
+            job = Job(
+                client=client.id,
+                faces_per_minute=client.faces_per_minute,
+                work=Work(
+                    body=body.name,
+                    answer=None if answer is None else answer.name,
+                    report=None if report is None else report.name,
+                    page=page.file.name,
+                    content_type=content_type,
+                    options=options,
+                    model=parameters.model,
+                    limits=settings.job_limits(),
+                    answer_bytes=None if wanted.folder is None else int(settings.result_bytes),
+                    request_id=REQUEST_ID.get(),
+                ),
+                body=body,
+                answer=answer,
+                report=report,
+                page=page,
+                upload_seconds=time.perf_counter() - began,
+                must_end=time.monotonic() + wanted.patience,
+            )
+            # From here on they are the job's.
+            files.pop_all()
+        yield job
+
+
+def owner_of(client: Client) -> str | None:
+    """Who alone may see what a client makes; None: everybody who knows its id."""
+    return client.id if client.named else None
+
+
+def _refuse_repeated(request: Request) -> None:
+    """Of a parameter that is given twice, one value would be lost without a word."""
+    given = Counter(name for name, _ in request.query_params.multi_items())
+    for name, count in given.items():
+        if count > 1:
+            raise InvalidParameter(name, f"{name} is given {count} times")

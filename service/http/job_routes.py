@@ -1,0 +1,190 @@
+"""Jobs: hand in a file, come back for the result."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, ExitStack
+from pathlib import Path
+from tempfile import gettempdir
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
+from starlette.responses import JSONResponse, Response, StreamingResponse
+
+from ..bodies import media
+from ..errors import ServiceError
+from ..workers.job import Job, State
+from ..workers.worker import JobFaultError
+from . import documentation, problems
+from .admission import DrainingError
+from .answer import FileAnswer
+from .answer_types import answer_type
+from .clients import client_of
+from .intake import Wanted, owner_of, taken_in
+from .job_book import Entry, NotDoneError
+from .parameters import Parameters
+from .service import Service
+
+# How often the page of a running job is looked at, and how long a stream may be silent.
+LOOK_SECONDS = 0.25
+SILENT_SECONDS = 15.0
+# While the service shuts down: how long it waits for somebody to fetch a result.
+FETCH_SECONDS = 10.0
+
+log = logging.getLogger("pns.service")
+
+
+def router(service: Service) -> APIRouter:
+    """The routes, bound to one service."""
+    routes = APIRouter(tags=["jobs"])
+
+    @routes.post("/jobs", status_code=202, **documentation.JOBS)
+    async def create_job(request: Request, parameters: Annotated[Parameters, Query()]) -> Response:
+        entry = await _hand_in(service, request, parameters)
+        # Relative to /jobs, so that it holds under any root path.
+        headers = {"Location": f"{request.scope.get('root_path', '')}/jobs/{entry.job.id}"}
+        return JSONResponse(job_json(service, entry.job), 202, headers=headers)
+
+    @routes.get("/jobs/{job_id}", **documentation.JOB)
+    async def read_job(request: Request, job_id: str) -> Response:
+        entry = _entry(service, request, job_id)
+        return JSONResponse(job_json(service, entry.job), headers={"Cache-Control": "no-store"})
+
+    @routes.get("/jobs/{job_id}/events", response_class=StreamingResponse, **documentation.EVENTS)
+    async def read_job_events(request: Request, job_id: str) -> Response:
+        entry = _entry(service, request, job_id)
+        return StreamingResponse(
+            _events(service, entry.job),
+            media_type="text/event-stream",
+            # A proxy that collects the stream (nginx) would keep it until its end.
+            headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
+        )
+
+    @routes.get("/jobs/{job_id}/result", response_class=Response, **documentation.RESULT)
+    async def read_job_result(request: Request, job_id: str) -> Response:
+        return _result(service, _entry(service, request, job_id).job, answer_type(request))
+
+    @routes.get("/jobs/{job_id}/report", response_class=Response, **documentation.JOB_REPORT)
+    async def read_job_report(request: Request, job_id: str) -> Response:
+        return _result(service, _entry(service, request, job_id).job, media.JSON)
+
+    @routes.delete("/jobs/{job_id}", status_code=204, **documentation.DELETE_JOB)
+    async def delete_job(request: Request, job_id: str) -> Response:
+        entry = _entry(service, request, job_id)
+        if entry.job.state.ended:
+            service.book.forget(job_id)
+        elif entry.task is not None:
+            entry.task.cancel()
+            await asyncio.wait({entry.task})
+        return Response(status_code=204)
+
+    return routes
+
+
+def job_json(service: Service, job: Job) -> dict[str, Any]:
+    """A job as its client sees it."""
+    queued = job.state is State.QUEUED
+    estimate = service.desk.remaining(job)
+    return {
+        "id": job.id,
+        "state": str(job.state),
+        "queue_place": service.desk.place(job) if queued else None,
+        "stage": job.page.stage if job.state is State.RUNNING else None,
+        "share": round(job.share, 4),
+        "estimate_seconds": None if estimate is None else round(estimate, 1),
+        "faces": None if job.cost is None else job.cost.faces,
+        "problem": None
+        if job.error is None
+        else json.loads(bytes(problems.of_job(job.error).body)),
+    }
+
+
+async def _hand_in(service: Service, request: Request, parameters: Parameters) -> Entry:
+    """Take a file in, and its job until it stands in line. Raises ServiceError."""
+    settings = service.settings
+    wanted = Wanted(
+        answer=True,
+        report=True,
+        folder=settings.result_folder or Path(gettempdir()),
+        patience=settings.queue_seconds + settings.job_seconds,
+    )
+    async with AsyncExitStack() as held:
+        job = await held.enter_async_context(taken_in(service, request, parameters, wanted))
+        entry = service.book.add(job, owner_of(client_of(request, settings)))
+        entry.task = asyncio.create_task(_work(service, job, held.pop_all()))
+    await job.accepted.wait()
+    if job.error is not None and job.waiting is None:
+        # Refused before it stood in line: there is nothing to come back for.
+        service.book.forget(job.id)
+        raise job.error
+    return entry
+
+
+async def _work(service: Service, job: Job, held: AsyncExitStack) -> None:
+    """A job that no connection waits for, to its end; while shutting down, to its fetching."""
+    async with held:
+        try:
+            async with service.admission.working():
+                await service.desk.serve(job)
+        except DrainingError:
+            pass
+        except ServiceError as error:
+            log.info("a job failed: %s", error.code)
+        except JobFaultError as error:
+            # The traceback that matters is the worker's.
+            log.error("a job failed in its worker:\n%s", error)  # noqa: TRY400
+        finally:
+            service.book.keep(job)
+    if service.admission.draining and job.state is State.DONE:
+        async with service.admission.working():
+            await asyncio.wait({asyncio.ensure_future(job.fetched.wait())}, timeout=FETCH_SECONDS)
+
+
+async def _events(service: Service, job: Job) -> AsyncIterator[str]:
+    """The job as server-sent events, one for each change, until it has ended."""
+    said, silent = "", 0.0
+    while True:
+        ended = job.state.ended
+        now = json.dumps(job_json(service, job), separators=(",", ":"))
+        if now != said:
+            said, silent = now, 0.0
+            yield f"event: progress\ndata: {now}\n\n"
+        elif silent >= SILENT_SECONDS:
+            silent = 0.0
+            yield ": still there\n\n"
+        if ended:
+            return
+        try:
+            async with asyncio.timeout(LOOK_SECONDS):
+                await job.ended.wait()
+        except TimeoutError:
+            silent += LOOK_SECONDS
+
+
+def _result(service: Service, job: Job, kind: str) -> Response:
+    if job.state is State.FAILED and job.error is not None:
+        return problems.of_job(job.error)
+    if job.state is not State.DONE:
+        raise NotDoneError(f"the job is {job.state}")
+    file = job.report if kind == media.JSON else job.answer
+    if file is None:
+        raise NotDoneError("the job was not to make this")
+    file.hold()
+    held = ExitStack()
+    held.callback(file.release)
+    held.callback(job.fetched.set)
+    return FileAnswer(
+        file,
+        held,
+        service.admission,
+        media_type=kind,
+        headers={"Vary": "Accept", "Cache-Control": "no-store"},
+        stall_seconds=service.settings.stall_seconds,
+    )
+
+
+def _entry(service: Service, request: Request, job_id: str) -> Entry:
+    return service.book.find(job_id, client_of(request, service.settings).id)

@@ -1,0 +1,64 @@
+"""The layers around the routes, from the outside in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from starlette.middleware.cors import CORSMiddleware
+from starlette.types import ASGIApp
+
+from ..settings import Settings
+from .access.bearer import Bearer
+from .access.forwarded import Forwarded
+from .access.keys import Entry
+from .body_limits import BodyLimit
+from .connection.pace import Pace
+from .head import Head
+from .watch.journal import Journal
+from .watch.metrics import Metrics
+from .watch.tracing import Traced
+
+if TYPE_CHECKING:
+    from opentelemetry.trace import Tracer
+
+# What a page of another origin may read of an answer beside its body.
+EXPOSED = ("ETag", "Location", "Retry-After", "Server-Timing", "X-Request-ID")
+
+
+def around(
+    app: ASGIApp,
+    settings: Settings,
+    metrics: Metrics,
+    keys: dict[str, Entry] | None,
+    tracer: Tracer | None = None,
+) -> ASGIApp:
+    """`app` with everything that is done for every request.
+
+    `keys` None: it is open to everybody; `tracer` None: nothing is traced.
+    """
+    app = Head(app)
+    app = BodyLimit(app, max_bytes=int(settings.body), pace=upload_pace(settings))
+    if keys is not None:
+        app = Bearer(app, keys)
+    if settings.cors_origins:
+        app = CORSMiddleware(
+            app,
+            allow_origins=settings.cors_origins,
+            allow_methods=["GET", "POST", "DELETE"],
+            allow_headers=["Authorization", "Content-Type", "X-Request-ID"],
+            expose_headers=EXPOSED,
+        )
+    app = Journal(app, (metrics.request,))
+    if tracer is not None:
+        app = Traced(app, tracer)
+    return Forwarded(app, settings.proxies)
+
+
+def upload_pace(settings: Settings) -> Pace:
+    """How fast a body must come."""
+    return Pace(
+        rate=int(settings.rate),
+        grace=settings.grace_seconds,
+        idle=settings.idle_seconds,
+        whole=settings.upload_seconds,
+    )

@@ -1,0 +1,72 @@
+"""The description of the service, such that generators make working clients of it.
+
+Generators want names: one schema for problems and one for jobs, by reference; an id for each
+operation; a file as `application/octet-stream`; one kind of answer for one operation.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.routing import APIRoute
+
+from . import documentation
+from .problems import MEDIA_TYPE
+
+# What every route may answer, whatever it is asked; the rest is with the routes.
+EVERYWHERE = {
+    "401": "A key is needed, or the one sent is not known",
+    "429": "Too much was asked for, or too many wrong keys (see Retry-After)",
+}
+OPEN_TAG = "probes"
+
+
+def operation_id(route: APIRoute) -> str:
+    """The name of the function: it is the clients' name of it, too."""
+    return route.name
+
+
+class Description:
+    """Makes the document once, when it is first asked for; FastAPI calls it for /openapi.json."""
+
+    def __init__(self, app: FastAPI) -> None:
+        self._make = app.openapi
+        self._document: dict[str, Any] | None = None
+
+    def __call__(self) -> dict[str, Any]:
+        """The document."""
+        if self._document is None:
+            self._document = _described(self._make())
+        return self._document
+
+
+def _described(document: dict[str, Any]) -> dict[str, Any]:
+    components = document.setdefault("components", {})
+    schemas = components.setdefault("schemas", {})
+    schemas |= documentation.SCHEMAS
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            responses = operation["responses"]
+            # FastAPI's own errors are never sent: ours are problems.
+            if responses.get("422", {}).get("content", {}).get("application/json"):
+                responses["422"] = _problem("A bad parameter")
+            if OPEN_TAG not in operation.get("tags", ()):
+                for status, text in EVERYWHERE.items():
+                    responses.setdefault(status, _problem(text))
+                operation["security"] = [{}, {"key": []}]
+    for name in ("HTTPValidationError", "ValidationError"):
+        schemas.pop(name, None)
+    components["securitySchemes"] = {
+        "key": {
+            "type": "http",
+            "scheme": "bearer",
+            "description": "needed where the service has keys",
+        }
+    }
+    return document
+
+
+def _problem(text: str) -> dict[str, Any]:
+    schema = {"$ref": "#/components/schemas/Problem"}
+    return {"description": text, "content": {MEDIA_TYPE: {"schema": schema}}}

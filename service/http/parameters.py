@@ -1,0 +1,116 @@
+"""The query parameters of POST /subdivide."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+from ..options import (
+    CREASE_PATTERN,
+    DEFAULTS,
+    MAX_LEVELS,
+    MAX_WELD_TOLERANCE,
+    Compression,
+    Diagnostics,
+    NormalRule,
+    Options,
+    SchemeName,
+    UvRule,
+)
+
+Finite = Field(allow_inf_nan=False)
+
+
+def _empty_is_absent(value: Any) -> Any:
+    """`budget=` in a URL means the same as no budget at all."""
+    return None if value == "" else value
+
+
+def _length(value: Any) -> float | Literal["auto"]:
+    """One sentence for a value that is neither, where a union would explain only one of the two."""
+    if value == "auto":
+        return "auto"
+    try:
+        length = float(value)
+    except (TypeError, ValueError):
+        length = math.nan
+    if not (math.isfinite(length) and length > 0):
+        raise PydanticCustomError("reference_length", "it must be 'auto' or a finite number > 0")
+    return length
+
+
+class Parameters(BaseModel):
+    """What a client may ask for; another name is an error, since a misspelt one would be lost."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    levels: int = Field(
+        default=DEFAULTS.levels,
+        ge=1,
+        le=MAX_LEVELS,
+        description="depth: each level makes four faces of one",
+    )
+    scheme: SchemeName = Field(
+        default=DEFAULTS.scheme,
+        description="`loop` is the same path without the learned correction",
+    )
+    model: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
+        default=None,
+        description="a name from `GET /models`; empty: the service's default. `scheme=loop` has no "
+        "use for it, nor for `budget`: both are checked and nothing else",
+    )
+    budget: Annotated[
+        Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,
+        BeforeValidator(_empty_is_absent),
+    ] = Field(default=DEFAULTS.budget, description="C, dimensionless; empty: the model's own")
+    reference_length: Annotated[
+        Literal["auto"] | Annotated[float, Field(gt=0, allow_inf_nan=False)],
+        BeforeValidator(_length),
+    ] = Field(
+        default=DEFAULTS.reference_length,
+        description="R, the unit of length of the budget; `auto` measures each mesh",
+    )
+    diagnostics: Diagnostics = Field(
+        default=DEFAULTS.diagnostics,
+        description="`full` adds the vertex attributes `_PNS_RATIO` and `_PNS_GATE`",
+    )
+    uv: UvRule = Field(
+        default=DEFAULTS.uv,
+        description="`smooth`: Loop's stencil inside charts; their boundaries stay linear",
+    )
+    normals: NormalRule = Field(
+        default=DEFAULTS.normals,
+        description="`keep`: hard edges of the file stay hard, and what has no normals "
+        "stays without; `smooth`: new ones everywhere, smooth but across creases; "
+        "`limit`: the same, and exactly those of the limit surface (with `limit=true`)",
+    )
+    crease: str = Field(
+        default=DEFAULTS.crease,
+        pattern=f"^({CREASE_PATTERN})$",
+        description="edges to keep sharp: `off`, `normals` (where the two sides carry different "
+        "normals) or `angle:` and degrees (where the faces meet at more)",
+    )
+    weld_tolerance: float = Field(
+        default=DEFAULTS.weld_tolerance,
+        ge=0,
+        le=MAX_WELD_TOLERANCE,
+        allow_inf_nan=False,
+        description="join vertices nearer than this times R; 0: exactly equal ones alone",
+    )
+
+    compress: Compression = Field(
+        default=DEFAULTS.compress,
+        description="`meshopt` is exact; `draco` is smaller, and rounds positions, normals and UVs",
+    )
+    limit: bool = Field(
+        default=DEFAULTS.limit,
+        description="put the vertices where Loop's rules would take them in the end: on the limit "
+        "surface",
+    )
+
+    def options(self) -> Options:
+        """The same as the pipeline takes them: all but the model, which is not its to find."""
+        return Options(**self.model_dump(exclude={"model"}))

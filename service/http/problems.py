@@ -1,0 +1,158 @@
+"""Errors as RFC 9457 problem documents: one shape for every status, and never a stack trace."""
+
+from __future__ import annotations
+
+import logging
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.responses import Response
+from starlette.types import Receive, Scope, Send
+
+from ..errors import BusyError, InvalidParameter, LimitError, ServiceError, UnauthorizedError
+from ..request_ids import REQUEST_ID
+from ..workers.worker import JobFaultError
+
+MEDIA_TYPE = "application/problem+json"
+
+log = logging.getLogger("pns.service")
+
+
+class Problem(BaseModel):
+    """The problem document, as the API's description shows it."""
+
+    type: str = Field(examples=["urn:pns:problem:invalid-parameter"])
+    title: str
+    status: int
+    detail: str
+    code: str = Field(description="stable slug to branch on")
+    pointer: str | None = Field(default=None, description="JSON pointer of the offending value")
+    parameter: str | None = Field(default=None, description="name of the offending parameter")
+    choices: list[str] | None = Field(default=None, description="what the parameter may be")
+    limit: str | None = Field(default=None, description="name of the limit that was exceeded")
+    allowed: float | None = Field(default=None, description="the limit's value")
+    found: float | None = Field(default=None, description="what this request would have taken")
+    request_id: str | None = Field(
+        default=None, description="the request's id, as in X-Request-ID and in the service's log"
+    )
+
+
+def problem(
+    status: int,
+    code: str,
+    title: str,
+    detail: str,
+    *,
+    headers: dict[str, str] | None = None,
+    **members: Any,
+) -> JSONResponse:
+    """One problem document; members that are None are left out."""
+    body = {
+        "type": f"urn:pns:problem:{code}",
+        "title": title,
+        "status": status,
+        "detail": detail,
+        "code": code,
+    }
+    members["request_id"] = REQUEST_ID.get()
+    body |= {name: value for name, value in members.items() if value is not None}
+    return ProblemResponse(body, status, headers=headers)
+
+
+class ProblemResponse(JSONResponse):
+    """A problem document, whose code goes into the journal."""
+
+    media_type = MEDIA_TYPE
+
+    def __init__(
+        self, content: dict[str, Any], status: int, headers: dict[str, str] | None = None
+    ) -> None:
+        super().__init__(content, status, headers=headers)
+        self.code = content["code"]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send it."""
+        scope.setdefault("state", {})["problem"] = self.code
+        await super().__call__(scope, receive, send)
+
+
+def of_service_error(error: ServiceError) -> JSONResponse:
+    """The document of an error that the service foresees."""
+    members: dict[str, Any] = {"pointer": error.pointer}
+    headers: dict[str, str] = {}
+    match error:
+        case LimitError():
+            members |= {"limit": error.limit, "allowed": error.allowed, "found": error.found}
+        case InvalidParameter():
+            members |= {"parameter": error.name, "choices": list(error.choices) or None}
+        case BusyError():
+            headers["Retry-After"] = str(error.retry_after)
+    if isinstance(error, UnauthorizedError):
+        headers["WWW-Authenticate"] = 'Bearer realm="pns"'
+    if error.status in (408, 413):
+        # What is left of the body is not read, so the connection cannot serve another request.
+        headers["Connection"] = "close"
+    return problem(error.status, error.code, error.title, error.detail, headers=headers, **members)
+
+
+def of_job(error: Exception) -> JSONResponse:
+    """The document of the error that a job ended with."""
+    return of_service_error(error) if isinstance(error, ServiceError) else internal_error()
+
+
+def _of_validation_error(error: RequestValidationError) -> JSONResponse:
+    first = error.errors()[0]
+    name = next((str(part) for part in first["loc"][1:]), "")
+    kind = InvalidParameter(name, f"{name}: {first['msg']}")
+    return of_service_error(kind)
+
+
+def _of_http_exception(error: HTTPException) -> JSONResponse:
+    title = HTTPStatus(error.status_code).phrase
+    code = title.lower().replace(" ", "-")
+    headers = dict(error.headers or {})
+    return problem(error.status_code, code, title, str(error.detail), headers=headers)
+
+
+def internal_error() -> JSONResponse:
+    """A fault of ours: plain, because its details belong in the log."""
+    return problem(500, "internal-error", "Internal error", "The service failed; it is logged.")
+
+
+def install(app: FastAPI) -> None:
+    """Make every error of `app` a problem document."""
+
+    @app.exception_handler(ServiceError)
+    async def service_error(request: Request, error: ServiceError) -> JSONResponse:
+        if error.status >= 500:
+            log.warning("%s: %s", error.code, error)
+        return of_service_error(error)
+
+    @app.exception_handler(RequestValidationError)
+    async def validation_error(request: Request, error: RequestValidationError) -> JSONResponse:
+        return _of_validation_error(error)
+
+    @app.exception_handler(HTTPException)
+    async def http_exception(request: Request, error: HTTPException) -> JSONResponse:
+        return _of_http_exception(error)
+
+    @app.exception_handler(JobFaultError)
+    async def job_fault(request: Request, error: JobFaultError) -> JSONResponse:
+        log.error("a job failed in its worker:\n%s", error)
+        return internal_error()
+
+    @app.exception_handler(ClientDisconnect)
+    async def client_disconnect(request: Request, error: ClientDisconnect) -> Response:
+        # Nobody reads it; the number is the one that proxies log for this.
+        return Response(status_code=499)
+
+    # Starlette answers with this and raises the error again, so that the server logs it.
+    @app.exception_handler(Exception)
+    async def fault(request: Request, error: Exception) -> JSONResponse:
+        return internal_error()

@@ -1,0 +1,130 @@
+"""The routes: a refined file, the models, and two probes for whoever runs the service."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Coroutine
+from contextlib import ExitStack
+from typing import Annotated, Any, TypeVar
+
+from fastapi import APIRouter, Query, Request
+from starlette.requests import ClientDisconnect
+from starlette.responses import JSONResponse, Response
+from starlette.types import Receive
+
+from ..bodies import media
+from ..errors import NoModelError
+from ..workers.catalogue import ModelEntry
+from ..workers.job import Job
+from . import documentation
+from .admission import DrainingError
+from .answer import FileAnswer
+from .answer_types import answer_type
+from .intake import Wanted, taken_in
+from .limits import LimitsEntry, limits_of
+from .parameters import Parameters
+from .service import Service
+
+log = logging.getLogger("pns.service")
+
+T = TypeVar("T")
+
+
+def router(service: Service) -> APIRouter:
+    """The routes, bound to one service."""
+    routes = APIRouter()
+
+    @routes.post("/subdivide", response_class=Response, **documentation.SUBDIVIDE)
+    async def subdivide(request: Request, parameters: Annotated[Parameters, Query()]) -> Response:
+        return await _subdivide(service, request, parameters, answer_type(request))
+
+    @routes.post("/report", response_class=Response, **documentation.REPORT)
+    async def report(request: Request, parameters: Annotated[Parameters, Query()]) -> Response:
+        return await _subdivide(service, request, parameters, media.JSON)
+
+    @routes.get("/models", response_model=list[ModelEntry], **documentation.MODELS)
+    async def models(request: Request) -> Response:
+        catalogue = await service.models.get()
+        # It may change when the service starts again, so a copy is asked for, and costs nothing.
+        headers = {"ETag": catalogue.tag, "Cache-Control": "no-cache"}
+        if catalogue.is_known(request.headers.get("if-none-match", "")):
+            return Response(status_code=304, headers=headers)
+        return Response(catalogue.content, headers=headers, media_type=media.JSON)
+
+    @routes.get("/limits", response_model=LimitsEntry, **documentation.LIMITS)
+    async def limits() -> LimitsEntry:
+        return limits_of(service.settings)
+
+    @routes.get("/healthz", **documentation.HEALTHZ)
+    async def healthz() -> dict[str, str]:
+        return {"status": "ok"}
+
+    @routes.get("/readyz", **documentation.READYZ)
+    async def readyz() -> JSONResponse:
+        if service.admission.draining:
+            raise DrainingError("no new request is taken", retry_after=5)
+        if not service.workers.ready:
+            raise NoModelError("no worker has loaded the model")
+        return JSONResponse({"status": "ready"})
+
+    return routes
+
+
+async def _subdivide(
+    service: Service, request: Request, parameters: Parameters, kind: str
+) -> Response:
+    """A job that its client waits for."""
+    settings = service.settings
+    report_only = kind == media.JSON
+    wanted = Wanted(not report_only, report_only, folder=None, patience=settings.job_seconds)
+
+    with ExitStack() as held:
+        async with taken_in(service, request, parameters, wanted) as job:
+            (answer,) = job.results
+            held.callback(answer.release)
+            async with service.admission.working():
+                await _unless_gone(request.receive, service.desk.serve(job))
+        timing = job.seconds | {"total": job.upload_seconds + time.monotonic() - job.admitted}
+        stages_text = _server_timing(timing)
+        _log(job, answer.size, stages_text)
+        return FileAnswer(
+            answer,
+            held.pop_all(),
+            service.admission,
+            media_type=kind,
+            headers={"Server-Timing": stages_text, "Vary": "Accept"},
+            stall_seconds=settings.stall_seconds,
+        )
+
+
+def _log(job: Job, size: int, stages: str) -> None:
+    options = job.work.options
+    model = None if job.done is None else job.done.model
+    what = options.scheme if model is None else f"{options.scheme} ({model})"
+    log.info("%s levels=%d: %d bytes; %s", what, options.levels, size, stages)
+
+
+def _server_timing(seconds: dict[str, float]) -> str:
+    return ", ".join(f"{stage};dur={1000 * value:.1f}" for stage, value in seconds.items())
+
+
+async def _unless_gone(receive: Receive, work: Coroutine[Any, Any, T]) -> T:
+    """The value of `work`, cancelled when the client disconnects. Raises ClientDisconnect."""
+    job = asyncio.create_task(work)
+    gone = asyncio.create_task(_disconnected(receive))
+    try:
+        await asyncio.wait({job, gone}, return_when=asyncio.FIRST_COMPLETED)
+        if not job.done():
+            raise ClientDisconnect
+        return job.result()
+    finally:
+        job.cancel()
+        gone.cancel()
+        await asyncio.gather(job, gone, return_exceptions=True)
+
+
+async def _disconnected(receive: Receive) -> None:
+    while (await receive())["type"] != "http.disconnect":
+        pass

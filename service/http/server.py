@@ -1,0 +1,122 @@
+"""`pns serve`: uvicorn with a shutdown that lets requests finish and says so beforehand."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from functools import partial
+from types import FrameType
+
+import uvicorn
+from fastapi import FastAPI
+
+from .. import log_lines
+from ..settings import Settings
+from .admission import Admission
+from .app import create_app
+from .connection import descriptors
+from .connection.crowd import Crowd
+from .connection.pace import Pace
+from .connection.protocol import BoundedProtocol, Bounds, Shared
+from .watch.metrics import Metrics
+
+log = logging.getLogger("pns.service")
+
+# After draining, what is still in the sockets' buffers may go out.
+FLUSH_SECONDS = 2
+
+
+class DrainingServer(uvicorn.Server):
+    """On the first SIGTERM or SIGINT it takes nothing new, and exits once no request is under way.
+
+    Bodies that have not arrived whole by then are refused: they may never. Until it exits it still
+    answers: /readyz and new requests with 503; uvicorn's own shutdown would close the socket at
+    once. A second signal, and the deadline, end what is under way with 503.
+    """
+
+    def __init__(self, config: uvicorn.Config, admission: Admission, drain_seconds: float) -> None:
+        super().__init__(config)
+        self._admission = admission
+        self._drain_seconds = drain_seconds
+        self._deadline: float | None = None
+        self._signals = 0
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Close the admission; uvicorn calls this as the signal handler."""
+        self._signals += 1
+        self._admission.draining = True
+        # The third is for a shutdown that hangs.
+        self.force_exit = self._signals > 2
+
+    async def on_tick(self, counter: int) -> bool:
+        """Decide, ten times a second, whether to exit."""
+        if self._admission.draining:
+            now = asyncio.get_running_loop().time()
+            self._deadline = self._deadline or now + self._drain_seconds
+            self._admission.end_uploads()
+            if self._signals > 1 or now >= self._deadline:
+                self._admission.end()
+                self.should_exit = True
+            if self._admission.admitted == 0:
+                self.should_exit = True
+        return await super().on_tick(counter)
+
+
+def serve(settings: Settings) -> None:
+    """Serve until a signal comes."""
+    log_lines.configure()
+    app = create_app(settings)
+    server = DrainingServer(
+        configuration(app, settings), app.state.admission, settings.drain_seconds
+    )
+    if settings.metrics_port is None:
+        server.run()
+        return
+    metrics: Metrics = app.state.metrics
+    port, stop = metrics.serve(settings.metrics_host, settings.metrics_port)
+    log.info("metrics on http://%s:%d/metrics", settings.metrics_host, port)
+    try:
+        server.run()
+    finally:
+        stop()
+
+
+def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:
+    """uvicorn's settings, and the protocol that takes over where they end."""
+    shared = Shared(
+        Bounds(
+            head_seconds=settings.head_seconds,
+            answer=Pace(
+                rate=int(settings.rate),
+                grace=settings.grace_seconds,
+                idle=settings.stall_seconds,
+                whole=settings.answer_seconds,
+            ),
+            linger_seconds=settings.linger_seconds,
+            # A client reads its 413 only once it has sent what it has, or most of it.
+            body_bytes=2 * int(settings.body),
+        ),
+        Crowd(
+            descriptors.fitting(settings),
+            settings.connections_of_address,
+            settings.proxies,
+        ),
+    )
+    metrics: Metrics = app.state.metrics
+    metrics.gauge("pns_connections", "Open connections", lambda: len(shared.crowd))
+    metrics.count("pns_refused_connections", "Connections refused", lambda: shared.crowd.refused)
+    return uvicorn.Config(
+        app,
+        host=settings.host,
+        port=settings.port,
+        http=partial(BoundedProtocol, shared=shared),  # pyright: ignore[reportArgumentType]
+        ws="none",
+        # Whose Forwarded headers are believed is the application's to say.
+        proxy_headers=False,
+        server_header=False,
+        timeout_keep_alive=settings.keep_alive_seconds,  # pyright: ignore[reportArgumentType]
+        # Its loggers are configured with ours, and the journal says what an access log would.
+        log_config=None,
+        access_log=False,
+        timeout_graceful_shutdown=FLUSH_SECONDS,
+    )

@@ -1,0 +1,125 @@
+"""The journal: for each request an id, one line and its counts; the outermost layer."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from ...request_ids import HEADER, REQUEST_ID, id_of
+from ..clients import Client
+
+log = logging.getLogger("pns.request")
+
+# Anything may be sent as a method; what is none of these is counted as one.
+METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+# Where a client is gone before it has its answer, as proxies log it.
+GONE = 499
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What is known of a request that has ended.
+
+    Attributes:
+        route: its pattern (`/jobs/{id}`), never what was in it; `none` where no route matched.
+        code: the problem's code, or empty.
+        received, sent: bytes of the bodies.
+    """
+
+    id: str
+    method: str
+    route: str
+    status: int
+    code: str
+    client: str
+    received: int
+    sent: int
+    seconds: float
+
+
+class Journal:
+    """ASGI layer that names requests and writes down how each ended.
+
+    Neither query strings nor paths are written: they may hold what a client would not like to see
+    in a log (the id of a job, a file's name).
+    """
+
+    def __init__(self, app: ASGIApp, listeners: tuple[Callable[[Entry], None], ...] = ()) -> None:
+        self.app = app
+        self.listeners = listeners
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        began = time.perf_counter()
+        name = id_of(scope["headers"])
+        token = REQUEST_ID.set(name)
+        state = scope.setdefault("state", {})
+        state["request_id"] = name
+        status, received, sent, whole = 0, 0, 0, False
+
+        async def counted_receive() -> Message:
+            nonlocal received
+            message = await receive()
+            received += len(message.get("body", b""))
+            return message
+
+        async def counted_send(message: Message) -> None:
+            nonlocal status, sent, whole
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                headers = [*message.get("headers", []), (HEADER, name.encode())]
+                message = {**message, "headers": headers}
+            else:
+                sent += len(message.get("body", b""))
+                whole = not message.get("more_body", False)
+            await send(message)
+
+        try:
+            await self.app(scope, counted_receive, counted_send)
+        except BaseException:
+            status = status or 500
+            raise
+        finally:
+            self._write(
+                Entry(
+                    id=name,
+                    method=scope["method"] if scope["method"] in METHODS else "other",
+                    route=getattr(scope.get("route"), "path", None) or "none",
+                    status=status if whole or status >= 400 else GONE,
+                    code=state.get("problem", ""),
+                    client=_client(scope),
+                    received=received,
+                    sent=sent,
+                    seconds=time.perf_counter() - began,
+                )
+            )
+            REQUEST_ID.reset(token)
+
+    def _write(self, entry: Entry) -> None:
+        fields = {
+            "method": entry.method,
+            "route": entry.route,
+            "status": entry.status,
+            "code": entry.code,
+            "client": entry.client,
+            "received": entry.received,
+            "sent": entry.sent,
+            "milliseconds": round(1000 * entry.seconds, 1),
+        }
+        log.info("request", extra={"fields": fields, "request_id": entry.id})
+        for listener in self.listeners:
+            listener(entry)
+
+
+def _client(scope: Scope) -> str:
+    known = scope["state"].get("client")
+    if isinstance(known, Client):
+        return known.id
+    return scope["client"][0] if scope.get("client") else ""

@@ -1,0 +1,177 @@
+"""Metrics for Prometheus, on a port of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections import Counter as Tally
+from collections.abc import Callable, Iterable, Iterator
+from importlib.metadata import version
+from pathlib import Path
+
+from prometheus_client import (
+    CollectorRegistry,
+    Counter,
+    Gauge,
+    Histogram,
+    Info,
+    PlatformCollector,
+    ProcessCollector,
+    start_http_server,
+)
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from ...workers.catalogue import Catalogue
+from .journal import Entry
+
+# From a small mesh to the longest job.
+SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 600)
+
+
+class Metrics:
+    """The service's metrics, in a registry of their own: two services in one process stay apart."""
+
+    def __init__(self) -> None:
+        own = self.registry = CollectorRegistry()
+        self._requests = Counter(
+            "pns_requests",
+            "Requests that have ended",
+            ["route", "method", "status", "code"],
+            registry=own,
+        )
+        self._request_seconds = Histogram(
+            "pns_request_seconds",
+            "Seconds from a request's head to the end of its answer",
+            ["route"],
+            buckets=SECONDS,
+            registry=own,
+        )
+        self._received = Counter("pns_received_bytes", "Bytes of bodies", ["route"], registry=own)
+        self._sent = Counter("pns_sent_bytes", "Bytes of answers", ["route"], registry=own)
+        self._stage_seconds = Histogram(
+            "pns_stage_seconds",
+            "Seconds of a job by stage",
+            ["stage"],
+            buckets=SECONDS,
+            registry=own,
+        )
+        self._queue_seconds = Histogram(
+            "pns_queue_seconds",
+            "Seconds that a job waited",
+            buckets=SECONDS,
+            registry=own,
+        )
+        self._faces = Counter(
+            "pns_faces", "Faces that came in and went out", ["direction"], registry=own
+        )
+        self._build = Info("pns_build", "What runs", registry=own)
+        self._build.info(
+            {"version": version("pns-subdivision"), "python": platform.python_version()}
+        )
+        self._model = Gauge(
+            "pns_model_info",
+            "The models that are served",
+            ["name", "hash", "default"],
+            registry=own,
+        )
+        ProcessCollector(registry=own)
+        PlatformCollector(registry=own)
+        self.registry.register(_WorkerMemory())
+
+    def request(self, entry: Entry) -> None:
+        """Count a request; the journal calls this."""
+        labels = (entry.route, entry.method, str(entry.status), entry.code)
+        self._requests.labels(*labels).inc()
+        self._request_seconds.labels(entry.route).observe(entry.seconds)
+        self._received.labels(entry.route).inc(entry.received)
+        self._sent.labels(entry.route).inc(entry.sent)
+
+    def job(self, seconds: dict[str, float], faces_in: int, faces_out: int) -> None:
+        """Count a job that has ended; `queue` among the stages is how long it waited."""
+        for stage, value in seconds.items():
+            if stage == "queue":
+                self._queue_seconds.observe(value)
+            else:
+                self._stage_seconds.labels(stage).observe(value)
+        self._faces.labels("in").inc(faces_in)
+        self._faces.labels("out").inc(faces_out)
+
+    def catalogue(self, catalogue: Catalogue) -> None:
+        """Say which models are served."""
+        for entry in json.loads(catalogue.content):
+            self._model.labels(entry["name"], entry["hash"], str(entry["default"]).lower()).set(1)
+
+    def gauge(self, name: str, text: str, value: Callable[[], float]) -> None:
+        """Show a number that is asked for at each scrape."""
+        Gauge(name, text, registry=self.registry).set_function(value)
+
+    def count(self, name: str, text: str, value: Callable[[], int]) -> None:
+        """Show a count that is kept elsewhere."""
+        self.registry.register(_Count(name, text, value))
+
+    def tally(self, name: str, text: str, label: str, counts: Callable[[], Tally[str]]) -> None:
+        """Show counts that are kept elsewhere, by their names."""
+        self.registry.register(_Tally(name, text, label, counts))
+
+    def serve(self, host: str, port: int) -> tuple[int, Callable[[], None]]:
+        """Answer on a port, 0 for any; return it, and what ends it. Raises OSError."""
+        server, thread = start_http_server(port, addr=host, registry=self.registry)
+
+        def stop() -> None:
+            server.shutdown()
+            server.server_close()
+            thread.join()
+
+        return server.server_port, stop
+
+
+class _Count(Collector):
+    def __init__(self, name: str, text: str, value: Callable[[], int]) -> None:
+        self._named = (name, text)
+        self._value = value
+
+    def collect(self) -> Iterable[Metric]:
+        yield CounterMetricFamily(*self._named, value=self._value())
+
+
+class _Tally(Collector):
+    def __init__(self, name: str, text: str, label: str, counts: Callable[[], Tally[str]]) -> None:
+        self._named = (name, text)
+        self._label = label
+        self._counts = counts
+
+    def collect(self) -> Iterable[Metric]:
+        family = CounterMetricFamily(*self._named, labels=[self._label])
+        for name, count in self._counts().items():
+            family.add_metric([name], count)
+        yield family
+
+
+class _WorkerMemory(Collector):
+    """What the worker processes hold; the server's own is in `process_resident_memory_bytes`."""
+
+    def collect(self) -> Iterable[Metric]:
+        family = GaugeMetricFamily(
+            "pns_worker_memory_bytes", "Resident memory of all worker processes"
+        )
+        family.add_metric([], sum(_resident(pid) for pid in _children()))
+        yield family
+
+
+def _children() -> Iterator[int]:
+    for path in Path("/proc/self/task").glob("*/children"):
+        try:
+            yield from map(int, path.read_text().split())
+        except OSError:
+            # The thread has ended meanwhile.
+            continue
+
+
+def _resident(pid: int) -> int:
+    try:
+        pages = Path(f"/proc/{pid}/statm").read_text().split()[1]
+    except OSError:
+        return 0
+    return int(pages) * os.sysconf("SC_PAGE_SIZE")

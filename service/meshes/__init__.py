@@ -1,0 +1,1 @@
+"""Meshes without a file format: welds, creases by angle, connectivity of splits, UV charts."""

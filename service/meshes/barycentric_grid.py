@@ -1,0 +1,86 @@
+"""Where the 4^L descendants of one triangle lie: the grid of barycentric points after L splits.
+
+Linear attributes need no level-by-level refinement: midpoints of midpoints are the points of this
+grid. It is made by the operator's own split, so faces and corners come in the operator's order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Int
+
+from pns_common.topology import build_topology, split
+
+
+@dataclass(frozen=True, eq=False)
+class BarycentricGrid:
+    """The T = (n + 1)(n + 2) / 2 points of a triangle split L times; n = 2^L segments a side.
+
+    Attributes:
+        segments: n.
+        points: (T, 3) barycentric coordinates times n; points 0, 1, 2 are the corners.
+        faces: (4^L, 3) points of each descendant.
+        slot: (T,) for each point one of the 3 · 4^L corners of `faces` (flattened) that is it.
+        sides: (3, n − 1) points inside the side from corner k to corner k + 1, in that order.
+        inner: (I,) points inside the triangle.
+        reorder: (9, T) for a triangle whose corners 0 and 1 are corners i and j of another, row
+            3 i + j says which point of the other each of its points is.
+    """
+
+    segments: int
+    points: Int[np.ndarray, "T 3"]
+    faces: Int[np.ndarray, "D 3"]
+    slot: Int[np.ndarray, " T"]
+    sides: Int[np.ndarray, "3 n"]
+    inner: Int[np.ndarray, " I"]
+    reorder: Int[np.ndarray, "9 T"]
+
+
+@lru_cache(maxsize=8)
+def barycentric_grid(levels: int) -> BarycentricGrid:
+    """The grid after `levels` splits."""
+    segments = 2**levels
+    points = segments * np.eye(3, dtype=np.int64)
+    faces = np.array([[0, 1, 2]])
+    for _ in range(levels):
+        topology = build_topology(faces, len(points))
+        a, b = topology.edges.T
+        points = np.concatenate([points, (points[a] + points[b]) // 2])
+        faces = split(topology)
+    number_at = np.full((segments + 1, segments + 1), -1, dtype=np.int64)
+    number_at[points[:, 0], points[:, 1]] = np.arange(len(points))
+    slot = np.empty(len(points), dtype=np.int64)
+    slot[faces.reshape(-1)] = np.arange(faces.size)
+    return BarycentricGrid(
+        segments=segments,
+        points=points,
+        faces=faces,
+        slot=slot,
+        sides=_sides(number_at, segments),
+        inner=np.flatnonzero((points > 0).all(axis=1)),
+        reorder=_reorder(number_at, points),
+    )
+
+
+def _sides(number_at: Int[np.ndarray, "S S"], segments: int) -> Int[np.ndarray, "3 n"]:
+    step = np.arange(1, segments)
+    zero = np.zeros_like(step)
+    return np.stack(
+        [number_at[segments - step, step], number_at[zero, segments - step], number_at[step, zero]]
+    )
+
+
+def _reorder(
+    number_at: Int[np.ndarray, "S S"], points: Int[np.ndarray, "T 3"]
+) -> Int[np.ndarray, "9 T"]:
+    rows = np.zeros((9, len(points)), dtype=np.int64)
+    for first in range(3):
+        for second in {0, 1, 2} - {first}:
+            order = [first, second, 3 - first - second]
+            other = np.empty_like(points)
+            other[:, order] = points
+            rows[3 * first + second] = number_at[other[:, 0], other[:, 1]]
+    return rows

@@ -1,0 +1,28 @@
+"""Which edges of a control mesh are creases: by the angle between their faces."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from jaxtyping import Int
+
+from pns_common.arrays import dot
+from pns_common.edge.frames import face_normals
+from pns_common.mesh import Mesh
+from pns_common.topology import build_topology
+
+
+def edges_sharper_than(mesh: Mesh, angle: float) -> Int[np.ndarray, "N 2"]:
+    """The interior edges at which the normals of the two faces differ by more than `angle` radians.
+
+    Faces without area have no normal, and make no crease.
+    """
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    normals = face_normals(mesh.vertices, mesh.faces)
+    n1, n2 = (normals[topology.edge_faces[topology.interior, side]] for side in (0, 1))
+    defined = (dot(n1, n1) > 0) & (dot(n2, n2) > 0)
+    # The chord of an angle keeps small angles that a cosine would round away.
+    chord = n1 - n2
+    sharp = defined & (dot(chord, chord) > (2 * math.sin(angle / 2)) ** 2)
+    return topology.edges[topology.interior[sharp]]

@@ -1,0 +1,95 @@
+"""Refine a connectivity for attributes that blend linearly: one vertex a distinct corner.
+
+A primitive's distinct corners (position and all attributes) form triangles of their own, cut open
+at seams. Splitting them needs only where each new vertex lies: at a corner, on an edge, in a face.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
+from pns_common.topology import build_topology
+
+from .barycentric_grid import BarycentricGrid
+
+
+@dataclass(frozen=True, eq=False)
+class SplitConnectivity:
+    """A refined connectivity. Its vertices: the C corners, then those on edges, then inner ones.
+
+    Attributes:
+        faces: (F, 3) corners before.
+        edges: (E, 2) their edges, lower corner first.
+        grid: the split.
+        ids: (F, T) the refined vertex at each grid point of each face.
+        count: the number of refined vertices.
+    """
+
+    faces: Int[np.ndarray, "F 3"]
+    edges: Int[np.ndarray, "E 2"]
+    grid: BarycentricGrid
+    ids: Int[np.ndarray, "F T"]
+    count: int
+
+    @property
+    def refined_faces(self) -> Int[np.ndarray, "D 3"]:
+        """(F · 4^L, 3) the refined faces, in the operator's order."""
+        return at_descendants(self.ids, self.grid)
+
+    def linear(self, values: Shaped[np.ndarray, "C K"]) -> Float[np.ndarray, "N K"]:
+        """Values at the refined vertices, blended linearly along edges and over faces."""
+        corners = values.astype(np.float64)
+        t = self._edge_parameter[:, None]
+        start, end = (corners[self.edges[:, side], None] for side in (0, 1))
+        weights = self.grid.points[self.grid.inner] / self.grid.segments
+        inner = sum(weights[:, k, None] * corners[self.faces[:, k], None] for k in range(3))
+        parts = [corners, (1 - t) * start + t * end, inner]
+        return np.concatenate([part.reshape(-1, values.shape[1]) for part in parts])
+
+    def nearest(self, values: Shaped[np.ndarray, "C K"]) -> Shaped[np.ndarray, "N K"]:
+        """Values at the refined vertices, copied from the nearest corner (a tie: the first)."""
+        side = (self._edge_parameter > 1 / 2).astype(np.int64)
+        corner = self.grid.points[self.grid.inner].argmax(axis=1)
+        parts = [values, values[self.edges[:, side]], values[self.faces[:, corner]]]
+        return np.concatenate([part.reshape(-1, values.shape[1]) for part in parts])
+
+    def at_vertices(self, at_points: Int[np.ndarray, "F T"]) -> Int[np.ndarray, " N"]:
+        """Labels that agree wherever refined vertices do, moved from grid points to vertices."""
+        labels = np.empty(self.count, dtype=np.int64)
+        labels[self.ids] = at_points
+        return labels
+
+    @property
+    def _edge_parameter(self) -> Float[np.ndarray, " n"]:
+        """Where the n − 1 vertices of an edge lie between its lower and its higher corner."""
+        return np.arange(1, self.grid.segments) / self.grid.segments
+
+
+def at_descendants(ids: Int[np.ndarray, "F T"], grid: BarycentricGrid) -> Int[np.ndarray, "D 3"]:
+    """From values at grid points to values at the corners of all descendants, face by face."""
+    # np.take, unlike indexing, gives rows that need no second copy to be reshaped.
+    return np.take(ids, grid.faces.reshape(-1), axis=1).reshape(-1, 3)
+
+
+def split_connectivity(
+    faces: Int[np.ndarray, "F 3"], corner_count: int, grid: BarycentricGrid
+) -> SplitConnectivity:
+    """Split `faces` over `corner_count` distinct corners; no face names a corner twice."""
+    topology = build_topology(faces, corner_count)
+    per_edge, per_face = grid.segments - 1, len(grid.inner)
+    first_inner = corner_count + per_edge * len(topology.edges)
+
+    ids = np.empty((len(faces), len(grid.points)), dtype=np.int64)
+    ids[:, :3] = faces
+    step = np.arange(per_edge)
+    for side in range(3):
+        forward = faces[:, side] < faces[:, (side + 1) % 3]
+        along = np.where(forward[:, None], step, per_edge - 1 - step)
+        base = corner_count + per_edge * topology.face_edges[:, side]
+        ids[:, grid.sides[side]] = base[:, None] + along
+    inner = first_inner + np.arange(len(faces) * per_face).reshape(len(faces), per_face)
+    ids[:, grid.inner] = inner
+    return SplitConnectivity(faces, topology.edges, grid, ids, first_inner + inner.size)

@@ -1,0 +1,1 @@
+"""Plain mesh files: OBJ, PLY, STL, OFF, and conversion from and to glTF."""

@@ -1,0 +1,194 @@
+"""`pns subdivide`: from one file to another, by way of what both formats can hold."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from rich.console import Console
+from rich.progress import Progress
+
+from pns_common import load_model
+from pns_common.schemes import Model
+from pns_common.whole_file import replace_file
+
+from ..bodies.folder import folder_of
+from ..bodies.sibling_files import ALONE, SiblingFiles
+from ..course import Course
+from ..errors import InvalidParameter
+from ..gltf.read.extras import REPORT_KEY
+from ..gltf.read.upload import read_upload
+from ..gltf.subdivide import make_scheme, subdivide_gltf
+from ..options import Limits, Options
+from ..report import Change
+from . import formats
+from .flatten import flatten
+from .indexed_triangles import IndexedTriangles
+from .refine_triangles import check_cost, refine_triangles
+from .single_precision import rounding_changes
+from .triangles_glb import as_gltf_json, triangles_glb
+
+KINDS = (*formats.GLTF_KINDS, *formats.MESH_KINDS)
+
+
+def convert(
+    source: Path,
+    output: Path,
+    options: Options,
+    model: str | None,
+    report_file: Path | None,
+    limits: Limits,
+) -> None:
+    """Refine `source` into `output`; what was changed or lost goes to stderr and the report.
+
+    `model` is a bundled name or a file; None: the default one.
+
+    Raises:
+        ServiceError, PnsError: the file, the model or a parameter cannot be used.
+        OSError: a file cannot be read or written.
+    """
+    kind, target = _kind("IN", source), _kind("OUT", output)
+    if report_file is not None and report_file.resolve() in (source.resolve(), output.resolve()):
+        raise InvalidParameter("report", f"{report_file}: the report would replace a model")
+    began = time.perf_counter()
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    data = source.read_bytes()
+    # Loop needs none, but one that is named and does not exist is a mistake to be told.
+    loaded = load_model(model) if options.scheme == "pns" or model is not None else None
+    with _progress(console) as course:
+        written = converted(data, kind, target, options, loaded, limits, course, folder_of(source))
+    replace_file(output, written.content)
+    if report_file is not None:
+        text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
+        replace_file(report_file, text + b"\n")
+    for line in _lines(written.report):
+        console.print(line, markup=False)
+    seconds = time.perf_counter() - began
+    console.print(f"{output}: {written.faces:,} faces in {seconds:.1f} s", markup=False)
+
+
+def converted(
+    data: bytes,
+    kind: str,
+    target: str,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    course: Course | None = None,
+    siblings: SiblingFiles = ALONE,
+) -> Written:
+    """Refine the bytes of a file of `kind` into those of one of `target`; no file is touched.
+
+    Raises:
+        ServiceError, PnsError: the file or a parameter cannot be used.
+    """
+    if kind in formats.GLTF_KINDS:
+        done = subdivide_gltf(data, kind, options, model, limits, course, siblings=siblings)
+        return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
+    course = Course() if course is None else course
+    with course.stage("read", 0.0, 0.2):
+        triangles = formats.read(data, kind)
+    scheme = make_scheme(options, model)
+    with course.stage("refine", 0.2, 0.7):
+        refined, report = refine_triangles(triangles, scheme, options, limits, course)
+    with course.stage("write", 0.7, 1.0):
+        written = _of_triangles(refined, report, target, options, limits)
+    return replace(written, seconds=course.seconds)
+
+
+def predicted_faces(
+    data: bytes, kind: str, options: Options, limits: Limits, siblings: SiblingFiles = ALONE
+) -> int:
+    """Return how many faces the refined file will have, found without refining.
+
+    Raises:
+        ServiceError: the file cannot be used, or would be over a limit.
+    """
+    if kind in formats.GLTF_KINDS:
+        upload = read_upload(data, kind, options.levels, limits, siblings)
+        return sum(mesh.faces for mesh in upload.plans) * 4**options.levels
+    faces = len(formats.read(data, kind).faces) * 4**options.levels
+    check_cost(faces, options, limits)
+    return faces
+
+
+def _lines(report: dict[str, Any]) -> Iterator[str]:
+    """What was changed or lost, and where, each thing once."""
+    for change in report["changes"]:
+        where = f" ({change['pointer']})" if change["pointer"] else ""
+        yield f"{change['count']} × {change['what']}{where}"
+    said = {change["what"] for change in report["changes"]}
+    for name, count in report["dropped"].items():
+        what = f"{name.replace('_', ' ')} dropped"
+        if count and what not in said:
+            yield f"{count} × {what}"
+
+
+def _kind(name: str, path: Path) -> str:
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in KINDS:
+        raise InvalidParameter(name, f"{path}: the extension must be one of {', '.join(KINDS)}")
+    return kind
+
+
+@dataclass(frozen=True)
+class Written:
+    """An output file: its bytes, its report, its faces; the seconds that each stage took."""
+
+    content: bytes
+    report: dict[str, Any]
+    faces: int
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) -> Written:
+    faces = report["totals"]["faces"]
+    if target == "glb":
+        return Written(glb, report, faces)
+    if target == "gltf":
+        return Written(as_gltf_json(glb, limits), report, faces)
+    triangles, changes = flatten(glb, target, limits)
+    if target not in formats.HOLDS_DOUBLE:
+        changes += rounding_changes(triangles)
+    # A mesh that several nodes show is there several times.
+    return Written(
+        formats.write(triangles, target), _with_changes(report, changes), len(triangles.faces)
+    )
+
+
+def _of_triangles(
+    refined: IndexedTriangles, report: dict[str, Any], target: str, options: Options, limits: Limits
+) -> Written:
+    changes = [] if target in formats.HOLDS_DOUBLE else rounding_changes(refined)
+    if refined.uv is not None and target not in formats.HOLDS_UV:
+        changes.append(Change("", "texture coordinates dropped: the format cannot hold them", 1))
+    if options.diagnostics == "full":
+        changes.append(Change("", "values at vertices dropped: only a glTF's are kept", 1))
+    if options.normals != "keep":
+        changes.append(Change("", "normals not written: the format cannot hold them", 1))
+    if options.compress != "none":
+        changes.append(Change("", "not compressed: only a glTF that came as one is", 1))
+    report = _with_changes(report, changes)
+    faces = len(refined.faces)
+    if target not in formats.GLTF_KINDS:
+        return Written(formats.write(refined, target), report, faces)
+    extras = {} if options.diagnostics == "none" else {REPORT_KEY: report}
+    glb = triangles_glb(refined, extras=extras)
+    return Written(glb if target == "glb" else as_gltf_json(glb, limits), report, faces)
+
+
+def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:
+    return report | {"changes": [*report["changes"], *(asdict(change) for change in changes)]}
+
+
+@contextmanager
+def _progress(console: Console) -> Iterator[Course]:
+    """A bar that shows on a terminal while the work goes on, and leaves nothing behind."""
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("refining", total=1.0)
+        yield Course(moves=lambda share: bar.update(task, completed=share))

@@ -1,0 +1,140 @@
+"""A glTF scene as plain triangles, for formats that know no nodes; says what is lost on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.disjoint_union import disjoint_faces
+
+from ..errors import UnrefinableError
+from ..gltf.read.primitives import TrianglePrimitive, read_primitive
+from ..gltf.read.upload import read_upload
+from ..meshes.weld import weld
+from ..options import Limits
+from ..report import Change
+from .formats import HOLDS_UV
+from .indexed_triangles import IndexedTriangles
+
+LOST = ("materials", "textures", "images", "animations", "cameras", "extensions")
+
+
+def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, list[Change]]:
+    """The default scene's triangles in world coordinates, and what a file of `kind` cannot hold.
+
+    Raises:
+        ServiceError: the file cannot be read, or its scene shows no triangles.
+    """
+    upload = read_upload(glb, "glb", 0, limits)
+    primitives = {
+        mesh.mesh: [
+            read_primitive(upload.document, upload.buffers, mesh.mesh, number)
+            for number in mesh.primitives
+        ]
+        for mesh in upload.plans
+    }
+    placed = [
+        (primitives[mesh], matrix)
+        for mesh, matrix in _placed_meshes(upload.tree)
+        if mesh in primitives
+    ]
+    if not placed:
+        raise UnrefinableError("the default scene shows no triangles")
+    names = [set(p.attributes) for shown, _ in placed for p in shown]
+    keeps_uv = kind in HOLDS_UV and all("TEXCOORD_0" in name for name in names)
+    mesh_file = _joined([_placed(shown, matrix, keeps_uv=keeps_uv) for shown, matrix in placed])
+    return mesh_file, _changes(upload.tree, len(placed), names, keeps_uv=keeps_uv)
+
+
+def _placed_meshes(tree: dict[str, Any]) -> Iterator[tuple[int, Float[np.ndarray, "4 4"]]]:
+    """Each mesh that the default scene shows, with its node's world matrix."""
+    nodes = tree.get("nodes", [])
+    scenes = tree.get("scenes", [])
+    roots = scenes[tree.get("scene", 0)].get("nodes", []) if scenes else range(len(nodes))
+    pending = [(root, np.eye(4)) for root in reversed(roots)]
+    while pending:
+        number, above = pending.pop()
+        node = nodes[number]
+        world = above @ _local_matrix(node)
+        if "mesh" in node:
+            yield node["mesh"], world
+        # A file without scenes lists its nodes, children among them.
+        if scenes:
+            pending += [(child, world) for child in reversed(node.get("children", []))]
+
+
+def _local_matrix(node: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation * np.array(node.get("scale", (1.0, 1.0, 1.0)))
+    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+    return matrix
+
+
+def _placed(
+    primitives: list[TrianglePrimitive], matrix: Float[np.ndarray, "4 4"], *, keeps_uv: bool
+) -> IndexedTriangles:
+    """One mesh in world coordinates; closed at its seams where nothing is left to tell them by."""
+    positions = np.concatenate([p.attributes["POSITION"] for p in primitives]).astype(np.float64)
+    faces = disjoint_faces((p.corners, len(p.attributes["POSITION"])) for p in primitives)
+    uv = np.concatenate([_uv(p) for p in primitives]) if keeps_uv else None
+    if uv is None:
+        welded = weld(positions, faces)
+        positions, faces = welded.points, welded.faces
+    if np.linalg.det(matrix[:3, :3]) < 0:
+        # A mirroring node turns faces over; their order of corners keeps them facing outwards.
+        faces = faces[:, ::-1]
+    return IndexedTriangles(positions @ matrix[:3, :3].T + matrix[:3, 3], faces, uv)
+
+
+def _joined(parts: list[IndexedTriangles]) -> IndexedTriangles:
+    uvs = [part.uv for part in parts if part.uv is not None]
+    return IndexedTriangles(
+        np.concatenate([part.vertices for part in parts]),
+        disjoint_faces((part.faces, len(part.vertices)) for part in parts),
+        np.concatenate(uvs) if uvs else None,
+    )
+
+
+def _uv(primitive: TrianglePrimitive) -> Float[np.ndarray, "N 2"]:
+    values = primitive.attributes["TEXCOORD_0"]
+    scale = 1 if values.dtype.kind == "f" else np.iinfo(values.dtype).max
+    u, v = values.astype(np.float64).T / scale
+    # glTF counts v downwards.
+    return np.column_stack([u, 1 - v])
+
+
+def _changes(
+    tree: dict[str, Any], placed: int, names: list[set[str]], *, keeps_uv: bool
+) -> list[Change]:
+    changes = [
+        Change(f"/{name}", f"{name} dropped: the format cannot hold them", len(tree[name]))
+        for name in LOST
+        if tree.get(name)
+    ]
+    if placed > 1:
+        changes.append(Change("/nodes", "nodes joined into one mesh in world space", placed))
+    lost = set[str]().union(*names) - {"POSITION"}
+    if keeps_uv:
+        lost.discard("TEXCOORD_0")
+    changes += [
+        Change(
+            "/meshes",
+            f"attribute {name} dropped: the format cannot hold it",
+            sum(name in own for own in names),
+        )
+        for name in sorted(lost)
+    ]
+    return changes

@@ -1,0 +1,151 @@
+"""OBJ, PLY, STL and OFF: triangles in and out, with what each format can hold."""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.disjoint_union import disjoint_faces
+
+from ..errors import UnreadableError
+from . import unsupported
+from .indexed_triangles import NUMBER, IndexedTriangles
+from .off import read_off, write_off
+
+if TYPE_CHECKING:
+    import trimesh
+
+GLTF_KINDS = ("glb", "gltf")
+MESH_KINDS = ("obj", "ply", "stl", "off")
+HOLDS_DOUBLE = frozenset({"obj", "off"})
+HOLDS_UV = frozenset({"obj", *GLTF_KINDS})
+
+_OBJ_UV = re.compile(rb"^[ \t]*vt[ \t]", re.MULTILINE)
+_OBJ_PART = re.compile(rb"^[ \t]*(?:usemtl|o|g)(?:[ \t][^\n]*)?$", re.MULTILINE)
+# trimesh takes time in the square of the parts that materials and names divide a file into. They
+# are lost in any case; beyond so many statements they are passed over before it reads.
+MOST_PARTS = 100
+_OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]", re.MULTILINE)
+
+
+def load_readers() -> ModuleType:
+    """Return trimesh. It is loaded when it is first needed: glTF files, and OFF, do without."""
+    import trimesh
+
+    return trimesh
+
+
+def read(data: bytes, kind: str) -> IndexedTriangles:
+    """Read a mesh file; its polygons are split into fans.
+
+    Raises:
+        UnreadableError: not a file of this kind, or one without faces.
+    """
+    if kind == "off":
+        return read_off(data)
+    scene = _scene(data, kind)
+    parts = [part for part in scene.geometry.values() if isinstance(part, load_readers().Trimesh)]
+    if not parts:
+        raise UnreadableError(f"the {kind.upper()} file has no faces")
+    faces = disjoint_faces((np.asarray(part.faces), len(part.vertices)) for part in parts)
+    uv = _uv(parts)
+    count, others = _beside_triangles(data, kind, parts, has_uv=uv is not None)
+    return IndexedTriangles(
+        vertices=np.concatenate([np.asarray(part.vertices, dtype=np.float64) for part in parts]),
+        faces=faces.astype(np.int64),
+        uv=uv,
+        unused=unsupported.unused_in_obj(data) if kind == "obj" else 0,
+        split=0 if count is None else max(0, len(faces) - count),
+        unsupported=others,
+    )
+
+
+def write(mesh_file: IndexedTriangles, kind: str) -> bytes:
+    """The file's bytes: PLY and STL binary, OBJ and OFF text."""
+    if kind == "obj":
+        return _obj(mesh_file)
+    if kind == "off":
+        return write_off(mesh_file)
+    mesh = load_readers().Trimesh(
+        mesh_file.vertices, mesh_file.faces, process=False, validate=False
+    )
+    exported: Any = mesh.export(file_type=kind)  # bytes for these kinds
+    return bytes(exported)
+
+
+def _scene(data: bytes, kind: str) -> trimesh.Scene:
+    """What trimesh makes of the file."""
+    # Before warnings become errors: what it imports may warn.
+    readers = load_readers()
+    text = _as_utf8(data) if kind == "obj" or (kind == "stl" and not _is_binary_stl(data)) else data
+    if kind == "obj" and len(_OBJ_PART.findall(text)) > MOST_PARTS:
+        text = _OBJ_PART.sub(b"", text)
+    try:
+        with warnings.catch_warnings():
+            # Where a number cannot be read, numpy warns and leaves out all that follows.
+            warnings.simplefilter("error")
+            # Each part comes apart by material; as they are listed, they make the file's triangles.
+            return readers.load_scene(io.BytesIO(text), file_type=kind, process=False)
+    except MemoryError:
+        raise
+    except Exception as error:
+        # On a broken file these readers fail as it comes, with an UnboundLocalError for one.
+        raise UnreadableError(f"this is not a readable {kind.upper()} file") from error
+
+
+def _as_utf8(data: bytes) -> bytes:
+    """The same text; names in old files are Latin-1, and geometry is ASCII in either."""
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return data.decode("latin-1").encode()
+    return data
+
+
+def _is_binary_stl(data: bytes) -> bool:
+    """Whether the count of faces agrees with the length: text may begin in any way."""
+    return len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
+
+
+def _uv(parts: list[trimesh.Trimesh]) -> Float[np.ndarray, "N 2"] | None:
+    """Texture coordinates of all parts, if all have them: half of a seam cannot be interpolated."""
+    of_parts = [getattr(part.visual, "uv", None) for part in parts]
+    if any(uv is None or len(uv) != len(p.vertices) for uv, p in zip(of_parts, parts, strict=True)):
+        return None
+    return np.concatenate([uv for uv in of_parts if uv is not None])[:, :2].astype(np.float64)
+
+
+def _beside_triangles(
+    data: bytes, kind: str, parts: list[trimesh.Trimesh], *, has_uv: bool
+) -> tuple[int | None, dict[str, int]]:
+    """How many faces the file lists (None: triangles only), and what it held beside them."""
+    match kind:
+        case "obj":
+            others = unsupported.of_obj(data)
+            coordinates = 0 if has_uv else len(_OBJ_UV.findall(data))
+            if coordinates:
+                others["texture coordinates that not all faces have"] = coordinates
+            return len(_OBJ_FACE.findall(data)), others
+        case "ply":
+            elements = parts[0].metadata["_ply_raw"]
+            return int(elements["face"]["length"]), unsupported.of_ply(elements, has_uv=has_uv)
+        case _:
+            return None, {}
+
+
+def _obj(mesh_file: IndexedTriangles) -> bytes:
+    text = io.StringIO()
+    np.savetxt(text, mesh_file.vertices, fmt=f"v {NUMBER} {NUMBER} {NUMBER}")
+    corner = mesh_file.faces + 1
+    if mesh_file.uv is None:
+        np.savetxt(text, corner, fmt="f %d %d %d")
+    else:
+        np.savetxt(text, mesh_file.uv, fmt=f"vt {NUMBER} {NUMBER}")
+        np.savetxt(text, np.repeat(corner, 2, axis=1), fmt="f %d/%d %d/%d %d/%d")
+    return text.getvalue().encode()

@@ -1,0 +1,96 @@
+"""The Object File Format: text, faces with any number of corners.
+
+trimesh 5 stops at faces with more than four corners, and those are what OFF files are used for.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from itertools import islice, pairwise
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ..errors import UnreadableError
+from .indexed_triangles import NUMBER, IndexedTriangles
+
+_COMMENT = re.compile(rb"#[^\n]*")
+_HEADER = re.compile(rb"\s*((?:ST)?C?N?)OFF\b")
+_COUNTS = re.compile(rb"\s*(\d{1,18})\s+(\d{1,18})(?:[ \t]+\d+)?[ \t]*\r?\n")
+
+_CUT_OFF = "the OFF file ends before its last face, or has none"
+_NO_FACE = "the OFF file has a face that is not a count and as many vertices"
+
+
+def read_off(data: bytes) -> IndexedTriangles:
+    """Positions and faces, polygons split into fans; colours and normals are passed over.
+
+    Raises:
+        UnreadableError: not a text OFF file, or one without faces.
+    """
+    text = _COMMENT.sub(b"", data)
+    header = _HEADER.match(text)
+    counts = _COUNTS.match(text, header.end() if header else 0)
+    if header is None or counts is None:
+        raise UnreadableError("this is not a readable OFF file: no header")
+    vertex_count, face_count = int(counts[1]), int(counts[2])
+    # Before anything is made of them: a vertex takes six bytes at least, a face two.
+    if 6 * vertex_count + 2 * face_count > len(text) + 1:
+        raise UnreadableError(_CUT_OFF)
+    lines = (line.split() for line in text[counts.end() :].splitlines() if line.strip())
+    vertices = _vertices(list(islice(lines, vertex_count)))
+    # Faces differ in length, so they are read one by one.
+    polygons = [_corners(line) for line in islice(lines, face_count)]
+    if len(vertices) < vertex_count or len(polygons) < face_count or not polygons:
+        raise UnreadableError(_CUT_OFF)
+    extras = header[1].decode()
+    unsupported = {
+        f"values that {extras}OFF adds to vertices": vertex_count if extras else 0,
+        "faces of fewer than three vertices": sum(len(polygon) < 3 for polygon in polygons),
+    }
+    return IndexedTriangles(
+        vertices,
+        _fans(polygons),
+        split=sum(max(0, len(polygon) - 3) for polygon in polygons),
+        unsupported={name: count for name, count in unsupported.items() if count},
+    )
+
+
+def write_off(mesh_file: IndexedTriangles) -> bytes:
+    """The file's bytes."""
+    text = io.StringIO()
+    text.write(f"OFF\n{len(mesh_file.vertices)} {len(mesh_file.faces)} 0\n")
+    np.savetxt(text, mesh_file.vertices, fmt=f"{NUMBER} {NUMBER} {NUMBER}")
+    np.savetxt(text, mesh_file.faces, fmt="3 %d %d %d")
+    return text.getvalue().encode()
+
+
+def _vertices(lines: list[list[bytes]]) -> Float[np.ndarray, "V 3"]:
+    try:
+        return np.array([line[:3] for line in lines], dtype=np.float64).reshape(-1, 3)
+    except ValueError as error:
+        raise UnreadableError("the OFF file has a vertex that is not three numbers") from error
+
+
+def _corners(line: list[bytes]) -> list[int]:
+    try:
+        count = int(line[0])
+        corners = [int(word) for word in line[1 : 1 + max(count, 0)]]
+    except ValueError as error:
+        raise UnreadableError(_NO_FACE) from error
+    if len(corners) != count:
+        raise UnreadableError(_NO_FACE)
+    return corners
+
+
+def _fans(polygons: list[list[int]]) -> Int[np.ndarray, "F 3"]:
+    triangles = [
+        (polygon[0], second, third)
+        for polygon in polygons
+        for second, third in pairwise(polygon[1:])
+    ]
+    try:
+        return np.array(triangles, dtype=np.int64).reshape(-1, 3)
+    except OverflowError as error:
+        raise UnreadableError(_NO_FACE) from error

@@ -1,0 +1,67 @@
+"""What a mesh file holds beside positions, faces and UVs: it is lost, so it is named."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+_OBJ_STATEMENT = re.compile(rb"^[ \t]*(vn|usemtl|g|o|s|l|p|vp|curv|surf)[ \t]", re.MULTILINE)
+_OBJ_COLOUR = re.compile(rb"^[ \t]*v(?:[ \t]+[^\s]+){6,}[ \t]*\r?$", re.MULTILINE)
+_OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
+_OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
+# The first number of each corner, and the ends of lines.
+_OBJ_REFERENCE = re.compile(rb"(?<![^\s])-?\d{1,18}|\n")
+_OBJ_CONTINUED = re.compile(rb"\\\r?\n")
+_OBJ_NAMES = {
+    b"vn": "vertex normals",
+    b"usemtl": "materials",
+    b"g": "groups",
+    b"o": "object names",
+    b"s": "smoothing groups",
+    b"l": "lines",
+    b"p": "points",
+    b"vp": "free-form curves",
+    b"curv": "free-form curves",
+    b"surf": "free-form surfaces",
+}
+_PLY_KEPT = frozenset({"x", "y", "z", "vertex_index", "vertex_indices"})
+_PLY_UV = frozenset({"u", "v", "s", "t", "texture_u", "texture_v"})
+
+
+def of_obj(data: bytes) -> dict[str, int]:
+    """Names and counts of the statements that are passed over."""
+    counts = Counter(_OBJ_NAMES[name] for name in _OBJ_STATEMENT.findall(data))
+    if colours := len(_OBJ_COLOUR.findall(data)):
+        counts["vertex colours"] = colours
+    return dict(counts)
+
+
+def unused_in_obj(data: bytes) -> int:
+    """How many vertices no face names; trimesh leaves them out without a word."""
+    text = _OBJ_CONTINUED.sub(b" ", data)
+    starts = np.array([match.start() for match in _OBJ_VERTEX.finditer(text)], dtype=np.int64)
+    lines = list(_OBJ_FACE.finditer(text))
+    words = np.array(_OBJ_REFERENCE.findall(b"\n".join(line[1] for line in lines)), dtype=bytes)
+    ends = words == b"\n"
+    number, line = words[~ends].astype(np.int64), np.cumsum(ends)[~ends]
+    # A negative index counts back from its own line.
+    before = starts.searchsorted([match.start() for match in lines])
+    index = np.where(number < 0, before[line] + number, number - 1)
+    return len(starts) - len(np.unique(index[(index >= 0) & (index < len(starts))]))
+
+
+def of_ply(elements: dict[str, Any], *, has_uv: bool) -> dict[str, int]:
+    """Names and counts of the properties and elements that are passed over."""
+    kept = _PLY_KEPT | _PLY_UV if has_uv else _PLY_KEPT
+    counts: dict[str, int] = {}
+    for element, content in elements.items():
+        if element not in ("vertex", "face"):
+            counts[f"element {element}"] = int(content["length"])
+            continue
+        for name in content["properties"]:
+            if name not in kept:
+                counts[f"{element} property {name}"] = int(content["length"])
+    return counts

@@ -1,0 +1,226 @@
+"""`pns batch`: refine a library of files, each in a worker of its own, and go on after a stop."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.progress import Task as RichTask
+from rich.table import Table
+from rich.text import Text
+
+from ..errors import InvalidParameter, NoModelError, ServiceError
+from ..meshfiles.convert import KINDS
+from ..options import Limits, Options
+from .engines import Engine, Work
+from .job import DONE, FAILED, PLANNED, SKIPPED, Row, Task, failed, run, target_of
+from .journal import Journal, check_report
+from .places import Place, place_of
+from .sources import Item, items_of
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What a batch does to each file.
+
+    Attributes:
+        source, destination: paths or URLs; a folder, glob or manifest, and a folder.
+        to: the format of all results; None: each its own.
+        model: a bundled name or a file; None: the default model.
+        report: the Parquet or JSON lines file; what is needed to go on lies beside it.
+        dry: say what would be done, and write nothing but that.
+    """
+
+    source: str
+    destination: str
+    options: Options
+    limits: Limits
+    report: Path
+    to: str | None = None
+    model: str | None = None
+    dry: bool = False
+
+
+@dataclass(frozen=True)
+class Summary:
+    """How many files ended how, the faces of their results, and the failures by code."""
+
+    counts: dict[str, int]
+    faces: dict[str, int]
+    failures: list[tuple[str, int]]
+
+    @property
+    def failed(self) -> int:
+        """Files that could not be refined."""
+        return self.counts.get(FAILED, 0)
+
+
+# A file that its worker does not survive twice is taken to be the cause.
+MOST_ATTEMPTS = 2
+
+
+def batch_work(seconds: float, job: Callable[[Task], Row] = run) -> Work[Task, Row]:
+    """What is done with each file, which may take so many seconds."""
+
+    def lost(task: Task, error: ServiceError) -> Row:
+        return replace(failed(task.url, task.output, error), attempts=task.attempt)
+
+    return Work(job, lost, MOST_ATTEMPTS, seconds)
+
+
+def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summary:
+    """Refine all files of a source; the report is written at the end, also after an interruption.
+
+    Raises:
+        InvalidParameter: the source, the report, the model or a format cannot be used.
+    """
+    check_report(batch.report)
+    if batch.to is not None and batch.to not in KINDS:
+        raise InvalidParameter("to", f"{batch.to}: it must be one of {', '.join(KINDS)}")
+    listing = items_of(batch.source, KINDS)
+    destination = place_of(batch.destination)
+    if destination.read_only and not batch.dry:
+        raise InvalidParameter("DEST", f"{batch.destination}: nothing can be written there")
+    journal = Journal(batch.report, work_hash(batch))
+    counts: Counter[str] = Counter()
+    faces: Counter[str] = Counter()
+    try:
+        with _progress(console) as bar:
+            line = bar.add_task("refining", total=None, failed=0)
+            _count_aside(listing, bar, line)
+
+            def note(row: Row) -> None:
+                journal.put(row)
+                counts[row.status] += 1
+                faces[row.status] += row.faces_out
+                if row.status == PLANNED:
+                    _say_plan(console, row)
+                if row.status == FAILED:
+                    console.print(f"{row.path}: {row.detail} [{row.code}]", markup=False)
+                bar.update(line, advance=1, failed=counts[FAILED])
+
+            for row in engine(_tasks(batch, listing, destination, journal, note)):
+                note(row)
+    finally:
+        failures = journal.failures()
+        journal.close()
+    return Summary(dict(counts), dict(faces), failures)
+
+
+def print_summary(summary: Summary, console: Console) -> None:
+    """Print what became of the files or would, in faces too, and the failures by code."""
+    table = Table("files", "", "faces")
+    for status in (DONE, SKIPPED, PLANNED, FAILED):
+        if status in summary.counts:
+            faces = summary.faces[status]
+            table.add_row(f"{summary.counts[status]:,}", status, f"{faces:,}" if faces else "")
+    console.print(table)
+    if summary.failures:
+        codes = Table("files", "code")
+        for code, count in summary.failures:
+            codes.add_row(f"{count:,}", code)
+        console.print(codes)
+
+
+def work_hash(batch: Batch) -> str:
+    """Return what, beside its input, a result depends on, as one hash: options, model, format."""
+    model = None
+    if batch.options.scheme == "pns":
+        from pns_common import ModelError, load_model
+
+        try:
+            model = load_model(batch.model).hash
+        except ModelError as error:
+            raise NoModelError(str(error)) from error
+    parts = {
+        "options": asdict(batch.options),
+        "model": model,
+        "to": batch.to,
+        "destination": place_of(batch.destination).url,
+    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _tasks(
+    batch: Batch,
+    listing: Callable[[], Iterator[Item]],
+    destination: Place,
+    journal: Journal,
+    reject: Callable[[Row], None],
+) -> Iterator[Task]:
+    for item in listing():
+        try:
+            kind, target, relative = target_of(item.relative, batch.to, KINDS)
+        except ServiceError as error:
+            reject(failed(item.url, "", error))
+            continue
+        output = destination.below(relative).url
+        if not batch.dry and not journal.claim(output, item.url):
+            taken = f"{output} is another file's result; give each source a folder of its own"
+            reject(failed(item.url, output, ServiceError(taken, code="output-taken")))
+            continue
+        yield Task(
+            item.url,
+            output,
+            kind,
+            target,
+            batch.options,
+            batch.model,
+            batch.limits,
+            known=journal.known(item.url),
+            dry=batch.dry,
+        )
+
+
+class _Rate(ProgressColumn):
+    """Files a second."""
+
+    def render(self, task: RichTask) -> Text:
+        """Return the rate, as far as it is known."""
+        return Text("" if task.speed is None else f"{task.speed:.1f} a second")
+
+
+def _progress(console: Console) -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        _Rate(),
+        TextColumn("{task.fields[failed]} failed"),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+
+
+def _count_aside(listing: Callable[[], Iterator[Item]], bar: Progress, line: TaskID) -> None:
+    """Count the files beside the work, so that the estimate knows how many there are."""
+    if bar.disable:
+        return
+
+    def count() -> None:
+        bar.update(line, total=sum(1 for _ in listing()))
+
+    threading.Thread(target=count, daemon=True).start()
+
+
+def _say_plan(console: Console, row: Row) -> None:
+    console.print(
+        f"{row.path} -> {row.output}: {row.faces_in:,} faces to {row.faces_out:,}", markup=False
+    )

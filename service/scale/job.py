@@ -1,0 +1,212 @@
+"""One file of a batch, as a worker runs it: read, refined under its limits, written whole."""
+
+from __future__ import annotations
+
+import hashlib
+import posixpath
+import time
+import traceback
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InvalidParameter, LimitError, NoModelError, ServiceError
+from ..options import Limits, Options
+
+if TYPE_CHECKING:
+    from pns_common.schemes import Model
+
+DONE, SKIPPED, FAILED, PLANNED = "done", "skipped", "failed", "planned"
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What a worker is told of one file.
+
+    Attributes:
+        url, output: where it is read, where its result goes.
+        kind, target: formats, by extension.
+        known: the hash of the input that the result at `output` was made of; None: there is none.
+        attempt: 1, then 2 where the first worker died or hung.
+        dry: predict the cost, write nothing.
+    """
+
+    url: str
+    output: str
+    kind: str
+    target: str
+    options: Options
+    model: str | None
+    limits: Limits
+    known: str | None = None
+    attempt: int = 1
+    dry: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What became of one file: a row of the report.
+
+    `code`, `detail` and `pointer` are those of the service's problems, and empty for what went
+    well; `limit_distance` is the certificate, in the mesh's own units (of several meshes, the
+    largest).
+    """
+
+    path: str
+    output: str
+    status: str
+    code: str = ""
+    detail: str = ""
+    pointer: str = ""
+    attempts: int = 1
+    faces_in: int = 0
+    faces_out: int = 0
+    bytes_in: int = 0
+    bytes_out: int = 0
+    input_sha256: str = ""
+    output_sha256: str = ""
+    model: str = ""
+    model_sha256: str = ""
+    limit_distance: float | None = None
+    flipped_faces: int = 0
+    seconds: float = 0.0
+    stages: dict[str, float] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The columns of the report; the seconds of each stage are columns of their own."""
+        values = asdict(self)
+        stages = values.pop("stages")
+        return values | {f"seconds_{name}": stages.get(name, 0.0) for name in STAGES}
+
+
+STAGES = ("read", "weld", "refine", "attributes", "write")
+
+
+def run(task: Task) -> Row:
+    """Refine one file. What goes wrong with it is its row's, and nobody else's."""
+    began = time.perf_counter()
+    try:
+        row = _plan(task) if task.dry else _refine(task)
+    except (ServiceError, OSError) as error:
+        row = failed(task.url, task.output, error)
+    except Exception as error:
+        # A fault of ours: the file's neighbours are refined all the same, and the row tells it.
+        text = "".join(traceback.format_exception(error))
+        row = Row(task.url, task.output, FAILED, "internal-error", text)
+    return replace(row, attempts=task.attempt, seconds=time.perf_counter() - began)
+
+
+def failed(path: str, output: str, error: Exception) -> Row:
+    """The row of a file that could not be refined."""
+    code = error.code if isinstance(error, ServiceError) else "cannot-be-read-or-written"
+    pointer = getattr(error, "pointer", None) or ""
+    detail = error.detail if isinstance(error, ServiceError) else str(error)
+    return Row(path, output, FAILED, code, detail, pointer)
+
+
+def _refine(task: Task) -> Row:
+    from pns_common.errors import PnsError
+
+    from ..gltf.read.memory_cap import memory_cap
+    from ..meshfiles.convert import converted
+    from .places import place_of
+
+    source, output = place_of(task.url), place_of(task.output)
+    data = source.read()
+    digest = hashlib.sha256(data).hexdigest()
+    if task.known == digest and output.is_file():
+        return Row(task.url, task.output, SKIPPED, input_sha256=digest, bytes_in=len(data))
+    model = _model(task.model) if task.options.scheme == "pns" else None
+    try:
+        with memory_cap(task.limits.max_memory_bytes):
+            written = converted(
+                data,
+                task.kind,
+                task.target,
+                task.options,
+                model,
+                task.limits,
+                siblings=source.siblings(),
+            )
+    except PnsError as error:
+        raise ServiceError(str(error), code="unrefinable") from error
+    except MemoryError as error:
+        allowed = task.limits.max_memory_bytes
+        raise LimitError(
+            f"refining took more than {allowed} bytes", limit="memory", allowed=allowed, found=0
+        ) from error
+    output.write(written.content)
+    return Row(
+        task.url,
+        task.output,
+        DONE,
+        faces_in=written.faces // 4**task.options.levels,
+        faces_out=written.faces,
+        bytes_in=len(data),
+        bytes_out=len(written.content),
+        input_sha256=digest,
+        output_sha256=hashlib.sha256(written.content).hexdigest(),
+        model="" if model is None else model.name,
+        model_sha256="" if model is None else model.hash,
+        limit_distance=_limit_distance(written.report),
+        flipped_faces=_flipped(written.report),
+        stages=written.seconds,
+    )
+
+
+def _plan(task: Task) -> Row:
+    """What refining would cost: the faces, found without refining."""
+    from ..meshfiles.convert import predicted_faces
+    from .places import place_of
+
+    source = place_of(task.url)
+    data = source.read()
+    digest = hashlib.sha256(data).hexdigest()
+    faces = predicted_faces(data, task.kind, task.options, task.limits, source.siblings())
+    status = SKIPPED if task.known == digest and place_of(task.output).is_file() else PLANNED
+    return Row(
+        task.url,
+        task.output,
+        status,
+        faces_in=faces // 4**task.options.levels,
+        faces_out=faces,
+        bytes_in=len(data),
+        input_sha256=digest,
+    )
+
+
+@cache
+def _model(name: str | None) -> Model:
+    """A model, loaded once a worker."""
+    from pns_common import ModelError, load_model
+
+    try:
+        return load_model(name)
+    except ModelError as error:
+        raise NoModelError(str(error)) from error
+
+
+def _limit_distance(report: dict[str, Any]) -> float | None:
+    meshes = report.get("meshes", [report])
+    values = [mesh["limit_distance"] for mesh in meshes if mesh.get("limit_distance") is not None]
+    return max(values, default=None)
+
+
+def _flipped(report: dict[str, Any]) -> int:
+    return sum(int(level.get("flipped_faces", 0)) for level in report.get("levels", []))
+
+
+def target_of(relative: str, to: str | None, kinds: tuple[str, ...]) -> tuple[str, str, str]:
+    """Return the kind of a file, that of its result, and the result's relative path.
+
+    Raises:
+        InvalidParameter: an extension that is none of `kinds`.
+    """
+    stem, ending = posixpath.splitext(relative)
+    kind = ending.lower().removeprefix(".")
+    if kind not in kinds:
+        raise InvalidParameter(
+            "SOURCE", f"{relative}: the extension must be one of {', '.join(kinds)}"
+        )
+    target = kind if to is None else to
+    return kind, target, relative if target == kind else f"{stem}.{target}"

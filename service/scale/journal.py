@@ -1,0 +1,161 @@
+"""What is known of each file, kept while a batch runs: a run that is killed goes on from here.
+
+SQLite, so that two runs at once do no harm and memory does not grow with the number of files. The
+report is written from it at the end, in whole.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from pns_common.whole_file import replacing
+
+from ..errors import InvalidParameter
+from .job import FAILED, PLANNED, SKIPPED, Row
+
+SCHEMA = """
+CREATE TABLE IF NOT EXISTS rows (
+  path TEXT, work TEXT, status TEXT, code TEXT, input TEXT, row TEXT, PRIMARY KEY (path, work)
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS outputs (output TEXT PRIMARY KEY, path TEXT) WITHOUT ROWID;
+"""
+BUSY_SECONDS = 60.0
+BATCH = 10_000
+REPORTS = (".parquet", ".jsonl")
+
+
+class Journal:
+    """The rows of a report, by file and by work: options, model and formats as one hash."""
+
+    def __init__(self, report: Path, work: str) -> None:
+        self.report = report
+        self._work = work
+        self._file = report.with_name(report.name + ".journal")
+        with _alone_with(self._file):
+            self._database = sqlite3.connect(self._file, timeout=BUSY_SECONDS, isolation_level=None)
+            self._database.execute("PRAGMA journal_mode=WAL")
+            self._database.execute("PRAGMA synchronous=NORMAL")
+            self._database.executescript(SCHEMA)
+
+    def known(self, path: str) -> str | None:
+        """The hash of the input whose result was written by this same work; None without one."""
+        row = self._database.execute(
+            "SELECT input FROM rows WHERE path = ? AND work = ? AND status = 'done'",
+            (path, self._work),
+        ).fetchone()
+        return None if row is None else str(row[0])
+
+    def claim(self, output: str, path: str) -> bool:
+        """Whether a result may be written at `output`: it is no other file's."""
+        self._database.execute("INSERT OR IGNORE INTO outputs VALUES (?, ?)", (output, path))
+        row = self._database.execute(
+            "SELECT path FROM outputs WHERE output = ?", (output,)
+        ).fetchone()
+        return bool(row[0] == path)
+
+    def put(self, row: Row) -> None:
+        """Keep a row; one that was skipped, or only planned, leaves what is known as it is."""
+        if row.status in (SKIPPED, PLANNED):
+            return
+        self._database.execute(
+            "INSERT OR REPLACE INTO rows VALUES (?, ?, ?, ?, ?, ?)",
+            (
+                row.path,
+                self._work,
+                row.status,
+                row.code,
+                row.input_sha256,
+                json.dumps(row.as_dict()),
+            ),
+        )
+
+    def failures(self) -> list[tuple[str, int]]:
+        """How many files of this work failed, by code, the most frequent first."""
+        return self._database.execute(
+            "SELECT code, count(*) FROM rows WHERE work = ? AND status = ? "
+            "GROUP BY code ORDER BY count(*) DESC, code",
+            (self._work, FAILED),
+        ).fetchall()
+
+    def close(self) -> None:
+        """Write the report of this work, whole, and let go of the file."""
+        # The last of several runs to come here writes the rows of all of them.
+        with _alone_with(self._file):
+            try:
+                self._write_report()
+            finally:
+                self._database.close()
+
+    def _write_report(self) -> None:
+        if self.report.suffix == ".parquet":
+            self._write_parquet()
+            return
+        with replacing(self.report) as temporary, temporary.open("w") as lines:
+            lines.writelines(json.dumps(row) + "\n" for row in self._rows())
+
+    def _rows(self) -> Iterator[dict[str, Any]]:
+        query = "SELECT row FROM rows WHERE work = ? ORDER BY path"
+        for (text,) in self._database.execute(query, (self._work,)):
+            yield json.loads(text)
+
+    def _write_parquet(self) -> None:
+        import pyarrow as arrow
+        import pyarrow.parquet as parquet
+
+        schema = arrow.schema(
+            [(name, _arrow_type(arrow, name)) for name in Row("", "", "").as_dict()]
+        )
+        with (
+            replacing(self.report) as temporary,
+            parquet.ParquetWriter(temporary, schema) as writer,
+        ):
+            batch: list[dict[str, Any]] = []
+            for row in self._rows():
+                batch.append(row)
+                if len(batch) == BATCH:
+                    writer.write_table(arrow.Table.from_pylist(batch, schema))
+                    batch = []
+            writer.write_table(arrow.Table.from_pylist(batch, schema))
+
+
+def check_report(report: Path) -> None:
+    """Raise InvalidParameter where a report cannot be written under this name."""
+    if report.suffix not in REPORTS:
+        raise InvalidParameter("report", f"{report}: it must end in {' or '.join(REPORTS)}")
+    if not report.parent.is_dir():
+        raise InvalidParameter("report", f"{report.parent}: there is no such folder")
+    if report.suffix == ".parquet":
+        try:
+            import pyarrow  # noqa: F401
+        except ImportError as error:
+            raise InvalidParameter(
+                "report",
+                f"{report}: Parquet needs the extra: pip install 'pns-subdivision[ray]'; "
+                "a .jsonl needs none",
+            ) from error
+
+
+def _arrow_type(arrow: Any, name: str) -> Any:
+    if name.startswith("seconds") or name == "limit_distance":
+        return arrow.float64()
+    if name.startswith(("faces_", "bytes_")) or name in ("attempts", "flipped_faces"):
+        return arrow.int64()
+    return arrow.string()
+
+
+@contextmanager
+def _alone_with(journal: Path) -> Iterator[None]:
+    """Keep other runs from opening or closing a journal meanwhile.
+
+    SQLite answers "locked" at once, whatever its timeout, while another connection starts its log
+    or tidies it up. The lock is a file of its own: closing SQLite's own would let go of its locks.
+    """
+    with journal.with_name(journal.name + "-lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield

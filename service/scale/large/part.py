@@ -1,0 +1,225 @@
+"""One part of a large mesh, as a worker does it: counted once, then refined and written."""
+
+from __future__ import annotations
+
+import json
+import resource
+import time
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Int
+
+from pns_common.blocks import Blocks
+from pns_common.errors import PnsError
+from pns_common.fused import KERNEL_ROWS, load_kernels
+from pns_common.mesh import Mesh
+from pns_common.pieces import Piece, RefinedPiece, ThinHaloError, halo_rings, refine_piece
+from pns_common.schemes import Scheme
+from pns_common.whole_file import replace_file, replacing
+
+from ...errors import LimitError, NoModelError, UnrefinableError
+from ...gltf.subdivide import make_scheme
+from ...meshes.crease_angle import edges_sharper_than
+from ...options import Options
+from .adjacency import Adjacency
+from .arrays import ArrayMesh, open_mesh
+from .cutout import Cutout, cutout
+from .numbering import BASES, Numbering, shown_first
+from .partition import Parts
+from .target import Target
+from .tiles import Tiles, write_tile
+
+COUNT, REFINE = "count", "refine"
+
+# No part takes less for a face that it makes, beside what any worker takes (docs/scale.md).
+LEAST_BYTES_PER_FACE = 150
+
+
+@dataclass(frozen=True)
+class PartTask:
+    """What a worker is told of a part.
+
+    Attributes:
+        stage: COUNT or REFINE.
+        mesh, work: folders of the mesh and of what is known of it.
+        length: R.
+        vertices: of each level of the whole mesh; empty while it is counted.
+        target: where to write; None while it is counted.
+        memory: bytes that the part may take; None: any.
+        threads: of the worker.
+    """
+
+    stage: str
+    part: int
+    parts: int
+    mesh: str
+    work: str
+    options: Options
+    model: str | None
+    length: float
+    vertices: tuple[int, ...] = ()
+    target: Target | Tiles | None = None
+    memory: int | None = None
+    threads: int = 1
+    attempt: int = 1
+
+
+@dataclass(frozen=True)
+class PartDone:
+    """A part that was done: in which try, and what it took of time and memory."""
+
+    part: int
+    attempts: int
+    seconds: float
+    peak_bytes: int
+
+
+def done_file(work: Path, stage: str, part: int) -> Path:
+    """What is there as soon as a part is done."""
+    return work / (f"count-{part:05}.npy" if stage == COUNT else f"part-{part:05}.json")
+
+
+def run_part(task: PartTask) -> PartDone:
+    """Do a part.
+
+    Raises:
+        UnrefinableError: it cannot be refined.
+        LimitError: with its halo it is larger than its memory.
+        NoModelError: there is no such model here.
+        OSError: a file cannot be read or written.
+    """
+    began, work = time.perf_counter(), Path(task.work)
+    file = done_file(work, task.stage, task.part)
+    mesh, adjacency = open_mesh(Path(task.mesh)), Adjacency.open(work)
+    own = Parts.open(work, task.parts).own(task.part)
+    if task.stage == COUNT:
+        shown = shown_first(cutout(mesh, adjacency, own, 1).piece, task.options.levels)
+        with replacing(file) as temporary, temporary.open("wb") as stream:
+            np.save(stream, shown.astype(np.uint32))
+    else:
+        try:
+            report = _refine(task, mesh, adjacency, own)
+        except PnsError as error:
+            # It crosses to the driver, which not all of these can.
+            raise UnrefinableError(f"part {task.part}: {error}") from error
+        replace_file(file, json.dumps(report).encode())
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    return PartDone(task.part, task.attempt, time.perf_counter() - began, peak)
+
+
+def _refine(
+    task: PartTask, mesh: ArrayMesh, adjacency: Adjacency, own: Int[np.ndarray, " N"]
+) -> dict[str, Any]:
+    """Refine the part, write it, and say what was done."""
+    load_kernels()
+    levels = task.options.levels
+    scheme = scheme_of(task.options, task.model)
+    rings, cut, made = _surely_refined(task, scheme, mesh, adjacency, own)
+    box = None
+    if isinstance(task.target, Tiles):
+        box = write_tile(task.target, task.part, cut, made, levels)
+    elif task.target is not None:
+        bases = np.load(Path(task.work) / BASES, mmap_mode="r")
+        write_part(task.target, cut, made, Numbering(bases, list(task.vertices)), levels)
+    return {
+        "own": len(own),
+        "halo": len(cut.faces) - len(own),
+        "rings": rings,
+        "box": box,
+        "several_fans": made.several_fans,
+        "levels": [tally.as_dict() for tally in made.tallies],
+    }
+
+
+def _surely_refined(
+    task: PartTask,
+    scheme: Scheme,
+    mesh: ArrayMesh,
+    adjacency: Adjacency,
+    own: Int[np.ndarray, " N"],
+) -> tuple[int, Cutout, RefinedPiece]:
+    """The part refined with as many rings around it as it turns out to need; how many that were.
+
+    Raises:
+        PnsError: it cannot be refined.
+        LimitError: with its halo it is larger than its memory.
+    """
+    levels, guard_rings = task.options.levels, 1
+    while True:
+        rings = halo_rings(scheme, levels, guard_rings)
+        cut = cutout(mesh, adjacency, own, rings)
+        _check_memory(task, cut, adjacency)
+        piece = with_angle_creases(cut.piece, task.options.crease_angle)
+        blocks = Blocks(task.threads, KERNEL_ROWS)
+        try:
+            return rings, cut, refine_piece(piece, scheme, levels, task.length, blocks)
+        except ThinHaloError:
+            # Only the guard goes farther than is known beforehand, and in all of the mesh no more.
+            guard_rings *= 2
+            if cut.is_all or halo_rings(scheme, levels, guard_rings) == rings:
+                raise
+
+
+def _check_memory(task: PartTask, cut: Cutout, adjacency: Adjacency) -> None:
+    """Refuse a part that would take more than its memory for certain, rather than be killed for it.
+
+    Raises:
+        LimitError: it would.
+    """
+    least = LEAST_BYTES_PER_FACE * len(cut.faces) * 4**task.options.levels
+    if task.memory is None or least <= task.memory:
+        return
+    hub = int(cut.vertices[np.argmax(adjacency.valence(cut.vertices))])
+    valence = int(adjacency.valence(np.array([hub]))[0])
+    raise LimitError(
+        f"part {task.part} has {cut.piece.own.sum():,} faces of its own and, with the halo that "
+        f"they need, {len(cut.faces):,}, which take {least / 2**30:.1f} GiB or more; at vertex "
+        f"{hub} alone there are {valence:,}. More --memory, or fewer --levels",
+        limit="part-memory",
+        allowed=task.memory,
+        found=least,
+    )
+
+
+def write_part(
+    target: Target, cut: Cutout, made: RefinedPiece, numbering: Numbering, levels: int
+) -> None:
+    """Write own vertices and faces under the whole mesh's numbers."""
+    edges = [numbering.of_edges(level, cut.faces, made.openers[level]) for level in range(levels)]
+    ids = np.concatenate([cut.vertices, *edges])
+    own = made.own_vertices
+    target.write_vertices(ids[own], made.points[own])
+    many = 4**levels
+    children = made.faces.reshape(-1, many, 3)[cut.piece.own]
+    target.write_children(cut.faces[cut.piece.own], ids[children])
+
+
+def with_angle_creases(piece: Piece, angle: float | None) -> Piece:
+    """The piece with its edges sharper than ``angle`` as creases too."""
+    if angle is None:
+        return piece
+    sharp = edges_sharper_than(Mesh(piece.points, piece.faces), angle)
+    given = np.zeros((0, 2), dtype=np.int64) if piece.creases is None else piece.creases
+    creases = np.concatenate([given, sharp])
+    return Piece(piece.points, piece.faces, piece.own, piece.whole, creases)
+
+
+@cache
+def scheme_of(options: Options, model: str | None) -> Scheme:
+    """The scheme of some options, made once a worker.
+
+    Raises:
+        NoModelError: there is no such model, or it cannot be used.
+    """
+    from pns_common import ModelError, load_model
+
+    if options.scheme != "pns":
+        return make_scheme(options, None)
+    try:
+        return make_scheme(options, load_model(model))
+    except ModelError as error:
+        raise NoModelError(str(error)) from error

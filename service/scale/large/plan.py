@@ -1,0 +1,126 @@
+"""What a large mesh's work is, and its folder beside the output: what a later run goes on from."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from pns_common.whole_file import replace_file
+
+from ...errors import InvalidParameter, ServiceError, WorkerDied
+from ...options import Options
+from .arrays import CREASES, FACES, POSITIONS
+
+VERSION = 1
+PLAN, LOCK = "plan.json", "pns-large.lock"
+
+
+@dataclass(frozen=True)
+class Large:
+    """What to make of one mesh.
+
+    Attributes:
+        source, output: files or folders; their endings say which.
+        memory: bytes that a worker may take.
+        parts: how many to cut it into; None: as many as the memory asks for.
+        model: a bundled name or a file; None: the default one.
+    """
+
+    source: Path
+    output: Path
+    options: Options
+    memory: int
+    parts: int | None = None
+    model: str | None = None
+
+    @property
+    def work(self) -> Path:
+        """The folder of what is not finished."""
+        return self.output.with_name(f"{self.output.name}.work")
+
+
+@contextmanager
+def work_folder(large: Large, model_hash: str | None) -> Iterator[Path]:
+    """The folder of a work, with what an earlier run of the same left in it; no other run's.
+
+    Each plan has a folder of its own in ``large.work``, so that a worker that outlived a killed run
+    of another plan writes nothing into this one's files. All is removed once the work is done, or
+    refused; it stays where a run was stopped, or its workers died.
+
+    Raises:
+        InvalidParameter: there is no such input, another run has the folder, or it is somebody's.
+    """
+    source = identity(large.source)
+    work = large.work
+    work.mkdir(exist_ok=True)
+    if any(work.iterdir()) and not (work / LOCK).exists():
+        raise InvalidParameter("OUT", f"{work}: it is needed, and holds something else")
+    with (work / LOCK).open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise InvalidParameter("OUT", f"{work}: another run is at work there") from error
+        plan = {
+            "version": VERSION,
+            "source": source,
+            "options": asdict(large.options),
+            "model": model_hash,
+            "parts": large.parts,
+            "memory": large.memory,
+            "output": large.output.name,
+        }
+        text = json.dumps(plan, sort_keys=True).encode()
+        folder = work / hashlib.sha256(text).hexdigest()[:16]
+        if not (folder / PLAN).exists():
+            for left in work.iterdir():
+                if left.name != LOCK:
+                    shutil.rmtree(left) if left.is_dir() else left.unlink()
+            folder.mkdir()
+            replace_file(folder / PLAN, text)
+        try:
+            yield folder
+        except WorkerDied:
+            raise
+        except ServiceError:
+            # Refused: the same again would be refused again.
+            _remove(work, folder)
+            raise
+        _remove(work, folder)
+
+
+def _remove(work: Path, folder: Path) -> None:
+    # First of all: what is half removed is nothing to go on from.
+    (folder / PLAN).unlink(missing_ok=True)
+    shutil.rmtree(work)
+
+
+def identity(source: Path) -> list[Any]:
+    """What tells a file, or the arrays of a folder, from others: names, sizes, times of change.
+
+    Raises:
+        InvalidParameter: there is no such file.
+    """
+    files = [source]
+    if source.is_dir():
+        files = [source / name for name in (POSITIONS, FACES, CREASES)]
+    known = [(str(file), file.stat()) for file in files if file.exists()]
+    if not known:
+        raise InvalidParameter("IN", f"{source}: there is no such file or folder of arrays")
+    return [[name, status.st_size, status.st_mtime_ns] for name, status in known]
+
+
+def keep(file: Path, values: Any) -> None:
+    """Write values as JSON, whole or not at all."""
+    replace_file(file, json.dumps(values).encode())
+
+
+def kept(file: Path) -> Any:
+    """What ``keep`` wrote; None where it has not."""
+    return json.loads(file.read_text()) if file.exists() else None

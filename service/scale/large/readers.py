@@ -1,0 +1,277 @@
+"""Mesh files larger than memory, block by block: the triangles that they list, as they list them.
+
+A reader gives vertices and faces to a sink as they come. Faces must be triangles: a polygon is
+refused, and `pns subdivide` splits it where the file fits into memory.
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import re
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import UnreadableError
+from ...gltf.constants import (
+    COMPONENT_TYPES,
+    FLOAT,
+    GLB_MAGIC,
+    GLB_VERSION,
+    JSON_CHUNK,
+    UNSIGNED_INTEGERS,
+)
+from ...gltf.read.modes import TRIANGLES
+from .arrays import blocks_of
+from .sink import Sink
+
+# Bytes of text that are read at a time.
+TEXT = 1 << 24
+PLY_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
+    "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+}  # fmt: skip
+CORNER_LISTS = ("vertex_indices", "vertex_index")
+LONGEST_HEADER = 1 << 20
+# What a tree that is not a glTF's, or lies, does to those who read it.
+UNREADABLE = (
+    AttributeError, LookupError, OverflowError, RecursionError, TypeError, ValueError, struct.error,
+)  # fmt: skip
+
+_OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+_OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]+([^\r\n#]*)", re.MULTILINE)
+_STL_VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+
+
+def read_ply(path: Path, sink: Sink) -> None:
+    """A binary PLY of triangles, of either byte order.
+
+    Raises:
+        UnreadableError: another file, or a face that is no triangle.
+    """
+    order, elements, start = _ply_header(path)
+    for name, count, properties in elements:
+        kind = _ply_record(path, order, name, properties)
+        if path.stat().st_size < start + count * kind.itemsize:
+            raise UnreadableError(f"{path}: it ends within its {name} elements")
+        if count and name in ("vertex", "face"):
+            records = np.memmap(path, kind, "r", start, (count,))
+            for rows in blocks_of(count):
+                if name == "vertex":
+                    axes = [records[axis][rows] for axis in "xyz"]
+                    sink.add_vertices(np.stack(axes, axis=1))
+                else:
+                    _add_triangles(path, records[rows], rows.start, sink)
+        start += count * kind.itemsize
+
+
+def _add_triangles(path: Path, records: np.ndarray, first: int, sink: Sink) -> None:
+    sizes = records["count"]
+    if (sizes != 3).any():
+        worst = int(np.argmax(sizes != 3))
+        raise UnreadableError(
+            f"{path}: face {first + worst} has {sizes[worst]} corners; only triangles are read"
+        )
+    sink.add_faces(records["corners"])
+
+
+def _ply_header(path: Path) -> tuple[str, list[tuple[str, int, list[list[str]]]], int]:
+    with path.open("rb") as file:
+        head = file.read(LONGEST_HEADER)
+    end = re.search(rb"^end_header\r?\n", head, re.MULTILINE)
+    if not re.match(rb"ply\r?\n", head) or end is None:
+        raise UnreadableError(f"{path}: this is not a PLY file")
+    order, elements = "", list[tuple[str, int, list[list[str]]]]()
+    for words in (line.split() for line in head[: end.start()].decode("latin-1").splitlines()):
+        match words:
+            case ["format", "binary_little_endian", _]:
+                order = "<"
+            case ["format", "binary_big_endian", _]:
+                order = ">"
+            case ["element", name, count] if count.isdecimal():
+                elements.append((name, int(count), []))
+            case ["property", *described] if elements:
+                elements[-1][2].append(described)
+            case _:
+                pass
+    if not order:
+        raise UnreadableError(f"{path}: only a binary PLY is read")
+    if {"vertex", "face"} - {name for name, _, _ in elements}:
+        raise UnreadableError(f"{path}: the PLY file has no vertices or no faces")
+    return order, elements, end.end()
+
+
+def _ply_record(path: Path, order: str, element: str, properties: list[list[str]]) -> np.dtype:
+    """The record of an element, whose lists are of triangles' corners."""
+    fields: list[Any] = []
+    try:
+        for words in properties:
+            match words:
+                case ["list", size, item, name] if name in CORNER_LISTS and element == "face":
+                    fields.append(("count", order + PLY_TYPES[size]))
+                    fields.append(("corners", order + PLY_TYPES[item], (3,)))
+                case [item, name]:
+                    fields.append((name, order + PLY_TYPES[item]))
+                case _:
+                    listed = " ".join(words)
+                    raise UnreadableError(f"{path}: '{listed}' of {element} is not read")
+        kind = np.dtype(fields)
+    except (KeyError, ValueError) as error:
+        raise UnreadableError(f"{path}: the PLY header's {element} cannot be read") from error
+    needed = {"vertex": {"x", "y", "z"}, "face": {"corners"}}.get(element, set())
+    if needed - set(kind.names or ()):
+        raise UnreadableError(f"{path}: the PLY file's {element} has no {sorted(needed)}")
+    return kind
+
+
+def read_stl(path: Path, sink: Sink) -> None:
+    """An STL, binary or text: three vertices of their own for each face.
+
+    Raises:
+        UnreadableError: another file.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(84)
+    count = int.from_bytes(head[80:84], "little") if len(head) == 84 else -1
+    if size == 84 + 50 * count:
+        kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+        records = np.memmap(path, kind, "r", 84, (count,)) if count else np.zeros(0, kind)
+        for rows in blocks_of(count):
+            _add_soup(sink, np.array(records["corners"][rows]).reshape(-1, 3))
+        return
+    left: np.ndarray = np.zeros((0, 3))
+    for text in _text_blocks(path):
+        points = np.concatenate([left, _numbers(path, _STL_VERTEX.findall(text))])
+        whole = len(points) - len(points) % 3
+        _add_soup(sink, points[:whole])
+        left = points[whole:]
+    if len(left):
+        raise UnreadableError(f"{path}: the STL file ends within a face")
+
+
+def _add_soup(sink: Sink, points: np.ndarray) -> None:
+    first = sink.vertices
+    sink.add_vertices(points)
+    sink.add_faces(np.arange(first, first + len(points)).reshape(-1, 3))
+
+
+def read_obj(path: Path, sink: Sink) -> None:
+    """An OBJ's positions and triangles; all else is passed over.
+
+    Raises:
+        UnreadableError: a number that is none, or a face that is no triangle.
+    """
+    for text in _text_blocks(path):
+        before = sink.vertices
+        lines = list(_OBJ_VERTEX.finditer(text))
+        sink.add_vertices(_numbers(path, [line.groups() for line in lines]))
+        starts = np.array([line.start() for line in lines], dtype=np.int64)
+        faces = list(_OBJ_FACE.finditer(text))
+        corners = _obj_corners(path, [face[1] for face in faces])
+        # A number below 0 counts back from the vertices above the face.
+        above = before + np.searchsorted(starts, [face.start() for face in faces])
+        sink.add_faces(np.where(corners < 0, above[:, None] + corners, corners - 1))
+
+
+def _obj_corners(path: Path, faces: list[bytes]) -> np.ndarray:
+    try:
+        rows = [[int(corner.partition(b"/")[0]) for corner in face.split()] for face in faces]
+    except ValueError as error:
+        raise UnreadableError(f"{path}: a corner of a face is no number") from error
+    for row in rows:
+        if len(row) != 3:
+            raise UnreadableError(f"{path}: a face has {len(row)} corners; only triangles are read")
+    try:
+        return np.array(rows, dtype=np.int64).reshape(-1, 3)
+    except OverflowError as error:
+        raise UnreadableError(f"{path}: a corner of a face is out of range") from error
+
+
+def _numbers(path: Path, rows: list[Any]) -> np.ndarray:
+    try:
+        return np.array(rows, dtype=np.float64).reshape(-1, 3)
+    except ValueError as error:
+        raise UnreadableError(f"{path}: a coordinate is no number") from error
+
+
+def _text_blocks(path: Path) -> Iterator[bytes]:
+    """A file's text in blocks of whole lines; a line that fills a block is no mesh's."""
+    with path.open("rb") as file:
+        left = b""
+        while block := file.read(TEXT):
+            whole, newline, rest = (left + block).rpartition(b"\n")
+            if not newline:
+                raise UnreadableError(f"{path}: a line of more than {TEXT} bytes")
+            yield whole + newline
+            left = rest
+        yield left
+
+
+def read_glb(path: Path, sink: Sink) -> None:
+    """The triangles of a GLB's one mesh, in its own coordinates, uncompressed.
+
+    Raises:
+        UnreadableError: another file, or one whose mesh is kept in another way.
+    """
+    try:
+        with path.open("rb") as file:
+            memory = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        magic, version, _, length, kind = struct.unpack_from("<4sIII4s", memory, 0)
+        if (magic, version, kind) != (GLB_MAGIC, GLB_VERSION, JSON_CHUNK):
+            raise UnreadableError(f"{path}: this is not a GLB file")
+        tree = json.loads(memory[20 : 20 + length])
+        meshes = tree["meshes"]
+        if len(meshes) != 1:
+            raise UnreadableError(f"{path}: it has {len(meshes)} meshes; only one is read")
+        for primitive in meshes[0]["primitives"]:
+            _read_primitive(path, memory, 28 + length, tree, primitive, sink)
+    except UNREADABLE as error:
+        raise UnreadableError(f"{path}: this is not a readable GLB file") from error
+
+
+def _read_primitive(
+    path: Path, memory: mmap.mmap, start: int, tree: Any, primitive: Any, sink: Sink
+) -> None:
+    if primitive.get("mode", TRIANGLES) != TRIANGLES or "extensions" in primitive:
+        raise UnreadableError(f"{path}: only plain, uncompressed triangles are read")
+    first = sink.vertices
+    position = primitive["attributes"]["POSITION"]
+    points = _accessor(path, memory, start, tree, position, (FLOAT,), 3)
+    for rows in blocks_of(len(points)):
+        sink.add_vertices(points[rows])
+    if "indices" in primitive:
+        flat = _accessor(path, memory, start, tree, primitive["indices"], UNSIGNED_INTEGERS, 1)
+    else:
+        flat = np.arange(len(points))
+    faces = flat.reshape(-1, 3)
+    for rows in blocks_of(len(faces)):
+        sink.add_faces(first + faces[rows].astype(np.int64))
+
+
+def _accessor(
+    path: Path,
+    memory: mmap.mmap,
+    start: int,
+    tree: Any,
+    number: int,
+    types: tuple[int, ...],
+    width: int,
+) -> np.ndarray:
+    """An accessor's rows where they lie."""
+    accessor = tree["accessors"][number]
+    if "sparse" in accessor or accessor["componentType"] not in types:
+        raise UnreadableError(f"{path}: accessor {number} is kept in a way that is not read")
+    view = tree["bufferViews"][accessor["bufferView"]]
+    if view.get("buffer", 0) != 0 or "uri" in tree["buffers"][0] or "extensions" in view:
+        raise UnreadableError(f"{path}: only what the GLB itself holds is read")
+    kind = COMPONENT_TYPES[accessor["componentType"]]
+    stride = view.get("byteStride", width * kind.itemsize)
+    offset = start + view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+    shape, strides = (accessor["count"], width), (stride, kind.itemsize)
+    return np.ndarray(shape, kind, memory, offset, strides)

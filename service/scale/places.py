@@ -1,0 +1,108 @@
+"""Files by path or URL, on any file system that fsspec knows: read, listed, written whole."""
+
+from __future__ import annotations
+
+import os
+import posixpath
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fsspec
+from fsspec.implementations.local import LocalFileSystem
+
+from pns_common.whole_file import replace_file
+
+from ..bodies.sibling_files import File, SiblingFiles
+from ..errors import InvalidParameter
+
+READ_ONLY = ("http", "https")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A file or a folder: its file system, and its path there."""
+
+    system: Any
+    path: str
+
+    @property
+    def local(self) -> bool:
+        """Whether it lies on this machine's own disks."""
+        return isinstance(self.system, LocalFileSystem)
+
+    @property
+    def url(self) -> str:
+        """How it is called outside: a plain path where it is local."""
+        return self.path if self.local else str(self.system.unstrip_protocol(self.path))
+
+    @property
+    def read_only(self) -> bool:
+        """Whether nothing can be written there."""
+        protocols = self.system.protocol
+        named = (protocols,) if isinstance(protocols, str) else protocols
+        return any(name in READ_ONLY for name in named)
+
+    def below(self, relative: str) -> Place:
+        """What lies at a relative path below a folder."""
+        return Place(self.system, posixpath.join(self.path, relative))
+
+    def read(self) -> bytes:
+        """The whole file. Raises OSError."""
+        return bytes(self.system.cat_file(self.path))
+
+    def is_file(self) -> bool:
+        """Whether there is a file."""
+        return bool(self.system.isfile(self.path))
+
+    def write(self, data: bytes) -> None:
+        """Write a file whole or not at all: renamed into place, or one put. Raises OSError."""
+        if self.local:
+            path = Path(self.path)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(path, data)
+        else:
+            # Object stores show an object only when its put has ended.
+            self.system.pipe_file(self.path, data)
+
+    def files(self) -> Iterator[str]:
+        """The relative paths of all files below a folder, folder by folder in order of name."""
+        for folder, folders, names in self._walk():
+            folders.sort()
+            for name in sorted(names):
+                inside = posixpath.relpath(posixpath.join(folder, name), self.path)
+                # A single file is what `walk` says of itself on some systems.
+                if name and inside != ".":
+                    yield inside
+
+    def _walk(self) -> Iterator[tuple[str, list[str], list[str]]]:
+        # A local folder of a million files is names alone, not what fsspec tells of each.
+        return os.walk(self.path) if self.local else self.system.walk(self.path)
+
+    def siblings(self) -> SiblingFiles:
+        """The files in the same folder and below it, opened when a document names them."""
+        folder = Place(self.system, posixpath.dirname(self.path))
+
+        def find(name: str) -> File | None:
+            place = folder.below(name)
+            if folder.local:
+                inside = Path(place.path).resolve().is_relative_to(Path(folder.path).resolve())
+                if not inside:
+                    return None
+            return File(name, place.read()) if place.is_file() else None
+
+        return SiblingFiles(find)
+
+
+def place_of(text: str) -> Place:
+    """The place of a path or URL.
+
+    Raises:
+        InvalidParameter: no file system takes it, or what that needs is not installed.
+    """
+    try:
+        system, path = fsspec.core.url_to_fs(text)
+    except (ValueError, ImportError) as error:
+        raise InvalidParameter("path", f"{text}: {error}") from error
+    return Place(system, path)

@@ -1,0 +1,1 @@
+"""Worker processes: jobs that can be killed, their memory files, the models that they hold."""

@@ -1,0 +1,156 @@
+"""The one way that a job takes: measured, charged, in line, run."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import TypeVar
+
+from ..errors import ServiceError
+from .budget import FacesBudget
+from .costs import Cost
+from .job import Job, State
+from .jobs import Done, Work
+from .pool import Workers
+from .turns import Lane, Turns, Waiting
+from .worker import JobFaultError
+
+T = TypeVar("T")
+
+# What measuring is counted as: the glance of a worker at a document.
+MEASURING_SECONDS = 0.005
+# How much one job's time tells of how fast this machine is.
+LEARNING = 0.2
+# Below, a job's time is mostly what goes on around it.
+TELLING_SECONDS = 0.05
+
+
+class Desk:
+    """Where jobs are handed in.
+
+    Args:
+        workers: those for any job, and the one for short jobs.
+        turns: who is next.
+        budget: what each client may still ask for.
+        run, measure: what a worker calls for a job, and to measure it.
+        job_seconds: how long a job may run.
+    """
+
+    def __init__(
+        self,
+        workers: dict[Lane, Workers],
+        turns: Turns,
+        budget: FacesBudget,
+        run: Callable[[Work], Done],
+        measure: Callable[[Work], Cost],
+        job_seconds: float,
+    ) -> None:
+        self.turns = turns
+        self.watchers: list[Callable[[Job], None]] = []
+        self._workers = workers
+        self._budget = budget
+        self._run = run
+        self._measure = measure
+        self._job_seconds = job_seconds
+        # Seconds here for each predicted one, learnt from the jobs.
+        self._slowness = 1.0
+
+    @property
+    def restarts(self) -> Counter[str]:
+        """How often a worker was replaced, by cause."""
+        return sum((workers.restarts for workers in self._workers.values()), Counter())
+
+    @property
+    def waiting(self) -> int:
+        """How many jobs wait."""
+        return self.turns.waiting
+
+    @property
+    def running(self) -> int:
+        """How many jobs run or are measured."""
+        return self.turns.running.total()
+
+    async def serve(self, job: Job) -> None:
+        """Take a job to its end. Cancelling this call ends the job.
+
+        Raises:
+            ServiceError: it failed; JobFaultError: by a fault of ours.
+        """
+        try:
+            await self._serve(job)
+            job.state = State.DONE
+        except (ServiceError, JobFaultError) as error:
+            job.state, job.error = State.FAILED, error
+            raise
+        finally:
+            if not job.state.ended:
+                job.state = State.CANCELLED
+            job.body.release()
+            job.page.close()
+            job.accepted.set()
+            job.ended.set()
+            for watcher in self.watchers:
+                watcher(job)
+
+    def place(self, job: Job) -> int:
+        """How many jobs come before one that waits."""
+        return self.turns.waiting if job.waiting is None else self.turns.place_of(job.waiting)
+
+    def remaining(self, job: Job) -> float | None:
+        """Predicted seconds until a job ends; None where that is not known."""
+        if job.state.ended:
+            return 0.0
+        if job.cost is None:
+            return None
+        predicted = job.cost.seconds * self._slowness
+        if job.began is None:
+            return self._wait(job.waiting) + predicted
+        spent = time.monotonic() - job.began
+        if job.share > 0.05:
+            return spent * (1 - job.share) / job.share
+        return max(predicted - spent, 0.0)
+
+    async def _serve(self, job: Job) -> None:
+        waiting = self.turns.join(job.client, MEASURING_SECONDS, counted=False)
+        async with self._turn(waiting, job) as lane:
+            job.cost = await self._call(lane, job, self._measure)
+        self._budget.charge(job.client, job.cost.faces, job.faces_per_minute)
+        job.waiting = self.turns.join(job.client, job.cost.seconds)
+        if time.monotonic() + self._wait(job.waiting) > job.must_end:
+            self.turns.leave(job.waiting)
+            raise self.turns.busy("the jobs in front of this one will take too long")
+        job.accepted.set()
+        async with self._turn(job.waiting, job) as lane:
+            job.began, job.state = time.monotonic(), State.RUNNING
+            job.done = await self._call(lane, job, self._run)
+        self._learn(job.cost, time.monotonic() - job.began)
+
+    @asynccontextmanager
+    async def _turn(self, waiting: Waiting, job: Job) -> AsyncIterator[Lane]:
+        """Wait for a turn while the job may wait, and hold it. Raises BusyError."""
+        try:
+            async with asyncio.timeout(max(job.must_end - time.monotonic(), 0)):
+                await self.turns.come(waiting)
+        except TimeoutError as error:
+            raise self.turns.busy("the job's turn did not come in time") from error
+        try:
+            yield waiting.lane
+        finally:
+            self.turns.end(waiting)
+
+    async def _call(self, lane: Lane, job: Job, function: Callable[[Work], T]) -> T:
+        must_end = min(job.must_end, time.monotonic() + self._job_seconds)
+        return await self._workers[lane].run(
+            function, job.work, files=job.files, must_end=must_end, stop=job.page.stop
+        )
+
+    def _wait(self, waiting: Waiting | None) -> float:
+        return self.turns.backlog(waiting) * self._slowness
+
+    def _learn(self, cost: Cost, seconds: float) -> None:
+        """Compare a prediction with what it came to."""
+        if seconds > TELLING_SECONDS:
+            self._slowness += LEARNING * (seconds / cost.seconds - self._slowness)

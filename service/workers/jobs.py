@@ -1,0 +1,189 @@
+"""The job of a request, as a worker runs it: unpack the body, refine, leave the answer.
+
+The heavy imports (the runtime, the pipeline) are made inside the functions: the server process
+imports this module to name its jobs, and never runs them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from ..course import Course
+from ..errors import LimitError, NoModelError, check_limit
+from ..gltf.read.memory_cap import memory_cap
+from ..options import Limits, Options
+from . import memory_file
+from .costs import Cost
+from .memory_file import FileName
+from .models import Models
+from .progress import Reporter
+
+if TYPE_CHECKING:
+    from pns_common.schemes import Model
+
+    from .catalogue import Catalogue
+
+
+# What an archive may take to be measured; others wait meanwhile.
+GLANCE_BYTES = 128 * 1024**2
+# Beside what is predicted for a job: threads' stacks, the allocator's arenas, the libraries' own.
+MEMORY_SLACK = 1024**3
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """One job, small enough for a pipe: its files go by their names.
+
+    `answer` and `report` are what the worker fills, None what nobody wants; together they may hold
+    `answer_bytes`. `page` is where it tells how far it is. `model` is the name of one of the
+    worker's models; None: the served one. `request_id` stands in what the worker logs.
+    """
+
+    body: FileName
+    answer: FileName | None
+    report: FileName | None
+    page: FileName
+    content_type: str
+    options: Options
+    model: str | None
+    limits: Limits
+    answer_bytes: int | None = None
+    request_id: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What is known of a job that was done.
+
+    The seconds of each stage, the model, the faces that came and those that were made.
+    """
+
+    seconds: dict[str, float]
+    model: str | None
+    faces_in: int = 0
+    faces: int = 0
+
+
+def subdivide(work: Work) -> Done:
+    """Write the GLB to `work.answer`, and the report as JSON to `work.report`.
+
+    Raises:
+        ServiceError: the upload is wrong or over a limit; JobStopped where nobody wants it.
+    """
+    import msgspec
+
+    from ..bodies import uploads
+    from ..gltf.subdivide import subdivide_gltf
+    from ..meshfiles.to_gltf import as_gltf
+
+    reporter = Reporter(work.page)
+    with job_memory(work.limits):
+        body = uploads.sent(memory_file.read(work.body), work.content_type, work.limits)
+        sent = as_gltf(body, work.options, work.limits)
+        model = _MODELS.get(work.model) if work.options.scheme == "pns" else None
+        done = subdivide_gltf(
+            sent.data,
+            sent.kind,  # pyright: ignore[reportArgumentType]  (as_gltf gives no other)
+            work.options,
+            model,
+            work.limits,
+            course=Course(begins=reporter.stage, moves=reporter.reach),
+            siblings=sent.siblings,
+            losses=sent.losses,
+        )
+        report = msgspec.json.encode(done.report)
+        _check_answer(work, report, done.glb)
+        if work.report is not None:
+            memory_file.write(work.report, report)
+        if work.answer is not None:
+            memory_file.write(work.answer, done.glb)
+    faces = done.report["totals"]["faces"]
+    return Done(
+        done.timings,
+        None if model is None else model.name,
+        faces_in=faces // 4**work.options.levels,
+        faces=faces,
+    )
+
+
+def measure(work: Work) -> Cost:
+    """What a job will cost. Raises ServiceError where a body is not what its type says."""
+    from ..bodies import uploads
+    from .costs import cost_of
+    from .measure import cost_of_gltf, cost_of_other
+
+    glance = replace(work.limits, max_memory_bytes=min(work.limits.max_memory_bytes, GLANCE_BYTES))
+    with job_memory(work.limits):
+        body = memory_file.read(work.body)
+        try:
+            sent = uploads.sent(body, work.content_type, glance)
+        except LimitError as error:
+            if error.limit != "archive-bytes":
+                raise
+            # Too large to be unpacked for a glance: it is taken for the largest that may come.
+            return cost_of(work.limits.max_faces, 1, len(body))
+        levels, learned = work.options.levels, _learned_levels(work)
+        if sent.kind in ("glb", "gltf"):
+            return cost_of_gltf(sent.data, sent.kind, levels, work.limits, learned)
+        return cost_of_other(sent.data, levels, work.limits, learned)
+
+
+def _learned_levels(work: Work) -> int:
+    """At how many levels a model acts."""
+    if work.options.scheme != "pns":
+        return 0
+    try:
+        card = _MODELS.get(work.model).card
+    except NoModelError:
+        # The job will say so, at once.
+        return 0
+    return work.options.levels if card.learned_levels is None else card.learned_levels
+
+
+@contextmanager
+def job_memory(limits: Limits) -> Iterator[None]:
+    """Hold the process to what one job may take, whatever was predicted. Raises LimitError."""
+    try:
+        with memory_cap(limits.max_memory_bytes + MEMORY_SLACK):
+            yield
+    except MemoryError as error:
+        raise LimitError(
+            f"the job took more memory than {limits.max_memory_bytes} bytes",
+            limit="memory",
+            allowed=limits.max_memory_bytes,
+            found=limits.max_memory_bytes + 1,
+        ) from error
+
+
+def _check_answer(work: Work, report: bytes, glb: bytes) -> None:
+    if work.answer_bytes is not None:
+        size = len(report) + len(glb)
+        text = f"the result would take {size} bytes"
+        check_limit("result-bytes", size, work.answer_bytes, text)
+
+
+_MODELS = Models()
+
+
+def warm_up(model: Model | str | None) -> None:
+    """Import and load what the first request would otherwise wait for. Raises NoModelError."""
+    from pns_common.fused import load_kernels
+
+    from ..gltf import subdivide  # noqa: F401
+    from ..meshfiles import to_gltf  # noqa: F401
+    from ..meshfiles.formats import load_readers
+
+    load_kernels()
+    load_readers()
+    _MODELS.hold(model)
+    _MODELS.get()
+
+
+def catalogue() -> Catalogue:
+    """What this worker's models say of themselves."""
+    from .catalogue import catalogue_of
+
+    return catalogue_of(_MODELS)

@@ -1,0 +1,90 @@
+"""A glance at a document: how many faces it asks for, in how many meshes.
+
+It reads counts and builds nothing else. The limits are checked by the job itself, on the document
+as it really is.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from ..bodies.media import Kind
+from ..errors import ServiceError
+from ..gltf.read.container import read_glb
+from ..gltf.read.json_text import BOM, check_size
+from ..options import Limits
+from .costs import Cost, cost_of
+
+# Of a format without counts: an OBJ's or PLY's face takes about as many bytes, an STL's 50.
+BYTES_PER_FACE = 30
+
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+
+
+class _Accessor(msgspec.Struct):
+    count: int = 0
+
+
+class _Primitive(msgspec.Struct):
+    attributes: dict[str, int] = {}
+    indices: int | None = None
+    mode: int = _TRIANGLES
+
+
+class _Mesh(msgspec.Struct):
+    primitives: list[_Primitive] = []
+
+
+class _Counts(msgspec.Struct):
+    """The few things of a document that say how large it is."""
+
+    accessors: list[_Accessor] = []
+    meshes: list[_Mesh] = []
+
+
+def cost_of_gltf(
+    data: bytes, kind: Kind, levels: int, limits: Limits, learned_levels: int = 0
+) -> Cost:
+    """The cost of a .glb or .gltf; a model acts at the first `learned_levels`.
+
+    One that cannot be read, or is over a limit, is refused as soon as a worker looks at it: it
+    costs no more than its bytes.
+    """
+    try:
+        text = read_glb(data).text if kind == "glb" else data
+        check_size(text, limits)
+        counts = msgspec.json.decode(text.removeprefix(BOM), type=_Counts)
+    except (ServiceError, msgspec.DecodeError, ValueError):
+        return cost_of(0, 0, len(data))
+    faces, meshes = 0, 0
+    for mesh in counts.meshes:
+        triangles = sum(_triangles(primitive, counts.accessors) for primitive in mesh.primitives)
+        faces += triangles
+        meshes += triangles > 0
+    refined = faces * 4**levels
+    if refined > limits.max_faces:
+        return cost_of(0, 0, len(data))
+    return cost_of(refined, meshes, len(data), _learned(faces, levels, learned_levels))
+
+
+def cost_of_other(data: bytes, levels: int, limits: Limits, learned_levels: int = 0) -> Cost:
+    """The cost of a file that does not say how many faces it has."""
+    before = min(len(data) // BYTES_PER_FACE, limits.max_faces // 4**levels)
+    return cost_of(before * 4**levels, 1, len(data), _learned(before, levels, learned_levels))
+
+
+def _learned(faces: int, levels: int, learned_levels: int) -> int:
+    return faces * 4 ** min(levels, learned_levels) if learned_levels else 0
+
+
+def _triangles(primitive: _Primitive, accessors: list[_Accessor]) -> int:
+    """The triangles that a primitive says it has; 0 where it makes no sense."""
+    index = primitive.indices
+    if index is None:
+        index = primitive.attributes.get("POSITION", -1)
+    if not 0 <= index < len(accessors):
+        return 0
+    corners = max(accessors[index].count, 0)
+    if primitive.mode == _TRIANGLES:
+        return corners // 3
+    return max(corners - 2, 0) if primitive.mode in (_STRIP, _FAN) else 0

@@ -1,0 +1,164 @@
+"""Request bodies and answers, kept in files without a name that a worker process opens by path.
+
+Bodies go to the worker this way, not through a pipe: the server process copies them in small
+pieces, parses nothing and pickles nothing, so no upload can hold its event loop; and a worker
+killed in the middle leaves no half-read pipe behind. On Linux the file is memory (no disk, no tmpfs
+quota); elsewhere a temporary file.
+
+A path into `/proc` is a number that the kernel gives to the next file once this one is closed. So a
+file is closed only when nobody who knows its path may still open it: each of them holds it. And who
+opens it compares what was opened with what was meant.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from ..errors import NoStorageError
+
+PIECE = 256 * 1024
+
+
+class ForeignFileError(RuntimeError):
+    """A path led to another file than the one that was meant: a fault of ours."""
+
+
+@dataclass(frozen=True, slots=True)
+class FileName:
+    """How another process finds a memory file, and knows it: its path, its device and inode."""
+
+    path: str
+    device: int
+    inode: int
+
+
+class MemoryFile:
+    """A file that others open by its `name`; gone once everybody who held it has let go.
+
+    Whoever makes it holds it, until the end of the `with` block. In a `folder` it lies on disk,
+    where it has no name either: nothing of it outlives the process.
+
+    Raises:
+        NoStorageError: nothing can be written there.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        try:
+            self._open(folder)
+        except OSError as error:
+            raise NoStorageError(f"no file can be made: {error.strerror}") from error
+
+    def _open(self, folder: Path | None) -> None:
+        if not hasattr(os, "memfd_create"):
+            self._file = tempfile.NamedTemporaryFile(  # noqa: SIM115
+                prefix="pns-", buffering=0, dir=folder
+            )
+            path = self._file.name
+        else:
+            if folder is None:
+                self._file = os.fdopen(os.memfd_create("pns", os.MFD_CLOEXEC), "w+b", buffering=0)
+            else:
+                self._file = tempfile.TemporaryFile(buffering=0, dir=folder)  # noqa: SIM115
+            path = f"/proc/{os.getpid()}/fd/{self._file.fileno()}"
+        status = os.fstat(self._file.fileno())
+        self.name = FileName(path, status.st_dev, status.st_ino)
+        self._holders = 1
+
+    def __enter__(self) -> MemoryFile:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.release()
+
+    def hold(self) -> None:
+        """Keep the file until one more `release`."""
+        if self._holders == 0:
+            raise ValueError("the file is closed")
+        self._holders += 1
+
+    def release(self) -> None:
+        """Let go; the last one gives the memory back."""
+        self._holders -= 1
+        if self._holders == 0:
+            self._file.close()
+
+    @property
+    def descriptor(self) -> int:
+        """The descriptor of this process."""
+        return self._file.fileno()
+
+    @property
+    def closed(self) -> bool:
+        """Whether everybody has let go."""
+        return self._holders == 0
+
+    def append(self, data: bytes) -> None:
+        """Write `data` at the end. Raises NoStorageError."""
+        _write(self._file.fileno(), data)
+
+    @property
+    def size(self) -> int:
+        """Bytes in the file, whichever process wrote them."""
+        return os.fstat(self._file.fileno()).st_size
+
+    def pieces(self) -> Iterator[bytes]:
+        """The content in pieces of at most `PIECE` bytes."""
+        offset = 0
+        while piece := os.pread(self._file.fileno(), PIECE, offset):
+            yield piece
+            offset += len(piece)
+
+
+def read(name: FileName) -> bytes:
+    """All bytes of another process's file. Raises ForeignFileError."""
+    with os.fdopen(opened(name, os.O_RDONLY), "rb") as file:
+        return file.read()
+
+
+def write(name: FileName, data: bytes) -> None:
+    """Fill the file of another process.
+
+    Raises ForeignFileError, and has then written nothing; NoStorageError, and has left nothing.
+    """
+    # Not truncated while it is opened: it might be another file.
+    descriptor = opened(name, os.O_WRONLY)
+    try:
+        os.ftruncate(descriptor, 0)
+        try:
+            _write(descriptor, data)
+        except NoStorageError:
+            # What is half an answer would only keep the room from others.
+            os.ftruncate(descriptor, 0)
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def _write(descriptor: int, data: bytes) -> None:
+    view = memoryview(data)
+    try:
+        while view:
+            view = view[os.write(descriptor, view) :]
+    except OSError as error:
+        raise NoStorageError(f"{len(data)} bytes do not fit: {error.strerror}") from error
+
+
+def opened(name: FileName, flags: int) -> int:
+    """A descriptor of another process's file. Raises ForeignFileError."""
+    # Another file might be a pipe, whose opening waits for its other end.
+    descriptor = os.open(name.path, flags | os.O_CLOEXEC | os.O_NONBLOCK)
+    status = os.fstat(descriptor)
+    if (status.st_dev, status.st_ino) != (name.device, name.inode):
+        os.close(descriptor)
+        raise ForeignFileError(f"{name.path} is another file than the one that was meant")
+    return descriptor

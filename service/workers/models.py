@@ -1,0 +1,68 @@
+"""The models of a worker process: the one that is served, and the bundled ones."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..errors import NoModelError, check_choice
+
+if TYPE_CHECKING:
+    from pns_common.schemes import Model
+
+
+class Models:
+    """Each is loaded when it is first asked for, and kept: there are no others to ask for.
+
+    A model may weigh megabytes and take long to build: requests carry names. The served one is
+    handed over once, when the process starts.
+    """
+
+    def __init__(self) -> None:
+        self._source: Model | str | None = None
+        self._loaded: dict[str, Model] = {}
+
+    def hold(self, source: Model | str | None) -> None:
+        """Serve a model, or the name or file of one; None stands for the default one."""
+        self._source = source
+
+    @property
+    def served(self) -> Model | str:
+        """The model that a request without a name gets, or its name or file."""
+        from pns_common.onnx_model import DEFAULT_MODEL
+
+        return DEFAULT_MODEL if self._source is None else self._source
+
+    @property
+    def sources(self) -> dict[str, Model | str]:
+        """What each name stands for; a bundled name wins over that of a served file."""
+        from pns_common.onnx_model import bundled_models, model_name
+
+        served = self.served
+        name = model_name(served) if isinstance(served, str) else served.name
+        return {name: served} | {bundled: bundled for bundled in bundled_models()}
+
+    def get(self, name: str | None = None) -> Model:
+        """The model of that name, or the served one.
+
+        Raises:
+            InvalidParameter: there is none of that name.
+            NoModelError: it does not load.
+        """
+        if name is None:
+            return self.load(self.served)
+        sources = self.sources
+        check_choice("model", name, sorted(sources))
+        return self.load(sources[name])
+
+    def load(self, source: Model | str) -> Model:
+        """A model, loaded where it has not been yet. Raises NoModelError."""
+        from pns_common import ModelError, load_model
+
+        if not isinstance(source, str):
+            return source
+        if source not in self._loaded:
+            try:
+                self._loaded[source] = load_model(source)
+            except ModelError as error:
+                raise NoModelError(str(error)) from error
+        return self._loaded[source]

@@ -1,0 +1,250 @@
+"""Worker processes: jobs run where they can be killed and cannot hold the server's interpreter."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import multiprocessing
+import time
+from collections import Counter
+from collections.abc import Callable, Coroutine, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from typing import TypeVar
+
+from pebble import ProcessExpired, ProcessPool
+
+from ..errors import BusyError, JobTimeout, ServiceError, WorkerDied
+from . import worker
+from .memory_file import MemoryFile
+
+T = TypeVar("T")
+
+# Where a fresh process cannot even warm up, the next one is not started at once.
+RESTART_SECONDS = 1.0
+# A warm-up imports and loads; a short limit on jobs must not keep every worker from starting.
+WARM_UP_SECONDS = 120.0
+# How long a worker may take to end a job by itself, when it is asked to, before it is killed.
+GRACE_SECONDS = 0.5
+# How long a worker that has died may go unnoticed while none is asked for.
+WATCH_SECONDS = 1.0
+
+log = logging.getLogger("pns.service")
+
+
+class Workers:
+    """`count` worker processes, each with one job at a time.
+
+    Every process has a pebble pool of its own, so that a worker that dies or is killed breaks
+    nothing which another request waits on. A pool whose job did not come back is thrown away and
+    replaced. `warm_up` is called in each new process before it takes jobs.
+    """
+
+    def __init__(self, count: int, seconds: float, warm_up: Callable[[], object]) -> None:
+        self._count = count
+        self._seconds = seconds
+        self._warm_up = warm_up
+        self._free: asyncio.Queue[ProcessPool] = asyncio.Queue()
+        self._pools: set[ProcessPool] = set()
+        self._background: set[asyncio.Task[None]] = set()
+        self._warm: set[ProcessPool] = set()
+        self._ends: set[asyncio.Task[None]] = set()
+        self._known: dict[ProcessPool, Sequence[MemoryFile]] = {}
+        self._stopping = False
+        self.restarts: Counter[str] = Counter()
+        """How often a process was replaced, by cause."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether a worker that has warmed up is alive."""
+        return any(pool.active for pool in self._warm)
+
+    def start(self) -> None:
+        """Start the processes; they warm up in the background."""
+        for _ in range(self._count):
+            self._in_background(self._add())
+        self._in_background(self._watch())
+
+    async def stop(self) -> None:
+        """End every process, whatever it is doing."""
+        self._stopping = True
+        for task in self._background:
+            task.cancel()
+        await asyncio.gather(*self._background, return_exceptions=True)
+        for pool in tuple(self._pools):
+            self._end(pool)
+        await asyncio.gather(*self._ends)
+
+    async def run(
+        self,
+        function: Callable[..., T],
+        *arguments: object,
+        files: Sequence[MemoryFile] = (),
+        must_end: float | None = None,
+        stop: Callable[[], None] | None = None,
+    ) -> T:
+        """The value of `function(*arguments)`, called in a worker once one is free.
+
+        `files` are those that the arguments name: they are held until the function has come back
+        or its process is dead, whatever becomes of this call. It comes back before `must_end` (on
+        the clock of `time.monotonic`; None: within the seconds of a job), whether the worker says
+        anything or not.
+
+        Cancelling this call ends the work: `stop` is called to ask for it, and a worker that has
+        not come back shortly after is killed, at once where there is no `stop`.
+
+        Raises what the function raises (ServiceError as it is, anything else as
+        worker.JobFaultError), BusyError where no worker becomes free, JobTimeout past the deadline,
+        WorkerDied where the process ended.
+        """
+        if must_end is None:
+            must_end = time.monotonic() + self._seconds
+        pool = await self._take(must_end)
+        for file in files:
+            file.hold()
+        self._known[pool] = files
+        try:
+            future = _scheduled(pool, function, *arguments)
+            value = await _result(future, must_end)
+        except asyncio.CancelledError:
+            if stop is None:
+                self._replace(pool, "stopped")
+            else:
+                stop()
+                self._in_background(self._wind_down(pool, future))  # pyright: ignore[reportPossiblyUnboundVariable]
+            raise
+        except (JobTimeout, WorkerDied) as error:
+            self._replace(pool, error.code)
+            raise
+        except BaseException:
+            self._let_go(pool)
+            raise
+        self._let_go(pool)
+        return value
+
+    async def _take(self, must_end: float) -> ProcessPool:
+        """A free pool; those whose idle process has died meanwhile are replaced."""
+        try:
+            async with asyncio.timeout(must_end - time.monotonic()):
+                while not (pool := await self._free.get()).active:
+                    self._replace(pool, "idle")
+                return pool
+        except TimeoutError as error:
+            raise BusyError("no worker became free in time") from error
+
+    async def _watch(self) -> None:
+        """Replace those that die idle: with no request to find them, readiness would not return."""
+        while True:
+            await asyncio.sleep(WATCH_SECONDS)
+            for _ in range(self._free.qsize()):
+                pool = self._free.get_nowait()
+                if pool.active:
+                    self._free.put_nowait(pool)
+                else:
+                    self._replace(pool, "idle")
+
+    async def _wind_down(self, pool: ProcessPool, future: asyncio.Future[T]) -> None:
+        """Give a job that nobody wants the time to end itself."""
+        try:
+            await asyncio.wait({future}, timeout=GRACE_SECONDS)
+        finally:
+            if future.done() and not _lost(future):
+                self._let_go(pool)
+            else:
+                self._replace(pool, "stopped")
+
+    async def _add(self) -> None:
+        """Start one more process, and put it among the free ones once it has warmed up."""
+        pool = ProcessPool(
+            max_workers=1,
+            initializer=worker.prepare,
+            # Spawn, not fork: the server has threads, and a fork of them may deadlock.
+            context=multiprocessing.get_context("spawn"),
+        )
+        self._pools.add(pool)
+        try:
+            future = _scheduled(pool, self._warm_up)
+            await _result(future, time.monotonic() + WARM_UP_SECONDS)
+        except (JobTimeout, WorkerDied) as error:
+            log.warning("a worker did not start: %s", error)
+            await asyncio.sleep(RESTART_SECONDS)
+            self._replace(pool, "start")
+            return
+        except (ServiceError, worker.JobFaultError) as error:
+            # The process lives: it may still serve what does not need the thing that failed.
+            log.warning("a worker did not warm up: %s", error)
+        else:
+            self._warm.add(pool)
+        self._free.put_nowait(pool)
+
+    def _let_go(self, pool: ProcessPool) -> None:
+        self._release(pool)
+        self._free.put_nowait(pool)
+
+    def _release(self, pool: ProcessPool) -> None:
+        for file in self._known.pop(pool, ()):
+            file.release()
+
+    def _replace(self, pool: ProcessPool, cause: str) -> None:
+        end = self._end(pool)
+        if not self._stopping:
+            self.restarts[cause] += 1
+            self._in_background(self._add_after(end))
+
+    async def _add_after(self, end: asyncio.Task[None]) -> None:
+        await asyncio.shield(end)
+        await self._add()
+
+    def _end(self, pool: ProcessPool) -> asyncio.Task[None]:
+        """End a process, whoever waits for that, and then let go of the files that it knows."""
+
+        async def end() -> None:
+            await asyncio.to_thread(_stop, pool)
+            self._release(pool)
+
+        self._pools.discard(pool)
+        self._warm.discard(pool)
+        task = asyncio.get_running_loop().create_task(end())
+        self._ends.add(task)
+        task.add_done_callback(self._ends.discard)
+        return task
+
+    def _in_background(self, work: Coroutine[object, object, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
+        self._background.add(task)
+        task.add_done_callback(self._background.discard)
+
+
+def _scheduled(
+    pool: ProcessPool, function: Callable[..., T], *arguments: object
+) -> asyncio.Future[T]:
+    """What a process is going to answer. Nothing ever cancels it: pebble would act on that."""
+    try:
+        future = asyncio.wrap_future(pool.schedule(worker.call, args=(function, *arguments)))
+    except RuntimeError as error:
+        # The process could not be started, or has died since the pool was looked at.
+        raise WorkerDied("no worker process could be started") from error
+    # What comes after everybody has gone is nobody's surprise.
+    future.add_done_callback(_lost)
+    return future
+
+
+async def _result(future: asyncio.Future[T], must_end: float) -> T:
+    # The clock is ours: a process that is frozen does not even say that it has begun.
+    await asyncio.wait({future}, timeout=max(must_end - time.monotonic(), 0))
+    if not future.done():
+        raise JobTimeout("the job took longer than a job may")
+    if _lost(future):
+        raise WorkerDied(
+            "the worker process ended before it answered; it may have run out of memory"
+        )
+    return future.result()
+
+
+def _lost(future: asyncio.Future[T]) -> bool:
+    """Whether the process ended instead of answering."""
+    return future.cancelled() or isinstance(future.exception(), (ProcessExpired, BrokenProcessPool))
+
+
+def _stop(pool: ProcessPool) -> None:
+    pool.stop()
+    pool.join()

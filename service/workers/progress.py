@@ -1,0 +1,108 @@
+"""How far a job is, in a page of memory that its worker writes and the server reads.
+
+Nothing is sent, so nothing waits: a worker inside one long numpy call and a server with a thousand
+clients hinder each other in nothing. The other way round the page carries one word: to stop.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+from types import TracebackType
+
+from ..errors import ServiceError
+from . import memory_file
+from .memory_file import FileName, MemoryFile
+
+STAGES = ("read", "weld", "refine", "attributes", "write")
+
+_SCALE = 10**9
+_WORDS = 3
+_SIZE = 8 * _WORDS
+# Which word is what; the stage is a number into STAGES, plus one, and the share a whole number.
+_STAGE, _DONE, _STOP = range(_WORDS)
+
+
+class JobStopped(ServiceError):  # noqa: N818
+    """Nobody wants the job any more: it ended itself when it was asked to."""
+
+    status = 499
+    code = "job-stopped"
+    title = "The job was stopped"
+
+
+class ProgressPage:
+    """The server's side of the page."""
+
+    def __init__(self) -> None:
+        self.file = MemoryFile()
+        self.file.append(bytes(_SIZE))
+        # None once nobody writes any more; the last that was read stays.
+        self._map = mmap.mmap(self.file.descriptor, _SIZE)
+        self._words: memoryview[int] | None = memoryview(self._map).cast("q")
+        self._last: tuple[str | None, float] = (None, 0.0)
+
+    def __enter__(self) -> ProgressPage:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """The job has ended: keep what the page says, and neither file nor memory."""
+        if self._words is not None:
+            self._last = self.stage, self.share
+            self._words.release()
+            self._words = None
+            self._map.close()
+            self.file.release()
+
+    @property
+    def stage(self) -> str | None:
+        """What the worker does now; None before it begins."""
+        if self._words is None:
+            return self._last[0]
+        number = self._words[_STAGE]
+        return STAGES[number - 1] if 1 <= number <= len(STAGES) else None
+
+    @property
+    def share(self) -> float:
+        """Share of the job that is done, 0 … 1."""
+        if self._words is None:
+            return self._last[1]
+        return min(max(self._words[_DONE] / _SCALE, 0.0), 1.0)
+
+    def stop(self) -> None:
+        """Ask the worker to end the job where it next looks."""
+        if self._words is not None:
+            self._words[_STOP] = 1
+
+
+class Reporter:
+    """The worker's side of the page."""
+
+    def __init__(self, name: FileName) -> None:
+        descriptor = memory_file.opened(name, os.O_RDWR)
+        try:
+            self._words = memoryview(mmap.mmap(descriptor, _SIZE)).cast("q")
+        finally:
+            os.close(descriptor)
+
+    def stage(self, name: str) -> None:
+        """A stage begins. Raises JobStopped."""
+        self._check()
+        self._words[_STAGE] = 1 + STAGES.index(name)
+
+    def reach(self, share: float) -> None:
+        """So much of the job is done, 0 … 1. Raises JobStopped."""
+        self._check()
+        self._words[_DONE] = round(share * _SCALE)
+
+    def _check(self) -> None:
+        if self._words[_STOP]:
+            raise JobStopped("the job was stopped")

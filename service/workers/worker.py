@@ -1,0 +1,55 @@
+"""What runs inside a worker process: its preparation, and the one door for jobs."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from .. import log_lines
+from ..errors import ServiceError
+from ..request_ids import REQUEST_ID
+
+T = TypeVar("T")
+
+# Of 1000. Out of memory, the kernel should take a worker (one request) before the server (all of
+# them).
+OOM_PREFERENCE = 500
+
+
+class JobFaultError(Exception):
+    """A fault of ours inside a job; the text is the worker's traceback, for the log only."""
+
+
+def prepare() -> None:
+    """Set up a fresh worker process."""
+    # A Python handler would wait for the next bytecode, and one numpy call may take seconds.
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    log_lines.configure()
+    # It logs what an upload says, word for word.
+    logging.getLogger("python_multipart").setLevel(logging.CRITICAL)
+    # A signal to the server's process group (a terminal, a supervisor) must not end requests that
+    # run.
+    os.setsid()
+    preference = Path("/proc/self/oom_score_adj")
+    if preference.exists():
+        preference.write_text(str(OOM_PREFERENCE))
+
+
+def call(function: Callable[..., T], *arguments: object) -> T:
+    """Run a job; a foreseen error crosses to the server as it is, any other as JobFaultError.
+
+    Not every exception survives pickling, and one that does not would take the pool with it. What
+    is logged meanwhile has the request's id.
+    """
+    REQUEST_ID.set(next((getattr(value, "request_id", None) for value in arguments), None))
+    try:
+        return function(*arguments)
+    except ServiceError:
+        raise
+    except Exception as error:
+        raise JobFaultError("".join(traceback.format_exception(error))) from None

@@ -1,0 +1,79 @@
+"""Overlays show what was measured, and leave no trace."""
+
+import bl_ext.user_default.pns_refine.overlay as overlay
+import bl_ext.user_default.pns_refine.result as result
+import bpy
+import numpy as np
+import pytest
+from scene import cube, evaluated, grid, numbers, points_of, refined
+
+
+def test_the_distance_is_that_from_loop():
+    obj = grid(6)
+    new, loop = refined(obj), refined(obj, scheme="LOOP")
+    expected = np.linalg.norm(points_of(new.data) - points_of(loop.data), axis=1)
+    distances = numbers(new.data.attributes["pns_distance"].data, "value").ravel()
+    np.testing.assert_allclose(distances, expected, atol=1e-6)
+    assert distances.max() == pytest.approx(new.data.pns_result.pns_distance)
+
+
+def test_ratio_and_gate_stand_at_the_points():
+    new = refined(grid(6)).data
+    for name in ("pns_ratio", "pns_gate"):
+        values = numbers(new.attributes[name].data, "value")
+        assert values.max() > 0
+        assert values.max() <= 1 + 1e-6
+
+
+@pytest.mark.parametrize("name", list(overlay.TITLES))
+def test_an_overlay_is_shown_and_the_materials_come_back(name):
+    obj = grid(6)
+    obj.data.materials.append(bpy.data.materials.new("own"))
+    new = refined(obj)
+    assert bpy.ops.object.pns_overlay(shown=name) == {"FINISHED"}
+    assert overlay.current(new) == name
+    assert [m.name for m in evaluated(new).materials] != ["own"]
+    assert len(overlay.ramp_of(new).color_ramp.elements) == len(overlay.COLOURS)
+    bpy.ops.object.pns_overlay(shown="NONE")
+    assert [m.name for m in evaluated(new).materials] == ["own"]
+    assert [m.name for m in bpy.data.materials] == ["own"]
+    assert not new.modifiers
+    assert not bpy.data.node_groups
+
+
+def test_changing_the_overlay_leaves_one():
+    new = refined(grid(4))
+    for name in overlay.TITLES:
+        bpy.ops.object.pns_overlay(shown=name)
+    assert len(new.modifiers) == 1
+    assert len(bpy.data.materials) == 1
+
+
+def test_an_object_that_was_not_refined_has_none():
+    cube()
+    with pytest.raises(RuntimeError, match="Refine the object first"):
+        bpy.ops.object.pns_overlay(shown="pns_gate")
+
+
+def test_live_results_have_overlays_too():
+    obj = grid(4)
+    bpy.ops.object.pns_live_add()
+    assert bpy.ops.object.pns_overlay(shown="pns_distance") == {"FINISHED"}
+    assert "pns_distance" in evaluated(obj).attributes
+    bpy.ops.object.pns_live_remove()
+    assert not obj.modifiers
+
+
+def test_the_certificate_is_in_the_scenes_units():
+    new = refined(grid(6))
+    scene = bpy.context.scene
+    scene.unit_settings.system = "METRIC"
+    scene.unit_settings.scale_length = 0.001
+    new.scale = (1000, 1000, 1000)
+    bpy.context.view_layer.update()
+    text = " ".join(result.certificate_lines(new, new.data, scene))
+    farthest = new.data.pns_result.pns_distance
+    assert result.in_units(farthest * 1000, scene) in text
+    assert "m" in result.in_units(farthest * 1000, scene)
+    scene.unit_settings.system = "NONE"
+    assert f"{farthest * 1000:.4g}" in " ".join(result.certificate_lines(new, new.data, scene))

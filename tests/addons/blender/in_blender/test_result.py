@@ -1,0 +1,65 @@
+"""The operator's positions, on the object that was asked for."""
+
+import bpy
+import numpy as np
+import pytest
+from scene import (
+    chosen,
+    cube,
+    grid,
+    points_of,
+    refined,
+    triangles_of,
+)
+
+import pns_common
+
+
+@pytest.mark.parametrize("scheme", ["PNS", "LOOP"])
+def test_positions_are_those_of_the_operator(scheme):
+    obj = grid(9)
+    mesh = pns_common.Mesh(points_of(obj.data), triangles_of(obj.data))
+    rule = pns_common.loop() if scheme == "LOOP" else pns_common.pns(pns_common.load_model())
+    expected = pns_common.refine(mesh, rule, 2).mesh.vertices
+    points = points_of(refined(obj, levels=2, scheme=scheme).data)
+    np.testing.assert_allclose(points, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_the_budget_is_passed_on():
+    obj = grid(5)
+    loop, none = refined(obj, scheme="LOOP"), refined(obj, budget=0.0)
+    np.testing.assert_array_equal(points_of(loop.data), points_of(none.data))
+    assert np.abs(points_of(refined(obj).data) - points_of(loop.data)).max() > 1e-6
+
+
+def test_the_limit_surface_is_reached():
+    obj = grid(5)
+    at_limit = points_of(refined(obj, levels=1, limit=True, scheme="LOOP").data)
+    deep = points_of(refined(obj, levels=6, scheme="LOOP").data)
+    np.testing.assert_allclose(at_limit, deep[: len(at_limit)], atol=2e-4)
+
+
+def test_keeping_the_original_leaves_it_as_it_was():
+    obj = cube()
+    before = points_of(obj.data)
+    new = refined(obj)
+    assert new.data != obj.data
+    np.testing.assert_array_equal(points_of(obj.data), before)
+
+
+def test_without_the_original_the_object_stays_itself():
+    obj = cube()
+    assert refined(obj, keep_original=False, levels=1) == obj
+    assert len(obj.data.polygons) == 48
+    assert len(bpy.data.objects) == 1
+
+
+def test_objects_that_share_a_mesh_share_the_result():
+    obj = cube()
+    twin = obj.copy()
+    bpy.context.scene.collection.objects.link(twin)
+    chosen(obj)
+    twin.select_set(True)
+    bpy.ops.object.pns_refine(keep_original=False)
+    assert obj.data == twin.data
+    assert len(obj.data.polygons) == 192

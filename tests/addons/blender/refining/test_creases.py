@@ -1,0 +1,145 @@
+"""Creases for good, creases that wear off, and creases by angle."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from addons.blender.pns_refine.refining.compute import Choice, compute
+from addons.blender.pns_refine.refining.steps import (
+    crease_of,
+    crease_sharpness_of,
+    level_steps,
+    refine_columns,
+)
+from pns_common import Mesh, load_model, loop, pns, refine
+from pns_common.linear import level_topologies, refine_linear
+from pns_common.onnx_model import DEFAULT_MODEL
+from tests.addons.blender.quads import cube, grid
+
+
+def points(snapshot, levels=1, **choice):
+    return compute(snapshot, Choice(None, levels, **choice)).points
+
+
+@given(st.floats(0, 1))
+def test_a_crease_is_ten_times_its_square_and_back(crease):
+    crease_sharpness = crease_sharpness_of(np.array([crease]))
+    assert crease_sharpness[0] == (np.inf if crease == 1 else pytest.approx(10 * crease**2))
+    assert crease_of(crease_sharpness)[0] == pytest.approx(crease, abs=1e-7)
+
+
+@pytest.mark.parametrize("model", [None, "paper", DEFAULT_MODEL])
+def test_without_creases_it_is_the_operator(model):
+    shape, model = grid(4), model and load_model(model)
+    scheme = pns(model) if model else loop()
+    expected = refine(Mesh(shape.points, shape.triangles), scheme, 2)
+    computed = compute(shape, Choice(model, 2))
+    np.testing.assert_array_equal(computed.points, expected.mesh.vertices)
+    assert computed.report == expected.report
+    learned = scheme.learned_levels
+    acted = (
+        expected if learned in (None, 0) else refine(Mesh(shape.points, shape.triangles), scheme, 1)
+    )
+    np.testing.assert_array_equal(computed.ratio[: len(acted.ratio)], acted.ratio)
+    assert (computed.ratio.max() > 0) == (model is not None)
+
+
+def test_a_crease_for_good_is_the_operators():
+    shape = cube(np.inf)
+    expected = refine(Mesh(shape.points, shape.triangles), loop(), 3, creases=shape.edges)
+    np.testing.assert_array_equal(points(shape, 3), expected.mesh.vertices)
+
+
+@pytest.mark.parametrize("levels", [1, 2, 3])
+def test_sharpness_of_all_levels_is_sharpness_for_good(levels):
+    np.testing.assert_allclose(points(cube(levels), levels), points(cube(np.inf), levels))
+
+
+def test_sharpness_ends_after_its_levels():
+    shape, sharp = cube(1.0), cube(np.inf)
+    first = refine(Mesh(sharp.points, sharp.triangles), loop(), 1, creases=sharp.edges)
+    then = refine(first.mesh, loop(), 1)
+    np.testing.assert_allclose(points(shape, 2), then.mesh.vertices)
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.8])
+def test_part_of_a_level_mixes_sharp_and_smooth(share):
+    mixed = (1 - share) * points(cube(0.0)) + share * points(cube(np.inf))
+    np.testing.assert_allclose(points(cube(share)), mixed)
+
+
+def test_a_vertex_is_as_sharp_as_its_edges_on_average():
+    shape = cube()
+    at_corner = (shape.edges == 0).any(axis=1)
+    shape.crease_sharpness[at_corner] = [0.2, 0.4, 0.9]
+    smooth, sharp = points(cube(0.0)), points(cube(np.where(at_corner, np.inf, 0)))
+    np.testing.assert_allclose(points(shape)[0], 0.5 * smooth[0] + 0.5 * sharp[0])
+
+
+def test_columns_go_through_the_same_masks_as_positions():
+    for crease_sharpness in (0.0, 0.4, 1.0, 1.7, np.inf):
+        shape = cube(crease_sharpness)
+        steps = level_steps(shape.triangles, 8, 2, shape.edges, shape.crease_sharpness)
+        np.testing.assert_allclose(refine_columns(shape.points, steps), points(shape, 2))
+
+
+def test_columns_without_creases_are_those_of_the_library():
+    shape = grid(3)
+    columns = np.random.default_rng(0).normal(size=(len(shape.points), 4))
+    steps = level_steps(shape.triangles, len(columns), 2, shape.edges, shape.crease_sharpness)
+    expected = refine_linear(columns, level_topologies(shape.triangles, len(columns), 2))
+    np.testing.assert_array_equal(refine_columns(columns, steps), expected)
+
+
+def test_what_is_left_stands_on_the_halves():
+    made = compute(cube(2.5), Choice(None, 2))
+    assert sorted(set(made.crease_sharpness)) == [0, 0.5]
+    assert (made.crease_sharpness > 0).sum() == 12 * 4
+    assert not (compute(cube(2.5), Choice(None, 3)).crease_sharpness > 0).any()
+
+
+@pytest.mark.parametrize(("degrees", "sharp"), [(89.9, True), (90.1, False)])
+def test_edges_are_sharp_above_the_angle(degrees, sharp):
+    placed = points(cube(), 1, crease_angle=np.radians(degrees))
+    np.testing.assert_allclose(placed, points(cube(np.inf if sharp else 0.0)))
+
+
+def test_diagonals_of_flat_quads_are_never_sharp():
+    made = compute(cube(), Choice(None, 1, crease_angle=0.0))
+    assert (made.crease_sharpness > 0).sum() == 24
+
+
+def test_a_mixture_stays_within_the_budget_of_loops():
+    made = compute(cube(0.6), Choice(load_model("paper"), 2))
+    assert [level["faces"] for level in made.report["levels"]] == [48, 192]
+    assert made.distance.max() > 0
+    assert all(level["proximity_ratio"]["max"] <= 1 + 1e-12 for level in made.report["levels"])
+
+
+def test_the_limit_is_what_many_levels_come_to():
+    for crease_sharpness in (0.0, np.inf):
+        near = points(cube(crease_sharpness), 1, limit=True)
+        deep = points(cube(crease_sharpness), 7)
+        np.testing.assert_allclose(near, deep[: len(near)], atol=2e-4)
+
+
+def test_offsets_go_to_the_limit_with_the_points():
+    shape = cube()
+    shape = type(shape)(**{**shape.__dict__, "offsets": shape.points[None].copy()})
+    made = compute(shape, Choice(None, 1, limit=True))
+    np.testing.assert_allclose(made.offsets[0], made.points, atol=1e-12)
+    assert made.normals is not None
+
+
+def test_what_is_left_of_a_crease_is_sharp_at_the_limit():
+    worn, sharp = points(cube(1.5), 1, limit=True), points(cube(np.inf), 1, limit=True)
+    np.testing.assert_allclose(worn, sharp, atol=1e-12)
+    smooth = compute(cube(0.5), Choice(None, 1, limit=True))
+    assert np.abs(smooth.points - sharp).max() > 0.1
+
+
+def test_the_report_of_a_mixture_adds_up():
+    report = compute(cube(1.5), Choice(load_model("paper"), 2)).report
+    assert report["learned_levels"] == 2
+    assert report["limit_distance"] <= report["limit_distance_bound"] * (1 + 1e-9)

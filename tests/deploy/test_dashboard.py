@@ -1,0 +1,81 @@
+"""The dashboard asks for series that the service has."""
+
+import json
+import re
+import urllib.request
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from prometheus_client.parser import text_string_to_metric_families
+
+from service.http.app import create_app
+from service.http.server import configuration
+from service.settings import Settings
+from tests.support import stand_in_jobs as jobs
+
+DASHBOARD = json.loads(
+    (Path(__file__).resolve().parents[2] / "deploy" / "grafana" / "pns.json").read_text()
+)
+QUERIES = [target["expr"] for panel in DASHBOARD["panels"] for target in panel["targets"]]
+SERIES = r"\b(?:pns|process)_[a-z_]+\b"
+
+
+@pytest.fixture(scope="module")
+def served():
+    """The names and labels of all series, after a request of each kind."""
+    settings = Settings(workers=1)
+    app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
+    configuration(app, settings)
+    with TestClient(app) as client:
+        glb = {"Content-Type": "model/gltf-binary"}
+        while client.post("/subdivide", content=b"x", headers=glb).status_code != 200:
+            pass
+        client.get("/models")
+        port, stop = app.state.metrics.serve("127.0.0.1", 0)
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:
+            text = answer.read().decode()
+        stop()
+    families = list(text_string_to_metric_families(text))
+    names = {sample.name: set() for family in families for sample in family.samples}
+    for family in families:
+        # A counter with labels shows nothing before it counts.
+        if not family.samples:
+            names[f"{family.name}_total"] = {"cause"}
+        for sample in family.samples:
+            names[sample.name] |= set(sample.labels)
+    return names
+
+
+@pytest.mark.parametrize("query", QUERIES)
+def test_every_series_of_the_dashboard_is_one_of_the_service(served, query):
+    named = re.findall(SERIES, query)
+    assert named
+    for name in named:
+        assert name in served, name
+    for labels in re.findall(r"by \(([^)]*)\)", query):
+        for label in labels.split(", "):
+            assert label in served[named[0]], label
+    assert query.count("(") == query.count(")")
+
+
+def test_panels_are_side_by_side():
+    taken = set()
+    for panel in DASHBOARD["panels"]:
+        panel_place = panel["gridPos"]
+        cells = {
+            (x, y)
+            for x in range(panel_place["x"], panel_place["x"] + panel_place["w"])
+            for y in range(panel_place["y"], panel_place["y"] + panel_place["h"])
+        }
+        assert panel_place["x"] + panel_place["w"] <= 24
+        assert not cells & taken, panel["title"]
+        taken |= cells
+    assert len({panel["id"] for panel in DASHBOARD["panels"]}) == len(DASHBOARD["panels"])
+
+
+def test_every_series_of_ours_is_on_the_dashboard_or_a_part_of_one(served):
+    text = " ".join(QUERIES)
+    ours = {name for name in served if name.startswith("pns_")}
+    bases = {re.sub(r"_(bucket|sum|count|created|total)$", "", name) for name in ours}
+    assert {base for base in bases if base not in text} == set()

@@ -1,0 +1,80 @@
+"""The image is made of what is pinned, and says what it is made of."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from service.settings import Settings
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCKERFILE = (ROOT / "Dockerfile").read_text()
+REQUIREMENTS = [ROOT / "requirements" / f"{name}.txt" for name in ("service", "build", "meshopt")]
+
+
+def normal(name):
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def pins(path):
+    """Name and version of each requirement."""
+    pinned = re.findall(r"^([A-Za-z0-9._-]+)==(\S+)", path.read_text(), re.MULTILINE)
+    return {normal(name): version for name, version in pinned}
+
+
+def constraints():
+    return pins(ROOT / "constraints.txt")
+
+
+@pytest.mark.parametrize("path", REQUIREMENTS, ids=lambda path: path.stem)
+def test_everything_has_hashes(path):
+    text = re.sub(r"\\\n", " ", path.read_text())
+    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    assert lines
+    for line in lines:
+        assert re.match(r"[a-z0-9._-]+==\S+ ( *--hash=sha256:[0-9a-f]{64})+ *$", line), line[:80]
+
+
+def test_what_is_installed_is_what_the_tests_ran_with():
+    wanted = constraints()
+    for path in REQUIREMENTS[::2]:
+        for name, version in pins(path).items():
+            assert wanted.get(name) == version, name
+
+
+def test_what_the_service_names_is_in_the_image():
+    project = (ROOT / "pyproject.toml").read_text()
+    named = set()
+    for table in ("dependencies", "fast", "service"):
+        (block,) = re.findall(rf"^{table} = \[\n(.*?)^\]", project, re.MULTILINE | re.DOTALL)
+        named |= {normal(name) for name in re.findall(r'"([A-Za-z0-9._-]+)', block)}
+    installed = set(pins(REQUIREMENTS[0])) | set(pins(REQUIREMENTS[2]))
+    assert named - {"pns-subdivision"} <= installed
+
+
+def test_nothing_is_installed_without_a_hash():
+    installs = re.findall(r"pip install[^&\n]*", DOCKERFILE)
+    assert len(installs) == 3
+    for install in installs:
+        assert "--require-hashes" in install or "--no-index" in install, install
+
+
+def test_every_stage_is_of_the_one_base_that_a_release_names_by_digest():
+    assert re.findall(r"^FROM (\S+)", DOCKERFILE, re.MULTILINE) == ["${BASE}", "${BASE}"]
+    recipe = (ROOT / "Makefile").read_text()
+    assert "@sha256:" in recipe.partition("\nimage:")[2].partition("\n\n")[0]
+
+
+def test_the_image_says_what_it_is_made_of():
+    assert "cyclonedx-py environment" in DOCKERFILE
+    assert "sha256sum --check --strict SHA256SUMS" in DOCKERFILE
+
+
+def test_the_images_settings_are_settings():
+    names = set(re.findall(r"PNS_([A-Z_]+)", DOCKERFILE))
+    assert {name.lower() for name in names} <= set(Settings.model_fields)
+
+
+def test_the_kernels_of_the_installed_package_are_compiled():
+    """In /src, `python -m` would take the sources there, and every worker would compile again."""
+    assert "cd / && /opt/pns/bin/python -m pns_common.fused" in DOCKERFILE

@@ -1,0 +1,90 @@
+"""Compose and Kubernetes: valid, restricted, and in step with the service."""
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from service.settings import Settings
+
+yaml = pytest.importorskip("yaml")
+
+ROOT = Path(__file__).resolve().parents[2]
+DEPLOY = ROOT / "deploy"
+COMPOSE = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
+OBJECTS = list(yaml.safe_load_all((DEPLOY / "kubernetes" / "pns.yaml").read_text()))
+BY_KIND = {entry["kind"]: entry for entry in OBJECTS}
+POD = BY_KIND["Deployment"]["spec"]["template"]["spec"]
+(CONTAINER,) = POD["containers"]
+
+
+def test_the_manifests_are_valid():
+    tool = ROOT / ".venv-clients" / "bin" / "kubernetes-validate"
+    program = str(tool) if tool.exists() else shutil.which("kubernetes-validate")
+    if program is None:
+        pytest.skip("needs kubernetes-validate (requirements/clients.txt)")
+    command = [program, "--strict", str(DEPLOY / "kubernetes" / "pns.yaml")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_pod_fits_the_restricted_standard():
+    """The controls of the Pod Security Standards' restricted profile that concern this pod."""
+    assert POD["securityContext"]["runAsNonRoot"] is True
+    assert POD["securityContext"]["seccompProfile"] == {"type": "RuntimeDefault"}
+    assert POD["automountServiceAccountToken"] is False
+    context = CONTAINER["securityContext"]
+    assert context["allowPrivilegeEscalation"] is False
+    assert context["readOnlyRootFilesystem"] is True
+    assert context["capabilities"] == {"drop": ["ALL"]}
+    assert not {"hostNetwork", "hostPID", "hostIPC"} & set(POD)
+    assert all(set(volume) & {"emptyDir", "secret"} for volume in POD["volumes"])
+
+
+def test_probes_ask_what_the_service_answers():
+    probes = {name: CONTAINER[name]["httpGet"]["path"] for name in CONTAINER if "Probe" in name}
+    assert probes == {
+        "startupProbe": "/readyz",
+        "readinessProbe": "/readyz",
+        "livenessProbe": "/healthz",
+    }
+    ports = {port["name"]: port["containerPort"] for port in CONTAINER["ports"]}
+    assert ports == {"http": 8000, "metrics": 9000}
+
+
+@pytest.mark.parametrize("where", ["kubernetes", "compose"])
+def test_the_environment_is_made_of_settings(where):
+    if where == "compose":
+        environment = COMPOSE["services"]["service"]["environment"]
+    else:
+        environment = {entry["name"]: entry["value"] for entry in CONTAINER["env"]}
+    settings = {name.removeprefix("PNS_").lower(): value for name, value in environment.items()}
+    assert Settings(**settings).proxies
+
+
+def test_a_drain_has_its_time():
+    assert POD["terminationGracePeriodSeconds"] >= Settings().drain_seconds
+    grace = COMPOSE["services"]["service"]["stop_grace_period"]
+    assert int(grace.removesuffix("s")) >= Settings().drain_seconds
+
+
+def test_only_the_proxy_is_reached_from_outside():
+    services = COMPOSE["services"]
+    assert "ports" not in services["service"]
+    assert set(services["service"]["networks"]) == {"inside"}
+    assert COMPOSE["networks"]["inside"]["internal"] is True
+    address = services["proxy"]["networks"]["inside"]["ipv4_address"]
+    assert services["service"]["environment"]["PNS_PROXIES"] == address
+    assert all(port.startswith("127.0.0.1:") for port in services["proxy"]["ports"])
+
+
+@pytest.mark.parametrize("name", ["service", "proxy"])
+def test_both_run_with_nothing_that_they_do_not_need(name):
+    service = COMPOSE["services"][name]
+    assert service["read_only"] is True
+    assert service["cap_drop"] == ["ALL"]
+    assert service["security_opt"] == ["no-new-privileges:true"]
+    assert {"mem_limit", "pids_limit"} <= set(service)
+    assert "privileged" not in json.dumps(service)

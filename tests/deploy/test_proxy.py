@@ -1,0 +1,158 @@
+"""The proxy of deploy/: its own configuration, run on loopback in front of a service."""
+
+import http.client
+import json
+import logging
+import re
+import shutil
+import socket
+import subprocess
+import threading
+from contextlib import closing, suppress
+from pathlib import Path
+
+import pytest
+
+from tests.support.live import served
+
+CONFIGURATION = Path(__file__).resolve().parents[2] / "deploy" / "proxy" / "nginx.conf"
+GLB = {"Content-Type": "model/gltf-binary"}
+
+
+def free_port():
+    with closing(socket.socket()) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture(scope="module")
+def proxy(tmp_path_factory):
+    """The address of a proxy, and a function that returns the clients that the service has seen."""
+    nginx = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
+    if nginx is None:
+        pytest.skip("needs nginx (Debian: nginx-light)")
+    folder, port = tmp_path_factory.mktemp("proxy"), free_port()
+    lines = []
+    handler = logging.Handler()
+    handler.emit = lambda record: lines.append(getattr(record, "fields", {}))
+    journal = logging.getLogger("pns.request")
+    level = journal.level
+    journal.addHandler(handler)
+    journal.setLevel(logging.INFO)
+    with served(workers=1, proxies="127.0.0.1") as (host, behind):
+        text = CONFIGURATION.read_text()
+        text = text.replace("service:8000", f"{host}:{behind}")
+        text = text.replace("listen 8080", f"listen 127.0.0.1:{port}").replace(
+            "/tmp/", f"{folder}/"
+        )
+        text = text.replace("/dev/stdout", str(folder / "access.log"))
+        # The times alone are shorter than what is deployed.
+        text = re.sub(r"(client_\w+_timeout) 10s", r"\1 1s", text)
+        (folder / "nginx.conf").write_text(text)
+        command = [nginx, "-p", folder, "-c", folder / "nginx.conf", "-g", "daemon off;"]
+        process = subprocess.Popen(command, stderr=subprocess.PIPE)
+        try:
+            pause = threading.Event()
+            for _ in range(300):
+                with closing(socket.socket()) as probe:
+                    if probe.connect_ex(("127.0.0.1", port)) == 0:
+                        break
+                assert process.poll() is None, process.stderr.read()
+                pause.wait(0.1)
+            yield ("127.0.0.1", port), lines, folder
+        finally:
+            process.terminate()
+            process.wait(30)
+            process.stderr.close()
+            journal.removeHandler(handler)
+            journal.setLevel(level)
+
+
+def ask(address, method, path, body=None, headers=None):
+    with closing(http.client.HTTPConnection(*address, timeout=30)) as connection:
+        connection.request(method, path, body, headers or {})
+        answer = connection.getresponse()
+        return answer, answer.read()
+
+
+def test_requests_go_through(proxy):
+    answer, body = ask(proxy[0], "POST", "/subdivide", b"echo", GLB)
+    assert (answer.status, body) == (200, b"echo")
+
+
+def test_the_service_sees_the_client_and_not_what_it_claims(proxy):
+    address, lines, _ = proxy
+    del lines[:]
+    claims = {"X-Forwarded-For": "203.0.113.9", "X-Request-ID": "mine-1"}
+    answer, _ = ask(address, "GET", "/healthz", headers=claims)
+    assert answer.headers["x-request-id"] == "mine-1"
+    # Its line is written once the answer is sent.
+    pause = threading.Event()
+    while not lines:
+        pause.wait(0.01)
+    # The only address that the proxy sees is that of this machine, which is the proxy's own here.
+    assert {line["client"] for line in lines} == {"127.0.0.1"}
+
+
+def test_a_request_id_that_is_no_token_is_replaced(proxy):
+    answer, _ = ask(proxy[0], "GET", "/healthz", headers={"X-Request-ID": 'a" b'})
+    assert re.fullmatch("[0-9a-f]{32}", answer.headers["x-request-id"])
+
+
+def test_a_body_over_the_limit_ends_at_the_proxy(proxy):
+    address, lines, _ = proxy
+    del lines[:]
+    with closing(http.client.HTTPConnection(*address, timeout=30)) as connection:
+        connection.putrequest("POST", "/subdivide")
+        connection.putheader("Content-Length", str(65 * 2**20))
+        connection.endheaders()
+        assert connection.getresponse().status == 413
+    assert lines == []
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"GET /healthz HTTP/1.1\r\nHost: a\r\nX-",
+        b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\nhalf",
+    ],
+)
+def test_slow_clients_are_the_proxys_to_end_and_the_service_never_hears_of_them(proxy, sent):
+    address, lines, _ = proxy
+    del lines[:]
+    with socket.create_connection(address, timeout=30) as connection:
+        connection.sendall(sent)
+        pieces = iter(lambda: connection.recv(4096), b"")
+        with suppress(ConnectionResetError):
+            assert b"200 OK" not in b"".join(pieces)
+    assert lines == []
+
+
+def beginning(connection):
+    try:
+        return connection.recv(4096)[:12]
+    except ConnectionResetError:
+        return b""
+
+
+def test_one_address_has_so_many_connections_and_no_more(proxy):
+    address, _, _ = proxy
+    upload = b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\n"
+    held = [socket.create_connection(address, timeout=30) for _ in range(40)]
+    try:
+        for connection in held:
+            connection.sendall(upload)
+        said = [beginning(connection) for connection in reversed(held)]
+    finally:
+        for connection in held:
+            connection.close()
+    assert b"HTTP/1.1 429" in said
+
+
+def test_the_proxys_log_says_nothing_of_paths(proxy):
+    address, _, folder = proxy
+    ask(address, "GET", "/nothing?secret=1")
+    log = (folder / "access.log").read_text()
+    assert "secret" not in log
+    assert "nothing" not in log
+    assert all(json.loads(line)["status"] for line in log.splitlines())

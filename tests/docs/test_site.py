@@ -1,0 +1,82 @@
+"""The documentation builds without a warning, reads without a network, and its Python runs."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS.glob("*.md")])
+PYTHON = re.compile(r"```python\n(.*?)```", re.DOTALL)
+LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
+# README's arrays are its reader's own.
+GIVEN = "import numpy as np\nvertices, faces = np.eye(3), np.array([[0, 1, 2]])\n"
+
+
+def build(source, target):
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html"]
+    done = subprocess.run(
+        [*command, source, target], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    return done.returncode, done.stderr
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    target = tmp_path_factory.mktemp("site")
+    code, errors = build(DOCS, target)
+    assert code == 0, errors
+    return target
+
+
+def test_the_site_has_every_page_in_its_menu(site):
+    menu = set(
+        re.findall(
+            r'toctree-l1[^"]*"><a class="[^"]*" href="([^"]+)"', (site / "index.html").read_text()
+        )
+    )
+    assert menu == {f"{page.stem}.html" for page in DOCS.glob("*.md")} - {"index.html"}
+
+
+def test_the_site_loads_nothing_from_elsewhere(site):
+    for page in site.glob("*.html"):
+        loaded = re.findall(
+            r"<(?:script|img|link)\b[^>]*?\b(?:src|href)=\"([^\"]+)\"", page.read_text()
+        )
+        assert loaded
+        assert not [address for address in loaded if "//" in address]
+
+
+def test_every_public_name_is_on_the_api_page(site):
+    import pns_common
+
+    page = (site / "api.html").read_text()
+    assert {name for name in pns_common.__all__ if f'id="pns_common.{name}"' not in page} == set()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_page_links_to_files_that_exist(page):
+    targets = LINK.findall(page.read_text())
+    assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if PYTHON.search(page.read_text())], ids=lambda page: page.stem
+)
+def test_a_pages_python_runs(page, tmp_path):
+    """One snippet after the other, as a reader would type them."""
+    code = "\n".join(PYTHON.findall(page.read_text()))
+    script = tmp_path / f"{page.stem}.py"
+    script.write_text(GIVEN + code if page.name == "README.md" else code)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", script],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(ROOT), "PATH": "", "MPLBACKEND": "agg"},
+    )
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,134 @@
+"""Meshes refined as parts of one are what they are alone, bit for bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pns_common import Mesh, load_model, loop, pns, refine
+from pns_common.diagnostics import _p99
+from pns_common.disjoint_union import disjoint_faces
+from pns_common.errors import MeshError, ParameterError
+from pns_common.fused import kernels_available
+from pns_common.refine_parts import refine_parts
+from tests.support.meshes import bumpy_sphere
+
+TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+
+needs_kernels = pytest.mark.skipif(not kernels_available(), reason="numba is not installed")
+
+
+def sheet(size: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """A bumpy open sheet of 2 size² faces."""
+    x, y = np.meshgrid(np.arange(size + 1.0), np.arange(size + 1.0))
+    points = np.column_stack([x.ravel(), y.ravel(), rng.normal(scale=0.4, size=x.size)])
+    low = (np.arange(size)[:, None] * (size + 1) + np.arange(size)).ravel()
+    right, up = low + 1, low + size + 1
+    return points, np.concatenate(
+        [np.column_stack([low, right, up + 1]), np.column_stack([low, up + 1, up])]
+    )
+
+
+def parts_of(rng: np.random.Generator, count: int) -> list[Mesh]:
+    meshes: list[Mesh] = []
+    for number in range(count):
+        if number % 3 == 0:
+            points, faces = sheet(int(rng.integers(1, 6)), rng)
+        else:
+            points, faces = TETRAHEDRON * rng.uniform(0.01, 9) + rng.normal(size=3), FACES
+            if number % 3 == 1 and number % 2:
+                points, faces = bumpy_sphere(number)
+            elif number % 3 == 1:
+                # Two faces on one edge of a third, and a vertex of two fans.
+                points = np.concatenate([points, rng.normal(size=(2, 3))])
+                faces = np.concatenate([faces, [[0, 1, 4], [3, 4, 5]]])
+        meshes.append(Mesh(points, faces))
+    return meshes
+
+
+def joined(meshes: list[Mesh]) -> tuple[Mesh, np.ndarray]:
+    """One mesh of all, and where the faces of each begin."""
+    starts = np.cumsum([0] + [len(mesh.faces) for mesh in meshes])
+    points = np.concatenate([mesh.vertices for mesh in meshes])
+    faces = disjoint_faces((mesh.faces, len(mesh.vertices)) for mesh in meshes)
+    return Mesh(points, faces), starts
+
+
+@needs_kernels
+@pytest.mark.parametrize("name", ["paper", "full", "general", None])
+@pytest.mark.parametrize("reference_length", ["auto", 1.0])
+@pytest.mark.parametrize("levels", [1, 3])
+def test_each_part_is_what_it_is_alone(
+    name: str | None, reference_length: float | str, levels: int
+) -> None:
+    scheme = loop() if name is None else pns(load_model(name))
+    meshes = parts_of(np.random.default_rng(3), 30)
+    whole, starts = joined(meshes)
+    made = refine_parts(whole, starts, scheme, levels, reference_length)
+    assert made is not None
+    shares = np.split(made.mesh.faces, starts[1:-1] * 4**levels)
+    for mesh, report, share in zip(meshes, made.reports, shares, strict=True):
+        alone = refine(mesh, scheme, levels, reference_length)
+        own = np.unique(share)
+        assert np.array_equal(made.mesh.vertices[own], alone.mesh.vertices)
+        assert np.array_equal(np.searchsorted(own, share), alone.mesh.faces)
+        assert np.array_equal(made.ratio[own], alone.ratio)
+        assert np.array_equal(made.gate[own], alone.gate)
+        assert report == alone.report
+
+
+@needs_kernels
+def test_each_part_is_put_on_its_own_limit_surface() -> None:
+    scheme = pns(load_model("paper"))
+    meshes = parts_of(np.random.default_rng(5), 20)
+    whole, starts = joined(meshes)
+    made = refine_parts(whole, starts, scheme, 2, limit=True)
+    assert made is not None
+    assert made.normals is not None
+    for mesh, share in zip(meshes, np.split(made.mesh.faces, starts[1:-1] * 16), strict=True):
+        alone = refine(mesh, scheme, 2, limit=True)
+        own = np.unique(share)
+        assert np.array_equal(made.mesh.vertices[own], alone.mesh.vertices)
+        assert np.array_equal(made.normals[own], alone.normals)
+
+
+@needs_kernels
+def test_creases_stay_with_their_parts() -> None:
+    meshes = parts_of(np.random.default_rng(4), 6)
+    whole, starts = joined(meshes)
+    crease = meshes[0].faces[0, :2]
+    made = refine_parts(whole, starts, loop(), 2, creases=crease[None])
+    assert made is not None
+    alone = refine(meshes[0], loop(), 2, creases=crease[None])
+    assert made.reports[0] == alone.report
+    assert made.reports[1] == refine(meshes[1], loop(), 2).report
+
+
+@pytest.mark.parametrize("starts", [[0], [0, 5], [0, 4, 4, 8], [1, 4, 8], [0, 3, 8]])
+def test_parts_that_are_none_are_refused(starts: list[int]) -> None:
+    whole, _ = joined([Mesh(TETRAHEDRON, FACES), Mesh(TETRAHEDRON, FACES)])
+    with pytest.raises(ParameterError, match="part_faces"):
+        refine_parts(whole, np.array(starts), loop())
+
+
+@needs_kernels
+def test_a_part_that_grows_beyond_all_bounds_is_refused() -> None:
+    whole, starts = joined([Mesh(TETRAHEDRON, FACES), Mesh(1e74 * TETRAHEDRON, FACES)])
+    with pytest.raises(MeshError):
+        refine_parts(whole, starts, pns(load_model("paper"), 1e3))
+
+
+def test_a_part_of_no_size_goes_alone() -> None:
+    # Its R is 0, which the compiled kernels leave to the others.
+    whole, starts = joined([Mesh(TETRAHEDRON, FACES), Mesh(0 * TETRAHEDRON, FACES)])
+    assert refine_parts(whole, starts, pns(load_model("paper"))) is None
+
+
+@given(st.integers(1, 400), st.integers(0, 2**32), st.integers(-9, 9))
+@settings(max_examples=60, deadline=None)
+def test_the_percentile_is_numpys(count: int, seed: int, power: int) -> None:
+    values = np.random.default_rng(seed).random(count) * 10.0**power
+    assert _p99(values) == float(np.percentile(values, 99))

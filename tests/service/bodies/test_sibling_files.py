@@ -1,0 +1,226 @@
+"""Files beside a document: found by relative names, and nothing else is ever opened."""
+
+import io
+import json
+import os
+import zipfile
+
+import numpy as np
+import pytest
+
+from service.bodies.archive import MAX_ENTRIES, ArchiveError, open_archive
+from service.bodies.folder import folder_of
+from service.bodies.sibling_files import File, SiblingFiles, safe_name
+from service.errors import GltfError, LimitError, ServiceError, UnreadableError
+from service.gltf.subdivide import subdivide_gltf
+from service.options import Limits, Options
+from tests.support.gltf import files
+from tests.support.gltf.shapes import box
+
+PNG = b"\x89PNG\r\n\x1a\n" + bytes(30)
+SAFE = [("box.bin", "box.bin"), ("./a/b%20c.bin", "a/b c.bin"), ("a//b.bin", "a/b.bin")]
+UNSAFE = [
+    "file:///etc/passwd",
+    "https://example.com/box.bin",
+    "/etc/passwd",
+    "../box.bin",
+    "a/../../box.bin",
+    "%2e%2e/box.bin",
+    "a%2f..%2f..%2fbox.bin",
+    "..\\box.bin",
+    "C:\\box.bin",
+    "C%3A/box.bin",
+    "box%00.bin",
+    "",
+    ".",
+]
+
+
+def external(uri="box.bin", images=()):
+    """(text of a .gltf, content of its buffer)."""
+    tree, binary = files.document([box()])
+    tree["buffers"][0]["uri"] = uri
+    tree["images"] = [{"uri": image} for image in images]
+    return json.dumps(tree).encode(), bytes(binary)
+
+
+def beside(**contents):
+    """SiblingFiles by name; dots are written as double underscores."""
+    named = {name.replace("__", "."): content for name, content in contents.items()}
+    return SiblingFiles(
+        lambda name: File(name, named[name]) if name in named else None, frozenset(named)
+    )
+
+
+def refine(text, siblings):
+    options = Options(scheme="loop")
+    return subdivide_gltf(text, "gltf", options, None, Limits(), siblings=siblings)
+
+
+@pytest.mark.parametrize(("uri", "name"), SAFE)
+def test_a_relative_uri_is_decoded_to_a_name(uri, name):
+    assert safe_name(uri) == name
+
+
+@pytest.mark.parametrize("uri", UNSAFE)
+def test_a_uri_that_leads_elsewhere_is_never_opened(uri):
+    asked = []
+    siblings = SiblingFiles(lambda name: asked.append(name))
+    text, _ = external(uri)
+    with pytest.raises(GltfError) as refusal:
+        refine(text, siblings)
+    assert (refusal.value.code, refusal.value.pointer) == ("unsafe-uri", "/buffers/0/uri")
+    assert not asked
+
+
+def test_a_buffer_that_did_not_come_is_named():
+    text, _ = external()
+    with pytest.raises(GltfError) as refusal:
+        refine(text, beside())
+    assert (refusal.value.code, refusal.value.pointer) == ("missing-file", "/buffers/0/uri")
+
+
+def test_external_files_give_what_an_embedded_file_gives():
+    text, binary = external(images=["a.png"])
+    result = refine(text, beside(box__bin=binary, a__png=PNG, notes__txt=b"?"))
+    whole = subdivide_gltf(files.glb([box()]), "glb", Options(scheme="loop"), None, Limits())
+    faces, attributes = files.primitive_of(result.glb)
+    expected_faces, expected = files.primitive_of(whole.glb)
+    np.testing.assert_array_equal(faces, expected_faces)
+    for name, values in expected.items():
+        np.testing.assert_array_equal(attributes[name], values)
+    tree, content = files.unpack(result.glb)
+    (image,) = tree["images"]
+    view = tree["bufferViews"][image["bufferView"]]
+    assert image["mimeType"] == "image/png"
+    assert content[view["byteOffset"] :][: view["byteLength"]] == PNG
+    changes = {(change["pointer"], change["what"]) for change in result.report["changes"]}
+    assert ("/images/0", "embedded") in changes
+    assert ("", "not used by the document: notes.txt") in changes
+
+
+@pytest.mark.parametrize("content", [None, b"no image"])
+def test_an_image_that_cannot_be_embedded_keeps_its_uri(content):
+    text, binary = external(images=["a.png"])
+    others = {} if content is None else {"a__png": content}
+    tree, _ = files.unpack(refine(text, beside(box__bin=binary, **others)).glb)
+    assert tree["images"] == [{"uri": "a.png"}]
+
+
+def test_files_on_disk_are_read_from_their_own_folder_only(tmp_path):
+    own = tmp_path / "own"
+    (own / "sub").mkdir(parents=True)
+    (own / "sub" / "in.bin").write_bytes(b"in")
+    (tmp_path / "out.bin").write_bytes(b"out")
+    (own / "link.bin").symlink_to(tmp_path / "out.bin")
+    siblings = folder_of(own / "box.gltf")
+    sibling = siblings.find("sub/in.bin")
+    assert sibling is not None
+    assert sibling.content == b"in"
+    for name in ("link.bin", "none.bin", "sub", "../out.bin"):
+        assert siblings.find(name) is None
+
+
+def archive(entries, compression=zipfile.ZIP_DEFLATED):
+    """A .zip of (name or ZipInfo, content)."""
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w", compression) as opened:
+        for name, content in entries:
+            opened.writestr(name, content)
+    return target.getvalue()
+
+
+def link(name):
+    info = zipfile.ZipInfo(name)
+    info.external_attr = 0o120777 << 16
+    return info
+
+
+def test_an_archive_holds_a_document_and_its_neighbours():
+    text, binary = external()
+    names = ["scene/box.gltf", "scene/box.bin", "readme.txt", "__MACOSX/._box.gltf"]
+    data = archive(zip(names, [text, binary, b"?", b"?"], strict=True))
+    main, siblings = open_archive(data, 2**20)
+    assert main.content == text
+    result = refine(main.content, siblings)
+    assert result.report["totals"]["faces"] == 48
+    assert {
+        "pointer": "",
+        "what": "not used by the document: readme.txt",
+        "count": 1,
+    } in result.report["changes"]
+
+
+BAD = {
+    "no document": [("a.bin", b"")],
+    "two documents": [("a.gltf", b"{}"), ("b.glb", b"glTF")],
+    "parent folder": [("a.gltf", b"{}"), ("../x.bin", b"")],
+    "absolute name": [("a.gltf", b"{}"), ("/x.bin", b"")],
+    "drive": [("a.gltf", b"{}"), ("C:/x.bin", b"")],
+    "link": [("a.gltf", b"{}"), (link("x.bin"), b"/etc/passwd")],
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_archives_that_could_lead_out_are_refused(case):
+    with pytest.raises(ArchiveError) as refusal:
+        open_archive(archive(BAD[case]), 2**20)
+    assert refusal.value.status == 422
+
+
+def test_two_entries_of_one_name_are_refused():
+    with pytest.warns(UserWarning, match="Duplicate"):
+        data = archive([("a.gltf", b"{}"), ("x", b"1"), ("x", b"2")])
+    with pytest.raises(ArchiveError):
+        open_archive(data, 2**20)
+
+
+def test_entries_are_counted_before_they_are_made():
+    data = archive([(f"{number}", b"") for number in range(MAX_ENTRIES + 1)])
+    with pytest.raises(LimitError) as refusal:
+        open_archive(data, 2**20)
+    assert refusal.value.limit == "archive-entries"
+
+
+def test_what_comes_out_is_limited_by_size_and_by_ratio():
+    data = archive([("a.gltf", bytes(2**25))])
+    for most in (2**24, 2**30):
+        with pytest.raises(LimitError) as refusal:
+            open_archive(data, most)
+        assert refusal.value.limit == "archive-bytes"
+
+
+def test_an_entry_that_lies_about_its_size_is_unreadable():
+    text, _ = external()
+    data = bytearray(archive([("a.gltf", text)]))
+    for signature, at in ((b"PK\x03\x04", 22), (b"PK\x01\x02", 24)):
+        start = data.index(signature) + at
+        data[start : start + 4] = (10).to_bytes(4, "little")
+    with pytest.raises(UnreadableError):
+        open_archive(bytes(data), 2**30)
+
+
+def test_damaged_archives_are_refused():
+    text, binary = external()
+    whole = archive([("a.gltf", text), ("box.bin", binary)])
+    rng = np.random.default_rng(0)
+    for _ in range(500):
+        data = bytearray(whole)
+        for place in rng.integers(0, len(data), rng.integers(1, 8)):
+            data[place] = rng.integers(256)
+        refusal = None
+        try:
+            main, siblings = open_archive(bytes(data), 2**24)
+            refine(bytes(main.content), siblings)
+        except ServiceError as error:
+            refusal = error
+        assert refusal is None or 400 <= refusal.status < 500
+
+
+@pytest.mark.skipif(not hasattr(os, "symlink"), reason="needs links")
+def test_a_folder_that_is_a_link_itself_may_be_used(tmp_path):
+    real = tmp_path / "real"
+    real.mkdir()
+    (real / "in.bin").write_bytes(b"in")
+    (tmp_path / "alias").symlink_to(real)
+    assert folder_of(tmp_path / "alias" / "box.gltf").find("in.bin") is not None

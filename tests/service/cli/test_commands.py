@@ -1,0 +1,168 @@
+"""Models by name or file, help, settings, keys, and the other options."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import trimesh
+
+from pns_common.onnx_model import DEFAULT_MODEL, bundled_models, load_model
+from pns_common.stencils import limit_ring_weight
+from service.gltf.read.container import read_glb
+from service.http.access import keys
+from service.meshfiles.example import part_glb
+from tests.service.cli.trees import FACES, tree_of
+from tests.support.meshes import icosphere
+from tests.support.networks import vertex_model_bytes
+
+
+def test_a_model_is_a_name_or_a_file_and_the_name_wins(
+    pns: Any, tmp_path: Path, part_file: Path
+) -> None:
+    (tmp_path / "paper").write_bytes(vertex_model_bytes(0))
+    report = tmp_path / "r.json"
+    for given, features in (("paper", "paper-5"), ("./paper", "signed-18")):
+        command = f"subdivide part.glb -o out.glb --model {given} --report r.json"
+        assert pns(*command.split()).code == 0
+        told = json.loads(report.read_text())
+        assert told["model"] == "paper"
+        assert told["model_hash"] == load_model(given).hash
+        assert load_model(given).card.features == features
+    assert "vertex_rule" in told["levels"][0]
+    loop = "subdivide part.glb -o out.glb --scheme loop --model ./paper --report r.json"
+    assert pns(*loop.split()).code == 0
+    assert json.loads(report.read_text())["model"] is None
+
+
+def test_help_says_that_a_model_is_a_name_or_a_file(pns: Any) -> None:
+    for command in ("subdivide", "serve", "info"):
+        assert "NAME|FILE" in pns(command, "--help").out
+    assert "./NAME" in pns("subdivide", "--help").out
+
+
+def test_info_lists_models_and_shows_a_card(pns: Any) -> None:
+    listed = pns("info").out.splitlines()
+    assert set(bundled_models()) <= {line.partition(" ")[0] for line in listed}
+    assert [line.partition(" ")[0] for line in listed if " * " in line] == [DEFAULT_MODEL]
+    shown = pns("info", "paper").out
+    model = load_model("paper")
+    assert model.hash in shown
+    assert str(model.card.budget) in shown
+    assert model.card.features in shown
+    percent = model.card.metrics["ridge-held-out"]["distance_near"]["percent"]
+    assert f"{percent:.4g}" in shown
+
+
+def test_settings_from_the_environment_hold_here_too(
+    pns: Any, part_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PNS_FACES", "1000")
+    outcome = pns("subdivide", str(part_file), "-o", "out.glb")
+    assert outcome.code == 1
+    assert "1000" in outcome.err
+
+
+def test_neither_the_commands_nor_their_help_import_torch(tmp_path: Path) -> None:
+    code = (
+        "import sys\n"
+        "import service.cli, service.http.server\n"
+        "assert not {'numpy', 'onnxruntime', 'trimesh'} & set(sys.modules)\n"
+        "import service.meshfiles.convert, service.meshfiles.example\n"
+        "import service.workers.jobs, service.model_info\n"
+        "assert 'torch' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
+
+
+def test_help_names_the_commands() -> None:
+    executable = Path(sys.executable).with_name("pns")
+    shown = subprocess.run([executable, "--help"], check=True, capture_output=True, text=True)
+    for command in ("subdivide", "serve", "info", "example"):
+        assert command in shown.stdout
+
+
+def test_a_gltf_is_read_with_the_files_of_its_own_folder(pns: Any, tmp_path: Path) -> None:
+    container = read_glb(part_glb())
+    tree = msgspec.json.decode(container.text)
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "part.bin").write_bytes(bytes(container.binary or b""))
+    source = tmp_path / "in" / "part.gltf"
+    for uri, code in (("part.bin", 0), ("other.bin", 1), ("../part.bin", 1)):
+        tree["buffers"][0]["uri"] = uri
+        source.write_bytes(msgspec.json.encode(tree))
+        done = pns("subdivide", "in/part.gltf", "-o", "out.glb", "--scheme", "loop")
+        assert done.code == code
+        assert len(done.err.splitlines()) == 1
+    assert "buffers" in tree_of(tmp_path / "out.glb")
+
+
+@pytest.mark.parametrize("compress", ["draco", "meshopt"])
+def test_compressed_files_are_written_and_read(pns: Any, part_file: Path, compress: str) -> None:
+    assert pns("subdivide", "part.glb", "-o", "packed.glb", "--compress", compress).code == 0
+    assert tree_of(part_file.with_name("packed.glb"))["extensionsRequired"]
+    done = pns("subdivide", "packed.glb", "-o", "again.obj")
+    assert done.code == 0
+    assert f"{16 * FACES:,} faces" in done.err
+
+
+def test_a_misspelt_setting_ends_it(pns: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PNS_BODDY", "1MiB")
+    code, out, err = pns("serve")
+    assert (code, out) == (2, "")
+    assert err == "pns: there is no setting PNS_BODDY; is it PNS_BODY?\n"
+
+
+def test_a_file_of_keys_that_cannot_be_used_ends_it(
+    pns: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PNS_KEYS_FILE", str(tmp_path / "none.toml"))
+    code, _, err = pns("serve", "--port", "0")
+    assert code == 1
+    assert err.splitlines()[-1].startswith("pns: ")
+    assert "none.toml" in err
+
+
+def test_a_key_and_its_entry(pns: Any, tmp_path: Path) -> None:
+    code, entry, fresh = pns("key", "studio", "--faces-per-minute", "5e6")
+    assert code == 0
+    file = tmp_path / "keys.toml"
+    file.write_text(entry)
+    (kept,) = keys.read_keys(file).values()
+    assert (kept.name, kept.faces_per_minute) == ("studio", 5e6)
+    assert keys.matches(fresh.strip(), kept.hash)
+    assert fresh.strip() not in entry
+
+
+def test_a_key_of_an_impossible_name_is_refused(pns: Any) -> None:
+    code, out, err = pns("key", "Studio")
+    assert (code, out) == (1, "")
+    assert "a name is 1 to 63 of" in err
+
+
+def test_a_files_name_cannot_speak_to_the_terminal(pns: Any) -> None:
+    code, _, err = pns("subdivide", "\x1b[31mred\x9b.glb", "-o", "out.glb")
+    assert code != 0
+    assert "\\x1b[31mred\\x9b.glb" in err
+    assert err.replace("\n", "").isprintable()
+
+
+def test_limit_puts_the_vertices_on_the_limit_surface(pns: Any, tmp_path: Path) -> None:
+    """A regular octahedron's tips end where Loop's limit mask says: nearer the middle."""
+    points, faces = icosphere(0)
+    source = tmp_path / "ball.off"
+    rows = [*(" ".join(map(str, p)) for p in points), *(f"3 {a} {b} {c}" for a, b, c in faces)]
+    source.write_text("\n".join(["OFF", f"{len(points)} {len(faces)} 0", *rows]))
+    assert pns("subdivide", str(source), "-o", "out.off", "--scheme", "loop", "--limit").code == 0
+    made = trimesh.load(tmp_path / "out.off", process=False)
+    weight = limit_ring_weight(np.array([5]))[0]
+    # The mean of an icosahedron's five neighbours is at 1/√5 of the tip's height.
+    height = 1 - weight + weight / np.sqrt(5)
+    tips = np.linalg.norm(made.vertices, axis=1)[: len(points)]
+    np.testing.assert_allclose(tips, height, rtol=1e-6)

@@ -1,0 +1,130 @@
+"""What cannot be done is one line and an exit code, and leaves what was there."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from pns_common.onnx_model import bundled_models
+from service import cli
+from service.cli import commands
+from service.meshfiles.example import part_glb
+from tests.service.cli.trees import FACES, tree_of, tree_of_bytes
+
+NAMES = ", ".join(bundled_models())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "says"),
+    [
+        ("subdivide missing.glb -o out.glb", 1, "missing.glb"),
+        ("subdivide part.glb -o nowhere/out.glb", 1, "nowhere"),
+        ("subdivide part.glb -o out.fbx", 2, "out.fbx"),
+        ("subdivide part.txt -o out.glb", 2, "part.txt"),
+        ("subdivide part.glb -o out.glb --levels 0", 2, "levels"),
+        ("subdivide part.glb -o out.glb --levels 7", 2, "levels"),
+        ("subdivide part.glb -o out.glb --budget nan", 2, "budget"),
+        ("subdivide part.glb -o out.glb --budget much", 2, "budget"),
+        ("subdivide part.glb -o out.glb --scheme cubic", 2, "scheme"),
+        ("subdivide part.glb -o out.glb --reference-length long", 2, "reference-length"),
+        ("subdivide part.glb -o out.glb --reference-length 0", 2, "reference_length"),
+        ("subdivide part.glb -o out.glb --model missing.onnx", 1, "missing.onnx"),
+        ("subdivide part.glb -o out.glb --model pape", 1, "bundled name (" + NAMES),
+        ("subdivide part.glb -o out.glb --model pape --scheme loop", 1, "bundled name (" + NAMES),
+        ("subdivide part.glb -o out.glb --model ./paper", 1, "./paper"),
+        ("subdivide part.glb -o out.glb --model part.glb", 1, "model part"),
+        ("subdivide part.glb -o out.glb --levels 6", 1, "faces"),
+        ("subdivide broken.glb -o out.glb", 1, "GLB"),
+        ("subdivide broken.ply -o out.glb", 1, "PLY"),
+        ("subdivide external.gltf -o out.glb", 1, "buffer"),
+        ("info missing", 1, "bundled name (" + NAMES),
+        ("info part.glb", 1, "ONNX"),
+        ("example part.obj", 2, "part.obj"),
+        ("serve --port 70000", 2, "port"),
+        ("subdivide part.glb", 2, "--output"),
+    ],
+)
+def test_errors_are_one_line_and_leave_no_file(
+    pns: Any, tmp_path: Path, part_file: Path, arguments: str, code: int, says: str
+) -> None:
+    (tmp_path / "broken.glb").write_bytes(b"no")
+    (tmp_path / "broken.ply").write_bytes(b"no")
+    tree = tree_of_bytes(part_glb())
+    tree["buffers"][0]["uri"] = "part.bin"
+    (tmp_path / "external.gltf").write_bytes(msgspec.json.encode(tree))
+    before = set(tmp_path.iterdir())
+    outcome = pns(*arguments.split())
+    assert outcome.code == code, outcome.err
+    assert says in outcome.err
+    assert "Traceback" not in outcome.err
+    if outcome.err.startswith("pns:"):
+        assert outcome.err.count("\n") == 1
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_a_failure_keeps_the_file_that_was_there(pns: Any, tmp_path: Path) -> None:
+    (tmp_path / "out.glb").write_text("precious")
+    (tmp_path / "broken.glb").write_bytes(b"no")
+    assert pns("subdivide", "broken.glb", "-o", "out.glb").code == 1
+    assert (tmp_path / "out.glb").read_text() == "precious"
+
+
+def test_output_has_the_permissions_of_any_new_file(
+    pns: Any, tmp_path: Path, part_file: Path
+) -> None:
+    pns("subdivide", str(part_file), "-o", "out.glb")
+    (tmp_path / "plain").touch()
+    modes = {stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("out.glb", "plain")}
+    assert len(modes) == 1
+
+
+@pytest.mark.parametrize(
+    ("output", "report"),
+    [("same.glb", "same.glb"), ("same.glb", "sub/../same.glb"), ("out.glb", "part.glb")],
+)
+def test_a_report_never_replaces_a_model(
+    pns: Any, tmp_path: Path, part_file: Path, output: str, report: str
+) -> None:
+    (tmp_path / "sub").mkdir()
+    outcome = pns("subdivide", "part.glb", "-o", output, "--report", report)
+    assert outcome.code == 2
+    assert report in outcome.err
+    assert part_file.read_bytes() == part_glb()
+    assert not (tmp_path / "same.glb").exists()
+
+
+def test_a_missing_folder_is_named_with_the_file_that_was_asked_for(
+    pns: Any, part_file: Path
+) -> None:
+    outcome = pns("subdivide", "part.glb", "-o", "nowhere/out.glb")
+    assert outcome.err == "pns: nowhere/out.glb: No such file or directory\n"
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"), [("PNS_FACES", "1000"), ("PNS_MEMORY", "1MiB"), ("PNS_JSON_ITEMS", "9")]
+)
+def test_a_limit_names_the_setting_that_raises_it(
+    pns: Any, part_file: Path, monkeypatch: pytest.MonkeyPatch, setting: str, value: str
+) -> None:
+    monkeypatch.setenv(setting, value)
+    outcome = pns("subdivide", "part.glb", "-o", "out.glb")
+    assert outcome.code == 1
+    assert f"{setting} allows more" in outcome.err
+
+
+def test_a_file_may_replace_itself(pns: Any, part_file: Path) -> None:
+    assert pns("subdivide", str(part_file), "-o", str(part_file)).code == 0
+    assert tree_of(part_file)["asset"]["extras"]["pns"]["totals"]["faces"] == 4 * FACES
+
+
+def test_a_fault_of_ours_is_a_traceback(pns: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fault() -> None:
+        raise ZeroDivisionError("ours")
+
+    monkeypatch.setattr(commands, "app", fault)
+    with pytest.raises(ZeroDivisionError):
+        cli.main()

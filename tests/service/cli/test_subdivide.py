@@ -1,0 +1,153 @@
+"""`pns subdivide`: every format into every other, and every loss said."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import trimesh
+
+from service.gltf.read.container import read_glb
+from service.meshfiles import formats
+from service.meshfiles.example import part, part_glb
+from service.meshfiles.triangles_glb import triangles_glb
+from tests.service.cli.trees import FACES, tree_of, tree_of_bytes
+
+
+def test_example_then_subdivide_as_the_readme_has_it(pns: Any, tmp_path: Path) -> None:
+    assert pns("example", "part.glb").code == 0
+    command = "subdivide part.glb -o part2.glb --levels 2 --report report.json"
+    outcome = pns(*command.split())
+    assert outcome.code == 0
+    assert outcome.out == ""
+    assert f"{16 * FACES:,} faces" in outcome.err
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report == tree_of(tmp_path / "part2.glb")["asset"]["extras"]["pns"]
+    assert report["totals"]["faces"] == 16 * FACES
+
+
+def test_options_reach_the_operator(pns: Any, tmp_path: Path, part_file: Path) -> None:
+    arguments = "-o out.glb --budget 0.25 --reference-length 2.5 --diagnostics full --report r.json"
+    assert pns("subdivide", str(part_file), *arguments.split()).code == 0
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert report["scheme"] == "pns"
+    assert report["budget"] == 0.25
+    assert report["meshes"][0]["reference_length"] == 2.5
+    attributes = tree_of(tmp_path / "out.glb")["meshes"][0]["primitives"][0]["attributes"]
+    assert "_PNS_RATIO" in attributes
+
+
+@pytest.mark.parametrize("source", ["glb", "gltf", "obj", "ply", "stl", "off"])
+@pytest.mark.parametrize("target", ["glb", "gltf", "obj", "ply", "stl", "off"])
+def test_every_format_becomes_every_other(
+    pns: Any, tmp_path: Path, part_file: Path, source: str, target: str
+) -> None:
+    if source == "gltf":
+        pns("subdivide", "part.glb", "-o", "in.gltf", "--scheme", "loop")
+        faces = 4 * FACES
+    elif source == "glb":
+        (tmp_path / "in.glb").write_bytes(part_file.read_bytes())
+        faces = FACES
+    else:
+        (tmp_path / f"in.{source}").write_bytes(formats.write(part(), source))
+        faces = FACES
+    outcome = pns("subdivide", f"in.{source}", "-o", f"out.{target}", "--scheme", "loop")
+    assert outcome.code == 0, outcome.err
+    mesh = trimesh.load_scene(tmp_path / f"out.{target}", process=False).to_mesh()
+    assert len(mesh.faces) == 4 * faces
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    assert mesh.is_watertight
+    assert mesh.volume > 0
+
+
+def test_what_a_format_cannot_hold_is_said_and_reported(
+    pns: Any, tmp_path: Path, part_file: Path
+) -> None:
+    outcome = pns("subdivide", str(part_file), "-o", "out.stl", "--report", "r.json")
+    changes = json.loads((tmp_path / "r.json").read_text())["changes"]
+    lost = {change["what"].partition(" dropped")[0] for change in changes}
+    assert lost == {"materials", "attribute NORMAL", "attribute TEXCOORD_0"}
+    for name in lost:
+        assert f"{name} dropped" in outcome.err
+    outcome = pns("subdivide", str(part_file), "-o", "out.obj")
+    assert "TEXCOORD_0" not in outcome.err
+    outcome = pns("subdivide", "out.obj", "-o", "out.ply", "--diagnostics", "full")
+    assert "texture coordinates dropped" in outcome.err
+    assert "values at vertices dropped" in outcome.err
+
+
+def test_every_loss_is_a_line_once(pns: Any, tmp_path: Path) -> None:
+    text = "OFF\n5 2 0\n0 0 0\n1 0 0\n0 1 0\n9 9 9\n8 8 8\n3 0 1 2\n3 0 3 3\n"
+    (tmp_path / "in.off").write_text(text)
+    outcome = pns("subdivide", "in.off", "-o", "out.off", "--scheme", "loop")
+    assert "1 × degenerate faces dropped\n" in outcome.err
+    assert "2 × vertices dropped\n" in outcome.err
+    assert "duplicate" not in outcome.err
+    tree = tree_of_bytes(part_glb())
+    indices = tree["accessors"][tree["meshes"][0]["primitives"][0]["indices"]]
+    indices["count"] -= 3
+    indices["byteOffset"] = 4
+    (tmp_path / "in.glb").write_bytes(with_tree(part_glb(), tree))
+    outcome = pns("subdivide", "in.glb", "-o", "out.glb", "--scheme", "loop")
+    assert outcome.err.count("degenerate faces dropped") <= 1
+
+
+@pytest.mark.parametrize("target", ["glb", "gltf", "ply", "stl"])
+def test_what_float32_cannot_tell_apart_is_said(pns: Any, tmp_path: Path, target: str) -> None:
+    far = "OFF\n3 1 0\n4500000 0 0\n4500000.2 0 0\n4500000 1 0\n3 0 1 2\n"
+    (tmp_path / "far.off").write_text(far)
+    assert "float32" in pns("subdivide", "far.off", "-o", f"out.{target}").err
+    assert "float32" not in pns("subdivide", "far.off", "-o", "out.obj").err
+    (tmp_path / "huge.off").write_text("OFF\n3 1 0\n1e40 0 0\n2e40 0 0\n0 1e40 0\n3 0 1 2\n")
+    huge = pns("subdivide", "huge.off", "-o", f"huge.{target}")
+    assert huge.code == 1
+    assert "float32" in huge.err
+    assert "Warning" not in huge.err
+    assert not (tmp_path / f"huge.{target}").exists()
+
+
+def test_texture_coordinates_keep_their_direction(pns: Any, tmp_path: Path) -> None:
+    (tmp_path / "in.obj").write_bytes(formats.write(part(), "obj"))
+    (tmp_path / "in.glb").write_bytes(triangles_glb(part()))
+    for source in ("in.obj", "in.glb"):
+        for target in ("out.obj", "out.glb"):
+            assert pns("subdivide", source, "-o", target, "--scheme", "loop").code == 0
+            assert pns("subdivide", target, "-o", "last.obj", "--scheme", "loop").code == 0
+            last = formats.read((tmp_path / "last.obj").read_bytes(), "obj")
+            # The section's first point has v = 0 in the example, whatever way it went.
+            low = last.vertices[np.isclose(last.uv[:, 1], 0, atol=1e-6)]
+            np.testing.assert_allclose(np.hypot(low[:, 0], low[:, 2]), 0.40, atol=0.03)
+            np.testing.assert_allclose(low[:, 1], -0.3, atol=0.06)
+
+
+def test_nodes_are_flattened_into_world_space(pns: Any, tmp_path: Path) -> None:
+    tree = tree_of_bytes(part_glb())
+    tree["nodes"] = [
+        {"children": [1, 2], "translation": [10, 0, 0]},
+        {"mesh": 0, "scale": [2, 2, 2], "rotation": [0, 0, 2**-0.5, 2**-0.5]},
+        {"mesh": 0, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 5, 0, 1]},
+        {"mesh": 0},
+    ]
+    (tmp_path / "in.glb").write_bytes(with_tree(part_glb(), tree))
+    assert pns("subdivide", "in.glb", "-o", "out.stl", "--scheme", "loop").code == 0
+    flattened = pns("subdivide", "in.glb", "-o", "one.stl", "--scheme", "loop")
+    assert "nodes joined" in flattened.err
+    mesh = trimesh.load_mesh(tmp_path / "out.stl")
+    # The scene shows the first root alone; the second instance is mirrored, not inside out.
+    theirs = trimesh.load_scene(tmp_path / "in.glb", process=False).to_mesh()
+    assert len(mesh.faces) == 2 * 4 * FACES
+    np.testing.assert_allclose(mesh.bounds, theirs.bounds, atol=0.2)
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(abs(theirs.volume), rel=0.1)
+
+
+def with_tree(glb: bytes, tree: dict[str, Any]) -> bytes:
+    from service.gltf.read.container import write_glb
+
+    binary = read_glb(glb).binary
+    assert binary is not None
+    return write_glb(msgspec.json.encode(tree), [binary], [])

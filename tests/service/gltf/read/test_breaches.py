@@ -1,0 +1,151 @@
+"""Breaches of glTF that change nothing for refinement: refined, and reported as found."""
+
+import numpy as np
+import pytest
+
+from service.gltf.subdivide import subdivide_gltf
+from service.options import Limits, Options
+from tests.support.gltf import files
+from tests.support.gltf.shapes import octahedron
+
+FOUND = "found, and left: "
+
+
+def refine(data):
+    return subdivide_gltf(data, "glb", Options(scheme="loop"), None, Limits())
+
+
+def found(made):
+    """The breaches that the report names: pointer, words, count."""
+    return [
+        (change["pointer"], change["what"].removeprefix(FOUND), change["count"])
+        for change in made.report["changes"]
+        if change["what"].startswith(FOUND)
+    ]
+
+
+def lying(values, *, start, stride):
+    """The rows at a stride, from a place in the bytes."""
+    rows = b"".join(row.tobytes().ljust(stride or row.nbytes, b"\xcd") for row in values)
+    return b"\xcd" * start + rows
+
+
+def with_identifiers(*, start=0, stride=None, kind=np.uint8, width=1):
+    """An octahedron whose `_ID` lies at the end of the bytes, and the numbers in it."""
+    tree, binary = files.document([octahedron()])
+    values = (7 * np.arange(6 * width) % 251).astype(kind).reshape(6, width)
+    binary.extend(b"\0" * (-len(binary) % 4))
+    view = {"buffer": 0, "byteOffset": len(binary)}
+    binary.extend(lying(values, start=start, stride=stride))
+    view["byteLength"] = len(binary) - view["byteOffset"]
+    if stride is not None:
+        view["byteStride"] = stride
+    tree["bufferViews"].append(view)
+    tree["accessors"].append(
+        {
+            "bufferView": len(tree["bufferViews"]) - 1,
+            "byteOffset": start,
+            "componentType": files.COMPONENTS[values.dtype.str[1:]],
+            "count": 6,
+            "type": files.TYPES[width],
+        }
+    )
+    tree["meshes"][0]["primitives"][0]["attributes"]["_ID"] = len(tree["accessors"]) - 1
+    tree["buffers"] = [{"byteLength": len(binary)}]
+    return files.pack(tree, binary), values
+
+
+def test_colours_of_plain_integers_are_averaged():
+    colours = (40 * np.arange(24) % 256).astype(np.uint8).reshape(6, 4)
+    made = refine(files.glb([octahedron(COLOR_0=colours)]))
+    right = refine(files.glb([octahedron(COLOR_0=files.Normalized(colours))]))
+    (_, kept), (_, wanted) = files.primitive_of(made.glb), files.primitive_of(right.glb)
+    assert np.array_equal(kept["COLOR_0"], wanted["COLOR_0"])
+    assert not np.isin(kept["COLOR_0"], colours).all()
+    tree, _ = files.unpack(made.glb)
+    accessor = tree["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"]
+    assert "normalized" not in tree["accessors"][accessor]
+    ((pointer, words, count),) = found(made)
+    assert (pointer, count) == ("/accessors/2", 1)
+    assert "COLOR_n" in words
+    assert found(right) == []
+
+
+@pytest.mark.parametrize("stride", [0, 1, 2, 3, 6, 253, 256, 4096])
+def test_odd_strides_are_read_as_they_say(stride):
+    data, values = with_identifiers(stride=stride)
+    made = refine(data)
+    _, attributes = files.primitive_of(made.glb)
+    assert np.array_equal(attributes["_ID"][:6], values[first_rows(attributes)])
+    ((pointer, words, count),) = found(made)
+    assert (pointer, count) == ("/bufferViews/2/byteStride", 1)
+    assert "byteStride" in words
+
+
+@pytest.mark.parametrize("stride", [None, 4, 8, 252])
+def test_even_strides_are_no_breach(stride):
+    made = refine(with_identifiers(stride=stride)[0])
+    assert found(made) == []
+
+
+def first_rows(attributes):
+    """Which old vertex each of the first six refined ones is: those that lie on its axis."""
+    points = attributes["POSITION"][:6]
+    old = octahedron()["POSITION"]
+    return (points @ old.T).argmax(axis=1)
+
+
+def test_elements_that_are_not_aligned_are_read_where_they_lie():
+    data, values = with_identifiers(start=1, stride=8, kind=np.float32)
+    made = refine(data)
+    _, attributes = files.primitive_of(made.glb)
+    assert np.array_equal(attributes["_ID"][:6], values[first_rows(attributes)])
+    ((pointer, words, count),) = found(made)
+    assert (pointer, count) == ("/accessors/2", 1)
+    assert "begin" in words
+
+
+@pytest.mark.parametrize("empty", [{"primitives": []}, {"name": "nothing"}])
+def test_a_mesh_without_primitives_stays_as_it_is(empty):
+    tree, binary = files.document([octahedron()])
+    tree["meshes"].insert(0, empty)
+    tree["nodes"] = [{"mesh": 0}, {"mesh": 1}]
+    made = refine(files.pack(tree, binary))
+    assert files.unpack(made.glb)[0]["meshes"][0] == empty
+    assert made.report["totals"]["meshes"] == 1
+    assert found(made) == [("/meshes/0", "meshes without primitives", 1)]
+
+
+def test_quantisation_that_nobody_declared_is_read():
+    shape = octahedron()
+    shape["POSITION"] = (100 * shape["POSITION"]).astype(np.int8)
+    made = refine(files.glb([shape], [shape]))
+    plain = refine(files.glb([octahedron(POSITION=100 * octahedron()["POSITION"])]))
+    assert np.array_equal(
+        files.primitive_of(made.glb)[1]["POSITION"], files.primitive_of(plain.glb)[1]["POSITION"]
+    )
+    ((pointer, words, count),) = found(made)
+    assert (pointer, count) == ("/accessors/0", 2)
+    assert "KHR_mesh_quantization" in words
+    tree, binary = files.document([shape])
+    tree["extensionsUsed"] = tree["extensionsRequired"] = ["KHR_mesh_quantization"]
+    assert found(refine(files.pack(tree, binary))) == []
+
+
+def test_what_is_made_anew_is_not_believed():
+    def edit(tree):
+        tree["accessors"][0].update(min=[9, 9, 9], max=[-9, -9, -9])
+        tree["bufferViews"][0]["target"] = 34963
+        tree["meshes"][0]["primitives"][0]["extensions"] = {"EXT_of_nobody": {}}
+        tree["never"] = {"heard": "of"}
+
+    tree, binary = files.document([octahedron()])
+    edit(tree)
+    made = refine(files.pack(tree, binary))
+    assert found(made) == []
+    tree, binary = files.unpack(made.glb)
+    position = tree["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
+    points = files.values_of(tree, binary, position)
+    assert tree["accessors"][position]["min"] == points.min(axis=0).tolist()
+    assert tree["bufferViews"][tree["accessors"][position]["bufferView"]]["target"] == 34962
+    assert tree["never"] == {"heard": "of"}

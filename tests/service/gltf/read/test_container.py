@@ -1,0 +1,75 @@
+"""The GLB container: exact bounds in, exact bytes out."""
+
+import struct
+
+import pytest
+
+from service.errors import LimitError, UnreadableError
+from service.gltf.read.container import read_glb, write_glb
+from tests.support.gltf import files
+
+
+class Claimed(bytes):
+    """Bytes that claim to be 4 GiB long."""
+
+    def __len__(self):
+        return 2**32
+
+
+def test_chunks_are_read_and_written_again():
+    data = files.pack(b'{"a":1}', b"12345", [(b"XTRA", b"more"), (b"LAST", b"")])
+    container = read_glb(data)
+    assert container.text == b'{"a":1} '
+    assert bytes(container.binary) == b"12345\0\0\0"
+    assert [(kind, bytes(content)) for kind, content in container.others] == [
+        (b"XTRA", b"more"),
+        (b"LAST", b""),
+    ]
+    assert write_glb(container.text, [container.binary], container.others) == data
+
+
+def test_chunks_are_counted_before_they_are_made():
+    data = files.pack(b"{}", others=[(b"XTRA", b"")] * 1000)
+    with pytest.raises(LimitError) as refusal:
+        read_glb(data)
+    assert refusal.value.limit == "glb-chunks"
+    # As many as are allowed: JSON and 63 others.
+    assert len(read_glb(files.pack(b"{}", others=[(b"XTRA", b"")] * 63)).others) == 63
+
+
+def test_a_file_without_binary_chunk_has_none():
+    container = read_glb(files.pack(b"{}"))
+    assert container.binary is None
+    assert write_glb(b"{}", [], []) == files.pack(b"{}")
+
+
+def test_a_foreign_second_chunk_is_not_taken_for_the_binary_one():
+    container = read_glb(files.pack(b"{}", others=[(b"XTRA", b"more")]))
+    assert container.binary is None
+    assert len(container.others) == 1
+
+
+WHOLE = files.pack(b"{}", b"1234")
+BROKEN = {
+    "empty": b"",
+    "shorter than its header": WHOLE[:11],
+    "another magic": b"gltf" + WHOLE[4:],
+    "another version": WHOLE[:4] + struct.pack("<I", 1) + WHOLE[8:],
+    "longer than it says": WHOLE + b"\0",
+    "shorter than it says": WHOLE[:-1],
+    "no chunk": struct.pack("<4sII", b"glTF", 2, 12),
+    "half a chunk header": struct.pack("<4sII", b"glTF", 2, 16) + b"1234",
+    "a chunk beyond the end": struct.pack("<4sIII4s", b"glTF", 2, 20, 2**32 - 1, b"JSON"),
+    "BIN before JSON": struct.pack("<4sII", b"glTF", 2, 20) + files.chunk(b"BIN\0", b"", b""),
+}
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_wrong_bounds_are_unreadable(kind):
+    with pytest.raises(UnreadableError):
+        read_glb(BROKEN[kind])
+
+
+def test_what_a_container_cannot_hold_is_refused_before_it_is_joined():
+    with pytest.raises(LimitError, match="bytes"):
+        write_glb(b"{}", [Claimed()], [])

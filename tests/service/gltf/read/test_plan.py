@@ -1,0 +1,48 @@
+"""What the prediction of memory must not leave out."""
+
+import tracemalloc
+
+import pytest
+
+from service.errors import LimitError
+from service.gltf.subdivide import subdivide_gltf
+from service.options import Limits, Options
+from tests.support.gltf import files
+from tests.support.gltf.shapes import octahedron
+
+LOOP = Options(scheme="loop")
+
+
+def with_image(size):
+    """Eight faces, and an image that is copied through."""
+    tree, binary = files.document([octahedron()])
+    start = len(binary) + -len(binary) % 4
+    binary = bytes(binary).ljust(start, b"\0") + bytes(size)
+    tree["buffers"][0]["byteLength"] = len(binary)
+    tree["images"] = [{"bufferView": len(tree["bufferViews"]), "mimeType": "image/png"}]
+    tree["bufferViews"].append({"buffer": 0, "byteOffset": start, "byteLength": size})
+    return files.pack(tree, binary)
+
+
+def test_an_uploads_own_bytes_are_predicted():
+    data = with_image(16 * 2**20)
+    tracemalloc.start()
+    try:
+        subdivide_gltf(data, "glb", LOOP, None, Limits())
+        used = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert used >= len(data)
+    # The upload itself was there before.
+    with pytest.raises(LimitError) as refusal:
+        subdivide_gltf(data, "glb", LOOP, None, Limits(max_memory_bytes=used + len(data) - 1))
+    assert refusal.value.limit == "memory"
+
+
+def test_prediction_grows_with_the_upload_by_what_an_answer_copies():
+    predicted = []
+    for size in (2**20, 2**21):
+        with pytest.raises(LimitError) as refusal:
+            subdivide_gltf(with_image(size), "glb", LOOP, None, Limits(max_memory_bytes=10**6))
+        predicted.append(refusal.value.found)
+    assert predicted[1] - predicted[0] >= 2 * 2**20

@@ -1,0 +1,83 @@
+"""Normals and tangents against an independent implementation, and where they have no direction."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from pns_common.blocks import Blocks
+from service.gltf.refine.normals import angle_weighted_normals, perpendicular_tangents, safe_unit
+from service.gltf.refine.smoothing import joined_normals
+
+BLOCKS = Blocks(threads=1, rows=100)
+
+
+def test_normals_equal_trimesh_on_a_smooth_surface():
+    sphere = trimesh.creation.icosphere(subdivisions=2)
+    rng = np.random.default_rng(0)
+    points = sphere.vertices + 0.05 * rng.standard_normal(sphere.vertices.shape)
+    faces = sphere.faces.astype(np.int64)
+    ours = angle_weighted_normals(points, faces, faces, len(points), BLOCKS)
+    theirs = trimesh.Trimesh(points, faces, process=False).vertex_normals
+    np.testing.assert_allclose(ours, theirs, atol=1e-9)
+
+
+def test_a_triangulation_of_a_cube_does_not_bend_its_normals():
+    # The point of angles as weights: a corner of a cube is symmetric however its sides are cut.
+    cube = trimesh.creation.box()
+    faces = cube.faces.astype(np.int64)
+    normals = angle_weighted_normals(cube.vertices, faces, faces, 8, BLOCKS)
+    np.testing.assert_allclose(normals, np.sign(cube.vertices) / np.sqrt(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("scale", [1e-38, 1e-10, 1.0, 1e38])
+def test_normals_do_not_depend_on_the_unit_of_length(scale):
+    points = scale * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    faces = np.array([[0, 1, 2]])
+    normals = angle_weighted_normals(points, faces, faces, 3, BLOCKS)
+    np.testing.assert_allclose(normals, [[0, 0, 1]] * 3, atol=1e-12)
+
+
+def test_groups_without_area_or_direction_have_none():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
+    # A line; then a face and its own back.
+    for faces in (np.array([[0, 1, 2]]), np.array([[0, 1, 3], [1, 0, 3]])):
+        normals = angle_weighted_normals(points, faces, faces, 4, BLOCKS)
+        np.testing.assert_array_equal(normals, np.zeros((4, 3)))
+
+
+def test_vectors_without_direction_become_the_z_axis():
+    vectors = np.array([[0.0, 0, 0], [0, -3, 0], [1e-12, 0, 0]])
+    np.testing.assert_array_equal(safe_unit(vectors), [[0, 0, 1], [0, -1, 0], [0, 0, 1]])
+
+
+def test_tangents_along_the_normal_are_replaced_by_a_perpendicular():
+    rng = np.random.default_rng(0)
+    normals = safe_unit(rng.standard_normal((50, 3)))
+    tangents = np.concatenate([2 * normals[:20], 0 * normals[20:30], rng.standard_normal((20, 3))])
+    flat = perpendicular_tangents(tangents, normals)
+    np.testing.assert_allclose(np.linalg.norm(flat, axis=1), 1, atol=1e-12)
+    np.testing.assert_allclose((flat * normals).sum(axis=1), 0, atol=1e-12)
+    # A tangent that has a direction keeps its side.
+    assert ((flat * tangents).sum(axis=1)[30:] > 0).all()
+
+
+def test_rows_join_by_vertex_and_normal():
+    rng = np.random.default_rng(0)
+    directions = safe_unit(rng.standard_normal((40, 3)))
+    which, vertex = rng.integers(0, 40, 400), rng.integers(0, 5, 400)
+    labels = joined_normals(vertex, directions[which])
+    expected = (which[:, None] == which) & (vertex[:, None] == vertex)
+    np.testing.assert_array_equal(labels[:, None] == labels, expected)
+
+
+def test_normals_that_differ_by_rounding_are_one_and_by_a_degree_are_two():
+    def tilted(degrees):
+        return [np.sin(np.radians(degrees)), 0, np.cos(np.radians(degrees))]
+
+    normals = np.array([tilted(0), tilted(0.01), tilted(1), tilted(1.01), tilted(-0.01)])
+    assert joined_normals(np.zeros(5, dtype=np.int64), normals).tolist() == [0, 0, 1, 1, 0]
+
+
+def test_zeros_of_either_sign_are_one_normal():
+    normals = np.array([[0.0, 0.0, 1.0], [-0.0, -0.0, 1.0]])
+    assert joined_normals(np.zeros(2, dtype=np.int64), normals).tolist() == [0, 0]

@@ -1,0 +1,177 @@
+"""Skins: weights go through the stencil by joint, and every refined vertex still adds up to one."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pns_common import Mesh, loop, refine
+from service.gltf.refine.skins import whole_units
+from service.gltf.subdivide import subdivide_gltf
+from service.options import Limits, Options
+from tests.support.gltf import files, validator
+from tests.support.gltf.shapes import octahedron
+from tests.support.networks import random_model
+
+
+def subdivide(*meshes, **options):
+    options = Options(**{"scheme": "loop", **options})
+    return subdivide_gltf(files.glb(*meshes), "glb", options, random_model(0), Limits())
+
+
+def bound(joints, weights, **others):
+    return octahedron(JOINTS_0=np.asarray(joints, dtype=np.uint8), WEIGHTS_0=weights, **others)
+
+
+def by_joint(attributes, count, sets=1):
+    """(N, joints) weights, sets added up."""
+    total = np.zeros((len(attributes["POSITION"]), count))
+    for number in range(sets):
+        joints, weights = attributes[f"JOINTS_{number}"], attributes[f"WEIGHTS_{number}"]
+        full = 1 if weights.dtype.kind == "f" else np.iinfo(weights.dtype).max
+        rows = np.arange(len(total))[:, None]
+        np.add.at(total, (rows, joints.astype(int)), weights.astype(float) / full)
+    return total
+
+
+def random_binding(seed, joints=3):
+    rng = np.random.default_rng(seed)
+    weights = np.zeros((6, 4))
+    weights[:, :joints] = rng.dirichlet(np.ones(joints), 6)
+    return np.tile([2, 0, 1, 0], (6, 1)), weights
+
+
+@pytest.mark.parametrize("levels", [1, 2, 3])
+def test_weights_follow_the_positions_of_loop(levels):
+    # Three joints in four slots: nothing is cut, so weights are Loop's columns, like x, y and z.
+    joints, weights = random_binding(0)
+    faces, attributes = files.primitive_of(subdivide([bound(joints, weights)], levels=levels).glb)
+    shape = octahedron()
+    columns = weights[:, [1, 2, 0]]
+    expected = refine(Mesh(columns, shape["indices"]), loop(), levels).mesh
+    by_row = by_joint(attributes, 3)
+    np.testing.assert_allclose(by_row[faces], expected.vertices[expected.faces], atol=2e-7)
+
+
+def test_the_learned_correction_changes_no_weight():
+    shape = bound(*random_binding(1))
+    pairs = [
+        files.primitive_of(subdivide([shape], scheme=s, levels=2).glb)[1] for s in ("pns", "loop")
+    ]
+    for name in ("JOINTS_0", "WEIGHTS_0"):
+        np.testing.assert_array_equal(pairs[0][name], pairs[1][name])
+    assert (pairs[0]["POSITION"] != pairs[1]["POSITION"]).any()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.uint8, np.uint16])
+@pytest.mark.parametrize("sets", [1, 2])
+def test_weights_sum_to_one_exactly_and_unused_joints_are_zero(dtype, sets):
+    rng = np.random.default_rng(0)
+    shape = octahedron()
+    for number in range(sets):
+        shape[f"JOINTS_{number}"] = rng.integers(0, 40, (6, 4), dtype=np.uint8)
+    weights = rng.dirichlet(np.ones(4 * sets), 6)
+    full = 1 if dtype is np.float32 else np.iinfo(dtype).max
+    if full > 1:
+        weights = whole_units(weights, full).astype(dtype)
+    for number in range(sets):
+        part = weights[:, 4 * number : 4 * number + 4]
+        shape[f"WEIGHTS_{number}"] = part if full == 1 else files.Normalized(part)
+    result = subdivide([shape], levels=3)
+    _, attributes = files.primitive_of(result.glb)
+    joints = np.hstack([attributes[f"JOINTS_{n}"] for n in range(sets)])
+    shares = np.hstack([attributes[f"WEIGHTS_{n}"] for n in range(sets)])
+    assert (joints.dtype, shares.dtype) == (np.uint8, dtype)
+    total = np.zeros(len(shares), dtype=np.float32 if full == 1 else np.int64)
+    for column in shares.T:
+        total = total + column
+    assert (total == full).all()
+    assert not joints[shares == 0].any()
+    # No joint is named twice, and the heaviest come first.
+    for row, weight in zip(joints, shares, strict=True):
+        named = row[weight > 0]
+        assert len(set(named.tolist())) == len(named)
+        assert (weight[1:] <= weight[:-1]).all()
+    changes = {change["what"]: change["count"] for change in result.report["changes"]}
+    assert 0 < changes["refined vertices that lost their lightest joints"] <= len(shares)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 12), st.sampled_from([255, 65535, 2**24]))
+def test_whole_units_are_within_one_of_the_weights(seed, width, full):
+    rng = np.random.default_rng(seed)
+    weights = rng.dirichlet(np.full(width, 0.3), 20) * rng.uniform(0.5, 2, (20, 1))
+    weights[3] = 0
+    units = whole_units(weights, full)
+    assert units.sum(axis=1).tolist() == [full] * 3 + [0] + [full] * 16
+    exact = full * weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-300)
+    assert np.abs(units - exact).max() <= 1
+    assert not units[weights == 0].any()
+
+
+def test_lips_with_different_joints_stay_two():
+    # Two coincident open sheets, each on a joint of its own: welded, they would be one surface.
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    pair = {
+        "POSITION": np.concatenate([points, points]),
+        "indices": np.concatenate([faces, faces[:, ::-1] + 4]),
+        "JOINTS_0": np.repeat(np.array([[0, 0, 0, 0], [1, 0, 0, 0]], dtype=np.uint8), 4, axis=0),
+        "WEIGHTS_0": np.tile([1.0, 0, 0, 0], (8, 1)),
+    }
+    result = subdivide([pair])
+    assert result.report["levels"][0]["edges"] == {"interior": 2, "boundary": 8, "irregular": 0}
+    _, attributes = files.primitive_of(result.glb)
+    assert set(attributes["JOINTS_0"][:, 0].tolist()) == {0, 1}
+    assert (attributes["WEIGHTS_0"] == [1, 0, 0, 0]).all()
+
+
+def test_the_order_of_slots_and_unused_joints_do_not_open_a_seam():
+    shape = octahedron()
+    halves = []
+    for faces, joints, weights in (
+        (shape["indices"][:4], [3, 5, 0, 0], [0.75, 0.25, 0, 0]),
+        (shape["indices"][4:], [5, 9, 3, 3], [0.25, 0, 0.5, 0.25]),
+    ):
+        halves.append(bound(np.tile(joints, (6, 1)), np.tile(weights, (6, 1)), indices=faces))
+    result = subdivide(halves)
+    assert result.report["levels"][0]["edges"]["boundary"] == 0
+    for number in (0, 1):
+        _, attributes = files.primitive_of(result.glb, 0, number)
+        assert (attributes["JOINTS_0"] == [3, 5, 0, 0]).all()
+        assert (attributes["WEIGHTS_0"] == np.float32([0.75, 0.25, 0, 0])).all()
+
+
+def test_joints_of_a_neighbour_widen_the_type():
+    shape = octahedron()
+    narrow = bound(np.zeros((6, 4)), np.tile([1.0, 0, 0, 0], (6, 1)), indices=shape["indices"][:4])
+    wide = {**narrow, "indices": shape["indices"][4:]}
+    # The vertices 4 and 5 belong to one half each.
+    wide["JOINTS_0"] = np.zeros((6, 4), dtype=np.uint16)
+    wide["JOINTS_0"][5, 0] = 300
+    result = subdivide([narrow, wide])
+    _, attributes = files.primitive_of(result.glb)
+    assert attributes["JOINTS_0"].dtype == np.uint16
+    assert 300 in attributes["JOINTS_0"]
+
+
+def test_vertices_without_weight_keep_none():
+    joints, weights = random_binding(2)
+    weights[:] = 0
+    _, attributes = files.primitive_of(subdivide([bound(joints, weights)]).glb)
+    assert not attributes["WEIGHTS_0"].any()
+    assert not attributes["JOINTS_0"].any()
+
+
+def test_a_mesh_shown_with_and_without_its_skin_is_refined_once(tmp_path):
+    tree, binary = files.document([bound(*random_binding(3))])
+    tree["nodes"] += [{"mesh": 0, "skin": 0}, {}, {}, {}]
+    tree["skins"] = [{"joints": [2, 3, 4]}]
+    tree["scenes"] = [{"nodes": [0, 1, 2, 3, 4]}]
+    data = files.pack(tree, binary)
+    result = subdivide_gltf(data, "glb", Options(scheme="loop"), None, Limits())
+    after, _ = files.unpack(result.glb)
+    assert (after["nodes"], after["skins"]) == (tree["nodes"], tree["skins"])
+    assert result.report["meshes"][0]["instances"] == 2
+    path = tmp_path / "skinned.glb"
+    path.write_bytes(result.glb)
+    assert validator.errors([path]) == [[]]

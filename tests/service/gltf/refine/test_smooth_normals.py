@@ -1,0 +1,135 @@
+"""normals=smooth: what a file without normals, or with hard ones, comes back with."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+
+from service.gltf.subdivide import subdivide_gltf
+from service.options import Limits, Options
+from tests.support.gltf.files import glb
+from tests.support.gltf.files import primitive_of as indices_and_attributes
+from tests.support.gltf.shapes import box, octahedron
+
+
+def refined(*meshes, **options):
+    chosen = Options(**({"scheme": "loop", "levels": 2, "normals": "smooth"} | options))
+    return subdivide_gltf(glb(*meshes), "glb", chosen, None, Limits()).glb
+
+
+def primitive_of(data, primitive=0):
+    indices, attributes = indices_and_attributes(data, primitive=primitive)
+    return attributes | {"indices": indices}
+
+
+def plain(shape):
+    return {name: values for name, values in shape.items() if name in ("POSITION", "indices")}
+
+
+def test_a_file_without_normals_gets_the_vertex_normals_of_its_refined_surface():
+    result = primitive_of(refined([plain(octahedron())]))
+    surface = trimesh.Trimesh(result["POSITION"], result["indices"].reshape(-1, 3), process=False)
+    assert surface.is_watertight
+    np.testing.assert_allclose(result["NORMAL"], surface.vertex_normals, atol=1e-5)
+
+
+def test_without_the_option_a_file_without_normals_stays_without():
+    assert "NORMAL" not in primitive_of(refined([plain(octahedron())], normals="keep"))
+
+
+def test_hard_edges_of_the_file_are_softened():
+    flat = primitive_of(refined([flat_box()], normals="keep"))
+    smooth = primitive_of(refined([flat_box()]))
+    assert directions(flat) > 1
+    # One normal wherever the surface has one point.
+    assert directions(smooth) == 1
+
+
+def test_creases_part_the_normals_and_nothing_else_does():
+    creased = primitive_of(refined([flat_box()], crease="angle:30"))
+    # A box whose edges all are creases keeps its six flat sides.
+    np.testing.assert_allclose(np.abs(creased["NORMAL"]).max(axis=1), 1, atol=1e-6)
+    assert directions(creased) == 3
+
+
+def test_creases_by_the_files_own_normals_are_found_before_these_are_replaced():
+    by_normals = primitive_of(refined([flat_box()], crease="normals"))
+    by_angle = primitive_of(refined([flat_box()], crease="angle:30"))
+    for name in ("POSITION", "NORMAL"):
+        np.testing.assert_array_equal(by_normals[name], by_angle[name])
+
+
+def test_a_seam_between_primitives_is_smooth():
+    whole = plain(octahedron())
+    faces = np.asarray(whole["indices"]).reshape(-1, 3)
+    halves = [whole | {"indices": faces[:4]}, whole | {"indices": faces[4:]}]
+    glb_of_halves = refined(halves)
+    left, right = (primitive_of(glb_of_halves, primitive=number) for number in (0, 1))
+    together = {name: np.concatenate([left[name], right[name]]) for name in ("POSITION", "NORMAL")}
+    assert directions(together) == 1
+
+
+def test_a_face_and_its_back_have_opposite_normals():
+    shape = plain(octahedron())
+    faces = np.asarray(shape["indices"]).reshape(-1, 3)
+    both = shape | {"indices": np.concatenate([faces, faces[:, [0, 2, 1]]])}
+    result = primitive_of(refined([both]))
+    corners = result["POSITION"][result["indices"].reshape(-1, 3)]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    along = (result["NORMAL"][result["indices"].reshape(-1, 3)] * normal[:, None]).sum(axis=2)
+    assert (along > 0).all()
+
+
+def test_other_attributes_stay_with_their_corners():
+    rng = np.random.default_rng(0)
+    shape = box()
+    shape["TEXCOORD_0"] = rng.random((len(shape["POSITION"]), 2))
+    kept, smooth = (
+        primitive_of(refined([shape], normals=rule, crease="angle:30"))
+        for rule in ("keep", "smooth")
+    )
+    for name in ("POSITION", "TEXCOORD_0"):
+        kept_values, smooth_values = (
+            primitive[name][primitive["indices"].reshape(-1)] for primitive in (kept, smooth)
+        )
+        np.testing.assert_array_equal(kept_values, smooth_values)
+
+
+def test_normals_of_the_limit_are_those_that_ever_deeper_levels_approach():
+    exact = primitive_of(refined([plain(octahedron())], limit=True, normals="limit"))
+    rough = primitive_of(refined([plain(octahedron())], limit=True))
+    deep = primitive_of(refined([plain(octahedron())], levels=6, limit=True))
+    # On the limit surface the vertices of level 2 are among those of level 6, in the same places.
+    distance, which = cKDTree(deep["POSITION"]).query(exact["POSITION"])
+    assert distance.max() < 1e-6
+    apart = [
+        np.linalg.norm(primitive["NORMAL"] - deep["NORMAL"][which], axis=1).max()
+        for primitive in (exact, rough)
+    ]
+    assert apart[0] < 2e-3 < apart[1]
+
+
+def test_a_crease_keeps_a_normal_for_each_side_on_the_limit_too():
+    creased = primitive_of(refined([flat_box()], crease="angle:30", limit=True, normals="limit"))
+    np.testing.assert_allclose(np.abs(creased["NORMAL"]).max(axis=1), 1, atol=1e-6)
+
+
+def flat_box():
+    """A box of 24 vertices with the normals of its sides."""
+    solid = trimesh.creation.box()
+    points = solid.triangles.reshape(-1, 3)
+    return {
+        "POSITION": points,
+        "NORMAL": np.repeat(solid.face_normals, 3, axis=0),
+        "indices": np.arange(len(points)),
+    }
+
+
+def directions(primitive):
+    """How many different normals the richest place has."""
+    places = np.round(primitive["POSITION"], 6) + 0.0
+    _, which = np.unique(places, axis=0, return_inverse=True)
+    normals = np.round(primitive["NORMAL"], 4) + 0.0
+    pairs = np.unique(np.column_stack([which.reshape(-1), normals]), axis=0)
+    return int(np.bincount(pairs[:, 0].astype(int)).max())

@@ -1,0 +1,217 @@
+"""Small meshes of a file are refined together, and come out as if each had been alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pns_common import load_model
+from pns_common.linear import LinearRefinement
+from service.course import Course
+from service.gltf.read.plan import MeshPlan
+from service.gltf.refine import meshes, together
+from service.gltf.subdivide import Subdivided, subdivide_gltf
+from service.options import Limits, Options
+from tests.support.gltf import files
+from tests.support.gltf.shapes import box, octahedron
+
+MODEL = load_model("paper")
+OPTIONS = [
+    {},
+    {"levels": 2},
+    {"levels": 3, "scheme": "loop"},
+    {"diagnostics": "full"},
+    {"uv": "smooth"},
+    {"crease": "normals", "levels": 2},
+    {"crease": "angle:30"},
+    {"reference_length": 1.0},
+    {"compress": "meshopt"},
+    {"normals": "smooth"},
+    {"limit": True},
+    {"weld_tolerance": 0.001},
+]
+MORE_OPTIONS = [
+    {"limit": True, "normals": "limit", "levels": 2},
+    {"normals": "smooth", "crease": "angle:40", "levels": 2},
+    {"weld_tolerance": 0.01, "reference_length": 0.5, "normals": "smooth"},
+    {"limit": True, "crease": "normals", "uv": "smooth", "levels": 3},
+    {"diagnostics": "full", "compress": "meshopt", "levels": 2},
+]
+
+
+def scene() -> bytes:
+    """Meshes of two kinds with copies, degenerate and turned faces, and some that go alone."""
+    rng = np.random.default_rng(3)
+    shapes = []
+    for number in range(24):
+        shape = dict(box() if number % 3 else octahedron())
+        scaled = np.asarray(shape["POSITION"]) * rng.uniform(0.1, 4, 3) + rng.normal(size=3)
+        shape["POSITION"] = scaled.astype(np.float32)
+        if number % 4 == 0:
+            faces = np.asarray(shape["indices"]).reshape(-1, 3)
+            more = [faces, faces[:2], [[0, 0, 1]], faces[2:3, ::-1]]
+            shape["indices"] = np.concatenate(more)
+        shapes.append([shape])
+    shapes.insert(7, [box(), octahedron()])
+    shapes.insert(9, [{"POSITION": np.zeros((3, 3), np.float32), "indices": np.arange(3)}])
+    return files.pack(*files.document(*shapes))
+
+
+def refine(data: bytes, **options: object) -> Subdivided:
+    return subdivide_gltf(data, "glb", Options(**options), MODEL, Limits())
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=str)
+def test_together_is_as_alone_to_the_last_byte(
+    options: dict[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = scene()
+    made = refine(data, **options)
+    monkeypatch.setattr(meshes, "MOST_FACES", -1)
+    alone = refine(data, **options)
+    assert made.report == alone.report
+    assert made.glb == alone.glb
+
+
+def random_mesh(rng: np.random.Generator, kind: int) -> list[dict[str, object]]:
+    """Primitives of one of 16 kinds: skins, morph targets, normals, two pieces of one surface."""
+    skinned, morphed, shaded, parted = (bool(kind >> bit & 1) for bit in range(4))
+    whole = dict(box() if shaded else octahedron())
+    rows = len(whole["POSITION"])
+    moved = np.asarray(whole["POSITION"]) * rng.uniform(0.2, 3, 3)
+    # On a grid of a thousandth: some are near each other, none nearer than weld_tolerance joins.
+    whole["POSITION"] = (moved + rng.choice([0, 1e-4], (rows, 3))).astype(np.float32)
+    whole["COLOR_0"] = files.Normalized(rng.integers(0, 255, (rows, 4)).astype(np.uint8))
+    whole["_ID"] = rng.integers(0, 9, (rows, 1)).astype(np.uint8)
+    place = np.unique(moved.round(3), axis=0, return_inverse=True)[1].reshape(-1)
+    if skinned:
+        joints = rng.integers(0, rng.choice([2, 30]), (rows, 4)).astype(np.uint8)
+        weights = rng.random((rows, 4)) * rng.integers(0, 2, (rows, 4))
+        weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-9)
+        whole["JOINTS_0"], whole["WEIGHTS_0"] = joints[place], weights[place].astype(np.float32)
+    if morphed:
+        delta = rng.normal(size=(2, rows, 3)).astype(np.float32)[:, place]
+        whole["targets"] = [{"POSITION": delta[0]}, {"POSITION": delta[1]}]
+        if shaded:
+            whole["targets"][1]["NORMAL"] = delta[0]
+    faces = np.asarray(whole["indices"]).reshape(-1, 3)
+    extra = [faces[:1, ::-1], [[0, 0, 1]]] if rng.random() < 0.3 else []
+    if rng.random() < 0.1:
+        faces, extra = faces[:1].repeat(3, axis=1)[:, :3], []
+    pieces = [np.concatenate([faces[:5], *extra]), faces[5:]] if parted else [faces]
+    return [whole | {"indices": piece} for piece in pieces if len(piece)]
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    kinds=st.lists(st.integers(0, 15), min_size=1, max_size=3),
+    asked=st.sampled_from(OPTIONS + MORE_OPTIONS),
+)
+@settings(max_examples=40, deadline=None)
+def test_skins_targets_and_pieces_together_are_as_alone(
+    seed: int, kinds: list[int], asked: dict[str, object]
+) -> None:
+    rng = np.random.default_rng(seed)
+    data = files.glb(*(random_mesh(rng, kinds[n % len(kinds)]) for n in range(3 * len(kinds))))
+    made = refine(data, **asked)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(meshes, "MOST_FACES", -1)
+        alone = refine(data, **asked)
+    assert made.report == alone.report
+    assert made.glb == alone.glb
+
+
+@pytest.mark.parametrize(
+    "asked", [{}, {"limit": True}, {"normals": "smooth"}, {"weld_tolerance": 0.001}], ids=str
+)
+def test_no_small_mesh_goes_alone(
+    asked: dict[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("a mesh was refined alone")
+
+    monkeypatch.setattr(meshes, "_alone", refuse)
+    rng = np.random.default_rng(0)
+    shapes = [random_mesh(rng, number % 16) for number in range(64)]
+    # Those that have no face to keep are not refined at all.
+    whole = [shape for shape in shapes if sum(len(piece["indices"]) for piece in shape) > 4]
+    assert len(whole) > 48
+    assert refine(files.glb(*whole), **asked).report["totals"]["meshes"] == len(whole)
+
+
+def test_joints_of_one_mesh_do_not_wait_for_those_of_another() -> None:
+    rng = np.random.default_rng(1)
+    shapes = []
+    for number in range(40):
+        shape = octahedron()
+        shape["JOINTS_0"] = (np.arange(24).reshape(6, 4) % 4 + 4 * number).astype(np.uint8)
+        shape["WEIGHTS_0"] = rng.random((6, 4)).astype(np.float32)
+        shapes.append([shape])
+    columns: list[int] = []
+    with pytest.MonkeyPatch.context() as patch:
+        linear = LinearRefinement.__call__
+        patch.setattr(
+            LinearRefinement,
+            "__call__",
+            lambda self, block: columns.append(block.shape[1]) or linear(self, block),
+        )
+        assert refine(files.glb(*shapes)).report["totals"]["meshes"] == 40
+    assert columns == [4]
+
+
+def test_one_mesh_without_a_face_does_not_send_the_others_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    alone: list[int] = []
+    original = meshes._alone
+
+    def counted(plan: MeshPlan, *rest: object) -> object:
+        alone.append(plan.mesh)
+        return original(plan, *rest)
+
+    monkeypatch.setattr(meshes, "_alone", counted)
+    flat = octahedron(indices=np.array([[0, 0, 1]] * 8))
+    point = octahedron() | {"POSITION": np.zeros((6, 3)) + 2, "targets": [spread()]}
+    plain = octahedron(targets=[spread()])
+    made = refine(files.glb([plain], [plain], [point], [plain], [octahedron()], [flat]))
+    assert made.report["totals"]["meshes"] == 5
+    assert alone == [2, 5]
+
+
+def spread() -> dict[str, np.ndarray]:
+    """A morph target that moves each vertex of an octahedron its own way."""
+    return {"POSITION": octahedron()["POSITION"].astype(np.float32)}
+
+
+def test_a_scene_of_small_meshes_is_a_handful_of_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    groups: list[int] = []
+
+    def counted(meshes: list[object], *rest: object) -> object:
+        groups.append(len(meshes))
+        return together.refine_together(meshes, *rest)
+
+    monkeypatch.setattr(meshes, "refine_together", counted)
+    data = files.pack(*files.document(*([[octahedron()]] * 300)))
+    assert refine(data).report["totals"]["meshes"] == 300
+    assert groups == [300]
+
+
+def test_a_mesh_that_cannot_be_refined_is_named_among_others() -> None:
+    far = octahedron() | {"POSITION": octahedron()["POSITION"] * np.float32(3e38)}
+    data = files.pack(*files.document([octahedron()], [far], [octahedron()]))
+    with pytest.raises(Exception, match="float32") as refusal:
+        refine(data, budget=1e6)
+    assert getattr(refusal.value, "pointer", None) == "/meshes/1"
+
+
+def test_progress_goes_on_through_groups() -> None:
+    shapes = [[octahedron()]] * 5 + [[box()]] + [[octahedron()]] * 5
+    told: list[float] = []
+    options = Options(levels=6)
+    data = files.pack(*files.document(*shapes))
+    subdivide_gltf(data, "glb", options, MODEL, Limits(), Course(moves=told.append))
+    assert told == sorted(told)
+    assert told[-1] == pytest.approx(1)
+    assert len(told) > 5

@@ -1,0 +1,299 @@
+"""What stays as it was, what is told, and how far the work has come."""
+
+import json
+
+import numpy as np
+import pytest
+
+from service.course import Course
+from service.gltf.subdivide import subdivide_gltf
+from service.meshfiles.example import part_glb
+from service.options import Limits, Options
+from service.workers.progress import STAGES
+from tests.service.gltf.subdivided import corner_positions, subdivide
+from tests.support.gltf import files, validator
+from tests.support.gltf.shapes import box, octahedron
+
+
+def test_vertices_that_no_refined_face_uses_are_counted_once():
+    # Two primitives share the positions; neither uses the last two, one of which is degenerate.
+    shape = octahedron()
+    shape["POSITION"] = np.concatenate([shape["POSITION"], [[7, 7, 7], [8, 8, 8]]])
+    tree, binary = files.document(
+        [
+            shape | {"indices": shape["indices"][:3]},
+            shape | {"indices": np.concatenate([shape["indices"][3:], [[0, 7, 7]]])},
+        ]
+    )
+    first, second = tree["meshes"][0]["primitives"]
+    apart = subdivide(data=files.pack(tree, binary)).report
+    assert apart["dropped"]["vertices"] == 2 * 8 - 5 - 6
+    second["attributes"] = first["attributes"]
+    shared = subdivide(data=files.pack(tree, binary)).report
+    assert shared["dropped"]["vertices"] == 2
+    # What points still show is not lost.
+    tree["meshes"].append({"primitives": [{"attributes": first["attributes"], "mode": 0}]})
+    assert subdivide(data=files.pack(tree, binary)).report["dropped"]["vertices"] == 0
+
+
+def test_a_mesh_without_a_length_is_counted():
+    # Morph targets keep the three vertices apart, which lie in one place.
+    moved = {"POSITION": np.eye(3), "indices": np.array([[0, 1, 2]])}
+    point = {**moved, "POSITION": np.zeros((3, 3)), "targets": [{"POSITION": np.eye(3)}]}
+    totals = subdivide([point], [moved], scheme="pns").report["totals"]
+    assert totals["zero_reference_lengths"] == 1
+
+
+def test_degenerate_faces_are_dropped_and_reported():
+    shape = octahedron()
+    shape["indices"] = np.concatenate([[[0, 0, 2]], shape["indices"], [[3, 1, 3]]])
+    result = subdivide([shape, octahedron(indices=np.array([[4, 5, 5]]))])
+    assert result.report["totals"]["faces"] == 32
+    dropped = {"degenerate_faces": 3, "duplicate_faces": 0, "vertices": 0}
+    assert result.report["dropped"] == dropped
+    assert result.report["changes"] == [
+        {"pointer": "/meshes/0/primitives/0", "what": "degenerate faces dropped", "count": 2},
+        {
+            "pointer": "/meshes/0/primitives/1",
+            "what": "left as it was: no face has an area",
+            "count": 1,
+        },
+    ]
+    before, after = files.unpack(files.glb([shape, shape]))[0], files.unpack(result.glb)[0]
+    assert after["meshes"][0]["primitives"][1].keys() == before["meshes"][0]["primitives"][1].keys()
+    np.testing.assert_array_equal(
+        corner_positions(result.glb), corner_positions(subdivide([octahedron()]).glb)
+    )
+
+
+@pytest.mark.parametrize("diagnostics", ["summary", "full"])
+def test_a_mesh_without_any_area_stays_as_it_was(diagnostics):
+    points = {"POSITION": np.zeros((3, 3)), "indices": np.array([[0, 1, 2]])}
+    result = subdivide([points], [octahedron()], scheme="pns", diagnostics=diagnostics)
+    report = result.report["meshes"][0]
+    assert (report["levels"], report["degenerate_faces"]) == ([], 1)
+    before, after = (
+        files.unpack(files.glb([points], [octahedron()]))[0],
+        files.unpack(result.glb)[0],
+    )
+    assert after["meshes"][0] == before["meshes"][0]
+    alone = subdivide([points], scheme="pns")
+    assert alone.report["levels"] == []
+    assert alone.report["totals"]["faces"] == 0
+
+
+def test_a_needle_of_coincident_points_keeps_its_report_finite():
+    # Faces with three different vertices on a line: no area, but nothing to drop.
+    line = {"POSITION": np.outer(np.arange(3.0), [1, 0, 0]), "indices": np.array([[0, 1, 2]])}
+    report = subdivide([line], scheme="pns", levels=2).report
+    assert json.loads(json.dumps(report, allow_nan=False)) == report
+
+
+@pytest.mark.parametrize("levels", [1, 2])
+@pytest.mark.parametrize("roll", [0, 1, 2])
+@pytest.mark.parametrize("flip", [False, True])
+def test_copies_of_faces_follow_the_faces_that_they_copy(levels, roll, flip):
+    shape = octahedron()
+    copies = np.roll(shape["indices"][:, ::-1] if flip else shape["indices"], roll, axis=1)
+    single = subdivide([shape], levels=levels)
+    double = subdivide([shape, octahedron(indices=copies)], levels=levels)
+    original = corner_positions(double.glb, primitive=0)
+    np.testing.assert_array_equal(original, corner_positions(single.glb))
+    followed = corner_positions(double.glb, primitive=1)
+    # The same triangles, each block of descendants with the copy's own order of corners.
+    for ours, theirs in zip(
+        followed.reshape(8, -1, 3, 3), original.reshape(8, -1, 3, 3), strict=True
+    ):
+        assert {frozenset(map(tuple, t)) for t in ours.tolist()} == {
+            frozenset(map(tuple, t)) for t in theirs.tolist()
+        }
+    # Each keeps the side that it shows.
+    side = np.einsum("fi,fi->f", areas(followed), followed.mean(axis=1))
+    assert (side < 0 if flip else side > 0).all()
+    assert double.report["totals"]["copied_faces"] == 8
+    assert double.report["levels"][-1]["edges"]["irregular"] == 0
+
+
+def areas(triangles):
+    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+
+
+def test_points_and_lines_stay_untouched():
+    lines = {"POSITION": np.eye(3), "mode": 3}
+    before = files.glb([lines, octahedron(), {"POSITION": np.eye(3), "mode": 0}])
+    tree, _ = files.unpack(subdivide(data=before).glb)
+    old, _ = files.unpack(before)
+    for number in (0, 2):
+        primitive = tree["meshes"][0]["primitives"][number]
+        assert primitive == old["meshes"][0]["primitives"][number]
+
+
+def test_instances_of_a_mesh_are_refined_once():
+    tree, binary = files.document([octahedron()])
+    tree["nodes"] = [{"mesh": 0}, {"mesh": 0, "translation": [3, 0, 0]}]
+    tree["scenes"] = [{"nodes": [0, 1]}]
+    result = subdivide(data=files.pack(tree, binary))
+    assert result.report["totals"]["faces"] == 32
+    assert result.report["meshes"][0]["instances"] == 2
+    assert files.unpack(result.glb)[0]["nodes"] == tree["nodes"]
+
+
+def test_everything_that_is_no_geometry_stays():
+    tree, binary = files.document([box(), octahedron()])
+    tree |= {
+        "extensionsUsed": ["EXT_unknown"],
+        "extensions": {"EXT_unknown": {"deep": [1, 2.5, None, {"é": "\u2028"}]}},
+        "extras": "anything",
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}],
+    }
+    tree["asset"]["extras"] = {"author": "me", "pns": "old"}
+    tree["meshes"][0]["primitives"][1]["extras"] = {"keep": [1]}
+    data = files.pack(tree, binary, [(b"XTRA", b"chunk")])
+    result = subdivide(data=data)
+    after, new_binary = files.unpack(result.glb)
+    assert new_binary[: len(binary)] == binary
+    assert result.glb.endswith(files.chunk(b"XTRA", b"chunk", b"\0"))
+    for key in ("extensionsUsed", "extensions", "extras", "cameras", "nodes", "scenes", "scene"):
+        assert after[key] == tree[key]
+    assert after["meshes"][0]["primitives"][1]["extras"] == {"keep": [1]}
+    assert after["asset"]["extras"]["author"] == "me"
+    assert after["asset"]["extras"]["pns"] == result.report
+
+
+def test_extras_that_are_no_object_move_and_are_reported():
+    tree, binary = files.document([octahedron()])
+    tree["asset"]["extras"] = ["a", "list"]
+    result = subdivide(data=files.pack(tree, binary))
+    extras = files.unpack(result.glb)[0]["asset"]["extras"]
+    assert extras == {"extras": ["a", "list"], "pns": result.report}
+    assert result.report["changes"] == [
+        {"pointer": "/asset/extras", "what": "moved to /asset/extras/extras", "count": 1}
+    ]
+
+
+def test_without_diagnostics_the_file_has_no_report():
+    result = subdivide([octahedron()], diagnostics="none")
+    assert "extras" not in files.unpack(result.glb)[0]["asset"]
+    assert result.report["totals"]["faces"] == 32
+
+
+def test_full_diagnostics_add_ratio_and_gate():
+    result = subdivide([octahedron()], scheme="pns", diagnostics="full")
+    faces, attributes = files.primitive_of(result.glb)
+    for name in ("_PNS_RATIO", "_PNS_GATE"):
+        values = attributes[name]
+        assert values.shape == (len(attributes["POSITION"]), 1)
+        assert values.dtype == np.float32
+        # Zero at old vertices: the first corner of each corner child.
+        old = faces.reshape(-1, 4, 3)[:, :3, 0]
+        assert (values[old] == 0).all()
+        assert 0 < values.max() <= 1
+    level = result.report["levels"][0]
+    assert attributes["_PNS_RATIO"].max() == np.float32(level["proximity_ratio"]["max"])
+    assert set(files.primitive_of(subdivide([octahedron()], scheme="pns").glb)[1]) == {"POSITION"}
+
+
+def test_many_vertices_get_wide_indices():
+    # 105 × 105 quads at level 1: 211² = 44,521 vertices; at level 2: 421² = 177,241.
+    n = 106
+    x, y = np.meshgrid(np.arange(float(n)), np.arange(n), indexing="ij")
+    points = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
+    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1, 1)
+    faces = np.concatenate([np.add(corner, [0, n, 1]), np.add(corner, [1, n, n + 1])])
+    for levels, component in ((1, 5123), (2, 5125)):
+        glb = subdivide([{"POSITION": points, "indices": faces}], levels=levels).glb
+        tree, _ = files.unpack(glb)
+        primitive = tree["meshes"][0]["primitives"][0]
+        assert tree["accessors"][primitive["indices"]]["componentType"] == component
+
+
+def test_positions_carry_their_exact_bounds():
+    glb = subdivide([octahedron()], [box()], scheme="pns").glb
+    tree, _ = files.unpack(glb)
+    for mesh in (0, 1):
+        index = tree["meshes"][mesh]["primitives"][0]["attributes"]["POSITION"]
+        points = files.primitive_of(glb, mesh)[1]["POSITION"]
+        assert tree["accessors"][index]["min"] == points.min(axis=0).tolist()
+        assert tree["accessors"][index]["max"] == points.max(axis=0).tolist()
+
+
+def test_totals_are_taken_over_meshes():
+    meshes = [[octahedron()], [box()], [{"POSITION": np.eye(3), "mode": 0}]]
+    report = subdivide(*meshes, scheme="pns", levels=2).report
+    assert [mesh["index"] for mesh in report["meshes"]] == [0, 1]
+    for level in range(2):
+        parts = [mesh["levels"][level] for mesh in report["meshes"]]
+        total = report["levels"][level]
+        for key in ("vertices", "faces", "degenerate_frames", "flipped_faces"):
+            assert total[key] == sum(part[key] for part in parts)
+        assert total["gate"]["max"] == max(part["gate"]["max"] for part in parts)
+        weights = [part["edges"]["interior"] for part in parts]
+        means = [part["proximity_ratio"]["mean"] for part in parts]
+        assert total["proximity_ratio"]["mean"] == pytest.approx(np.average(means, weights=weights))
+    assert (report["scheme"], report["budget"], report["model"]) == ("pns", 0.5, "random")
+    assert len(report["model_hash"]) == 64
+
+
+@pytest.mark.parametrize("together", [True, False])
+@pytest.mark.parametrize("compress", ["none", "draco", "meshopt"])
+def test_the_share_moves_through_every_stage_and_reaches_its_end(together, compress, monkeypatch):
+    if not together:
+        monkeypatch.setattr("service.gltf.refine.meshes.MOST_FACES", 0)
+    shares, stages = [], []
+    course = Course(begins=lambda stage: stages.append((stage, shares[-1])), moves=shares.append)
+    shares.append(0.0)
+    options = Options(scheme="loop", levels=2, compress=compress)
+    data = files.glb([octahedron()], [box()])
+    seen = subdivide_gltf(data, "glb", options, None, Limits(), course)
+    assert seen.glb == subdivide_gltf(data, "glb", options, None, Limits()).glb
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1)
+    # Each stage begins further on than the one before.
+    assert stages == sorted(stages, key=lambda stage: stage[1])
+    assert {stage for stage, _ in stages} == set(STAGES) == set(seen.timings)
+
+
+def test_the_share_moves_inside_the_long_stages():
+    """Where one mesh is all there is, what is told between the stages' ends is inside them."""
+    shares, begun = [0.0], []
+    course = Course(begins=lambda stage: begun.append((stage, len(shares))), moves=shares.append)
+    options = Options(scheme="loop", levels=5)
+    subdivide_gltf(part_glb(), "glb", options, None, Limits(), course)
+    ends = [at for _, at in begun[1:]] + [len(shares)]
+    moved = {
+        stage: len(set(shares[start:end])) for (stage, start), end in zip(begun, ends, strict=True)
+    }
+    assert moved["refine"] > 20
+    assert moved["attributes"] > 20
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_what_the_course_raises_ends_the_work(stage):
+    class Enough(Exception):  # noqa: N818
+        pass
+
+    def begins(name):
+        if name == stage:
+            raise Enough
+
+    with pytest.raises(Enough):
+        subdivide_gltf(
+            files.glb([box()]), "glb", Options(scheme="loop"), None, Limits(), Course(begins)
+        )
+
+
+def test_validator_accepts_every_kind_of_attribute(tmp_path):
+    rng = np.random.default_rng(0)
+    shape = box(
+        COLOR_0=files.Normalized(rng.integers(0, 256, (24, 3), dtype=np.uint8)),
+        COLOR_1=rng.random((24, 4)),
+        TEXCOORD_1=files.Normalized(rng.integers(0, 65536, (24, 2), dtype=np.uint16)),
+        _FEATURE_ID_0=rng.integers(0, 9, (24, 1), dtype=np.uint8),
+        _HEAT=rng.random((24, 1)),
+    )
+    path = tmp_path / "refined.glb"
+    for levels in (1, 2):
+        path.write_bytes(
+            subdivide([shape, octahedron()], levels=levels, scheme="pns", diagnostics="full").glb
+        )
+        assert validator.errors([path]) == [[]]

@@ -1,0 +1,133 @@
+"""Compressed output: it decodes, by other paths than it was made, to what plain output holds."""
+
+import DracoPy
+import numpy as np
+import pytest
+
+from service.gltf.subdivide import subdivide_gltf
+from service.gltf.write.draco_encode import NORMAL_BITS, POSITION_BITS
+from service.options import Limits, Options
+from tests.support.gltf import files, validator
+from tests.support.gltf.shapes import box, octahedron
+
+KINDS = ["draco", "meshopt"]
+NAMES = {"draco": "KHR_draco_mesh_compression", "meshopt": "EXT_meshopt_compression"}
+
+
+SAYS = {"draco": "compressed by Draco", "meshopt": "compressed by meshopt, exactly"}
+
+
+def refine(data, compress="none", levels=2):
+    options = Options(levels=levels, scheme="loop", compress=compress)
+    return subdivide_gltf(data, "glb", options, None, Limits())
+
+
+def sample():
+    """Two meshes of two materials, with every kind of attribute."""
+    colours = np.random.default_rng(0).integers(0, 255, (24, 4), dtype=np.uint8)
+    return files.glb(
+        [box(COLOR_0=files.Normalized(colours)), octahedron()],
+        [box(_ID=np.arange(24, dtype=np.uint16).reshape(-1, 1))],
+    )
+
+
+def triangles(data, mesh, primitive):
+    """By attribute the values at all corners, in an order that numbering does not change."""
+    faces, attributes = files.primitive_of(data, mesh, primitive)
+    position = attributes["POSITION"][faces]
+    key = np.round(position.reshape(len(faces), 9) * 64)
+    key = np.sort(key.reshape(-1, 3, 3).sum(axis=2), axis=1)
+    centre = np.round(position.mean(axis=1) * 256)
+    order = np.lexsort((*key.T, *centre.T))
+    return {name: values[faces][order] for name, values in attributes.items()}
+
+
+def read_back(data):
+    """The same file through the reader: level 1 of what it decodes to."""
+    return refine(data, levels=1)
+
+
+@pytest.mark.parametrize("compress", KINDS)
+def test_compressed_output_is_smaller_and_declared(compress):
+    plain, packed = refine(sample()), refine(sample(), compress)
+    assert len(packed.glb) < len(plain.glb)
+    tree, _ = files.unpack(packed.glb)
+    assert tree["extensionsUsed"] == tree["extensionsRequired"] == [NAMES[compress]]
+    whats = [change["what"] for change in packed.report["changes"]]
+    assert any(what.startswith(SAYS[compress]) for what in whats)
+
+
+@pytest.mark.parametrize("compress", KINDS)
+def test_refining_compressed_output_is_refining_plain_output(compress):
+    plain, packed = (read_back(refine(sample(), kind).glb) for kind in ("none", compress))
+    tree, _ = files.unpack(packed.glb)
+    assert "extensionsUsed" not in tree
+    exact = compress == "meshopt"
+    for mesh, primitive in [(0, 0), (0, 1), (1, 0)]:
+        wanted, unpacked = (triangles(r.glb, mesh, primitive) for r in (plain, packed))
+        assert wanted.keys() == unpacked.keys()
+        step = 2 / (2**POSITION_BITS - 1)
+        np.testing.assert_allclose(
+            np.sort(unpacked["POSITION"].reshape(-1, 3), axis=0),
+            np.sort(wanted["POSITION"].reshape(-1, 3), axis=0),
+            atol=1e-6 if exact else step,
+        )
+        for name in {"_ID", "COLOR_0"} & wanted.keys():
+            assert unpacked[name].dtype == wanted[name].dtype
+
+
+def test_draco_rounds_no_more_than_it_says():
+    # One level of nothing: the stored positions themselves, decoded by the reader.
+    shape = box()
+    packed = refine(files.glb([shape]), "draco", levels=1)
+    plain = refine(files.glb([shape]), levels=1)
+    tree, binary = files.unpack(packed.glb)
+    extension = tree["meshes"][0]["primitives"][0]["extensions"][NAMES["draco"]]
+    view = tree["bufferViews"][extension["bufferView"]]
+    mesh = DracoPy.decode(bytes(binary[view["byteOffset"] :][: view["byteLength"]]))
+    parts = {part["unique_id"]: part["data"] for part in mesh.attributes}
+    _, attributes = files.primitive_of(plain.glb)
+    extent = np.ptp(attributes["POSITION"], axis=0).max()
+    stored = parts[extension["attributes"]["POSITION"]]
+    nearest = np.abs(stored[:, None] - attributes["POSITION"]).max(axis=2).min(axis=1)
+    assert nearest.max() <= 0.51 * extent / (2**POSITION_BITS - 1)
+    lengths = np.linalg.norm(parts[extension["attributes"]["NORMAL"]], axis=1)
+    np.testing.assert_allclose(lengths, 1, atol=2.0**-NORMAL_BITS)
+
+
+def test_seams_between_primitives_do_not_open_on_dracos_grid():
+    # A sheet cut in two: the halves have different extents, and one grid.
+    x, y = np.meshgrid(np.linspace(0, 1, 9) ** 2, np.linspace(0, 0.7, 5), indexing="ij")
+    points = np.stack([x.reshape(-1), y.reshape(-1), np.sin(3 * x.reshape(-1))], axis=1)
+    corner = (np.arange(8)[:, None] * 5 + np.arange(4)).reshape(-1, 1)
+    faces = np.concatenate([np.add(corner, [0, 5, 1]), np.add(corner, [1, 5, 6])])
+    left = (faces < 20).any(axis=1)
+    halves = [{"POSITION": points, "indices": faces[side]} for side in (left, ~left)]
+    again = read_back(refine(files.glb(halves), "draco").glb)
+    whole = read_back(refine(files.glb(halves)).glb)
+    for report in (again.report, whole.report):
+        assert report["levels"][0]["edges"]["irregular"] == 0
+    assert again.report["levels"][0]["edges"] == whole.report["levels"][0]["edges"]
+
+
+def test_morph_targets_stay_uncompressed_under_draco_and_are_named():
+    tree, binary = files.document([octahedron()])
+    target = files.add_accessor(tree, binary, np.ones((6, 3)))
+    tree["buffers"] = [{"byteLength": len(binary)}]
+    tree["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": target}]
+    result = refine(files.pack(tree, binary), "draco")
+    after, _ = files.unpack(result.glb)
+    assert "extensions" not in after["meshes"][0]["primitives"][0]
+    assert "extensionsUsed" not in after
+    assert {
+        "pointer": "/meshes/0/primitives/0",
+        "what": "not compressed: Draco cannot hold it",
+        "count": 1,
+    } in result.report["changes"]
+
+
+def test_validator_finds_no_error_in_compressed_output(tmp_path):
+    paths = [tmp_path / f"{compress}.glb" for compress in KINDS]
+    for path, compress in zip(paths, KINDS, strict=True):
+        path.write_bytes(refine(sample(), compress).glb)
+    assert validator.errors(paths) == [[], []]

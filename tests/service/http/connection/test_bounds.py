@@ -1,0 +1,306 @@
+"""A connection takes bounded bytes, pieces and time, whatever is asked on it; over real sockets.
+
+Nothing here measures time: a test waits for the server's answer or its end, and each socket gives
+up after `PATIENCE` where neither comes.
+"""
+
+import http.client
+import itertools
+import json
+import socket
+import time
+from contextlib import ExitStack, closing
+
+import pytest
+
+from service.http.connection import protocol
+from service.http.connection.parser import FREE_PIECES
+from tests.support.live import served
+
+PATIENCE = 30
+MIB = 2**20
+HEAD = "{} {} HTTP/1.1\r\nHost: test\r\nContent-Type: model/gltf-binary\r\n{}\r\n"
+CHUNKED = "Transfer-Encoding: chunked\r\n"
+
+
+@pytest.fixture(scope="module")
+def address():
+    """A server with the usual times, and small bodies."""
+    with served(workers=1, body=MIB) as where:
+        yield where
+
+
+@pytest.fixture(scope="module")
+def hasty():
+    """A server that waits for nobody."""
+    hurry = {"head_seconds": 0.5, "keep_alive_seconds": 0.5, "linger_seconds": 0.5}
+    with served(workers=1, rate=64 * MIB, grace_seconds=0.5, **hurry) as where:
+        yield where
+
+
+def connect(address, *, source=None):
+    return socket.create_connection(address, timeout=PATIENCE, source_address=source)
+
+
+def head(method, path, more=""):
+    return HEAD.format(method, path, more).encode()
+
+
+def received(connection):
+    """All that the server sends before it ends the connection."""
+    pieces = []
+    try:
+        while piece := connection.recv(2**16):
+            pieces.append(piece)
+    except ConnectionResetError:
+        pass
+    return b"".join(pieces)
+
+
+def status(answer):
+    return int(answer.split(maxsplit=2)[1])
+
+
+def problem(answer):
+    return json.loads(answer.partition(b"\r\n\r\n")[2])
+
+
+def trickle(connection, piece=b"x", *, most=PATIENCE / 0.05):
+    """Send a piece now and then, until the server ends the connection; return what it said."""
+    connection.settimeout(0.05)
+    said = b""
+    for _ in range(int(most)):
+        try:
+            connection.sendall(piece)
+            if not (got := connection.recv(2**16)):
+                return said
+            said += got
+        except TimeoutError:
+            continue
+        except OSError:
+            return said
+    pytest.fail("the connection does not end")
+
+
+UNREAD = [("GET", "/healthz", 200), ("POST", "/nothing", 404), ("POST", "/subdivide?levels=9", 422)]
+
+
+@pytest.mark.parametrize(("method", "path", "expected"), UNREAD)
+def test_a_body_that_no_route_reads_is_not_taken_without_end(address, method, path, expected):
+    chunk = b"10000\r\n" + bytes(2**16) + b"\r\n"
+    sent = 0
+    with connect(address) as connection:
+        connection.sendall(head(method, path, CHUNKED))
+        try:
+            for _ in range(16 * 64):
+                connection.sendall(chunk)
+                sent += len(chunk)
+        except OSError:
+            pass
+    # Twice the limit is listened to; the sockets' buffers hold some more.
+    assert sent <= 32 * MIB
+
+
+@pytest.mark.parametrize(("method", "path", "expected"), UNREAD)
+def test_a_body_that_no_route_reads_may_not_trickle(hasty, method, path, expected):
+    with connect(hasty) as connection:
+        connection.sendall(head(method, path, CHUNKED))
+        answer = trickle(connection, b"1\r\nx\r\n")
+    assert status(answer) == expected
+    assert b"\r\nconnection: close\r\n" in answer.lower()
+
+
+@pytest.mark.parametrize("size", [MIB + 1, 2 * MIB, 3 * MIB])
+def test_a_client_that_sends_first_and_reads_later_sees_its_413(address, size):
+    for _ in range(8):
+        with closing(http.client.HTTPConnection(*address, timeout=PATIENCE)) as connection:
+            connection.request("POST", "/subdivide", bytes(size))
+            answer = connection.getresponse()
+            assert answer.status == 413
+            assert json.loads(answer.read())["limit"] == "body"
+            assert answer.headers["connection"] == "close"
+
+
+def test_a_connection_whose_bodies_are_whole_is_kept(address):
+    with connect(address) as connection:
+        for _ in range(3):
+            # In one piece: where the body comes later than the answer, the connection ends.
+            connection.sendall(head("POST", "/nothing", "Content-Length: 5\r\n") + b"hello")
+            with http.client.HTTPResponse(connection) as answer:
+                answer.begin()
+                assert (answer.status, answer.headers["connection"]) == (404, None)
+                answer.read()
+
+
+def test_413_for_a_body_in_countless_pieces(address):
+    with connect(address) as connection:
+        connection.sendall(head("POST", "/subdivide", CHUNKED) + b"1\r\nx\r\n" * (4 * FREE_PIECES))
+        answer = received(connection)
+    assert status(answer) == 413
+    assert problem(answer)["limit"] == "pieces"
+
+
+def test_a_chunked_body_in_ordinary_pieces_is_taken(address):
+    pieces = [bytes([n]) * 1024 for n in range(250)]
+    with closing(http.client.HTTPConnection(*address, timeout=PATIENCE)) as connection:
+        headers = {"Content-Type": "model/gltf-binary"}
+        connection.request("POST", "/subdivide", iter(pieces), headers, encode_chunked=True)
+        answer = connection.getresponse()
+        assert answer.status == 200
+        assert answer.read() == b"".join(pieces)
+
+
+def test_many_small_chunks_within_the_limit_are_taken_whole(address):
+    body = bytes(itertools.islice(itertools.cycle(b"abc"), FREE_PIECES))
+    with connect(address) as connection:
+        chunks = b"".join(b"1\r\n%c\r\n" % byte for byte in body)
+        connection.sendall(head("POST", "/subdivide", CHUNKED) + chunks + b"0\r\n\r\n")
+        assert connection.recv(2**16).startswith(b"HTTP/1.1 200 ")
+
+
+def test_408_for_a_head_that_trickles(hasty):
+    with connect(hasty) as connection:
+        connection.sendall(b"GET /healthz HTTP/1.1\r\nX-")
+        answer = trickle(connection)
+    assert (status(answer), problem(answer)["code"]) == (408, "head-timeout")
+
+
+def test_a_connection_that_says_nothing_is_ended(hasty):
+    with connect(hasty) as connection:
+        assert received(connection) == b""
+
+
+def test_a_second_head_may_not_trickle_either(hasty):
+    with connect(hasty) as connection:
+        connection.sendall(head("GET", "/healthz"))
+        assert connection.recv(2**16).startswith(b"HTTP/1.1 200 ")
+        connection.sendall(b"GET /healthz HTTP/1.1\r\nX-")
+        answer = trickle(connection)
+    assert (status(answer), problem(answer)["code"]) == (408, "head-timeout")
+
+
+def test_a_second_head_may_not_trickle_behind_the_first(hasty):
+    with connect(hasty) as connection:
+        connection.sendall(head("GET", "/healthz") + b"GET /healthz HTTP/1.1\r\nX-")
+        answer = trickle(connection)
+    first, _, second = answer.partition(b'{"status":"ok"}')
+    assert (status(first), status(second)) == (200, 408)
+
+
+def test_408_for_an_upload_below_the_least_rate(hasty):
+    with connect(hasty) as connection:
+        connection.sendall(head("POST", "/subdivide", f"Content-Length: {2**20}\r\n"))
+        answer = trickle(connection, bytes(100))
+    assert status(answer) == 408
+    assert "slower than" in problem(answer)["detail"]
+
+
+def test_a_reader_below_the_least_rate_is_cut_off(hasty):
+    body = f"large {48 * MIB}".encode().ljust(100)
+    taken = 0
+    with connect(hasty) as connection:
+        connection.sendall(head("POST", "/subdivide", f"Content-Length: {len(body)}\r\n") + body)
+        connection.recv(1)
+        try:
+            # Never idle: it takes a little all the time.
+            while piece := connection.recv(2**14):
+                taken += len(piece)
+                time.sleep(0.02)
+        except ConnectionResetError:
+            pass
+    assert taken < 48 * MIB
+
+
+@pytest.mark.parametrize(
+    ("sent", "expected"),
+    [
+        (b"nonsense\r\n\r\n", 400),
+        (b"GET / HTTP/1.1\r\n\r\n", 400),
+        (b"GET / HTTP/1.1\r\nHost: a\r\nX: " + b"x" * 2**17, 431),
+        (b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: gzip\r\n\r\n", 501),
+    ],
+)
+def test_what_is_no_http_is_answered_with_a_problem(address, sent, expected):
+    with connect(address) as connection:
+        connection.sendall(sent)
+        answer = received(connection)
+    assert status(answer) == expected
+    assert problem(answer)["status"] == expected
+
+
+def test_a_body_that_stops_being_http_is_a_problem_too(address):
+    with connect(address) as connection:
+        connection.sendall(head("POST", "/subdivide", CHUNKED) + b"1\r\nx\r\nnonsense\r\n")
+        answer = received(connection)
+    assert (status(answer), problem(answer)["code"]) == (400, "invalid-http")
+
+
+def test_an_address_that_has_its_share_is_refused_and_others_are_not():
+    with served(workers=1, connections_of_address=3) as where, ExitStack() as opened:
+        for _ in range(3):
+            connection = opened.enter_context(connect(where))
+            connection.sendall(head("GET", "/healthz"))
+            assert connection.recv(2**16).startswith(b"HTTP/1.1 200 ")
+        answer = received(opened.enter_context(connect(where)))
+        assert (status(answer), problem(answer)["code"]) == (503, "too-many-connections")
+        other = opened.enter_context(connect(where, source=("127.0.0.2", 0)))
+        other.sendall(head("GET", "/healthz"))
+        assert other.recv(2**16).startswith(b"HTTP/1.1 200 ")
+
+
+def test_a_named_proxy_has_no_share():
+    with (
+        served(workers=1, connections_of_address=1, proxies="127.0.0.1") as where,
+        ExitStack() as opened,
+    ):
+        for _ in range(5):
+            connection = opened.enter_context(connect(where))
+            connection.sendall(head("GET", "/healthz"))
+            assert connection.recv(2**16).startswith(b"HTTP/1.1 200 ")
+
+
+def test_idle_connections_give_way_to_those_that_ask():
+    with served(workers=1, connections=8, head_seconds=60) as where, ExitStack() as opened:
+        idle = [opened.enter_context(connect(where)) for _ in range(30)]
+        for connection in idle[:4]:
+            # Some have begun to ask, and do not go on. The first are closed already.
+            try:
+                connection.sendall(b"GET ")
+            except OSError:
+                continue
+        late = opened.enter_context(connect(where))
+        late.sendall(head("GET", "/healthz"))
+        assert late.recv(2**16).startswith(b"HTTP/1.1 200 ")
+        assert received(idle[10]) == b""
+
+
+def test_a_client_that_only_sends_and_never_reads_is_let_go(hasty):
+    """More answers than the sockets hold: the connection ends, and the server serves others."""
+    with connect(hasty) as connection:
+        requests = head("GET", "/openapi.json") * 64
+        try:
+            while True:
+                connection.sendall(requests)
+        except OSError:
+            pass
+    with connect(hasty) as connection:
+        connection.sendall(head("GET", "/healthz"))
+        assert connection.recv(2**16).startswith(b"HTTP/1.1 200 ")
+
+
+def test_trickling_uploads_give_way_to_those_that_ask(monkeypatch):
+    monkeypatch.setattr(protocol, "RATE_SECONDS", 0.2)
+    with served(workers=1, connections=4) as where, ExitStack() as opened:
+        begun = head("POST", "/subdivide", "Content-Length: 1000\r\n")
+        trickling = [opened.enter_context(connect(where)) for _ in range(4)]
+        for connection in trickling:
+            connection.sendall(begun)
+        for _ in range(PATIENCE * 20):
+            late = opened.enter_context(connect(where))
+            late.sendall(head("GET", "/healthz", "Connection: close\r\n"))
+            answer = received(late)
+            # Too early to tell which is the slowest.
+            if not answer.startswith(b"HTTP/1.1 503 "):
+                break
+            time.sleep(0.05)
+        assert answer.startswith(b"HTTP/1.1 200 ")

@@ -1,0 +1,217 @@
+"""What the connection is made of, each part alone: pace, parser, turns, crowd."""
+
+import asyncio
+from dataclasses import dataclass
+from ipaddress import ip_network
+from math import inf
+
+import h11
+import pytest
+
+from service.http.addresses import is_named, site
+from service.http.connection.crowd import Crowd
+from service.http.connection.pace import Pace
+from service.http.connection.parser import BYTES_A_PIECE, FREE_PIECES, Parser
+from service.http.connection.turns import Turns
+
+PACE = Pace(rate=100, grace=10, idle=4, whole=60)
+CHUNKED = b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n"
+
+
+@pytest.mark.parametrize(
+    ("moved", "waited", "patience", "excuse"),
+    [
+        (0, 0, 4, "nothing for 4 seconds"),
+        (0, 8, 2, None),
+        (0, 10, 0, "slower than 100 bytes a second"),
+        (100, 10, 1, None),
+        (10_000, 59, 1, None),
+        (10_000, 60, 0, "not whole within 60 seconds"),
+    ],
+)
+def test_a_client_may_be_late_but_not_slow(moved, waited, patience, excuse):
+    assert PACE.patience(moved, waited) == patience
+    if excuse is not None:
+        assert PACE.excuse(moved, waited) == excuse
+
+
+def events(parser, most):
+    parser.breathe(most)
+    seen = []
+    while (event := parser.next_event()) is not h11.NEED_DATA:
+        seen.append(event)
+    return seen
+
+
+def test_a_read_full_of_small_chunks_is_parsed_in_turns():
+    parser = Parser(2**14)
+    parser.receive_data(CHUNKED + b"1\r\nx\r\n" * 100)
+    assert len(events(parser, 32)) == 32
+    assert parser.out_of_breath
+    assert len(events(parser, 1000)) == 69
+    assert not parser.out_of_breath
+
+
+def test_a_body_in_countless_pieces_is_a_flood():
+    parser = Parser(2**14)
+    parser.receive_data(CHUNKED + b"1\r\nx\r\n" * FREE_PIECES)
+    events(parser, 10**6)
+    assert not parser.flooded
+    parser.receive_data(b"1\r\nx\r\n" * 10)
+    assert len(events(parser, 10**6)) == 1
+    assert parser.flooded
+    assert parser.next_event() is h11.NEED_DATA
+
+
+def test_pieces_of_ordinary_size_are_no_flood():
+    parser = Parser(2**14)
+    parser.receive_data(CHUNKED)
+    for _ in range(4 * FREE_PIECES):
+        parser.receive_data(b"%x\r\n" % BYTES_A_PIECE + bytes(BYTES_A_PIECE) + b"\r\n")
+        events(parser, 10)
+    assert not parser.flooded
+
+
+def test_a_content_length_body_has_no_pieces():
+    parser = Parser(2**14)
+    parser.receive_data(b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 1000\r\n\r\n")
+    for _ in range(1000):
+        parser.receive_data(b"x")
+        events(parser, 10)
+    assert not parser.flooded
+
+
+def test_a_refusal_keeps_the_status_that_the_parser_gave():
+    parser = Parser(1000)
+    parser.receive_data(b"GET / HTTP/1.1\r\nX: " + b"x" * 2000)
+    with pytest.raises(h11.RemoteProtocolError):
+        events(parser, 10)
+    assert parser.status_hint == 431
+
+
+def test_each_turn_of_the_loop_takes_one_step():
+    async def run():
+        turns, order = Turns(), []
+        left = {"a": 3, "b": 2}
+
+        def step(name):
+            order.append(name)
+            left[name] -= 1
+            if left[name]:
+                turns.add(steps[name])
+
+        steps = {name: (lambda name=name: step(name)) for name in left}
+        turns.add(steps["a"])
+        turns.add(steps["a"])
+        turns.add(steps["b"])
+        for _ in range(10):
+            await asyncio.sleep(0)
+            order.append("|")
+        return "".join(order).strip("|")
+
+    assert asyncio.run(run()) == "a|b|a|b|a"
+
+
+def test_a_step_that_leaves_is_not_called():
+    async def run():
+        turns, called = Turns(), []
+        gone, kept = (lambda: called.append("gone")), (lambda: called.append("kept"))
+        turns.add(gone)
+        turns.add(kept)
+        turns.remove(gone)
+        for _ in range(4):
+            await asyncio.sleep(0)
+        turns.add(gone)
+        turns.remove(gone)
+        await asyncio.sleep(0)
+        return called
+
+    assert asyncio.run(run()) == ["kept"]
+
+
+@pytest.mark.parametrize(
+    ("address", "name"),
+    [
+        ("192.0.2.7", "192.0.2.7"),
+        ("::ffff:192.0.2.7", "192.0.2.7"),
+        ("2001:db8::1", "2001:db8::/64"),
+        ("2001:db8::ffff:0:1", "2001:db8::/64"),
+        ("2001:db8:0:1::1", "2001:db8:0:1::/64"),
+        ("not an address", "not an address"),
+    ],
+)
+def test_an_ipv6_client_is_its_network(address, name):
+    assert site(address) == name
+
+
+def test_only_addresses_inside_the_networks_are_named():
+    networks = (ip_network("10.0.0.0/8"), ip_network("2001:db8::/32"))
+    inside = ["10.1.2.3", "::ffff:10.1.2.3", "2001:db8::1"]
+    outside = ["11.0.0.1", "::1", "", "10.1.2.3, 10.1.2.4", "unknown"]
+    assert [is_named(address, networks) for address in inside + outside] == [True] * 3 + [False] * 5
+
+
+@dataclass(eq=False)
+class Guest:
+    """A connection as the crowd sees it."""
+
+    idle: bool = True
+    rate: float = inf
+    ended: bool = False
+
+    def is_idle(self):
+        return self.idle
+
+    def upload_rate(self):
+        return self.rate
+
+    def give_way(self):
+        self.ended = True
+
+
+def test_an_address_has_its_share_and_a_proxy_has_none():
+    crowd = Crowd(most=10, most_of_address=2, proxies=(ip_network("10.0.0.1/32"),))
+    assert [crowd.enter("192.0.2.1") for _ in range(2)] == [None, None]
+    assert "2 connections of your address" in crowd.enter("192.0.2.1")
+    assert crowd.enter("192.0.2.2") is None
+    assert [crowd.enter("10.0.0.1") for _ in range(3)] == [None] * 3
+    assert (len(crowd), crowd.refused) == (6, 1)
+    crowd.leave(Guest(), "192.0.2.1")
+    assert crowd.enter("192.0.2.1") is None
+
+
+def entered(crowd, *guests):
+    for number, guest in enumerate(guests):
+        assert crowd.enter(f"192.0.2.{number}") is None
+        crowd.wait(guest)
+    return guests
+
+
+def test_who_has_waited_longest_gives_way():
+    crowd = Crowd(most=3, most_of_address=1)
+    first, second, third = entered(crowd, Guest(), Guest(), Guest())
+    crowd.work(first)
+    assert crowd.enter("a") is None
+    assert (first.ended, second.ended, third.ended) == (False, True, False)
+    assert crowd.enter("b") is None
+    assert (first.ended, third.ended) == (False, True)
+    assert "3 connections are open" in crowd.enter("c")
+
+
+def test_who_has_said_something_that_is_not_read_yet_does_not():
+    crowd = Crowd(most=2, most_of_address=1)
+    first, second = entered(crowd, Guest(idle=False), Guest())
+    assert crowd.enter("a") is None
+    assert (first.ended, second.ended) == (False, True)
+
+
+def test_where_nobody_waits_the_slowest_upload_gives_way():
+    crowd = Crowd(most=3, most_of_address=1)
+    guests = entered(crowd, Guest(rate=1e6), Guest(rate=3), Guest(rate=inf))
+    for guest in guests:
+        crowd.send(guest)
+    assert crowd.enter("a") is None
+    assert [guest.ended for guest in guests] == [False, True, False]
+    crowd.work(guests[0])
+    # Of the last one it is too early to tell.
+    assert "3 connections are open" in crowd.enter("b")

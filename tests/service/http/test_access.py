@@ -1,0 +1,266 @@
+"""Who asks: addresses behind proxies, and keys."""
+
+import http.client
+import logging
+from contextlib import closing
+from ipaddress import ip_network
+
+import httpx2
+import pytest
+from fastapi.testclient import TestClient
+from starlette.responses import PlainTextResponse
+
+from service.http.access.bearer import WRONG_A_MINUTE
+from service.http.access.forwarded import Forwarded
+from service.http.access.keys import Entry, KeysError, hash_of, matches, new_key, read_keys
+from service.http.access.keys import toml_entry as written
+from service.http.app import create_app
+from service.settings import Settings
+from tests.support import stand_in_jobs as jobs
+from tests.support.live import served
+
+GLB = {"Content-Type": "model/gltf-binary"}
+
+
+def seen_behind(proxies, *, peer="10.0.0.1", **headers):
+    """The client's address and scheme as the application sees them."""
+
+    async def app(scope, receive, send):
+        text = f"{scope['client'][0]} {scope['scheme']}"
+        await PlainTextResponse(text)(scope, receive, send)
+
+    layer = Forwarded(app, tuple(map(ip_network, proxies)))
+    client = TestClient(layer, client=(peer, 1))
+    names = {name.replace("_", "-"): value for name, value in headers.items()}
+    return client.get("/", headers=names).text.split()
+
+
+@pytest.mark.parametrize(
+    ("proxies", "forwarded", "address"),
+    [
+        ([], "192.0.2.9", "10.0.0.1"),
+        (["10.0.0.2/32"], "192.0.2.9", "10.0.0.1"),
+        (["10.0.0.0/8"], "192.0.2.9", "192.0.2.9"),
+        # The client's own word, then what two proxies saw.
+        (["10.0.0.0/8"], "198.51.100.1, 192.0.2.9, 10.0.0.3", "192.0.2.9"),
+        (["10.0.0.0/8"], "2001:db8::1", "2001:db8::1"),
+        (["10.0.0.0/8"], '1.2.3.4" 200 "forged', "10.0.0.1"),
+        (["10.0.0.0/8"], "192.0.2.9, unknown", "10.0.0.1"),
+        (["10.0.0.0/8"], "", "10.0.0.1"),
+        (["10.0.0.0/8"], "10.0.0.9, " * 40 + "10.0.0.8", "10.0.0.1"),
+    ],
+)
+def test_only_a_named_proxy_is_believed(proxies, forwarded, address):
+    assert seen_behind(proxies, X_Forwarded_For=forwarded) == [address, "http"]
+
+
+def test_the_scheme_is_the_proxys_too():
+    assert seen_behind(["10.0.0.1/32"], X_Forwarded_Proto="https") == ["10.0.0.1", "https"]
+    assert seen_behind([], X_Forwarded_Proto="https") == ["10.0.0.1", "http"]
+    assert seen_behind(["10.0.0.1/32"], X_Forwarded_Proto="javascript") == ["10.0.0.1", "http"]
+
+
+def test_a_forged_address_is_in_no_line(caplog):
+    with caplog.at_level(logging.INFO), served(workers=1) as where:
+        connection = http.client.HTTPConnection(*where, timeout=30)
+        with closing(connection):
+            connection.request("GET", "/healthz", headers={"X-Forwarded-For": "203.0.113.77"})
+            connection.getresponse().read()
+    assert [record.fields["client"] for record in caplog.records if record.name == "pns.request"]
+    assert "203.0.113.77" not in caplog.text
+
+
+# Keys
+
+KEY = "pns_studio_" + "k" * 43
+OTHER = "pns_farm_" + "f" * 43
+
+
+@pytest.fixture(scope="module")
+def keys_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("keys") / "keys.toml"
+    entries = [
+        Entry(name="studio", hash=hash_of(KEY)),
+        Entry(name="farm", hash=hash_of(OTHER), faces_per_minute=4000),
+    ]
+    path.write_text("\n\n".join(map(written, entries)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def client(keys_file):
+    settings = Settings(workers=1, keys_file=keys_file)
+    app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
+    with TestClient(app, raise_server_exceptions=False) as opened:
+        yield opened
+
+
+def bearer(key):
+    return {"Authorization": f"Bearer {key}"}
+
+
+def test_a_key_is_kept_as_a_salted_hash():
+    key = new_key("studio")
+    assert len(key) == len("pns_studio_") + 43
+    first, second = hash_of(key), hash_of(key)
+    assert first != second
+    assert matches(key, first)
+    assert matches(key, second)
+    assert not matches(key + "x", first)
+    assert not matches(key, first[:-1] + ("A" if first[-1] != "A" else "Q"))
+    assert not matches(key, "scrypt$nonsense")
+
+
+def test_the_hash_is_scrypts():
+    """RFC 7914, the third test vector, cut to our length: another implementation agrees."""
+    import hashlib
+
+    digest = hashlib.scrypt(
+        b"pleaseletmein", salt=b"SodiumChloride", n=16384, r=8, p=1, maxmem=2**26, dklen=64
+    )
+    assert digest.hex().startswith("7023bdcb3afd7348461c06cd81fd38eb")
+    assert hash_of("pleaseletmein", salt=b"SodiumChlorideXX").split("$")[1:4] == ["14", "8", "1"]
+
+
+@pytest.mark.parametrize("name", ["", "-a", "A", "a_b", "a" * 64, "a b", 'a"'])
+def test_a_name_is_plain(name):
+    with pytest.raises(KeysError, match="a name is"):
+        new_key(name)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "there is no"),
+        ("key = 1", "key"),
+        ("[[key]]\nname = 'a'\nhash = 'plain'", "hash"),
+        ("[[key]]\nname = 'A'\nhash = 'plain'", "name"),
+        ("[[keys]]\nname = 'a'", "keys is not known"),
+        ("ENTRY\ncolour = 1", "colour"),
+        ("not toml", "keys.toml"),
+        ("ENTRY\nENTRY", "two entries have one name"),
+        ("[[key]]\nname = 'a'\nhash = 'scrypt$24$8$1$SALT$DIGEST'", "asks for too much"),
+        ("ENTRY\nfaces_per_minute = inf", "faces_per_minute"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_refused_at_start(tmp_path, text, reason):
+    entry = written(Entry(name="a", hash=hash_of("x")))
+    text = text.replace("ENTRY", entry).replace("SALT", "s" * 22).replace("DIGEST", "d" * 43)
+    path = tmp_path / "keys.toml"
+    path.write_text(text)
+    with pytest.raises(KeysError, match=reason):
+        create_app(Settings(workers=1, keys_file=path))
+
+
+def test_a_file_that_is_not_there_is_refused_at_start(tmp_path):
+    with pytest.raises(KeysError, match="No such file"):
+        read_keys(tmp_path / "none.toml")
+
+
+def test_what_costs_something_needs_a_key(client):
+    for method, path in ("POST", "/subdivide"), ("GET", "/nothing"), ("POST", "/jobs"):
+        answer = client.request(method, path, content=b"x", headers=GLB)
+        assert answer.status_code == 401, path
+        assert answer.headers["www-authenticate"] == 'Bearer realm="pns"'
+        assert answer.json()["code"] == "unauthorized"
+    for path in "/healthz", "/docs", "/openapi.json", "/models", "/":
+        assert client.get(path).status_code == 200, path
+
+
+@pytest.mark.parametrize("scheme", ["Bearer", "bearer", "BEARER "])
+def test_the_bearer_of_a_key_is_served(client, scheme):
+    headers = GLB | {"Authorization": f"{scheme} {KEY}"}
+    assert client.post("/subdivide", content=b"x", headers=headers).content == b"x"
+
+
+@pytest.mark.parametrize(
+    "authorization",
+    [
+        "Bearer",
+        "Basic cG5zOnBucw==",
+        "Bearer nonsense",
+        f"Bearer {KEY[:-1]}",
+        f"Bearer {KEY[:-1]}K",
+        f"Bearer {KEY.replace('studio', 'farm')}",
+        f"Bearer {KEY.replace('studio', 'nobody')}",
+        f"Bearer {KEY}, Bearer {KEY}",
+        f"Bearer {KEY}x",
+    ],
+)
+def test_a_wrong_key_is_refused_wherever_it_is_sent(keys_file, authorization):
+    settings = Settings(workers=1, keys_file=keys_file)
+    app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
+    client = TestClient(app)
+    headers = {"Authorization": authorization}
+    assert client.get("/healthz", headers=headers).status_code == 401
+    assert KEY not in client.get("/healthz", headers=headers).text
+
+
+def test_guessing_ends_and_keys_that_were_right_stay_right(keys_file):
+    settings = Settings(workers=1, keys_file=keys_file)
+    client = TestClient(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up))
+    assert client.get("/healthz", headers=bearer(KEY)).status_code == 200
+    wrong = [
+        client.get("/healthz", headers=bearer(f"pns_x_{n:043d}")).status_code
+        for n in range(WRONG_A_MINUTE + 2)
+    ]
+    assert wrong == [401] * WRONG_A_MINUTE + [429] * 2
+    refused = client.get("/healthz", headers=bearer(OTHER))
+    assert (refused.status_code, refused.json()["code"]) == (429, "too-many-wrong-keys")
+    assert int(refused.headers["retry-after"]) >= 1
+    assert client.get("/healthz", headers=bearer(KEY)).status_code == 200
+
+
+def test_the_routes_see_the_name_of_the_key(client, caplog):
+    with caplog.at_level(logging.INFO):
+        client.get("/healthz", headers=bearer(OTHER))
+    (line,) = [record.fields for record in caplog.records if record.name == "pns.request"]
+    assert line["client"] == "key:farm"
+    assert OTHER not in caplog.text
+
+
+@pytest.mark.parametrize("with_keys", [True, False])
+def test_the_service_says_at_start_to_whom_it_is_open(keys_file, with_keys, caplog):
+    settings = Settings(workers=1, keys_file=keys_file if with_keys else None)
+    app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
+    with caplog.at_level(logging.INFO), TestClient(app):
+        pass
+    said = "the bearers of 2 keys" if with_keys else "open to everybody: no PNS_KEYS_FILE"
+    assert said in caplog.text
+
+
+# Other origins
+
+
+def cross(client, method="GET", **headers):
+    return client.request(method, "/healthz", headers={"Origin": "https://a.example"} | headers)
+
+
+def test_no_other_origin_may_ask_unless_it_is_named():
+    with TestClient(create_app(Settings(workers=1), warm_up=jobs.no_warm_up)) as client:
+        assert "access-control-allow-origin" not in cross(client).headers
+        assert cross(client, "OPTIONS").status_code == 405
+
+
+def test_a_named_origin_may(keys_file):
+    settings = Settings(workers=1, cors_origins="https://a.example", keys_file=keys_file)
+    client = TestClient(create_app(settings, warm_up=jobs.no_warm_up))
+    answer = cross(client)
+    assert answer.headers["access-control-allow-origin"] == "https://a.example"
+    assert "X-Request-ID" in answer.headers["access-control-expose-headers"]
+    asks = {"Access-Control-Request-Method": "POST"}
+    asks["Access-Control-Request-Headers"] = "Authorization, Content-Type"
+    assert cross(client, "OPTIONS", **asks).status_code == 200
+    other = client.get("/healthz", headers={"Origin": "https://b.example"})
+    assert "access-control-allow-origin" not in other.headers
+
+
+def test_a_proxys_clients_are_told_apart_on_a_real_connection(caplog):
+    with (
+        caplog.at_level(logging.INFO),
+        served(workers=1, proxies="127.0.0.1") as where,
+        httpx2.Client(base_url=f"http://{where[0]}:{where[1]}") as client,
+    ):
+        client.get("/healthz", headers={"X-Forwarded-For": "192.0.2.1"})
+    lines = [record.fields for record in caplog.records if record.name == "pns.request"]
+    assert [line["client"] for line in lines] == ["192.0.2.1"]

@@ -1,0 +1,116 @@
+"""No client receives what belongs to another, whoever disconnects when."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import random
+from asyncio import StreamReader, StreamWriter
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.support import stand_in_jobs as jobs
+from tests.support.live import served
+
+ANSWERS = 2000
+# Each costs a worker's life, and the start of its successor.
+DISCONNECTS = 96
+HONEST = 32
+RUDE = 8
+
+Address = tuple[str, int]
+
+
+async def sent(where: Address, body: bytes, told: str) -> tuple[StreamReader, StreamWriter]:
+    """A connection that has sent a whole request; its content type tells the worker more."""
+    reader, writer = await asyncio.open_connection(*where)
+    head = (
+        "POST /subdivide HTTP/1.1\r\nHost: test\r\nConnection: close\r\n"
+        f"Content-Type: model/gltf-binary; {told}\r\nContent-Length: {len(body)}\r\n\r\n"
+    )
+    writer.write(head.encode() + body)
+    await writer.drain()
+    return reader, writer
+
+
+async def content(reader: StreamReader, writer: StreamWriter) -> bytes:
+    """The content of the answer."""
+    try:
+        head, _, rest = (await reader.read()).partition(b"\r\n\r\n")
+        assert head.startswith(b"HTTP/1.1 200 "), head
+        return rest
+    finally:
+        writer.close()
+        await writer.wait_closed()
+
+
+def digest(body: bytes) -> bytes:
+    return hashlib.sha256(body).hexdigest().encode()
+
+
+def test_2000_answers_beside_clients_that_disconnect_are_each_of_their_own_input() -> None:
+    chance = random.Random(7)
+    bodies = [chance.randbytes(chance.randrange(1, 4096)) for _ in range(ANSWERS)]
+    wrong: list[int] = []
+
+    async def honest(where: Address, waiting: list[int]) -> None:
+        while waiting:
+            number = waiting.pop()
+            connection = await sent(where, bodies[number], "before=0; after=0.004")
+            if await content(*connection) != digest(bodies[number]):
+                wrong.append(number)
+
+    async def rude(where: Address, times: int) -> None:
+        for _ in range(times):
+            _, writer = await sent(where, chance.randbytes(1000), "before=0.1; after=0")
+            await asyncio.sleep(chance.uniform(0, 0.15))
+            writer.transport.abort()
+
+    async def scenario(where: Address) -> None:
+        waiting = list(range(ANSWERS))
+        async with asyncio.timeout(300), asyncio.TaskGroup() as clients:
+            for _ in range(HONEST):
+                clients.create_task(honest(where, waiting))
+            for _ in range(RUDE):
+                clients.create_task(rude(where, DISCONNECTS // RUDE))
+
+    with served(jobs.digest, workers=4, queue=100) as where:
+        asyncio.run(scenario(where))
+    assert wrong == []
+
+
+def test_a_worker_that_outlives_its_request_writes_into_no_other_answer(tmp_path: Path) -> None:
+    late, patient = tmp_path / "late", tmp_path / "patient"
+    late.mkdir()
+    patient.mkdir()
+
+    async def scenario(where: Address) -> None:
+        _, leaving = await sent(where, b"late", f"folder={late}")
+        await until((late / "read").exists)
+        worker = int((late / "read").read_text())
+        leaving.transport.abort()
+        for _ in range(5):
+            # An answer on another connection: the server has been round its loop.
+            reader, writer = await asyncio.open_connection(*where)
+            writer.write(b"GET /healthz HTTP/1.1\r\nHost: test\r\nConnection: close\r\n\r\n")
+            await content(reader, writer)
+        # Whatever the first request has closed by now, this one gets the numbers of.
+        connection = await sent(where, b"patient", f"folder={patient}")
+        (patient / "may-write").touch()
+        await until((patient / "wrote").exists)
+        (late / "may-write").touch()
+        await until(lambda: (late / "wrote").exists() or not alive(worker))
+        (patient / "may-return").touch()
+        assert await content(*connection) == digest(b"patient")
+
+    with served(jobs.digest_step_by_step, workers=2) as where:
+        asyncio.run(asyncio.wait_for(scenario(where), 60))
+
+
+async def until(holds: Callable[[], bool]) -> None:
+    while not holds():
+        await asyncio.sleep(0.002)
+
+
+def alive(process: int) -> bool:
+    return Path(f"/proc/{process}").exists()

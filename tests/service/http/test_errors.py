@@ -1,0 +1,306 @@
+"""Every status of the service, each as a problem document, through the whole application."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+from fastapi.testclient import TestClient
+
+from service.http.app import create_app
+from service.settings import Settings
+from tests.support import stand_in_jobs as jobs
+
+GLB = {"Content-Type": "model/gltf-binary"}
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[TestClient]:
+    settings = Settings(workers=1, queue=1, body=2**20, levels=5)
+    app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
+    with TestClient(app, raise_server_exceptions=False) as opened:
+        wait_until_ready(opened)
+        yield opened
+
+
+def wait_until_ready(client: TestClient) -> None:
+    """Jobs may take two seconds here, and on a busy machine a worker takes longer to start."""
+    pause = threading.Event()
+    for _ in range(600):
+        if client.get("/readyz").status_code == 200:
+            return
+        pause.wait(0.1)
+    pytest.fail("not ready")
+
+
+def post(client: TestClient, body: bytes, query: str = "", **headers: str) -> httpx2.Response:
+    return client.post(f"/subdivide?{query}", content=body, headers=GLB | headers)
+
+
+def assert_problem(answer: httpx2.Response, status: int, code: str) -> dict[str, object]:
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    document = answer.json()
+    assert document["status"] == status
+    assert document["code"] == code
+    assert document["type"] == f"urn:pns:problem:{code}"
+    assert document["title"]
+    assert document["detail"]
+    assert "Traceback" not in answer.text
+    return document
+
+
+def test_200_carries_the_answer_and_its_stages(client: TestClient) -> None:
+    answer = post(client, b"echo this")
+    assert answer.status_code == 200
+    assert answer.content == b"echo this"
+    assert answer.headers["content-type"] == "model/gltf-binary"
+    assert answer.headers["vary"] == "Accept"
+    stages = [entry.partition(";")[0] for entry in answer.headers["server-timing"].split(", ")]
+    assert stages == ["upload", "queue", "read", "refine", "total"]
+
+
+def test_accept_json_asks_for_the_report(client: TestClient) -> None:
+    answer = post(client, b"{}", Accept="application/json")
+    assert answer.headers["content-type"] == "application/json"
+    both = post(client, b"{}", Accept="application/json, model/gltf-binary")
+    assert both.headers["content-type"] == "model/gltf-binary"
+
+
+@pytest.mark.parametrize(
+    ("query", "name"),
+    [
+        ("levels=0", "levels"),
+        ("levels=7", "levels"),
+        ("levels=1.5", "levels"),
+        ("levels=many", "levels"),
+        ("levels=nan", "levels"),
+        ("scheme=butterfly", "scheme"),
+        ("budget=nan", "budget"),
+        ("budget=inf", "budget"),
+        ("budget=-1", "budget"),
+        ("reference_length=0", "reference_length"),
+        ("reference_length=-inf", "reference_length"),
+        ("reference_length=nan", "reference_length"),
+        ("diagnostics=all", "diagnostics"),
+        ("level=2", "level"),
+    ],
+)
+def test_422_names_the_bad_parameter(client: TestClient, query: str, name: str) -> None:
+    document = assert_problem(post(client, b"x", query), 422, "invalid-parameter")
+    assert document["parameter"] == name
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "inf", "nan", "Auto", "many"])
+def test_a_reference_length_is_explained_whole(client: TestClient, value: str) -> None:
+    document = post(client, b"x", f"reference_length={value}").json()
+    assert document["detail"] == "reference_length: it must be 'auto' or a finite number > 0"
+
+
+@pytest.mark.parametrize("query", ["levels=1&levels=2", "scheme=loop&levels=3&scheme=loop"])
+def test_422_for_a_parameter_given_twice(client: TestClient, query: str) -> None:
+    document = assert_problem(post(client, b"x", query), 422, "invalid-parameter")
+    assert document["parameter"] == query.partition("=")[0]
+
+
+@pytest.mark.parametrize(
+    ("accept", "kind"),
+    [
+        ("application/json", "application/json"),
+        ("APPLICATION/JSON; charset=utf-8", "application/json"),
+        ("application/json, model/gltf-binary;q=0.5", "application/json"),
+        ("application/json, */*;q=0.1", "application/json"),
+        ("application/*, model/gltf-binary;q=0", "application/json"),
+        ("application/json;q=0.5, model/gltf-binary", "model/gltf-binary"),
+        ("application/json;q=0.5, model/*;q=0.6", "model/gltf-binary"),
+        ("application/json;q=0", "model/gltf-binary"),
+        ("application/json, model/gltf-binary", "model/gltf-binary"),
+        ("*/*", "model/gltf-binary"),
+        ("image/png", "model/gltf-binary"),
+    ],
+)
+def test_the_answer_is_what_is_wanted_most(client: TestClient, accept: str, kind: str) -> None:
+    assert post(client, b"{}", Accept=accept).headers["content-type"] == kind
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "levels=1&scheme=pns&budget=&reference_length=auto&diagnostics=summary",
+        "levels=2&scheme=loop&budget=0.5&reference_length=2.5&diagnostics=full",
+        "diagnostics=none",
+    ],
+)
+def test_documented_queries_are_taken(client: TestClient, query: str) -> None:
+    assert post(client, b"x", query).status_code == 200
+
+
+def test_400_unreadable(client: TestClient) -> None:
+    assert_problem(post(client, b"unreadable"), 400, "unreadable")
+
+
+def test_422_points_at_the_broken_promise(client: TestClient) -> None:
+    document = assert_problem(post(client, b"broken"), 422, "invalid-gltf")
+    assert document["pointer"] == "/accessors/3/count"
+
+
+def test_413_of_a_job_says_which_limit(client: TestClient) -> None:
+    document = assert_problem(post(client, b"faces"), 413, "limit-exceeded")
+    assert (document["limit"], document["allowed"], document["found"]) == ("faces", 5, 20)
+
+
+def test_413_deeper_than_this_service_refines(client: TestClient) -> None:
+    document = assert_problem(post(client, b"x", "levels=6"), 413, "limit-exceeded")
+    assert document["limit"] == "levels"
+
+
+def test_413_before_the_body_is_read(client: TestClient) -> None:
+    document = assert_problem(post(client, bytes(2**20 + 1)), 413, "limit-exceeded")
+    assert (document["limit"], document["allowed"]) == ("body", 2**20)
+
+
+def test_413_while_a_chunked_body_is_read(client: TestClient) -> None:
+    chunks = (bytes(2**16) for _ in range(17))
+    answer = client.post("/subdivide", content=chunks, headers=GLB)
+    assert_problem(answer, 413, "limit-exceeded")
+
+
+def test_a_body_of_exactly_the_limit_is_taken(client: TestClient) -> None:
+    assert len(post(client, bytes(2**20)).content) == 2**20
+
+
+def test_400_for_a_content_length_that_is_no_number(client: TestClient) -> None:
+    answer = client.post("/subdivide", content=b"x", headers=GLB | {"Content-Length": "many"})
+    assert_problem(answer, 400, "unreadable")
+
+
+@pytest.mark.parametrize("kind", ["image/png", "application/octet-stream", "", "model"])
+def test_415_for_another_content_type(client: TestClient, kind: str) -> None:
+    answer = client.post("/subdivide", content=b"x", headers={"Content-Type": kind})
+    assert_problem(answer, 415, "unsupported-media-type")
+
+
+def test_415_for_a_compressed_body(client: TestClient) -> None:
+    answer = post(client, b"x", **{"Content-Encoding": "gzip"})
+    assert_problem(answer, 415, "unsupported-media-type")
+
+
+def test_404_and_405_are_problems_too(client: TestClient) -> None:
+    assert_problem(client.get("/nothing"), 404, "not-found")
+    wrong = client.get("/subdivide")
+    assert_problem(wrong, 405, "method-not-allowed")
+    assert wrong.headers["allow"] == "POST"
+
+
+@pytest.mark.parametrize("body", [b"fault", b"unpicklable"])
+def test_500_keeps_our_faults_in_the_log(
+    client: TestClient, body: bytes, caplog: pytest.LogCaptureFixture
+) -> None:
+    answer = post(client, body)
+    assert_problem(answer, 500, "internal-error")
+    assert "secret" not in answer.text
+    assert "raise" in caplog.text
+
+
+def test_500_in_the_server_itself_is_a_problem_too() -> None:
+    app = create_app(
+        Settings(workers=1), job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up
+    )
+
+    @app.get("/breaks")
+    async def breaks() -> None:
+        raise ZeroDivisionError("secret")
+
+    # Without `with`: no lifespan, hence no workers.
+    answer = TestClient(app, raise_server_exceptions=False).get("/breaks")
+    assert_problem(answer, 500, "internal-error")
+    assert "secret" not in answer.text
+
+
+def test_500_for_a_worker_that_dies_and_the_next_request_is_served(client: TestClient) -> None:
+    assert_problem(post(client, b"die"), 500, "worker-died")
+    wait_until_ready(client)
+    assert post(client, b"again").status_code == 200
+
+
+def test_413_for_a_job_that_takes_more_than_was_predicted(client: TestClient) -> None:
+    worker = post(client, b"pid").content
+    document = assert_problem(post(client, b"memory 1000000"), 413, "limit-exceeded")
+    assert (document["limit"], document["allowed"]) == ("memory", 1_000_000)
+    assert post(client, b"pid").content == worker
+
+
+def test_504_for_a_job_past_its_time() -> None:
+    settings = Settings(workers=1, job_seconds=2)
+    app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
+    with TestClient(app, raise_server_exceptions=False) as client:
+        # A worker that still starts leaves a job no time.
+        wait_until_ready(client)
+        assert_problem(post(client, b"sleep 30"), 504, "job-timeout")
+        wait_until_ready(client)
+
+
+def test_503_while_the_service_drains(client: TestClient) -> None:
+    gate = client.app.state.admission
+    gate.draining = True
+    try:
+        answer = post(client, b"x")
+        assert_problem(answer, 503, "draining")
+        assert int(answer.headers["retry-after"]) >= 1
+        assert_problem(client.get("/readyz"), 503, "draining")
+        assert client.get("/healthz").status_code == 200
+    finally:
+        gate.draining = False
+
+
+def test_503_without_a_model() -> None:
+    app = create_app(
+        Settings(workers=1), job=jobs.obey, measure=jobs.measure, warm_up=jobs.fails_to_warm_up
+    )
+    with TestClient(app) as client:
+        assert_problem(client.get("/readyz"), 503, "no-model")
+        # What needs no model is served.
+        assert post(client, b"x", "scheme=loop").status_code == 200
+        assert_problem(client.get("/readyz"), 503, "no-model")
+
+
+def test_ready_and_healthy(client: TestClient) -> None:
+    post(client, b"x")
+    assert client.get("/readyz").json() == {"status": "ready"}
+    assert client.get("/healthz").json() == {"status": "ok"}
+
+
+def test_the_description_names_bodies_parameters_and_errors(client: TestClient) -> None:
+    assert client.get("/docs").status_code == 200
+    operation = client.get("/openapi.json").json()["paths"]["/subdivide"]["post"]
+    assert set(operation["requestBody"]["content"]) == {
+        "model/gltf-binary",
+        "model/gltf+json",
+        "model/obj",
+        "model/ply",
+        "model/stl",
+        "model/off",
+        "application/zip",
+        "multipart/form-data",
+    }
+    names = {parameter["name"] for parameter in operation["parameters"]}
+    assert names == {
+        "levels",
+        "scheme",
+        "model",
+        "budget",
+        "reference_length",
+        "diagnostics",
+        "uv",
+        "normals",
+        "crease",
+        "weld_tolerance",
+        "compress",
+        "limit",
+    }
+    statuses = {"200", "400", "401", "408", "413", "415", "422", "429", "500", "503", "504"}
+    assert set(operation["responses"]) == statuses
+    for status in statuses - {"200"}:
+        assert set(operation["responses"][status]["content"]) == {"application/problem+json"}

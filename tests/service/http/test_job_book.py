@@ -1,0 +1,149 @@
+"""The book of jobs: whose a job is, how long it is kept, and who makes room."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+
+import pytest
+
+from service.http.job_book import JobBook, NoSuchJobError
+from service.options import Limits, Options
+from service.workers.job import Job, State
+from service.workers.jobs import Work
+from service.workers.memory_file import MemoryFile
+from service.workers.progress import ProgressPage
+
+
+def run(scenario: Callable[[], Awaitable[None]]) -> None:
+    asyncio.run(asyncio.wait_for(scenario(), 10))
+
+
+def job(client: str, size: int = 0) -> Job:
+    body, answer, page = MemoryFile(), MemoryFile(), ProgressPage()
+    answer.append(bytes(size))
+    work = Work(body.name, answer.name, None, page.file.name, "", Options(), None, Limits())
+    made = Job(
+        client=client,
+        faces_per_minute=None,
+        work=work,
+        body=body,
+        answer=answer,
+        report=None,
+        page=page,
+        upload_seconds=0,
+        must_end=time.monotonic(),
+    )
+    body.release()
+    page.close()
+    made.state = State.DONE
+    return made
+
+
+def kept(book: JobBook, *jobs: Job) -> list[bool]:
+    present: list[bool] = []
+    for entry in jobs:
+        try:
+            book.find(entry.id, entry.client)
+        except NoSuchJobError:
+            present.append(False)
+        else:
+            present.append(True)
+    return present
+
+
+def test_what_a_named_client_made_is_for_it_alone() -> None:
+    async def scenario() -> None:
+        book = JobBook(seconds=60, max_bytes=100, max_jobs=9)
+        own, open_to_all = job("key:a"), job("address:1")
+        book.add(own, "key:a")
+        book.add(open_to_all, None)
+        assert book.find(own.id, "key:a").job is own
+        with pytest.raises(NoSuchJobError):
+            book.find(own.id, "key:b")
+        assert book.find(open_to_all.id, "anybody").job is open_to_all
+        await book.close()
+        own.answer.release()
+        open_to_all.answer.release()
+
+    run(scenario)
+
+
+def test_where_room_is_needed_the_greediest_client_loses_its_oldest() -> None:
+    async def scenario() -> None:
+        book = JobBook(seconds=60, max_bytes=100, max_jobs=50)
+        greedy = [job("greedy", 30) for _ in range(3)]
+        modest = job("modest", 10)
+        for entry in (modest, *greedy):
+            book.add(entry, None)
+            book.keep(entry)
+        assert book.bytes == 100
+        last = job("modest", 5)
+        book.add(last, None)
+        book.keep(last)
+        assert kept(book, modest, *greedy, last) == [True, False, True, True, True]
+        assert greedy[0].answer.closed
+        await book.close()
+        assert modest.answer.closed
+
+    run(scenario)
+
+
+def test_many_small_results_are_bounded_too() -> None:
+    async def scenario() -> None:
+        book = JobBook(seconds=60, max_bytes=100, max_jobs=2)
+        jobs = [job("a") for _ in range(3)]
+        for entry in jobs:
+            book.add(entry, None)
+            book.keep(entry)
+        assert kept(book, *jobs) == [False, True, True]
+        await book.close()
+
+    run(scenario)
+
+
+def test_a_job_that_was_struck_out_while_it_ran_keeps_no_result() -> None:
+    async def scenario() -> None:
+        book = JobBook(seconds=60, max_bytes=100, max_jobs=2)
+        gone = job("a", 10)
+        book.add(gone, None)
+        book.forget(gone.id)
+        book.keep(gone)
+        assert gone.answer.closed
+        assert book.bytes == 0
+
+    run(scenario)
+
+
+@pytest.mark.parametrize("state", [State.FAILED, State.CANCELLED])
+def test_jobs_without_results_are_bounded_too_and_the_greedy_loses_first(state: State) -> None:
+    async def scenario() -> None:
+        book = JobBook(seconds=60, max_bytes=100, max_jobs=3)
+        modest = job("modest", 10)
+        greedy = [job("greedy") for _ in range(5)]
+        for one in (modest, *greedy):
+            if one is not modest:
+                one.state = state
+            book.add(one, None)
+            book.keep(one)
+        assert kept(book, modest, *greedy) == [True, False, False, False, True, True]
+        assert all(one.answer.closed for one in greedy)
+        await book.close()
+        assert modest.answer.closed
+
+    run(scenario)
+
+
+def test_a_job_without_a_result_is_kept_for_its_problem_and_no_file() -> None:
+    async def scenario() -> None:
+        book = JobBook(seconds=60, max_bytes=100, max_jobs=2)
+        failed = job("a", 10)
+        failed.state = State.FAILED
+        book.add(failed, None)
+        book.keep(failed)
+        assert failed.answer.closed
+        assert kept(book, failed) == [True]
+        await book.close()
+
+    run(scenario)

@@ -1,0 +1,222 @@
+"""What only a real connection shows: slow and vanishing clients, and a server that stays awake."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from tests.support.live import served
+
+GLB = {"Content-Type": "model/gltf-binary"}
+MIB = 2**20
+GO_ON = b"HTTP/1.1 100 Continue\r\n\r\n"
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[tuple[str, int]]:
+    with served(
+        workers=2, queue=1, body=64 * MIB, upload_seconds=3, stall_seconds=1, job_seconds=3600
+    ) as where:
+        yield where
+
+
+@pytest.fixture
+def client(address: tuple[str, int]) -> Iterator[httpx2.Client]:
+    with httpx2.Client(base_url=f"http://{address[0]}:{address[1]}", timeout=60) as opened:
+        yield opened
+
+
+def subdivide(client: httpx2.Client, body: bytes) -> httpx2.Response:
+    return client.post("/subdivide", content=body, headers=GLB)
+
+
+def request_head(length: int, *, extra: str = "") -> bytes:
+    return (
+        "POST /subdivide HTTP/1.1\r\nHost: test\r\nContent-Type: model/gltf-binary\r\n"
+        f"Content-Length: {length}\r\n{extra}\r\n"
+    ).encode()
+
+
+def begin(connection: socket.socket) -> None:
+    """The head of an upload; comes back once the service reads its body."""
+    connection.sendall(request_head(100, extra="Expect: 100-continue\r\n"))
+    go_on = connection.recv(len(GO_ON), socket.MSG_WAITALL)
+    assert go_on == GO_ON
+
+
+def until(holds: Callable[[], bool]) -> None:
+    while not holds():
+        time.sleep(0.005)
+
+
+def received(connection: socket.socket) -> bytes:
+    """All that the server sends before it closes."""
+    return b"".join(iter(lambda: connection.recv(4096), b""))
+
+
+def test_healthz_answers_while_a_job_holds_its_interpreter(
+    address: tuple[str, int], client: httpx2.Client
+) -> None:
+    with socket.create_connection(address) as job:
+        job.sendall(request_head(4) + b"hold")
+        # A probe that waited for the job would never come back.
+        assert [client.get("/healthz").status_code for _ in range(50)] == [200] * 50
+        job.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            job.recv(1)
+    # Leaving has killed its worker.
+
+
+def test_healthz_answers_while_a_large_body_is_taken_in(client: httpx2.Client) -> None:
+    with ThreadPoolExecutor(1) as other:
+        job = other.submit(subdivide, client, b"{}," * (16 * MIB // 3))
+        probes = 0
+        while not job.done():
+            assert client.get("/healthz").status_code == 200
+            probes += 1
+    # Were it parsed in one go, one at most would be answered meanwhile.
+    assert probes > 5
+
+
+def test_a_client_that_leaves_frees_its_worker(
+    address: tuple[str, int], client: httpx2.Client, tmp_path: Path
+) -> None:
+    for number in range(4):
+        # Twice as many as there are workers, and more than the queue holds.
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        body = f"steps {folder}".encode()
+        with socket.create_connection(address) as leaving:
+            leaving.sendall(request_head(len(body)) + body)
+            until((folder / "took-1").exists)
+    # A job may take an hour here: only leaving has freed them.
+    assert subdivide(client, b"here").content == b"here"
+
+
+def test_a_client_that_leaves_during_its_upload_is_forgotten(
+    address: tuple[str, int], client: httpx2.Client
+) -> None:
+    for _ in range(6):
+        with socket.create_connection(address) as connection:
+            begin(connection)
+            connection.sendall(b"half")
+    assert subdivide(client, b"here").content == b"here"
+
+
+def test_503_with_retry_after_when_every_place_is_taken(
+    client: httpx2.Client, tmp_path: Path
+) -> None:
+    # 202 once it stands in line: two run, and one waits.
+    jobs = [
+        client.post("/jobs", content=f"steps {tmp_path}".encode(), headers=GLB) for _ in range(3)
+    ]
+    assert [job.status_code for job in jobs] == [202] * 3
+    refused = subdivide(client, b"one too many")
+    assert refused.status_code == 503
+    assert refused.json()["code"] == "busy"
+    assert int(refused.headers["retry-after"]) >= 1
+    for number in (1, 2, 3):
+        (tmp_path / f"go-{number}").touch()
+    for job in jobs:
+        path = job.headers["location"]
+        until(lambda path=path: client.get(path).json()["state"] == "done")
+
+
+def test_408_for_an_upload_that_trickles(address: tuple[str, int]) -> None:
+    with socket.create_connection(address) as connection:
+        connection.sendall(request_head(100) + b"some")
+        answer = received(connection)
+    assert answer.startswith(b"HTTP/1.1 408 ")
+    assert b"upload-timeout" in answer
+
+
+def test_408_for_an_upload_that_stops() -> None:
+    with (
+        served(workers=1, idle_seconds=1, upload_seconds=60) as where,
+        socket.create_connection(where) as connection,
+    ):
+        connection.sendall(request_head(100))
+        for _ in range(4):
+            # Slow, but never idle.
+            time.sleep(0.4)
+            connection.sendall(b"some")
+        answer = received(connection)
+    assert answer.startswith(b"HTTP/1.1 408 ")
+    assert b"nothing for 1 seconds" in answer
+
+
+def test_idle_uploads_refuse_nobody(address: tuple[str, int], client: httpx2.Client) -> None:
+    idle = [socket.create_connection(address) for _ in range(10)]
+    try:
+        for connection in idle:
+            begin(connection)
+            connection.sendall(b"half")
+        assert subdivide(client, b"here").content == b"here"
+    finally:
+        for connection in idle:
+            connection.close()
+
+
+def test_503_for_more_uploads_than_are_taken() -> None:
+    with (
+        served(workers=1, uploads=1) as where,
+        socket.create_connection(where) as idle,
+        httpx2.Client(base_url=f"http://{where[0]}:{where[1]}", timeout=60) as client,
+    ):
+        begin(idle)
+        refused = subdivide(client, b"one too many")
+        assert refused.status_code == 503
+        assert refused.json()["code"] == "busy"
+
+
+def test_413_is_answered_before_the_body_is_sent(address: tuple[str, int]) -> None:
+    with socket.create_connection(address) as connection:
+        connection.sendall(request_head(10**12, extra="Expect: 100-continue\r\n"))
+        answer = connection.recv(4096)
+    assert answer.startswith(b"HTTP/1.1 413 ")
+
+
+def test_an_endless_chunked_upload_is_cut_off_at_the_limit(address: tuple[str, int]) -> None:
+    head = (
+        b"POST /subdivide HTTP/1.1\r\nHost: test\r\nContent-Type: model/gltf-binary\r\n"
+        b"Transfer-Encoding: chunked\r\n\r\n"
+    )
+    chunk = b"100000\r\n" + bytes(MIB) + b"\r\n"
+    sent = 0
+    with socket.create_connection(address) as connection:
+        connection.sendall(head)
+        try:
+            for _ in range(400):
+                connection.sendall(chunk)
+                sent += MIB
+        except OSError:
+            pass
+    # After its 413 it is listened to, up to twice the limit; the sockets' buffers hold some more.
+    assert sent <= 144 * MIB
+
+
+def test_an_answer_larger_than_any_buffer_arrives_whole(client: httpx2.Client) -> None:
+    answer = subdivide(client, f"large {48 * MIB}".encode().ljust(100))
+    assert answer.headers["content-length"] == str(48 * MIB)
+    assert len(answer.content) == 48 * MIB
+
+
+def test_a_client_that_does_not_read_is_cut_off(
+    address: tuple[str, int], client: httpx2.Client, caplog: pytest.LogCaptureFixture
+) -> None:
+    body = f"large {48 * MIB}".encode().ljust(100)
+    with socket.create_connection(address) as connection:
+        connection.sendall(request_head(len(body)) + body)
+        # Nothing is read until the service has given up.
+        until(lambda: "a client took too long to read its answer" in caplog.messages)
+        received = 0
+        while piece := connection.recv(MIB):
+            received += len(piece)
+    assert received < 48 * MIB
+    assert subdivide(client, b"here").content == b"here"

@@ -1,0 +1,175 @@
+"""The description of the service, and the clients that generators make of it."""
+
+import http.client
+import json
+import re
+import shutil
+import subprocess
+import threading
+from pathlib import Path
+
+import pytest
+import uvicorn
+from fastapi.testclient import TestClient
+
+from service.gltf.read.container import read_glb
+from service.http.app import create_app
+from service.http.server import configuration
+from service.meshfiles.example import part_glb
+from service.settings import Settings
+from tests.support import node_tools
+from tests.support import stand_in_jobs as jobs
+
+ROOT = Path(__file__).resolve().parents[3]
+SUPPORT = ROOT / "tests" / "support"
+
+
+@pytest.fixture(scope="module")
+def document():
+    app = create_app(Settings(workers=1), warm_up=jobs.no_warm_up)
+    return TestClient(app).get("/openapi.json").json()
+
+
+@pytest.fixture(scope="module")
+def address():
+    """A server that really refines."""
+    settings = Settings(workers=1, port=0)
+    server = uvicorn.Server(configuration(create_app(settings), settings))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    pause = threading.Event()
+    while not server.started:
+        pause.wait(0.01)
+    host, port = server.servers[0].sockets[0].getsockname()
+    connection = http.client.HTTPConnection(host, port, timeout=60)
+    for _ in range(600):
+        connection.request("GET", "/readyz")
+        answer = connection.getresponse()
+        answer.read()
+        if answer.status == 200:
+            break
+        pause.wait(0.1)
+    connection.close()
+    yield f"http://{host}:{port}"
+    server.should_exit = True
+    thread.join()
+
+
+def operations(document):
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            yield f"{method.upper()} {path}", operation
+
+
+def test_operations_have_names_of_their_own(document):
+    names = [operation["operationId"] for _, operation in operations(document)]
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch("[a-z]+(_[a-z]+)*", name) for name in names)
+    assert {"subdivide", "report", "create_job", "read_job", "limits", "models"} <= set(names)
+
+
+def test_there_is_one_schema_of_problems(document):
+    wanted = {"schema": {"$ref": "#/components/schemas/Problem"}}
+    for name, operation in operations(document):
+        for status, answer in operation["responses"].items():
+            if int(status) >= 400:
+                assert answer["content"] == {"application/problem+json": wanted}, (name, status)
+    assert "HTTPValidationError" not in document["components"]["schemas"]
+    assert json.dumps(document).count('"JSON pointer of the offending value"') == 1
+
+
+def test_every_reference_leads_somewhere(document):
+    text = json.dumps(document)
+    for name in re.findall(r'"#/components/schemas/(\w+)"', text):
+        assert name in document["components"]["schemas"], name
+
+
+def test_one_operation_has_one_kind_of_answer(document):
+    for name, operation in operations(document):
+        for status in {"200", "202"} & set(operation["responses"]):
+            kinds = operation["responses"][status].get("content", {}).values()
+            assert len({kind["schema"].get("format", "json") for kind in kinds}) <= 1, name
+    file = document["paths"]["/subdivide"]["post"]["responses"]["200"]["content"]
+    # Generators take the first that they know.
+    assert list(file) == ["application/octet-stream", "model/gltf-binary"]
+
+
+def test_an_answer_is_sent_as_what_was_asked_for():
+    app = create_app(
+        Settings(workers=1), job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up
+    )
+    glb = {"Content-Type": "model/gltf-binary"}
+    with TestClient(app) as client:
+        for accept, kind in (
+            ("*/*", "model/gltf-binary"),
+            ("application/octet-stream", "application/octet-stream"),
+            ("application/octet-stream;q=0.5, model/*", "model/gltf-binary"),
+            ("application/json", "application/json"),
+        ):
+            answer = client.post("/subdivide", content=b"{}", headers=glb | {"Accept": accept})
+            assert answer.headers["content-type"] == kind
+        answer = client.post(
+            "/report", content=b"{}", headers=glb | {"Accept": "model/gltf-binary"}
+        )
+        assert answer.headers["content-type"] == "application/json"
+
+
+def generator():
+    """openapi-python-client, from where `make` puts it or from the path."""
+    program = ROOT / ".venv-clients" / "bin" / "openapi-python-client"
+    program = str(program) if program.exists() else shutil.which("openapi-python-client")
+    if program is None:
+        pytest.skip("needs openapi-python-client (requirements/clients.txt)")
+    return Path(program)
+
+
+def check(seen, output):
+    assert seen["scheme"] in ("loop", "pns")
+    assert seen["problem"] == "invalid-parameter"
+    assert seen["body_bytes"] == Settings().body
+    assert "paper" in seen["models"]
+    assert seen["job"] == "done"
+    assert b'"pns"' in read_glb(output.read_bytes()).text
+
+
+def test_the_generated_python_client_works(document, address, tmp_path):
+    tool = generator()
+    described = tmp_path / "openapi.json"
+    described.write_text(json.dumps(document))
+    source, output = tmp_path / "part.glb", tmp_path / "refined.glb"
+    source.write_bytes(part_glb())
+    config = tmp_path / "config.yml"
+    # Formatting what was made is for people.
+    config.write_text("post_hooks: []\n")
+    command = [tool, "generate", "--path", described, "--config", config, "--meta", "none"]
+    made = [*command, "--output-path", tmp_path / "generated"]
+    subprocess.run(made, check=True, capture_output=True, cwd=tmp_path)
+    python = tool.with_name("python")
+    run = [python, SUPPORT / "python_client.py", tmp_path, address, source, output]
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    seen = json.loads(done.stdout)
+    check(seen, output)
+    assert seen["fetched"] == "glTF"
+
+
+def test_the_generated_typescript_client_works(document, address, tmp_path):
+    node_tools.install()
+    (tmp_path / "node_modules").symlink_to(node_tools.FOLDER / "node_modules")
+    (tmp_path / "package.json").write_text('{"type": "module"}')
+    (tmp_path / "openapi.json").write_text(json.dumps(document))
+    (tmp_path / "client.mts").write_bytes((node_tools.FOLDER / "client.mts").read_bytes())
+    source, output = tmp_path / "part.glb", tmp_path / "refined.glb"
+    source.write_bytes(part_glb())
+    tools = tmp_path / "node_modules" / ".bin"
+    compile_ = "--strict --target es2022 --module nodenext --types node --skipLibCheck"
+    for command in (
+        [tools / "openapi-typescript", "openapi.json", "--output", "openapi.d.ts"],
+        [tools / "tsc", *compile_.split(), "--rewriteRelativeImportExtensions", "client.mts"],
+    ):
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    run = ["node", "client.mjs", address, source, output]
+    done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    check(json.loads(done.stdout), output)

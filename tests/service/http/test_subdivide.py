@@ -1,0 +1,272 @@
+"""The whole service on real files: workers, pipeline and bundled model together."""
+
+from __future__ import annotations
+
+import io
+import time
+import zipfile
+from collections.abc import Iterator
+from typing import Any
+
+import httpx2
+import msgspec
+import pytest
+from fastapi.testclient import TestClient
+
+from service.gltf.read.container import read_glb
+from service.http.app import create_app
+from service.meshfiles import formats
+from service.meshfiles.example import part as example_part
+from service.meshfiles.example import part_glb
+from service.meshfiles.triangles_glb import as_gltf_json
+from service.options import Limits
+from service.settings import Settings
+from tests.support.stand_in_jobs import CountedModel, ZeroModel
+
+GLB = {"Content-Type": "model/gltf-binary"}
+FACES = 1920
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[TestClient]:
+    with TestClient(create_app(Settings(workers=1, faces=100_000))) as opened:
+        for _ in range(600):
+            if opened.get("/readyz").status_code == 200:
+                break
+            time.sleep(0.05)
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def part() -> bytes:
+    return part_glb()
+
+
+def tree_of(glb: bytes) -> dict[str, Any]:
+    return msgspec.json.decode(read_glb(glb).text)
+
+
+def report_of(answer: httpx2.Response) -> dict[str, Any]:
+    assert answer.status_code == 200, answer.text
+    return tree_of(answer.content)["asset"]["extras"]["pns"]
+
+
+def test_a_raw_glb_is_refined_and_carries_its_report(client: TestClient, part: bytes) -> None:
+    answer = client.post("/subdivide?levels=2", content=part, headers=GLB)
+    assert answer.headers["content-type"] == "model/gltf-binary"
+    report = report_of(answer)
+    assert report["scheme"] == "pns"
+    assert report["totals"]["faces"] == 16 * FACES
+    assert [level["faces"] for level in report["levels"]] == [4 * FACES, 16 * FACES]
+    assert tree_of(answer.content)["materials"] == tree_of(part)["materials"]
+    assert "refine;dur=" in answer.headers["server-timing"]
+
+
+def test_every_way_to_send_a_file_gives_the_same_answer(client: TestClient, part: bytes) -> None:
+    raw = client.post("/subdivide", content=part, headers=GLB)
+    for kind in ("application/octet-stream", "model/gltf-binary"):
+        form = client.post("/subdivide", files={"file": ("part.glb", part, kind)})
+        assert form.content == raw.content
+    text = as_gltf_json(part, Limits())
+    as_json = client.post(
+        "/subdivide", content=text, headers={"Content-Type": "model/gltf+json; charset=utf-8"}
+    )
+    in_form = client.post("/subdivide", files={"file": text})
+    assert as_json.content == in_form.content
+    assert report_of(as_json)["levels"] == report_of(raw)["levels"]
+
+
+def test_files_beside_the_document_come_as_parts_or_in_an_archive(
+    client: TestClient, part: bytes
+) -> None:
+    container = read_glb(part)
+    tree = msgspec.json.decode(container.text)
+    tree["buffers"][0]["uri"] = "data/part%201.bin"
+    text, binary = msgspec.json.encode(tree), bytes(container.binary or b"")
+    named = {"file": ("part.gltf", text), "data/part 1.bin": ("part 1.bin", binary)}
+    in_parts = client.post("/subdivide", files=named)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("scene/part.gltf", text)
+        archive.writestr("scene/data/part 1.bin", binary)
+    raw = client.post(
+        "/subdivide", content=packed.getvalue(), headers={"Content-Type": "application/zip"}
+    )
+    in_form = client.post("/subdivide", files={"file": ("part.zip", packed.getvalue())})
+    assert report_of(in_parts)["totals"]["faces"] == 4 * FACES
+    assert in_parts.content == raw.content == in_form.content
+
+    missing = client.post("/subdivide", files={"file": ("part.gltf", text)})
+    assert missing.status_code == 422
+    assert missing.json()["code"] == "missing-file"
+    assert missing.json()["pointer"] == "/buffers/0/uri"
+
+
+@pytest.mark.parametrize("compress", ["draco", "meshopt"])
+def test_compressed_answers_are_smaller(client: TestClient, part: bytes, compress: str) -> None:
+    plain = client.post("/subdivide", content=part, headers=GLB)
+    packed = client.post(f"/subdivide?compress={compress}", content=part, headers=GLB)
+    assert report_of(packed)["totals"] == report_of(plain)["totals"]
+    assert len(packed.content) < 0.8 * len(plain.content)
+    assert client.post("/subdivide?compress=zip", content=part, headers=GLB).status_code == 422
+
+
+def test_accept_json_gives_the_same_report_alone(client: TestClient, part: bytes) -> None:
+    whole = client.post("/subdivide", content=part, headers=GLB)
+    alone = client.post("/subdivide", content=part, headers=GLB | {"Accept": "application/json"})
+    assert alone.headers["content-type"] == "application/json"
+    assert alone.json() == report_of(whole)
+
+
+def test_parameters_reach_the_operator(client: TestClient, part: bytes) -> None:
+    query = "/subdivide?scheme=pns&budget=0.25&reference_length=2.5&diagnostics=full"
+    answer = client.post(query, content=part, headers=GLB)
+    report = report_of(answer)
+    assert report["budget"] == 0.25
+    assert report["meshes"][0]["reference_length"] == 2.5
+    attributes = tree_of(answer.content)["meshes"][0]["primitives"][0]["attributes"]
+    assert {"_PNS_RATIO", "_PNS_GATE"} <= set(attributes)
+    loop = client.post("/subdivide?scheme=loop", content=part, headers=GLB)
+    assert report_of(loop)["scheme"] == "loop"
+    bare = client.post("/subdivide?diagnostics=none", content=part, headers=GLB)
+    assert "extras" not in tree_of(bare.content)["asset"]
+
+
+@pytest.mark.parametrize(
+    ("change", "status"),
+    [
+        (lambda part: part[:100], 400),
+        (lambda part: b"{" + part, 400),
+        (lambda part: b"", 400),
+        (lambda part: part.replace(b'"count":', b'"cOunt":'), 422),
+        (lambda part: part.replace(b'"buffer":0', b'"buffer":7'), 422),
+    ],
+)
+def test_broken_files_are_the_clients_fault(
+    client: TestClient, part: bytes, change: Any, status: int
+) -> None:
+    answer = client.post("/subdivide", content=change(part), headers=GLB)
+    assert answer.status_code == status
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+def test_413_for_more_faces_than_allowed_before_they_are_made(
+    client: TestClient, part: bytes
+) -> None:
+    began = time.monotonic()
+    answer = client.post("/subdivide?levels=6", content=part, headers=GLB)
+    assert answer.status_code == 413
+    assert answer.json()["limit"] == "faces"
+    assert answer.json()["found"] == FACES * 4**6
+    assert time.monotonic() - began < 10
+
+
+@pytest.mark.parametrize("kind", ["obj", "ply", "stl", "off"])
+def test_other_mesh_formats_come_back_as_the_glb_that_their_glb_gives(
+    client: TestClient, part: bytes, kind: str
+) -> None:
+    triangles = example_part()
+    content = formats.write(triangles, kind)
+    raw = client.post("/subdivide", content=content, headers={"Content-Type": f"model/{kind}"})
+    assert report_of(raw)["totals"]["faces"] == 4 * FACES
+    assert report_of(raw)["levels"][0]["edges"]["boundary"] == 0
+    form = client.post("/subdivide", files={"file": (f"part.{kind.upper()}", content)})
+    assert form.content == raw.content
+    direct = report_of(client.post("/subdivide", content=part, headers=GLB))
+    mean_ratio = report_of(raw)["levels"][0]["proximity_ratio"]["mean"]
+    assert mean_ratio == pytest.approx(direct["levels"][0]["proximity_ratio"]["mean"], rel=1e-3)
+
+
+def test_what_a_conversion_loses_is_in_the_report(client: TestClient) -> None:
+    text = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 9 9 9\nusemtl red\nf 1 2 3 4\n"
+    files = {"file": ("quad.obj", text), "quad.mtl": ("quad.mtl", b"newmtl red\n")}
+    report = report_of(client.post("/subdivide", files=files))
+    assert {(change["what"], change["count"]) for change in report["changes"]} == {
+        ("materials dropped", 1),
+        ("triangles added by splitting polygons", 1),
+        ("vertices dropped that no face uses", 1),
+        ("not used by the document: quad.mtl", 1),
+    }
+    assert report["totals"]["faces"] == 8
+
+
+@pytest.mark.parametrize(
+    ("query", "content", "status", "code"),
+    [
+        ("", b"no mesh", 400, "unreadable"),
+        ("", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 422, "unrefinable-mesh"),
+        ("", b"v 0 0 1e39\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 422, "unrefinable-mesh"),
+        ("?crease=normals", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 422, "invalid-parameter"),
+    ],
+)
+def test_a_mesh_file_that_cannot_be_converted_is_refused(
+    client: TestClient, query: str, content: bytes, status: int, code: str
+) -> None:
+    kind = {"Content-Type": "model/obj"}
+    answer = client.post(f"/subdivide{query}", content=content, headers=kind)
+    assert (answer.status_code, answer.json()["code"]) == (status, code)
+
+
+def test_413_for_a_json_of_64_mib_of_braces(client: TestClient) -> None:
+    text = b'{"asset":[' + b"{}," * 21_000_000 + b"0]}"
+    answer = client.post("/subdivide", content=text, headers={"Content-Type": "model/gltf+json"})
+    assert answer.status_code == 413
+    assert answer.json()["limit"].startswith("json")
+
+
+def test_415_in_a_form_for_what_is_no_gltf(client: TestClient) -> None:
+    answer = client.post("/subdivide", files={"file": b"\x89PNG"})
+    assert answer.status_code == 415
+
+
+def test_422_for_a_form_with_two_parts(client: TestClient, part: bytes) -> None:
+    answer = client.post("/subdivide", files=[("file", part), ("file", part)])
+    assert answer.status_code == 422
+    assert answer.json()["code"] == "invalid-multipart"
+
+
+def test_a_model_given_to_the_application_is_the_one_that_runs(part: bytes) -> None:
+    with TestClient(create_app(Settings(workers=1), model=ZeroModel())) as client:
+        report = report_of(client.post("/subdivide", content=part, headers=GLB))
+    assert report["model"] == "zero"
+    assert report["levels"][0]["proximity_ratio"]["max"] == 0
+
+
+def test_a_model_crosses_to_each_worker_once(part: bytes) -> None:
+    before = CountedModel.pickled
+    with TestClient(create_app(Settings(workers=1), model=CountedModel())) as client:
+        for _ in range(3):
+            report = report_of(client.post("/subdivide", content=part, headers=GLB))
+            assert report["model"] == "zero"
+    # One worker for any job, and the one for short jobs.
+    assert CountedModel.pickled == before + 2
+
+
+def test_what_an_upload_says_is_not_logged(capfd: pytest.CaptureFixture[str]) -> None:
+    kind = {"Content-Type": "multipart/form-data; boundary=b"}
+    # Its worker starts here, so that it writes to the stream that is captured.
+    with TestClient(create_app(Settings(workers=1))) as client:
+        answer = client.post("/subdivide", content=b"--b\r\nNot a header: x", headers=kind)
+        assert answer.status_code == 400
+    assert "header" not in capfd.readouterr().err
+
+
+def test_without_a_model_loop_still_works(part: bytes) -> None:
+    settings = Settings(workers=1, model="missing.onnx")
+    with TestClient(create_app(settings)) as client:
+        refused = client.post("/subdivide", content=part, headers=GLB)
+        assert refused.status_code == 503
+        assert refused.json()["code"] == "no-model"
+        assert client.post("/subdivide?scheme=loop", content=part, headers=GLB).status_code == 200
+        assert client.get("/readyz").status_code == 503
+
+
+def test_limit_moves_the_vertices_and_leaves_the_report(client: TestClient, part: bytes) -> None:
+    plain, limit = (
+        client.post(f"/subdivide?scheme=loop&limit={given}", content=part, headers=GLB)
+        for given in ("false", "true")
+    )
+    assert report_of(plain) == report_of(limit)
+    assert plain.content != limit.content
+    refused = client.post("/subdivide?limit=perhaps", content=part, headers=GLB)
+    assert refused.status_code == 422

@@ -1,0 +1,75 @@
+"""Traces: a span for each request, and nothing in it that a client would not like to see."""
+
+import sys
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.http import layers
+from service.http.app import create_app
+from service.http.watch.metrics import Metrics
+from service.http.watch.tracing import TracingError, tracer_from_environment
+from service.settings import Settings
+from tests.support import stand_in_jobs as jobs
+
+GLB = {"Content-Type": "model/gltf-binary"}
+
+
+@pytest.fixture
+def traced():
+    """A client of a traced service, and its spans."""
+    trace = pytest.importorskip("opentelemetry.sdk.trace")
+    from opentelemetry.sdk.trace.export import SimpleSpanProcessor
+    from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
+
+    exporter, provider = InMemorySpanExporter(), trace.TracerProvider()
+    provider.add_span_processor(SimpleSpanProcessor(exporter))
+    settings = Settings(workers=1)
+    app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
+    tracer = provider.get_tracer("tests")
+    app.layers = lambda routes: layers.around(routes, settings, Metrics(), None, tracer)
+    with TestClient(app, raise_server_exceptions=False) as client:
+        yield client, exporter.get_finished_spans
+
+
+def test_a_request_is_a_span_under_its_callers(traced):
+    client, spans = traced
+    parent = "00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01"
+    answer = client.get("/healthz?secret=1", headers={"traceparent": parent})
+    (span,) = spans()
+    assert span.name == "GET /healthz"
+    assert f"{span.context.trace_id:032x}" == parent.split("-")[1]
+    assert f"{span.parent.span_id:016x}" == parent.split("-")[2]
+    assert dict(span.attributes) == {
+        "http.request.method": "GET",
+        "http.route": "/healthz",
+        "http.response.status_code": 200,
+        "pns.request_id": answer.headers["x-request-id"],
+    }
+
+
+def test_a_fault_is_an_error_and_a_refusal_is_none(traced):
+    client, spans = traced
+
+    @client.app.get("/breaks")
+    async def breaks():
+        raise ZeroDivisionError("secret")
+
+    client.get("/breaks")
+    client.get("/nothing/secret")
+    fault, refusal = spans()
+    assert (fault.status.is_ok, fault.attributes["http.response.status_code"]) == (False, 500)
+    assert (refusal.status.is_unset, refusal.name) == (True, "GET none")
+    assert "secret" not in str([span.to_json() for span in spans()])
+
+
+def test_without_an_endpoint_nothing_is_traced(monkeypatch):
+    monkeypatch.delenv("OTEL_EXPORTER_OTLP_ENDPOINT", raising=False)
+    assert tracer_from_environment() is None
+
+
+def test_an_endpoint_without_the_extra_is_refused_at_start(monkeypatch):
+    monkeypatch.setenv("OTEL_EXPORTER_OTLP_ENDPOINT", "http://127.0.0.1:4318")
+    monkeypatch.setitem(sys.modules, "opentelemetry.sdk.trace", None)
+    with pytest.raises(TracingError, match="pip install"):
+        create_app(Settings(workers=1))

@@ -1,0 +1,238 @@
+"""What operators see: request ids, log lines, metrics."""
+
+import json
+import logging
+import urllib.request
+from collections import Counter
+
+import pytest
+from fastapi.testclient import TestClient
+from hypothesis import given
+from hypothesis import strategies as st
+from prometheus_client.parser import text_string_to_metric_families
+
+from service.http.app import create_app
+from service.http.watch.metrics import Metrics
+from service.log_lines import LONGEST, JsonLines
+from service.request_ids import REQUEST_ID
+from service.settings import Settings
+from service.workers.catalogue import Catalogue
+from tests.support import stand_in_jobs as jobs
+
+GLB = {"Content-Type": "model/gltf-binary"}
+
+
+@pytest.fixture(scope="module")
+def client():
+    app = create_app(Settings(workers=1), job=jobs.obey, warm_up=jobs.no_warm_up)
+
+    @app.get("/breaks")
+    async def breaks():
+        raise ZeroDivisionError("secret")
+
+    with TestClient(app, raise_server_exceptions=False) as opened:
+        yield opened
+
+
+def lines(caplog):
+    """The journal's lines, as they would be written."""
+    records = [record for record in caplog.records if record.name == "pns.request"]
+    return [json.loads(JsonLines().format(record)) for record in records]
+
+
+# Request ids
+
+
+@pytest.mark.parametrize("sent", ["a", "7f3e-22.B_1", "x" * 64])
+def test_a_sane_request_id_is_kept(client, sent, caplog):
+    with caplog.at_level(logging.INFO):
+        answer = client.get("/nothing", headers={"X-Request-ID": sent})
+    assert answer.headers["x-request-id"] == sent
+    assert answer.json()["request_id"] == sent
+    assert lines(caplog)[0]["request_id"] == sent
+
+
+@pytest.mark.parametrize("sent", ["", "x" * 65, "-a", "a b", "a\x1b[31m", "{}", "../a", "é"])
+def test_another_is_replaced(client, sent):
+    answer = client.get("/nothing", headers=[(b"x-request-id", sent.encode("latin-1"))])
+    given_back = answer.headers["x-request-id"]
+    assert given_back != sent
+    assert len(given_back) == 16
+    assert answer.json()["request_id"] == given_back
+
+
+def test_two_ids_are_none(client):
+    headers = [("X-Request-ID", "a"), ("X-Request-ID", "b")]
+    assert client.get("/healthz", headers=headers).headers["x-request-id"] not in ("a", "b")
+
+
+def test_a_fault_has_its_request_id_everywhere(client, caplog):
+    with caplog.at_level(logging.INFO):
+        answer = client.get("/breaks", headers={"X-Request-ID": "fault-1"})
+    assert answer.status_code == 500
+    assert answer.headers["x-request-id"] == answer.json()["request_id"] == "fault-1"
+    (line,) = lines(caplog)
+    assert (line["status"], line["route"]) == (500, "/breaks")
+
+
+def test_the_id_of_one_request_is_not_in_the_next(client):
+    client.get("/healthz", headers={"X-Request-ID": "first"})
+    assert REQUEST_ID.get() is None
+    assert client.get("/nothing").json()["request_id"] != "first"
+
+
+# Log lines
+
+
+def test_one_line_for_each_request_with_what_it_was(client, caplog):
+    with caplog.at_level(logging.INFO):
+        client.post("/subdivide?levels=2&model=", content=b"echo this", headers=GLB)
+        client.post("/subdivide", content=b"broken", headers=GLB)
+        client.head("/healthz")
+        client.request("BREW", "/secret-name.glb?secret=1")
+    names = ("method", "route", "status", "code")
+    told = [tuple(line[name] for name in names) for line in lines(caplog)]
+    assert told == [
+        ("POST", "/subdivide", 200, ""),
+        ("POST", "/subdivide", 422, "invalid-gltf"),
+        ("HEAD", "/healthz", 200, ""),
+        ("other", "none", 404, "not-found"),
+    ]
+    assert (lines(caplog)[0]["received"], lines(caplog)[0]["sent"]) == (9, 9)
+    assert "secret" not in json.dumps(lines(caplog))
+    assert "levels" not in json.dumps(lines(caplog))
+
+
+def record(message, **fields):
+    made = logging.LogRecord("pns", logging.INFO, "", 0, message, None, None)
+    made.fields = fields
+    return made
+
+
+@given(st.text(), st.text())
+def test_no_text_ends_its_line_or_speaks_to_a_terminal(message, value):
+    line = JsonLines().format(record(message.replace("%", ""), value=value))
+    assert all(" " <= character <= "~" for character in line)
+    assert json.loads(line)["value"] == value[: len(value)]
+
+
+def test_a_long_text_is_cut_in_its_middle():
+    line = json.loads(JsonLines().format(record("a" * 10**6 + "z", value="b" * 10**6)))
+    assert len(line["message"]) == len(line["value"]) == LONGEST + 1
+    assert line["message"].startswith("aaa")
+    assert line["message"].endswith("az")
+
+
+def test_a_traceback_is_one_line():
+    made = record("failed")
+    try:
+        int("line\nend")
+    except ValueError as error:
+        made.exc_info = (type(error), error, error.__traceback__)
+    line = JsonLines().format(made)
+    assert "\n" not in line
+    assert "ValueError: invalid literal" in json.loads(line)["traceback"]
+
+
+def test_what_a_worker_says_has_the_id_of_its_request(capfd):
+    headers = GLB | {"X-Request-ID": "of-a-worker"}
+    stand_ins = {"job": jobs.obey, "measure": jobs.measure, "warm_up": jobs.no_warm_up}
+    with TestClient(create_app(Settings(workers=1), **stand_ins)) as client:
+        assert client.post("/subdivide", content=b"log", headers=headers).status_code == 200
+    # The worker wrote before it answered.
+    (line,) = [line for line in capfd.readouterr().err.splitlines() if "a job says" in line]
+    said = json.loads(line)
+    assert (said["request_id"], said["level"]) == ("of-a-worker", "warning")
+    assert said["message"] == "a job says\nsomething"
+
+
+# Metrics
+
+
+def scraped(port):
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=30) as answer:
+        families = text_string_to_metric_families(answer.read().decode())
+        return {
+            (sample.name, tuple(sorted(sample.labels.items()))): sample.value
+            for family in families
+            for sample in family.samples
+        }
+
+
+def labelled(values, name, /, **labels):
+    return values.get((name, tuple(sorted(labels.items()))))
+
+
+@pytest.fixture
+def scrape():
+    stops = []
+
+    def of(metrics):
+        port, stop = metrics.serve("127.0.0.1", 0)
+        stops.append(stop)
+        return scraped(port)
+
+    yield of
+    for stop in stops:
+        stop()
+
+
+def test_requests_are_counted_by_route_status_and_code(client, scrape):
+    client.post("/subdivide", content=b"echo", headers=GLB)
+    client.post("/subdivide", content=b"unreadable", headers=GLB)
+    values = scrape(client.app.state.metrics)
+    counted = {"route": "/subdivide", "method": "POST"}
+    assert labelled(values, "pns_requests_total", **counted, status="400", code="unreadable") == 1
+    assert labelled(values, "pns_requests_total", **counted, status="200", code="") >= 1
+    assert labelled(values, "pns_request_seconds_count", route="/subdivide") >= 2
+    assert labelled(values, "pns_received_bytes_total", route="/subdivide") >= 14
+    assert labelled(values, "process_open_fds") > 0
+    assert labelled(values, "pns_worker_memory_bytes") > 2**20
+
+
+def test_a_stranger_cannot_make_series(client, scrape):
+    for n in range(20):
+        client.request(f"M{n}", f"/made-up-{n}")
+    values = scrape(client.app.state.metrics)
+    routes = {dict(labels).get("route") for _, labels in values}
+    methods = {dict(labels).get("method") for _, labels in values}
+    assert not any("made-up" in (route or "") for route in routes)
+    assert not any((method or "").startswith("M") for method in methods)
+
+
+def test_jobs_faces_models_and_restarts_are_counted(scrape):
+    metrics = Metrics()
+    metrics.job({"queue": 0.2, "read": 0.1, "refine": 0.3}, faces_in=4, faces_out=64)
+    entry = {"name": "full", "hash": "ab" * 32, "default": True}
+    metrics.catalogue(Catalogue(("full",), json.dumps([entry]).encode()))
+    metrics.gauge("pns_queue_jobs", "Jobs that wait", lambda: 3)
+    metrics.tally("pns_worker_restarts", "…", "cause", lambda: Counter(died=2))
+    values = scrape(metrics)
+    assert labelled(values, "pns_faces_total", direction="in") == 4
+    assert labelled(values, "pns_faces_total", direction="out") == 64
+    assert labelled(values, "pns_queue_seconds_sum") == pytest.approx(0.2)
+    assert labelled(values, "pns_stage_seconds_sum", stage="refine") == pytest.approx(0.3)
+    assert labelled(values, "pns_stage_seconds_count", stage="queue") is None
+    assert labelled(values, "pns_model_info", name="full", hash="ab" * 32, default="true") == 1
+    assert labelled(values, "pns_queue_jobs") == 3
+    assert labelled(values, "pns_worker_restarts_total", cause="died") == 2
+    assert any(name == "pns_build_info" for name, _ in values)
+
+
+# HEAD
+
+
+@pytest.mark.parametrize("path", ["/healthz", "/readyz", "/models", "/openapi.json", "/docs", "/"])
+def test_head_is_get_without_a_body(client, path):
+    client.post("/subdivide", content=b"x", headers=GLB)
+    head, get = client.head(path), client.get(path)
+    assert (head.status_code, get.status_code) == (200, 200)
+    assert head.content == b""
+    unlike = {"x-request-id"}
+    assert {n: v for n, v in head.headers.items() if n not in unlike} == {
+        n: v for n, v in get.headers.items() if n not in unlike
+    }
+
+
+def test_head_of_what_has_no_get_is_405(client):
+    assert client.head("/subdivide").status_code == 405

@@ -1,0 +1,302 @@
+"""OBJ, PLY, STL and OFF: what goes in comes out, refined, with nothing cracked or invented."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from pns_common.schemes import loop
+from service.errors import LimitError, UnreadableError, UnrefinableError
+from service.gltf.subdivide import subdivide_gltf
+from service.meshfiles import formats
+from service.meshfiles.example import part
+from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.refine_triangles import refine_triangles
+from service.meshfiles.triangles_glb import triangles_glb
+from service.options import Limits, Options
+from tests.support.shared import shared_path
+
+KINDS = ("obj", "ply", "stl", "off")
+
+
+def refined(mesh_file: IndexedTriangles, levels: int = 1) -> tuple[IndexedTriangles, dict]:
+    return refine_triangles(mesh_file, loop(), Options(levels=levels, scheme="loop"), Limits())
+
+
+def welded(mesh_file: IndexedTriangles) -> trimesh.Trimesh:
+    mesh = trimesh.Trimesh(mesh_file.vertices, mesh_file.faces, process=False)
+    mesh.merge_vertices()
+    return mesh
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_written_and_read_again_is_the_same_surface(kind: str) -> None:
+    mesh_file = part()
+    again = formats.read(formats.write(mesh_file, kind), kind)
+    assert len(again.faces) == len(mesh_file.faces)
+    np.testing.assert_allclose(
+        again.vertices[again.faces], mesh_file.vertices[mesh_file.faces], rtol=1e-6, atol=1e-7
+    )
+    assert again.split == 0
+    assert (again.uv is not None) == (kind == "obj")
+
+
+def test_an_obj_of_many_materials_is_the_same_surface_as_one_of_few() -> None:
+    # trimesh alone would take minutes: its time grows with the square of their number.
+    whole = formats.read(formats.write(part(), "obj"), "obj")
+    lines = formats.write(part(), "obj").decode().splitlines()
+    faces = [line for line in lines if line.startswith("f ")]
+    others = [line for line in lines if not line.startswith("f ")]
+    many = [text for number, face in enumerate(faces) for text in (f"usemtl m{number}", face)]
+    read = formats.read("\n".join(others + many * 11).encode(), "obj")
+    assert read.unsupported["materials"] == 11 * len(faces) > 20_000
+    corners = read.vertices[read.faces]
+    assert np.array_equal(corners[: len(faces)], whole.vertices[whole.faces])
+    assert len(corners) == 11 * len(faces)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_trimesh_reads_what_is_written(kind: str) -> None:
+    mesh = trimesh.load_mesh(io.BytesIO(formats.write(part(), kind)), file_type=kind)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(welded(part()).volume, rel=1e-6)
+
+
+def test_a_surface_cut_at_its_uv_seams_stays_closed() -> None:
+    fine, report = refined(part(), levels=2)
+    assert welded(fine).is_watertight
+    assert len(fine.faces) == 16 * len(part().faces)
+    assert report["levels"][0]["edges"]["boundary"] == 0
+
+
+def test_seams_make_no_difference_to_the_surface() -> None:
+    mesh_file = part()
+    fine, _ = refined(mesh_file, levels=2)
+    bare, _ = refined(IndexedTriangles(mesh_file.vertices, mesh_file.faces), levels=2)
+    assert np.array_equal(fine.vertices[fine.faces], bare.vertices[bare.faces])
+
+
+def test_loop_positions_equal_trimeshs_on_a_closed_mesh() -> None:
+    mesh_file = part()
+    fine, _ = refined(IndexedTriangles(mesh_file.vertices, mesh_file.faces))
+    closed = trimesh.Trimesh(mesh_file.vertices, mesh_file.faces, process=False)
+    closed.merge_vertices(digits_vertex=12)
+    vertices, faces = trimesh.remesh.subdivide_loop(closed.vertices, closed.faces, 1)
+    ours = fine.vertices[fine.faces].mean(axis=1)
+    theirs = vertices[faces].mean(axis=1)
+    order = [np.lexsort(np.round(centres, 9).T) for centres in (ours, theirs)]
+    np.testing.assert_allclose(ours[order[0]], theirs[order[1]], atol=1e-9)
+
+
+def test_texture_coordinates_are_linear_along_edges() -> None:
+    mesh_file = part()
+    fine, _ = refined(mesh_file)
+    assert fine.uv is not None
+    # Faces come in fours, the first of them at corner a; its second corner is the middle of ab.
+    a, b, _ = mesh_file.faces.T
+    middle = fine.faces[0::4, 1]
+    np.testing.assert_allclose(fine.uv[middle], (mesh_file.uv[a] + mesh_file.uv[b]) / 2, atol=1e-15)
+    assert np.array_equal(fine.uv[fine.faces[0::4, 0]], mesh_file.uv[a])
+
+
+def test_double_precision_survives() -> None:
+    # So far from the origin, float32 has steps of 1/32.
+    corners = np.array([[512_000.01, 0, 0], [512_001.02, 0, 0], [512_000.03, 1, 0]])
+    fine, _ = refined(IndexedTriangles(corners, np.array([[0, 1, 2]])))
+    middle = fine.vertices[fine.faces[0, 1]]
+    np.testing.assert_array_equal(middle, (corners[0] + corners[1]) / 2)
+    again = formats.read(formats.write(fine, "obj"), "obj")
+    lost = again.vertices[again.faces] - fine.vertices[fine.faces]
+    assert np.abs(lost).max() < 1e-6
+
+
+POLYGONS = {
+    "obj": b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv .5 2 0\nf 1 2 3 4\nf 1 3 5\nf 4 3 2 1 5\n",
+    "off": b"# comment\nOFF\n5 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n.5 2 0\n"
+    b"4 0 1 2 3 255 0 0\n3 0 2 4\n5 3 2 1 0 4\n",
+    "ply": b"ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
+    b"property float z\nelement face 3\nproperty list uchar int vertex_indices\nend_header\n"
+    b"0 0 0\n1 0 0\n1 1 0\n0 1 0\n.5 2 0\n4 0 1 2 3\n3 0 2 4\n5 3 2 1 0 4\n",
+}
+
+
+@pytest.mark.parametrize("kind", POLYGONS)
+def test_polygons_are_split_and_counted(kind: str) -> None:
+    mesh_file = formats.read(POLYGONS[kind], kind)
+    assert len(mesh_file.faces) == 2 + 1 + 3
+    assert mesh_file.split == 3
+    _, report = refined(mesh_file)
+    assert report["changes"] == [
+        {"pointer": "", "what": "triangles added by splitting polygons", "count": 3}
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "data", "names"),
+    [
+        ("obj", b"vn 0 0 1\nusemtl a\n" + POLYGONS["obj"], {"vertex normals", "materials"}),
+        ("obj", b"vt 0 0\n" + POLYGONS["obj"], {"texture coordinates that not all faces have"}),
+        (
+            "obj",
+            b"v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\nf 1 2 3\nl 1 2\n",
+            {"vertex colours", "lines"},
+        ),
+        (
+            "ply",
+            POLYGONS["ply"]
+            .replace(b"float z\n", b"float z\nproperty uchar red\n")
+            .replace(b" 0\n", b" 0 255\n"),
+            {"vertex property red"},
+        ),
+        ("off", POLYGONS["off"].replace(b"OFF", b"COFF"), {"values that COFF adds to vertices"}),
+    ],
+)
+def test_what_is_left_out_is_named(kind: str, data: bytes, names: set[str]) -> None:
+    mesh_file = formats.read(data, kind)
+    assert set(mesh_file.unsupported) == names
+    _, report = refined(mesh_file)
+    assert {f"{name} dropped" for name in names} <= {c["what"] for c in report["changes"]}
+
+
+def test_an_obj_of_several_materials_does_not_crack_between_them() -> None:
+    text = formats.write(part(), "obj").decode().splitlines(keepends=True)
+    faces = [n for n, line in enumerate(text) if line.startswith("f ")]
+    text[faces[0]] = "usemtl one\n" + text[faces[0]]
+    text[faces[700]] = "usemtl two\n" + text[faces[700]]
+    mesh_file = formats.read("".join(text).encode(), "obj")
+    fine, _ = refined(mesh_file)
+    assert len(fine.faces) == 4 * len(part().faces)
+    assert welded(fine).is_watertight
+
+
+def test_degenerate_faces_are_dropped_and_copies_kept_and_both_counted() -> None:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -0.0]])
+    mesh_file = IndexedTriangles(vertices, np.array([[0, 1, 2], [0, 1, 3], [2, 1, 0]]))
+    fine, report = refined(mesh_file)
+    assert report["dropped"] == {"degenerate_faces": 1, "duplicate_faces": 0, "vertices": 0}
+    assert report["totals"]["copied_faces"] == 1
+    assert len(fine.faces) == 8
+
+
+@pytest.mark.parametrize(
+    ("kind", "data", "unused"),
+    [
+        ("obj", b"v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 2 \\\n 3 4\n", 1),
+        ("obj", b"v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 8 8 8\nv 7 7 7\n", 3),
+        ("off", b"OFF\n5 1 0\n0 0 0\n9 9 9\n1 0 0\n0 1 0\n8 8 8\n3 0 2 3\n", 2),
+        ("off", b"OFF\n5 2 0\n0 0 0\n9 9 9\n1 0 0\n0 1 0\n8 8 8\n3 0 2 3\n3 0 1 1\n", 2),
+        ("off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", 0),
+    ],
+)
+def test_vertices_that_no_face_uses_are_counted(kind: str, data: bytes, unused: int) -> None:
+    _, report = refined(formats.read(data, kind))
+    assert report["dropped"]["vertices"] == unused
+
+
+def test_what_the_report_counts_is_the_same_as_a_gltfs() -> None:
+    _, report = refined(part())
+    options = Options(scheme="loop")
+    of_gltf = subdivide_gltf(triangles_glb(part()), "glb", options, None, Limits()).report
+    assert report["dropped"] == of_gltf["dropped"]
+    assert set(of_gltf["totals"]) - set(report["totals"]) == {"meshes", "primitives"}
+    assert report["totals"]["zero_reference_lengths"] == 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "data", [b"", b"garbage", b"\0" * 200, b"ply\nformat ascii 1.0\n", b"OFF\n3 1 0\n0 0 0\n"]
+)
+def test_what_is_no_mesh_is_unreadable(kind: str, data: bytes) -> None:
+    with pytest.raises(UnreadableError):
+        formats.read(data, kind)
+
+
+TRIANGLE = b"0 0 0\n1 0 0\n0 1 0\n"
+
+
+@pytest.mark.parametrize(
+    ("kind", "data"),
+    [
+        ("stl", bytes(80) + b"\xff\xff\xff\xff"),
+        ("stl", b"solid\nfacet\nvertex 0 0 0\nvertex 1 0 x\nvertex 0 1 0\nendsolid\n"),
+        ("obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999999\n"),
+        ("off", b"OFF\n3 1 0\n" + TRIANGLE + b"3 0 1 99999999999999999999999\n"),
+        ("off", b"OFF\n3 " + b"9" * 25 + b" 0\n" + TRIANGLE + b"3 0 1 2\n"),
+        ("off", b"OFF\n999999999999999999 1 0\n" + TRIANGLE + b"3 0 1 2\n"),
+        ("off", b"OFF\n3 1 0\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n"),
+        ("off", b"OFF\n3 1 0\n" + TRIANGLE + b"-3 0 1 2\n"),
+        ("off", b"OFF\n3 1 0\n" + TRIANGLE + b"4 0 1 2\n"),
+    ],
+)
+def test_refusals_speak_of_the_file(kind: str, data: bytes) -> None:
+    with pytest.raises(UnreadableError) as refusal:
+        formats.read(data, kind)
+    assert kind.upper() in refusal.value.detail
+    for word in ("islice", "inhomogeneous", "int", "charset", "list", "array", "Traceback"):
+        assert word not in refusal.value.detail.split()
+
+
+@pytest.mark.parametrize("kind", ["obj", "stl"])
+def test_names_in_old_encodings_are_no_obstacle(kind: str) -> None:
+    name = "Geh\xe4use".encode("latin-1")
+    corners = [b"0 0 0", b"1 0 0", b"0 1 0"]
+    text = {
+        "obj": b"# " + name + b"\n" + b"".join(b"v %b\n" % c for c in corners) + b"f 1 2 3\n",
+        "stl": b"solid "
+        + name
+        + b"\nfacet normal 0 0 1\nouter loop\n"
+        + b"".join(b"vertex %b\n" % c for c in corners)
+        + b"endloop\nendfacet\nendsolid\n",
+    }
+    assert len(formats.read(text[kind], kind).faces) == 1
+
+
+def test_faces_of_two_vertices_are_counted() -> None:
+    mesh_file = formats.read(b"OFF\n3 2 0\n" + TRIANGLE + b"3 0 1 2\n2 0 1\n", "off")
+    assert mesh_file.unsupported == {"faces of fewer than three vertices": 1}
+    assert mesh_file.split == 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"OFF\n3 1 0\n0 0 0\n1 0 0\nnan 1 0\n3 0 1 2\n",
+        b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n",
+        b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n",
+        b"OFF\n3 1 0\n0 0 0\n0 0 0\n0 1 0\n3 0 1 2\n",
+    ],
+)
+def test_numbers_that_make_no_mesh_are_refused(text: bytes) -> None:
+    with pytest.raises(UnrefinableError):
+        refined(formats.read(text, "off"))
+
+
+@pytest.mark.parametrize("limits", [Limits(max_faces=100), Limits(max_memory_bytes=1000)])
+def test_limits_hold_for_mesh_files_too(limits: Limits) -> None:
+    with pytest.raises(LimitError):
+        refine_triangles(part(), loop(), Options(scheme="loop"), limits)
+
+
+@pytest.mark.parametrize(
+    ("name", "faces"),
+    [
+        ("fuze.ply", 1000),
+        ("lego.ply", 3072),
+        ("moebius.obj", 448),
+        ("fish_control_mesh.obj", 220),
+        ("spot_control_mesh.obj", 372),
+        ("penguin_control_mesh.obj", 398),
+    ],
+)
+def test_assets_refine_without_cracks(name: str, faces: int) -> None:
+    path: Path = shared_path("assets") / name
+    mesh_file = formats.read(path.read_bytes(), path.suffix[1:])
+    fine, report = refined(mesh_file)
+    assert len(mesh_file.faces) == faces
+    assert len(fine.faces) == 4 * (faces - report["dropped"]["degenerate_faces"])
+    assert welded(fine).is_watertight == welded(mesh_file).is_watertight

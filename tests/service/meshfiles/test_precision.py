@@ -1,0 +1,78 @@
+"""Double positions: what OBJ, PLY and OFF hold is not rounded, and where it must be, it is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pns_common.mesh import Mesh
+from pns_common.refine import refine
+from pns_common.schemes import loop
+from service.errors import UnrefinableError
+from service.meshfiles import formats
+from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.refine_triangles import refine_triangles
+from service.meshfiles.single_precision import rounding_changes
+from service.options import Limits, Options
+
+SIDE = 12
+
+
+def grid(*, spacing: float, offset: float) -> IndexedTriangles:
+    """A square of SIDE × SIDE vertices, so far along x."""
+    x, y = np.meshgrid(np.arange(SIDE), np.arange(SIDE), indexing="ij")
+    points = np.column_stack([offset + spacing * x.ravel(), spacing * y.ravel(), 0 * x.ravel()])
+    a = (SIDE * np.arange(SIDE - 1)[:, None] + np.arange(SIDE - 1)).ravel()
+    b, c, d = a + SIDE, a + SIDE + 1, a + 1
+    return IndexedTriangles(
+        points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    )
+
+
+PLY_HEAD = """ply
+format ascii 1.0
+element vertex {vertices}
+property double x
+property double y
+property double z
+element face {faces}
+property list uchar int vertex_indices
+end_header
+"""
+
+
+def double_ply(triangles: IndexedTriangles) -> bytes:
+    head = PLY_HEAD.format(vertices=len(triangles.vertices), faces=len(triangles.faces))
+    rows = [" ".join(map(repr, row)) for row in triangles.vertices.tolist()]
+    rows += ["3 " + " ".join(map(str, row)) for row in triangles.faces.tolist()]
+    return (head + "\n".join(rows) + "\n").encode()
+
+
+@pytest.mark.parametrize("kind", ["obj", "off", "ply"])
+@pytest.mark.parametrize(("spacing", "offset"), [(0.1, 4.5e6), (1e-46, 0.0), (1e40, 1e41)])
+def test_coordinates_beyond_float32_keep_every_face(
+    kind: str, spacing: float, offset: float
+) -> None:
+    triangles = grid(spacing=spacing, offset=offset)
+    data = double_ply(triangles) if kind == "ply" else formats.write(triangles, kind)
+    read = formats.read(data, kind)
+    fine, report = refine_triangles(read, loop(), Options(scheme="loop"), Limits())
+    assert report["dropped"] == {"degenerate_faces": 0, "duplicate_faces": 0, "vertices": 0}
+    assert len(fine.faces) == 4 * len(triangles.faces)
+    expected = refine(Mesh(read.vertices, read.faces), loop()).mesh
+    np.testing.assert_array_equal(fine.vertices[fine.faces], expected.vertices[expected.faces])
+
+
+def test_faces_that_rounding_flattens_are_counted() -> None:
+    triangles = grid(spacing=0.1, offset=4.5e6)
+    x = triangles.vertices.astype(np.float32)[triangles.faces]
+    sides = [(x[:, i] == x[:, i - 1]).all(axis=1) for i in range(3)]
+    (change,) = rounding_changes(triangles)
+    assert change.count == np.any(sides, axis=0).sum() > 100
+    assert "float32" in change.what
+    assert rounding_changes(grid(spacing=0.1, offset=0)) == []
+
+
+def test_positions_beyond_the_range_of_float32_are_refused() -> None:
+    with pytest.raises(UnrefinableError, match="float32"):
+        rounding_changes(grid(spacing=1e40, offset=0))

@@ -1,0 +1,50 @@
+"""Creases, smooth UVs and the weld tolerance for formats without a scene."""
+
+import numpy as np
+import pytest
+
+from pns_common import loop
+from service.errors import InvalidParameter
+from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.refine_triangles import refine_triangles
+from service.options import Limits, Options
+from tests.support.gltf.shapes import box, octahedron
+
+
+def refined(shape, texture=None, **options):
+    triangles = IndexedTriangles(shape["POSITION"], shape["indices"].astype(np.int64), texture)
+    return refine_triangles(triangles, loop(), Options(**options), Limits())
+
+
+def test_mesh_files_take_creases_by_angle():
+    triangles, report = refined(box(), levels=2, crease="angle:60")
+    assert report["levels"][0]["edges"]["crease"] == 12
+    assert (np.abs(triangles.vertices).max(axis=1) == 1).all()
+
+
+def test_creases_by_normals_need_a_gltf():
+    with pytest.raises(InvalidParameter) as refusal:
+        refined(box(), crease="normals")
+    assert refusal.value.name == "crease"
+
+
+def test_smooth_uvs_follow_the_positions_of_a_closed_chart():
+    shape = octahedron()
+    triangles, _ = refined(shape, shape["POSITION"][:, :2], levels=2, uv="smooth")
+    np.testing.assert_allclose(triangles.uv, triangles.vertices[:, :2], atol=1e-12)
+
+
+def test_a_weld_tolerance_is_counted():
+    flat = octahedron()["indices"].reshape(-1)
+    noise = 1e-6 * np.random.default_rng(0).standard_normal((24, 3))
+    loose = {
+        "POSITION": octahedron()["POSITION"][flat] + noise,
+        "indices": np.arange(24).reshape(-1, 3),
+    }
+    _, report = refined(loose, weld_tolerance=1e-4)
+    assert report["levels"][0]["edges"]["boundary"] == 0
+    assert {
+        "pointer": "",
+        "what": "vertices joined within weld_tolerance",
+        "count": 18,
+    } in report["changes"]

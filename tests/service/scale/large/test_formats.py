@@ -1,0 +1,283 @@
+"""Files in and out: what `pns subdivide` reads, parts that meet, and broken files that are told."""
+
+import io
+import json
+import shutil
+import struct
+import subprocess
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.console import Console
+
+from pns_common import Mesh, clean, loop, refine
+from pns_common.mesh import repeated_vertex
+from service.errors import InvalidParameter, UnreadableError, UnrefinableError
+from service.gltf.read.container import read_glb, write_glb
+from service.meshes.weld import weld
+from service.meshfiles import formats
+from service.meshfiles.example import part_glb
+from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.triangles_glb import triangles_glb
+from service.options import Options
+from service.scale.large import weld as outside_memory
+from service.scale.large.part import run_part
+from service.scale.large.plan import Large
+from service.scale.large.run import run_large
+from service.scale.large.weld import weld_outside_memory
+from tests.support.meshes import bent, grid, soups
+
+LOOP = Options(scheme="loop")
+
+
+def refined(source, output, parts=3, options=LOOP):
+    large = Large(source, output, options, 2**31, parts)
+    report, _ = run_large(large, lambda tasks: map(run_part, tasks), Console(file=io.StringIO()))
+    return report
+
+
+def soup():
+    """Triangles with seams: each corner of a surface, some repeated, one without area."""
+    points, faces = grid(8, bent)
+    faces = np.concatenate([faces, faces[:2, ::-1], [[3, 3, 4]]])
+    return IndexedTriangles(points[faces.reshape(-1)], np.arange(faces.size).reshape(-1, 3))
+
+
+def written(path, triangles):
+    kind = path.suffix[1:]
+    data = triangles_glb(triangles) if kind == "glb" else formats.write(triangles, kind)
+    path.write_bytes(data)
+    return path
+
+
+def control_of(vertices, faces):
+    """The control mesh that is made in memory."""
+    welded = weld(vertices, faces)
+    return clean(Mesh(welded.points, welded.faces)).mesh
+
+
+def assert_same(folder, mesh):
+    points, faces = np.load(folder / "positions.npy"), np.load(folder / "faces.npy")
+    assert points.tobytes() == mesh.vertices.tobytes()
+    assert (faces == mesh.faces).all()
+
+
+@pytest.mark.parametrize("ending", ["ply", "stl", "obj", "glb"])
+def test_files_are_refined_as_in_memory(tmp_path, ending):
+    source = written(tmp_path / f"in.{ending}", soup())
+    report = refined(source, tmp_path / "out")
+    as_stl = formats.read(formats.write(soup(), "stl"), "stl")
+    read = formats.read(source.read_bytes(), ending) if ending != "glb" else as_stl
+    assert_same(tmp_path / "out", refine(control_of(read.vertices, read.faces), loop()).mesh)
+    assert (report["dropped"]["degenerate_faces"], report["dropped"]["duplicate_faces"]) == (1, 2)
+
+
+@settings(max_examples=25)
+@given(mesh=soups(), rows=st.integers(1, 50))
+def test_welding_outside_memory_is_welding(tmp_path_factory, mesh, rows):
+    folder = tmp_path_factory.mktemp("weld")
+    vertices = np.round(mesh.vertices / np.abs(mesh.vertices).max() * 2)  # many meet, some at −0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(outside_memory, "SORTED", rows)
+        patch.setattr(
+            outside_memory,
+            "blocks_of",
+            lambda count: (
+                slice(start, min(start + rows, count)) for start in range(0, count, rows)
+            ),
+        )
+        if repeated_vertex(weld(vertices, mesh.faces).faces).all():
+            with pytest.raises(UnrefinableError, match="three different"):
+                weld_outside_memory(vertices, mesh.faces, folder)
+            return
+        weld_outside_memory(vertices, mesh.faces, folder)
+    assert_same(folder, control_of(vertices, mesh.faces))
+    assert sorted(path.name for path in folder.iterdir()) == ["faces.npy", "positions.npy"]
+
+
+def test_what_many_vertices_share_is_never_held_at_once(tmp_path, monkeypatch):
+    """Three positions and two faces, a thousand times each."""
+    held = []
+
+    def watched(rows, width):
+        held.append(len(rows))
+        return in_order(rows, width)
+
+    in_order = outside_memory._sorted
+    monkeypatch.setattr(outside_memory, "_sorted", watched)
+    monkeypatch.setattr(
+        outside_memory,
+        "blocks_of",
+        lambda count: (slice(at, min(at + 500, count)) for at in range(0, count, 500)),
+    )
+    points = np.tile(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), (1000, 1))
+    faces = np.arange(4000).reshape(-1, 4)[:, [0, 1, 2, 0, 1, 3]].reshape(-1, 3)
+    dropped = weld_outside_memory(points, faces, tmp_path)
+    assert_same(tmp_path, control_of(points, faces))
+    assert dropped == outside_memory.Dropped(0, 1998, 3996)
+    assert max(held) <= 4 * len(points) // 500
+
+
+def test_an_obj_may_count_backwards_and_name_other_things(tmp_path, monkeypatch):
+    monkeypatch.setattr("service.scale.large.readers.TEXT", 32)
+    text = b"# a\nmtllib x\nv 0 0 0\nv 1 0 0 1\n v 0 1 0\r\nvt 0 0\nf -3/1/1 -2//1 -1 # f 9\n"
+    (tmp_path / "in.obj").write_bytes(text + b"v 0 0 1\nf 1 2 4\ng x\n")
+    refined(tmp_path / "in.obj", tmp_path / "out", 1)
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    expected = refine(Mesh(points, np.array([[0, 1, 2], [0, 1, 3]])), loop()).mesh
+    assert_same(tmp_path / "out", expected)
+
+
+def test_an_stl_may_be_text(tmp_path, monkeypatch):
+    monkeypatch.setattr("service.scale.large.readers.TEXT", 40)
+    mesh = trimesh.Trimesh(*grid(3), process=False)
+    (tmp_path / "in.stl").write_text(mesh.export(file_type="stl_ascii"))
+    refined(tmp_path / "in.stl", tmp_path / "out", 2)
+    assert_same(tmp_path / "out", refine(control_of(*grid(3)), loop()).mesh)
+
+
+def test_a_ply_may_be_of_either_byte_order_with_other_properties(tmp_path):
+    points, faces = grid(4, bent)
+    header = [
+        "ply",
+        "format binary_big_endian 1.0",
+        "comment made by hand",
+        "element vertex 16",
+        *(f"property double {name}" for name in ("x", "y", "quality", "z")),
+        "element camera 1",
+        "property int number",
+        f"element face {len(faces)}",
+        "property list uchar ushort vertex_index",
+        "property float area",
+        "end_header",
+    ]
+    with (tmp_path / "in.ply").open("wb") as file:
+        file.write(("\n".join(header) + "\n").encode())
+        for x, y, z in points:
+            file.write(struct.pack(">4d", x, y, 7.0, z))
+        file.write(struct.pack(">i", 5))
+        for face in faces:
+            file.write(struct.pack(">B3Hf", 3, *face, 1.5))
+    refined(tmp_path / "in.ply", tmp_path / "out", 2)
+    assert_same(tmp_path / "out", refine(control_of(points, faces), loop()).mesh)
+
+
+def test_a_ply_that_is_written_holds_what_the_arrays_hold(tmp_path):
+    source = written(tmp_path / "in.obj", soup())
+    refined(source, tmp_path / "out.ply")
+    refined(source, tmp_path / "out")
+    read = formats.read((tmp_path / "out.ply").read_bytes(), "ply")
+    assert_same(tmp_path / "out", Mesh(read.vertices, read.faces))
+    refined(tmp_path / "out.ply", tmp_path / "again")
+
+
+def test_parts_of_a_tileset_meet_in_bits(tmp_path):
+    source = written(tmp_path / "in.obj", soup())
+    report = refined(source, tmp_path / "out.3dtiles", 5)
+    refined(source, tmp_path / "out")
+    tree = json.loads((tmp_path / "out.3dtiles" / "tileset.json").read_text())
+    x, minus_z, y = tree["root"]["transform"][12:15]
+    points, faces = np.load(tmp_path / "out/positions.npy"), np.load(tmp_path / "out/faces.npy")
+    expected = (points - [x, y, -minus_z]).astype(np.float32)
+    tiles = [
+        trimesh.load(
+            tmp_path / "out.3dtiles" / child["content"]["uri"], process=False, force="mesh"
+        )
+        for child in tree["root"]["children"]
+    ]
+    corners = np.concatenate([tile.vertices[tile.faces] for tile in tiles]).astype(np.float32)
+    assert sorted(corners.tolist()) == sorted(expected[faces].tolist())
+    assert tree["asset"]["extras"]["pns"]["levels"] == report["levels"]
+    for tile, child in zip(tiles, tree["root"]["children"], strict=True):
+        box = np.array(child["boundingVolume"]["box"])
+        turned = np.stack([tile.vertices[:, 0], -tile.vertices[:, 2], tile.vertices[:, 1]], axis=1)
+        inside = np.abs(turned - box[:3]) <= np.abs(box[3:]).reshape(3, 3).sum(axis=0) + 1e-6
+        assert inside.all()
+
+
+def test_a_tileset_is_valid(tmp_path):
+    validator = shutil.which("3d-tiles-validator")
+    if validator is None:
+        pytest.skip("3d-tiles-validator is not installed (npm)")
+    refined(written(tmp_path / "in.stl", soup()), tmp_path / "out.3dtiles", 4)
+    arguments = [validator, "--tilesetFile", str(tmp_path / "out.3dtiles" / "tileset.json")]
+    told = subprocess.run(arguments, capture_output=True, text=True, check=True).stdout
+    report = json.loads(told[told.index("{") :])
+    assert (report["numErrors"], report["numWarnings"]) == (0, 0), told
+
+
+def changed_glb(change):
+    container = read_glb(triangles_glb(IndexedTriangles(*grid(3))))
+    tree = json.loads(container.text)
+    change(tree)
+    return write_glb(json.dumps(tree).encode(), [container.binary], [])
+
+
+def _two_meshes(tree):
+    tree["meshes"] *= 2
+
+
+def _lines(tree):
+    tree["meshes"][0]["primitives"][0]["mode"] = 1
+
+
+def _bytes(tree):
+    tree["accessors"][0]["componentType"] = 5121
+
+
+def _elsewhere(tree):
+    tree["buffers"][0]["uri"] = "x"
+
+
+PLY = b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\n"
+FACE = b"element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+XYZ = b"property float y\nproperty float z\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "words"),
+    [
+        ("a.ply", b"no ply", "not a PLY"),
+        ("a.ply", b"ply\nformat ascii 1.0\nend_header\n", "only a binary"),
+        ("a.ply", PLY + b"end_header\n", "no vertices or no faces"),
+        ("a.ply", PLY + FACE, "vertex has no"),
+        ("a.ply", PLY + XYZ.replace(b"float z", b"real z") + FACE, "cannot be read"),
+        ("a.ply", PLY + XYZ + b"property list uchar int w\n" + FACE, "w' of vertex"),
+        ("a.ply", PLY + XYZ + FACE, "ends within its vertex"),
+        ("a.ply", PLY + XYZ + FACE + bytes(12) + b"\4" + bytes(16), "face 0 has 4 corners"),
+        ("a.ply", PLY + XYZ + FACE + bytes(12) + struct.pack("<B3i", 3, 0, 1, 2), "indices"),
+        ("a.stl", b"solid\nvertex 0 0 0\n", "ends within a face"),
+        ("a.stl", b"solid\nvertex 0 0 x\n", "no number"),
+        ("a.obj", b"v 0 0 0\nf 1 2 3 4\n", "4 corners"),
+        ("a.obj", b"v 0 0 zero\n", "no number"),
+        ("a.obj", b"v 0 0 0\nf 1 x 3\n", "no number"),
+        ("a.obj", b"v 0 0 0\nf 1 1 1\n", "three different"),
+        ("a.glb", b"no glb" * 9, "not a GLB"),
+        ("a.glb", b"x", "not a readable GLB"),
+        ("a.glb", changed_glb(_two_meshes), "2 meshes"),
+        ("a.glb", changed_glb(_lines), "plain, uncompressed"),
+        ("a.glb", changed_glb(_bytes), "is kept in a way"),
+        ("a.glb", changed_glb(_elsewhere), "itself holds"),
+        ("a.glb", changed_glb(lambda tree: tree.pop("meshes")), "not a readable GLB"),
+        ("a.fbx", b"", "must be a folder"),
+    ],
+)
+def test_files_that_cannot_be_read_are_told(tmp_path, name, data, words):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises((UnreadableError, UnrefinableError, InvalidParameter), match=words):
+        refined(tmp_path / name, tmp_path / "out", 1)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_glb_of_several_primitives_is_one_mesh(tmp_path):
+    (tmp_path / "in.glb").write_bytes(part_glb())
+    refined(tmp_path / "in.glb", tmp_path / "out", 2)
+    scene = trimesh.load(tmp_path / "in.glb", process=False)
+    parts = list(scene.geometry.values())
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts])
+    faces = np.concatenate([p.faces + s for p, s in zip(parts, starts, strict=False)])
+    vertices = np.concatenate([part.vertices for part in parts])
+    assert_same(tmp_path / "out", refine(control_of(vertices, faces), loop()).mesh)

@@ -1,0 +1,219 @@
+"""Libraries of files: every file refined once, each fault its own file's, nothing half-written."""
+
+import hashlib
+import pickle
+import sqlite3
+import threading
+from pathlib import Path
+
+import pytest
+
+from service.cli import app
+from service.errors import InvalidParameter
+from service.meshfiles.convert import converted
+from service.options import Limits, Options
+from service.scale.batch import batch_work, work_hash
+from service.scale.engines import local
+from service.scale.job import Task, run
+from tests.service.scale.jobs import misbehave
+from tests.service.scale.libraries import (
+    LOOP,
+    TETRAHEDRON,
+    batch_of,
+    hashes,
+    library,
+    refined,
+    rows,
+)
+
+
+def test_each_file_is_what_subdivide_makes_of_it(tmp_path):
+    source = library(tmp_path / "in")
+    assert refined(batch_of(tmp_path)).counts == {"done": 3}
+    for name in ("a.obj", "b/c.obj", "d.glb"):
+        kind = name[-3:]
+        alone = converted((source / name).read_bytes(), kind, kind, LOOP, None, Limits())
+        assert (tmp_path / "out" / name).read_bytes() == alone.content
+
+
+def test_rows_say_what_was_done(tmp_path):
+    library(tmp_path / "in")
+    batch = batch_of(tmp_path)
+    refined(batch)
+    row = rows(batch)["a.obj"]
+    data = (tmp_path / "out" / "a.obj").read_bytes()
+    assert (row["status"], row["faces_in"], row["faces_out"]) == ("done", 4, 16)
+    assert row["bytes_in"] == len(TETRAHEDRON)
+    assert row["output_sha256"] == hashlib.sha256(data).hexdigest()
+
+
+def test_what_is_done_is_not_done_again(tmp_path):
+    source = library(tmp_path / "in")
+    batch = batch_of(tmp_path)
+    refined(batch)
+    before = rows(batch)
+    assert refined(batch).counts == {"skipped": 3}
+    assert rows(batch) == before
+    (source / "a.obj").write_bytes(TETRAHEDRON.replace(b"v 1 0 0", b"v 2 0 0"))
+    (tmp_path / "out" / "d.glb").unlink()
+    assert refined(batch).counts == {"skipped": 1, "done": 2}
+
+
+def test_other_options_are_other_work(tmp_path):
+    library(tmp_path / "in", ["a.obj"])
+    refined(batch_of(tmp_path))
+    deeper = batch_of(tmp_path, options=Options(scheme="loop", levels=2))
+    assert refined(deeper).counts == {"done": 1}
+    assert work_hash(deeper) != work_hash(batch_of(tmp_path))
+
+
+def test_a_run_that_was_stopped_goes_on(tmp_path):
+    library(tmp_path / "in")
+
+    def stopped(tasks):
+        yield run(next(tasks))
+        raise KeyboardInterrupt
+
+    batch = batch_of(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        refined(batch, stopped)
+    assert len(rows(batch)) == 1
+    assert refined(batch).counts == {"skipped": 1, "done": 2}
+    assert len(rows(batch)) == 3
+
+
+def test_two_runs_at_once_do_no_harm(tmp_path):
+    library(tmp_path / "in", [f"{number}.obj" for number in range(20)])
+    batch = batch_of(tmp_path)
+    # In processes: the cap on a job's memory is that of a whole process.
+    threads = [
+        threading.Thread(target=refined, args=(batch, local(batch_work(60.0), 1))) for _ in range(2)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(rows(batch)) == 20
+    assert len(set(hashes(tmp_path / "out").values())) == 1
+
+
+@pytest.mark.parametrize(("content", "code"), [(b"glTF", "unreadable"), (b"", "unreadable")])
+def test_a_bad_file_costs_itself_alone(tmp_path, content, code):
+    library(tmp_path / "in")
+    (tmp_path / "in" / "bad.glb").write_bytes(content)
+    batch = batch_of(tmp_path)
+    summary = refined(batch)
+    assert summary.counts == {"done": 3, "failed": 1}
+    assert summary.failures == [(code, 1)]
+    assert rows(batch)["bad.glb"]["code"] == code
+    assert not (tmp_path / "out" / "bad.glb").exists()
+
+
+def test_limits_hold_for_each_file(tmp_path):
+    library(tmp_path / "in", ["a.obj"])
+    batch = batch_of(tmp_path, limits=Limits(max_faces=15))
+    assert refined(batch).failures == [("limit-exceeded", 1)]
+
+
+def test_a_fault_of_ours_is_told_and_the_rest_goes_on(tmp_path, monkeypatch):
+    library(tmp_path / "in", ["a.obj"])
+
+    def broken(*_):
+        raise ZeroDivisionError("ours")
+
+    monkeypatch.setattr("service.meshfiles.formats.read", broken)
+    batch = batch_of(tmp_path)
+    assert refined(batch).failures == [("internal-error", 1)]
+    assert "ZeroDivisionError: ours" in rows(batch)["a.obj"]["detail"]
+
+
+def test_workers_that_die_or_hang_cost_their_file_alone(tmp_path):
+    library(tmp_path / "in", ["a.obj", "dies.obj", "dies-once.obj", "hangs.obj", "z.obj"])
+    batch = batch_of(tmp_path)
+    summary = refined(batch, local(batch_work(3.0, misbehave), 2))
+    by_name = rows(batch)
+    assert summary.counts == {"done": 3, "failed": 2}
+    assert (by_name["dies.obj"]["code"], by_name["dies.obj"]["attempts"]) == ("worker-died", 2)
+    assert (by_name["hangs.obj"]["code"], by_name["hangs.obj"]["attempts"]) == ("job-timeout", 2)
+    assert by_name["dies-once.obj"]["attempts"] == 2
+
+
+def test_two_sources_of_one_result_are_told(tmp_path):
+    library(tmp_path / "in", ["a.obj"])
+    (tmp_path / "in" / "a.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    summary = refined(batch_of(tmp_path, to="ply"))
+    assert summary.counts == {"done": 1, "failed": 1}
+    assert summary.failures == [("output-taken", 1)]
+
+
+def test_a_dry_run_writes_nothing_but_its_report(tmp_path):
+    library(tmp_path / "in")
+    planned = refined(batch_of(tmp_path, dry=True))
+    assert planned.counts == {"planned": 3}
+    assert not (tmp_path / "out").exists()
+    assert planned.faces["planned"] == refined(batch_of(tmp_path)).faces["done"] > 0
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"source": "/no/such/folder"},
+        {"report": Path("/no/such/folder/report.jsonl")},
+        {"report": Path("report.txt")},
+        {"to": "fbx"},
+    ],
+)
+def test_what_cannot_be_used_is_told_before_anything_runs(tmp_path, changes):
+    library(tmp_path / "in")
+    with pytest.raises(InvalidParameter):
+        refined(batch_of(tmp_path, **changes))
+    assert not (tmp_path / "out").exists()
+
+
+def test_parquet_reports_hold_the_rows_that_json_lines_hold(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="the extra [ray] is not installed")
+    library(tmp_path / "in")
+    plain, columns = batch_of(tmp_path), batch_of(tmp_path, report=tmp_path / "report.parquet")
+    refined(plain)
+    for path in (tmp_path / "out").rglob("*.*"):
+        path.unlink()
+    refined(columns)
+    timed = ("seconds",)
+    table = parquet.read_table(columns.report).to_pylist()
+    for row in table:
+        expected = rows(plain)[Path(row["path"]).name]
+        assert {k: v for k, v in row.items() if not k.startswith(timed)} == {
+            k: v for k, v in expected.items() if not k.startswith(timed)
+        }
+
+
+def test_the_command_says_what_failed_and_ends_with_one(tmp_path, monkeypatch):
+    from typer.testing import CliRunner
+
+    library(tmp_path / "in", ["a.obj"])
+    (tmp_path / "in" / "bad.glb").write_bytes(b"no")
+    monkeypatch.chdir(tmp_path)
+    arguments = ["batch", "in", "out", "--scheme", "loop", "--report", "r.jsonl", "--workers", "1"]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 1
+    assert (tmp_path / "out" / "a.obj").is_file()
+
+
+def test_what_is_not_refined_is_not_collected(tmp_path):
+    """Rows of a manifest that no engine is asked for are noted as they come."""
+    (tmp_path / "list.txt").write_text("".join(f"{number}.fbx\n" for number in range(50)))
+    batch = batch_of(tmp_path, tmp_path / "list.txt")
+
+    def looks(tasks):
+        assert next(tasks, None) is None
+        noted = sqlite3.connect(f"{batch.report}.journal")
+        assert noted.execute("SELECT count(*) FROM rows").fetchone() == (50,)
+        noted.close()
+        return iter(())
+
+    assert refined(batch, looks).counts == {"failed": 50}
+
+
+def test_tasks_cross_to_a_worker_as_they_are():
+    task = Task("a.obj", "b.obj", "obj", "obj", LOOP, None, Limits(), known="x")
+    assert pickle.loads(pickle.dumps(task)) == task

@@ -1,0 +1,187 @@
+"""What a batch works through: manifests, globs and folders, here and behind URLs."""
+
+import json
+import socket
+import threading
+import tracemalloc
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+from service.errors import InvalidParameter
+from service.scale.sources import items_of
+from tests.service.scale.libraries import (
+    KINDS,
+    TETRAHEDRON,
+    batch_of,
+    hashes,
+    library,
+    refined,
+)
+
+
+@pytest.mark.parametrize("ending", ["txt", "csv", "jsonl", "parquet"])
+def test_manifests_name_files_beside_them(tmp_path, ending):
+    library(tmp_path, ["x/a.obj", "b.obj"])
+    names = ["x/a.obj", "b.obj"]
+    manifest = tmp_path / f"list.{ending}"
+    if ending == "parquet":
+        arrow = pytest.importorskip("pyarrow", reason="the extra [ray] is not installed")
+        parquet = pytest.importorskip("pyarrow.parquet")
+        parquet.write_table(arrow.table({"path": names, "size": [1, 2]}), manifest)
+    else:
+        manifest.write_text(
+            {
+                "txt": "# two files\nx/a.obj\n\nb.obj\n",
+                "csv": "size,path\n1,x/a.obj\n2,b.obj\n",
+                "jsonl": "".join(json.dumps({"path": name}) + "\n" for name in names),
+            }[ending]
+        )
+    assert refined(batch_of(tmp_path, manifest)).counts == {"done": 2}
+    assert set(hashes(tmp_path / "out")) == set(names)
+
+
+def test_a_glob_takes_what_it_matches(tmp_path):
+    library(tmp_path / "in", ["a.obj", "b/c.obj", "b/e.obj"])
+    listing = items_of(f"{tmp_path}/in/b/*.obj", KINDS)
+    assert [item.relative for item in listing()] == ["c.obj", "e.obj"]
+
+
+@pytest.mark.parametrize(
+    "line", ["../../up.obj", "/etc/passwd.obj", "a/../../../b.obj", "memory://x/c.obj"]
+)
+def test_no_manifest_leads_a_result_out_of_its_folder(tmp_path, line):
+    manifest = tmp_path / "list.txt"
+    manifest.write_text(f"{line}\n")
+    (item,) = items_of(str(manifest), KINDS)()
+    assert not item.relative.startswith(("/", ".."))
+    assert "/../" not in item.relative
+
+
+def test_a_long_manifest_takes_no_memory(tmp_path):
+    manifest = tmp_path / "list.txt"
+    with manifest.open("w") as file:
+        file.writelines(f"folder/file-{number}.obj\n" for number in range(100_000))
+    listing = items_of(str(manifest), KINDS)
+    tracemalloc.start()
+    try:
+        assert sum(1 for _ in listing()) == 100_000
+        assert tracemalloc.get_traced_memory()[1] < 1_000_000
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("text", ["size\n1\n", "path\n\n"])
+def test_a_manifest_without_paths_is_told(tmp_path, text):
+    (tmp_path / "list.csv").write_text("other\nx\n" if text == "size\n1\n" else text)
+    listing = items_of(str(tmp_path / "list.csv"), KINDS)
+    if text == "size\n1\n":
+        with pytest.raises(InvalidParameter):
+            list(listing())
+    else:
+        assert list(listing()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("list.jsonl", b'{"path": "a.obj"}\n{'),
+        ("list.jsonl", b"[1]\n"),
+        ("list.csv", b"\xff\xfe\x00"),
+        ("list.parquet", b"no parquet"),
+    ],
+)
+def test_a_manifest_that_is_none_is_told(tmp_path, name, text):
+    if name.endswith("parquet"):
+        pytest.importorskip("pyarrow", reason="the extra [ray] is not installed")
+    (tmp_path / name).write_bytes(text)
+    with pytest.raises(InvalidParameter, match=name):
+        list(items_of(str(tmp_path / name), KINDS)())
+
+
+def test_a_parquet_row_without_a_path_is_told(tmp_path):
+    arrow = pytest.importorskip("pyarrow", reason="the extra [ray] is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet.write_table(arrow.table({"path": ["a.obj", None]}), tmp_path / "list.parquet")
+    with pytest.raises(InvalidParameter, match="row 2"):
+        list(items_of(str(tmp_path / "list.parquet"), KINDS)())
+
+
+@pytest.fixture
+def web(tmp_path):
+    """A folder served over HTTP; its URL."""
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *_):
+            pass
+
+    folder = library(tmp_path / "served", ["a.obj", "b/c.obj"])
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=folder)) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+        thread.join()
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_http_is_a_source(tmp_path, web):
+    pytest.importorskip("aiohttp", reason="the extra [ray] is not installed")
+    # Over HTTP, a text that holds links could be taken for a folder.
+    (tmp_path / "served" / "list.txt").write_text(f"b/c.obj\n{web}/a.obj\n")
+    made = refined(batch_of(tmp_path, f"{web}/list.txt"))
+    assert made.counts == {"done": 2}
+    by_folder = batch_of(
+        tmp_path, web, destination=str(tmp_path / "two"), report=tmp_path / "2.jsonl"
+    )
+    assert refined(by_folder).counts == {"done": 2}
+    assert set(hashes(tmp_path / "two").values()) == set(hashes(tmp_path / "out").values())
+
+
+def test_http_is_no_destination(tmp_path):
+    pytest.importorskip("aiohttp", reason="the extra [ray] is not installed")
+    library(tmp_path / "in")
+    with pytest.raises(InvalidParameter, match="nothing can be written"):
+        refined(batch_of(tmp_path, destination="http://127.0.0.1:1/out"))
+
+
+@pytest.mark.parametrize("source", ["nowhere://x/y", "az-none://a"])
+def test_a_url_that_no_file_system_takes_is_told(tmp_path, source):
+    with pytest.raises(InvalidParameter, match=source):
+        refined(batch_of(tmp_path, source))
+
+
+@pytest.fixture
+def s3(monkeypatch):
+    server = pytest.importorskip("moto.server", reason="moto is not installed")
+    pytest.importorskip("s3fs", reason="s3fs is not installed")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.setenv(name, "test")
+    monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{port}")
+    monkeypatch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+    running = server.ThreadedMotoServer(ip_address="127.0.0.1", port=port, verbose=False)
+    running.start()
+    yield
+    running.stop()
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_s3_is_a_source_and_a_destination(tmp_path, s3):
+    import s3fs
+
+    store = s3fs.S3FileSystem(skip_instance_cache=True)
+    store.mkdir("meshes")
+    store.pipe_file("meshes/in/a.obj", TETRAHEDRON)
+    store.pipe_file("meshes/in/b/c.obj", TETRAHEDRON)
+    batch = batch_of(tmp_path, "s3://meshes/in", destination="s3://meshes/out")
+    assert refined(batch).counts == {"done": 2}
+    assert refined(batch).counts == {"skipped": 2}
+    local_batch = batch_of(
+        tmp_path, library(tmp_path / "in", ["a.obj"]), report=tmp_path / "l.jsonl"
+    )
+    refined(local_batch)
+    assert store.cat_file("meshes/out/b/c.obj") == (tmp_path / "out" / "a.obj").read_bytes()

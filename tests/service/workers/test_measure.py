@@ -1,0 +1,87 @@
+"""A glance at a document: what it predicts, and what it builds nothing of."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+
+import numpy as np
+import pytest
+
+from service.options import BYTES_PER_INPUT_BYTE, Limits, Options
+from service.workers.costs import Cost, cost_of
+from service.workers.jobs import GLANCE_BYTES, Work, measure
+from service.workers.measure import cost_of_gltf, cost_of_other
+from service.workers.memory_file import MemoryFile
+from tests.support.gltf import files
+from tests.support.gltf.shapes import box, octahedron
+
+
+def cost(data: bytes, levels: int = 1, limits: Limits | None = None) -> Cost:
+    return cost_of_gltf(data, "glb", levels, limits or Limits())
+
+
+def test_faces_and_meshes_are_those_that_the_document_counts() -> None:
+    data = files.pack(*files.document([octahedron(), box()], [octahedron()]))
+    measured = cost(data, levels=2)
+    assert (measured.faces, measured.meshes) == (16 * (8 + 12 + 8), 2)
+
+
+@pytest.mark.parametrize(("mode", "faces"), [(4, 2), (5, 4), (6, 4), (1, 0)])
+def test_faces_by_mode(mode: int, faces: int) -> None:
+    shape = {"POSITION": np.zeros((6, 3), np.float32), "mode": mode}
+    assert cost(files.pack(*files.document([shape]))).faces == 4 * faces
+
+
+def test_a_text_with_a_byte_order_mark_is_the_same() -> None:
+    tree, _ = files.document([octahedron()])
+    text = files.json.dumps(tree).encode()
+    plain = cost_of_gltf(text, "gltf", 1, Limits())
+    marked = cost_of_gltf(b"\xef\xbb\xbf" + text, "gltf", 1, Limits())
+    assert plain.faces == marked.faces == 32
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"glTF",
+        files.pack(b"{"),
+        files.pack(b'{"meshes":[{"primitives":3}]}'),
+        files.pack(b'{"meshes":[{"primitives":[{"attributes":{"POSITION":9}}]}]}'),
+        files.pack(b'{"accessors":[{"count":-4}],"meshes":[{"primitives":[{"indices":0}]}]}'),
+        files.pack(b'{"accessors":[{"count":' + b"9" * 5000 + b"}]}"),
+    ],
+)
+def test_what_will_be_refused_costs_its_bytes(data: bytes) -> None:
+    assert cost(data) == cost_of(0, 0, len(data))
+
+
+def test_what_is_over_the_limit_of_faces_costs_its_bytes() -> None:
+    data = files.pack(*files.document([octahedron()]))
+    assert cost(data, levels=3, limits=Limits(max_faces=100)) == cost_of(0, 0, len(data))
+
+
+def test_more_levels_and_more_learned_levels_cost_more() -> None:
+    data = files.pack(*files.document([octahedron()]))
+    learned = [cost_of_gltf(data, "glb", 3, Limits(), count).seconds for count in (0, 1, 2, 3)]
+    assert learned == sorted(set(learned))
+    # A model cannot act at more levels than there are.
+    assert cost_of_gltf(data, "glb", 3, Limits(), 9).seconds == learned[3]
+    assert cost(data, levels=3).seconds < cost(data, levels=4).seconds
+
+
+def test_other_formats_cost_by_their_bytes_within_the_limit() -> None:
+    assert cost_of_other(bytes(3000), 1, Limits()).faces == 400
+    assert cost_of_other(bytes(3000), 1, Limits(max_faces=9)).faces == 8
+
+
+def test_an_archive_too_large_for_a_glance_is_taken_for_the_largest() -> None:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr("a.gltf", b"{" + bytes(GLANCE_BYTES // BYTES_PER_INPUT_BYTE) + b"}")
+    limits = Limits(max_faces=1000)
+    with MemoryFile() as body, MemoryFile() as page:
+        body.append(content.getvalue())
+        work = Work(body.name, None, None, page.name, "application/zip", Options(), None, limits)
+        assert measure(work).faces == 1000

@@ -1,0 +1,134 @@
+"""Which models a worker has, by name, and what the catalogue says of them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from pns_common import onnx_model
+from pns_common.model_card import ModelCard
+from pns_common.onnx_model import DEFAULT_MODEL, load_model
+from service.errors import InvalidParameter, NoModelError
+from service.workers.catalogue import Catalogue, ModelEntry, catalogue_of
+from service.workers.models import Models
+from tests.support.packages import served_file, several_models
+from tests.support.stand_in_jobs import ZeroModel
+
+NAMES = sorted({"broken", "paper", "vertices", DEFAULT_MODEL})
+
+
+@pytest.fixture(autouse=True)
+def several(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(onnx_model, "BUNDLED", several_models(tmp_path / "models"))
+
+
+def serving(source: ZeroModel | str | None) -> Models:
+    models = Models()
+    models.hold(source)
+    return models
+
+
+def entries(models: Models) -> dict[tuple[str, bool], dict[str, object]]:
+    listed = json.loads(catalogue_of(models).content)
+    return {(entry["name"], entry["default"]): entry for entry in listed}
+
+
+def test_without_a_name_the_served_one_runs_and_every_bundled_one_by_name(tmp_path: Path) -> None:
+    mine = served_file(tmp_path / "mine.onnx")
+    for source, name in ((None, DEFAULT_MODEL), ("vertices", "vertices"), (mine, "mine")):
+        models = serving(source)
+        assert models.get().name == name
+        assert models.get(name) is models.get()
+        assert models.get("paper").hash == load_model("paper").hash
+    assert serving(ZeroModel()).get("zero") == ZeroModel()
+
+
+def test_a_model_is_loaded_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    models = serving(None)
+    assert models.get("vertices") is models.get("vertices")
+    assert models.get(DEFAULT_MODEL) is models.get()
+
+
+@pytest.mark.parametrize("name", ["mine.onnx", "./paper", "models/paper.onnx", "paper.onnx", "x"])
+def test_a_path_is_no_name_even_of_the_served_file(tmp_path: Path, name: str) -> None:
+    served_file(tmp_path / "x.onnx")
+    models = serving(served_file(tmp_path / "mine.onnx"))
+    with pytest.raises(InvalidParameter) as refusal:
+        models.get(name)
+    assert refusal.value.name == "model"
+    assert refusal.value.choices == tuple(sorted([*NAMES, "mine"]))
+    with pytest.raises(InvalidParameter):
+        models.get(str(tmp_path / "mine.onnx"))
+
+
+def test_a_file_that_does_not_load_keeps_no_other_from_its_work() -> None:
+    models = serving(None)
+    with pytest.raises(NoModelError, match="ONNX"):
+        models.get("broken")
+    assert models.get("vertices").card.vertex_features == "ring-10"
+    with pytest.raises(NoModelError, match="missing"):
+        serving("missing.onnx").get()
+    assert serving("missing.onnx").get("paper").name == "paper"
+
+
+def test_a_bundled_name_wins_over_that_of_the_served_file(tmp_path: Path) -> None:
+    models = serving(served_file(tmp_path / "paper.onnx"))
+    assert models.get("paper").hash == load_model("paper").hash != models.get().hash
+    listed = entries(models)
+    assert listed["paper", False]["hash"] == load_model("paper").hash
+    assert listed["paper", True]["hash"] == models.get().hash
+
+
+def test_the_catalogue_says_what_the_files_say() -> None:
+    models = serving(None)
+    listed = entries(models)
+    assert [name for name, _ in listed] == [name for name in NAMES if name != "broken"]
+    assert catalogue_of(models).names == tuple(NAMES)
+    assert [name for name, default in listed if default] == [DEFAULT_MODEL]
+    for entry in listed.values():
+        model = load_model(str(entry["name"]))
+        assert (entry["hash"], entry["size"]) == (model.hash, model.size)
+        card = {name: entry[name] for name in ModelCard.__dataclass_fields__}
+        assert ModelCard(**card) == model.card
+
+
+def test_an_entry_has_every_field_of_a_card() -> None:
+    own = {"name", "default", "hash", "size"}
+    assert set(ModelEntry.model_fields) == own | set(ModelCard.__dataclass_fields__)
+
+
+def test_a_served_file_is_the_default_and_one_that_does_not_load_is_not_listed(
+    tmp_path: Path,
+) -> None:
+    listed = entries(serving(served_file(tmp_path / "mine.onnx")))
+    assert [name for name, default in listed if default] == ["mine"]
+    missing = serving("missing.onnx")
+    assert not any(default for _, default in entries(missing))
+    assert "missing" in catalogue_of(missing).names
+
+
+def test_a_model_without_a_file_has_no_size() -> None:
+    entry = entries(serving(ZeroModel()))["zero", True]
+    assert entry["size"] is None
+    assert asdict(ZeroModel().card).items() <= entry.items()
+
+
+def test_same_models_same_bytes_same_tag() -> None:
+    first, again = catalogue_of(serving(None)), catalogue_of(serving(None))
+    assert (first, first.tag) == (again, again.tag)
+    assert first.tag != catalogue_of(serving("vertices")).tag
+    assert first.tag.strip('"') == hashlib.sha256(first.content).hexdigest()[:32]
+
+
+@pytest.mark.parametrize(
+    ("header", "known"),
+    [("{tag}", True), ("W/{tag}", True), ('"a", {tag}', True), ("*", True), ("", False)],
+)
+def test_a_client_that_has_the_list_is_recognised(header: str, known: bool) -> None:
+    catalogue = Catalogue((), b"[]")
+    assert catalogue.is_known(header.format(tag=catalogue.tag)) is known
+    assert not catalogue.is_known('"another"')

@@ -1,0 +1,28 @@
+"""The page of a job: what its worker tells, and the word to stop."""
+
+from __future__ import annotations
+
+import pytest
+
+from service.workers.progress import JobStopped, ProgressPage, Reporter
+
+
+def test_the_server_reads_what_the_worker_tells() -> None:
+    with ProgressPage() as page:
+        assert (page.stage, page.share) == (None, 0)
+        reporter = Reporter(page.file.name)
+        reporter.stage("refine")
+        reporter.reach(0.25)
+        assert (page.stage, page.share) == ("refine", 0.25)
+
+
+def test_a_job_that_is_stopped_ends_where_it_next_tells() -> None:
+    with ProgressPage() as page:
+        reporter = Reporter(page.file.name)
+        page.stop()
+        for tell in (
+            lambda: reporter.stage("read"),
+            lambda: reporter.reach(0.5),
+        ):
+            with pytest.raises(JobStopped):
+                tell()

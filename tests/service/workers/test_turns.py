@@ -1,0 +1,118 @@
+"""Whose turn it is: short jobs, fair shares, places, and who leaves the line."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+import pytest
+
+from service.errors import BusyError
+from service.workers.turns import Lane, Turns, Waiting
+
+
+def run(scenario: Callable[[], Awaitable[None]]) -> None:
+    asyncio.run(asyncio.wait_for(scenario(), 10))
+
+
+def granted(*waiting: Waiting) -> list[bool]:
+    return [job.turn.done() for job in waiting]
+
+
+def test_a_short_job_has_a_worker_to_itself() -> None:
+    async def scenario() -> None:
+        turns = Turns(workers=1, places=9, short_seconds=0.5)
+        large, next_large = turns.join("a", 30), turns.join("b", 30)
+        short = turns.join("c", 0.1)
+        assert granted(large, next_large, short) == [True, False, True]
+        assert (large.lane, short.lane) == (Lane.ANY, Lane.SHORT)
+        # A second short one waits for the first, or for any worker.
+        second = turns.join("c", 0.1)
+        assert granted(second) == [False]
+        turns.end(large)
+        assert second.lane is Lane.ANY
+        assert granted(next_large) == [False]
+
+    run(scenario)
+
+
+def test_clients_take_turns_by_what_their_jobs_cost() -> None:
+    async def scenario() -> None:
+        turns = Turns(workers=1, places=9, short_seconds=0)
+        running = turns.join("a", 1)
+        many = [turns.join("a", 10) for _ in range(3)]
+        lone = turns.join("b", 10)
+        order: list[Waiting] = []
+        while any(not waiting.turn.done() for waiting in (*many, lone)):
+            turns.end(running)
+            running = next(w for w in (*many, lone) if w.turn.done() and w not in order)
+            order.append(running)
+        # The second client comes before the first one's second job.
+        assert order.index(lone) <= 1
+
+    run(scenario)
+
+
+def test_places_are_bounded_and_one_client_never_takes_all() -> None:
+    async def scenario() -> None:
+        turns = Turns(workers=1, places=4, short_seconds=0)
+        turns.join("a", 10)
+        for _ in range(3):
+            turns.join("a", 10)
+        with pytest.raises(BusyError, match="this client") as refusal:
+            turns.join("a", 10)
+        assert refusal.value.retry_after in (40, 41)
+        turns.join("b", 10)
+        with pytest.raises(BusyError, match="jobs wait"):
+            turns.join("c", 10)
+        assert turns.waiting == 4
+
+    run(scenario)
+
+
+def test_what_is_not_counted_takes_no_place() -> None:
+    async def scenario() -> None:
+        turns = Turns(workers=1, places=0, short_seconds=0)
+        turns.join("a", 10)
+        glance = turns.join("a", 0, counted=False)
+        assert glance.lane is Lane.SHORT
+        with pytest.raises(BusyError):
+            turns.join("a", 10)
+
+    run(scenario)
+
+
+def test_who_leaves_makes_room_and_who_leaves_late_gives_the_turn_back() -> None:
+    async def scenario() -> None:
+        turns = Turns(workers=1, places=2, short_seconds=0)
+        first, second, third = (turns.join(name, 10) for name in "abc")
+        assert [turns.place_of(job) for job in (second, third)] == [0, 1]
+        coming = asyncio.create_task(turns.come(second))
+        await asyncio.sleep(0)
+        coming.cancel()
+        await asyncio.gather(coming, return_exceptions=True)
+        assert turns.waiting == 1
+        # Its turn comes, and it is cancelled before it can hear of it.
+        coming = asyncio.create_task(turns.come(third))
+        await asyncio.sleep(0)
+        turns.end(first)
+        assert granted(third) == [True]
+        coming.cancel()
+        await asyncio.gather(coming, return_exceptions=True)
+        assert turns.running[Lane.ANY] == 0
+        assert turns.join("d", 10).lane is Lane.ANY
+
+    run(scenario)
+
+
+def test_the_backlog_is_what_is_in_front() -> None:
+    async def scenario() -> None:
+        turns = Turns(workers=2, places=9, short_seconds=0)
+        first = turns.join("a", 10)
+        turns.join("b", 20)
+        waiting = turns.join("c", 30)
+        assert turns.backlog(first) == 0
+        assert turns.backlog(waiting) == 15
+        assert turns.backlog() == 30
+
+    run(scenario)

@@ -1,0 +1,197 @@
+"""Attacks, each from loopback addresses of its own, until it is told to end."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import socket
+import struct
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing.synchronize import Event
+
+Address = tuple[str, int]
+HEAD = "{} {} HTTP/1.1\r\nHost: soak\r\nContent-Type: model/gltf-binary\r\n{}\r\n"
+CHUNKED = "Transfer-Encoding: chunked\r\n"
+PATIENCE = 30
+
+
+def _head(method: str, path: str, more: str = "") -> bytes:
+    return HEAD.format(method, path, more).encode()
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is attacked, and from where: many addresses of this machine, or (`one_source`) its own.
+
+    A container's bridge carries no loopback address but the one that it listens on.
+    """
+
+    address: Address
+    one_source: bool = False
+
+    @contextmanager
+    def connected(self, number: int) -> Iterator[socket.socket]:
+        """A connection from one of the attackers' addresses, none of them an honest client's."""
+        source = None if self.one_source else (f"127.9.{number // 16}.{1 + number % 16}", 0)
+        with socket.create_connection(self.address, PATIENCE, source_address=source) as opened:
+            yield opened
+
+
+Attack = Callable[[Target, Event], None]
+
+
+def crumbs(target: Target, ended: Event) -> None:
+    """Four connections of one-byte chunks, again and again."""
+
+    def connect(number: int) -> None:
+        flood = _head("POST", "/subdivide", CHUNKED) + b"1\r\nx\r\n" * 10_000
+        while not ended.is_set():
+            with suppress(OSError), target.connected(number) as opened:
+                opened.sendall(flood)
+                while opened.recv(2**16):
+                    pass
+
+    _side_by_side(connect, 4)
+
+
+def trickles(target: Target, ended: Event) -> None:
+    """Uploads of a byte a second: as many as may arrive at the same time, and more."""
+    _hold(target, ended, 96, _head("POST", "/subdivide", "Content-Length: 1000000\r\n"), b"x")
+
+
+def slow_heads(target: Target, ended: Event) -> None:
+    """Heads that never end."""
+    _hold(target, ended, 200, b"GET /healthz HTTP/1.1\r\nX-A: ", b"x")
+
+
+def idle(target: Target, ended: Event) -> None:
+    """More connections than there are places for, that say nothing."""
+    _hold(target, ended, 700, b"", b"")
+
+
+def unread(target: Target, ended: Event) -> None:
+    """Bodies without end for routes that read none."""
+
+    def connect(number: int) -> None:
+        path = ("/healthz", "/nothing", "/subdivide?levels=9", "/models")[number % 4]
+        chunk = b"10000\r\n" + bytes(2**16) + b"\r\n"
+        while not ended.is_set():
+            with suppress(OSError), target.connected(number) as opened:
+                opened.sendall(_head("POST", path, CHUNKED))
+                while not ended.is_set():
+                    opened.sendall(chunk)
+            ended.wait(0.5)
+
+    _side_by_side(connect, 4)
+
+
+def slow_readers(target: Target, ended: Event) -> None:
+    """Ask for large answers and take a few bytes of each."""
+    requests = _head("GET", "/docs/swagger-ui-bundle.js") * 8
+
+    def connect(number: int) -> None:
+        while not ended.is_set():
+            with suppress(OSError), target.connected(number) as opened:
+                opened.sendall(requests)
+                while not ended.is_set() and opened.recv(64):
+                    ended.wait(1)
+
+    _side_by_side(connect, 24)
+
+
+def nonsense(target: Target, ended: Event) -> None:
+    """What is no HTTP, or nearly."""
+    messages = [
+        b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + bytes(64),
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 5\r\nContent-Length: 6\r\n\r\nhello",
+        b"GET / HTTP/1.1\r\nHost: a\r\n" + b"X: y\r\n" * 5000,
+        _head("POST", "/subdivide", CHUNKED) + b"zz\r\n",
+        b"GET /\x1b[31m HTTP/1.1\r\nHost: a\r\nX-Forwarded-For: 1.1.1.1\r\n\r\n",
+        b"GET /" + b"a" * 2**17,
+        _head("POST", "/jobs/../../etc/passwd") + b"",
+    ]
+
+    def connect(number: int) -> None:
+        for message in itertools.islice(itertools.cycle(messages), number, None):
+            if ended.wait(0.02):
+                return
+            with suppress(OSError), target.connected(number) as opened:
+                opened.settimeout(2)
+                opened.sendall(message)
+                opened.recv(2**16)
+
+    _side_by_side(connect, 4)
+
+
+def bombs(target: Target, ended: Event) -> None:
+    """Small files that ask for much: empty chunks, many nodes, deep levels, a zip of zeros."""
+    files = [_empty_chunks(300_000), _many_nodes(100_000), b"PK\x03\x04" + bytes(10_000)]
+
+    def connect(number: int) -> None:
+        for body in itertools.islice(itertools.cycle(files), number, None):
+            if ended.wait(0.2):
+                return
+            head = _head("POST", "/subdivide?levels=6", f"Content-Length: {len(body)}\r\n")
+            with suppress(OSError), target.connected(number) as opened:
+                opened.settimeout(PATIENCE)
+                opened.sendall(head + body)
+                opened.recv(2**16)
+
+    _side_by_side(connect, 2)
+
+
+def _hold(target: Target, ended: Event, count: int, first: bytes, drop: bytes) -> None:
+    """Keep `count` connections open, opening them anew, and send each a drop a second."""
+    while not ended.is_set():
+        with ExitStack() as held:
+            opened = []
+            for number in range(count):
+                with suppress(OSError):
+                    connection = held.enter_context(target.connected(number))
+                    connection.sendall(first)
+                    opened.append(connection)
+            for _ in range(15):
+                if ended.wait(1):
+                    return
+                for connection in opened:
+                    with suppress(OSError):
+                        connection.sendall(drop)
+
+
+def _side_by_side(connect: Callable[[int], None], count: int) -> None:
+    threads = [threading.Thread(target=connect, args=(number,)) for number in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
+def _empty_chunks(count: int) -> bytes:
+    text = b'{"asset":{"version":"2.0"}} '
+    chunks = (
+        struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", 0, b"abcd") * count
+    )
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def _many_nodes(count: int) -> bytes:
+    text = json.dumps({"asset": {"version": "2.0"}, "nodes": [{}] * count}).encode()
+    text += b" " * (-len(text) % 4)
+    chunk = struct.pack("<I4s", len(text), b"JSON") + text
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk
+
+
+ATTACKS: dict[str, Attack] = {
+    "one-byte chunks": crumbs,
+    "trickling uploads": trickles,
+    "endless heads": slow_heads,
+    "idle connections": idle,
+    "unread bodies": unread,
+    "slow readers": slow_readers,
+    "nonsense": nonsense,
+    "bombs": bombs,
+}

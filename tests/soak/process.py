@@ -1,0 +1,75 @@
+"""The service under test: started here, or running elsewhere on this machine."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+RUNNING = re.compile(r"running on http://([\d.]+):(\d+)")
+
+
+@dataclass(frozen=True)
+class Held:
+    """What the service's processes hold."""
+
+    mebibytes: float
+    descriptors: int
+    processes: int
+
+
+@contextmanager
+def started(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
+    """A server on a free port of 127.0.0.1: its address and process id; its lines go to `log`."""
+    command = [sys.executable, "-c", "from service.cli import main; main()", "serve", "--port", "0"]
+    with log.open("w") as lines:
+        process = subprocess.Popen(
+            command, cwd=ROOT, stderr=lines, env=os.environ | {"PNS_WORKERS": "2"}
+        )
+    try:
+        pause = threading.Event()
+        while not (told := RUNNING.search(log.read_text())):
+            if process.poll() is not None:
+                raise RuntimeError(log.read_text()[-2000:])
+            pause.wait(0.1)
+        yield (told[1], int(told[2])), process.pid
+    finally:
+        process.terminate()
+        process.wait(90)
+
+
+def held_by(pid: int) -> Held:
+    """Memory and descriptors of a process and those that it started."""
+    family = [pid, *_children(pid)]
+    return Held(
+        mebibytes=sum(map(_resident, family)) / 2**20,
+        descriptors=len(list(Path(f"/proc/{pid}/fd").iterdir())),
+        processes=len(family),
+    )
+
+
+def lines_of(log: Path) -> list[dict[str, object]]:
+    """The service's log; every line must be JSON."""
+    return [json.loads(line) for line in log.read_text().splitlines()]
+
+
+def _children(pid: int) -> Iterator[int]:
+    for path in Path(f"/proc/{pid}/task").glob("*/children"):
+        for child in map(int, path.read_text().split()):
+            yield child
+            yield from _children(child)
+
+
+def _resident(pid: int) -> int:
+    try:
+        return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        return 0

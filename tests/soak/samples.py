@@ -1,0 +1,111 @@
+"""What honest clients send: a part in every format, no two alike, and what it must become."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+import json
+import zipfile
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from service.bodies import uploads
+from service.gltf.read.container import read_glb
+from service.gltf.subdivide import subdivide_gltf
+from service.meshfiles.example import part
+from service.meshfiles.formats import write
+from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.to_gltf import as_gltf
+from service.meshfiles.triangles_glb import triangles_glb
+from service.options import Limits, Options
+
+BOUNDARY = "a-soak-boundary"
+MULTIPART = f"multipart/form-data; boundary={BOUNDARY}"
+OF_EACH = 3
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A request and the sha256 of its answer, computed here and not by the service."""
+
+    name: str
+    query: str
+    content_type: str
+    body: bytes
+    digest: str
+
+
+def samples() -> list[Sample]:
+    """`OF_EACH` of each format: GLB, glTF, archive, form, OBJ, PLY, STL and OFF."""
+    made = []
+    for number in range(OF_EACH):
+        mesh = _part(number)
+        glb = triangles_glb(mesh)
+        gltf = _as_gltf(glb)
+        made += [
+            _sample(f"glb-{number}", "model/gltf-binary", glb),
+            _sample(f"gltf-{number}", "model/gltf+json", gltf),
+            _sample(f"zip-{number}", "application/zip", _zip(gltf)),
+            _sample(f"form-{number}", MULTIPART, _form(glb)),
+        ]
+        for kind in ("obj", "ply", "stl", "off"):
+            made.append(_sample(f"{kind}-{number}", f"model/{kind}", write(mesh, kind)))
+    return made
+
+
+def small_sample() -> Sample:
+    """A tetrahedron: what a small job is."""
+    vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
+    faces = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
+    mesh = IndexedTriangles(vertices, faces)
+    return _sample("small", "model/gltf-binary", triangles_glb(mesh))
+
+
+def large_body() -> bytes:
+    """A part whose refinement takes seconds at four levels."""
+    return triangles_glb(_part(99))
+
+
+def _part(number: int) -> IndexedTriangles:
+    mesh = part()
+    rng = np.random.default_rng(number)
+    moved = mesh.vertices + 1e-3 * rng.standard_normal(mesh.vertices.shape)
+    return replace(mesh, vertices=moved, uv=None)
+
+
+def _sample(name: str, content_type: str, body: bytes) -> Sample:
+    options = Options(levels=1, scheme="loop")
+    limits = Limits()
+    sent = as_gltf(uploads.sent(body, content_type, limits), options, limits)
+    if sent.kind not in ("glb", "gltf"):
+        raise ValueError(f"{name} is {sent.kind}, which no stage turns into glTF")
+    done = subdivide_gltf(
+        sent.data, sent.kind, options, None, limits, siblings=sent.siblings, losses=sent.losses
+    )
+    digest = hashlib.sha256(done.glb).hexdigest()
+    return Sample(name, "levels=1&scheme=loop", content_type, body, digest)
+
+
+def _as_gltf(glb: bytes) -> bytes:
+    container = read_glb(glb)
+    tree = json.loads(bytes(container.text))
+    data = base64.b64encode(container.binary or b"").decode()
+    tree["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{data}"
+    return json.dumps(tree).encode()
+
+
+def _zip(gltf: bytes) -> bytes:
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("part.gltf", gltf)
+    return packed.getvalue()
+
+
+def _form(glb: bytes) -> bytes:
+    head = (
+        f'--{BOUNDARY}\r\nContent-Disposition: form-data; name="file"; filename="part.glb"\r\n'
+        "Content-Type: model/gltf-binary\r\n\r\n"
+    )
+    return head.encode() + glb + f"\r\n--{BOUNDARY}--\r\n".encode()

@@ -1,0 +1,37 @@
+"""A short soak, in CI: it asserts no time, only that no answer is wrong."""
+
+import pytest
+
+from tests.soak.attacks import ATTACKS
+from tests.soak.process import lines_of, started
+from tests.soak.run import soak
+
+SECONDS = 24
+
+
+@pytest.fixture(scope="module")
+def soaked(tmp_path_factory):
+    """What a soak found, and the service's log."""
+    log = tmp_path_factory.mktemp("soak") / "log"
+    with started(log) as (address, pid):
+        tally = soak(address, SECONDS, pid, ATTACKS, say=lambda text: None)
+    return tally, lines_of(log)
+
+
+def test_no_answer_is_wrong_and_none_is_a_fault(soaked):
+    tally = soaked[0].tally
+    assert tally.answers["glb 200"] + tally.answers["small 200"] > 0
+    assert tally.wrong == []
+    assert tally.faults() == {}
+
+
+def test_every_line_of_the_log_is_json_and_short(soaked):
+    lines = soaked[1]
+    assert any(line.get("route") == "/subdivide" for line in lines)
+    assert all(len(str(line)) < 10_000 for line in lines)
+
+
+def test_nothing_is_kept_open(soaked):
+    before, after = soaked[0].before, soaked[0].after
+    # Requests that are under way hold a few.
+    assert after.descriptors <= before.descriptors + 40

@@ -1,0 +1,185 @@
+"""Model files made in the tests, by a builder of their own: nothing here comes from export."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from onnx import TensorProto, helper, numpy_helper
+
+from pns_common.edge.features import FEATURE_COUNT
+from pns_common.model_card import CARD_KEY, ModelCard
+from pns_common.onnx_model import model_from_bytes
+from pns_common.vertex.rings import RING_10
+
+PUBLISHED_BUDGET, PUBLISHED_GATE_SHARPNESS = 0.5, 10.0
+
+CARD = ModelCard(1, "paper-5", PUBLISHED_GATE_SHARPNESS, PUBLISHED_BUDGET, "first-face", {}, {})
+SCALE_FREE_CARD = ModelCard(
+    *(3, "signed-18", 1e6, 20.0, "symmetric", {}, {}, "ring-10", 1e3),
+    *(1, 1.0, 0.4, 75.0),
+)
+VERTEX_CARD = ModelCard(2, "signed-18", 40.0, 0.25, "symmetric", {}, {}, "ring-10", 20.0)
+
+
+def model_bytes(nodes, weights, *, card=CARD, width=5, inputs=None, outputs=None, domains=()):
+    """An ONNX file with the given nodes; ``weights`` maps names to arrays."""
+    inputs = inputs or [("features", ["edges", width]), ("budget", [])]
+    outputs = outputs or [("correction", ["edges", 3])]
+    graph = helper.make_graph(
+        nodes,
+        "test",
+        [helper.make_tensor_value_info(n, TensorProto.FLOAT, s) for n, s in inputs],
+        [helper.make_tensor_value_info(n, TensorProto.FLOAT, s) for n, s in outputs],
+        [numpy_helper.from_array(_tensor(w), n) for n, w in weights.items()],
+    )
+    opsets = [helper.make_opsetid("", 20), *(helper.make_opsetid(d, 1) for d in domains)]
+    model = helper.make_model(graph, opset_imports=opsets, ir_version=10)
+    if card is not None:
+        entry = model.metadata_props.add()
+        entry.key, entry.value = CARD_KEY, card if isinstance(card, str) else card.to_json()
+    return model.SerializeToString()
+
+
+def _tensor(values):
+    values = np.asarray(values)
+    return values if values.dtype.kind == "i" else values.astype(np.float32)
+
+
+def perceptron_bytes(layers, *, project=True, card=CARD):
+    """A GELU perceptron from (weight (in, out), bias) pairs, projected onto the ball or not."""
+    nodes, weights = perceptron(layers, project=project)
+    return model_bytes(nodes, weights, card=card, width=len(layers[0][0]))
+
+
+def two_perceptrons_bytes(edges, vertices, *, card=VERTEX_CARD):
+    """A file of format 2: one perceptron for edges, one for old vertices."""
+    nodes, weights = perceptron(edges)
+    more_nodes, more_weights = perceptron(vertices, prefix="vertex_")
+    return model_bytes(
+        nodes + more_nodes,
+        weights | more_weights,
+        card=card,
+        inputs=[
+            ("features", ["edges", len(edges[0][0])]),
+            ("budget", []),
+            ("vertex_features", ["vertices", len(vertices[0][0])]),
+        ],
+        outputs=[("correction", ["edges", 3]), ("vertex_correction", ["vertices", 3])],
+    )
+
+
+def perceptron(layers, *, project=True, prefix=""):
+    """Nodes and weights from the input ``features`` to the output ``correction``, prefixed."""
+    nodes, weights, name = [], {}, "features"
+
+    def add(operator, inputs, output, **attributes):
+        inputs = [i if i == "budget" else f"{prefix}{i}" for i in inputs]
+        nodes.append(helper.make_node(operator, inputs, [f"{prefix}{output}"], **attributes))
+        return output
+
+    for number, (weight, bias) in enumerate(layers):
+        weights |= {f"w{number}": weight, f"b{number}": bias}
+        name = add("Gemm", [name, f"w{number}", f"b{number}"], f"z{number}")
+        if number < len(layers) - 1:
+            name = add("Gelu", [name], f"g{number}")
+    if project:
+        weights |= {"one": 1.0, "last": np.array([1])}
+        add("ReduceL2", [name, "last"], "length", keepdims=1)
+        add("Max", ["length", "one"], "divisor")
+        name = add("Div", [name, "divisor"], "in_ball")
+    add("Mul", [name, "budget"], "correction")
+    return nodes, {f"{prefix}{key}": value for key, value in weights.items()}
+
+
+def breaking_off_bytes():
+    """A file that keeps the contract and reads rows that there are not, whatever it is given."""
+    nodes = [
+        helper.make_node("Slice", ["features", "zero", "one", "axis"], ["first"]),
+        helper.make_node("Slice", ["features", "zero", "three", "axis"], ["answer"]),
+        helper.make_node("Squeeze", ["first", "axis"], ["flat"]),
+        helper.make_node("Add", ["flat", "far"], ["beyond"]),
+        helper.make_node("Cast", ["beyond"], ["rows"], to=TensorProto.INT64),
+        helper.make_node("Gather", ["answer", "rows"], ["correction"]),
+    ]
+    whole = {name: np.array([i]) for name, i in (("zero", 0), ("one", 1), ("three", 3))}
+    return model_bytes(nodes, whole | {"axis": whole["one"], "far": np.full(1, 1e6)})
+
+
+def random_layers(seed, widths=(5, 32, 32, 3), scale=1.0):
+    """Random weights of a perceptron."""
+    rng = np.random.default_rng(seed)
+    return [
+        (scale * rng.standard_normal((i, o)) / math.sqrt(i), scale * rng.standard_normal(o))
+        for i, o in pairwise(widths)
+    ]
+
+
+def random_model(seed, scale=1.0):
+    """A model with random weights."""
+    return model_from_bytes(perceptron_bytes(random_layers(seed, scale=scale)), "random")
+
+
+def vertex_model_bytes(seed, scale=2.0):
+    """A file of format 2 with random weights, so loud that both rules use much of their bound."""
+    edges = random_layers(seed, (FEATURE_COUNT["signed-18"], 16, 3), scale)
+    vertices = random_layers(seed + 1, (RING_10.count, 16, 3), scale)
+    return two_perceptrons_bytes(edges, vertices)
+
+
+def vertex_model(seed=0, scale=2.0):
+    """A model with random weights for edges and for old vertices."""
+    return model_from_bytes(vertex_model_bytes(seed, scale), "vertices")
+
+
+def scale_free_model(seed=0, scale=2.0, **changes):
+    """A model of format 3 with random weights; of scale 0, the prior alone."""
+    edges = random_layers(seed, (FEATURE_COUNT["signed-18"], 16, 3), scale)
+    vertices = random_layers(seed + 1, (RING_10.count, 16, 3), scale)
+    card = replace(SCALE_FREE_CARD, **changes)
+    return model_from_bytes(two_perceptrons_bytes(edges, vertices, card=card), "scale-free")
+
+
+def huge_model(seed):
+    """A hostile model: its file lies, its corrections have norms of about 10⁶ budgets."""
+    layers = random_layers(seed)
+    layers[-1] = (layers[-1][0] * 1e6, layers[-1][1] * 1e6)
+    return model_from_bytes(perceptron_bytes(layers, project=False), "huge")
+
+
+def published_layers(weights, checkpoint):
+    """The published state dictionary as (weight (in, out), bias) pairs."""
+    keys = sorted(k for k in weights if k.startswith(f"{checkpoint}/") and k.endswith("weight"))
+    return [(weights[k].T, weights[k.removesuffix("weight") + "bias"]) for k in keys]
+
+
+def published_model(weights, checkpoint):
+    """A published network as a model file."""
+    return model_from_bytes(perceptron_bytes(published_layers(weights, checkpoint)), checkpoint)
+
+
+def float64_network(layers):
+    """A GELU perceptron in float64 numpy, projected onto the unit ball."""
+    erf = np.vectorize(math.erf, otypes=[float])
+
+    def network(features):
+        z = features
+        for number, (weight, bias) in enumerate(layers):
+            z = z @ np.asarray(weight, dtype=float) + bias
+            if number < len(layers) - 1:
+                z = 0.5 * z * (1 + erf(z / math.sqrt(2)))
+        return z / np.maximum(1, np.linalg.norm(z, axis=1, keepdims=True))
+
+    return network
+
+
+class Float64Model:
+    """A perceptron that keeps the model protocol in double precision."""
+
+    name, hash, card = "float64", "0" * 64, CARD
+
+    def __init__(self, layers):
+        self.network = float64_network(layers)
+
+    def __call__(self, features, budget):
+        return budget * self.network(features)

@@ -1,0 +1,239 @@
+"""Jobs for the service's tests: each does one thing that a real job may do to its worker.
+
+The request's body says what to do, so that one pool of workers serves all tests.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import re
+import resource
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pns_common import onnx_model
+from pns_common.model_card import ModelCard
+from pns_common.schemes import Model
+from service.errors import GltfError, LimitError, NoModelError, UnreadableError
+from service.options import Limits
+from service.workers import memory_file
+from service.workers.costs import Cost
+from service.workers.jobs import Done, Work, job_memory, warm_up
+from service.workers.progress import Reporter
+
+ZERO_CARD = ModelCard(1, "paper-5", 10.0, 0.5, "first-face", {}, {})
+
+
+@dataclass(frozen=True)
+class ZeroModel:
+    """A model that corrects nothing, and crosses to the workers by pickling."""
+
+    card: ModelCard = ZERO_CARD
+    name: str = "zero"
+    hash: str = "0" * 64
+
+    def __call__(self, features: np.ndarray, budget: float) -> np.ndarray:
+        return np.zeros((len(features), 3))
+
+
+class CountedModel(ZeroModel):
+    """A model that counts how often it is sent somewhere; it arrives as a ZeroModel."""
+
+    pickled = 0
+
+    def __reduce__(self) -> tuple[object, ...]:
+        CountedModel.pickled += 1
+        return (ZeroModel, ())
+
+
+def no_warm_up(model: object) -> None:
+    pass
+
+
+def warm_up_among(folder: str, model: Model | str | None) -> None:
+    """The real warm-up, in a package whose bundled files are those of another folder."""
+    onnx_model.BUNDLED = Path(folder)
+    warm_up(model)
+
+
+def stay_away(seconds: float, model: object) -> None:
+    """A warm-up that does not come to its end."""
+    time.sleep(seconds)
+
+
+def fails_to_warm_up(model: object) -> None:
+    raise RuntimeError("no such thing")
+
+
+def measure(work: Work) -> Cost:
+    """One second for a body that begins with `sleep` or the like, nothing for a `short` one."""
+    short = memory_file.read(work.body).startswith(b"short")
+    return Cost(4, 1, 0.01 if short else 1.0)
+
+
+def obey(work: Work) -> Done:
+    """`sleep 2`, `die`, `hold`, … as the body says; anything else is echoed."""
+    reporter = Reporter(work.page)
+    body = memory_file.read(work.body)
+    word, _, argument = body[:300].decode(errors="replace").partition(" ")
+    match word:
+        case "sleep":
+            time.sleep(float(argument))
+        case "die":
+            os.kill(os.getpid(), signal.SIGKILL)
+        case "hold":
+            # One long match in C: the interpreter lock is not released, and no signal handler runs.
+            re.match(r"(a+)+$", "a" * 40 + "b")
+        case "fault":
+            raise ZeroDivisionError("secret detail")
+        case "unpicklable":
+            raise UnpicklableError(lambda: None)
+        case "unreadable":
+            raise UnreadableError("not a GLB")
+        case "broken":
+            raise GltfError("accessor 3 is too short", pointer="/accessors/3/count")
+        case "faces":
+            raise LimitError("too many faces", limit="faces", allowed=5, found=20)
+        case "large":
+            fill(work, bytes(int(argument)))
+            return Done({}, None)
+        case "full":
+            # What a full disk is to a process: a write that the kernel refuses.
+            with files_of_at_most(int(argument) // 2):
+                fill(work, bytes(int(argument)))
+        case "memory":
+            with job_memory(Limits(max_memory_bytes=int(argument))):
+                bytearray(int(argument) + 2**31)
+        case "steps":
+            take_steps(reporter, Path(argument.strip()))
+        case "log":
+            logging.getLogger("pns.service").warning("a job says\nsomething")
+        case "pid":
+            body = str(os.getpid()).encode()
+    fill(work, body)
+    return Done({"read": 0.001, "refine": 0.002}, None)
+
+
+def fill(work: Work, data: bytes) -> None:
+    """Write the same to whatever is wanted."""
+    for file in (work.answer, work.report):
+        if file is not None:
+            memory_file.write(file, data)
+
+
+@contextmanager
+def files_of_at_most(size: int) -> Iterator[None]:
+    """Let this process write no file beyond so many bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def take_steps(reporter: Reporter, folder: Path) -> None:
+    """Three quarters of a job; after each it waits until it may go on, or is stopped."""
+    reporter.stage("refine")
+    for number in (1, 2, 3):
+        reporter.reach(number / 4)
+        tell(folder / f"took-{number}")
+        while not (folder / f"go-{number}").exists():
+            time.sleep(0.002)
+            reporter.reach(number / 4)
+
+
+def digest(work: Work) -> Done:
+    """The body's SHA-256; it dawdles `before` and `after` it writes, as the content type says."""
+    told = dict(part.split("=") for part in work.content_type.split("; ")[1:])
+    body = memory_file.read(work.body)
+    time.sleep(float(told["before"]))
+    fill(work, hashlib.sha256(body).hexdigest().encode())
+    time.sleep(float(told["after"]))
+    return Done({}, None)
+
+
+def digest_step_by_step(work: Work) -> Done:
+    """The body's SHA-256; files of a folder tell what was done, and what may be done.
+
+    It lives on for a while when it is told to end.
+    """
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    told = Path(work.content_type.partition("folder=")[2])
+    body = memory_file.read(work.body)
+    tell(told / "read")
+    wait_for(told / "may-write")
+    fill(work, hashlib.sha256(body).hexdigest().encode())
+    (told / "wrote").touch()
+    wait_for(told / "may-return")
+    return Done({}, None)
+
+
+def tell(path: Path) -> None:
+    """Leave a file with the process's number: whole or not at all."""
+    whole = path.with_suffix(".part")
+    whole.write_text(str(os.getpid()))
+    whole.replace(path)
+
+
+def wait_for(path: Path) -> None:
+    while not path.exists():
+        time.sleep(0.002)
+
+
+class UnpicklableError(Exception):
+    pass
+
+
+def sleep(seconds: float) -> str:
+    time.sleep(seconds)
+    return "slept"
+
+
+def pid() -> int:
+    return os.getpid()
+
+
+def die() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def hold() -> None:
+    re.match(r"(a+)+$", "a" * 40 + "b")
+
+
+def begin_to_hold(begun: Path) -> None:
+    tell(begun)
+    hold()
+
+
+def wait_between(folder: Path) -> int:
+    """The process's number, once it may be told."""
+    tell(folder / "begun")
+    wait_for(folder / "go")
+    return os.getpid()
+
+
+def fault() -> None:
+    raise UnpicklableError(lambda: None)
+
+
+def refuse() -> None:
+    raise GltfError("no", pointer="/meshes/0")
+
+
+def nothing() -> None:
+    pass
+
+
+def needs(path: str) -> None:
+    if not Path(path).exists():
+        raise NoModelError(f"no {path}")

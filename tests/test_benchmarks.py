@@ -1,0 +1,67 @@
+"""The benchmarks' own parts: the peers' protocol, the meshes, the tables. No timing is asserted."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from benchmarks.answers import upload
+from benchmarks.contest import ROOT, Case, contest, ours
+from benchmarks.generated import ORDERS
+from benchmarks.peers.protocol import read_mesh, write_mesh
+from pns_common.topology import EdgeClass, build_topology
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_generated_meshes_are_manifold_and_about_as_large_as_asked(order):
+    mesh = ORDERS[order](2000)
+    classes = np.bincount(build_topology(mesh.faces, len(mesh.vertices)).edge_class, minlength=4)
+    assert abs(len(mesh.faces) - 2000) < 200
+    assert classes[EdgeClass.IRREGULAR] == 0
+    assert (classes[EdgeClass.BOUNDARY] > 0) == (order == "open")
+
+
+def test_a_mesh_file_holds_what_was_written(tmp_path):
+    mesh = ORDERS["open"](50)
+    write_mesh(tmp_path / "mesh", mesh.vertices, mesh.faces)
+    points, faces = read_mesh(str(tmp_path / "mesh"))
+    assert np.array_equal(points, mesh.vertices)
+    assert np.array_equal(faces, mesh.faces)
+    assert (points.dtype, faces.dtype) == (np.float64, np.int32)
+
+
+def test_ours_answers_each_run_with_what_it_made(tmp_path):
+    mesh = ORDERS["closed"](200)
+    write_mesh(tmp_path / "mesh", mesh.vertices, mesh.faces)
+    command = [*ours("loop", sys.executable), str(tmp_path / "mesh"), "2"]
+    done = subprocess.run(
+        command, input="run\nrun\n", capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    answers = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [a["faces"] for a in answers] == 2 * [16 * len(mesh.faces)]
+
+
+def test_a_method_that_fails_is_left_out_by_name():
+    broken = [sys.executable, "-c", "raise SystemExit(1)"]
+    contested = contest(
+        Case("closed", 200), {"pns loop": ours("loop", sys.executable), "broken": broken}, 2, {}
+    )
+    assert contested["left_out"] == {"broken": "failed"}
+    assert contested["methods"]["pns loop"]["runs"] == 2
+
+
+def test_a_method_that_would_be_too_slow_is_not_started():
+    contested = contest(
+        Case("closed", 200),
+        {"pns loop": ours("loop", sys.executable), "slow": ["no"]},
+        2,
+        {"slow": 99},
+    )
+    assert list(contested["left_out"]) == ["slow"]
+
+
+@pytest.mark.parametrize("size", [1_000, 10_000])
+def test_an_upload_fills_its_size(size):
+    assert 0.9 * size < len(upload(size)) <= size

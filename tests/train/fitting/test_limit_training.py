@@ -1,0 +1,165 @@
+"""Training to the limit: the linear maps, the measures, and that a few steps help."""
+
+from dataclasses import replace
+from itertools import islice
+
+import msgspec
+import numpy as np
+import pytest
+import torch
+
+from pns_common.refine import refine
+from pns_common.schemes import loop
+from pns_common.topology import build_topology
+from train.data.grid_pairs import grid_pair
+from train.data.pair_stream import pair_stream
+from train.data.primitives import box, globe, torus
+from train.data.references import AUTHORED, Pair, Reference
+from train.fitting.limit_batch import SMOOTH_KINDS, limit_batch
+from train.fitting.limit_loss import Standards, limit_loss, measure
+from train.fitting.limit_maps import applied, limit_maps, loop_matrix
+from train.fitting.limit_trainer import fit_to_limit, limit_measures, standards_of
+from train.metrics.fairness import bending, vertex_normals
+from train.models.from_recipe import initial_network, initial_vertex_network, recipe_scheme
+from train.models.recipes import general
+
+SHAPES = {"torus": torus(7, 5), "globe": globe(9, 4), "box": box(1, 2, 3)}
+SURFACE = Reference(SHAPES["torus"].vertices, vertex_normals(SHAPES["torus"]))
+
+
+@pytest.fixture(scope="module")
+def batch():
+    pairs = [pair for pair in islice(pair_stream(0), 40) if len(pair.coarse.faces) < 400]
+    return limit_batch(pairs[:5], np.random.default_rng(0))
+
+
+def open_grid():
+    return grid_pair(np.random.default_rng(4)).coarse
+
+
+@pytest.mark.parametrize("mesh", [*SHAPES.values(), open_grid()], ids=[*SHAPES, "grid"])
+def test_the_matrix_of_a_level_is_loop(mesh):
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    expected = refine(mesh, loop(), 1, threads=1).mesh.vertices
+    np.testing.assert_allclose(loop_matrix(topology) @ mesh.vertices, expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("levels", [0, 1])
+@pytest.mark.parametrize("mesh", [*SHAPES.values(), open_grid()], ids=[*SHAPES, "grid"])
+def test_maps_lead_to_where_many_levels_lead(mesh, levels):
+    maps = limit_maps(build_topology(mesh.faces, len(mesh.vertices)), levels)
+    deep = refine(mesh, loop(), 6, threads=1).mesh
+    count = len(maps.ancestor)
+    positions = maps.position @ mesh.vertices
+    np.testing.assert_allclose(positions, deep.vertices[:count], atol=1e-3 * np.ptp(mesh.vertices))
+    across = np.cross(maps.tangent @ mesh.vertices, maps.cotangent @ mesh.vertices)
+    across = across[maps.smooth] / np.linalg.norm(across[maps.smooth], axis=1, keepdims=True)
+    a, b, c = (deep.vertices[deep.faces[:, corner]] for corner in range(3))
+    normals = np.zeros_like(deep.vertices)
+    np.add.at(normals, deep.faces.reshape(-1), np.repeat(np.cross(b - a, c - a), 3, axis=0))
+    expected = normals[:count][maps.smooth]
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    assert (across * expected).sum(axis=1).min() > 0.99
+
+
+def test_applied_has_the_transposed_gradient():
+    mesh = SHAPES["torus"]
+    matrix = loop_matrix(build_topology(mesh.faces, len(mesh.vertices)))
+    points = torch.from_numpy(mesh.vertices.copy()).requires_grad_()
+    weights = torch.rand(matrix.shape[0], 3, dtype=torch.float64)
+    (weights * applied(matrix, points)).sum().backward()
+    np.testing.assert_allclose(points.grad, matrix.toarray().T @ weights.numpy(), atol=1e-14)
+
+
+@pytest.fixture(scope="module")
+def held(batch):
+    return standards_of(batch)
+
+
+def test_loop_against_itself_is_one_in_every_term(batch, held):
+    weights = general().training.weights
+    terms = ("mean", "spread", "peak", "normal", "normal_spread")
+    expected = sum(getattr(weights, name) for name in terms)
+    even = replace(weights, worse=0.0)
+    same = Standards(loop=held.loop, prior=held.loop)
+    assert limit_loss(even, kinds_of(batch), held.loop, same).item() == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("kind", ["sharp", "smooth", "authored"])
+def test_bending_too_much_costs_by_the_kind_of_mesh(kind, batch, held):
+    weights = replace(general().training.weights, jump=0.0)
+    same = Standards(loop=held.loop, prior=held.loop)
+    kinds = kinds_of(batch, kind)
+    more = replace(held.loop, bend=4 * held.loop.bend)
+    costs = [limit_loss(weights, kinds, measures, same).item() for measures in (held.loop, more)]
+    allowed = getattr(weights, f"{kind}_bend")
+    weight = weights.sharp if kind == "sharp" else weights.ripples
+    expected = weights.bend * np.log(4) + weight * np.log(4 / allowed)
+    assert costs[1] - costs[0] == pytest.approx(expected, rel=1e-2)
+
+
+def test_what_is_to_bend_no_more_than_the_prior_is_counted_as_smooth():
+    pairs = [Pair(kind, SHAPES["torus"], SURFACE) for kind in (*SMOOTH_KINDS, "faceted", AUTHORED)]
+    batch = limit_batch(pairs, np.random.default_rng(0))
+    assert batch.smooth.tolist() == [True] * len(SMOOTH_KINDS) + [False, False]
+    assert batch.authored.tolist() == [False] * (len(SMOOTH_KINDS) + 1) + [True]
+
+
+def test_of_authored_meshes_fairness_alone_is_asked(batch, held):
+    weights, authored = general().training.weights, kinds_of(batch, "authored")
+    worse = replace(held.loop, mean=9 * held.loop.mean, normal=9 * held.loop.normal)
+    costs = [limit_loss(weights, authored, measures, held) for measures in (held.loop, worse)]
+    assert torch.equal(*costs)
+    costs = [limit_loss(weights, kinds_of(batch), one, held) for one in (held.loop, worse)]
+    assert costs[1] > costs[0] + 1
+
+
+def kinds_of(batch, kind="sharp"):
+    """The batch with all its meshes of one kind."""
+    every = torch.ones(batch.count, dtype=bool)
+    return replace(
+        batch,
+        authored=every if kind == "authored" else ~every,
+        smooth=every if kind == "smooth" else ~every,
+    )
+
+
+@pytest.mark.parametrize("mesh", [torus(9, 6), globe(11, 6), box(1, 2, 3)])
+def test_bending_is_that_of_a_finely_refined_mesh(mesh):
+    pair = Pair("", mesh, Reference(mesh.vertices, vertex_normals(mesh)))
+    one = limit_batch([pair], np.random.default_rng(0))
+    points = applied(loop_matrix(one.level.topology), one.level.points)
+    expected = bending(refine(mesh, loop(), 5, threads=1).mesh)
+    assert measure(one, points).bend.item() == pytest.approx(expected, rel=0.03)
+
+
+def test_untrained_networks_leave_the_prior_where_a_surface_bends_gently():
+    recipe, mesh = general(), torus(24, 14)
+    networks = initial_network(recipe), initial_vertex_network(recipe)
+    pair = Pair("", mesh, Reference(mesh.vertices, vertex_normals(mesh)))
+    one = limit_batch([pair], np.random.default_rng(0))
+    with torch.no_grad():
+        measures = limit_measures(one, recipe_scheme(recipe, *networks))
+    standards = standards_of(one)
+    torch.testing.assert_close(measures.bend, standards.prior.bend, rtol=1e-3, atol=0)
+    assert (measures.bend < standards.loop.bend).all()
+
+
+def test_measures_see_a_shift(batch):
+    with torch.no_grad():
+        points = applied(loop_matrix(batch.level.topology), batch.level.points)
+        shift = torch.tensor([0.3, 0.2, 0.1])
+        here, away = measure(batch, points), measure(batch, points + shift)
+    assert (away.mean > here.mean + 0.02).all()
+    torch.testing.assert_close(away.bend, here.bend)
+
+
+def test_a_few_steps_lower_the_loss_and_are_the_same_again():
+    base = general()
+    plan = msgspec.structs.replace(base.training, faces=200, pool=1, reuse=1000)
+    recipe = replace(base, steps=25, training=plan, learning_rate=1e-2)
+    first, second = (fit_to_limit(recipe, plan, lambda *_: None) for _ in range(2))
+    assert first[2][-1] < first[2][0] - 0.02
+    assert first[2] == second[2]
+    for weight, again in zip(first[0].parameters(), second[0].parameters(), strict=True):
+        assert torch.equal(weight, again)

@@ -1,0 +1,84 @@
+import numpy as np
+import pytest
+import torch
+
+from train.surfaces.implicit import Ridge, Saddle, SphereRidge, signed_distance, unit_normal
+from train.surfaces.smooth import Bump, Crossing, CurvedRidge, LumpySphere
+
+SURFACES = [
+    Ridge(amplitude=0.6, sharpness=7.0, angle=0.7, centre_x=0.05, centre_y=-0.02),
+    Saddle(amplitude=0.5, centre_x=0.05, centre_y=-0.02),
+    SphereRidge(radius=1.0, amplitude=0.1, sharpness=30.0, angle=2.9),
+    CurvedRidge(amplitude=0.5, sharpness=6.0, radius=0.9, centre_x=-0.3, centre_y=0.1),
+    Crossing(0.5, 6.0, 0.4, 0.3, 4.0, 1.7),
+    Bump(amplitude=0.5, sharpness=4.0, elongation=0.3, angle=0.8, centre_x=0.4, centre_y=0.3),
+    LumpySphere(0.8, amplitude=0.1, frequency=4.0, phase_x=0.3, phase_y=1.1, phase_z=2.0),
+]
+BY_NAME = [pytest.param(surface, id=type(surface).__name__) for surface in SURFACES]
+
+
+def sample_points():
+    return np.random.default_rng(0).uniform(0.2, 0.9, size=(50, 3))
+
+
+@pytest.mark.parametrize("surface", BY_NAME)
+def test_gradient_is_the_derivative_of_value(surface):
+    points = torch.from_numpy(sample_points()).requires_grad_()
+    (expected,) = torch.autograd.grad(surface.value(points).sum(), points)
+    np.testing.assert_allclose(surface.gradient(points.detach()), expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("surface", BY_NAME)
+def test_numpy_and_torch_agree(surface):
+    points = sample_points()
+    for quantity in (surface.value, surface.gradient, surface.feature_distance):
+        by_torch = quantity(torch.from_numpy(points))
+        np.testing.assert_allclose(quantity(points), by_torch, rtol=0, atol=1e-14)
+        assert by_torch.dtype == torch.float64
+
+
+@pytest.mark.parametrize("surface", BY_NAME)
+def test_distance_is_right_to_first_order(surface):
+    points = sample_points()
+    # Newton steps along the gradient reach the surface; then step off it by a known length.
+    for _ in range(50):
+        gradient = surface.gradient(points)
+        points = points - (surface.value(points) / (gradient**2).sum(-1))[:, None] * gradient
+    np.testing.assert_allclose(surface.value(points), 0, atol=1e-12)
+    away = points + 1e-5 * unit_normal(surface, points)
+    np.testing.assert_allclose(signed_distance(surface, away), 1e-5, rtol=2e-3)
+
+
+def test_distance_to_a_plain_sphere_is_exact():
+    sphere = SphereRidge(radius=2.0, amplitude=0.0, sharpness=1.0, angle=0.0)
+    points = sample_points()
+    expected = np.linalg.norm(points, axis=1) - 2
+    np.testing.assert_allclose(signed_distance(sphere, points), expected, atol=1e-14)
+
+
+def test_ridge_crest_is_at_its_amplitude_and_along_its_angle():
+    ridge = SURFACES[0]
+    along = np.linspace(-1, 1, 9)
+    crest = np.stack(
+        [
+            ridge.centre_x + along * np.cos(ridge.angle),
+            ridge.centre_y + along * np.sin(ridge.angle),
+            np.zeros(9),
+        ],
+        axis=1,
+    )
+    np.testing.assert_allclose(ridge.feature_distance(crest), 0, atol=1e-15)
+    np.testing.assert_allclose(ridge.height(crest), ridge.amplitude, atol=1e-15)
+
+
+def test_parameters_may_differ_from_point_to_point():
+    points = sample_points()[:2]
+    first, second = SURFACES[0], Ridge(0.4, 4.0, 2.0, 0.0, 0.1)
+    both = Ridge(
+        *(
+            np.array([getattr(first, name), getattr(second, name)])
+            for name in ("amplitude", "sharpness", "angle", "centre_x", "centre_y")
+        )
+    )
+    expected = [first.value(points)[0], second.value(points)[1]]
+    np.testing.assert_allclose(both.value(points), expected, atol=1e-15)

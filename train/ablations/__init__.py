@@ -1,0 +1,1 @@
+"""The operator with parts taken out, and feature sets with groups left out."""

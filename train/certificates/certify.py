@@ -1,0 +1,216 @@
+"""Certify a model or any scheme: every certificate, as data, as a table and as JSON."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from rich.table import Table
+
+from pns_common.errors import ModelError, PnsError
+from pns_common.onnx_model import DEFAULT_MODEL, load_model
+from train.certificates.affine import affine_reproduction
+from train.certificates.bodies import Body, flat_bodies, synthetic_bodies
+from train.certificates.certificate import Certificate
+from train.certificates.displacement import bounded_displacement
+from train.certificates.double_precision import double_model, read_bytes
+from train.certificates.equivariance import equivariance
+from train.certificates.learned_once import (
+    fold_free,
+    limit_distance,
+    resolution_independence,
+    smoothness_class,
+)
+from train.certificates.lifted_star import lifted_stars
+from train.certificates.model_file import keeps_its_word
+from train.certificates.planar_spectrum import planar_spectrum
+from train.certificates.regular import regular_smoothness
+from train.certificates.scaling import normal_variation_slope, proximity_slope
+from train.certificates.stability import lipschitz_slope
+from train.certificates.subject import Subject, subject_of_model
+from train.spectra.spectrum import VALENCES
+
+OnProgress = Callable[[str, int, int], None]
+"""Called with what comes next, how many steps are done, and of how many."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """All certificates of one subject.
+
+    Attributes:
+        facts: what was certified: the model's hash, the budget, the meshes.
+    """
+
+    name: str
+    facts: dict[str, Any]
+    certificates: tuple[Certificate, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything that counts has passed."""
+        return all(certificate.passed for certificate in self.certificates if certificate.counts)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One piece of a certification: its theorem and title, should it fail to run, and the work."""
+
+    theorem: str
+    title: str
+    work: Callable[[], Certificate | list[Certificate]]
+
+
+def certify_model_file(
+    source: str | Path | None,
+    real: Sequence[Body],
+    seed: int,
+    on_progress: OnProgress,
+    valences: Sequence[int] = VALENCES,
+) -> Verdict:
+    """Certify a model file, also one that someone else made.
+
+    Args:
+        source: a file, a bundled name, or None for the default.
+        real: meshes beside the synthetic ones.
+        valences: of the stars.
+    """
+    source = DEFAULT_MODEL if source is None else source
+    facts: dict[str, Any] = {"source": str(source)}
+    try:
+        model = load_model(source)
+        subject = subject_of_model(model, double_model(model, read_bytes(source)))
+    except ModelError as error:
+        return Verdict(str(source), facts, (refused("file", "the file keeps the contract", error),))
+    facts |= {
+        "sha256": model.hash,
+        "budget": subject.budget,
+        "meshes": [body.name for body in real],
+    }
+    word = Step("file", "the file keeps its word", lambda: keeps_its_word(model))
+    certificates = run_steps([word, *scheme_steps(subject, real, seed, valences)], on_progress)
+    return Verdict(model.name, facts, certificates)
+
+
+def certify_scheme(
+    subject: Subject,
+    real: Sequence[Body],
+    seed: int,
+    on_progress: OnProgress,
+    valences: Sequence[int] = VALENCES,
+) -> Verdict:
+    """Certify any scheme against T1–T8 and what its kind promises beside them."""
+    certificates = run_steps(scheme_steps(subject, real, seed, valences), on_progress)
+    return Verdict(subject.name, {"budget": subject.budget}, certificates)
+
+
+def scheme_steps(
+    subject: Subject, real: Sequence[Body], seed: int, valences: Sequence[int]
+) -> list[Step]:
+    """The certificates of a scheme, ready to run."""
+    shaped, flat = synthetic_bodies(seed), flat_bodies(seed)
+    every = (*shaped, *real)
+    return [
+        Step("T1", "bounded displacement", lambda: bounded_displacement(subject, every)),
+        Step("T2", "equivariance", lambda: equivariance(subject, every, seed)),
+        Step("T3", "affine reproduction", lambda: affine_reproduction(subject, flat, seed)),
+        Step("T4", "proximity slope", lambda: proximity_slope(subject, every)),
+        Step("T5", "regular regions", lambda: regular_smoothness(subject, seed)),
+        Step("T6", "normal-variation slope", lambda: normal_variation_slope(subject, shaped)),
+        Step("T7", "Lipschitz slope", lambda: lipschitz_slope(subject, shaped, seed)),
+        Step("T8", "planar spectrum", lambda: planar_spectrum(subject, valences)),
+        *_steps_of_kind(subject, every, valences),
+    ]
+
+
+def _steps_of_kind(subject: Subject, bodies: Sequence[Body], valences: Sequence[int]) -> list[Step]:
+    """Schemes that turn into Loop have its spectra; of others lifted stars say more."""
+    if subject.scheme.guard is None:
+        return [Step("stars", "lifted stars", lambda: lifted_stars(subject, valences))]
+    return [
+        Step("folds", "fold-free", lambda: fold_free(subject, bodies)),
+        Step("limit", "limit distance", lambda: limit_distance(subject, bodies)),
+        Step("class", "smoothness class", lambda: smoothness_class(subject, bodies)),
+        Step("scale", "resolution independence", lambda: resolution_independence(subject, bodies)),
+    ]
+
+
+def run_steps(steps: Sequence[Step], on_progress: OnProgress) -> tuple[Certificate, ...]:
+    """Run steps in order; one that the operator refuses to finish fails by its name."""
+    certificates: list[Certificate] = []
+    for number, step in enumerate(steps):
+        on_progress(step.title, number, len(steps))
+        try:
+            made = step.work()
+        except PnsError as error:
+            made = refused(step.theorem, step.title, error)
+        certificates += [made] if isinstance(made, Certificate) else made
+    on_progress("done", len(steps), len(steps))
+    return tuple(certificates)
+
+
+def refused(theorem: str, title: str, error: PnsError) -> Certificate:
+    """A certificate that could not be measured, and so has failed."""
+    return Certificate(theorem, title, math.nan, where=str(error))
+
+
+def verdict_json(verdict: Verdict) -> bytes:
+    """A verdict as JSON; numbers that JSON does not know (NaN, ∞) are null."""
+    rows = [
+        {
+            "theorem": certificate.theorem,
+            "name": certificate.name,
+            "kind": str(certificate.kind),
+            "value": _number(certificate.value),
+            "low": _number(certificate.low),
+            "high": _number(certificate.high),
+            "passed": certificate.passed,
+            "where": certificate.where,
+        }
+        for certificate in verdict.certificates
+    ]
+    facts = {"name": verdict.name, **verdict.facts, "passed": verdict.passed}
+    return msgspec.json.format(msgspec.json.encode({**facts, "certificates": rows})) + b"\n"
+
+
+def verdict_table(verdict: Verdict) -> Table:
+    """One row a certificate."""
+    table = Table(title=f"Certificates of {verdict.name}", title_justify="left")
+    for heading in ("", "Property"):
+        table.add_column(heading, no_wrap=heading == "")
+    for heading in ("Value", "Bound"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("")
+    for row in _rows(verdict):
+        table.add_row(*row)
+    return table
+
+
+def _rows(verdict: Verdict) -> Iterator[tuple[str, ...]]:
+    for certificate in verdict.certificates:
+        colour = "green" if certificate.passed else "red" if certificate.counts else "yellow"
+        word = "pass" if certificate.passed else "fail"
+        kind = "" if certificate.kind == "certificate" else f" ({certificate.kind})"
+        name = (
+            f"{certificate.name}\n[dim]{_escaped(certificate.where)}[/dim]"
+            if certificate.where
+            else certificate.name
+        )
+        yield (
+            certificate.theorem,
+            name,
+            f"{certificate.value:.6g}",
+            certificate.bound,
+            f"[{colour}]{word}[/]{kind}",
+        )
+
+
+def _escaped(text: str) -> str:
+    # rich reads square brackets as markup.
+    return text.replace("[", "\\[")
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,143 @@
+"""Certificates of schemes that correct at their first K levels and are Loop afterwards.
+
+Fold-free, limit distance, smoothness class and resolution independence: docs/theorems.md proves
+them for the scale-free rule and any weights.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.mesh import Mesh
+from pns_common.refine import refine
+from pns_common.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
+from pns_common.schemes import Scheme, loop
+from pns_common.topology import split
+from train.certificates.bodies import Body
+from train.certificates.certificate import Certificate, worst
+from train.certificates.plain_loop import plain_loop
+from train.certificates.step import rounding, step
+from train.certificates.subject import Subject
+
+# Child faces that Loop makes flatter than this, in squared edge lengths, have no direction.
+FLAT = 1e-9
+ROUNDING_ANGLE = 1e-5
+"""In degrees: what positions rounded to doubles may turn a face by."""
+
+SAME = 1e-12
+SCALES = (2.0**-12, 2.0**-3, 2.0**5)
+UNBOUNDED = 1e15
+"""A budget that no correction reaches."""
+
+
+def fold_free(subject: Subject, bodies: Sequence[Body]) -> Certificate:
+    """Certify that no child face turns by more than θ from Loop's, in degrees."""
+    guard = subject.scheme.guard
+    allowed = math.nan if guard is None else math.degrees(guard.angle) + ROUNDING_ANGLE
+    measured = []
+    for body in bodies:
+        base = plain_loop(body.mesh.vertices, body.mesh.faces).positions
+        made = step(subject.scheme, body.mesh)
+        measured.append((largest_turn(split(made.topology), base, made.positions), body.name))
+    angle, place = worst(measured)
+    return Certificate("folds", "fold-free", angle, high=allowed, where=place)
+
+
+def largest_turn(
+    faces: Int[np.ndarray, "F 3"], before: Float[np.ndarray, "V 3"], after: Float[np.ndarray, "V 3"]
+) -> float:
+    """The largest angle between a face's normal before and after, in degrees; 180 for NaN."""
+    vectors, longest = [], []
+    for points in (before, after):
+        a, b, c = points[faces].transpose(1, 0, 2)
+        vectors.append(np.cross(b - a, c - a))
+        longest.append(np.maximum(np.sum((b - a) ** 2, axis=1), np.sum((c - a) ** 2, axis=1)))
+    size = [np.linalg.norm(vector, axis=1) for vector in vectors]
+    defined = size[0] > FLAT * longest[0]
+    # An arctangent: an arc cosine would round small angles away.
+    sine = np.linalg.norm(np.cross(*vectors), axis=1)[defined]
+    angle = np.degrees(np.arctan2(sine, np.sum(vectors[0] * vectors[1], axis=1)[defined]))
+    return float(np.max(np.where(np.isnan(angle), 180.0, angle), initial=0.0))
+
+
+def limit_distance(subject: Subject, bodies: Sequence[Body], levels: int = 2) -> Certificate:
+    """Certify that the report bounds the distance from Loop's limit surface.
+
+    The value is the largest distance between the two limits at common parameters, as a fraction of
+    what the report says; and what it says must be no more than the budget's bound.
+    """
+    measured = []
+    for body in bodies:
+        ours, theirs = (
+            refine(body.mesh, scheme, levels, 1.0, limit=True, threads=1)
+            for scheme in (subject.scheme, loop())
+        )
+        apart = np.linalg.norm(ours.mesh.vertices - theirs.mesh.vertices, axis=1).max()
+        stated, bound = (ours.report[key] for key in ("limit_distance", "limit_distance_bound"))
+        assert stated is not None
+        slack = rounding(body.mesh)
+        measured.append((float(apart) / (stated + slack), body.name))
+        if bound is not None:
+            measured.append((stated / (bound * (1 + SAME) + slack), f"{body.name}, bound"))
+    ratio, place = worst(measured)
+    return Certificate("limit", "limit distance", ratio, high=1 + SAME, where=place)
+
+
+def smoothness_class(subject: Subject, bodies: Sequence[Body]) -> Certificate:
+    """Certify that after K levels the rule is Loop's: its limits are C² off extraordinary points.
+
+    The value is the largest difference from an independent Loop at the level after, in the mesh's
+    extents; NaN for a scheme that never stops to correct.
+    """
+    name, levels = "smoothness class", subject.scheme.learned_levels
+    if levels is None:
+        return Certificate("class", name, math.nan, high=SAME, where="corrects at every level")
+    measured = []
+    for body in bodies:
+        last, after = (
+            refine(body.mesh, subject.scheme, count, 1.0, threads=1).mesh
+            for count in (max(levels, 1), max(levels, 1) + 1)
+        )
+        expected = plain_loop(last.vertices, last.faces).positions
+        extent = np.ptp(last.vertices, axis=0).max()
+        measured.append((float(np.abs(after.vertices - expected).max() / extent), body.name))
+    value, place = worst(measured)
+    return Certificate("class", name, value, high=SAME, where=place)
+
+
+def resolution_independence(subject: Subject, bodies: Sequence[Body]) -> Certificate:
+    """Certify that what is learned is in units of h: without the budget, scaling a mesh scales δ.
+
+    R stays what it is. A rule in units of h² / R fails: it is right at one resolution alone. The
+    value is the largest relative difference.
+    """
+    scheme = unbounded(subject.exact)
+    measured = []
+    for body in bodies:
+        own = step(scheme, body.mesh).displacement
+        size = np.abs(own).max()
+        if size == 0:
+            continue
+        for scale in SCALES:
+            scaled = Mesh(scale * body.mesh.vertices, body.mesh.faces)
+            apart = step(scheme, scaled).displacement / scale - own
+            measured.append((float(np.abs(apart).max() / size), f"{body.name}, times {scale:g}"))
+    value, place = worst(measured) if measured else (0.0, "the scheme is Loop on every mesh")
+    return Certificate("scale", "resolution independence", value, high=SAME, where=place)
+
+
+def unbounded(scheme: Scheme) -> Scheme:
+    """The scheme with a budget that nothing reaches, where its rules say how to."""
+    vertices, edges = scheme.vertex_rule, scheme.edge_rule
+    if not (isinstance(vertices, ScaleFreeVertexRule) and isinstance(edges, ScaleFreeEdgeRule)):
+        return scheme
+    form = replace(edges.form, budget=UNBOUNDED)
+    boundary = None if edges.boundary is None else replace(edges.boundary, form=form)
+    return replace(
+        scheme,
+        vertex_rule=replace(vertices, form=form, boundary=boundary),
+        edge_rule=replace(edges, form=form, boundary=boundary),
+    )

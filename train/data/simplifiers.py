@@ -1,0 +1,111 @@
+"""Several ways to simplify a dense mesh: coarse meshes in practice come from any of them."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import fast_simplification
+import igl
+import numpy as np
+from jaxtyping import Int
+from numpy.typing import ArrayLike
+
+from pns_common.errors import MeshError
+from pns_common.mesh import Mesh, clean
+from train.data.dense_meshes import largest_part
+
+AGGRESSIVENESS = 5.0
+"""How fast fast-simplification raises its threshold: below its own 7, for better triangles."""
+
+LEAST_KEPT = 0.8
+"""Share of the simplification that its largest part has to hold."""
+
+CLOSENESS = 1.6
+"""A result is used where its faces are within this factor of the target."""
+
+Simplifier = Callable[[Mesh, int], Mesh]
+
+
+def fast_quadric(mesh: Mesh, faces: int) -> Mesh:
+    """Quadric edge collapses in sweeps with a rising threshold (fast-simplification)."""
+    vertices, triangles = fast_simplification.simplify(
+        mesh.vertices.copy(), mesh.faces.copy(), target_count=faces, agg=AGGRESSIVENESS
+    )[:2]
+    return _mesh(vertices, triangles)
+
+
+def quadric(mesh: Mesh, faces: int) -> Mesh:
+    """Quadric edge collapses, the cheapest first (Garland and Heckbert 1997; libigl)."""
+    vertices, triangles, *_ = igl.qslim(mesh.vertices, mesh.faces, faces)
+    return _mesh(vertices, triangles)
+
+
+def shortest_edges(mesh: Mesh, faces: int) -> Mesh:
+    """Collapses of the shortest edge to its midpoint: even triangles that ignore shape (libigl)."""
+    vertices, triangles, *_ = igl.decimate(mesh.vertices, mesh.faces, faces)
+    return _mesh(vertices, triangles)
+
+
+def clustered(mesh: Mesh, faces: int) -> Mesh:
+    """Vertices of one cell of a grid become their mean (Rossignac and Borrel 1993).
+
+    The grid's fineness is found by bisection.
+    """
+    corner, extent = mesh.vertices.min(axis=0), float(np.ptp(mesh.vertices, axis=0).max())
+    low, high, best, least = 2, 512, None, np.inf
+    while low <= high:
+        cells = (low + high) // 2
+        merged = _merged(mesh, np.floor((mesh.vertices - corner) / extent * cells).astype(np.int64))
+        count = 0 if merged is None else len(merged.faces)
+        if merged is not None and abs(count - faces) < least:
+            best, least = merged, abs(count - faces)
+        low, high = (cells + 1, high) if count < faces else (low, cells - 1)
+    if best is None:
+        raise MeshError("clustering leaves nothing", element="mesh")
+    return best
+
+
+SIMPLIFIERS: Mapping[str, Simplifier] = MappingProxyType(
+    {
+        "fast-quadric": fast_quadric,
+        "quadric": quadric,
+        "shortest-edges": shortest_edges,
+        "clustered": clustered,
+    }
+)
+
+
+def simplified(mesh: Mesh, simplifier: Simplifier, faces: int) -> Mesh | None:
+    """Return the largest part of a simplification; None where it is no fair coarse mesh.
+
+    That is where too much is pinched off, or the simplifier stopped far from the target.
+    """
+    try:
+        whole = simplifier(mesh, faces)
+        part = largest_part(whole)
+    except MeshError:
+        return None
+    near = faces / CLOSENESS <= len(part.faces) <= faces * CLOSENESS
+    kept = len(part.faces) >= LEAST_KEPT * len(whole.faces)
+    return part if near and kept else None
+
+
+def _merged(mesh: Mesh, cell: Int[np.ndarray, "V 3"]) -> Mesh | None:
+    _, number = np.unique(cell, axis=0, return_inverse=True)
+    number = number.reshape(-1)
+    members = np.bincount(number)
+    sums = [np.bincount(number, column) for column in mesh.vertices.T]
+    faces = number[mesh.faces]
+    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    # Two sheets that fall together, whichever way they face, are left out both.
+    _, first, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    single = np.zeros(len(faces), dtype=bool)
+    single[first[count == 1]] = True
+    if not (whole & single).any():
+        return None
+    return _mesh(np.stack(sums, axis=1) / members[:, None], faces[whole & single])
+
+
+def _mesh(vertices: ArrayLike, faces: ArrayLike) -> Mesh:
+    return clean(Mesh(np.asarray(vertices, dtype=np.float64), np.asarray(faces))).mesh

@@ -1,0 +1,89 @@
+"""Random solids, simplified: coarse meshes as they come out of quadric edge collapses."""
+
+from collections.abc import Iterator
+
+import fast_simplification
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.errors import MeshError
+from pns_common.mesh import Mesh, clean
+from train.data.dense_meshes import is_manifold
+from train.data.references import Pair, Reference
+from train.surfaces.marching import laid_onto, marched, unit_gradient
+from train.surfaces.solids import Field, random_solid
+
+FIRST_LOOK, FIRST_EXTENT = 20, 1.9
+"""Grid on which a solid is first looked for."""
+
+MARGIN = 1.12
+SIDES = {40: 0.3, 64: 0.7}
+"""Points a side of the grid that it is marched on, and how often."""
+
+FEWEST_DENSE = 500
+FEWEST, MOST = 24, 4000
+LEAST_REDUCTION = 4
+USUAL, USUALLY = (300, 2000), 0.5
+"""Half of the coarse meshes are of usual size; the others of any, evenly by logarithm."""
+
+ON_SURFACE = 0.16
+"""How often the collapsed vertices are laid onto the surface; collapses leave them beside it."""
+
+AGGRESSIVENESS = (3.0, 5.0, 7.0)
+EACH = 5
+"""Coarse meshes made of one solid."""
+
+
+def solid_pairs(rng: np.random.Generator) -> Iterator[Pair]:
+    """Yield up to five coarse meshes of one random solid, closed manifolds all."""
+    field = _framed(random_solid(rng))
+    if field is None:
+        return
+    side = int(rng.choice(list(SIDES), p=list(SIDES.values())))
+    dense = marched(field, side, 1.0)
+    if len(dense.faces) < FEWEST_DENSE:
+        return
+    points = laid_onto(field, dense.vertices)
+    surface = Reference(points, unit_gradient(field, points))
+    for _ in range(EACH):
+        on_surface = rng.random() < ON_SURFACE
+        coarse = collapsed(points, dense.faces, _size(rng, len(dense.faces)), rng)
+        if coarse is None:
+            continue
+        if on_surface:
+            coarse = Mesh(laid_onto(field, coarse.vertices), coarse.faces)
+        yield Pair("laid" if on_surface else "collapsed", coarse, surface)
+
+
+def collapsed(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    count: int,
+    rng: np.random.Generator,
+) -> Mesh | None:
+    """Return a mesh after quadric edge collapses; None where it is no closed manifold any more."""
+    vertices, triangles = fast_simplification.simplify(
+        points.copy(), faces.copy(), target_count=count, agg=float(rng.choice(AGGRESSIVENESS))
+    )[:2]
+    try:
+        mesh = clean(Mesh(np.asarray(vertices, dtype=np.float64), np.asarray(triangles))).mesh
+    except MeshError:
+        return None
+    return mesh if len(mesh.faces) >= 8 and is_manifold(mesh) else None
+
+
+def _framed(field: Field) -> Field | None:
+    """Return the field moved and scaled so that its zero set just fits into [−1, 1]³."""
+    try:
+        seen = marched(field, FIRST_LOOK, FIRST_EXTENT)
+    except (MeshError, ValueError):
+        return None
+    low, high = seen.vertices.min(axis=0), seen.vertices.max(axis=0)
+    centre, reach = (low + high) / 2, float((high - low).max()) / 2 * MARGIN
+    return lambda points: field(points * reach + centre) / reach
+
+
+def _size(rng: np.random.Generator, dense_faces: int) -> int:
+    largest = min(MOST, dense_faces // LEAST_REDUCTION)
+    low, high = USUAL if rng.random() < USUALLY else (FEWEST, largest)
+    return int(min(np.exp(rng.uniform(np.log(low), np.log(high))), largest))

@@ -1,0 +1,182 @@
+"""An endless, seeded stream of random coarse meshes on random surfaces of several families.
+
+Whole families are held out: ridges on spheres, tori, rounded boxes and crossings are in no stream.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import fast_simplification
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.mesh import Mesh, clean
+from train.data.datasets import Instance
+from train.data.patches import marched
+from train.data.plane_meshes import PlaneMesh, regular_grid, scattered, turned_grid
+from train.surfaces.cad import Fillet
+from train.surfaces.implicit import Ridge, Saddle, Surface
+from train.surfaces.smooth import Bump, Crossing, CurvedRidge, LumpySphere
+
+Lift = Callable[[Float[np.ndarray, "P 2"]], Float[np.ndarray, "P 3"]]
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A surface, and how a plane mesh over [−1, 1]² is lifted onto it."""
+
+    surface: Surface
+    lift: Lift
+
+
+def ridge(rng: np.random.Generator) -> Drawn:
+    """The paper's family."""
+    surface = Ridge(
+        amplitude=rng.uniform(0.2, 0.85),
+        sharpness=rng.uniform(2.5, 11),
+        angle=rng.uniform(0, np.pi),
+        centre_x=rng.uniform(-0.3, 0.3),
+        centre_y=rng.uniform(-0.3, 0.3),
+    )
+    return _graph(surface)
+
+
+def curved_ridge(rng: np.random.Generator) -> Drawn:
+    """Ridges along an arc or a whole circle, its centre in the patch.
+
+    Where the circle is small, the surface comes to a faint tip at its centre.
+    """
+    surface = CurvedRidge(
+        amplitude=rng.uniform(0.2, 0.7),
+        sharpness=rng.uniform(3, 10),
+        radius=rng.uniform(0.5, 1.5),
+        centre_x=rng.uniform(-1, 1),
+        centre_y=rng.uniform(-1, 1),
+    )
+    return _graph(surface)
+
+
+def bump(rng: np.random.Generator) -> Drawn:
+    """Bumps from round to twice as long as wide."""
+    surface = Bump(
+        amplitude=rng.uniform(0.2, 0.7),
+        sharpness=rng.uniform(1.5, 7),
+        elongation=rng.uniform(0.2, 1),
+        angle=rng.uniform(0, np.pi),
+        centre_x=rng.uniform(-0.4, 0.4),
+        centre_y=rng.uniform(-0.4, 0.4),
+    )
+    return _graph(surface)
+
+
+def saddle(rng: np.random.Generator) -> Drawn:
+    """The paper's saddles, on which Loop is hard to beat."""
+    surface = Saddle(rng.uniform(0.2, 0.7), rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2))
+    return _graph(surface)
+
+
+def lumpy_sphere(rng: np.random.Generator) -> Drawn:
+    """A part of a sphere with waves; the patch is laid on it by central projection."""
+    radius = rng.uniform(1.2, 2.5)
+    surface = LumpySphere(
+        radius,
+        amplitude=rng.uniform(0.05, 0.25) * radius,
+        frequency=rng.uniform(2, 6),
+        phase_x=rng.uniform(0, 6.3),
+        phase_y=rng.uniform(0, 6.3),
+        phase_z=rng.uniform(0, 6.3),
+    )
+
+    def lift(plane: Float[np.ndarray, "P 2"]) -> Float[np.ndarray, "P 3"]:
+        direction = np.concatenate([plane, np.full((len(plane), 1), radius)], axis=1)
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        return direction * surface.reach(direction)[:, None]
+
+    return Drawn(surface, lift)
+
+
+def fillet(rng: np.random.Generator) -> Drawn:
+    """Two walls at a right angle with a fillet, sharp to wide."""
+    surface = Fillet(rng.uniform(0.1, 0.9))
+    shift = rng.uniform(-0.25, 0.25)
+    turn = rng.uniform(0, np.pi)
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+
+    def lift(plane: Float[np.ndarray, "P 2"]) -> Float[np.ndarray, "P 3"]:
+        turned = plane @ rotation + [0, shift]
+        return marched(surface, turned, np.zeros(3), np.array([0.0, 1.0, 1.0]))
+
+    return Drawn(surface, lift)
+
+
+def crossing(rng: np.random.Generator) -> Drawn:
+    """Two crossing ridges: held out of every stream."""
+    angle = rng.uniform(0, np.pi)
+    surface = Crossing(
+        amplitude=rng.uniform(0.3, 0.6),
+        sharpness=rng.uniform(3, 10),
+        angle=angle,
+        other_amplitude=rng.uniform(0.2, 0.5),
+        other_sharpness=rng.uniform(3, 10),
+        other_angle=angle + rng.uniform(0.3, 0.7) * np.pi,
+    )
+    return _graph(surface)
+
+
+Family = Callable[[np.random.Generator], Drawn]
+
+FAMILIES: Mapping[str, Family] = MappingProxyType(
+    {
+        "ridge": ridge,
+        "curved-ridge": curved_ridge,
+        "bump": bump,
+        "saddle": saddle,
+        "lumpy-sphere": lumpy_sphere,
+        "fillet": fillet,
+    }
+)
+SHARES = (0.42, 0.14, 0.10, 0.12, 0.12, 0.10)
+"""How often each family is drawn."""
+
+
+def random_instance(rng: np.random.Generator) -> Instance:
+    """Draw a family, a surface of it, and a coarse mesh on that."""
+    family = list(FAMILIES.values())[rng.choice(len(FAMILIES), p=SHARES)]
+    drawn = family(rng)
+    kind = rng.choice(4, p=[0.55, 0.15, 0.15, 0.15])
+    if kind == 3:
+        return Instance(drawn.surface, decimated(rng, drawn.lift))
+    side = int(rng.integers(8, 12)) if kind else int(rng.choice([9, 9, 9, 8, 10, 11]))
+    jitter = rng.uniform(0, 0.5) if kind else rng.choice([0.04, 0.04, 0.3])
+    plane = (regular_grid, turned_grid, scattered)[kind](rng, side, jitter)
+    return Instance(drawn.surface, _mesh(plane, drawn.lift))
+
+
+def decimated(rng: np.random.Generator, lift: Lift) -> Mesh:
+    """A dense mesh of the surface, simplified: vertices of all valences, near the surface."""
+    dense = _mesh(regular_grid(rng, 41, 0.3), lift)
+    count = int(rng.integers(100, 260))
+    points, faces = fast_simplification.simplify(
+        dense.vertices.copy(), dense.faces.astype(np.int32), target_count=count
+    )[:2]
+    return clean(Mesh(np.asarray(points, dtype=np.float64), faces.astype(np.int64))).mesh
+
+
+def stream(seed: int) -> Iterator[Instance]:
+    """All instances of a seed, without end."""
+    rng = np.random.default_rng(seed)
+    while True:
+        yield random_instance(rng)
+
+
+def _graph(surface: Ridge | CurvedRidge | Crossing | Bump | Saddle) -> Drawn:
+    def lift(plane: Float[np.ndarray, "P 2"]) -> Float[np.ndarray, "P 3"]:
+        flat = np.concatenate([plane, np.zeros((len(plane), 1))], axis=1)
+        return np.concatenate([plane, surface.height(flat)[:, None]], axis=1)
+
+    return Drawn(surface, lift)
+
+
+def _mesh(plane: PlaneMesh, lift: Lift) -> Mesh:
+    return Mesh(lift(plane.points), plane.faces)

@@ -1,0 +1,1 @@
+"""Tables and figures of what the paper leaves open: the bundled models, real meshes, stars."""

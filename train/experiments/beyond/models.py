@@ -1,0 +1,143 @@
+"""Loop, the bundled models and the unconstrained network: accuracy, stability, guarantees."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+
+from pns_common.onnx_model import BUNDLED, DEFAULT_MODEL, bundled_models, load_model
+from pns_common.schemes import Scheme, loop, pns
+from train.data.datasets import Dataset
+from train.experiments.harness.experiment import Cell, Column, Experiment, Figure, Outcome, Table
+from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.style import COLOURS, panels
+from train.experiments.paper.methods import unconstrained_scheme
+from train.metrics.evaluation import compare_with_loop
+from train.metrics.whole_surface import WholeSurface, gain, surface_jump, whole_surface
+
+JUMP_LIMIT = 1.5
+"""Times Loop's: the jump that is asked for where the surface itself has no larger one."""
+
+COLUMNS = (
+    Column("method", "Method"),
+    Column("near_percent", "Near %", "+.1f"),
+    Column("global_percent", "All %", "+.1f"),
+    Column("hausdorff_percent", "Hausdorff %", "+.1f"),
+    Column("normal_near_percent", "Normals near %", "+.1f"),
+    Column("normal_percent", "Normals %", "+.1f"),
+    Column("whole_percent", "Whole surface %", "+.1f"),
+    Column("shading_percent", "Shading %", "+.1f"),
+    Column("jump", "Largest jump", ".3f"),
+    Column("jump_to_loop", "Jump / Loop's", ".2f"),
+    Column("jump_to_allowed", "Worst jump / allowed", ".2f"),
+    Column("max_ratio", "Max ratio", ".4g"),
+    Column("flipped", "Flipped", "d"),
+)
+
+
+def model_files(_: Laboratory) -> Iterable[Path]:
+    """Return the bundled model files: what an experiment that measures them reads."""
+    return [Path(str(BUNDLED / f"{name}.onnx")) for name in bundled_models()]
+
+
+def bundled_schemes() -> dict[str, Scheme]:
+    """Return PNS with every bundled model, the default last, as the product runs them."""
+    names = sorted(bundled_models(), key=lambda name: (name == DEFAULT_MODEL, name))
+    return {name: pns(load_model(name)) for name in names}
+
+
+def run(laboratory: Laboratory) -> Outcome:
+    """Measure all on the held-out ridges: one step, and the whole surface after four."""
+    held_out, levels = laboratory.dataset("ridge-held-out"), laboratory.scale.levels
+    schemes = {
+        "Loop": loop(),
+        **{f"`{name}`": scheme for name, scheme in bundled_schemes().items()},
+        "Unconstrained": unconstrained_scheme(laboratory),
+    }
+    surface = np.array([surface_jump(instance, levels) for instance in held_out.instances])
+    reference, rows, after = whole_surface(loop(), held_out, levels), [], {}
+    for number, (name, scheme) in enumerate(schemes.items()):
+        laboratory.progress(f"models: {name}", number, len(schemes))
+        after[name] = whole_surface(scheme, held_out, levels)
+        rows.append(_row(name, scheme, held_out, after[name], reference, surface))
+    notes = (
+        "*Near*, *all*, *Hausdorff* and *normals* are the published one-step metrics: improvement "
+        f"over Loop at the vertices inserted on edges. The rest is the whole mesh after {levels} "
+        "levels: the distance of all vertices, *shading* the mean angle between a face's normal "
+        "and the surface's at the nearest point, the largest angle between neighbouring faces. "
+        f"*Allowed* is {JUMP_LIMIT:g} times Loop's jump, or the jump of Loop's own mesh once it is "
+        "laid onto the surface where that is more; the column is the worst ridge's.",
+        "The product's own files are measured, each with its own C and c; "
+        "docs/models.md says how they were made.",
+    )
+    return Outcome(
+        tables=(Table("models", "Held-out ridges", COLUMNS, tuple(rows)),),
+        figures=(
+            Figure(
+                "models",
+                f"The held-out ridges after {levels} levels, one dot a ridge. Left: distance of "
+                "all vertices over Loop's. Right: the largest jump between neighbouring faces "
+                "over Loop's; the crosses are the surface's own.",
+                lambda: _draw(after, reference, surface),
+            ),
+        ),
+        notes=notes,
+    )
+
+
+def _row(
+    name: str,
+    scheme: Scheme,
+    held_out: Dataset,
+    after: WholeSurface,
+    reference: WholeSurface,
+    surface: np.ndarray,
+) -> tuple[Cell, ...]:
+    step = compare_with_loop(scheme, held_out)
+    shown = ("distance_near", "distance", "hausdorff", "normal_near", "normal")
+    whole = gain(after, reference)
+    allowed = np.maximum(JUMP_LIMIT * reference.jump, surface)
+    return (
+        name,
+        *(step[metric].percent for metric in shown),
+        whole.distance,
+        whole.normal,
+        float(after.jump.max()),
+        float(after.jump.max() / reference.jump.max()),
+        float((after.jump / allowed).max()),
+        float(after.ratio.max()),
+        int(after.flipped.sum()),
+    )
+
+
+def _draw(
+    after: Mapping[str, WholeSurface], reference: WholeSurface, surface: np.ndarray
+) -> Drawing:
+    figure, (distance, jump) = panels(2, height=2.6)
+    jump.set_yscale("log")
+    shown = [name for name in after if name not in ("Loop", "Unconstrained")]
+    for place, name in enumerate(shown):
+        whole = after[name]
+        spread = place + np.linspace(-0.2, 0.2, len(whole.distance))
+        distance.scatter(spread, whole.distance / reference.distance, s=12, color=COLOURS["pns"])
+        jump.scatter(spread, whole.jump / reference.jump, s=12, color=COLOURS["pns"])
+        jump.scatter(spread, surface / reference.jump, s=10, color="0.5", marker="x", linewidth=0.7)
+    for axes in (distance, jump):
+        axes.axhline(1, color=COLOURS["loop"], linewidth=1)
+        axes.set_xticks(range(len(shown)), [name.strip("`") for name in shown])
+        axes.set_xlim(-0.5, len(shown) - 0.5)
+    jump.axhline(JUMP_LIMIT, color="0.3", linewidth=0.8, linestyle="--")
+    distance.set(title="Distance over Loop's", ylim=(0, None))
+    jump.set(title="Largest jump over Loop's")
+    return figure
+
+
+EXPERIMENT = Experiment(
+    name="models",
+    title="The bundled models",
+    source="Beyond the paper.",
+    run=run,
+    seconds=60,
+    reads=model_files,
+)

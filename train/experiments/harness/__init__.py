@@ -1,0 +1,1 @@
+"""What experiments share: the laboratory, results that are kept, tables, figures, the page."""

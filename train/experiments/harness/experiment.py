@@ -1,0 +1,80 @@
+"""What an experiment is: a function of the laboratory whose tables and figures are data."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure as Drawing
+
+from train.experiments.harness.laboratory import Laboratory
+
+Cell = str | float | int | bool | None
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column of a table.
+
+    Attributes:
+        name: heading in the CSV file.
+        heading: heading on the page.
+        digits: how the page formats a number, as in `format(value, digits)`; the CSV file keeps
+            every digit.
+    """
+
+    name: str
+    heading: str
+    digits: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table: `results/NAME.csv`, and a part of the page. None is an empty cell."""
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure: `results/figures/NAME.png` and `.pdf`; `draw` makes it in the shared style."""
+
+    name: str
+    caption: str
+    draw: Callable[[], Drawing]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What an experiment found. Notes are Markdown paragraphs: above all, where it differs."""
+
+    tables: tuple[Table, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """A table or figure of the paper, or one that it names as open.
+
+    Attributes:
+        name: on the command line.
+        title: on the page.
+        source: where the paper has it, or that it goes beyond the paper.
+        run: does the work; at `SMALL` scale it takes a few seconds.
+        seconds: about how long it takes at full scale, for the estimate.
+        needs_published: cannot run without the author's published data.
+        needs_assets: cannot run without a folder of meshes.
+        reads: the files that it reads beside code, checkpoints and published data.
+    """
+
+    name: str
+    title: str
+    source: str
+    run: Callable[[Laboratory], Outcome]
+    seconds: float
+    needs_published: bool = False
+    needs_assets: bool = False
+    reads: Callable[[Laboratory], Iterable[Path]] = lambda _: ()

@@ -1,0 +1,102 @@
+"""What experiments share: their scale, the data sets, trained networks, progress."""
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+
+from pns_common.schemes import Scheme, pns
+from train.ablations.variants import PNS, Variant, fit_variant
+from train.data.datasets import DATASETS, Dataset
+from train.experiments.harness.sources import code_of, sources_of
+from train.fitting.determinism import machine_fingerprint
+from train.models.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from train.models.networks import BoundedNet
+from train.models.recipes import Recipe
+from train.models.torch_model import recipe_model
+
+OnProgress = Callable[[str, int, int], None]
+"""Called with what is being done, how many steps of it are done, and of how many."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How much of an experiment is run.
+
+    Attributes:
+        name: on the page, where it is not the whole.
+        instances: of each data set, at most.
+        training_steps: at most.
+        levels: of repeated subdivision.
+        deepest: level of the extended iteration.
+        samples: random draws where an experiment takes any.
+    """
+
+    name: str
+    instances: int
+    training_steps: int
+    levels: int
+    deepest: int
+    samples: int
+
+
+FULL = Scale("full", instances=1000, training_steps=100_000, levels=4, deepest=7, samples=1000)
+SMALL = Scale("small", instances=2, training_steps=2, levels=2, deepest=2, samples=20)
+"""A few seconds each, for the tests: every line runs, no number means anything."""
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """What an experiment may use.
+
+    Attributes:
+        checkpoints: folder of networks to take as they are, by recipe name; what is missing there
+            is trained.
+        cache: folder where trained networks are kept between runs.
+        published: folder of the author's published data, or None.
+        progress: called while something takes long.
+        assets: folder of dense meshes, or None.
+    """
+
+    scale: Scale
+    cache: Path
+    checkpoints: Path | None
+    published: Path | None
+    progress: OnProgress
+    assets: Path | None = None
+
+    def dataset(self, name: str) -> Dataset:
+        """Return a data set, cut to the scale."""
+        dataset = DATASETS[name]()
+        return Dataset(dataset.name, dataset.instances[: self.scale.instances])
+
+    def scheme(self, recipe: Recipe) -> Scheme:
+        """Return PNS with the network of a recipe."""
+        return pns(recipe_model(recipe, self.network(recipe)), recipe.budget)
+
+    def network(self, recipe: Recipe, variant: Variant = PNS) -> BoundedNet:
+        """Return the network of a recipe: given, kept from an earlier run, or trained now."""
+        if self.checkpoints is not None:
+            given = self.checkpoints / f"{recipe.name}.safetensors"
+            if given.is_file():
+                return load_checkpoint(given).network
+        recipe = replace(recipe, steps=min(recipe.steps, self.scale.training_steps))
+        kept = self.cache / f"{recipe.name}-{_digest(recipe, variant)}.safetensors"
+        if kept.is_file():
+            return load_checkpoint(kept).network
+
+        def on_step(done: int, _: float) -> None:
+            self.progress(f"training {recipe.name}", done, recipe.steps)
+
+        fitted = fit_variant(variant, recipe, on_step)
+        save_checkpoint(kept, Checkpoint(recipe, fitted.network, {}, machine_fingerprint()))
+        return fitted.network
+
+
+def _digest(recipe: Recipe, variant: Variant) -> str:
+    """Return a short hash of what decides the weights: the recipe, the rule, the code."""
+    parts = [msgspec.json.encode(recipe), variant.name.encode()]
+    parts += [code_of(path) for path in sources_of("train.ablations.variants")]
+    return hashlib.sha256(b"\n".join(parts)).hexdigest()[:12]

@@ -1,0 +1,78 @@
+"""The eight methods of the paper's comparison, trained or fitted, by the names of the style."""
+
+from collections.abc import Iterator
+from typing import cast
+
+from pns_common.mesh import Mesh
+from pns_common.refine import Refinement, refine
+from pns_common.schemes import Scheme, loop
+from train.ablations.variants import UNCONSTRAINED, variant_recipe
+from train.baselines.butterfly import modified_butterfly
+from train.baselines.curvature_adaptive import curvature_adaptive
+from train.baselines.normal_displacement import fit_scalar, normal_displacement
+from train.baselines.pn_triangles import pn_triangles
+from train.baselines.quadric import quadric_fit
+from train.baselines.unconstrained import unconstrained
+from train.data.datasets import Instance, ridge_held_out
+from train.experiments.harness.laboratory import Laboratory
+from train.experiments.paper.paper_values import PAPER_INSTANCE
+from train.models.recipes import one_step, paper
+from train.surfaces.implicit import Ridge
+
+PAPER_UNITS = 1.0
+"""Reference length of all experiments: the paper's C is absolute."""
+
+
+def eight_methods(laboratory: Laboratory) -> dict[str, Scheme]:
+    """Return Loop, five hand-made methods, PNS and the unconstrained network."""
+    recipe = paper()
+    training_set = laboratory.dataset(one_step(recipe).dataset)
+    return {
+        "loop": loop(),
+        "butterfly": modified_butterfly(),
+        "pn-triangles": pn_triangles(),
+        "quadric": quadric_fit(),
+        "normal-displacement": normal_displacement(fit_scalar(training_set)),
+        "curvature-adaptive": curvature_adaptive(recipe.gate_sharpness),
+        "pns": laboratory.scheme(recipe),
+        "unconstrained": unconstrained_scheme(laboratory),
+    }
+
+
+def learned_methods(laboratory: Laboratory) -> dict[str, Scheme]:
+    """Return Loop and the two learned methods, which the paper's figures set side by side."""
+    return {
+        "loop": loop(),
+        "pns": laboratory.scheme(paper()),
+        "unconstrained": unconstrained_scheme(laboratory),
+    }
+
+
+def unconstrained_scheme(laboratory: Laboratory) -> Scheme:
+    """Return the unconstrained network, trained on the same ridges."""
+    recipe = variant_recipe(paper(), UNCONSTRAINED)
+    return unconstrained(laboratory.network(recipe, UNCONSTRAINED), recipe)
+
+
+def hard_instance() -> Instance:
+    """Return the held-out ridge that the paper's figures and its repeated table show."""
+    amplitude, sharpness = PAPER_INSTANCE["amplitude"], PAPER_INSTANCE["sharpness"]
+
+    def difference(instance: Instance) -> float:
+        ridge = ridge_of(instance)
+        return abs(ridge.amplitude - amplitude) + abs(ridge.sharpness - sharpness)
+
+    return min(ridge_held_out().instances, key=difference)
+
+
+def ridge_of(instance: Instance) -> Ridge:
+    """Return the surface of an instance from a data set of ridges."""
+    return cast(Ridge, instance.surface)
+
+
+def level_by_level(mesh: Mesh, scheme: Scheme, levels: int) -> Iterator[Refinement]:
+    """Yield the refinement after each level; every step keeps the paper's units."""
+    for _ in range(levels):
+        refinement = refine(mesh, scheme, levels=1, reference_length=PAPER_UNITS)
+        mesh = refinement.mesh
+        yield refinement

@@ -1,0 +1,1 @@
+"""Training: differentiable steps, losses, trainers, and what keeps their bits the same."""

@@ -1,0 +1,95 @@
+"""Training on the limit surface after one learned level, on a stream of coarse meshes."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import torch
+
+from pns_common.schemes import Scheme
+from pns_common.step import level_step
+from train.data.pair_stream import pair_stream
+from train.data.references import Pair
+from train.fitting.determinism import deterministic
+from train.fitting.limit_batch import LimitBatch, limit_batch
+from train.fitting.limit_loss import LimitMeasures, Standards, limit_loss, measure
+from train.fitting.limit_maps import applied, loop_matrix
+from train.models.from_recipe import (
+    initial_network,
+    initial_vertex_network,
+    recipe_scheme,
+)
+from train.models.networks import BoundedNet
+from train.models.recipes import Recipe, ToLimit
+
+WARM_UP = 0.1
+"""Share of the steps in which the learning rate rises."""
+
+LONGEST_GRADIENT = 1.0
+
+
+def fit_to_limit(
+    recipe: Recipe, plan: ToLimit, on_step: Callable[[int, float], None]
+) -> tuple[BoundedNet, BoundedNet, tuple[float, ...]]:
+    """Return the trained networks of a scale-free recipe, and the loss before each step."""
+    with deterministic():
+        network, vertex_network = initial_network(recipe), initial_vertex_network(recipe)
+        scheme = recipe_scheme(recipe, network, vertex_network)
+        assert vertex_network is not None  # recipe_scheme refuses it
+        weights = [*network.parameters(), *vertex_network.parameters()]
+        optimiser = torch.optim.Adam(weights, lr=recipe.learning_rate)
+        schedule = torch.optim.lr_scheduler.OneCycleLR(
+            optimiser, recipe.learning_rate, total_steps=recipe.steps, pct_start=WARM_UP
+        )
+        losses: list[float] = []
+        for batch, standards in _batches(recipe, plan):
+            loss = limit_loss(plan.weights, batch, limit_measures(batch, scheme), standards)
+            optimiser.zero_grad()
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(weights, LONGEST_GRADIENT)
+            optimiser.step()
+            schedule.step()
+            losses.append(loss.item())
+            on_step(len(losses), losses[-1])
+    return network, vertex_network, tuple(losses)
+
+
+def limit_measures(batch: LimitBatch, scheme: Scheme) -> LimitMeasures:
+    """Take one level of a scheme, and measure the limit of Loop after it."""
+    return measure(batch, level_step(batch.level, scheme).points)
+
+
+def standards_of(batch: LimitBatch) -> Standards:
+    """Return Loop's measures on a batch, and those of quasi-interpolation along the normal."""
+    level = batch.level
+    with torch.no_grad():
+        matrix = loop_matrix(level.topology)
+        return Standards(
+            loop=measure(batch, applied(matrix, level.points)),
+            prior=measure(batch, applied(matrix, level.points + level.pushes)),
+        )
+
+
+def _batches(recipe: Recipe, plan: ToLimit) -> Iterator[tuple[LimitBatch, Standards]]:
+    """Yield one batch a step, drawn from a pool that grows until its oldest give way to new ones.
+
+    Making a batch takes as long as some ten steps on it.
+    """
+    rng = np.random.default_rng(recipe.seed)
+    fresh = _fresh(recipe, plan, rng)
+    pool: list[tuple[LimitBatch, Standards]] = []
+    for step in range(recipe.steps):
+        if step % plan.reuse == 0:
+            pool = [*pool, next(fresh)][-plan.pool :]
+        yield pool[rng.integers(len(pool))]
+
+
+def _fresh(
+    recipe: Recipe, plan: ToLimit, rng: np.random.Generator
+) -> Iterator[tuple[LimitBatch, Standards]]:
+    waiting: list[Pair] = []
+    for pair in pair_stream(recipe.seed):
+        waiting.append(pair)
+        if sum(len(mesh_pair.coarse.faces) for mesh_pair in waiting) >= plan.faces:
+            batch = limit_batch(waiting, rng)
+            waiting = []
+            yield batch, standards_of(batch)

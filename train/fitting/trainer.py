@@ -1,0 +1,122 @@
+"""Training: a recipe in, weights out; the same bits every time on one machine."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from pns_common.arrays import gather
+from pns_common.edge.features import FEATURE_SETS
+from train.data.batch import Batch, disjoint_union
+from train.data.datasets import DATASETS, Instance
+from train.fitting.determinism import deterministic
+from train.fitting.limit_trainer import fit_to_limit
+from train.fitting.losses import weighted_loss
+from train.fitting.one_step import Step, refine_once, vertex_normals
+from train.fitting.quiet import quiet_term
+from train.models.from_recipe import initial_network, recipe_operator
+from train.models.networks import BoundedNet
+from train.models.recipes import OneStep, Recipe, ToLimit, one_step
+from train.surfaces.implicit import signed_distance, unit_normal
+
+OnStep = Callable[[int, float], None]
+"""Called after each step with the number of steps done and the loss."""
+
+Loss = Callable[[BoundedNet, Batch], Float[Tensor, ""]]
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Trained float32 networks and the loss before each step.
+
+    `vertex_network` is None where the recipe has no vertex rule.
+    """
+
+    network: BoundedNet
+    losses: tuple[float, ...]
+    vertex_network: BoundedNet | None = None
+
+
+def fit(recipe: Recipe, on_step: OnStep) -> Fit:
+    """Train the operator with Adam, on what the recipe says."""
+    match recipe.training:
+        case ToLimit() as plan:
+            network, vertex_network, losses = fit_to_limit(recipe, plan, on_step)
+            return Fit(network, losses, vertex_network)
+        case OneStep():
+            quiet = with_quiet(recipe, lambda network, batch: batch_loss(recipe, network, batch))
+            return optimise(recipe, quiet, on_step)
+
+
+def with_quiet(recipe: Recipe, loss: Loss) -> Loss:
+    """Add the recipe's quiet term, if it has one, to any loss of a batch."""
+    plan = one_step(recipe)
+    if plan.quiet == 0:
+        return loss
+    meshes = [instance.mesh for instance in DATASETS[plan.dataset]().instances]
+    quiet = quiet_term(meshes, FEATURE_SETS[recipe.features], recipe.seed)
+    return lambda network, batch: loss(network, batch) + plan.quiet * quiet(network)
+
+
+def optimise(
+    recipe: Recipe,
+    loss_of: Loss,
+    on_step: OnStep,
+    initial: Callable[[Recipe], BoundedNet] = initial_network,
+) -> Fit:
+    """Train a recipe's network, or another that `initial` makes, against any loss of a batch."""
+    plan = one_step(recipe)
+    instances = DATASETS[plan.dataset]().instances
+    with deterministic():
+        network = initial(recipe)
+        optimiser = torch.optim.Adam(network.parameters(), lr=recipe.learning_rate)
+        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
+            optimiser, T_max=recipe.steps, eta_min=plan.final_learning_rate
+        )
+        losses: list[float] = []
+        for batch in _batches(recipe, plan.batch_size, instances):
+            optimiser.zero_grad()
+            loss = loss_of(network, batch)
+            loss.backward()
+            optimiser.step()
+            schedule.step()
+            losses.append(loss.item())
+            on_step(len(losses), losses[-1])
+    return Fit(network, tuple(losses))
+
+
+def batch_loss(recipe: Recipe, network: BoundedNet, batch: Batch) -> Float[Tensor, ""]:
+    """Refine a batch by one step of the operator and weigh its loss."""
+    operator = recipe_operator(recipe, network)
+    step = refine_once(batch.points, batch.topology, operator, recipe.budget)
+    return step_loss(recipe, batch, step)
+
+
+def step_loss(recipe: Recipe, batch: Batch, step: Step) -> Float[Tensor, ""]:
+    """Weigh the four loss terms of a refined batch."""
+    inserted = gather(step.points, batch.inserted)
+    normals = gather(vertex_normals(step.points, batch.children), batch.inserted)
+    return weighted_loss(
+        one_step(recipe).weights,
+        distance=signed_distance(batch.surface, inserted),
+        normals=normals,
+        surface_normals=unit_normal(batch.surface, inserted),
+        ratio=step.ratio,
+        pairs=batch.face_pairs,
+    )
+
+
+def _batches(recipe: Recipe, batch_size: int, instances: Sequence[Instance]) -> Iterator[Batch]:
+    """Yield one batch a step, each drawn without replacement from the whole set."""
+    if batch_size >= len(instances):
+        whole = disjoint_union(instances)
+        for _ in range(recipe.steps):
+            yield whole
+        return
+    rng = np.random.default_rng(recipe.seed)
+    for _ in range(recipe.steps):
+        drawn = rng.choice(len(instances), batch_size, replace=False)
+        yield disjoint_union([instances[index] for index in drawn])

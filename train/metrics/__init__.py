@@ -1,0 +1,1 @@
+"""Measured numbers: one step, whole surfaces, distances between meshes, the envelope's limit."""

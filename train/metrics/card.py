@@ -1,0 +1,57 @@
+"""What a model card says of a model's results, by names under which they can be measured again."""
+
+import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from pns_common.schemes import Scheme, loop
+from train.data.datasets import Dataset, ridge_held_out, saddle_held_out, sphere_ridge_held_out
+from train.metrics.evaluation import compare_with_loop
+from train.metrics.one_step import Improvement, improvement
+from train.metrics.whole_surface import whole_surface
+from train.models.recipes import OneStep, Recipe
+
+LEVELS = 4
+
+
+def after_four_levels(scheme: Scheme, held_out: Dataset) -> dict[str, Improvement]:
+    """Compare with Loop on a data set: all vertices, all faces, the largest jump."""
+    ours, reference = (whole_surface(rule, held_out, LEVELS) for rule in (scheme, loop()))
+    shown = ("distance", "normal", "jump")
+    return {name: improvement(getattr(reference, name), getattr(ours, name)) for name in shown}
+
+
+def _without_near(improvements: Mapping[str, Improvement]) -> dict[str, Improvement]:
+    """Leave out what is measured near the ridge, where nothing is near it."""
+    return {name: row for name, row in improvements.items() if not math.isnan(row.percent)}
+
+
+MEASURES: Mapping[str, Callable[[Scheme], Mapping[str, Improvement]]] = MappingProxyType(
+    {
+        "ridge-held-out": lambda scheme: compare_with_loop(scheme, ridge_held_out()),
+        "ridge-held-out after 4 levels": lambda scheme: after_four_levels(scheme, ridge_held_out()),
+        "saddle-held-out after 4 levels": lambda scheme: after_four_levels(
+            scheme, saddle_held_out()
+        ),
+        "sphere-ridge-held-out after 4 levels": lambda scheme: after_four_levels(
+            scheme, sphere_ridge_held_out()
+        ),
+        "saddle-held-out": lambda scheme: compare_with_loop(scheme, saddle_held_out()),
+        "sphere-ridge-held-out": lambda scheme: _without_near(
+            compare_with_loop(scheme, sphere_ridge_held_out())
+        ),
+    }
+)
+"""One step by the published metrics where nothing else is said."""
+
+ONE_STEP = ("ridge-held-out",)
+"""All that there is to say of a model that was trained on ridges for one step."""
+
+TO_LIMIT = tuple(name for name in MEASURES if name.endswith("levels"))
+"""What there is to say of one that aims at the limit: where it is after one step says nothing."""
+
+
+def card_metrics(recipe: Recipe, scheme: Scheme) -> dict[str, Mapping[str, Improvement]]:
+    """Measure a trained scheme for its card."""
+    names = ONE_STEP if isinstance(recipe.training, OneStep) else TO_LIMIT
+    return {name: MEASURES[name](scheme) for name in names}

@@ -1,0 +1,147 @@
+"""Metrics of a whole refined mesh: all its vertices and faces, at any level.
+
+The one-step metrics of `train.metrics.one_step` are the published ones, at inserted vertices; these
+see old vertices too, and their normal error is one that shading would show.
+"""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.arrays import cross, dot, norm
+from pns_common.edge.frames import face_normals
+from pns_common.mesh import Mesh
+from pns_common.refine import Refinement
+from train.surfaces.implicit import Surface, signed_distance, unit_normal
+
+PROJECTIONS = 4
+FOOT_POINT_STEPS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeErrors:
+    """Errors of one mesh; lengths in the surface's units, angles in radians.
+
+    Attributes:
+        distance: root mean square of |f| / ‖∇f‖ over all vertices.
+        hausdorff: the largest.
+        normal_mean, normal_max: angle between a face's normal and the surface's at the point
+            nearest to the face's centroid; faces without area are left out.
+    """
+
+    distance: float
+    hausdorff: float
+    normal_mean: float
+    normal_max: float
+
+
+@dataclass(frozen=True, slots=True)
+class LevelErrors:
+    """Errors of a mesh after a number of levels, with what the refinement's report adds.
+
+    Attributes:
+        normal_jump: largest angle between the normals of neighbouring faces.
+        ratio: largest proximity ratio of the last step.
+        flipped: faces of the last step that oppose their Loop counterpart.
+    """
+
+    level: int
+    faces: int
+    shape: ShapeErrors
+    normal_jump: float
+    ratio: float
+    flipped: int
+
+    def as_row(self) -> dict[str, float]:
+        """Return all numbers by name."""
+        return {**asdict(self.shape), **{k: v for k, v in asdict(self).items() if k != "shape"}}
+
+
+@dataclass(frozen=True, slots=True)
+class DistanceLevel:
+    """What a step has made, without normal errors: cheap on half a million faces."""
+
+    faces: int
+    distance: float
+    hausdorff: float
+    jump: float
+    ratio: float
+    flipped: int
+
+
+def distance_level(surface: Surface, refinement: Refinement) -> DistanceLevel:
+    """Measure the distances and the report of a refinement's last step."""
+    distance = np.abs(signed_distance(surface, refinement.mesh.vertices))
+    last = refinement.report["levels"][-1]
+    return DistanceLevel(
+        faces=last["faces"],
+        distance=float(np.sqrt((distance**2).mean())),
+        hausdorff=float(distance.max()),
+        jump=last["normal_jump_max"],
+        ratio=last["proximity_ratio"]["max"],
+        flipped=last["flipped_faces"],
+    )
+
+
+def level_errors(surface: Surface, refinement: Refinement, level: int) -> LevelErrors:
+    """Measure a refinement whose last step was the given level."""
+    last = refinement.report["levels"][-1]
+    return LevelErrors(
+        level=level,
+        faces=last["faces"],
+        shape=shape_errors(surface, refinement.mesh),
+        normal_jump=last["normal_jump_max"],
+        ratio=last["proximity_ratio"]["max"],
+        flipped=last["flipped_faces"],
+    )
+
+
+def shape_errors(surface: Surface, mesh: Mesh) -> ShapeErrors:
+    """Measure all vertices and faces of a mesh against a surface."""
+    distance = np.abs(signed_distance(surface, mesh.vertices))
+    angle = face_normal_error(surface, mesh)
+    return ShapeErrors(
+        distance=float(np.sqrt((distance**2).mean())),
+        hausdorff=float(distance.max()),
+        normal_mean=float(angle.mean()),
+        normal_max=float(angle.max()),
+    )
+
+
+def face_normal_error(surface: Surface, mesh: Mesh) -> Float[np.ndarray, " N"]:
+    """Return the angle of each face with area to the surface at its centroid's nearest point."""
+    normals = face_normals(mesh.vertices, mesh.faces)
+    has_area = dot(normals, normals) > 0
+    centroids = mesh.vertices[mesh.faces[has_area]].mean(axis=1)
+    target = unit_normal(surface, nearest_points(surface, centroids))
+    own = normals[has_area]
+    return np.arctan2(norm(cross(own, target)), dot(own, target))
+
+
+def nearest_points(surface: Surface, points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "P 3"]:
+    """Return the point of a surface nearest to each point, for points close to it.
+
+    Foot-point iteration: onto the tangent plane at the last estimate, then back to the surface.
+    It converges where distance times curvature is below 1; the nearest estimate seen is kept.
+    """
+    estimate = _projected(surface, points)
+    nearest, least = estimate, norm(points - estimate)
+    for _ in range(FOOT_POINT_STEPS):
+        normal = unit_normal(surface, estimate)
+        foot = points - dot(points - estimate, normal)[:, None] * normal
+        # Half-way: where the surface bends towards the point, whole steps swing.
+        estimate = _projected(surface, (estimate + foot) / 2)
+        away = norm(points - estimate)
+        nearest = np.where((away < least)[:, None], estimate, nearest)
+        least = np.minimum(away, least)
+    return nearest
+
+
+def _projected(surface: Surface, points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "P 3"]:
+    """Return points moved along ∇f onto the surface by Newton's method."""
+    for _ in range(PROJECTIONS):
+        gradient = surface.gradient(points)
+        step = surface.value(points) / dot(gradient, gradient)
+        points = points - step[:, None] * gradient
+    return points

@@ -1,0 +1,110 @@
+"""How far two triangle meshes are apart as surfaces: distances and normals, both ways."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.arrays import cross, dot, norm
+from pns_common.edge.frames import face_normals
+from pns_common.mesh import Mesh
+from train.metrics.point_mesh import BoxTree, box_tree, farthest, nearest
+
+SAMPLES = 10_000
+"""Sample points on each of the two surfaces."""
+
+SEED = 0
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceErrors:
+    """How far a surface is from the true one; lengths in the true one's bounding-box diagonal.
+
+    Attributes:
+        mean: mean distance of a surface's points from the other surface, mean of both ways.
+        p95: 95th percentile of that distance, mean of both ways.
+        hausdorff: the largest distance of a sample point or a vertex, of both ways.
+        normal: mean angle between the faces at a point and at its nearest point (on an edge, one
+            of its faces), mean of both ways, radians.
+    """
+
+    mean: float
+    p95: float
+    hausdorff: float
+    normal: float
+
+
+SURFACE_METRICS = tuple(field.name for field in fields(SurfaceErrors))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Surface:
+    """A mesh, prepared to be measured from and to.
+
+    Attributes:
+        normals: of its faces; zero where a face has no area.
+        points: sample points, evenly by area.
+        faces: the faces that they lie in.
+    """
+
+    tree: BoxTree
+    vertices: Float[np.ndarray, "V 3"]
+    normals: Float[np.ndarray, "F 3"]
+    points: Float[np.ndarray, "P 3"]
+    faces: Int[np.ndarray, " P"]
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal."""
+        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+
+
+def prepared(mesh: Mesh, samples: int = SAMPLES) -> Surface:
+    """Return a mesh with its tree and so many sample points; the same mesh gives the same ones."""
+    points, faces = surface_samples(mesh, samples, np.random.default_rng(SEED))
+    normals = face_normals(mesh.vertices, mesh.faces)
+    return Surface(box_tree(mesh), mesh.vertices, normals, points, faces)
+
+
+def surface_samples(
+    mesh: Mesh, count: int, rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "N 3"], Int[np.ndarray, " N"]]:
+    """Return points spread evenly by area, and their faces.
+
+    Stratified: one point in each of `count` pieces of equal area, in the order of the faces. Means
+    over two refinements of one mesh then differ by their surfaces, and hardly by the draw.
+    """
+    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
+    upto = np.cumsum(norm(cross(b - a, c - a)))
+    place = (np.arange(count) + rng.random(count)) / count * upto[-1]
+    face = np.searchsorted(upto, place, side="right").clip(max=len(upto) - 1)
+    u, v = rng.random((2, count, 1))
+    # The far half of the parallelogram is turned onto the triangle.
+    far = u + v > 1
+    u, v = np.where(far, 1 - u, u), np.where(far, 1 - v, v)
+    return a[face] + u * (b - a)[face] + v * (c - a)[face], face
+
+
+def surface_errors(true: Surface, refined: Surface) -> SurfaceErrors:
+    """Measure a surface against the true one."""
+    there, back = _one_way(refined, true), _one_way(true, refined)
+    return SurfaceErrors(
+        mean=(there.mean + back.mean) / 2 / true.diagonal,
+        p95=(there.p95 + back.p95) / 2 / true.diagonal,
+        hausdorff=max(there.hausdorff, back.hausdorff) / true.diagonal,
+        normal=(there.normal + back.normal) / 2,
+    )
+
+
+def _one_way(source: Surface, target: Surface) -> SurfaceErrors:
+    """Measure from one surface to the other, in the surfaces' own unit."""
+    closest = nearest(target.tree, source.points)
+    here, there = source.normals[source.faces], target.normals[closest.face]
+    angle = np.arctan2(norm(cross(here, there)), dot(here, there))
+    largest = float(closest.distance.max())
+    return SurfaceErrors(
+        mean=float(closest.distance.mean()),
+        p95=float(np.percentile(closest.distance, 95)),
+        hausdorff=farthest(target.tree, source.vertices, largest),
+        normal=float(angle.mean()),
+    )

@@ -1,0 +1,96 @@
+"""A torch network as the operator's model, so that training and product share one harness."""
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import safetensors.torch
+import torch
+from jaxtyping import Float
+
+from pns_common.errors import ModelError
+from pns_common.model_card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
+from train.models.networks import BoundedNet, unit_correction
+from train.models.recipes import Recipe
+
+
+@dataclass(frozen=True, eq=False)
+class TorchModel:
+    """Networks with a model card; they keep the `Model` protocol of pns_common.schemes.
+
+    `vertex_network` goes with the card's vertex features.
+    """
+
+    name: str
+    card: ModelCard
+    network: BoundedNet
+    vertex_network: BoundedNet | None = None
+
+    @property
+    def hash(self) -> str:
+        """The sha256 of the weights."""
+        weights = dict(self.network.state_dict())
+        if self.vertex_network is not None:
+            extra = self.vertex_network.state_dict()
+            weights |= {f"vertex.{name}": tensor for name, tensor in extra.items()}
+        return hashlib.sha256(safetensors.torch.save(weights)).hexdigest()
+
+    def __call__(
+        self, features: Float[np.ndarray, "E K"], budget: float
+    ) -> Float[np.ndarray, "E 3"]:
+        """Return the corrections, in the network's own precision."""
+        return _answer(self.network, features, budget)
+
+    def vertex_correction(
+        self, features: Float[np.ndarray, "N L"], budget: float
+    ) -> Float[np.ndarray, "N 3"]:
+        """Return the weights for the rings of old vertices, likewise.
+
+        Raises:
+            ModelError: there is no vertex network.
+        """
+        if self.vertex_network is None:
+            raise ModelError(self.name, expected="a vertex rule", found="none")
+        return _answer(self.vertex_network, features, budget)
+
+
+def _answer(
+    network: BoundedNet, features: Float[np.ndarray, "N K"], budget: float
+) -> Float[np.ndarray, "N 3"]:
+    own = network.linear_layers[0].weight.dtype
+    with torch.no_grad():
+        return network(torch.from_numpy(features).to(own), budget).numpy()
+
+
+def numpy_correction(
+    network: BoundedNet,
+) -> Callable[[Float[np.ndarray, "E K"]], Float[np.ndarray, "E 3"]]:
+    """Return the network at budget 1 as the callable that pns_common's numpy kernels take."""
+    correction = unit_correction(network)
+
+    def on_arrays(features: Float[np.ndarray, "E K"]) -> Float[np.ndarray, "E 3"]:
+        with torch.no_grad():
+            return correction(torch.from_numpy(features)).numpy()
+
+    return on_arrays
+
+
+def recipe_model(
+    recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet | None = None
+) -> TorchModel:
+    """Return a recipe's networks as a model whose card has no metrics yet."""
+    rule, form = recipe.vertex, recipe.scale_free
+    card = ModelCard(
+        format=FORMAT if rule is None else VERTEX_FORMAT if form is None else SCALE_FREE_FORMAT,
+        features=recipe.features,
+        gate_sharpness=recipe.gate_sharpness,
+        budget=recipe.budget,
+        orientation=recipe.orientation,
+        training={},
+        metrics={},
+        vertex_features=None if rule is None else rule.features,
+        vertex_gate_sharpness=None if rule is None else rule.gate_sharpness,
+        **({} if form is None else asdict(form)),
+    )
+    return TorchModel(recipe.name, card, network, vertex_network)

@@ -1,0 +1,1 @@
+"""Spectra of schemes at stars: subdivision matrices, tangent eigenvalues, the Reif gap."""

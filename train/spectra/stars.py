@@ -1,0 +1,97 @@
+"""k-stars: one vertex of valence k in regular rings, and which refined vertices repeat them."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.mesh import Mesh
+from pns_common.topology import build_topology
+
+# Place (sector, i, j) is i steps along the sector's first spoke and j along its second.
+Place = tuple[int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Star:
+    """A valence-k star in the plane z = 0, its centre lifted.
+
+    Attributes:
+        mesh: the star; the outermost ring is its boundary.
+        inner: vertices of the inner rings, the centre first.
+        refined: after one step, the vertices that stand in for `inner`: the same rings around the
+            same centre at half the size, in the same order.
+    """
+
+    mesh: Mesh
+    inner: Int[np.ndarray, " N"]
+    refined: Int[np.ndarray, " N"]
+
+
+def star(
+    valence: int, rings: int, spoke: float, lift: float = 0.0, *, inner_rings: int = 2
+) -> Star:
+    """Build a star of equilateral lattice sectors.
+
+    Args:
+        valence: k ≥ 3.
+        rings: rings around the centre, the boundary included.
+        spoke: length of the spokes.
+        lift: height of the centre, in spokes.
+        inner_rings: rings that the spectrum looks at; with two of them Loop's spectrum is whole
+            (one ring misses its eigenvalue 1/8).
+    """
+    places = _places(valence, rings)
+    number = {place: index for index, place in enumerate(places)}
+    points = np.array([_position(place, valence) for place in places]) * spoke
+    points[0, 2] = lift * spoke
+    mesh = Mesh(points, _faces(valence, rings, number))
+
+    inner = [place for place in places if place[1] + place[2] <= inner_rings]
+    topology = build_topology(mesh.faces, len(points))
+    edge = {tuple(ends): index for index, ends in enumerate(topology.edges.tolist())}
+    refined = []
+    for sector, i, j in inner:
+        # At half the size, place (i, j) is half-way between two places of the old star.
+        low = _canonical(sector, i // 2, j - j // 2, valence)
+        high = _canonical(sector, i - i // 2, j // 2, valence)
+        first, second = sorted((number[low], number[high]))
+        refined.append(first if first == second else len(points) + edge[first, second])
+    return Star(mesh, np.array([number[place] for place in inner]), np.array(refined))
+
+
+def _places(valence: int, rings: int) -> list[Place]:
+    """All places, ring by ring; a spoke belongs to the sector that it begins."""
+    places: list[Place] = [(0, 0, 0)]
+    for ring, sector in product(range(1, rings + 1), range(valence)):
+        places += [(sector, ring - j, j) for j in range(ring)]
+    return places
+
+
+def _canonical(sector: int, i: int, j: int, valence: int) -> Place:
+    if i == j == 0:
+        return (0, 0, 0)
+    return ((sector + 1) % valence, j, 0) if i == 0 else (sector % valence, i, j)
+
+
+def _position(place: Place, valence: int) -> Float[np.ndarray, "3"]:
+    sector, i, j = place
+    first, second = (2 * np.pi * (sector + step) / valence for step in (0, 1))
+    x = i * np.cos(first) + j * np.cos(second)
+    y = i * np.sin(first) + j * np.sin(second)
+    return np.array([x, y, 0.0])
+
+
+def _faces(valence: int, rings: int, number: dict[Place, int]) -> Int[np.ndarray, "F 3"]:
+    faces = []
+    for sector, i in product(range(valence), range(rings)):
+        for j in range(rings - i):
+
+            def vertex(i: int, j: int, sector: int = sector) -> int:
+                return number[_canonical(sector, i, j, valence)]
+
+            faces.append((vertex(i, j), vertex(i + 1, j), vertex(i, j + 1)))
+            if i + j + 2 <= rings:
+                faces.append((vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)))
+    return np.array(faces, dtype=np.int64)

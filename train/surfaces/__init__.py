@@ -1,0 +1,1 @@
+"""Analytic surfaces: implicit functions, distances and gradients, of one or of many instances."""

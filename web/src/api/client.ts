@@ -1,0 +1,53 @@
+/** Requests to the service, relative to where the page itself came from. */
+
+import { localProblem, problemOf } from "./problem";
+
+export interface Limits {
+  body_bytes: number;
+  faces: number;
+  levels: { min: number; max: number };
+  seconds?: number;
+}
+
+export interface ModelEntry {
+  name: string;
+  default: boolean;
+  hash: string;
+  budget: number;
+  format: number;
+  learned_levels?: number | null;
+}
+
+// Kept in memory alone: a reload forgets it.
+let key = "";
+
+export function useKey(value: string): void {
+  key = value.trim();
+}
+
+export function headers(more: Record<string, string> = {}): Record<string, string> {
+  return key ? { ...more, Authorization: `Bearer ${key}` } : more;
+}
+
+/** The address of a route: the page may live under a prefix, and this file is in its assets. */
+export function address(path: string): string {
+  return new URL(path.replace(/^\//, ""), new URL("..", import.meta.url)).href;
+}
+
+/** Fetch a route; anything but success throws the Problem that the service describes. */
+export async function request(path: string, init: RequestInit = {}): Promise<Response> {
+  const sent = { ...init, headers: headers(init.headers as Record<string, string>) };
+  let response: Response;
+  try {
+    response = await fetch(address(path), sent);
+  } catch (error) {
+    if (init.signal?.aborted) throw error;
+    throw localProblem("The service does not answer", "Is it running, and the network up?");
+  }
+  if (!response.ok) throw problemOf(response.status, await response.text());
+  return response;
+}
+
+export async function json<T>(path: string, init: RequestInit = {}): Promise<T> {
+  return (await (await request(path, init)).json()) as T;
+}

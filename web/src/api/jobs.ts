@@ -1,0 +1,148 @@
+/** One refinement: upload, queue, stages, download. Each may be cancelled by its signal. */
+
+import { address, headers, request } from "./client";
+import { events } from "./events";
+import { localProblem, Problem, problemOf, type ProblemDocument } from "./problem";
+
+export interface Body {
+  content: Blob | FormData;
+  /** Empty for a form, which brings its own. */
+  type: string;
+}
+
+export type Step = "upload" | "queue" | "refine" | "download";
+
+export interface Progress {
+  step: Step;
+  /** 0 to 1; null while it cannot be known. */
+  share: number | null;
+  /** Before this job in the queue; only while queued. */
+  place?: number | null;
+  stage?: string | null;
+  /** Seconds that the service expects the job to take in all. */
+  estimate?: number | null;
+}
+
+export interface Answer {
+  bytes: ArrayBuffer;
+  /** Milliseconds by stage, from Server-Timing. */
+  timings: [string, number][];
+}
+
+interface Job {
+  id: string;
+  state: "queued" | "running" | "done" | "failed" | "cancelled";
+  queue_place: number | null;
+  stage: string | null;
+  share: number | null;
+  estimate_seconds?: number | null;
+  problem?: ProblemDocument | null;
+}
+
+export async function refine(
+  body: Body,
+  query: URLSearchParams,
+  signal: AbortSignal,
+  tell: (progress: Progress) => void,
+): Promise<Answer> {
+  const location = await upload(`jobs?${query}`, body, signal, tell);
+  try {
+    await finished(location, signal, tell);
+    return await download(location, signal, tell);
+  } finally {
+    // Fetched, failed or cancelled: nobody needs the job any more, and its worker should be free.
+    void request(location, { method: "DELETE", keepalive: true }).catch(() => {});
+  }
+}
+
+/** POST the body; XMLHttpRequest, since fetch does not tell how much of a body has gone out. */
+function upload(
+  path: string,
+  body: Body,
+  signal: AbortSignal,
+  tell: (progress: Progress) => void,
+): Promise<string> {
+  return new Promise((resolve, reject) => {
+    const sent = new XMLHttpRequest();
+    sent.open("POST", address(path));
+    for (const [name, value] of Object.entries(headers())) sent.setRequestHeader(name, value);
+    if (body.type) sent.setRequestHeader("Content-Type", body.type);
+    sent.upload.onprogress = (event) =>
+      tell({ step: "upload", share: event.lengthComputable ? event.loaded / event.total : null });
+    sent.onload = () => {
+      if (sent.status !== 202) return reject(problemOf(sent.status, sent.responseText));
+      const job = JSON.parse(sent.responseText) as Job;
+      resolve(`jobs/${job.id}`);
+    };
+    sent.onerror = () =>
+      reject(localProblem("The upload did not arrive", "The connection to the service broke."));
+    sent.onabort = () => reject(new DOMException("cancelled", "AbortError"));
+    signal.addEventListener("abort", () => sent.abort());
+    if (signal.aborted) return reject(new DOMException("cancelled", "AbortError"));
+    tell({ step: "upload", share: 0 });
+    sent.send(body.content);
+  });
+}
+
+/** Follow the job's events to its end. */
+async function finished(
+  location: string,
+  signal: AbortSignal,
+  tell: (progress: Progress) => void,
+): Promise<void> {
+  const response = await request(`${location}/events`, { signal });
+  if (!response.body) throw localProblem("No progress came", "The event stream has no body.");
+  for await (const { event, data } of events(response.body)) {
+    if (event !== "progress") continue;
+    const job = JSON.parse(data) as Job;
+    if (job.state === "done") return;
+    if (job.state === "failed") throw failure(job);
+    if (job.state === "cancelled") throw new DOMException("cancelled", "AbortError");
+    tell({
+      step: job.state === "queued" ? "queue" : "refine",
+      share: job.state === "queued" ? null : job.share,
+      place: job.queue_place,
+      stage: job.stage,
+      estimate: job.estimate_seconds ?? null,
+    });
+  }
+  // A proxy may cut a long stream: the job itself tells what became of it.
+  const job = (await (await request(location, { signal })).json()) as Job;
+  if (job.state === "failed") throw failure(job);
+  if (job.state !== "done") return finished(location, signal, tell);
+}
+
+function failure(job: Job): Problem {
+  return job.problem
+    ? new Problem(job.problem)
+    : localProblem("The job failed", "The service gave no reason.");
+}
+
+async function download(
+  location: string,
+  signal: AbortSignal,
+  tell: (progress: Progress) => void,
+): Promise<Answer> {
+  const response = await request(`${location}/result`, {
+    signal,
+    headers: { Accept: "model/gltf-binary" },
+  });
+  const total = Number(response.headers.get("Content-Length")) || null;
+  const pieces: Uint8Array[] = [];
+  let received = 0;
+  if (!response.body) throw localProblem("No result came", "The answer has no body.");
+  for await (const piece of response.body) {
+    pieces.push(piece);
+    received += piece.length;
+    tell({ step: "download", share: total ? received / total : null });
+  }
+  const bytes = await new Blob(pieces as BlobPart[]).arrayBuffer();
+  return { bytes, timings: timings(response.headers.get("Server-Timing") ?? "") };
+}
+
+function timings(header: string): [string, number][] {
+  return [...header.matchAll(/([\w-]+);dur=([\d.]+)/g)].map(([, name, ms]) => [
+    name as string,
+    Number(ms),
+  ]);
+}

@@ -1,0 +1,47 @@
+/** What went wrong with a request, in the service's own words (RFC 9457) or in ours. */
+
+export interface ProblemDocument {
+  title: string;
+  status: number;
+  detail: string;
+  code?: string;
+  pointer?: string;
+  parameter?: string;
+}
+
+export class Problem extends Error {
+  readonly title: string;
+  readonly status: number;
+  readonly pointer: string | undefined;
+  readonly parameter: string | undefined;
+
+  constructor(document: ProblemDocument) {
+    super(document.detail);
+    this.title = document.title;
+    this.status = document.status;
+    this.pointer = document.pointer;
+    this.parameter = document.parameter;
+  }
+}
+
+/** A sentence of the page itself: a file that no viewer opens, a server that does not answer. */
+export function localProblem(title: string, detail: string): Problem {
+  return new Problem({ title, detail, status: 0 });
+}
+
+/** The problem that a failed answer describes; a proxy's page of HTML becomes a sentence. */
+export function problemOf(status: number, text: string): Problem {
+  try {
+    const body = JSON.parse(text) as Partial<ProblemDocument>;
+    if (typeof body.title === "string" && typeof body.detail === "string") {
+      return new Problem({ ...body, title: body.title, detail: body.detail, status });
+    }
+  } catch {
+    // Not JSON: said below.
+  }
+  return localProblem(`The server answered ${status}`, "It gave no further explanation.");
+}
+
+export function isAbort(error: unknown): boolean {
+  return error instanceof DOMException && error.name === "AbortError";
+}

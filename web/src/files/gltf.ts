@@ -1,0 +1,121 @@
+/** glTF into a scene, with no request to anywhere but the files at hand. */
+
+import { LoadingManager } from "three";
+import { GLTFLoader, type GLTF } from "three/addons/loaders/GLTFLoader.js";
+import { localProblem } from "../api/problem";
+
+export interface GltfJson {
+  asset?: { extras?: { pns?: unknown } };
+  extensionsUsed?: string[];
+  accessors?: { count: number }[];
+  meshes?: {
+    name?: string;
+    extras?: { targetNames?: string[] };
+    primitives: { mode?: number; indices?: number; attributes: Record<string, number> }[];
+  }[];
+}
+
+const MAGIC = 0x46546c67;
+
+/** The JSON of a .glb or a .gltf. */
+export function jsonOf(bytes: ArrayBuffer): GltfJson {
+  const view = new DataView(bytes);
+  const isBinary = bytes.byteLength >= 20 && view.getUint32(0, true) === MAGIC;
+  const text = isBinary ? new Uint8Array(bytes, 20, view.getUint32(12, true)) : bytes;
+  return JSON.parse(new TextDecoder().decode(text)) as GltfJson;
+}
+
+/** Triangles of all meshes, each counted once however many nodes show it. */
+export function triangles(json: GltfJson): number {
+  let count = 0;
+  for (const mesh of json.meshes ?? []) {
+    for (const { mode = 4, indices, attributes } of mesh.primitives) {
+      const corners = json.accessors?.[indices ?? attributes.POSITION ?? -1]?.count ?? 0;
+      if (mode === 4) count += Math.floor(corners / 3);
+      if (mode === 5 || mode === 6) count += Math.max(corners - 2, 0);
+    }
+  }
+  return count;
+}
+
+/** Whether any mesh brings normals. */
+export function hasNormals(json: GltfJson): boolean {
+  const primitives = (json.meshes ?? []).flatMap((mesh) => mesh.primitives);
+  return primitives.some(({ attributes }) => "NORMAL" in attributes);
+}
+
+/** Parse a glTF; `neighbours` are the files that it may name. */
+export async function parseGltf(
+  bytes: ArrayBuffer,
+  neighbours: Map<string, Blob> = new Map(),
+): Promise<GLTF> {
+  const made: string[] = [];
+  const blobUrl = (blob: Blob): string => {
+    const url = URL.createObjectURL(blob);
+    made.push(url);
+    return url;
+  };
+  const missing: string[] = [];
+  const manager = new LoadingManager();
+  manager.setURLModifier((url) => {
+    if (url.startsWith("blob:")) return url;
+    // The content security policy lets blobs be fetched and nothing else.
+    if (url.startsWith("data:")) return blobUrl(blobOfDataUri(url));
+    const file = neighbours.get(url) ?? neighbours.get(decodeURIComponent(url));
+    if (file) return blobUrl(file);
+    missing.push(url);
+    return blobUrl(new Blob());
+  });
+  const loader = new GLTFLoader(manager);
+  const used = jsonOf(bytes).extensionsUsed ?? [];
+  if (used.includes("EXT_meshopt_compression") || used.includes("KHR_meshopt_compression")) {
+    const { MeshoptDecoder } = await import("three/addons/libs/meshopt_decoder.module.js");
+    await MeshoptDecoder.ready;
+    loader.setMeshoptDecoder(MeshoptDecoder);
+  }
+  const draco = used.includes("KHR_draco_mesh_compression") ? await dracoLoader() : null;
+  if (draco) loader.setDRACOLoader(draco);
+  if (used.includes("KHR_texture_basisu")) {
+    const { ktx2Loader } = await import("./ktx2");
+    loader.setKTX2Loader(await ktx2Loader((url) => manager.resolveURL(url)));
+  }
+  try {
+    const gltf = await loader.parseAsync(bytes, "");
+    for (const [object, place] of gltf.parser.associations) {
+      // Which of the file's meshes this is a part of: reports speak of those. What the loader adds
+      // of its own, such as a material where the file has none, has no place in it.
+      const mesh = place?.meshes;
+      if ("isMesh" in object && mesh !== undefined) object.userData.meshIndex = mesh;
+    }
+    return gltf;
+  } catch (error) {
+    if (missing.length) {
+      throw localProblem(
+        "A file is missing",
+        `The document names ${missing.join(", ")}: drop it together with the .gltf, or as a .zip.`,
+      );
+    }
+    throw localProblem("The file cannot be shown", (error as Error).message);
+  } finally {
+    draco?.dispose();
+    made.forEach((url) => URL.revokeObjectURL(url));
+  }
+}
+
+async function dracoLoader() {
+  const { DRACOLoader } = await import("three/addons/loaders/DRACOLoader.js");
+  const at = (path: string): string => new URL(path, import.meta.url).href;
+  const loader = new DRACOLoader();
+  // The types know a folder alone; a pair of addresses is taken too, and ours carry hashes.
+  loader.setDecoderPath({ js: at(DRACO_WRAPPER), wasm: at(DRACO_WASM) } as unknown as string);
+  return loader;
+}
+
+function blobOfDataUri(uri: string): Blob {
+  const comma = uri.indexOf(",");
+  const head = uri.slice(5, comma);
+  const type = head.replace(/;base64$/, "");
+  const text = decodeURIComponent(uri.slice(comma + 1));
+  if (!head.endsWith(";base64")) return new Blob([text], { type });
+  return new Blob([Uint8Array.from(atob(text), (character) => character.charCodeAt(0))], { type });
+}

@@ -1,0 +1,18 @@
+/** Which files the page takes, and what the service calls them. */
+
+export type Kind = "glb" | "gltf" | "zip" | "obj" | "ply" | "stl" | "off";
+
+export const MEDIA_TYPES: Record<Kind, string> = {
+  glb: "model/gltf-binary",
+  gltf: "model/gltf+json",
+  zip: "application/zip",
+  obj: "model/obj",
+  ply: "model/ply",
+  stl: "model/stl",
+  off: "model/off",
+};
+
+export function kindOf(name: string): Kind | null {
+  const extension = /\.([^./]+)$/.exec(name)?.[1]?.toLowerCase() ?? "";
+  return extension in MEDIA_TYPES ? (extension as Kind) : null;
+}

@@ -1,0 +1,306 @@
+/** The page: what the user does goes to the session, what comes of it to the stage and the panel. */
+
+import { json, type Limits, type ModelEntry } from "./api/client";
+import { isAbort } from "./api/problem";
+import { chosen, dropped } from "./files/dropped";
+import { parseGltf } from "./files/gltf";
+import type { Opened } from "./files/open";
+import { uploadOf, type PathedFile } from "./files/upload";
+import { dihedrals } from "./measure/dihedral";
+import { distances, largestLength } from "./measure/distance";
+import { surfaceOf } from "./measure/surface";
+import type { Lengths } from "./report/certificate";
+import { bytes } from "./report/format";
+import { Session, type Result, type Source } from "./session";
+import { fromHash, toHash, type Compression, type Settings } from "./settings";
+import { debounced, element, input, save, select } from "./ui/dom";
+import {
+  showCertificate,
+  showChanges,
+  showStatistics,
+  showTimings,
+  showValidation,
+  type Before,
+} from "./ui/results";
+import { SettingsForm } from "./ui/settings-form";
+import { Stage } from "./ui/stage";
+import { announce, bindProblem, hideProblem, hideProgress, showProblem, showProgress } from "./ui/status";
+import { compare } from "./validate/compare";
+import { validate } from "./validate/validate";
+import { dispose, modelOf } from "./view/model";
+
+let began = 0;
+let validation = new AbortController();
+/** Whether the page, and not the user, asked for smooth normals. */
+let smoothed = false;
+/** Of the file that is shown. */
+let facts: { source: Source; before: Before } | null = null;
+
+const stage = new Stage(() => void fetchValues(), remember);
+
+const session = new Session({
+  progress: showProgress,
+  opened: (source) => {
+    document.body.classList.remove("empty", "refined");
+    element("file-name").textContent = source.upload.name;
+    stage.open(source);
+  },
+  refined: (ours) => {
+    stage.refine(ours, session.loop);
+    const milliseconds = performance.now() - began;
+    describe(ours);
+    showTimings([
+      ...ours.timings.map(([name, ms]): [string, number] => [STAGES[name] ?? name, ms / 1000]),
+      ["From request to picture", milliseconds / 1000],
+    ]);
+    void validateBoth(ours);
+  },
+  compared: (loop) => {
+    const { ours } = session;
+    if (!ours) return;
+    stage.refine(ours, loop);
+    announce(`Refined. ${showCertificate(ours.report, lengths(ours, loop))}`);
+  },
+  idle: hideProgress,
+  failed: showProblem,
+  cleared: () => {
+    document.body.classList.add("empty");
+    document.body.classList.remove("refined");
+    element("file-name").textContent = "";
+  },
+  discarded: (model) => stage.discard(model),
+});
+
+const STAGES: Record<string, string> = {
+  read: "Service: reading",
+  weld: "Service: welding",
+  refine: "Service: refining",
+  attributes: "Service: attributes",
+  write: "Service: writing",
+  upload: "Upload",
+  queue: "Queue",
+  total: "Service: in all",
+  opening: "Opening the result",
+};
+
+const given = fromHash(location.hash);
+const form = new SettingsForm(
+  given.settings,
+  debounced(300, () => {
+    remember();
+    hideProblem();
+    began = performance.now();
+    void session.again({ ...form.settings });
+  }),
+);
+stage.view = given.view;
+
+async function prepare(opened: Opened): Promise<Settings> {
+  // Which levels are open depends on the service's limits.
+  await offered;
+  chooseNormals(opened);
+  form.start(opened.faces);
+  return { ...form.settings };
+}
+
+/** Files that bring no normals would come back faceted: nobody refines for that. */
+function chooseNormals({ normals }: Opened): void {
+  const { settings } = form;
+  if (!normals && settings.normals === "keep") {
+    settings.normals = "smooth";
+    smoothed = true;
+  } else if (normals && smoothed) {
+    if (settings.normals === "smooth") settings.normals = "keep";
+    smoothed = false;
+  }
+}
+
+function take(files: PathedFile[]): void {
+  hideProblem();
+  began = performance.now();
+  try {
+    void session.take(uploadOf(files), prepare);
+  } catch (error) {
+    showProblem(error);
+  }
+}
+
+/** Everything that the report and the file say, before Loop's side has come. */
+function describe(ours: Result): void {
+  document.body.classList.add("refined");
+  const { source } = session;
+  if (!source) return;
+  showCertificate(ours.report, lengths(ours, null));
+  if (facts?.source !== source) facts = { source, before: before(source) };
+  showStatistics(facts.before, ours.report, ours.bytes.byteLength);
+  showChanges(ours.report);
+}
+
+function lengths({ model, report }: Result, loop: Result | null): Lengths {
+  const ofMesh = new Map(report.meshes.map((mesh) => [mesh.index, mesh]));
+  const measured = loop && distances(model, loop.model);
+  return {
+    proved: largestLength(model, (index) => ofMesh.get(index)?.limit_distance ?? 0) ?? 0,
+    allowed: largestLength(model, (index) => ofMesh.get(index)?.limit_distance_bound),
+    measured: measured && measured.max,
+    size: stage.size,
+    unit: stage.unit,
+  };
+}
+
+/** What is told of the file itself; it stays the same however often it is refined. */
+function before({ upload, opened, model }: Source): Before {
+  const geometries = new Set(model.meshes.map(({ geometry }) => geometry));
+  const vertices = [...geometries].reduce((n, g) => n + g.getAttribute("position").count, 0);
+  return {
+    faces: opened.faces,
+    vertices,
+    bytes: upload.bytes,
+    surface: surfaceOf(model.meshes),
+    sharpest: dihedrals(model).max,
+  };
+}
+
+async function validateBoth(ours: Result): Promise<void> {
+  validation.abort();
+  const { signal } = (validation = new AbortController());
+  showValidation("Looking at both files…");
+  try {
+    const gltf = session.source?.opened.gltf;
+    const result = await validate({ bytes: ours.bytes, neighbours: new Map() }, signal);
+    const first = gltf ? await validate(gltf, signal) : null;
+    showValidation(compare(first, result));
+  } catch (error) {
+    if (!isAbort(error)) showValidation(`The validator could not run: ${(error as Error).message}`);
+  }
+}
+
+/** The values at vertices, which a plain result does not hold: the same job with all diagnostics. */
+async function fetchValues(): Promise<void> {
+  const { ours } = session;
+  const answer = await session.fetch({ ...form.settings }, "full", "none");
+  if (!answer || !ours || session.ours !== ours) return;
+  const { scene } = await parseGltf(answer.bytes);
+  const full = modelOf(scene, []);
+  full.meshes.forEach(({ geometry }, number) => {
+    const target = ours.model.meshes[number]?.geometry;
+    for (const name of ["_pns_ratio", "_pns_gate"]) {
+      if (geometry.hasAttribute(name)) target?.setAttribute(name, geometry.getAttribute(name));
+    }
+  });
+  dispose(full);
+  ours.full = true;
+  stage.arrange();
+}
+
+function remember(): void {
+  const hash = toHash(form.settings, stage.view);
+  history.replaceState(null, "", hash ? `#${hash}` : location.pathname + location.search);
+}
+
+function resultName(extension: string): string {
+  const stem = session.source?.upload.name.replace(/\.\w+$/, "") ?? "result";
+  return `${stem}-refined.${extension}`;
+}
+
+async function downloadGlb(): Promise<void> {
+  if (!session.ours) return;
+  const compress = select("compress").value as Compression;
+  const full = input("attributes").checked;
+  let content = session.ours.bytes;
+  if (full || compress !== "none") {
+    const answer = await session.fetch({ ...form.settings }, full ? "full" : "summary", compress);
+    if (!answer) return;
+    content = answer.bytes;
+  }
+  save(new Blob([content], { type: "model/gltf-binary" }), resultName("glb"));
+}
+
+function bindFiles(): void {
+  const files = input("files");
+  for (const id of ["choose", "choose-first"]) {
+    element(id).addEventListener("click", () => files.click());
+  }
+  files.addEventListener("change", () => {
+    if (files.files?.length) take(chosen(files.files));
+    // The same file may be chosen again.
+    files.value = "";
+  });
+  element("example").addEventListener("click", async () => {
+    const response = await fetch(new URL(EXAMPLE, import.meta.url));
+    const file = new File([await response.arrayBuffer()], "example.glb");
+    take([{ path: file.name, file }]);
+  });
+  const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
+  document.addEventListener("dragover", (event) => {
+    if (!hasFiles(event)) return;
+    event.preventDefault();
+    document.body.classList.add("dragging");
+  });
+  document.addEventListener("dragleave", (event) => {
+    if (!event.relatedTarget) document.body.classList.remove("dragging");
+  });
+  document.addEventListener("drop", async (event) => {
+    event.preventDefault();
+    document.body.classList.remove("dragging");
+    if (event.dataTransfer) take(await dropped(event.dataTransfer));
+  });
+  document.addEventListener("paste", (event) => {
+    if (event.clipboardData?.files.length) take(chosen(event.clipboardData.files));
+  });
+}
+
+function bindPanel(): void {
+  element("cancel").addEventListener("click", () => {
+    session.cancel();
+    hideProgress();
+    announce("Cancelled");
+  });
+  bindProblem(() => {
+    offered = start();
+    void session.retry(prepare);
+  });
+  element("fold").addEventListener("click", () => {
+    const folded = document.body.classList.toggle("folded");
+    element("fold").setAttribute("aria-expanded", String(!folded));
+  });
+  element("share").addEventListener("click", async () => {
+    remember();
+    // Browsers keep the clipboard from pages without TLS; the address bar has the link all the same.
+    const copied = await navigator.clipboard?.writeText(location.href).then(
+      () => true,
+      () => false,
+    );
+    announce(copied ? "The link is copied" : "The link is in the address bar");
+    element("share").textContent = copied ? "Copied" : "See address bar";
+    setTimeout(() => (element("share").textContent = "Copy link"), 1500);
+  });
+  element("download").addEventListener("click", () => void downloadGlb());
+  element("download-report").addEventListener("click", () => {
+    if (!session.ours) return;
+    const text = JSON.stringify(session.ours.report, null, 2);
+    save(new Blob([text], { type: "application/json" }), resultName("json"));
+  });
+  element("download-picture").addEventListener("click", async () => {
+    if (stage.viewer) save(await stage.viewer.picture(), resultName("png"));
+  });
+  input("download-picture").disabled = !stage.viewer;
+}
+
+/** What the service offers; the page works with less where it does not say. */
+async function start(): Promise<void> {
+  const models = json<ModelEntry[]>("models")
+    .then((models) => form.offerModels(models))
+    .catch(showProblem);
+  await json<Limits>("limits")
+    .then((limits) => {
+      form.offerLimits(limits);
+      element("limits").textContent = ` · up to ${bytes(limits.body_bytes)}`;
+    })
+    .catch(showProblem);
+  void models;
+}
+
+bindFiles();
+bindPanel();
+let offered = start();

@@ -1,0 +1,58 @@
+/** How far each refined vertex lies from its counterpart by Loop's rules; both have one numbering. */
+
+import { Matrix4, Vector3, type Mesh, type SkinnedMesh } from "three";
+import type { Model } from "../view/model";
+
+export interface Field {
+  /** One value a vertex, by mesh. */
+  values: Float32Array[];
+  max: number;
+}
+
+/** Distances in the scene's units; null where the two are no counterparts. */
+export function distances(ours: Model, loop: Model): Field | null {
+  if (ours.meshes.length !== loop.meshes.length) return null;
+  const values: Float32Array[] = [];
+  let max = 0;
+  const apart = new Vector3();
+  for (const [number, mesh] of ours.meshes.entries()) {
+    const a = mesh.geometry.getAttribute("position");
+    const b = loop.meshes[number]!.geometry.getAttribute("position");
+    if (a.count !== b.count) return null;
+    const toScene = placement(mesh);
+    const lengths = new Float32Array(a.count);
+    for (let i = 0; i < a.count; i++) {
+      apart.set(a.getX(i) - b.getX(i), a.getY(i) - b.getY(i), a.getZ(i) - b.getZ(i));
+      lengths[i] = apart.applyMatrix4(toScene).length();
+      max = Math.max(max, lengths[i]!);
+    }
+    values.push(lengths);
+  }
+  return { values, max };
+}
+
+/** The linear part of what places a mesh at rest; a skin is placed by its joints, not its node. */
+export function placement(mesh: Mesh): Matrix4 {
+  const { isSkinnedMesh, skeleton } = mesh as SkinnedMesh;
+  const [bone, inverse] = isSkinnedMesh ? [skeleton.bones[0], skeleton.boneInverses[0]] : [];
+  const whole =
+    bone && inverse ? bone.matrixWorld.clone().multiply(inverse) : mesh.matrixWorld.clone();
+  return whole.setPosition(0, 0, 0);
+}
+
+/**
+ * A length of each of the file's meshes, in its own units, as the largest in the scene's; null where
+ * a mesh has none.
+ */
+export function largestLength(
+  model: Model,
+  ofMesh: (index: number) => number | null | undefined,
+): number | null {
+  let largest = 0;
+  for (const mesh of model.meshes) {
+    const value = ofMesh(mesh.userData.meshIndex as number);
+    if (value === null || value === undefined) return null;
+    largest = Math.max(largest, value * placement(mesh).getMaxScaleOnAxis());
+  }
+  return largest;
+}

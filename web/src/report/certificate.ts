@@ -1,0 +1,90 @@
+/** What the report proves of this result, in words. */
+
+import { length, percent, count, type Unit } from "./format";
+import { largestRatio, type Report } from "./report";
+
+export interface Statement {
+  holds: boolean;
+  text: string;
+  /** The longer story. */
+  note: string;
+}
+
+/** Lengths in the scene's units. */
+export interface Lengths {
+  /** No point of the limit surface is farther from Loop's: what the report proves. */
+  proved: number;
+  /** What the budget would have allowed; null where it says nothing. */
+  allowed: number | null;
+  /** Largest distance of a vertex from its counterpart by Loop; null until that has come. */
+  measured: number | null;
+  /** The model's own size: the diagonal of its box. */
+  size: number;
+  unit: Unit;
+}
+
+/** The statements of a refinement. */
+export function certificate(report: Report, lengths: Lengths): Statement[] {
+  if (!report.levels.length) {
+    return [{ holds: false, text: "Nothing was refined", note: "The file has no triangle mesh." }];
+  }
+  const learned = report.scheme !== "loop";
+  return [
+    ...(learned ? nearness(report, lengths) : [loopAlone]),
+    folds(report),
+    ...(learned ? [planes(report)] : []),
+  ];
+}
+
+const loopAlone: Statement = {
+  holds: true,
+  text: "Loop’s rules alone",
+  note: "Nothing learned took part: the distance to Loop is zero.",
+};
+
+function nearness(report: Report, lengths: Lengths): Statement[] {
+  const { proved, allowed, measured, size, unit } = lengths;
+  const used = Math.max(...report.levels.map(largestRatio));
+  const bound = allowed === null ? "" : ` Its budget allows ${length(allowed, unit)}.`;
+  const apart = measured === null ? "" : ` Between the refined vertices: ${length(measured, unit)}.`;
+  return [
+    {
+      holds: measured === null || measured <= proved * 1.001 + 1e-6 * size,
+      text: `Nowhere more than ${length(proved, unit)} from Loop`,
+      note: `That is ${percent(proved / size)} of the model’s size, for every point of the limit surface.${bound}${apart}`,
+    },
+    {
+      holds: used <= 1 + 1e-12,
+      text: `Within its budget: at most ${percent(Math.min(used, 1))} of it used`,
+      note: "Each vertex may leave Loop’s place by C h² / R and no more, whatever the model says.",
+    },
+  ];
+}
+
+function folds(report: Report): Statement {
+  const turned = report.levels.reduce((sum, level) => sum + level.flipped_faces, 0);
+  const guarded = report.levels.reduce((sum, level) => sum + (level.guarded ?? 0), 0);
+  const kept = guarded ? ` The guard shortened ${count(guarded)} corrections to keep it so.` : "";
+  return turned
+    ? {
+        holds: false,
+        text: `${count(turned)} faces turned over`,
+        note: "A face points away from where Loop’s would: look at the wireframe there.",
+      }
+    : {
+        holds: true,
+        text: "No fold",
+        note: `No face turned against its counterpart by Loop, at any level.${kept}`,
+      };
+}
+
+function planes(report: Report): Statement {
+  const active = Math.max(...report.levels.map((level) => level.gate.active));
+  return {
+    holds: true,
+    text: "Planes untouched",
+    note:
+      "The gate of each correction is shut where neighbouring faces are level; " +
+      `it stood more than 1 % open on at most ${percent(active)} of the edges of a level.`,
+  };
+}

@@ -1,0 +1,47 @@
+/** Numbers as people read them. */
+
+const METRIC: [number, string][] = [
+  [1e3, "km"],
+  [1, "m"],
+  [1e-2, "cm"],
+  [1e-3, "mm"],
+  [1e-6, "µm"],
+  [1e-9, "nm"],
+];
+
+export type Unit = "metre" | "unit";
+
+export function count(value: number): string {
+  return value.toLocaleString("en-US");
+}
+
+/** Two or three digits that mean something. */
+export function figure(value: number): string {
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e5 || size < 1e-3) return value.toExponential(1).replace("e+", "e");
+  return String(Number(value.toPrecision(size >= 100 ? 3 : 2)));
+}
+
+/** A length; glTF counts in metres, other formats in whatever their author meant. */
+export function length(value: number, unit: Unit): string {
+  if (unit === "unit") return `${figure(value)} units`;
+  if (value === 0) return "0 m";
+  const [scale, name] = METRIC.find(([scale]) => Math.abs(value) >= scale) ?? [1e-9, "nm"];
+  return `${figure(value / scale)} ${name}`;
+}
+
+export function percent(share: number): string {
+  if (share === 0) return "0 %";
+  const value = 100 * share;
+  return value < 0.01 ? "< 0.01 %" : `${figure(value)} %`;
+}
+
+export function bytes(value: number): string {
+  if (value < 1000) return `${value} B`;
+  return value < 1e6 ? `${figure(value / 1e3)} kB` : `${figure(value / 1e6)} MB`;
+}
+
+export function seconds(value: number): string {
+  return value < 1 ? `${Math.round(1000 * value)} ms` : `${figure(value)} s`;
+}

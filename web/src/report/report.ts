@@ -1,0 +1,55 @@
+/** The service's report, as far as the page reads it. */
+
+export interface Summary {
+  max: number;
+  mean: number;
+}
+
+export interface Level {
+  vertices: number;
+  faces: number;
+  edges: { interior: number; boundary: number; irregular: number; crease?: number };
+  flipped_faces: number;
+  proximity_ratio: Summary;
+  gate: Summary & { active: number };
+  normal_jump_max: number;
+  guarded?: number;
+  displacement_max?: number;
+  vertex_rule?: { proximity_ratio: Summary; gate: Summary };
+}
+
+export interface Report {
+  scheme: string;
+  budget: number | null;
+  model: string | null;
+  model_hash: string | null;
+  totals: { vertices: number; faces: number };
+  dropped: Record<string, number>;
+  changes: { pointer: string; what: string; count: number }[];
+  levels: Level[];
+  meshes: MeshReport[];
+}
+
+export interface MeshReport {
+  /** Its place in the file's `meshes`. */
+  index: number;
+  learned_levels: number;
+  /** No point of the limit surface is farther from Loop's, in the mesh's own units. */
+  limit_distance: number;
+  /** What the budget would have allowed; null where it says nothing. */
+  limit_distance_bound: number | null;
+}
+
+/** How many levels the learned rule acted at; those below are Loop's. */
+export function learnedLevels(report: Report): number {
+  if (report.scheme === "loop") return 0;
+  return Math.max(0, ...report.meshes.map((mesh) => mesh.learned_levels ?? report.levels.length));
+}
+
+export function largestRatio(level: Level): number {
+  return Math.max(level.proximity_ratio.max, level.vertex_rule?.proximity_ratio.max ?? 0);
+}
+
+export function largestGate(level: Level): number {
+  return Math.max(level.gate.max, level.vertex_rule?.gate.max ?? 0);
+}

@@ -1,0 +1,197 @@
+/** A file, what became of it, and the jobs under way. Knows no element of the page. */
+
+import { refine, type Answer, type Progress } from "./api/jobs";
+import { isAbort, Problem } from "./api/problem";
+import { open, type Opened } from "./files/open";
+import { jsonOf, parseGltf, type GltfJson } from "./files/gltf";
+import { bodyOf, type Upload } from "./files/upload";
+import type { Report } from "./report/report";
+import { asLoop, LOOP, query, type Compression, type Diagnostics, type Settings } from "./settings";
+import { isFinite, modelOf, type Model } from "./view/model";
+
+export interface Result {
+  /** The query that made it. */
+  key: string;
+  bytes: ArrayBuffer;
+  json: GltfJson;
+  report: Report;
+  model: Model;
+  timings: [string, number][];
+  /** Whether values at vertices are in it. */
+  full: boolean;
+}
+
+export interface Source {
+  upload: Upload;
+  opened: Opened;
+  model: Model;
+}
+
+export interface Listener {
+  progress(progress: Progress, what: string): void;
+  /** A new file has taken the place of the old. */
+  opened(source: Source): void;
+  refined(ours: Result): void;
+  compared(loop: Result | null): void;
+  idle(): void;
+  failed(error: unknown): void;
+  discarded(model: Model): void;
+  /** The file that was shown turned out to be broken. */
+  cleared(): void;
+}
+
+export class Session {
+  source: Source | null = null;
+  ours: Result | null = null;
+  loop: Result | null = null;
+  private controller = new AbortController();
+  private lastDrop: Upload | null = null;
+
+  constructor(private readonly listener: Listener) {}
+
+  cancel(): void {
+    this.controller.abort();
+  }
+
+  /** Take a new file. What was there stays until the new one is refined. */
+  async take(upload: Upload, prepare: (opened: Opened) => Promise<Settings>): Promise<void> {
+    this.lastDrop = upload;
+    await this.only(async (signal) => {
+      const opened = await open(upload);
+      const source = { upload, opened, model: modelOf(opened.scene, opened.clips) };
+      const settings = await prepare(opened);
+      // Nothing is lost by showing the first file at once.
+      const early = this.source === null && isFinite(source.model);
+      if (early) this.show(source);
+      let ours: Result;
+      try {
+        ours = await this.run(upload, settings, signal);
+      } catch (error) {
+        if (!early) this.listener.discarded(source.model);
+        else if (isTheFiles(error)) this.clear();
+        throw error;
+      }
+      if (!early) this.show(source);
+      await this.complete(upload, ours, settings, signal);
+    });
+  }
+
+  /** Refine the file that is there anew. */
+  async again(settings: Settings): Promise<void> {
+    const { source } = this;
+    if (!source) return;
+    await this.only(async (signal) => {
+      const ours = await this.run(source.upload, settings, signal);
+      await this.complete(source.upload, ours, settings, signal);
+    });
+  }
+
+  /** The file that was dropped last, also when it was refused. */
+  async retry(prepare: (opened: Opened) => Promise<Settings>): Promise<void> {
+    if (this.lastDrop) await this.take(this.lastDrop, prepare);
+  }
+
+  /** Another answer for the same settings; null when it was cancelled. */
+  async fetch(
+    settings: Settings,
+    diagnostics: Diagnostics,
+    compress: Compression,
+  ): Promise<Answer | null> {
+    const { source } = this;
+    if (!source) return null;
+    let answer: Answer | null = null;
+    await this.only(async (signal) => {
+      const asked = query(settings, diagnostics, compress);
+      answer = await refine(bodyOf(source.upload), asked, signal, (progress) =>
+        this.listener.progress(progress, ""),
+      );
+    });
+    return answer;
+  }
+
+  private async complete(
+    upload: Upload,
+    ours: Result,
+    settings: Settings,
+    signal: AbortSignal,
+  ): Promise<void> {
+    this.replace("ours", ours);
+    const key = query(asLoop(settings)).toString();
+    if (this.loop && this.loop.key !== key) this.replace("loop", null);
+    this.listener.refined(ours);
+    if (settings.model !== LOOP && !this.loop) {
+      this.replace("loop", await this.run(upload, asLoop(settings), signal, "Loop’s side"));
+    }
+    this.listener.compared(this.loop);
+  }
+
+  private async run(
+    upload: Upload,
+    settings: Settings,
+    signal: AbortSignal,
+    what = "",
+  ): Promise<Result> {
+    const asked = query(settings);
+    const answer = await refine(bodyOf(upload), asked, signal, (progress) =>
+      this.listener.progress(progress, what),
+    );
+    return resultOf(asked.toString(), answer);
+  }
+
+  private show(source: Source): void {
+    const old = this.source;
+    this.replace("ours", null);
+    this.replace("loop", null);
+    this.source = source;
+    this.listener.opened(source);
+    if (old) this.listener.discarded(old.model);
+  }
+
+  /** Back to a page without a file. */
+  private clear(): void {
+    const old = this.source;
+    this.source = null;
+    if (old) this.listener.discarded(old.model);
+    this.listener.cleared();
+  }
+
+  private replace(side: "ours" | "loop", result: Result | null): void {
+    const old = this[side];
+    this[side] = result;
+    if (old && old !== result) this.listener.discarded(old.model);
+  }
+
+  /** Run a task after ending the one before. */
+  private async only(task: (signal: AbortSignal) => Promise<void>): Promise<void> {
+    this.controller.abort();
+    const { signal } = (this.controller = new AbortController());
+    try {
+      await task(signal);
+    } catch (error) {
+      if (!signal.aborted && !isAbort(error)) this.listener.failed(error);
+    } finally {
+      if (this.controller.signal === signal) this.listener.idle();
+    }
+  }
+}
+
+/** Whether an error is one of the file, which no other setting will mend. */
+function isTheFiles(error: unknown): boolean {
+  return error instanceof Problem && [400, 415, 422].includes(error.status) && !error.parameter;
+}
+
+async function resultOf(key: string, answer: Answer): Promise<Result> {
+  const began = performance.now();
+  const json = jsonOf(answer.bytes);
+  const { scene, animations } = await parseGltf(answer.bytes);
+  const timings: [string, number][] = [...answer.timings, ["opening", performance.now() - began]];
+  return {
+    key,
+    bytes: answer.bytes,
+    json,
+    report: json.asset?.extras?.pns as Report,
+    model: modelOf(scene, animations),
+    timings,
+    full: false,
+  };
+}

@@ -1,0 +1,132 @@
+/** What came of it: certificate, statistics, changes, validator, timings. */
+
+import type { Comparison } from "../validate/compare";
+import { certificate, type Lengths } from "../report/certificate";
+import { bytes, count, figure, seconds } from "../report/format";
+import type { Surface } from "../measure/surface";
+import type { Report } from "../report/report";
+import { element, make } from "./dom";
+
+export function showCertificate(report: Report, lengths: Lengths): string {
+  const statements = certificate(report, lengths);
+  element("statements").replaceChildren(
+    ...statements.map(({ holds, text, note }) =>
+      make(
+        "li",
+        { className: holds ? "" : "broken" },
+        make(
+          "div",
+          {},
+          make("span", { className: "hidden", textContent: holds ? "Holds: " : "Broken: " }),
+          make("strong", { textContent: text }),
+          make("span", { className: "note", textContent: note }),
+        ),
+      ),
+    ),
+  );
+  const made = element("made-by");
+  made.textContent = report.model
+    ? `Model ${report.model}, C = ${figure(report.budget ?? 0)}, hash ${report.model_hash?.slice(0, 12)}…`
+    : "";
+  made.title = report.model_hash ?? "";
+  return statements.map(({ text }) => text).join(". ");
+}
+
+export interface Before {
+  faces: number;
+  vertices: number;
+  bytes: number;
+  surface: Surface;
+  /** Degrees. */
+  sharpest: number;
+}
+
+export function showStatistics(before: Before, report: Report, size: number): void {
+  const last = report.levels.at(-1);
+  const { surface } = before;
+  const angle = (degrees: number): string => `${figure(degrees)}°`;
+  const rows: [string, string, string][] = [
+    ["Faces", count(before.faces), count(report.totals.faces)],
+    ["Vertices in the file", count(before.vertices), count(report.totals.vertices)],
+    ["File", bytes(before.bytes), bytes(size)],
+  ];
+  if (last) {
+    rows.push(
+      ["Vertices of the surface", count(surface.vertices), count(last.vertices)],
+      ["Boundary edges", count(surface.boundary), count(last.edges.boundary)],
+      ["Irregular edges", count(surface.irregular), count(last.edges.irregular)],
+      ["Sharpest edge", angle(before.sharpest), angle((last.normal_jump_max * 180) / Math.PI)],
+      ["Faces turned over", "–", count(report.levels.reduce((n, l) => n + l.flipped_faces, 0))],
+    );
+    if (last.edges.crease) rows.push(["Crease edges", "–", count(last.edges.crease)]);
+  }
+  fill("statistics", rows);
+}
+
+export function showTimings(rows: [string, number][]): void {
+  fill(
+    "timings",
+    rows.map(([name, time]) => [name, seconds(time)]),
+  );
+}
+
+export function showChanges(report: Report): void {
+  const said = new Set(report.changes.map(({ what }) => what));
+  const dropped = Object.entries(report.dropped)
+    .map(([name, n]) => ({ pointer: "", what: `${name.replaceAll("_", " ")} dropped`, count: n }))
+    .filter(({ what, count }) => count > 0 && !said.has(what));
+  const all = [...report.changes, ...dropped];
+  element("changes-count").textContent = all.length ? String(all.length) : "none";
+  element("changes").replaceChildren(
+    ...(all.length
+      ? all.map(({ pointer, what, count: n }) =>
+          make(
+            "li",
+            {},
+            `${n > 1 ? `${count(n)} × ` : ""}${what}`,
+            ...(pointer ? [make("span", { className: "where", textContent: pointer })] : []),
+          ),
+        )
+      : [make("li", { className: "note", textContent: "Nothing beside the geometry changed." })]),
+  );
+}
+
+export function showValidation(comparison: Comparison | string): void {
+  const badge = element("validation-badge");
+  const text = element("validation-text");
+  const list = element("findings");
+  list.replaceChildren();
+  if (typeof comparison === "string") {
+    badge.textContent = "";
+    text.textContent = comparison;
+    return;
+  }
+  const fresh = comparison.findings.filter((finding) => finding.isNew && finding.severity < 2);
+  badge.className = `badge ${fresh.length ? "bad" : "good"}`;
+  badge.textContent = fresh.length ? `${fresh.length} new` : "nothing new";
+  text.textContent = `Khronos’ glTF Validator. Result: ${comparison.after}. Input: ${comparison.before}.`;
+  list.replaceChildren(
+    ...comparison.findings.map(({ code, message, pointer, times, isNew, severity }) =>
+      make(
+        "li",
+        { className: isNew && severity < 2 ? "new" : "" },
+        `${isNew ? "New: " : ""}${times > 1 ? `${times} × ` : ""}${message || code}`,
+        make("span", { className: "where", textContent: `${code} ${pointer}` }),
+      ),
+    ),
+  );
+}
+
+function fill(id: string, rows: string[][]): void {
+  const body = element<HTMLTableElement>(id).tBodies[0]!;
+  body.replaceChildren(
+    ...rows.map(([name, ...cells]) =>
+      make(
+        "tr",
+        {},
+        make("th", { scope: "row", textContent: name ?? "" }),
+        ...cells.map((text) => make("td", { textContent: text })),
+      ),
+    ),
+  );
+}

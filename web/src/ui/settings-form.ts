@@ -1,0 +1,125 @@
+/** The form of settings: what may be chosen for this file, on this service. */
+
+import type { Limits, ModelEntry } from "../api/client";
+import { count } from "../report/format";
+import { DEFAULTS, LOOP, type Settings } from "../settings";
+import { element, input, option, select } from "./dom";
+
+export class SettingsForm {
+  private models: ModelEntry[] = [];
+  private limits: Limits | null = null;
+  private faces = 0;
+
+  constructor(
+    public settings: Settings,
+    private readonly changed: () => void,
+  ) {
+    const form = element<HTMLFormElement>("settings");
+    form.addEventListener("submit", (event) => event.preventDefault());
+    form.addEventListener("input", () => this.read());
+    element("reset").addEventListener("click", () => {
+      this.settings = { ...DEFAULTS };
+      this.write();
+      this.changed();
+    });
+    this.write();
+  }
+
+  offerModels(models: ModelEntry[]): void {
+    this.models = models;
+    this.write();
+  }
+
+  offerLimits(limits: Limits): void {
+    this.limits = limits;
+    this.write();
+  }
+
+  /** Say how many faces refinement starts from; levels beyond the service's limits close. */
+  start(faces: number): void {
+    this.faces = faces;
+    const deepest = this.levels().filter((level) => !this.refusal(level));
+    this.settings.levels = Math.min(this.settings.levels, deepest.at(-1) ?? 1);
+    this.write();
+  }
+
+  private levels(): number[] {
+    const { min, max } = this.limits?.levels ?? { min: 1, max: 6 };
+    return Array.from({ length: max - min + 1 }, (_, i) => min + i);
+  }
+
+  private predicted(level: number): number {
+    return this.faces * 4 ** level;
+  }
+
+  /** Why a level is closed; empty where it is open. */
+  private refusal(level: number): string {
+    const most = this.limits?.faces;
+    return most && this.predicted(level) > most ? `over the limit of ${count(most)} faces` : "";
+  }
+
+  private write(): void {
+    const { settings } = this;
+    select("levels").replaceChildren(
+      ...this.levels().map((level) => {
+        const faces = this.faces ? ` · ${count(this.predicted(level))} faces` : "";
+        return option(String(level), `${level}${faces}`, this.refusal(level) !== "");
+      }),
+    );
+    select("levels").value = String(settings.levels);
+    const closed = this.levels().find((level) => this.refusal(level));
+    element("levels-note").textContent = closed
+      ? `${closed} and more: ${this.refusal(closed)} of this service`
+      : "";
+    const bundled = this.models.map((model) =>
+      option(model.default ? "" : model.name, model.name + (model.default ? " (default)" : "")),
+    );
+    if (!bundled.length) bundled.push(option("", "default"));
+    select("model").replaceChildren(...bundled, option(LOOP, "Loop, nothing learned"));
+    select("model").value = settings.model;
+    const unknown = select("model").value !== settings.model;
+    // A model that a link names may be on a list that is still on its way.
+    if (unknown && this.models.length) select("model").value = settings.model = "";
+    input("budget").value = settings.budget === null ? "" : String(settings.budget);
+    input("limit").checked = settings.limit;
+    select("crease").value = settings.crease;
+    input("angle").value = String(settings.angle);
+    select("uv").value = settings.uv;
+    select("normals").value = settings.normals;
+    this.adjust();
+  }
+
+  private read(): void {
+    const { settings } = this;
+    settings.levels = Number(select("levels").value);
+    const model = select("model").value;
+    // Each model has its own budget: a number meant for another is let go.
+    if (model !== settings.model) input("budget").value = "";
+    settings.model = model;
+    const budget = input("budget");
+    const angle = input("angle");
+    if (!budget.checkValidity() || !angle.checkValidity()) return;
+    settings.budget = budget.value === "" ? null : Number(budget.value);
+    settings.limit = input("limit").checked;
+    settings.crease = select("crease").value as Settings["crease"];
+    settings.angle = Number(angle.value || DEFAULTS.angle);
+    settings.uv = select("uv").value as Settings["uv"];
+    settings.normals = select("normals").value as Settings["normals"];
+    // Normals of the limit surface stand on the limit surface.
+    if (settings.normals === "limit" && !settings.limit) {
+      settings.limit = input("limit").checked = true;
+    }
+    this.adjust();
+    this.changed();
+  }
+
+  private adjust(): void {
+    const { settings } = this;
+    const model = this.models.find((entry) =>
+      settings.model ? entry.name === settings.model : entry.default,
+    );
+    input("budget").placeholder = model ? `${model.budget}, the model’s` : "the model’s";
+    input("budget").disabled = settings.model === LOOP;
+    element("angle-row").hidden = settings.crease !== "angle";
+  }
+}

@@ -1,0 +1,336 @@
+/** The stage: which models stand on which side, how they look, and the tools under them. */
+
+import { Box3, type Mesh } from "three";
+import { cividis } from "../measure/cividis";
+import { count, type Unit } from "../report/format";
+import type { Result, Source } from "../session";
+import { LOOP } from "../settings";
+import { colour, HEATS, needsFull, type Heat, type Legend } from "../view/heat";
+import { edgesOf, normalsOf, removeLines } from "../view/lines";
+import { dress, plain, type Look } from "../view/looks";
+import { dispose, extentOf, type Extent, type Model } from "../view/model";
+import { Playback } from "../view/playback";
+import { Viewer, type Layout } from "../view/viewer";
+import { element, input, make, select } from "./dom";
+import { copyMorphs, offerMorphs, Timeline } from "./timeline";
+import { bindWipe } from "./wipe";
+
+export interface Shown {
+  source: Source | null;
+  ours: Result | null;
+  loop: Result | null;
+}
+
+/** What stands over a side. */
+interface Label {
+  title: string;
+  text: string;
+}
+
+export class Stage {
+  /** null where the browser has no WebGL. */
+  readonly viewer: Viewer | null;
+  private readonly playback = new Playback();
+  private readonly timeline: Timeline;
+  private readonly setWipe: (share: number) => void;
+  private shown: Shown = { source: null, ours: null, loop: null };
+  private surface: Look = "material";
+  private heat: Heat | null = null;
+  private lines: Mesh[] = [];
+  private extent: Extent = { box: new Box3(), points: new Float32Array() };
+
+  /** `wantFull` is called for values that the result does not hold yet. */
+  constructor(
+    private readonly wantFull: () => void,
+    private readonly changed: () => void,
+  ) {
+    this.viewer = startViewer();
+    this.timeline = new Timeline(this.playback, () => this.viewer?.invalidate());
+    this.setWipe = bindWipe((share) => {
+      if (!this.viewer) return;
+      this.viewer.wipe = share;
+      this.viewer.invalidate();
+    });
+    if (this.viewer) {
+      this.viewer.onFrame = (seconds) => {
+        const moving = this.playback.advance(seconds);
+        if (moving) this.timeline.write();
+        return moving;
+      };
+    }
+    for (const id of ["layout", "pair", "look", "edges", "normal-lines"]) {
+      element(id).addEventListener("change", () => {
+        this.read();
+        this.changed();
+      });
+    }
+    element("frame").addEventListener("click", () => this.viewer?.frame(this.extent));
+    // Tools wrap into more lines where the window is narrow.
+    const cover = new ResizeObserver(() => this.cover());
+    for (const id of ["canvas", "tools", "timeline"]) cover.observe(element(id));
+    this.bindKeys();
+    const dark = matchMedia("(prefers-color-scheme: dark)");
+    dark.addEventListener("change", () => this.arrange());
+    drawLegendBar();
+  }
+
+  /** The view's own settings, for the page's address. */
+  get view(): Record<string, string> {
+    const view: Record<string, string> = {};
+    if (this.layout !== "wipe") view.layout = this.layout;
+    if (select("pair").value !== "control") view.pair = select("pair").value;
+    if (select("look").value !== "material") view.look = select("look").value;
+    if (input("edges").checked) view.edges = "1";
+    return view;
+  }
+
+  set view(view: Record<string, string>) {
+    const radio = document.querySelector<HTMLInputElement>(
+      `input[name="layout"][value="${CSS.escape(view.layout ?? "wipe")}"]`,
+    );
+    if (radio) radio.checked = true;
+    for (const name of ["pair", "look"] as const) {
+      const wanted = view[name];
+      if (wanted && [...select(name).options].some(({ value }) => value === wanted)) {
+        select(name).value = wanted;
+      }
+    }
+    input("edges").checked = view.edges === "1";
+    this.read();
+  }
+
+  open(source: Source): void {
+    this.shown = { source, ours: null, loop: null };
+    this.adopt(source.model);
+    this.extent = extentOf(source.model);
+    this.timeline.offer(source.model);
+    offerMorphs(source.model, () => this.models(), () => this.viewer?.invalidate());
+    this.cover();
+    this.viewer?.frame(this.extent);
+    this.arrange();
+  }
+
+  refine(ours: Result, loop: Result | null): void {
+    const fresh = this.shown.ours !== ours;
+    const news = loop && this.shown.loop !== loop ? loop : null;
+    this.shown = { ...this.shown, ours, loop };
+    for (const result of [fresh ? ours : null, news]) {
+      if (!result) continue;
+      if (this.shown.source?.opened.json === null) plain(result.model.meshes);
+      this.adopt(result.model);
+      if (this.shown.source) copyMorphs(this.shown.source.model, result.model);
+    }
+    this.arrange();
+  }
+
+  discard(model: Model): void {
+    this.clearLines();
+    this.playback.remove(model);
+    dispose(model);
+    if (this.shown.ours?.model === model) this.shown.ours = null;
+    if (this.shown.loop?.model === model) this.shown.loop = null;
+    if (this.shown.source?.model === model) this.shown.source = null;
+  }
+
+  /** The diagonal of the model's box. */
+  get size(): number {
+    const { box } = this.extent;
+    return box.isEmpty() ? 1 : box.min.distanceTo(box.max) || 1;
+  }
+
+  get unit(): Unit {
+    return this.shown.source?.opened.json ? "metre" : "unit";
+  }
+
+  private get layout(): Layout {
+    const chosen = document.querySelector<HTMLInputElement>('input[name="layout"]:checked');
+    return (chosen?.value ?? "wipe") as Layout;
+  }
+
+  private adopt(model: Model): void {
+    this.viewer?.add(model);
+    this.playback.add(model);
+  }
+
+  private models(): Model[] {
+    const { source, ours, loop } = this.shown;
+    return [source?.model, ours?.model, loop?.model].filter((model) => model !== undefined);
+  }
+
+  private read(): void {
+    const look = select("look").value;
+    this.heat = HEATS.find((heat) => heat === look) ?? null;
+    if (!this.heat) this.surface = look as Look;
+    this.arrange();
+  }
+
+  /** Put everything where the tools say. */
+  arrange(): void {
+    const { source, ours, loop } = this.shown;
+    const learned = ours && ours.report.scheme !== LOOP;
+    const byLoop = select("pair").value === "loop" && learned;
+    select("pair").disabled = !learned;
+    const left = byLoop ? (loop?.model ?? null) : (source?.model ?? null);
+    const right = ours?.model ?? null;
+    const paper = getComputedStyle(document.body).backgroundColor;
+    this.writeLabels(byLoop ? loop : null);
+    this.showLegend(this.colourResult());
+    if (!this.viewer) return;
+    this.viewer.background(paper);
+    const moved = this.viewer.layout !== this.layout;
+    this.viewer.layout = this.layout;
+    this.viewer.sides = { left, right };
+    this.viewer.over = this.overlaid;
+    for (const model of this.models()) {
+      const hot = model === right && !element("legend").hidden;
+      const look = model === this.overlaid ? "hidden" : hot ? "heat" : this.surface;
+      model.meshes.forEach((mesh) => dress(mesh, look, paper));
+    }
+    this.drawLines();
+    if (moved && (this.layout === "side" || this.layout === "wipe")) {
+      this.viewer.frame(this.extent, false);
+    }
+    this.viewer.invalidate();
+  }
+
+  /** The control mesh, where only its edges are shown, over the result. */
+  private get overlaid(): Model | null {
+    const { source, ours } = this.shown;
+    return this.layout === "overlay" && source && ours ? source.model : null;
+  }
+
+  private colourResult(): Legend | null {
+    const { ours, loop } = this.shown;
+    if (!this.heat || !ours) return null;
+    if (needsFull(this.heat) && !ours.full && ours.report.scheme !== LOOP) {
+      this.wantFull();
+      return null;
+    }
+    return colour(this.heat, ours, loop, this.unit);
+  }
+
+  private showLegend(legend: Legend | null): void {
+    const figure = element("legend");
+    figure.hidden = !legend;
+    if (!legend) return;
+    figure.dataset.end = String(legend.end);
+    element("legend-title").textContent = legend.title;
+    element("legend-low").textContent = legend.low;
+    element("legend-high").textContent = legend.high;
+    element("legend-note").textContent = legend.note;
+  }
+
+  private writeLabels(loop: Result | null): void {
+    const { source, ours } = this.shown;
+    const [left, right] = this.labels(loop);
+    for (const [side, label] of [["left", left], ["right", right]] as const) {
+      element(`label-${side}`).hidden = !label;
+      element(`label-${side}`).replaceChildren(
+        make("strong", { textContent: label?.title ?? "" }),
+        make("span", { textContent: label?.text ?? "" }),
+      );
+    }
+    element("wipe").hidden = !(this.layout === "wipe" && source && ours) || !this.viewer;
+  }
+
+  /** What stands over the left side and the right; `loop` is given where it takes the left. */
+  private labels(loop: Result | null): [Label | null, Label | null] {
+    const { source, ours } = this.shown;
+    const of = ({ report }: Result): string => `${count(report.totals.faces)} faces`;
+    const text = ours ? `${ours.report.model ?? "Loop"} · ${of(ours)}` : "";
+    const before = source && { title: "Before", text: `${count(source.opened.faces)} faces` };
+    const after = ours && { title: "After", text };
+    if (this.layout === "overlay" || this.layout === "single") return [null, after ?? before];
+    if (loop && ours) return [{ title: "Loop", text: of(loop) }, { title: "Ours", text }];
+    return [before, after];
+  }
+
+  /** Make room for the tools that float over the canvas, however many lines they take. */
+  private cover(): void {
+    const { bottom } = element("canvas").getBoundingClientRect();
+    const above = (id: string) => bottom - (element(id).getBoundingClientRect().top || bottom);
+    element("view").style.setProperty("--tools", `${Math.max(above("tools"), 0)}px`);
+    if (!this.viewer) return;
+    this.viewer.covered = Math.max(above("tools"), above("timeline"), 0);
+    this.viewer.invalidate();
+  }
+
+  private clearLines(): void {
+    removeLines(this.lines);
+    this.lines = [];
+  }
+
+  private drawLines(): void {
+    this.clearLines();
+    const style = getComputedStyle(document.body);
+    const accent = style.getPropertyValue("--accent");
+    const wire = this.surface === "wire" && !this.heat;
+    for (const model of this.models()) {
+      if (model === this.overlaid) {
+        // Clear in front, faint behind.
+        this.lines.push(...edgesOf(model, accent, 0.9), ...edgesOf(model, accent, 0.2, true));
+        continue;
+      }
+      if (input("edges").checked || wire) {
+        this.lines.push(...edgesOf(model, style.color, wire ? 0.9 : 0.35));
+      }
+      if (input("normal-lines").checked) {
+        this.lines.push(...normalsOf(model, accent, this.size / 60));
+      }
+    }
+  }
+
+  private bindKeys(): void {
+    const turn = Math.PI / 24;
+    const click = (id: string) => () => element(id).click();
+    const layout = (value: string) => () =>
+      document.querySelector<HTMLInputElement>(`input[name="layout"][value="${value}"]`)?.click();
+    const keys: Record<string, () => void> = {
+      ArrowLeft: () => this.viewer?.orbit(-turn, 0),
+      ArrowRight: () => this.viewer?.orbit(turn, 0),
+      ArrowUp: () => this.viewer?.orbit(0, -turn),
+      ArrowDown: () => this.viewer?.orbit(0, turn),
+      "+": () => this.viewer?.zoom(0.9),
+      "=": () => this.viewer?.zoom(0.9),
+      "-": () => this.viewer?.zoom(1 / 0.9),
+      f: click("frame"),
+      w: click("edges"),
+      n: click("normal-lines"),
+      "1": layout("wipe"),
+      "2": layout("side"),
+      "3": layout("overlay"),
+      "4": layout("single"),
+      ",": () => this.setWipe((this.viewer?.wipe ?? 0.5) - 0.05),
+      ".": () => this.setWipe((this.viewer?.wipe ?? 0.5) + 0.05),
+      " ": () => this.timeline.toggle(),
+    };
+    // Letters act only while the canvas has the focus: elsewhere they are typed.
+    element("canvas").addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+      if (!act) return;
+      event.preventDefault();
+      act();
+    });
+  }
+}
+
+function startViewer(): Viewer | null {
+  try {
+    return new Viewer(element<HTMLCanvasElement>("canvas"));
+  } catch {
+    document.body.classList.add("no-webgl-here");
+    element("no-webgl").hidden = false;
+    element("canvas").hidden = true;
+    return null;
+  }
+}
+
+function drawLegendBar(): void {
+  const bar = element<HTMLCanvasElement>("legend-bar").getContext("2d");
+  if (!bar) return;
+  for (let x = 0; x < 256; x++) {
+    bar.fillStyle = `rgb(${cividis(x / 255).join(" ")})`;
+    bar.fillRect(x, 0, 1, 1);
+  }
+}

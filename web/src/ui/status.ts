@@ -1,0 +1,88 @@
+/** What goes on, and what went wrong. */
+
+import { useKey } from "../api/client";
+import type { Progress } from "../api/jobs";
+import { Problem } from "../api/problem";
+import { percent, seconds } from "../report/format";
+import { element, input } from "./dom";
+
+const STAGES: Record<string, string> = {
+  read: "Reading",
+  weld: "Welding",
+  refine: "Refining",
+  attributes: "Normals and attributes",
+  write: "Writing",
+};
+
+export function sentence({ step, share, place, stage, estimate }: Progress): string {
+  const done = share === null ? "" : ` ${Math.round(100 * share)} %`;
+  switch (step) {
+    case "upload":
+      return `Uploading${done}`;
+    case "queue":
+      return place ? `Waiting, number ${place} in line` : "Waiting for a worker";
+    case "refine":
+      return `${STAGES[stage ?? ""] ?? "Refining"}${done}${estimate && estimate > 2 ? `, about ${seconds(estimate)}` : ""}`;
+    case "download":
+      return `Downloading${done}`;
+  }
+}
+
+/** Show progress; `what` says of which of several jobs. */
+export function showProgress(progress: Progress, what = ""): void {
+  element("work").hidden = false;
+  const text = `${sentence(progress)}${what ? ` · ${what}` : ""}`;
+  const line = element("work-text");
+  // A screen reader hears each step, not each percent.
+  line.setAttribute("aria-label", text.replace(/ \d+ %/, ""));
+  line.textContent = text;
+  const bar = element<HTMLProgressElement>("work-bar");
+  if (progress.share === null) bar.removeAttribute("value");
+  else bar.value = progress.share;
+  bar.setAttribute("aria-valuetext", percent(progress.share ?? 0));
+}
+
+export function hideProgress(): void {
+  element("work").hidden = true;
+}
+
+export function announce(text: string): void {
+  element("announce").textContent = text;
+}
+
+export function showProblem(error: unknown): void {
+  const problem = error instanceof Problem ? error : null;
+  if (!problem) console.error(error);
+  element("problem-title").textContent = problem?.title ?? "The page failed";
+  element("problem-detail").textContent = problem?.message ?? String(error);
+  const pointer = problem?.pointer ?? problem?.parameter ?? "";
+  element("problem-pointer").textContent = pointer ? `at ${pointer}` : "";
+  element("problem-pointer").hidden = !pointer;
+  element("key-form").hidden = problem?.status !== 401;
+  // Busy, slow, or gone: the same may work in a moment.
+  element("problem-again").hidden = !problem || (problem.status < 500 && ![0, 408, 429].includes(problem.status));
+  element("problem").hidden = false;
+  document.body.classList.remove("folded");
+  element("problem").scrollIntoView({ block: "nearest" });
+  if (problem?.status === 401) input("key").focus();
+}
+
+export function hideProblem(): void {
+  element("problem").hidden = true;
+}
+
+/** `again` runs where the user wants another try, and once they have given a key. */
+export function bindProblem(again: () => void): void {
+  element("problem-again").addEventListener("click", () => {
+    hideProblem();
+    again();
+  });
+  element("problem-close").addEventListener("click", hideProblem);
+  element("key-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    useKey(input("key").value);
+    input("key").value = "";
+    hideProblem();
+    again();
+  });
+}

@@ -1,0 +1,114 @@
+/** Which numbers colour the result, their unit, and the ends of the scale. */
+
+import { BufferAttribute } from "three";
+import type { Result } from "../session";
+import { dihedrals } from "../measure/dihedral";
+import { distances, type Field } from "../measure/distance";
+import { figure, length, percent, type Unit } from "../report/format";
+import { largestGate, largestRatio, learnedLevels } from "../report/report";
+import { heatRange } from "./looks";
+import type { Model } from "./model";
+
+export type Heat = "distance" | "ratio" | "gate" | "dihedral";
+
+export const HEATS: readonly Heat[] = ["distance", "ratio", "gate", "dihedral"];
+
+/** Whether the values come with the file, on demand. */
+export function needsFull(heat: Heat): boolean {
+  return heat === "ratio" || heat === "gate";
+}
+
+export interface Legend {
+  title: string;
+  low: string;
+  high: string;
+  /** The upper end as a number. */
+  end: number;
+  note: string;
+}
+
+/** Colour the result; null where the values are not there. */
+export function colour(
+  heat: Heat,
+  ours: Result,
+  loop: Result | null,
+  unit: Unit,
+): Legend | null {
+  const shown = field(heat, ours, loop);
+  if (!shown) return null;
+  shown.values.forEach((values, number) =>
+    ours.model.meshes[number]!.geometry.setAttribute("heat", new BufferAttribute(values, 1)),
+  );
+  const legend = legendOf(heat, shown.max, ours, unit);
+  heatRange.high.value = legend.end;
+  return legend;
+}
+
+function field(heat: Heat, ours: Result, loop: Result | null): Field | null {
+  switch (heat) {
+    case "distance":
+      return loop && distances(ours.model, loop.model);
+    case "dihedral":
+      return dihedrals(ours.model);
+    default:
+      return attribute(ours.model, `_pns_${heat}`);
+  }
+}
+
+function attribute(model: Model, name: string): Field | null {
+  const values: Float32Array[] = [];
+  let max = 0;
+  for (const { geometry } of model.meshes) {
+    if (!geometry.hasAttribute(name)) return null;
+    const at = geometry.getAttribute(name);
+    values.push(Float32Array.from({ length: at.count }, (_, i) => at.getX(i)));
+    max = values.at(-1)!.reduce((a, b) => Math.max(a, b), max);
+  }
+  return { values, max };
+}
+
+function legendOf(heat: Heat, max: number, { report }: Result, unit: Unit): Legend {
+  const level = report.levels.at(-1);
+  const asleep =
+    learnedLevels(report) < report.levels.length
+      ? ` The learned rule acted at level ${learnedLevels(report)} last: this one is Loop’s.`
+      : "";
+  switch (heat) {
+    case "distance":
+      return {
+        title: "Distance to Loop",
+        low: length(0, unit),
+        high: length(max, unit),
+        end: max,
+        note: "Each vertex against its counterpart by Loop’s rules.",
+      };
+    case "ratio": {
+      const end = level ? largestRatio(level) : max;
+      return {
+        title: "Share of the budget",
+        low: "0 %",
+        high: percent(Math.min(end, 1)),
+        end,
+        note: `Of the last level’s corrections; 100 % is the bound C h² / R.${asleep}`,
+      };
+    }
+    case "gate": {
+      const end = level ? largestGate(level) : max;
+      return {
+        title: "Gate",
+        low: "0, shut",
+        high: `${figure(end)}${end > 0.995 ? ", open" : ""}`,
+        end,
+        note: `Shut on planes, open at sharp edges; of the last level.${asleep}`,
+      };
+    }
+    case "dihedral":
+      return {
+        title: "Dihedral angle",
+        low: "0°",
+        high: `${figure(max)}°`,
+        end: max,
+        note: "The largest turn between faces at each vertex.",
+      };
+  }
+}

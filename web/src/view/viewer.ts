@@ -1,0 +1,256 @@
+/** One canvas, one camera, one or two models; drawn when something changed. */
+
+import {
+  Color,
+  NeutralToneMapping,
+  PerspectiveCamera,
+  Raycaster,
+  Scene,
+  Sphere,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { light, paint } from "./lights";
+import { drawnBySoftware } from "./software";
+import type { Extent, Model } from "./model";
+
+export type Layout = "wipe" | "side" | "overlay" | "single";
+
+/** Milliseconds without a change after which a picture may take its time. */
+const REST = 200;
+
+/** How much farther away than need be: the air around a model. */
+const MARGIN = 1.15;
+
+const FIRST_DIRECTION = new Vector3(0.6, 0.5, 1).normalize();
+
+export interface Sides {
+  left: Model | null;
+  right: Model | null;
+}
+
+export class Viewer {
+  readonly renderer: WebGLRenderer;
+  readonly camera = new PerspectiveCamera(35, 1, 0.01, 100);
+  readonly controls: OrbitControls;
+  sides: Sides = { left: null, right: null };
+  /** Drawn together with the right side: lines over it. */
+  over: Model | null = null;
+  layout: Layout = "wipe";
+  /** Where the wipe stands, 0 to 1 from the left. */
+  wipe = 0.5;
+  /** How much of the canvas tools cover at its foot, in pixels: the model stands above them. */
+  covered = 0;
+  /** Called once a frame with the seconds since the last; returns whether it wants another. */
+  onFrame: (seconds: number) => boolean = () => false;
+
+  // Without a card, edges are smoothed by finer pixels, and only once nothing moves.
+  private readonly software = drawnBySoftware();
+  private readonly scene = new Scene();
+  private readonly paper = new Color();
+  private readonly sphere = new Sphere(new Vector3(), 1);
+  private scheduled = false;
+  private last = 0;
+  private frames = 0;
+  private rest = 0;
+
+  /** Throws where the browser has no WebGL. */
+  constructor(readonly canvas: HTMLCanvasElement) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software });
+    this.renderer.setScissorTest(true);
+    this.renderer.autoClear = false;
+    this.renderer.toneMapping = NeutralToneMapping;
+    light(this.renderer, this.scene, this.camera, this.software);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = false;
+    this.controls.zoomToCursor = true;
+    this.controls.addEventListener("change", () => this.invalidate());
+    canvas.addEventListener("dblclick", (event) => this.centreAt(event));
+    canvas.addEventListener("webglcontextrestored", () => this.invalidate());
+    new ResizeObserver(() => this.invalidate()).observe(canvas);
+  }
+
+  add(model: Model): void {
+    if (this.software) paint(model.meshes);
+    this.scene.add(model.root);
+    this.invalidate();
+  }
+
+  background(colour: string): void {
+    this.paper.set(colour);
+    this.invalidate();
+  }
+
+  /** Draw soon, and once however often it is asked for. */
+  invalidate(): void {
+    if (this.scheduled) return;
+    this.scheduled = true;
+    clearTimeout(this.rest);
+    requestAnimationFrame((now) => {
+      this.scheduled = false;
+      // After a pause the clock does not jump.
+      const seconds = Math.min((now - this.last) / 1000, 0.1);
+      this.last = now;
+      const again = this.onFrame(seconds);
+      this.draw(!this.software);
+      if (again) this.invalidate();
+      else if (this.software) this.settle();
+    });
+  }
+
+  /** Draw finely once nothing has asked for a picture in a while. */
+  private settle(): void {
+    this.rest = window.setTimeout(() => requestAnimationFrame(() => this.draw(true)), REST);
+  }
+
+  /** Look at all of a model; `turn` goes back to the first direction: ahead, and a little above. */
+  frame({ box, points }: Extent, turn = true): void {
+    if (box.isEmpty()) return;
+    const { center, radius } = box.getBoundingSphere(this.sphere);
+    const size = radius || 1;
+    const towards = turn
+      ? FIRST_DIRECTION.clone()
+      : this.camera.position.clone().sub(this.controls.target).normalize();
+    const right = new Vector3().crossVectors(this.camera.up, towards).normalize();
+    const up = new Vector3().crossVectors(towards, right);
+    const { width, height } = this.size();
+    const tall = Math.tan((this.camera.fov * Math.PI) / 360);
+    const free = tall * (1 - this.foot(height));
+    const wide = (tall * (this.layout === "side" ? width / 2 : width)) / height;
+    // The nearest place from which every vertex is in the picture.
+    let distance = 0;
+    const at = new Vector3();
+    for (let place = 0; place < points.length; place += 3) {
+      at.fromArray(points, place).sub(center);
+      const aside = Math.max(Math.abs(at.dot(right)) / wide, Math.abs(at.dot(up)) / free);
+      distance = Math.max(distance, MARGIN * aside + at.dot(towards));
+    }
+    this.controls.target.copy(center);
+    this.camera.position.copy(center).addScaledVector(towards, distance || 3 * size);
+    this.camera.near = size / 200;
+    this.camera.far = size * 200;
+    this.controls.minDistance = size / 50;
+    this.controls.maxDistance = size * 40;
+    this.controls.update();
+    this.invalidate();
+  }
+
+  /** Turn around the centre, in radians. */
+  orbit(right: number, up: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    const side = new Vector3().crossVectors(this.camera.up, offset).normalize();
+    const polar = offset.angleTo(this.camera.up);
+    offset.applyAxisAngle(side, Math.min(Math.max(up, 0.01 - polar), Math.PI - 0.01 - polar));
+    offset.applyAxisAngle(this.camera.up, right);
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
+    this.invalidate();
+  }
+
+  zoom(factor: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    this.camera.position.copy(this.controls.target).addScaledVector(offset, factor);
+    this.controls.update();
+    this.invalidate();
+  }
+
+  /** The view as a PNG, at the canvas's own size. */
+  picture(): Promise<Blob> {
+    // The buffer is gone once the browser has shown it, so it is drawn anew and read at once.
+    this.draw(true);
+    return new Promise((resolve, reject) =>
+      this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("no picture")))),
+    );
+  }
+
+  /** The part of the canvas's height that tools cover; on a low canvas they are not minded. */
+  private foot(height: number): number {
+    return Math.min(this.covered / height, 0.3);
+  }
+
+  private size(): { width: number; height: number } {
+    return { width: this.canvas.clientWidth || 1, height: this.canvas.clientHeight || 1 };
+  }
+
+  private draw(finely: boolean): void {
+    const { width, height } = this.size();
+    const ratio = this.software ? (finely ? 2 : 1) : Math.min(window.devicePixelRatio, 2);
+    const drawn = this.renderer.getSize(new Vector2());
+    if (drawn.x !== width || drawn.y !== height || this.renderer.getPixelRatio() !== ratio) {
+      this.renderer.setPixelRatio(ratio);
+      this.renderer.setSize(width, height, false);
+    }
+    const { left, right } = this.sides;
+    const split = Math.round(this.wipe * width);
+    if (!left || !right || this.layout === "overlay" || this.layout === "single") {
+      this.view(right ?? left, 0, width, 0, width);
+    } else if (this.layout === "side") {
+      this.view(left, 0, width / 2, 0, width / 2);
+      this.view(right, width / 2, width / 2, width / 2, width / 2);
+    } else {
+      this.view(left, 0, width, 0, split);
+      this.view(right, 0, width, split, width - split);
+    }
+    this.tell();
+  }
+
+  /** Say on the canvas how often it was drawn, and what the card holds: growth would be a leak. */
+  private tell(): void {
+    const { geometries, textures } = this.renderer.info.memory;
+    this.canvas.dataset.held = `${geometries} geometries, ${textures} textures`;
+    this.canvas.dataset.frames = String(++this.frames);
+  }
+
+  /** Draw one model over the columns from `x`, and of those the ones from `from`. */
+  private view(model: Model | null, x: number, width: number, from: number, columns: number): void {
+    if (columns <= 0) return;
+    const { height } = this.size();
+    const { renderer } = this;
+    renderer.setViewport(x, 0, width, height);
+    renderer.setScissor(from, 0, columns, height);
+    renderer.setClearColor(this.paper);
+    renderer.clear();
+    if (!model) return;
+    for (const object of this.scene.children) {
+      if (object === this.camera || "isLight" in object) continue;
+      object.visible = object === model.root || object === this.over?.root;
+    }
+    this.project(width, height);
+    renderer.render(this.scene, this.camera);
+  }
+
+  /** A picture of so many pixels, whose middle lies in the middle of what tools leave free. */
+  private project(width: number, height: number): void {
+    this.camera.setViewOffset(1, 1, 0, this.foot(height) / 2, 1, 1);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+  }
+
+  private centreAt(event: MouseEvent): void {
+    const box = this.canvas.getBoundingClientRect();
+    const { left, right } = this.sides;
+    let [x, width] = [event.clientX - box.left, box.width];
+    let model = right ?? left;
+    if (left && right && this.layout === "side") {
+      width /= 2;
+      model = x < width ? left : right;
+      x %= width;
+    } else if (left && right && this.layout === "wipe" && x < this.wipe * width) {
+      model = left;
+    }
+    if (!model) return;
+    const at = new Vector2((2 * x) / width - 1, 1 - (2 * (event.clientY - box.top)) / box.height);
+    const caster = new Raycaster();
+    this.project(width, box.height);
+    caster.setFromCamera(at, this.camera);
+    const hit = caster.intersectObjects(model.meshes, false)[0];
+    if (!hit) return;
+    const shift = hit.point.clone().sub(this.controls.target);
+    this.controls.target.add(shift);
+    this.camera.position.add(shift);
+    this.controls.update();
+    this.invalidate();
+  }
+}

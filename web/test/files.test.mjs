@@ -1,0 +1,260 @@
+/** The kinds of file that the page opens, and what moves in them. */
+
+import assert from "node:assert/strict";
+import { existsSync } from "node:fs";
+import { readdir, readFile } from "node:fs/promises";
+import { basename, dirname, join } from "node:path";
+import { describe, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { choose, noBrowser, picture, settled } from "./support/browser.mjs";
+import { bare, broken, moving, textured } from "./support/glb.mjs";
+import { example, number, part, PART_FACES, studio } from "./support/studio.mjs";
+
+const FOX = fileURLToPath(new URL("../../../shared/assets/Fox.glb", import.meta.url));
+
+const FIXTURES = fileURLToPath(new URL("../../../shared/assets/fixtures/", import.meta.url));
+// Both sides of a square that stays one: its corners are creases.
+const SQUARE = "#levels=1&layout=side&crease=angle&angle=1";
+const REFUSED = [
+  ["BoxWithInfinites.glb", /NaN or infinity/],
+  ["IndexOutOfRange.gltf", /index 255, but there are 24 vertices/],
+  ["empty_nodes.glb", /no triangles/],
+];
+
+describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
+  const { visit, refined } = studio();
+
+  test("both sides of an animation stand at the same time", async () => {
+    const page = await visit({ hash: "#levels=1&layout=side" });
+    await choose(page, { ...example, buffer: moving(part, 0.5) });
+    await settled(page);
+    await page.selectOption("#clip", { label: "There" });
+    const places = [];
+    for (const time of ["0", "0.5", "1"]) {
+      await page.locator("#scrub").fill(time);
+      const shown = await picture(page);
+      const [left, right] = [0, shown.width / 2].map((from) => middleOfShape(shown, from));
+      assert.ok(Math.abs(left - right) < 3, `at ${time}: ${left} and ${right}`);
+      places.push(left);
+    }
+    assert.ok(places[1] - places[0] > 8 && places[2] - places[1] > 8, `${places}`);
+    await page.click("#play");
+    await page.waitForFunction(() => document.querySelector("#scrub").value < 0.99);
+    assert.equal(await page.getAttribute("#play", "aria-pressed"), "true");
+  });
+
+  for (const compress of ["meshopt", "draco"]) {
+    test(`a file compressed by ${compress} is shown`, async () => {
+      const page = await visit({ hash: "#levels=1" });
+      const packed = await refined(`levels=1&scheme=loop&compress=${compress}`);
+      await choose(page, { ...example, buffer: packed });
+      await settled(page);
+      assert.match(await page.textContent("#label-left"), new RegExp(number(4 * PART_FACES)));
+      await page.focus("#wipe");
+      await page.keyboard.press("End");
+      assert.ok(Number.isFinite(middleOfShape(await picture(page), 0, 1)));
+    });
+  }
+
+  for (const kind of ["etc1s", "uastc"]) {
+    test(`a texture in KTX2 (${kind}) is shown on both sides`, async () => {
+      const page = await visit({ hash: SQUARE });
+      await choose(page, ...(await square(kind)));
+      await settled(page);
+      await assertQuarters(page);
+    });
+  }
+
+  test("a transcoder that did not come is asked for again", async () => {
+    const page = await visit({ hash: SQUARE, foreseen: /ERR_FAILED/ });
+    const transcoder = /basis_transcoder.*\.wasm$/;
+    await page.route(transcoder, (route) => route.abort());
+    await choose(page, ...(await square("etc1s")));
+    await page.locator("#problem").waitFor();
+    assert.match(await page.textContent("#problem-detail"), /transcoder/);
+    await page.unroute(transcoder);
+    await page.click("#problem-again");
+    await settled(page);
+    await assertQuarters(page);
+  });
+
+  test("Fox runs at the same phase on both sides", { skip: !existsSync(FOX) && `needs ${FOX}` }, async () => {
+    const page = await visit({ hash: "#levels=1&layout=side" });
+    await choose(page, { name: "Fox.glb", mimeType: "", buffer: await readFile(FOX) });
+    await settled(page);
+    assert.match(await page.textContent("#label-right"), /· 2,304 faces/);
+    await page.selectOption("#clip", { label: "Run" });
+    const times = [0.1, 0.35, 0.6, 0.85];
+    const poses = [];
+    for (const time of times) {
+      await page.locator("#scrub").fill(String(time));
+      const shown = await picture(page);
+      poses.push([0, shown.width / 2].map((from) => silhouette(shown, from)));
+    }
+    for (const [number, [control]] of poses.entries()) {
+      const likeness = poses.map(([, ours]) => overlap(control, ours));
+      assert.ok(likeness[number] > 0.8, `at ${times[number]}: ${likeness}`);
+      assert.ok(
+        likeness.every((other, i) => i === number || other < likeness[number] - 0.05),
+        `another phase is as near at ${times[number]}: ${likeness}`,
+      );
+    }
+  });
+
+  test("a glTF of positions alone is shown, and comes back smooth", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, { name: "bare.gltf", mimeType: "", buffer: Buffer.from(JSON.stringify(bare())) });
+    await settled(page);
+    assert.match(await page.textContent("#label-left"), /\D4 faces/);
+    assert.match(await page.textContent("#label-right"), /· 16 faces/);
+    assert.equal(await page.inputValue("#normals"), "smooth");
+    // What the page chose for this file it does not keep for one that brings its normals.
+    await choose(page, example);
+    await page.waitForFunction(() => document.querySelector("#normals").value === "keep");
+    await settled(page);
+  });
+
+  test("each file of a collection is refined, or refused in words", { skip: !existsSync(FIXTURES) && `needs ${FIXTURES}` }, async () => {
+    // What three.js says of files that are broken, or hold what it leaves out, is as it should be.
+    const page = await visit({ hash: "#levels=1", expected: [422], foreseen: /Missing min\/max|Unknown extension/ });
+    const names = await readdir(FIXTURES, { recursive: true });
+    const documents = names.filter((name) => /\.(glb|gltf)$/.test(name)).sort();
+    assert.ok(documents.length > 10);
+    for (const name of documents) {
+      const beside = name.includes("/") ? await neighbours(name) : [];
+      await page.evaluate(() => {
+        document.body.classList.remove("refined");
+        document.querySelector("#problem").hidden = true;
+      });
+      await choose(page, join(FIXTURES, name), ...beside);
+      await page.waitForFunction(
+        () =>
+          document.querySelector("#work").hidden &&
+          (document.body.classList.contains("refined") || !document.querySelector("#problem").hidden),
+      );
+      const refused = REFUSED.find(([file]) => name.endsWith(file));
+      if (refused) {
+        assert.match(await page.textContent("#problem-detail"), refused[1], name);
+        continue;
+      }
+      assert.ok(await page.isHidden("#problem"), `${name}: ${await page.textContent("#problem-detail")}`);
+      const [before, after] = await Promise.all(
+        ["#label-left", "#label-right"].map(async (id) => facesIn(await page.textContent(id))),
+      );
+      assert.ok(before > 0, name);
+      assert.equal(after, 4 * before, name);
+    }
+  });
+
+  test("an OBJ is converted, shown and told of", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    const text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nusemtl red\nf 1 2 3 4\nf 1 2 5\n";
+    await choose(page, { name: "a.obj", mimeType: "", buffer: Buffer.from(text) });
+    await settled(page);
+    assert.match(await page.textContent("#label-left"), /\D3 faces/);
+    assert.match(await page.textContent("#label-right"), /· 12 faces/);
+    assert.match(await page.textContent("#changes"), /materials dropped/);
+    // It came back smooth, though the file has no normals.
+    assert.equal(await page.inputValue("#normals"), "smooth");
+  });
+
+  test("a broken file gets words, and the model that was there stays", async () => {
+    const page = await visit({ hash: "#levels=1", expected: [422] });
+    await choose(page, example);
+    await settled(page);
+    const label = await page.textContent("#label-right");
+    await choose(page, { name: "broken.glb", mimeType: "", buffer: broken(part) });
+    await page.locator("#problem").waitFor();
+    assert.equal(await page.textContent("#problem-title"), "The glTF breaks its own promises");
+    assert.match(await page.textContent("#problem-detail"), /NaN/);
+    assert.match(await page.textContent("#problem-pointer"), /\/accessors\/\d/);
+    assert.equal(await page.textContent("#label-right"), label);
+    assert.equal(await page.textContent("#file-name"), "part.glb");
+    await choose(page, { name: "text.txt", mimeType: "", buffer: Buffer.from("hello") });
+    assert.match(await page.textContent("#problem-title"), /No mesh/);
+  });
+
+});
+
+/** A square with a texture of four colours, and its texture beside it. */
+async function square(kind) {
+  const name = `quarters-${kind}.ktx2`;
+  const texture = await readFile(new URL(`./textures/${name}`, import.meta.url));
+  const document = Buffer.from(JSON.stringify(textured(name)));
+  return [
+    { name: "square.gltf", mimeType: "", buffer: document },
+    { name, mimeType: "", buffer: texture },
+  ];
+}
+
+/** Each colour fills about a quarter of the shape, on either side. */
+async function assertQuarters(page) {
+  const shown = await picture(page);
+  for (const from of [0, shown.width / 2]) {
+    const parts = coloursOf(shown, from);
+    for (const colour of ["red", "green", "blue", "yellow"]) {
+      assert.ok(parts[colour] > 0.15 && parts[colour] < 0.35, JSON.stringify(parts));
+    }
+  }
+}
+
+/** The files in the folder of a document, but the document itself. */
+async function neighbours(name) {
+  const folder = dirname(join(FIXTURES, name));
+  const names = await readdir(folder);
+  return names.filter((other) => other !== basename(name)).map((other) => join(folder, other));
+}
+
+/** The number of faces that a label tells. */
+function facesIn(label) {
+  return Number(/([\d,]+) faces/.exec(label)[1].replaceAll(",", ""));
+}
+
+/** For each pixel of the part of a picture that begins at `from`: whether it is not background. */
+function silhouette({ width, height, data }, from, parts = 2) {
+  const background = data.readUInt32LE(4 * (width * (height - 1) + from));
+  const columns = width / parts;
+  return Uint8Array.from({ length: columns * height }, (_, i) => {
+    const pixel = width * Math.floor(i / columns) + from + (i % columns);
+    return Number(data.readUInt32LE(4 * pixel) !== background);
+  });
+}
+
+/** The mean column of what is not background. */
+function middleOfShape(shown, from, parts = 2) {
+  const columns = shown.width / parts;
+  let [sum, count] = [0, 0];
+  silhouette(shown, from, parts).forEach((inside, i) => {
+    sum += inside * (i % columns);
+    count += inside;
+  });
+  return sum / count;
+}
+
+/** What two silhouettes have in common, as a part of what they cover together. */
+function overlap(a, b) {
+  let [both, either] = [0, 0];
+  a.forEach((inside, i) => {
+    both += inside & b[i];
+    either += inside | b[i];
+  });
+  return both / either;
+}
+
+/** The parts of a shape that are of each colour, in the half of a picture that begins at `from`. */
+function coloursOf(shown, from) {
+  const { width, data } = shown;
+  const counts = { red: 0, green: 0, blue: 0, yellow: 0 };
+  let all = 0;
+  silhouette(shown, from).forEach((inside, i) => {
+    if (!inside) return;
+    all++;
+    const pixel = width * Math.floor(i / (width / 2)) + from + (i % (width / 2));
+    const [r, g, b] = data.subarray(4 * pixel, 4 * pixel + 3);
+    if (r > 2 * g && r > 2 * b) counts.red++;
+    if (g > 2 * r && g > 2 * b) counts.green++;
+    if (b > 2 * r && b > 2 * g) counts.blue++;
+    if (r > 2 * b && g > 2 * b) counts.yellow++;
+  });
+  return Object.fromEntries(Object.entries(counts).map(([colour, count]) => [colour, count / all]));
+}

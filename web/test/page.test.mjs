@@ -1,0 +1,253 @@
+/** The page against a real server, as a user meets it. */
+
+import assert from "node:assert/strict";
+import { describe, test } from "node:test";
+import axe from "axe-core";
+import { choose, columns, downloaded, launch, noBrowser, open, picture, settled } from "./support/browser.mjs";
+import { moving, positions, report } from "./support/glb.mjs";
+import { serve } from "./support/server.mjs";
+import { example, number, part, PART_FACES, same, studio } from "./support/studio.mjs";
+
+describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
+  const { visit, refined } = studio();
+
+  test("a dropped file is refined, to the exact number of faces", async () => {
+    const page = await visit();
+    await drop(page, part, "part.glb");
+    await settled(page);
+    assert.match(await page.textContent("#label-right"), new RegExp(`· ${number(16 * PART_FACES)} faces`));
+    assert.match(await page.textContent("#label-left"), new RegExp(`${number(PART_FACES)} faces`));
+    assert.match(await page.textContent("#statements"), /Nowhere more than .* from Loop/);
+    assert.equal(await page.textContent("#validation-badge"), "nothing new");
+    // Seams apart, as the service counts: 48 columns of 20 rows, closed.
+    const rows = await page.$$eval("#statistics tbody tr", (rows) =>
+      rows.map((row) => [...row.cells].map((cell) => cell.textContent)),
+    );
+    const [before, after] = [1, 2].map((side) => new Map(rows.map((row) => [row[0], row[side]])));
+    assert.equal(before.get("Vertices of the surface"), "960");
+    assert.equal(after.get("Vertices of the surface"), number(16 * 960));
+    assert.equal(before.get("Boundary edges"), "0");
+  });
+
+  test("what is downloaded is what the service answers, byte for byte", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, example);
+    await settled(page);
+    const plain = await downloaded(page, "#download");
+    assert.equal(plain.name, "part-refined.glb");
+    same(plain.bytes, await refined("levels=1"));
+    await page.check("#attributes");
+    await page.selectOption("#compress", "meshopt");
+    const full = await downloaded(page, "#download");
+    same(full.bytes, await refined("levels=1&diagnostics=full&compress=meshopt"));
+    const text = await downloaded(page, "#download-report");
+    assert.deepEqual(JSON.parse(text.bytes), report(plain.bytes));
+  });
+
+  test("each half of the wipe is that half of the whole picture", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, example);
+    await settled(page);
+    const halves = await picture(page);
+    await page.focus("#wipe");
+    await page.keyboard.press("Home");
+    const right = await picture(page);
+    await page.focus("#wipe");
+    await page.keyboard.press("End");
+    const left = await picture(page);
+    const middle = halves.width / 2;
+    same(columns(halves, 0, middle), columns(left, 0, middle));
+    same(columns(halves, middle, halves.width), columns(right, middle, halves.width));
+    assert.ok(!left.data.equals(right.data));
+  });
+
+  test("on a graphics card a room lights the model, and metal mirrors it", async () => {
+    const page = await visit({ hash: "#levels=1&layout=single", card: true, viewport: { width: 560, height: 400 } });
+    await choose(page, example);
+    await settled(page);
+    const shades = new Map();
+    const { data } = await picture(page);
+    for (let i = 0; i < data.length; i += 4) {
+      const shade = (data[i] + data[i + 1] + data[i + 2]) >> 4;
+      shades.set(shade, (shades.get(shade) ?? 0) + 1);
+    }
+    // Neither black, as metal is with nothing to mirror, nor without a dark side.
+    const often = [...shades].filter(([, times]) => times > 20).map(([shade]) => shade);
+    const [least, most] = [Math.min(...often), Math.max(...often)];
+    assert.ok(least > 12 && most > 40 && most - least > 18, `from ${least} to ${most} of 47`);
+  });
+
+  test("a heat map colours the result alone, and its legend ends at the report's number", async () => {
+    const page = await visit({ hash: "#levels=2&layout=side" });
+    await choose(page, example);
+    await settled(page);
+    const plain = await picture(page);
+    const middle = plain.width / 2;
+    const left = columns(plain, 0, middle);
+    const [ours, loop] = [await refined("levels=2"), await refined("levels=2&scheme=loop")];
+    const last = report(ours).levels.at(-1);
+    const wanted = {
+      distance: largestDistance(positions(ours), positions(loop)),
+      ratio: Math.max(last.proximity_ratio.max, last.vertex_rule?.proximity_ratio.max ?? 0),
+      gate: Math.max(last.gate.max, last.vertex_rule?.gate.max ?? 0),
+      dihedral: (last.normal_jump_max * 180) / Math.PI,
+    };
+    for (const [heat, end] of Object.entries(wanted)) {
+      await page.selectOption("#look", heat);
+      await page.locator("#legend").waitFor();
+      await page.locator("#work").waitFor({ state: "hidden" });
+      const shown = Number(await page.getAttribute("#legend", "data-end"));
+      assert.ok(Math.abs(shown - end) <= 1e-5 * end, `${heat}: ${shown} is not ${end}`);
+      const coloured = await picture(page);
+      same(columns(coloured, 0, middle), left);
+      const halves = [coloured, plain].map((shown) => columns(shown, middle, 2 * middle));
+      assert.ok(!halves[0].equals(halves[1]), `${heat} changes nothing`);
+    }
+  });
+
+  test("a link restores the settings", async () => {
+    const page = await visit();
+    await choose(page, example);
+    await settled(page);
+    await page.selectOption("#levels", "1");
+    await page.selectOption("#model", "loop");
+    await page.selectOption("#look", "zebra");
+    await page.click("summary:has-text('More')");
+    await page.selectOption("#crease", "angle");
+    await page.fill("#angle", "25");
+    await page.waitForFunction(() => location.hash.includes("angle=25"));
+    const hash = await page.evaluate(() => location.hash);
+    const other = await visit({ hash });
+    for (const [id, value] of [["levels", "1"], ["look", "zebra"], ["crease", "angle"], ["angle", "25"]]) {
+      assert.equal(await other.inputValue(`#${id}`), value);
+    }
+    await other.waitForFunction(() => document.querySelector("#model").value === "loop");
+  });
+
+  test("without a mouse: the example, the view, the wipe", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await page.focus("#example");
+    await page.keyboard.press("Enter");
+    await settled(page);
+    await page.focus("#canvas");
+    const before = await picture(page);
+    await page.focus("#canvas");
+    for (const key of ["ArrowRight", "ArrowUp", "-"]) await page.keyboard.press(key);
+    const turned = await picture(page);
+    assert.ok(!turned.data.equals(before.data));
+    await page.focus("#canvas");
+    await page.keyboard.press("f");
+    same((await picture(page)).data, before.data);
+    await page.focus("#canvas");
+    await page.keyboard.press("3");
+    assert.ok(await page.isChecked('input[value="overlay"]'));
+  });
+
+  for (const colorScheme of ["light", "dark"]) {
+    test(`axe finds no serious fault (${colorScheme})`, async () => {
+      const page = await visit({ colorScheme, hash: "#levels=1" });
+      assert.deepEqual(await faultsOf(page), []);
+      await choose(page, { ...example, buffer: moving(part, 1) });
+      await settled(page);
+      await unfold(page);
+      await page.selectOption("#look", "distance");
+      assert.deepEqual(await faultsOf(page), []);
+      await choose(page, { name: "a.txt", mimeType: "", buffer: Buffer.from("") });
+      await page.locator("#problem").waitFor();
+      assert.deepEqual(await faultsOf(page), []);
+    });
+  }
+
+  test("nothing overflows a phone of 360 pixels", async () => {
+    const page = await visit({ viewport: { width: 360, height: 640 }, hasTouch: true, hash: "#levels=1" });
+    const width = () => page.evaluate(() => document.scrollingElement.scrollWidth);
+    assert.equal(await width(), 360);
+    await choose(page, { ...example, name: `${"long ".repeat(20)}.glb`, buffer: moving(part, 1) });
+    await settled(page);
+    await unfold(page);
+    await page.selectOption("#look", "distance");
+    assert.equal(await width(), 360);
+    const outside = await page.evaluate(() =>
+      [...document.querySelectorAll("button, select, input, label, summary")]
+        .filter((element) => element.checkVisibility() && !element.closest(".hidden"))
+        .map((element) => [element.id || element.textContent, element.getBoundingClientRect()])
+        .filter(([, box]) => box.width && (box.left < 0 || box.right > 360))
+        .map(([name]) => name),
+    );
+    assert.deepEqual(outside, []);
+  });
+
+  test("upload after upload, the graphics card holds no more", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    const held = async () => {
+      await choose(page, example);
+      await settled(page);
+      await page.click("#frame");
+      await page.waitForFunction(() => document.querySelector("#canvas").dataset.held);
+      return page.getAttribute("#canvas", "data-held");
+    };
+    await held();
+    const first = await held();
+    for (let i = 0; i < Number(process.env.UPLOADS ?? 5); i++) await held();
+    assert.equal(await held(), first);
+  });
+});
+
+describe("the page without WebGL", { skip: noBrowser, timeout: 900_000 }, () => {
+  test("refines, certifies and downloads all the same", async () => {
+    const [server, browser] = await Promise.all([serve(), launch("--disable-3d-apis", "--disable-gpu")]);
+    try {
+      await server.ready();
+      const { page, faults } = await open(browser, `${server.address}/#levels=1`);
+      assert.ok(await page.isVisible("#no-webgl"));
+      await choose(page, example);
+      await settled(page);
+      assert.match(await page.textContent("#statements"), /Nowhere more than/);
+      const { bytes } = await downloaded(page, "#download");
+      assert.equal(report(bytes).totals.faces, 4 * PART_FACES);
+      assert.deepEqual(faults.filter((fault) => !/WebGL/.test(fault)), []);
+    } finally {
+      await browser.close();
+      await server.close();
+    }
+  });
+});
+
+/** A drop as the browser makes one: dragged over, then let go. */
+async function drop(page, bytes, name) {
+  const transfer = await page.evaluateHandle(
+    ([base64, name]) => {
+      const transfer = new DataTransfer();
+      const content = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+      transfer.items.add(new File([content], name));
+      return transfer;
+    },
+    [bytes.toString("base64"), name],
+  );
+  await page.dispatchEvent("#view", "dragover", { dataTransfer: transfer });
+  assert.ok(await page.isVisible(".veil"));
+  await page.dispatchEvent("#view", "drop", { dataTransfer: transfer });
+}
+
+async function unfold(page) {
+  await page.evaluate(() => document.querySelectorAll("details").forEach((part) => (part.open = true)));
+}
+
+async function faultsOf(page) {
+  // Evaluated by the driver: the page's policy lets no script of ours in.
+  const { violations } = await page.evaluate(`${axe.source}; axe.run({ resultTypes: ["violations"] })`);
+  return violations
+    .filter(({ impact }) => impact === "serious" || impact === "critical")
+    .map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html.slice(0, 120)).join(" | ")}`);
+}
+
+function largestDistance(ours, loop) {
+  let largest = 0;
+  for (const [number, points] of ours.entries()) {
+    for (let i = 0; i < points.length; i += 3) {
+      const apart = [0, 1, 2].map((k) => points[i + k] - loop[number][i + k]);
+      largest = Math.max(largest, Math.hypot(...apart));
+    }
+  }
+  return largest;
+}

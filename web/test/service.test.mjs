@@ -1,0 +1,196 @@
+/** The page and the service's limits: full, slow, locked, behind a proxy. */
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdtemp, readFile, rm } from "node:fs/promises";
+import { createServer, request } from "node:http";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, describe, test } from "node:test";
+import { choose, launch, noBrowser, open, settled } from "./support/browser.mjs";
+import { PNS, serve } from "./support/server.mjs";
+
+const part = await readFile(new URL("./part.glb", import.meta.url));
+// One worker, nobody may wait, and no job is short enough for the worker of its own.
+const ALONE = { PNS_QUEUE: "0", PNS_SHORT_SECONDS: "0.02", PNS_METRICS_PORT: "0" };
+const example = { name: "part.glb", mimeType: "", buffer: part };
+
+describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
+  let browser;
+  before(async () => (browser = await launch()));
+  after(() => browser?.close());
+
+  async function with_(settings, visit, options = {}) {
+    const server = await serve(settings);
+    try {
+      if (!settings.PNS_MODEL) await server.ready();
+      const opened = await open(browser, `${server.address}/${options.hash ?? ""}`, options);
+      await visit({ server, ...opened });
+      assert.deepEqual(opened.faults, []);
+      await opened.context.close();
+    } finally {
+      await server.close();
+    }
+  }
+
+  test("a slow job is seen to move, and cancel frees its worker", async (t) => {
+    // A model that acts at every level, and the most faces that the service takes: seconds of work,
+    // looked at four times a second, and cancelled as soon as it was seen to move. One worker, and
+    // nobody may wait: whoever is let in was let in because the worker is free.
+    await with_(ALONE, async ({ page, server }) => {
+      await page.evaluate(() => {
+        window.shares = new Set();
+        new MutationObserver(() => {
+          const { value } = document.querySelector("#work-bar");
+          const working = /^(?!Uploading|Downloading)/.test(document.querySelector("#work-text").textContent);
+          if (working && value > 0 && value < 1) window.shares.add(value);
+        }).observe(document.querySelector("#work"), { subtree: true, childList: true, attributes: true });
+      });
+      const job = page.waitForResponse((answer) => answer.request().method() === "POST");
+      await choose(page, example);
+      const { id } = await (await job).json();
+      await page.waitForFunction(() => window.shares.size > 1);
+      assert.equal(await server.metric("pns_jobs_running"), 1);
+      assert.equal((await slowJob(server)).status, 503);
+      const freed = page.waitForResponse((answer) => answer.request().method() === "DELETE");
+      const began = performance.now();
+      await page.click("#cancel");
+      assert.equal((await freed).status(), 204);
+      t.diagnostic(`the worker was free ${Math.round(performance.now() - began)} ms after the click`);
+      assert.equal(await server.metric("pns_jobs_running"), 0);
+      const state = await fetch(`${server.address}/jobs/${id}`);
+      assert.ok(state.status === 404 || (await state.json()).state === "cancelled");
+      assert.ok(await page.isHidden("#work"));
+      const next = await slowJob(server);
+      assert.equal(next.status, 202);
+      await fetch(`${server.address}${next.headers.get("Location")}`, { method: "DELETE" });
+      // The control mesh stays, and the worker takes the next job.
+      await page.selectOption("#levels", "1");
+      await settled(page);
+    }, { hash: "#levels=5&model=full" });
+  });
+
+  test("413: a body over the limit", async () => {
+    await with_({ PNS_BODY: "10kB" }, async ({ page }) => {
+      await page.locator("#limits", { hasText: "up to 10 kB" }).waitFor();
+      await choose(page, example);
+      await page.locator("#problem").waitFor();
+      assert.match(await page.textContent("#problem-title"), /over a limit/);
+      assert.match(await page.textContent("#problem-detail"), /10000/);
+    }, { expected: [413] });
+  });
+
+  test("levels over the limit are closed, and say why", async () => {
+    await with_({ PNS_FACES: "50000" }, async ({ page }) => {
+      await choose(page, example);
+      await settled(page);
+      // 1,920 faces are 30,720 after two levels, and 122,880 after three.
+      assert.equal(await page.inputValue("#levels"), "2");
+      assert.ok(await page.locator('#levels option[value="3"]').isDisabled());
+      assert.match(await page.textContent("#levels-note"), /50,000 faces/);
+    }, { hash: "#levels=4" });
+  });
+
+  test("503: a service without its model, in words, with another try", async () => {
+    await with_({ PNS_MODEL: "/nowhere.onnx" }, async ({ page }) => {
+      await choose(page, example);
+      await page.locator("#problem").waitFor();
+      assert.equal(await page.textContent("#problem-title"), "No model is loaded");
+      assert.ok(await page.isVisible("#problem-again"));
+      // Loop needs none.
+      await page.selectOption("#model", "loop");
+      await settled(page);
+    }, { expected: [503], hash: "#levels=1" });
+  });
+
+  test("503: a full queue, in words, with another try", async () => {
+    await with_(ALONE, async ({ page, server }) => {
+      const { id } = await (await slowJob(server)).json();
+      await choose(page, example);
+      await page.locator("#problem").waitFor();
+      assert.equal(await page.textContent("#problem-title"), "The service is busy");
+      assert.notEqual(await page.textContent("#problem-detail"), "");
+      await fetch(`${server.address}/jobs/${id}`, { method: "DELETE" });
+      await page.click("#problem-again");
+      await settled(page);
+      assert.ok(await page.isHidden("#problem"));
+    }, { expected: [503], hash: "#levels=3" });
+  });
+
+  for (const [path, settings] of [
+    ["/tools/pns/", {}],
+    ["/tools/pns", { PNS_PREFIX: "/tools/pns" }],
+  ]) {
+    test(`under a proxy's prefix nothing is missing (${path})`, async () => {
+      const server = await serve(settings);
+      await server.ready();
+      const proxy = createServer((incoming, outgoing) => {
+        if (!/^\/tools\/pns(\/|$)/.test(incoming.url)) return outgoing.writeHead(404).end();
+        const to = new URL(incoming.url.slice("/tools/pns".length) || "/", server.address);
+        const { method, headers } = incoming;
+        incoming.pipe(
+          request(to, { method, headers }, (answer) => {
+            outgoing.writeHead(answer.statusCode, answer.headers);
+            answer.pipe(outgoing);
+          }),
+        );
+      });
+      await new Promise((resolve) => proxy.listen(0, "127.0.0.1", resolve));
+      try {
+        const address = `http://127.0.0.1:${proxy.address().port}${path}#levels=1`;
+        const { page, faults, context } = await open(browser, address);
+        await page.click("#example");
+        await settled(page);
+        assert.match(await page.textContent("#label-right"), /1,488 faces/);
+        assert.deepEqual(faults, []);
+        await context.close();
+      } finally {
+        proxy.closeAllConnections();
+        proxy.close();
+        await server.close();
+      }
+    });
+  }
+
+  test("with keys on, the page asks for one and keeps it in memory alone", async () => {
+    const folder = await mkdtemp(join(tmpdir(), "pns-keys-"));
+    const script = `"${PNS}" key studio > "${folder}/keys.toml" 2> "${folder}/key"`;
+    execFileSync("sh", ["-c", script]);
+    const key = (await readFile(join(folder, "key"), "utf8")).trim();
+    try {
+      await with_({ PNS_KEYS_FILE: join(folder, "keys.toml") }, async ({ page }) => {
+        await choose(page, example);
+        await page.locator("#key-form").waitFor();
+        const sent = new Map();
+        page.on("request", async (request) => {
+          const kind = new URL(request.url()).pathname.replace(/^\/jobs\/[^/]+/, "/jobs/ID");
+          sent.set(`${request.method()} ${kind}`, (await request.allHeaders()).authorization);
+        });
+        await page.fill("#key", key);
+        await page.keyboard.press("Enter");
+        await settled(page);
+        for (const kind of ["POST /jobs", "GET /jobs/ID/events", "GET /jobs/ID/result", "DELETE /jobs/ID"]) {
+          assert.equal(sent.get(kind), `Bearer ${key}`, kind);
+        }
+        const stored = await page.evaluate(() =>
+          JSON.stringify([{ ...localStorage }, { ...sessionStorage }, document.cookie, location.href]),
+        );
+        assert.ok(!stored.includes(key));
+        await page.reload();
+        await choose(page, example);
+        await page.locator("#key-form").waitFor();
+      }, { expected: [401], hash: "#levels=1" });
+    } finally {
+      await rm(folder, { recursive: true });
+    }
+  });
+});
+
+/** Ask for seconds of work. */
+function slowJob(server) {
+  return fetch(`${server.address}/jobs?levels=5&model=full`, {
+    method: "POST",
+    headers: { "Content-Type": "model/gltf-binary" },
+    body: part,
+  });
+}
