@@ -1,9 +1,12 @@
 """Faces of a mesh that pass through another face, away from what the two share."""
 
+import math
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from numba import njit
 
-from pns_common.arrays import cross, dot
+from pns_common.fused.kernels.rings import cross, dot, row
 from pns_common.mesh import Mesh
 
 CELL = 1.5
@@ -15,7 +18,6 @@ MOST_CELLS = 1 << 20
 SLACK = 1e-12
 """Crossings this close to a border, as a share of a triangle, are no crossings."""
 
-Pairs = Int[np.ndarray, "N 2"]
 Corners = Float[np.ndarray, "N 3 3"]
 
 
@@ -26,24 +28,27 @@ def self_intersecting(mesh: Mesh) -> Bool[np.ndarray, " F"]:
     vertex only the edges opposite it are: the others meet the other face's plane there already, and
     where the two are almost in one plane rounding would decide.
     """
+    crossing = np.zeros(len(mesh.faces), dtype=np.bool_)
     corners = mesh.vertices[mesh.faces]
-    pairs = _near_pairs(corners)
-    pairs = pairs[~_share_an_edge(mesh.faces, pairs)]
-    met = _crosses(mesh, pairs)
-    crossing = np.zeros(len(mesh.faces), dtype=bool)
-    crossing[pairs[met].reshape(-1)] = True
+    lower, upper = corners.min(axis=1), corners.max(axis=1)
+    origin = lower.min(axis=0)
+    side = max(CELL * float((upper - lower).mean()), float(np.ptp(upper)) / MOST_CELLS, 1e-300)
+    keys, face = _entries(lower, upper, origin, side)
+    _mark(mesh.vertices, mesh.faces, lower, upper, origin, side, keys, face, crossing)
     return crossing
 
 
-def _near_pairs(corners: Corners) -> Pairs:
-    """Return all pairs of faces whose boxes overlap, each once."""
-    lower, upper = corners.min(axis=1), corners.max(axis=1)
-    side = max(CELL * float((upper - lower).mean()), float(np.ptp(upper)) / MOST_CELLS, 1e-300)
-    origin = lower.min(axis=0)
+def _entries(
+    lower: Float[np.ndarray, "F 3"],
+    upper: Float[np.ndarray, "F 3"],
+    origin: Float[np.ndarray, " 3"],
+    side: float,
+) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " N"]]:
+    """Return for each cell that a face's box touches the cell's key and the face, by key."""
     first = np.floor((lower - origin) / side).astype(np.int64)
     span = np.floor((upper - origin) / side).astype(np.int64) - first + 1
     copies = span.prod(axis=1)
-    face = np.repeat(np.arange(len(corners)), copies)
+    face = np.repeat(np.arange(len(lower)), copies)
     place = np.arange(len(face)) - np.repeat(np.cumsum(copies) - copies, copies)
     rows = span[face]
     steps = np.stack(
@@ -51,55 +56,85 @@ def _near_pairs(corners: Corners) -> Pairs:
         axis=1,
     )
     cell = first[face] + steps
-    key = (cell[:, 0] * MOST_CELLS + cell[:, 1]) * MOST_CELLS + cell[:, 2]
-    order = np.argsort(key, kind="stable")
-    key, face, cell = key[order], face[order], cell[order]
-    # Each entry meets those after it in its own cell.
-    end = np.searchsorted(key, key, side="right")
-    partners = end - np.arange(len(key)) - 1
-    entry = np.repeat(np.arange(len(key)), partners)
-    later = entry + 1 + np.arange(len(entry)) - np.repeat(np.cumsum(partners) - partners, partners)
-    a, b = face[entry], face[later]
-    low = np.maximum(lower[a], lower[b])
-    overlap = (low <= np.minimum(upper[a], upper[b])).all(axis=1)
-    # A pair that shares several cells counts in the one that holds its boxes' common corner.
-    here = np.floor((low - origin) / side).astype(np.int64) == cell[entry]
-    kept = overlap & here.all(axis=1)
-    return np.stack([a[kept], b[kept]], axis=1)
+    keys = (cell[:, 0] * MOST_CELLS + cell[:, 1]) * MOST_CELLS + cell[:, 2]
+    order = np.argsort(keys, kind="stable")
+    return keys[order], face[order]
 
 
-def _share_an_edge(faces: Int[np.ndarray, "F 3"], pairs: Pairs) -> Bool[np.ndarray, " N"]:
-    first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]
-    return (first[:, :, None] == second[:, None, :]).sum(axis=(1, 2)) > 1
+@njit(cache=True)
+def _mark(vertices, faces, lower, upper, origin, side, keys, face, crossing):
+    """Mark the faces that cross another one of a cell."""
+    for entry in range(len(keys)):
+        later = entry + 1
+        while later < len(keys) and keys[later] == keys[entry]:
+            i, j = face[entry], face[later]
+            later += 1
+            if crossing[i] and crossing[j]:
+                continue
+            if _boxes_meet_here(lower, upper, origin, side, i, j, keys[entry]) and _cross(
+                vertices, faces[i], faces[j]
+            ):
+                crossing[i] = crossing[j] = True
 
 
-def _crosses(mesh: Mesh, pairs: Pairs) -> Bool[np.ndarray, " N"]:
-    """Return whether an edge of either triangle passes through the other."""
-    met = np.zeros(len(pairs), dtype=bool)
-    for here, there in ((0, 1), (1, 0)):
-        face, edges = mesh.faces[pairs[:, here]], mesh.faces[pairs[:, there]]
-        triangle, ends = mesh.vertices[face], mesh.vertices[edges]
-        shared = (edges[:, :, None] == face[:, None, :]).any(axis=2)
-        for corner in range(3):
-            after = (corner + 1) % 3
-            apart = ~shared[:, corner] & ~shared[:, after]
-            met[apart] |= _pierces(ends[apart, corner], ends[apart, after], triangle[apart])
-    return met
+@njit(cache=True)
+def _boxes_meet_here(lower, upper, origin, side, i, j, key):
+    """Whether two boxes overlap and their common corner lies in this cell, as in one alone."""
+    here = 0
+    for axis in range(3):
+        low = max(lower[i, axis], lower[j, axis])
+        if low > min(upper[i, axis], upper[j, axis]):
+            return False
+        here = here * MOST_CELLS + math.floor((low - origin[axis]) / side)
+    return here == key
 
 
-def _pierces(
-    start: Float[np.ndarray, "N 3"], end: Float[np.ndarray, "N 3"], triangle: Corners
-) -> Bool[np.ndarray, " N"]:
-    """Return whether segments pass through triangles (Möller and Trumbore 1997)."""
-    a = triangle[:, 0]
-    u, v, along = triangle[:, 1] - a, triangle[:, 2] - a, end - start
+@njit(cache=True)
+def _cross(vertices, first, second):
+    """Whether an edge of either triangle passes through the other; never where they share two."""
+    shared = 0
+    for corner in first:
+        shared += _is_of(corner, second)
+    if shared > 1:
+        return False
+    return _edge_pierces(vertices, first, second) or _edge_pierces(vertices, second, first)
+
+
+@njit(cache=True)
+def _is_of(vertex, triangle):
+    return vertex == triangle[0] or vertex == triangle[1] or vertex == triangle[2]
+
+
+@njit(cache=True)
+def _edge_pierces(vertices, edges, triangle):
+    for corner in range(3):
+        start, end = edges[corner], edges[(corner + 1) % 3]
+        if (
+            not _is_of(start, triangle)
+            and not _is_of(end, triangle)
+            and _pierces(vertices, start, end, triangle)
+        ):
+            return True
+    return False
+
+
+@njit(cache=True)
+def _pierces(vertices, start, end, triangle):
+    """Whether a segment passes through a triangle (Möller and Trumbore 1997)."""
+    a, b, c = row(vertices, triangle[0]), row(vertices, triangle[1]), row(vertices, triangle[2])
+    p, q = row(vertices, start), row(vertices, end)
+    u, v, along, offset = _from_to(a, b), _from_to(a, c), _from_to(p, q), _from_to(a, p)
     side = cross(along, v)
     volume = dot(u, side)
-    flat = np.abs(volume) <= SLACK * np.sqrt(dot(u, u) * dot(v, v) * dot(along, along))
-    scale = 1 / np.where(flat, 1.0, volume)
-    offset = start - a
-    first = dot(offset, side) * scale
+    if abs(volume) <= SLACK * math.sqrt(dot(u, u) * dot(v, v) * dot(along, along)):
+        return False
     lifted = cross(offset, u)
-    second, reach = dot(along, lifted) * scale, dot(v, lifted) * scale
-    inside = (first > SLACK) & (second > SLACK) & (first + second < 1 - SLACK)
-    return ~flat & inside & (reach > SLACK) & (reach < 1 - SLACK)
+    first, second = dot(offset, side) / volume, dot(along, lifted) / volume
+    reach = dot(v, lifted) / volume
+    inside = first > SLACK and second > SLACK and first + second < 1 - SLACK
+    return inside and SLACK < reach < 1 - SLACK
+
+
+@njit(cache=True)
+def _from_to(p, q):
+    return q[0] - p[0], q[1] - p[1], q[2] - p[2]
