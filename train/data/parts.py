@@ -1,7 +1,7 @@
 """Closed parts as computer-aided design makes them, dense: grids on surfaces with exact formulas.
 
 Every vertex lies on its surface. Faces are anticlockwise from outside; lengths are in a unit in
-which a part is about 2 across.
+which a part is about 2 across. A fineness of n cuts every side of the grid into n.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,8 +16,9 @@ Profile = Float[np.ndarray, "N 2"]
 """Points (radius, height) of a lathe's profile, from the lower end of the axis to the upper."""
 
 
-def torus(around: int = 144, across: int = 56) -> Mesh:
+def torus(fineness: int = 1) -> Mesh:
     """Return a torus: a tube of radius 0.35 round a circle of radius 0.65."""
+    around, across = 144 * fineness, 56 * fineness
     u, v = _angles(around)[:, None], _angles(across)[None, :]
     radius = 0.65 + 0.35 * np.cos(v)
     height = np.broadcast_to(0.35 * np.sin(v), np.broadcast_shapes(u.shape, v.shape))
@@ -25,12 +26,13 @@ def torus(around: int = 144, across: int = 56) -> Mesh:
     return Mesh(points.reshape(-1, 3), closed_grid_faces(around, across))
 
 
-def pipe(around: int = 320, across: int = 24) -> Mesh:
+def pipe(fineness: int = 1) -> Mesh:
     """Return a trefoil of pipe, radius 0.13, round (sin t + 2 sin 2t, cos t − 2 cos 2t, −sin 3t)/3.
 
     The pipe's cross-section stands in the curve's Frenet frame; this curve has curvature
     everywhere.
     """
+    around, across = 320 * fineness, 24 * fineness
     t, v = _angles(around), _angles(across)[None, :, None]
     curve, first, second = (
         np.stack(parts, axis=-1) / 3
@@ -49,38 +51,39 @@ def pipe(around: int = 320, across: int = 24) -> Mesh:
     return Mesh(points.reshape(-1, 3), closed_grid_faces(around, across))
 
 
-def rounded_cylinder(around: int = 112) -> Mesh:
+def rounded_cylinder(fineness: int = 1, around: int = 112) -> Mesh:
     """Return a cylinder of radius 0.7 and height 1.4 whose rims are rounded with radius 0.2."""
     return lathe(
         _joined(
-            _line((0, -0.7), (0.5, -0.7), 12),
-            _arc((0.5, -0.5), 0.2, -90, 0, 10),
-            _line((0.7, -0.5), (0.7, 0.5), 20),
-            _arc((0.5, 0.5), 0.2, 0, 90, 10),
-            _line((0.5, 0.7), (0, 0.7), 12),
+            _line((0, -0.7), (0.5, -0.7), 12 * fineness),
+            _arc((0.5, -0.5), 0.2, -90, 0, 10 * fineness),
+            _line((0.7, -0.5), (0.7, 0.5), 20 * fineness),
+            _arc((0.5, 0.5), 0.2, 0, 90, 10 * fineness),
+            _line((0.5, 0.7), (0, 0.7), 12 * fineness),
         ),
-        around,
+        around * fineness,
     )
 
 
-def stepped_shaft() -> Mesh:
+def stepped_shaft(fineness: int = 1) -> Mesh:
     """Return a shaft with one step, filleted (concave) with radius 0.15, its rims rounded."""
     return lathe(
         _joined(
-            _line((0, -0.8), (0.58, -0.8), 12),
-            _arc((0.58, -0.68), 0.12, -90, 0, 8),
-            _line((0.7, -0.68), (0.7, -0.22), 10),
-            _arc((0.58, -0.22), 0.12, 0, 90, 8),
-            _line((0.58, -0.1), (0.5, -0.1), 3),
-            _arc((0.5, 0.05), 0.15, 270, 180, 8),
-            _line((0.35, 0.05), (0.35, 0.8), 16),
-            _arc((0.25, 0.8), 0.1, 0, 90, 8),
-            _line((0.25, 0.9), (0, 0.9), 6),
-        )
+            _line((0, -0.8), (0.58, -0.8), 12 * fineness),
+            _arc((0.58, -0.68), 0.12, -90, 0, 8 * fineness),
+            _line((0.7, -0.68), (0.7, -0.22), 10 * fineness),
+            _arc((0.58, -0.22), 0.12, 0, 90, 8 * fineness),
+            _line((0.58, -0.1), (0.5, -0.1), 3 * fineness),
+            _arc((0.5, 0.05), 0.15, 270, 180, 8 * fineness),
+            _line((0.35, 0.05), (0.35, 0.8), 16 * fineness),
+            _arc((0.25, 0.8), 0.1, 0, 90, 8 * fineness),
+            _line((0.25, 0.9), (0, 0.9), 6 * fineness),
+        ),
+        112 * fineness,
     )
 
 
-def pulley() -> Mesh:
+def pulley(fineness: int = 1) -> Mesh:
     """Return a disc of radius 0.9 with a round groove of radius 0.25; its edges are rounded.
 
     The groove's circle touches those of the rounded edges, radius 0.1, from outside.
@@ -90,31 +93,32 @@ def pulley() -> Mesh:
     contact = np.degrees(np.arctan2(height, reach))
     return lathe(
         _joined(
-            _line((0, -height - edge), (0.8, -height - edge), 16),
-            _arc((0.8, -height), edge, -90, contact, 12),
-            _arc((0.8 + reach, 0), groove, 180 + contact, 180 - contact, 16),
-            _arc((0.8, height), edge, -contact, 90, 12),
-            _line((0.8, height + edge), (0, height + edge), 16),
-        )
+            _line((0, -height - edge), (0.8, -height - edge), 16 * fineness),
+            _arc((0.8, -height), edge, -90, contact, 12 * fineness),
+            _arc((0.8 + reach, 0), groove, 180 + contact, 180 - contact, 16 * fineness),
+            _arc((0.8, height), edge, -contact, 90, 12 * fineness),
+            _line((0.8, height + edge), (0, height + edge), 16 * fineness),
+        ),
+        112 * fineness,
     )
 
 
-def knob(around: int = 160) -> Mesh:
+def knob(fineness: int = 1) -> Mesh:
     """Return a rounded cylinder whose radius is waved eight times round it by a tenth."""
-    part = rounded_cylinder(around)
+    part = rounded_cylinder(fineness, around=160)
     angle = np.arctan2(part.vertices[:, 1], part.vertices[:, 0])
     waved = part.vertices * np.array([1.0, 1.0, 0.8])
     waved[:, :2] *= (1 + 0.1 * np.cos(8 * angle))[:, None]
     return Mesh(waved, part.faces)
 
 
-def rounded_box() -> Mesh:
+def rounded_box(fineness: int = 1) -> Mesh:
     """Return a box of 2 × 1.4 × 0.8 whose edges and corners are rounded with radius 0.2.
 
     It is a grid on the cube, moved onto the sphere of radius 0.2 round the nearest point of the
     inner box; in the rounded zones the grid's lines stand at equal angles.
     """
-    radius, flat, bent = 0.2, 20, 7
+    radius, flat, bent = 0.2, 20 * fineness, 7 * fineness
     lattice, faces = cube_faces(flat + 2 * bent)
     inner = np.array([1.0, 0.7, 0.4]) - radius
     rim = radius * np.tan(np.linspace(0, np.pi / 4, bent + 1))
@@ -130,7 +134,7 @@ def rounded_box() -> Mesh:
     return Mesh(core + radius * outward, faces)
 
 
-def lathe(profile: Profile, around: int = 112) -> Mesh:
+def lathe(profile: Profile, around: int) -> Mesh:
     """Return the surface of revolution of a profile round the z axis, which it starts and ends on.
 
     Each end is one vertex.
@@ -215,7 +219,7 @@ def _joined(*pieces: Profile) -> Profile:
     return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
 
 
-CAD_PARTS: Mapping[str, Callable[[], Mesh]] = MappingProxyType(
+CAD_PARTS: Mapping[str, Callable[[int], Mesh]] = MappingProxyType(
     {
         "torus": torus,
         "pipe": pipe,
@@ -226,4 +230,4 @@ CAD_PARTS: Mapping[str, Callable[[], Mesh]] = MappingProxyType(
         "knob": knob,
     }
 )
-"""Every part, by its name in tables."""
+"""Every part of a fineness, by its name in tables."""

@@ -1,6 +1,6 @@
 """`python train/run.py reproduce`: progress with an estimate, and the page at the end."""
 
-import time
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -9,10 +9,11 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from pns_common.errors import PnsError
+from train.experiments.at_once import run_each
 from train.experiments.harness.experiment import Experiment
-from train.experiments.harness.laboratory import FULL, Laboratory, Scale
+from train.experiments.harness.laboratory import FULL, Laboratory, silent
 from train.experiments.harness.page import markdown_page
-from train.experiments.harness.reproduce import Record, read_record, reproduce
+from train.experiments.harness.reproduce import Record, read_record
 from train.experiments.registry import EXPERIMENTS
 
 
@@ -32,12 +33,17 @@ def reproduce_command(
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder to write.")] = Path("results"),
     force: Annotated[bool, typer.Option(help="Run finished experiments again.")] = False,
+    processes: Annotated[
+        int, typer.Option(min=1, help="Experiments at once; all cores if not given.")
+    ] = os.cpu_count() or 1,
 ) -> None:
     """Make the paper's tables and figures again, and those that it leaves open."""
     console = Console()
     try:
         chosen = _chosen(name, published, assets)
-        run_all(chosen, FULL, console, checkpoints, published, assets, output, force=force)
+        networks = output / "cache" / "networks"
+        laboratory = Laboratory(FULL, networks, checkpoints, published, silent, assets)
+        run_all(chosen, laboratory, output, console, processes, force=force)
     except PnsError as error:
         console.print(str(error), style="red", soft_wrap=True)
         raise typer.Exit(1) from error
@@ -45,35 +51,35 @@ def reproduce_command(
 
 def run_all(
     experiments: list[Experiment],
-    scale: Scale,
-    console: Console,
-    checkpoints: Path | None,
-    published: Path | None,
-    assets: Path | None,
+    laboratory: Laboratory,
     output: Path,
+    console: Console,
+    processes: int,
     *,
     force: bool,
 ) -> None:
-    """Run experiments one after another and write the page of everything found so far."""
+    """Run experiments, some at once, and write the page of everything found so far."""
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as progress:
         total = sum(experiment.seconds for experiment in experiments)
-        minutes = max(1, round(total / 60))
-        progress.print(f"{len(experiments)} experiments, up to about {minutes} min on two cores")
+        at_once = min(processes, len(experiments))
+        minutes = max(1, round(total / at_once / 60))
+        progress.print(f"{len(experiments)} experiments, up to about {minutes} min")
         overall = progress.add_task("all", total=total)
-        for experiment in experiments:
-            began = time.perf_counter()
-            step = progress.add_task(experiment.name, total=None)
+        steps: dict[str, TaskID] = {}
 
-            def on_progress(text: str, done: int, of: int, step: TaskID = step) -> None:
-                progress.update(step, description=text, completed=done, total=of)
+        def on_news(name: str, text: str, done: int, of: int) -> None:
+            if name not in steps:
+                steps[name] = progress.add_task(name)
+            progress.update(steps[name], description=text, completed=done, total=of)
 
-            networks = output / "cache" / "networks"
-            laboratory = Laboratory(scale, networks, checkpoints, published, on_progress, assets)
-            reproduce(experiment, laboratory, output, force=force)
-            progress.remove_task(step)
-            progress.advance(overall, experiment.seconds)
-            console.print(f"{experiment.name}: {time.perf_counter() - began:.1f} s")
+        # What takes longest starts first, so that all end at about one time.
+        queue = sorted(experiments, key=lambda experiment: -experiment.seconds)
+        for ended, seconds in run_each(queue, laboratory, output, at_once, on_news, force=force):
+            if ended.name in steps:
+                progress.remove_task(steps.pop(ended.name))
+            progress.advance(overall, ended.seconds)
+            console.print(f"{ended.name}: {seconds:.1f} s")
     page = output / "README.md"
     page.write_text(markdown_page(EXPERIMENTS, _records(output)), encoding="utf-8")
     console.print(f"{page} written", soft_wrap=True)

@@ -22,7 +22,7 @@ from train.surfaces.cad import Torus
 
 @pytest.fixture(scope="module", params=CAD_PARTS)
 def part(request):
-    mesh = CAD_PARTS[request.param]()
+    mesh = CAD_PARTS[request.param](1)
     return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 
 
@@ -31,6 +31,14 @@ def test_parts_are_closed_and_look_outwards(part):
     assert part.is_winding_consistent
     assert part.volume > 0
     assert part.body_count == 1
+
+
+@pytest.mark.parametrize("name", CAD_PARTS)
+def test_a_finer_part_has_the_grid_of_the_coarser_in_it(name):
+    coarse, fine = CAD_PARTS[name](1), CAD_PARTS[name](2)
+    assert len(fine.faces) > 3.9 * len(coarse.faces)
+    apart, _ = cKDTree(fine.vertices).query(coarse.vertices)
+    assert apart.max() < 1e-12
 
 
 def test_parts_are_dense_and_smooth(part):

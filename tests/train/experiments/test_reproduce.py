@@ -1,8 +1,10 @@
 """The harness: what is written, what is remembered, and what makes it run again."""
 
 from dataclasses import replace
+from io import StringIO
 
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 import train.experiments.command as command
@@ -13,6 +15,7 @@ from train.experiments.harness.laboratory import FULL, SMALL, Laboratory
 from train.experiments.harness.page import markdown_page
 from train.experiments.harness.reproduce import content_key, read_record, reproduce
 from train.experiments.harness.style import panels
+from train.experiments.registry import EXPERIMENTS
 from train.models.checkpoint import Checkpoint, save_checkpoint
 from train.models.from_recipe import initial_network
 from train.models.recipes import paper
@@ -181,3 +184,17 @@ def test_the_command_refuses_what_it_cannot_do(tmp_path, monkeypatch, counting, 
     everything = runner.invoke(train.run.app, ["reproduce", *output])
     assert everything.exit_code == 0
     assert counting.runs == 1
+
+
+@pytest.mark.spawning
+def test_experiments_that_run_at_once_find_the_same(tmp_path):
+    chosen = [EXPERIMENTS[name] for name in ("cross-section", "saddle")]
+    pages = []
+    for processes in (1, 2):
+        output = tmp_path / str(processes)
+        lab = laboratory(output)
+        console = Console(file=StringIO())
+        command.run_all(chosen, lab, output, console, processes, force=False)
+        pages.append({path.name: path.read_bytes() for path in output.glob("*.*")})
+    assert pages[0] == pages[1]
+    assert {"cross_section.csv", "saddle.csv", "README.md"} <= set(pages[0])

@@ -15,7 +15,7 @@ from pns_common.topology import EdgeClass, build_topology
 from train.data.dense_meshes import asset_files, read_mesh
 from train.data.primitives import PRIMITIVES
 from train.experiments.beyond.models import model_files
-from train.experiments.harness.contenders import LOOP, contenders
+from train.experiments.harness.contenders import LOOP, OURS, contenders
 from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
 from train.experiments.harness.laboratory import Laboratory
 from train.metrics.fairness import volume
@@ -167,10 +167,15 @@ def run(laboratory: Laboratory) -> Outcome:
     return Outcome(
         (
             Table("whole_meshes", "All meshes", columns, totals),
-            Table("whole_meshes_each", "Each mesh", COLUMNS, tuple(map(astuple, rows))),
+            Table("whole_meshes_ours", "Each mesh, PNS", COLUMNS, _those_of(OURS, rows)),
+            Table("whole_meshes_each", "Every method", COLUMNS, tuple(map(astuple, rows))),
         ),
         notes=(NOTE,),
     )
+
+
+def _those_of(method: str, rows: list[Row]) -> tuple[tuple[Cell, ...], ...]:
+    return tuple(astuple(row) for row in rows if row.method == method)
 
 
 def _total(method: str, rows: list[Row]) -> tuple[Cell, ...]:

@@ -21,6 +21,10 @@ OnProgress = Callable[[str, int, int], None]
 """Called with what is being done, how many steps of it are done, and of how many."""
 
 
+def silent(_text: str, _done: int, _of: int) -> None:
+    """Tell nobody."""
+
+
 @dataclass(frozen=True, slots=True)
 class Scale:
     """How much of an experiment is run.

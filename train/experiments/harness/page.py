@@ -23,7 +23,7 @@ Every table is a CSV file with all digits beside this page, every figure a PNG a
 """
 
 
-LONGEST = 60
+LONGEST = 90
 """Rows of the longest table that the page shows; of longer ones it names the file."""
 
 
