@@ -23,6 +23,7 @@ from .admission import DrainingError
 from .answer import FileAnswer
 from .answer_types import answer_type
 from .clients import client_of
+from .connection.crowd import LISTENS
 from .intake import Wanted, owner_of, taken_in
 from .job_book import Entry, NotDoneError
 from .parameters import Parameters
@@ -56,6 +57,8 @@ def router(service: Service) -> APIRouter:
     @routes.get("/jobs/{job_id}/events", response_class=StreamingResponse, **documentation.EVENTS)
     async def read_job_events(request: Request, job_id: str) -> Response:
         entry = _entry(service, request, job_id)
+        # Whoever follows a job can ask again: where connections run short, it gives way.
+        request.scope.get("extensions", {}).get(LISTENS, bool)()
         return StreamingResponse(
             _events(service, entry.job),
             media_type="text/event-stream",

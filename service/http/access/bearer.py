@@ -15,7 +15,7 @@ from ...errors import BusyError, ServiceError, UnauthorizedError
 from .. import problems
 from ..addresses import site
 from ..clients import Client
-from .keys import NAME, PREFIX, Entry, hash_of, matches
+from .keys import NAME, PREFIX, Entry, Keyring
 
 log = logging.getLogger("pns.service")
 
@@ -43,10 +43,9 @@ class Bearer:
 
     def __init__(self, app: ASGIApp, keys: dict[str, Entry]) -> None:
         self.app = app
-        self._keys = keys
+        self._keys = Keyring(keys)
         # Of keys that were right, by their plain hash: scrypt is run once for each.
         self._known: dict[bytes, Entry] = {}
-        self._nobody = hash_of("")
         self._one = asyncio.Semaphore(1)
         self._waiting = 0
         self._wrong: Counter[str] = Counter()
@@ -82,16 +81,13 @@ class Bearer:
             return self._known[plain]
         address = site(scope["client"][0] if scope.get("client") else "")
         self._check_patience(address)
-        entry = self._keys.get(name)
         self._waiting += 1
         try:
             async with self._one:
-                # Of a name that is not there, too: how long it takes tells nothing.
-                hashed = self._nobody if entry is None else entry.hash
-                right = await asyncio.to_thread(matches, key, hashed)
+                entry = await asyncio.to_thread(self._keys.find, key, name)
         finally:
             self._waiting -= 1
-        if entry is None or not right:
+        if entry is None:
             self._wrong[address] += 1
             raise UnauthorizedError("the key is not known")
         self._known[plain] = entry

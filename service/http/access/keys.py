@@ -47,8 +47,7 @@ def new_key(name: str) -> str:
 def hash_of(key: str, *, salt: bytes | None = None) -> str:
     """What a file keeps of a key: scrypt's parameters, the salt, and the digest."""
     salt = secrets.token_bytes(16) if salt is None else salt
-    digest = _scrypt(key, salt, LOG_N, R, P)
-    return f"scrypt${LOG_N}${R}${P}${_encode(salt)}${_encode(digest)}"
+    return _written(LOG_N, R, P, salt, _scrypt(key, salt, LOG_N, R, P))
 
 
 def matches(key: str, hashed: str) -> bool:
@@ -56,9 +55,30 @@ def matches(key: str, hashed: str) -> bool:
     fields = _HASH.fullmatch(hashed)
     if fields is None:
         return False
-    log_n, r, p = (int(text) for text in fields.group(1, 2, 3))
     salt, digest = (_decode(text) for text in fields.group(4, 5))
-    return hmac.compare_digest(_scrypt(key, salt, log_n, r, p), digest)
+    return hmac.compare_digest(_scrypt(key, salt, *_cost(hashed)), digest)
+
+
+class Keyring:
+    """The entries of a file, and the check of a key, which costs the same whoever it names.
+
+    Entries may be hashed more or less strongly than others. So that the time of a check tells
+    neither which names there are nor how theirs are hashed, scrypt is run once with each choice of
+    parameters in the file: of the named entry, or of nobody.
+    """
+
+    def __init__(self, entries: dict[str, Entry]) -> None:
+        self._entries = entries
+        self._nobody = {
+            _cost(entry.hash): _hash_of_nobody(entry.hash) for entry in entries.values()
+        }
+
+    def find(self, key: str, name: str) -> Entry | None:
+        """The entry of that name, where the key is its."""
+        entry = self._entries.get(name)
+        own = {} if entry is None else {_cost(entry.hash): entry.hash}
+        right = [matches(key, hashed) for hashed in (self._nobody | own).values()]
+        return entry if any(right) else None
 
 
 def read_keys(path: Path) -> dict[str, Entry]:
@@ -96,6 +116,21 @@ def toml_entry(entry: Entry) -> str:
 
 
 _ENTRIES = TypeAdapter(list[Entry])
+
+
+def _cost(hashed: str) -> tuple[int, int, int]:
+    """scrypt's log n, r and p of a hash."""
+    log_n, r, p = map(int, hashed.split("$")[1:4])
+    return log_n, r, p
+
+
+def _hash_of_nobody(hashed: str) -> str:
+    """A hash that costs as much and is no key's."""
+    return _written(*_cost(hashed), secrets.token_bytes(16), secrets.token_bytes(32))
+
+
+def _written(log_n: int, r: int, p: int, salt: bytes, digest: bytes) -> str:
+    return f"scrypt${log_n}${r}${p}${_encode(salt)}${_encode(digest)}"
 
 
 def _scrypt(key: str, salt: bytes, log_n: int, r: int, p: int) -> bytes:

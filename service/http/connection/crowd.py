@@ -8,6 +8,10 @@ from typing import Protocol
 
 from ..addresses import Network, is_named, site
 
+LISTENS = "pns.listens"
+"""Name of the ASGI extension by which an application says that its answer is a stream that the
+client may ask for again: a function to call before it begins."""
+
 
 class Guest(Protocol):
     """A connection, as the crowd sees it."""
@@ -16,8 +20,8 @@ class Guest(Protocol):
         """Whether its client has really said nothing: not even what is yet unread."""
         ...
 
-    def upload_rate(self) -> float:
-        """Bytes a second of the body that it sends; infinite while that is too early to tell."""
+    def rate(self) -> float:
+        """Bytes a second that its client sends or takes; infinite while it is early to tell."""
         ...
 
     def give_way(self) -> None:
@@ -29,8 +33,9 @@ class Crowd:
     """The open connections, by address.
 
     Proxies are exempt from the share of an address: many clients come through one. Where all places
-    are taken, one gives way to a new connection, so that neither idle nor trickling clients lock
-    anybody out: the oldest whose client has asked for nothing yet, else the slowest upload.
+    are taken, one gives way to a new connection, so that neither idle nor slow clients lock anybody
+    out: the oldest whose client has asked for nothing yet, else the slowest of those that the
+    service waits for, and of equally slow ones the oldest of the address with the most connections.
     """
 
     def __init__(self, most: int, most_of_address: int, proxies: tuple[Network, ...] = ()) -> None:
@@ -42,7 +47,8 @@ class Crowd:
         self._count = 0
         # In the order in which they began to wait.
         self._waiting: dict[Guest, None] = {}
-        self._sending: dict[Guest, None] = {}
+        # With the name of the address.
+        self._slow: dict[Guest, str] = {}
 
     def __len__(self) -> int:
         return self._count
@@ -71,23 +77,35 @@ class Crowd:
 
     def wait(self, guest: Guest) -> None:
         """Note that a connection asks for nothing."""
+        self._slow.pop(guest, None)
         self._waiting.setdefault(guest)
 
-    def send(self, guest: Guest) -> None:
-        """Note that a connection has asked, and sends a body."""
+    def attend(self, guest: Guest, address: str) -> None:
+        """Note that a connection has asked, and that the service waits for its client."""
         self._waiting.pop(guest, None)
-        self._sending.setdefault(guest)
+        if guest not in self._slow:
+            self._slow[guest] = site(address)
 
     def work(self, guest: Guest) -> None:
         """Note that a connection has asked, and waits for the service."""
         self._waiting.pop(guest, None)
-        self._sending.pop(guest, None)
+        self._slow.pop(guest, None)
 
     def _make_room(self) -> bool:
-        idle = next((guest for guest in self._waiting if guest.is_idle()), None)
-        guest = idle or min(self._sending, key=lambda sender: sender.upload_rate(), default=None)
-        if guest is None or (guest is not idle and guest.upload_rate() == inf):
+        guest = next((guest for guest in self._waiting if guest.is_idle()), None)
+        guest = guest or self._slowest()
+        if guest is None:
             return False
         self.work(guest)
         guest.give_way()
         return True
+
+    def _slowest(self) -> Guest | None:
+        """The slowest, where there is one whose rate can be told."""
+        rates = {guest: guest.rate() for guest in self._slow}
+        told = [guest for guest, rate in rates.items() if rate < inf]
+        return min(
+            told,
+            key=lambda guest: (rates[guest], -self._of_address[self._slow[guest]]),
+            default=None,
+        )

@@ -7,6 +7,7 @@ from typing import Any
 import h11
 
 from .strict import check_lines, check_request, is_chunked
+from .target import origin_form
 
 # A body of n bytes may come in this many chunks, and one more for each so many bytes: each costs
 # the event loop as much as a kilobyte does, however small it is.
@@ -67,6 +68,7 @@ class Parser(h11.Connection):
             taken = len(waiting) - len(self.trailing_data[0])
             check_request(event, waiting[:taken], self._longest_head)
             self._chunked = is_chunked(event)
+            event = origin_form(event)
         elif isinstance(event, h11.EndOfMessage):
             if self._chunked:
                 check_lines(waiting[: len(waiting) - len(self.trailing_data[0])])

@@ -16,7 +16,7 @@ from uvicorn.protocols.http.flow_control import CLOSE_HEADER, FlowControl
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
-from .crowd import Crowd
+from .crowd import LISTENS, Crowd
 from .outlet import Outlet
 from .pace import Pace
 from .parser import FLOODED, Parser
@@ -33,7 +33,7 @@ HEAD_BYTES = 16 * 1024
 READ_BYTES = 64 * 1024
 # What is parsed in one go; a request of ordinary clients is two or three events.
 EVENTS_A_TURN = 32
-# An upload's rate is not judged before.
+# Neither an upload's rate nor an answer's is judged before.
 RATE_SECONDS = 2.0
 
 
@@ -100,6 +100,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         self._address: str | None = None
         self._head_timer: asyncio.TimerHandle | None = None
         self._end_timer: asyncio.TimerHandle | None = None
+        self._listens = False
         self._lingering = False
         self._linger_left = 0
         self._asked_at = self.loop.time()
@@ -188,9 +189,14 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
             self.flow.resume_reading()
 
     def _say_to_crowd(self) -> None:
-        crowd = self._shared.crowd
-        if self.conn.their_state is h11.SEND_BODY:
-            crowd.send(self)
+        if self._address is None:
+            return
+        crowd, state = self._shared.crowd, self.conn.their_state
+        goes = self.transport.is_closing()
+        if self._taking.waits or self._listens or (state is h11.SEND_BODY and not goes):
+            crowd.attend(self, self._address)
+        elif state is h11.IDLE and not goes:
+            crowd.wait(self)
         else:
             crowd.work(self)
 
@@ -202,14 +208,28 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         readable.register(self.transport.get_extra_info("socket").fileno(), select.POLLIN)
         return not readable.poll(0)
 
-    def upload_rate(self) -> float:
-        """Bytes a second of its body, once there is time enough to tell."""
+    def rate(self) -> float:
+        """Bytes a second of its body or its answer; of a stream of events none that count."""
+        if self._listens:
+            return 0.0
+        if self._taking.waits:
+            return self._taking.rate(RATE_SECONDS)
         seconds = self.loop.time() - self._asked_at
         return self.conn.body_bytes / seconds if seconds > RATE_SECONDS else inf
 
     def give_way(self) -> None:
-        """End, for a new connection."""
-        self._abort()
+        """End, for a new connection; a stream of events as if that were all."""
+        if self._listens and self.conn.our_state is h11.SEND_BODY and not self._taking.waits:
+            self.cycle.disconnected = True
+            self.cycle.message_event.set()
+            self.transport.write(self.conn.send(h11.EndOfMessage()) or b"")
+            self.transport.close()
+        else:
+            self._abort()
+
+    def _listen(self) -> None:
+        self._listens = True
+        self._say_to_crowd()
 
     def send_400_response(self, msg: str) -> None:
         """Refuse what is no HTTP; a body that stops being HTTP, too, where nothing is said yet."""
@@ -257,7 +277,9 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         parser = self.conn
         self._taking.begin()
         self._asked_at = self.loop.time()
-        scope.setdefault("extensions", {})[FLOODED] = lambda: parser.flooded
+        extensions = scope.setdefault("extensions", {})
+        extensions[FLOODED] = lambda: parser.flooded
+        extensions[LISTENS] = self._listen
 
         async def send_and_close(message: Message) -> None:
             if message["type"] == "http.response.start" and parser.their_state is h11.SEND_BODY:
@@ -271,22 +293,24 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
 
     def on_response_complete(self) -> None:
         """Rest, or go on with what has come meanwhile."""
+        self._listens = False
         super().on_response_complete()
         if self.transport.is_closing():
             return
-        if self.conn.their_state is h11.IDLE:
-            self._shared.crowd.wait(self)
-            if self.conn.trailing_data[0]:
-                self._await_head()
+        self._say_to_crowd()
+        if self.conn.their_state is h11.IDLE and self.conn.trailing_data[0]:
+            self._await_head()
 
     def pause_writing(self) -> None:
         """The client has more to take than it takes: its clock runs."""
         super().pause_writing()
         self._taking.fall_behind()
+        self._say_to_crowd()
 
     def resume_writing(self) -> None:
         """The client has caught up: its clock stands."""
         self._taking.catch_up()
+        self._say_to_crowd()
         if self.transport.is_closing():
             self._abort_after(self._shared.bounds.answer.idle)
         super().resume_writing()
@@ -297,7 +321,8 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         """Close; where the client may still be sending, half, until it has heard."""
         self._forget_head()
         self._unset_keepalive_if_required()
-        self._shared.crowd.work(self)
+        self._listens = False
+        self._say_to_crowd()
         real, bounds = self._outlet.real, self._shared.bounds
         if self._is_heard():
             real.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
+from math import inf
 
 from .outlet import Outlet
 from .pace import Pace
@@ -37,6 +38,11 @@ class Taking:
         """Whether the client has more to take than it takes."""
         return self._timer is not None
 
+    def rate(self, early: float) -> float:
+        """Bytes a second of those that it was waited for; infinite before `early` seconds."""
+        moved, waited = self._progress(self._clock.time())
+        return moved / waited if waited > early else inf
+
     def begin(self) -> None:
         """Another answer begins."""
         self._waited, self._from = 0.0, self._outlet.taken
@@ -63,9 +69,13 @@ class Taking:
         now, taken = self._clock.time(), self._outlet.taken
         if taken > self._moved[0]:
             self._moved = (taken, now)
-        moved, waited = taken - self._from, self._waited + now - self._full_since
+        moved, waited = self._progress(now)
         if now - self._moved[1] >= self._pace.idle or self._pace.patience(moved, waited) <= 0:
             log.warning("an answer is cut off: %s", self._pace.excuse(moved, waited))
             self._late()
         else:
             self._timer = self._clock.call_later(TICK_SECONDS, self._look)
+
+    def _progress(self, now: float) -> tuple[int, float]:
+        """Bytes that this client took of its answer, and the seconds that it was waited for."""
+        return self._outlet.taken - self._from, self._waited + now - self._full_since

@@ -1,5 +1,7 @@
 """Who asks: addresses behind proxies, and keys."""
 
+import base64
+import hashlib
 import http.client
 import logging
 from contextlib import closing
@@ -113,8 +115,6 @@ def test_a_key_is_kept_as_a_salted_hash():
 
 def test_the_hash_is_scrypts():
     """RFC 7914, the third test vector, cut to our length: another implementation agrees."""
-    import hashlib
-
     digest = hashlib.scrypt(
         b"pleaseletmein", salt=b"SodiumChloride", n=16384, r=8, p=1, maxmem=2**26, dklen=64
     )
@@ -167,6 +167,20 @@ def test_what_costs_something_needs_a_key(client):
         assert client.get(path).status_code == 200, path
 
 
+def test_a_target_with_a_host_needs_a_key_as_its_path_does(keys_file):
+    with (
+        served(workers=1, keys_file=keys_file) as where,
+        closing(http.client.HTTPConnection(*where, timeout=30)) as connection,
+    ):
+        statuses = []
+        for target in ("http://b/healthz", "http://b/nothing", "http://healthz/jobs/x"):
+            connection.request("GET", target)
+            answer = connection.getresponse()
+            answer.read()
+            statuses.append(answer.status)
+    assert statuses == [200, 401, 401]
+
+
 @pytest.mark.parametrize("scheme", ["Bearer", "bearer", "BEARER "])
 def test_the_bearer_of_a_key_is_served(client, scheme):
     headers = GLB | {"Authorization": f"{scheme} {KEY}"}
@@ -209,6 +223,36 @@ def test_guessing_ends_and_keys_that_were_right_stay_right(keys_file):
     assert (refused.status_code, refused.json()["code"]) == (429, "too-many-wrong-keys")
     assert int(refused.headers["retry-after"]) >= 1
     assert client.get("/healthz", headers=bearer(KEY)).status_code == 200
+
+
+def hashed_by(key, log_n):
+    digest = hashlib.scrypt(key.encode(), salt=b"s" * 16, n=2**log_n, r=8, p=1, dklen=32)
+    texts = (base64.urlsafe_b64encode(data).decode().rstrip("=") for data in (b"s" * 16, digest))
+    return f"scrypt${log_n}$8$1$" + "$".join(texts)
+
+
+def test_a_check_costs_the_same_whoever_is_named_and_however_it_is_hashed(tmp_path, monkeypatch):
+    entries = [
+        Entry(name="studio", hash=hashed_by(KEY, 4)),
+        Entry(name="farm", hash=hashed_by(OTHER, 6)),
+        Entry(name="mill", hash=hashed_by("another", 6)),
+    ]
+    path = tmp_path / "keys.toml"
+    path.write_text("\n\n".join(map(written, entries)))
+    settings = Settings(workers=1, keys_file=path)
+    client = TestClient(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up))
+    scrypt, costs = hashlib.scrypt, []
+
+    def counted(*arguments, n, r, p, **others):
+        costs.append((n, r, p))
+        return scrypt(*arguments, n=n, r=r, p=p, **others)
+
+    monkeypatch.setattr(hashlib, "scrypt", counted)
+    wrong = [f"pns_{name}_" + "w" * 43 for name in ("studio", "farm", "mill", "nobody")]
+    for key, status in [*((key, 401) for key in wrong), (KEY, 200), (OTHER, 200)]:
+        assert client.get("/healthz", headers=bearer(key)).status_code == status
+        assert costs == [(2**4, 8, 1), (2**6, 8, 1)]
+        costs.clear()
 
 
 def test_the_routes_see_the_name_of_the_key(client, caplog):

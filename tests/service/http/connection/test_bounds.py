@@ -288,6 +288,19 @@ def test_a_client_that_only_sends_and_never_reads_is_let_go(hasty):
         assert connection.recv(2**16).startswith(b"HTTP/1.1 200 ")
 
 
+def served_late(where, opened):
+    """The first answer of a connection that found a place, where others came before it."""
+    for _ in range(PATIENCE * 20):
+        late = opened.enter_context(connect(where))
+        late.sendall(head("GET", "/healthz", "Connection: close\r\n"))
+        answer = received(late)
+        # Too early to tell which is the slowest.
+        if not answer.startswith(b"HTTP/1.1 503 "):
+            return answer
+        time.sleep(0.05)
+    pytest.fail("nobody gives way")
+
+
 def test_trickling_uploads_give_way_to_those_that_ask(monkeypatch):
     monkeypatch.setattr(protocol, "RATE_SECONDS", 0.2)
     with served(workers=1, connections=4) as where, ExitStack() as opened:
@@ -295,12 +308,34 @@ def test_trickling_uploads_give_way_to_those_that_ask(monkeypatch):
         trickling = [opened.enter_context(connect(where)) for _ in range(4)]
         for connection in trickling:
             connection.sendall(begun)
-        for _ in range(PATIENCE * 20):
-            late = opened.enter_context(connect(where))
-            late.sendall(head("GET", "/healthz", "Connection: close\r\n"))
-            answer = received(late)
-            # Too early to tell which is the slowest.
-            if not answer.startswith(b"HTTP/1.1 503 "):
-                break
-            time.sleep(0.05)
-        assert answer.startswith(b"HTTP/1.1 200 ")
+        assert served_late(where, opened).startswith(b"HTTP/1.1 200 ")
+
+
+def test_slow_readers_give_way_to_those_that_ask(monkeypatch):
+    monkeypatch.setattr(protocol, "RATE_SECONDS", 0.2)
+    body = f"large {16 * MIB}".encode()
+    asks = head("POST", "/subdivide", f"Content-Length: {len(body)}\r\n") + body
+    with served(workers=1, connections=4) as where, ExitStack() as opened:
+        for _ in range(4):
+            reader = opened.enter_context(connect(where))
+            reader.sendall(asks)
+            assert reader.recv(12) == b"HTTP/1.1 200"
+        assert served_late(where, opened).startswith(b"HTTP/1.1 200 ")
+
+
+def test_streams_of_events_give_way_as_if_they_had_ended(tmp_path):
+    """Whoever follows a job asks again; the job goes on."""
+    with served(workers=1, connections=4) as where, ExitStack() as opened:
+        body = f"steps {tmp_path}".encode()
+        first = opened.enter_context(connect(where))
+        first.sendall(head("POST", "/jobs", f"Content-Length: {len(body)}\r\n") + body)
+        job = json.loads(first.recv(2**16).partition(b"\r\n\r\n")[2])["id"]
+        followers = [first, *(opened.enter_context(connect(where)) for _ in range(3))]
+        for connection in followers:
+            connection.sendall(head("GET", f"/jobs/{job}/events"))
+            assert connection.recv(12) == b"HTTP/1.1 200"
+        assert served_late(where, opened).startswith(b"HTTP/1.1 200 ")
+        assert received(followers[0]).endswith(b"0\r\n\r\n")
+        asks = opened.enter_context(connect(where))
+        asks.sendall(head("GET", f"/jobs/{job}", "Connection: close\r\n"))
+        assert problem(received(asks))["state"] == "running"

@@ -89,6 +89,29 @@ def test_a_refusal_keeps_the_status_that_the_parser_gave():
     assert parser.status_hint == 431
 
 
+@pytest.mark.parametrize(
+    ("target", "path", "host"),
+    [
+        (b"/limits?x=http://b/", b"/limits?x=http://b/", b"a"),
+        (b"*", b"*", b"a"),
+        (b"http://b/limits?x=1", b"/limits?x=1", b"b"),
+        (b"HTTPS://b.example:8000/", b"/", b"b.example:8000"),
+        (b"http://[2001:db8::1]:80/limits", b"/limits", b"[2001:db8::1]:80"),
+        (b"http://b", b"/", b"b"),
+        (b"http://b?x=1", b"/?x=1", b"b"),
+        (b"http://b//c/d", b"//c/d", b"b"),
+        (b"ftp://b/limits", b"ftp://b/limits", b"a"),
+    ],
+)
+def test_a_target_with_a_host_is_its_path_and_its_host_is_the_requests(target, path, host):
+    parser = Parser(2**14)
+    parser.receive_data(b"GET %b HTTP/1.1\r\nX: y\r\nHost: a\r\n\r\n" % target)
+    request, _ = events(parser, 10)
+    assert request.target == path
+    assert [value for name, value in request.headers if name == b"host"] == [host]
+    assert (b"x", b"y") in list(request.headers)
+
+
 def test_each_turn_of_the_loop_takes_one_step():
     async def run():
         turns, order = Turns(), []
@@ -156,14 +179,14 @@ class Guest:
     """A connection as the crowd sees it."""
 
     idle: bool = True
-    rate: float = inf
+    speed: float = inf
     ended: bool = False
 
     def is_idle(self):
         return self.idle
 
-    def upload_rate(self):
-        return self.rate
+    def rate(self):
+        return self.speed
 
     def give_way(self):
         self.ended = True
@@ -205,13 +228,33 @@ def test_who_has_said_something_that_is_not_read_yet_does_not():
     assert (first.ended, second.ended) == (False, True)
 
 
-def test_where_nobody_waits_the_slowest_upload_gives_way():
+def test_where_nobody_waits_the_slowest_gives_way():
     crowd = Crowd(most=3, most_of_address=1)
-    guests = entered(crowd, Guest(rate=1e6), Guest(rate=3), Guest(rate=inf))
-    for guest in guests:
-        crowd.send(guest)
+    guests = entered(crowd, Guest(speed=1e6), Guest(speed=3), Guest(speed=inf))
+    for number, guest in enumerate(guests):
+        crowd.attend(guest, f"192.0.2.{number}")
     assert crowd.enter("a") is None
     assert [guest.ended for guest in guests] == [False, True, False]
     crowd.work(guests[0])
     # Of the last one it is too early to tell.
     assert "3 connections are open" in crowd.enter("b")
+
+
+def test_of_equally_slow_ones_the_oldest_of_the_greediest_address_gives_way():
+    crowd = Crowd(most=4, most_of_address=3)
+    one, *three = [Guest(speed=0) for _ in range(4)]
+    for guest, address in zip([one, *three], "abbb", strict=True):
+        assert crowd.enter(address) is None
+        crowd.attend(guest, address)
+    assert crowd.enter("c") is None
+    assert [guest.ended for guest in [one, *three]] == [False, True, False, False]
+
+
+def test_who_rests_again_gives_way_as_one_who_rests():
+    crowd = Crowd(most=2, most_of_address=1)
+    resting, slow = entered(crowd, Guest(), Guest(speed=1))
+    crowd.attend(resting, "192.0.2.0")
+    crowd.attend(slow, "192.0.2.1")
+    crowd.wait(resting)
+    assert crowd.enter("a") is None
+    assert (resting.ended, slow.ended) == (True, False)

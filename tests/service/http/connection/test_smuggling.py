@@ -88,6 +88,14 @@ REFUSED = {
     "the last chunk ends in LF": (chunked(b"1\r\nx\r\n0\n\r\n"), 400),
     "a body ends in LF": (chunked(b"1\r\nx\r\n0\r\n\n"), 400),
     "a trailer ends in LF": (chunked(b"1\r\nx\r\n0\r\nX: a\n\n"), 400),
+    "a target of no host": (get(b"Host: a\r\n", b"http:///limits"), 400),
+    "a target of a user": (get(b"Host: a\r\n", b"http://u:p@a/limits"), 400),
+    "a target of half an address": (get(b"Host: a\r\n", b"http://[::1/limits"), 400),
+    "a target with a host, and no Host": (get(b"", b"http://a/limits"), 400),
+    "a target with a host, and two Hosts": (
+        get(b"Host: a\r\nHost: b\r\n", b"http://a/limits"),
+        400,
+    ),
     "the preface of HTTP/2": (b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", 505),
     "a head that is too long": (get(b"Host: a\r\n", b"/limits?" + b"a" * HEAD_BYTES), 431),
 }
@@ -111,6 +119,15 @@ TAKEN = {
     "a long query": (get(b"Host: a\r\n", b"/limits?" + b"a" * 15000), 200),
     "a long path": (get(b"Host: a\r\n", b"/" + b"a/" * 7000), 404),
     "a path that climbs": (get(b"Host: a\r\n", b"/" + b"%2e%2e%2f" * 1500), 404),
+    "a target with a host": (get(b"Host: a\r\n", b"http://b.example:80/limits?x=1"), 200),
+    "a target with an address": (get(b"Host: a\r\n", b"HTTPS://[::1]/limits"), 200),
+    "a target of another protocol": (get(b"Host: a\r\n", b"ftp://b/limits"), 404),
+    "a path of a target": (get(b"Host: a\r\n", b"/http://b/limits"), 404),
+    "a target with two slashes": (get(b"Host: a\r\n", b"http://b//limits"), 404),
+    "a target with a body": (
+        b"POST http://b/subdivide HTTP/1.1\r\nHost: a\r\nContent-Length: 5\r\n\r\nhello",
+        415,
+    ),
     "many headers": (get(b"Host: a\r\n" + b"".join(b"h%d: x\r\n" % n for n in range(1500))), 200),
     "many parameters": (
         b"POST /subdivide?%b HTTP/1.1\r\nHost: a\r\nContent-Length: 0\r\n\r\n"
