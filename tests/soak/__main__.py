@@ -20,6 +20,8 @@ import typer
 from tests.soak.process import lines_of, started
 from tests.soak.run import Soaked, soak
 
+MOST_WARM_SECONDS = 120.0
+
 
 def main(
     minutes: Annotated[float, typer.Option(help="how long, about")] = 10.0,
@@ -34,16 +36,24 @@ def main(
         host, _, port = address.rpartition(":")
         if not ip_address(host).is_loopback:
             raise typer.BadParameter("it attacks: this machine's own addresses alone")
-        print_(soak((host, int(port)), 60 * minutes, pid, one_source=one_source))
+        print_(_soaked((host, int(port)), minutes, pid, one_source=one_source))
         return
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log"
         with started(log) as (where, process):
-            soaked = soak(where, 60 * minutes, process, one_source=one_source)
+            soaked = _soaked(where, minutes, process, one_source=one_source)
         lines = lines_of(log)
         longest = max(len(str(line)) for line in lines)
         typer.echo(f"{len(lines)} log lines, all JSON, the longest of {longest} characters")
     print_(soaked)
+
+
+def _soaked(
+    address: tuple[str, int], minutes: float, pid: int | None, *, one_source: bool
+) -> Soaked:
+    warm = min(0.2 * 60 * minutes, MOST_WARM_SECONDS)
+    seconds = 60 * minutes - warm
+    return soak(address, seconds, pid, warm_seconds=warm, one_source=one_source)
 
 
 def print_(soaked: Soaked) -> None:
@@ -60,9 +70,10 @@ def print_(soaked: Soaked) -> None:
     if soaked.before is not None and soaked.after is not None:
         before, after = soaked.before, soaked.after
         typer.echo(
-            f"memory {before.mebibytes:.0f} -> {after.mebibytes:.0f} MiB, descriptors "
-            f"{before.descriptors} -> {after.descriptors}, processes {before.processes} -> "
-            f"{after.processes}"
+            f"memory {before.mebibytes:.0f} -> {after.mebibytes:.0f} MiB "
+            f"({after.mebibytes / before.mebibytes - 1:+.1%}), "
+            f"descriptors {before.descriptors} -> {after.descriptors}, "
+            f"processes {before.processes} -> {after.processes}"
         )
     faults = tally.faults()
     typer.echo(f"wrong answers {len(tally.wrong)}, 5xx but 503 {faults.total()}")

@@ -4,42 +4,15 @@ from __future__ import annotations
 
 import itertools
 import json
-import socket
 import struct
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.synchronize import Event
 
-Address = tuple[str, int]
-HEAD = "{} {} HTTP/1.1\r\nHost: soak\r\nContent-Type: model/gltf-binary\r\n{}\r\n"
+from tests.soak.job_attacks import come_and_go, deletes, followers
+from tests.soak.target import PATIENCE, Target, head, hold_anew, side_by_side
+
 CHUNKED = "Transfer-Encoding: chunked\r\n"
-PATIENCE = 30
-
-
-def _head(method: str, path: str, more: str = "") -> bytes:
-    return HEAD.format(method, path, more).encode()
-
-
-@dataclass(frozen=True)
-class Target:
-    """What is attacked, and from where: many addresses of this machine, or (`one_source`) its own.
-
-    A container's bridge carries no loopback address but the one that it listens on.
-    """
-
-    address: Address
-    one_source: bool = False
-
-    @contextmanager
-    def connected(self, number: int) -> Iterator[socket.socket]:
-        """A connection from one of the attackers' addresses, none of them an honest client's."""
-        source = None if self.one_source else (f"127.9.{number // 16}.{1 + number % 16}", 0)
-        with socket.create_connection(self.address, PATIENCE, source_address=source) as opened:
-            yield opened
-
-
 Attack = Callable[[Target, Event], None]
 
 
@@ -47,29 +20,29 @@ def crumbs(target: Target, ended: Event) -> None:
     """Four connections of one-byte chunks, again and again."""
 
     def connect(number: int) -> None:
-        flood = _head("POST", "/subdivide", CHUNKED) + b"1\r\nx\r\n" * 10_000
+        flood = head("POST", "/subdivide", CHUNKED) + b"1\r\nx\r\n" * 10_000
         while not ended.is_set():
             with suppress(OSError), target.connected(number) as opened:
                 opened.sendall(flood)
                 while opened.recv(2**16):
                     pass
 
-    _side_by_side(connect, 4)
+    side_by_side(connect, 4)
 
 
 def trickles(target: Target, ended: Event) -> None:
     """Uploads of a byte a second: as many as may arrive at the same time, and more."""
-    _hold(target, ended, 96, _head("POST", "/subdivide", "Content-Length: 1000000\r\n"), b"x")
+    hold_anew(target, ended, 96, head("POST", "/subdivide", "Content-Length: 1000000\r\n"), b"x")
 
 
 def slow_heads(target: Target, ended: Event) -> None:
     """Heads that never end."""
-    _hold(target, ended, 200, b"GET /healthz HTTP/1.1\r\nX-A: ", b"x")
+    hold_anew(target, ended, 200, b"GET /healthz HTTP/1.1\r\nX-A: ", b"x")
 
 
 def idle(target: Target, ended: Event) -> None:
     """More connections than there are places for, that say nothing."""
-    _hold(target, ended, 700, b"", b"")
+    hold_anew(target, ended, 700, b"", b"")
 
 
 def unread(target: Target, ended: Event) -> None:
@@ -80,17 +53,17 @@ def unread(target: Target, ended: Event) -> None:
         chunk = b"10000\r\n" + bytes(2**16) + b"\r\n"
         while not ended.is_set():
             with suppress(OSError), target.connected(number) as opened:
-                opened.sendall(_head("POST", path, CHUNKED))
+                opened.sendall(head("POST", path, CHUNKED))
                 while not ended.is_set():
                     opened.sendall(chunk)
             ended.wait(0.5)
 
-    _side_by_side(connect, 4)
+    side_by_side(connect, 4)
 
 
 def slow_readers(target: Target, ended: Event) -> None:
     """Ask for large answers and take a few bytes of each."""
-    requests = _head("GET", "/docs/swagger-ui-bundle.js") * 8
+    requests = head("GET", "/docs/swagger-ui-bundle.js") * 8
 
     def connect(number: int) -> None:
         while not ended.is_set():
@@ -99,7 +72,23 @@ def slow_readers(target: Target, ended: Event) -> None:
                 while not ended.is_set() and opened.recv(64):
                     ended.wait(1)
 
-    _side_by_side(connect, 24)
+    side_by_side(connect, 24)
+
+
+def pipelines(target: Target, ended: Event) -> None:
+    """Hundreds of requests on a connection before the first answer; half of them are never read."""
+    asked = [head("GET", path) for path in ("/healthz", "/limits", "/nothing", "/docs")]
+    requests = b"".join(itertools.islice(itertools.cycle(asked), 600))
+
+    def connect(number: int) -> None:
+        while not ended.wait(0.2):
+            with suppress(OSError), target.connected(number) as opened:
+                opened.settimeout(2)
+                opened.sendall(requests)
+                while number % 2 and opened.recv(2**16):
+                    pass
+
+    side_by_side(connect, 4)
 
 
 def nonsense(target: Target, ended: Event) -> None:
@@ -109,10 +98,10 @@ def nonsense(target: Target, ended: Event) -> None:
         b"GET / HTTP/9.9\r\n\r\n",
         b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 5\r\nContent-Length: 6\r\n\r\nhello",
         b"GET / HTTP/1.1\r\nHost: a\r\n" + b"X: y\r\n" * 5000,
-        _head("POST", "/subdivide", CHUNKED) + b"zz\r\n",
+        head("POST", "/subdivide", CHUNKED) + b"zz\r\n",
         b"GET /\x1b[31m HTTP/1.1\r\nHost: a\r\nX-Forwarded-For: 1.1.1.1\r\n\r\n",
         b"GET /" + b"a" * 2**17,
-        _head("POST", "/jobs/../../etc/passwd") + b"",
+        head("POST", "/jobs/../../etc/passwd") + b"",
     ]
 
     def connect(number: int) -> None:
@@ -124,7 +113,7 @@ def nonsense(target: Target, ended: Event) -> None:
                 opened.sendall(message)
                 opened.recv(2**16)
 
-    _side_by_side(connect, 4)
+    side_by_side(connect, 4)
 
 
 def bombs(target: Target, ended: Event) -> None:
@@ -135,39 +124,13 @@ def bombs(target: Target, ended: Event) -> None:
         for body in itertools.islice(itertools.cycle(files), number, None):
             if ended.wait(0.2):
                 return
-            head = _head("POST", "/subdivide?levels=6", f"Content-Length: {len(body)}\r\n")
+            asks = head("POST", "/subdivide?levels=6", f"Content-Length: {len(body)}\r\n")
             with suppress(OSError), target.connected(number) as opened:
                 opened.settimeout(PATIENCE)
-                opened.sendall(head + body)
+                opened.sendall(asks + body)
                 opened.recv(2**16)
 
-    _side_by_side(connect, 2)
-
-
-def _hold(target: Target, ended: Event, count: int, first: bytes, drop: bytes) -> None:
-    """Keep `count` connections open, opening them anew, and send each a drop a second."""
-    while not ended.is_set():
-        with ExitStack() as held:
-            opened = []
-            for number in range(count):
-                with suppress(OSError):
-                    connection = held.enter_context(target.connected(number))
-                    connection.sendall(first)
-                    opened.append(connection)
-            for _ in range(15):
-                if ended.wait(1):
-                    return
-                for connection in opened:
-                    with suppress(OSError):
-                        connection.sendall(drop)
-
-
-def _side_by_side(connect: Callable[[int], None], count: int) -> None:
-    threads = [threading.Thread(target=connect, args=(number,)) for number in range(count)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    side_by_side(connect, 2)
 
 
 def _empty_chunks(count: int) -> bytes:
@@ -192,6 +155,10 @@ ATTACKS: dict[str, Attack] = {
     "idle connections": idle,
     "unread bodies": unread,
     "slow readers": slow_readers,
+    "pipelines": pipelines,
     "nonsense": nonsense,
     "bombs": bombs,
+    "followers": followers,
+    "jobs that come and go": come_and_go,
+    "deletes": deletes,
 }

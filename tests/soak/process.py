@@ -8,12 +8,15 @@ import re
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 
 ROOT = Path(__file__).resolve().parents[2]
+PROPORTIONAL = re.compile(r"^Pss: +(\d+) kB$", re.MULTILINE)
 RUNNING = re.compile(r"running on http://([\d.]+):(\d+)")
 
 
@@ -50,9 +53,23 @@ def held_by(pid: int) -> Held:
     """Memory and descriptors of a process and those that it started."""
     family = [pid, *_children(pid)]
     return Held(
-        mebibytes=sum(map(_resident, family)) / 2**20,
+        mebibytes=sum(map(_proportional, family)) / 1024,
         descriptors=len(list(Path(f"/proc/{pid}/fd").iterdir())),
         processes=len(family),
+    )
+
+
+def usually_held_by(pid: int, seconds: float) -> Held:
+    """The median of what is held meanwhile: at any one moment a job may have just begun."""
+    pause, seen = threading.Event(), [held_by(pid)]
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        pause.wait(0.5)
+        seen.append(held_by(pid))
+    return Held(
+        median(held.mebibytes for held in seen),
+        int(median(held.descriptors for held in seen)),
+        int(median(held.processes for held in seen)),
     )
 
 
@@ -68,8 +85,10 @@ def _children(pid: int) -> Iterator[int]:
             yield from _children(child)
 
 
-def _resident(pid: int) -> int:
+def _proportional(pid: int) -> int:
+    """KiB of memory; of what processes share, each has its part."""
     try:
-        return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except OSError:
+        return int(PROPORTIONAL.findall(Path(f"/proc/{pid}/smaps_rollup").read_text())[0])
+    except (OSError, IndexError):
+        # It has ended meanwhile.
         return 0

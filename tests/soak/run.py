@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import multiprocessing
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 from tests.soak import honest
-from tests.soak.attacks import ATTACKS, Attack, Target
-from tests.soak.process import Held, held_by
-from tests.soak.samples import large_body, samples, small_sample
+from tests.soak.attacks import ATTACKS, Attack
+from tests.soak.bodies import large_body
+from tests.soak.process import Held, usually_held_by
+from tests.soak.samples import samples, small_sample
 from tests.soak.tally import Tally
+from tests.soak.target import Target
 
 Address = tuple[str, int]
 QUIET = "quiet"
@@ -35,12 +38,15 @@ def soak(
     attacks: dict[str, Attack] = ATTACKS,
     say: Callable[[str], None] = print,
     *,
+    warm_seconds: float = 0.0,
     one_source: bool = False,
 ) -> Soaked:
     """Run for about so many seconds: a tenth each in quiet before and after, the rest in attacks.
 
     Attackers have addresses of their own, or (`one_source`) none but the honest clients'. Memory is
-    compared between the two quiet times, with the honest clients at work in both.
+    compared between the two quiet times, with the honest clients at work in both. A process grows
+    until it has met all that there is, and what counts is what comes after: `warm_seconds` of every
+    format and attack come before all that.
     """
     honest.wait_until_ready(address)
     tally, ended = Tally(), threading.Event()
@@ -60,18 +66,29 @@ def soak(
         stack.enter_context(_probing(address, tally))
         for thread in threads:
             thread.start()
-        quiet, each = seconds / 10, 0.8 * seconds / max(len(attacks), 1)
-        ended.wait(quiet)
-        before = None if pid is None else held_by(pid)
+        target, each = Target(address, one_source), 1 / max(len(attacks), 1)
+        if warm_seconds:
+            say("… warming")
+            tally.phase = "warming"
+            for attack in attacks.values():
+                _attack(attack, target, warm_seconds * each)
+            tally.phase = QUIET
+        before = _quiet(seconds / 10, pid)
         for name, attack in attacks.items():
             say(f"… {name}")
-            with _under(attack, Target(address, one_source)):
-                tally.phase = name
-                ended.wait(each)
+            tally.phase = name
+            _attack(attack, target, 0.8 * seconds * each)
             tally.phase = QUIET
-        ended.wait(quiet)
-        after = None if pid is None else held_by(pid)
+        after = _quiet(seconds / 10, pid)
     return Soaked(tally, before, after)
+
+
+def _quiet(seconds: float, pid: int | None) -> Held | None:
+    """Let the honest clients alone; what the service holds meanwhile, if its process is known."""
+    if pid is not None:
+        return usually_held_by(pid, seconds)
+    time.sleep(seconds)
+    return None
 
 
 def _end(ended: threading.Event, threads: list[threading.Thread]) -> None:
@@ -80,18 +97,19 @@ def _end(ended: threading.Event, threads: list[threading.Thread]) -> None:
         thread.join()
 
 
-@contextmanager
-def _under(attack: Attack, target: Target) -> Iterator[None]:
+def _attack(attack: Attack, target: Target, seconds: float) -> None:
     """In a process of its own: its threads must not keep the honest clients' waiting."""
     context = multiprocessing.get_context("spawn")
     over = context.Event()
     process = context.Process(target=attack, args=(target, over))
     process.start()
     try:
-        yield
+        process.join(seconds)
     finally:
         over.set()
         process.join()
+    if process.exitcode:
+        raise RuntimeError(f"{attack.__name__} failed: {process.exitcode}")
 
 
 @contextmanager

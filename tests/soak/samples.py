@@ -7,19 +7,16 @@ import hashlib
 import io
 import json
 import zipfile
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from service.bodies import uploads
 from service.gltf.read.container import read_glb
 from service.gltf.subdivide import subdivide_gltf
-from service.meshfiles.example import part
 from service.meshfiles.formats import write
-from service.meshfiles.indexed_triangles import IndexedTriangles
 from service.meshfiles.to_gltf import as_gltf
 from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Limits, Options
+from tests.soak.bodies import a_part, small_body
 
 BOUNDARY = "a-soak-boundary"
 MULTIPART = f"multipart/form-data; boundary={BOUNDARY}"
@@ -41,7 +38,7 @@ def samples() -> list[Sample]:
     """`OF_EACH` of each format: GLB, glTF, archive, form, OBJ, PLY, STL and OFF."""
     made = []
     for number in range(OF_EACH):
-        mesh = _part(number)
+        mesh = a_part(number)
         glb = triangles_glb(mesh)
         gltf = _as_gltf(glb)
         made += [
@@ -57,22 +54,7 @@ def samples() -> list[Sample]:
 
 def small_sample() -> Sample:
     """A tetrahedron: what a small job is."""
-    vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
-    faces = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
-    mesh = IndexedTriangles(vertices, faces)
-    return _sample("small", "model/gltf-binary", triangles_glb(mesh))
-
-
-def large_body() -> bytes:
-    """A part whose refinement takes seconds at four levels."""
-    return triangles_glb(_part(99))
-
-
-def _part(number: int) -> IndexedTriangles:
-    mesh = part()
-    rng = np.random.default_rng(number)
-    moved = mesh.vertices + 1e-3 * rng.standard_normal(mesh.vertices.shape)
-    return replace(mesh, vertices=moved, uv=None)
+    return _sample("small", "model/gltf-binary", small_body())
 
 
 def _sample(name: str, content_type: str, body: bytes) -> Sample:

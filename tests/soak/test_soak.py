@@ -6,7 +6,7 @@ from tests.soak.attacks import ATTACKS
 from tests.soak.process import lines_of, started
 from tests.soak.run import soak
 
-SECONDS = 24
+SECONDS = 18
 
 
 @pytest.fixture(scope="module")

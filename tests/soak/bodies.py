@@ -1,0 +1,31 @@
+"""Meshes that clients send, well-meaning or not; made without loading what refines them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from service.meshfiles.example import part
+from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.triangles_glb import triangles_glb
+
+
+def a_part(number: int) -> IndexedTriangles:
+    """The example's part; no two numbers have one shape."""
+    mesh = part()
+    rng = np.random.default_rng(number)
+    moved = mesh.vertices + 1e-3 * rng.standard_normal(mesh.vertices.shape)
+    return replace(mesh, vertices=moved, uv=None)
+
+
+def large_body() -> bytes:
+    """A part whose refinement takes seconds at four levels."""
+    return triangles_glb(a_part(99))
+
+
+def small_body() -> bytes:
+    """A tetrahedron."""
+    vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
+    faces = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
+    return triangles_glb(IndexedTriangles(vertices, faces))
