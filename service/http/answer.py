@@ -11,6 +11,7 @@ from starlette.types import Receive, Scope, Send
 
 from ..workers.memory_file import MemoryFile
 from .admission import Admission, CutOffError, DrainingError
+from .head import HEAD_ALONE
 
 log = logging.getLogger("pns.service")
 
@@ -44,13 +45,16 @@ class FileAnswer(Response):
         with self._held:
             try:
                 async with self._admission.working(), self._admission.answering(self._content.size):
-                    await self._send_pieces(send)
+                    await self._send_start(send)
+                    # What nobody gets is not read: it would hold the event loop.
+                    if HEAD_ALONE not in scope.get("extensions", {}):
+                        await self._send_pieces(send)
             except (TimeoutError, CutOffError):
                 log.warning("a client took too long to read its answer")
             except DrainingError:
                 log.warning("an answer was cut off by the shutdown")
 
-    async def _send_pieces(self, send: Send) -> None:
+    async def _send_start(self, send: Send) -> None:
         await send(
             {
                 "type": "http.response.start",
@@ -58,6 +62,8 @@ class FileAnswer(Response):
                 "headers": self.raw_headers,
             }
         )
+
+    async def _send_pieces(self, send: Send) -> None:
         for piece in self._content.pieces():
             message = {"type": "http.response.body", "body": piece, "more_body": True}
             async with asyncio.timeout(self._stall_seconds):

@@ -12,6 +12,7 @@ import httpx2
 import pytest
 
 from service.http import documentation
+from service.workers.memory_file import MemoryFile
 from tests.support.live import served
 from tests.support.stand_in_jobs import files_of_at_most
 
@@ -250,6 +251,50 @@ def test_a_body_that_does_not_fit_is_503_and_nothing_of_it_stays(
     assert refused.json()["code"] == "no-storage"
     assert client.post("/subdivide", content=b"echo", headers=GLB).content == b"echo"
     until(lambda: descriptors() <= before)
+
+
+def test_a_result_that_is_struck_out_while_it_is_fetched_arrives_whole(
+    client: httpx2.Client,
+) -> None:
+    client.post("/subdivide", content=b"echo", headers=GLB)
+    before = descriptors()
+    job = started(client, b"large 30000000")
+    assert ended(client, job)["state"] == "done"
+    with client.stream("GET", f"/jobs/{job}/result") as answer:
+        pieces = answer.iter_bytes()
+        taken = len(next(pieces))
+        assert client.delete(f"/jobs/{job}").status_code == 204
+        assert client.get(f"/jobs/{job}").status_code == 404
+        # More than the sockets hold: the rest is read after its end.
+        assert taken + sum(map(len, pieces)) == 30_000_000
+    until(lambda: descriptors() <= before)
+
+
+def test_a_result_that_nobody_takes_is_let_go() -> None:
+    with (
+        served(workers=1, rate=2**26, grace_seconds=0.5) as where,
+        opened(where) as client,
+        opened(where) as slow,
+    ):
+        client.post("/subdivide", content=b"echo", headers=GLB)
+        before = descriptors()
+        job = started(client, b"large 30000000")
+        assert ended(client, job)["state"] == "done"
+        with slow.stream("GET", f"/jobs/{job}/result"):
+            client.delete(f"/jobs/{job}")
+            until(lambda: descriptors() <= before)
+
+
+def test_a_head_of_a_result_reads_nothing_of_it(
+    client: httpx2.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = started(client, b"large 1000000")
+    assert ended(client, job)["state"] == "done"
+    read: list[MemoryFile] = []
+    monkeypatch.setattr(MemoryFile, "pieces", lambda file: read.append(file) or iter(()))
+    answer = client.head(f"/jobs/{job}/result")
+    assert (answer.status_code, answer.headers["content-length"]) == (200, "1000000")
+    assert read == []
 
 
 def test_a_result_that_does_not_fit_fails_by_name_and_its_room_is_free(tmp_path: Path) -> None:

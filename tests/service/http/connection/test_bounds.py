@@ -4,6 +4,7 @@ Nothing here measures time: a test waits for the server's answer or its end, and
 up after `PATIENCE` where neither comes.
 """
 
+import gc
 import http.client
 import itertools
 import json
@@ -285,6 +286,33 @@ def test_a_client_that_only_sends_and_never_reads_is_let_go(hasty):
             pass
     with connect(hasty) as connection:
         connection.sendall(head("GET", "/healthz"))
+        assert connection.recv(2**16).startswith(b"HTTP/1.1 200 ")
+
+
+def test_requests_that_wait_behind_another_stay_in_the_clients_socket(address, tmp_path):
+    """Two reads of them at most are the server's, however many are sent before the first answer."""
+    body = f"steps {tmp_path}".encode()
+    with connect(address) as connection:
+        connection.sendall(head("POST", "/subdivide", f"Content-Length: {len(body)}\r\n") + body)
+        while not (tmp_path / "took-1").exists():
+            time.sleep(0.005)
+        (mine,) = (
+            known
+            for known in gc.get_objects()
+            if isinstance(known, protocol.BoundedProtocol)
+            and known.client == connection.getsockname()
+        )
+        connection.setblocking(False)
+        requests = head("GET", "/healthz") * 1000
+        while mine.transport.is_reading():
+            try:
+                connection.send(requests)
+            except BlockingIOError:
+                time.sleep(0.005)
+        assert 0 < len(mine.conn.trailing_data[0]) <= 2 * protocol.READ_BYTES
+        for number in (1, 2, 3):
+            (tmp_path / f"go-{number}").touch()
+        connection.settimeout(PATIENCE)
         assert connection.recv(2**16).startswith(b"HTTP/1.1 200 ")
 
 
