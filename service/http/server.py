@@ -17,7 +17,8 @@ from .app import create_app
 from .connection import descriptors
 from .connection.crowd import Crowd
 from .connection.pace import Pace
-from .connection.protocol import BoundedProtocol, Bounds, Shared
+from .connection.protocol import BoundedProtocol
+from .connection.shared import Bounds, Shared
 from .watch.metrics import Metrics
 
 log = logging.getLogger("pns.service")

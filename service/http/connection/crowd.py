@@ -33,9 +33,13 @@ class Crowd:
     """The open connections, by address.
 
     Proxies are exempt from the share of an address: many clients come through one. Where all places
-    are taken, one gives way to a new connection, so that neither idle nor slow clients lock anybody
-    out: the oldest whose client has asked for nothing yet, else the slowest of those that the
-    service waits for, and of equally slow ones the oldest of the address with the most connections.
+    are taken, one gives way to a new connection, so that no client locks others out. It is, of
+    those that there are, the first of:
+
+    - the oldest whose client has asked for nothing yet;
+    - the slowest of those that the service waits for, and of equally slow ones the oldest of the
+      address with the most connections;
+    - the oldest of the address with the most connections, if those are more than the newcomer's.
     """
 
     def __init__(self, most: int, most_of_address: int, proxies: tuple[Network, ...] = ()) -> None:
@@ -43,60 +47,68 @@ class Crowd:
         self.most_of_address = most_of_address
         self.proxies = proxies
         self.refused = 0
-        self._of_address: Counter[str] = Counter()
-        self._count = 0
-        # In the order in which they began to wait.
+        # The names of their addresses; None: a proxy's.
+        self._names: dict[Guest, str | None] = {}
+        self._of_address: Counter[str | None] = Counter()
+        # In the order in which they began it.
         self._waiting: dict[Guest, None] = {}
-        # With the name of the address.
-        self._slow: dict[Guest, str] = {}
+        self._slow: dict[Guest, None] = {}
+        self._working: dict[Guest, None] = {}
 
     def __len__(self) -> int:
-        return self._count
+        return len(self._names)
 
-    def enter(self, address: str) -> str | None:
+    def enter(self, guest: Guest, address: str) -> str | None:
         """Take a place for a connection; where there is none, say why and take none."""
-        name = site(address)
-        if self._of_address[name] >= self.most_of_address and not is_named(address, self.proxies):
+        name = None if is_named(address, self.proxies) else site(address)
+        if name is not None and self._of_address[name] >= self.most_of_address:
             self.refused += 1
             return f"{self.most_of_address} connections of your address are open"
-        if self._count >= self.most and not self._make_room():
+        if len(self) >= self.most and not self._make_room(name):
             self.refused += 1
             return f"{self.most} connections are open"
+        self._names[guest] = name
         self._of_address[name] += 1
-        self._count += 1
+        self._waiting[guest] = None
         return None
 
-    def leave(self, guest: Guest, address: str) -> None:
-        """Give the place of a connection back."""
-        self.work(guest)
-        name = site(address)
-        self._of_address[name] -= 1
-        if not self._of_address[name]:
-            del self._of_address[name]
-        self._count -= 1
+    def leave(self, guest: Guest) -> None:
+        """Give the place of a connection back, where it has one."""
+        if guest in self._names:
+            self._forget(guest)
+            name = self._names.pop(guest)
+            self._of_address[name] -= 1
+            if not self._of_address[name]:
+                del self._of_address[name]
 
     def wait(self, guest: Guest) -> None:
         """Note that a connection asks for nothing."""
-        self._slow.pop(guest, None)
-        self._waiting.setdefault(guest)
+        self._move(guest, self._waiting)
 
-    def attend(self, guest: Guest, address: str) -> None:
+    def attend(self, guest: Guest) -> None:
         """Note that a connection has asked, and that the service waits for its client."""
-        self._waiting.pop(guest, None)
-        if guest not in self._slow:
-            self._slow[guest] = site(address)
+        self._move(guest, self._slow)
 
     def work(self, guest: Guest) -> None:
         """Note that a connection has asked, and waits for the service."""
-        self._waiting.pop(guest, None)
-        self._slow.pop(guest, None)
+        self._move(guest, self._working)
 
-    def _make_room(self) -> bool:
+    def _move(self, guest: Guest, to: dict[Guest, None]) -> None:
+        if guest in self._names and guest not in to:
+            self._forget(guest)
+            to[guest] = None
+
+    def _forget(self, guest: Guest) -> None:
+        for state in (self._waiting, self._slow, self._working):
+            state.pop(guest, None)
+
+    def _make_room(self, newcomer: str | None) -> bool:
         guest = next((guest for guest in self._waiting if guest.is_idle()), None)
-        guest = guest or self._slowest()
+        mine = 0 if newcomer is None else self._of_address[newcomer]
+        guest = guest or self._slowest() or self._greediest(mine + 1)
         if guest is None:
             return False
-        self.work(guest)
+        self._forget(guest)
         guest.give_way()
         return True
 
@@ -104,8 +116,14 @@ class Crowd:
         """The slowest, where there is one whose rate can be told."""
         rates = {guest: guest.rate() for guest in self._slow}
         told = [guest for guest, rate in rates.items() if rate < inf]
-        return min(
-            told,
-            key=lambda guest: (rates[guest], -self._of_address[self._slow[guest]]),
-            default=None,
-        )
+        return min(told, key=lambda guest: (rates[guest], -self._held_with(guest)), default=None)
+
+    def _greediest(self, most: int) -> Guest | None:
+        """The oldest that works for the address with the most connections, if more than `most`."""
+        guest = max(self._working, key=self._held_with, default=None)
+        return guest if guest is not None and self._held_with(guest) > most else None
+
+    def _held_with(self, guest: Guest) -> int:
+        """How many connections its address has; none that count, where it is a proxy's."""
+        name = self._names[guest]
+        return 0 if name is None else self._of_address[name]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import select
-from dataclasses import dataclass, field
 from math import inf
 from typing import Any
 
@@ -16,51 +15,21 @@ from uvicorn.protocols.http.flow_control import CLOSE_HEADER, FlowControl
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
-from .crowd import LISTENS, Crowd
+from .crowd import LISTENS
 from .outlet import Outlet
-from .pace import Pace
 from .parser import FLOODED, Parser
 from .refusal import refusal
+from .shared import READ_BYTES, Shared
 from .taking import Taking
-from .turns import Turns
 
 log = logging.getLogger("pns.connection")
 
 # The longest head: request line and headers together.
 HEAD_BYTES = 16 * 1024
-# One read of a socket. asyncio's own reads are four times as long, and each connection may hold
-# two: one parsed, one that waits.
-READ_BYTES = 64 * 1024
 # What is parsed in one go; a request of ordinary clients is two or three events.
 EVENTS_A_TURN = 32
 # Neither an upload's rate nor an answer's is judged before.
 RATE_SECONDS = 2.0
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """What one connection may take: seconds and bytes.
-
-    `head_seconds` for a request line and its headers, from the first byte on or from the
-    connection; `answer` for the client to take what is written; `linger_seconds` for a client that
-    still sends after its answer, and `body_bytes` for all that it sends, before and after.
-    """
-
-    head_seconds: float
-    answer: Pace
-    linger_seconds: float
-    body_bytes: int
-
-
-@dataclass
-class Shared:
-    """What the connections of one server have in common."""
-
-    bounds: Bounds
-    crowd: Crowd
-    turns: Turns = field(default_factory=Turns)
-    # Filled and emptied within one callback, so one is enough for all.
-    buffer: bytearray = field(default_factory=lambda: bytearray(READ_BYTES))
 
 
 class _Flow(FlowControl):
@@ -97,7 +66,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         self.conn: Parser = Parser(config.h11_max_incomplete_event_size or HEAD_BYTES)
         self.app = self._application
         self._shared = shared
-        self._address: str | None = None
+        self._has_place = False
         self._head_timer: asyncio.TimerHandle | None = None
         self._end_timer: asyncio.TimerHandle | None = None
         self._listens = False
@@ -113,14 +82,12 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         self._taking = Taking(outlet, self._shared.bounds.answer, self._abort)
         super().connection_made(outlet)  # type: ignore[arg-type]
         self.flow: _Flow = _Flow(outlet)  # type: ignore[arg-type]
-        address = self.client[0] if self.client else ""
-        refusal = self._shared.crowd.enter(address)
+        refusal = self._shared.crowd.enter(self, self.client[0] if self.client else "")
         if refusal is not None:
             log.warning("a connection is refused: %s", refusal)
             self._say(503, "too-many-connections", refusal, b"retry-after: 5\r\n")
             return
-        self._address = address
-        self._shared.crowd.wait(self)
+        self._has_place = True
         self._await_head()
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -131,9 +98,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
             if timer is not None:
                 timer.cancel()
         self._shared.turns.remove(self._more)
-        if self._address is not None:
-            self._shared.crowd.leave(self, self._address)
-            self._address = None
+        self._shared.crowd.leave(self)
         super().connection_lost(exc)
         self._unset_keepalive_if_required()
 
@@ -189,12 +154,10 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
             self.flow.resume_reading()
 
     def _say_to_crowd(self) -> None:
-        if self._address is None:
-            return
         crowd, state = self._shared.crowd, self.conn.their_state
         goes = self.transport.is_closing()
         if self._taking.waits or self._listens or (state is h11.SEND_BODY and not goes):
-            crowd.attend(self, self._address)
+            crowd.attend(self)
         elif state is h11.IDLE and not goes:
             crowd.wait(self)
         else:
@@ -339,7 +302,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
 
     def _is_heard(self) -> bool:
         """Whether nothing more is expected of the client; of those without a place, nothing is."""
-        if self._address is None:
+        if not self._has_place:
             return True
         if self.conn.their_state is h11.IDLE:
             return not self.conn.trailing_data[0]

@@ -16,6 +16,7 @@ import pytest
 
 from service.http.connection import protocol
 from service.http.connection.parser import FREE_PIECES
+from service.http.connection.shared import READ_BYTES
 from tests.support.live import served
 
 PATIENCE = 30
@@ -309,7 +310,7 @@ def test_requests_that_wait_behind_another_stay_in_the_clients_socket(address, t
                 connection.send(requests)
             except BlockingIOError:
                 time.sleep(0.005)
-        assert 0 < len(mine.conn.trailing_data[0]) <= 2 * protocol.READ_BYTES
+        assert 0 < len(mine.conn.trailing_data[0]) <= 2 * READ_BYTES
         for number in (1, 2, 3):
             (tmp_path / f"go-{number}").touch()
         connection.settimeout(PATIENCE)
@@ -354,11 +355,11 @@ def test_slow_readers_give_way_to_those_that_ask(monkeypatch):
 def test_streams_of_events_give_way_as_if_they_had_ended(tmp_path):
     """Whoever follows a job asks again; the job goes on."""
     with served(workers=1, connections=4) as where, ExitStack() as opened:
-        body = f"steps {tmp_path}".encode()
-        first = opened.enter_context(connect(where))
-        first.sendall(head("POST", "/jobs", f"Content-Length: {len(body)}\r\n") + body)
-        job = json.loads(first.recv(2**16).partition(b"\r\n\r\n")[2])["id"]
-        followers = [first, *(opened.enter_context(connect(where)) for _ in range(3))]
+        client = opened.enter_context(closing(http.client.HTTPConnection(*where, PATIENCE)))
+        kind = {"Content-Type": "model/gltf-binary"}
+        client.request("POST", "/jobs", f"steps {tmp_path}", kind)
+        job = json.loads(client.getresponse().read())["id"]
+        followers = [client.sock, *(opened.enter_context(connect(where)) for _ in range(3))]
         for connection in followers:
             connection.sendall(head("GET", f"/jobs/{job}/events"))
             assert connection.recv(12) == b"HTTP/1.1 200"

@@ -192,69 +192,94 @@ class Guest:
         self.ended = True
 
 
+def entered(crowd, *guests, addresses="abcdefgh"):
+    for guest, address in zip(guests, addresses, strict=False):
+        assert crowd.enter(guest, address) is None
+    return guests
+
+
 def test_an_address_has_its_share_and_a_proxy_has_none():
     crowd = Crowd(most=10, most_of_address=2, proxies=(ip_network("10.0.0.1/32"),))
-    assert [crowd.enter("192.0.2.1") for _ in range(2)] == [None, None]
-    assert "2 connections of your address" in crowd.enter("192.0.2.1")
-    assert crowd.enter("192.0.2.2") is None
-    assert [crowd.enter("10.0.0.1") for _ in range(3)] == [None] * 3
+    first, _ = entered(crowd, Guest(), Guest(), addresses="aa")
+    assert "2 connections of your address" in crowd.enter(Guest(), "a")
+    assert crowd.enter(Guest(), "b") is None
+    assert [crowd.enter(Guest(), "10.0.0.1") for _ in range(3)] == [None] * 3
     assert (len(crowd), crowd.refused) == (6, 1)
-    crowd.leave(Guest(), "192.0.2.1")
-    assert crowd.enter("192.0.2.1") is None
-
-
-def entered(crowd, *guests):
-    for number, guest in enumerate(guests):
-        assert crowd.enter(f"192.0.2.{number}") is None
-        crowd.wait(guest)
-    return guests
+    crowd.leave(first)
+    crowd.leave(first)
+    assert len(crowd) == 5
+    assert crowd.enter(Guest(), "a") is None
 
 
 def test_who_has_waited_longest_gives_way():
     crowd = Crowd(most=3, most_of_address=1)
     first, second, third = entered(crowd, Guest(), Guest(), Guest())
     crowd.work(first)
-    assert crowd.enter("a") is None
+    entered(crowd, Guest(idle=False), addresses="x")
     assert (first.ended, second.ended, third.ended) == (False, True, False)
-    assert crowd.enter("b") is None
+    crowd.leave(second)
+    entered(crowd, Guest(idle=False), addresses="y")
     assert (first.ended, third.ended) == (False, True)
-    assert "3 connections are open" in crowd.enter("c")
+    crowd.leave(third)
+    assert "3 connections are open" in crowd.enter(Guest(), "z")
 
 
 def test_who_has_said_something_that_is_not_read_yet_does_not():
     crowd = Crowd(most=2, most_of_address=1)
     first, second = entered(crowd, Guest(idle=False), Guest())
-    assert crowd.enter("a") is None
+    assert crowd.enter(Guest(), "x") is None
     assert (first.ended, second.ended) == (False, True)
 
 
 def test_where_nobody_waits_the_slowest_gives_way():
     crowd = Crowd(most=3, most_of_address=1)
     guests = entered(crowd, Guest(speed=1e6), Guest(speed=3), Guest(speed=inf))
-    for number, guest in enumerate(guests):
-        crowd.attend(guest, f"192.0.2.{number}")
-    assert crowd.enter("a") is None
+    for guest in guests:
+        crowd.attend(guest)
+    entered(crowd, Guest(idle=False), addresses="x")
     assert [guest.ended for guest in guests] == [False, True, False]
+    crowd.leave(guests[1])
     crowd.work(guests[0])
     # Of the last one it is too early to tell.
-    assert "3 connections are open" in crowd.enter("b")
+    assert "3 connections are open" in crowd.enter(Guest(), "y")
 
 
 def test_of_equally_slow_ones_the_oldest_of_the_greediest_address_gives_way():
     crowd = Crowd(most=4, most_of_address=3)
-    one, *three = [Guest(speed=0) for _ in range(4)]
-    for guest, address in zip([one, *three], "abbb", strict=True):
-        assert crowd.enter(address) is None
-        crowd.attend(guest, address)
-    assert crowd.enter("c") is None
-    assert [guest.ended for guest in [one, *three]] == [False, True, False, False]
+    guests = entered(crowd, *(Guest(speed=0) for _ in range(4)), addresses="abbb")
+    for guest in guests:
+        crowd.attend(guest)
+    assert crowd.enter(Guest(), "c") is None
+    assert [guest.ended for guest in guests] == [False, True, False, False]
 
 
 def test_who_rests_again_gives_way_as_one_who_rests():
     crowd = Crowd(most=2, most_of_address=1)
     resting, slow = entered(crowd, Guest(), Guest(speed=1))
-    crowd.attend(resting, "192.0.2.0")
-    crowd.attend(slow, "192.0.2.1")
+    crowd.attend(resting)
+    crowd.attend(slow)
     crowd.wait(resting)
-    assert crowd.enter("a") is None
+    assert crowd.enter(Guest(), "x") is None
     assert (resting.ended, slow.ended) == (True, False)
+
+
+def test_where_all_are_served_the_greediest_address_gives_way_to_one_that_has_less():
+    crowd = Crowd(most=4, most_of_address=3)
+    guests = entered(crowd, *(Guest() for _ in range(4)), addresses="abbb")
+    for guest in guests:
+        crowd.work(guest)
+    late = Guest()
+    assert crowd.enter(late, "c") is None
+    assert [guest.ended for guest in guests] == [False, True, False, False]
+    crowd.leave(guests[1])
+    crowd.work(late)
+    # Now nobody has more than one who came would have.
+    assert "4 connections are open" in crowd.enter(Guest(), "c")
+
+
+def test_a_proxys_requests_never_give_way_to_a_stranger():
+    crowd = Crowd(most=3, most_of_address=1, proxies=(ip_network("10.0.0.1/32"),))
+    guests = entered(crowd, *(Guest() for _ in range(3)), addresses=["10.0.0.1"] * 3)
+    for guest in guests:
+        crowd.work(guest)
+    assert "3 connections are open" in crowd.enter(Guest(), "a")
