@@ -63,7 +63,7 @@ def large(faces: int, parts: int | None, workers: int, memory: int, place: Path)
     from rich.console import Console
 
     from service.options import Options
-    from service.scale.engines import local
+    from service.scale.engines.local import local
     from service.scale.large.plan import Large
     from service.scale.large.run import large_work, run_large
 
@@ -121,7 +121,7 @@ def library(workers: int, files: int) -> dict[str, Any]:
     from service.meshfiles.convert import converted
     from service.options import Limits, Options
     from service.scale.batch import Batch, batch_work, run_batch
-    from service.scale.engines import local
+    from service.scale.engines.local import local
 
     mesh = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
     options = Options(scheme="loop", levels=3)

@@ -18,23 +18,31 @@ def replacing(path: Path) -> Generator[Path, None, None]:
     Raises:
         OSError: the folder is missing or cannot be written; `path` is then as it was.
     """
+    with _new_file(path) as (temporary, descriptor):
+        os.close(descriptor)
+        yield temporary
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Write `data` in the place of `path`, whole or not at all: see `replacing`."""
+    with _new_file(path) as (_, descriptor), os.fdopen(descriptor, "wb") as file:
+        file.write(data)
+
+
+@contextmanager
+def _new_file(path: Path) -> Generator[tuple[Path, int], None, None]:
+    """Yield the name of a new file and its descriptor, which is to be closed."""
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}.tmp")
     try:
         # The mode of any file that a user writes: the system takes the umask off.
-        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     except OSError as error:
         # Nobody asked for the temporary name.
         error.filename = str(path)
         raise
     try:
-        yield temporary
+        yield temporary, descriptor
         temporary.replace(path)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
-
-
-def replace_file(path: Path, data: bytes) -> None:
-    """Write `data` in the place of `path`, whole or not at all: see `replacing`."""
-    with replacing(path) as temporary:
-        temporary.write_bytes(data)

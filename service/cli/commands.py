@@ -137,7 +137,7 @@ def batch(
     from rich.console import Console
 
     from ..scale.batch import Batch, batch_work, print_summary, run_batch
-    from ..scale.engines import engine_of
+    from ..scale.engines.named import engine_of
     from ..settings import Settings
 
     settings = Settings()
@@ -192,7 +192,7 @@ def large(
 
     from rich.console import Console
 
-    from ..scale.engines import engine_of
+    from ..scale.engines.named import engine_of
     from ..scale.large.plan import Large, keep
     from ..scale.large.run import large_work, run_large
 

@@ -8,6 +8,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 from rich.console import Console
@@ -27,8 +28,8 @@ from rich.text import Text
 from ..errors import InvalidParameter, NoModelError, ServiceError
 from ..meshfiles.convert import KINDS
 from ..options import Limits, Options
-from .engines import Engine, Work
-from .job import DONE, FAILED, PLANNED, SKIPPED, Row, Task, failed, run, target_of
+from .engines.work import Engine, Work
+from .job import DONE, FAILED, PLANNED, SKIPPED, Row, Task, failed, read_libraries, run, target_of
 from .journal import Journal, check_report
 from .places import Place, place_of
 from .sources import Item, items_of
@@ -72,6 +73,8 @@ class Summary:
 
 # A file that its worker does not survive twice is taken to be the cause.
 MOST_ATTEMPTS = 2
+# Files that are looked up in the journal together.
+LOOK_UP = 64
 
 
 def batch_work(seconds: float, job: Callable[[Task], Row] = run) -> Work[Task, Row]:
@@ -80,7 +83,7 @@ def batch_work(seconds: float, job: Callable[[Task], Row] = run) -> Work[Task, R
     def lost(task: Task, error: ServiceError) -> Row:
         return replace(failed(task.url, task.output, error), attempts=task.attempt)
 
-    return Work(job, lost, MOST_ATTEMPTS, seconds)
+    return Work(job, lost, MOST_ATTEMPTS, seconds, read_libraries)
 
 
 def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summary:
@@ -104,18 +107,19 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
             line = bar.add_task("refining", total=None, failed=0)
             _count_aside(listing, bar, line)
 
-            def note(row: Row) -> None:
-                journal.put(row)
-                counts[row.status] += 1
-                faces[row.status] += row.faces_out
-                if row.status == PLANNED:
-                    _say_plan(console, row)
-                if row.status == FAILED:
-                    console.print(f"{row.path}: {row.detail} [{row.code}]", markup=False)
-                bar.update(line, advance=1, failed=counts[FAILED])
+            def note(rows: list[Row]) -> None:
+                journal.put(rows)
+                for row in rows:
+                    counts[row.status] += 1
+                    faces[row.status] += row.faces_out
+                    if row.status == PLANNED:
+                        _say_plan(console, row)
+                    if row.status == FAILED:
+                        console.print(f"{row.path}: {row.detail} [{row.code}]", markup=False)
+                bar.update(line, advance=len(rows), failed=counts[FAILED])
 
-            for row in engine(_tasks(batch, listing, destination, journal, note)):
-                note(row)
+            for rows in engine(_tasks(batch, listing, destination, journal, note)):
+                note(rows)
     finally:
         failures = journal.failures()
         journal.close()
@@ -161,30 +165,45 @@ def _tasks(
     listing: Callable[[], Iterator[Item]],
     destination: Place,
     journal: Journal,
-    reject: Callable[[Row], None],
+    reject: Callable[[list[Row]], None],
 ) -> Iterator[Task]:
-    for item in listing():
-        try:
-            kind, target, relative = target_of(item.relative, batch.to, KINDS)
-        except ServiceError as error:
-            reject(failed(item.url, "", error))
-            continue
-        output = destination.below(relative).url
-        if not batch.dry and not journal.claim(output, item.url):
-            taken = f"{output} is another file's result; give each source a folder of its own"
-            reject(failed(item.url, output, ServiceError(taken, code="output-taken")))
-            continue
-        yield Task(
-            item.url,
-            output,
-            kind,
-            target,
-            batch.options,
-            batch.model,
-            batch.limits,
-            known=journal.known(item.url),
-            dry=batch.dry,
-        )
+    items = listing()
+    while block := list(islice(items, LOOK_UP)):
+        tasks: list[Task] = []
+        rejected: list[Row] = []
+        with journal.together():
+            for item in block:
+                try:
+                    tasks.append(_task(batch, item, destination, journal))
+                except ServiceError as error:
+                    rejected.append(failed(item.url, "", error))
+        if rejected:
+            reject(rejected)
+        yield from tasks
+
+
+def _task(batch: Batch, item: Item, destination: Place, journal: Journal) -> Task:
+    """What is to be done with a file, with what is known of it.
+
+    Raises:
+        ServiceError: nothing can be made of it, or not there.
+    """
+    kind, target, relative = target_of(item.relative, batch.to, KINDS)
+    output = destination.below(relative).url
+    if not batch.dry and not journal.claim(output, item.url):
+        taken = f"{output} is another file's result; give each source a folder of its own"
+        raise ServiceError(taken, code="output-taken")
+    return Task(
+        item.url,
+        output,
+        kind,
+        target,
+        batch.options,
+        batch.model,
+        batch.limits,
+        known=journal.known(item.url),
+        dry=batch.dry,
+    )
 
 
 class _Rate(ProgressColumn):

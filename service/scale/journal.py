@@ -18,6 +18,7 @@ from pns_common.whole_file import replacing
 
 from ..errors import InvalidParameter
 from .job import FAILED, PLANNED, SKIPPED, Row
+from .places import place_of
 
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS rows (
@@ -52,28 +53,53 @@ class Journal:
         return None if row is None else str(row[0])
 
     def claim(self, output: str, path: str) -> bool:
-        """Whether a result may be written at `output`: it is no other file's."""
+        """Whether a result may be written at `output`: no other file that is there holds it."""
         self._database.execute("INSERT OR IGNORE INTO outputs VALUES (?, ?)", (output, path))
-        row = self._database.execute(
-            "SELECT path FROM outputs WHERE output = ?", (output,)
-        ).fetchone()
-        return bool(row[0] == path)
-
-    def put(self, row: Row) -> None:
-        """Keep a row; one that was skipped, or only planned, leaves what is known as it is."""
-        if row.status in (SKIPPED, PLANNED):
-            return
+        query = "SELECT path FROM outputs WHERE output = ?"
+        holder = str(self._database.execute(query, (output,)).fetchone()[0])
+        if holder == path:
+            return True
+        if not place_of(holder).is_gone():
+            return False
+        # Its row would tell of a result that is replaced.
         self._database.execute(
-            "INSERT OR REPLACE INTO rows VALUES (?, ?, ?, ?, ?, ?)",
-            (
-                row.path,
-                self._work,
-                row.status,
-                row.code,
-                row.input_sha256,
-                json.dumps(row.as_dict()),
-            ),
+            "DELETE FROM rows WHERE path = ? AND json_extract(row, '$.output') = ?",
+            (holder, output),
         )
+        self._database.execute("UPDATE outputs SET path = ? WHERE output = ?", (path, output))
+        return True
+
+    def put(self, rows: list[Row]) -> None:
+        """Keep rows; those skipped, or only planned, leave what is known as it is."""
+        kept = [row for row in rows if row.status not in (SKIPPED, PLANNED)]
+        if not kept:
+            return
+        with self.together():
+            self._database.executemany(
+                "INSERT OR REPLACE INTO rows VALUES (?, ?, ?, ?, ?, ?)",
+                (
+                    (
+                        row.path,
+                        self._work,
+                        row.status,
+                        row.code,
+                        row.input_sha256,
+                        json.dumps(row.as_dict()),
+                    )
+                    for row in kept
+                ),
+            )
+
+    @contextmanager
+    def together(self) -> Iterator[None]:
+        """Write all changes inside at once, or none of them; other runs wait meanwhile."""
+        self._database.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self._database.execute("ROLLBACK")
+            raise
+        self._database.execute("COMMIT")
 
     def failures(self) -> list[tuple[str, int]]:
         """How many files of this work failed, by code, the most frequent first."""
@@ -97,12 +123,12 @@ class Journal:
             self._write_parquet()
             return
         with replacing(self.report) as temporary, temporary.open("w") as lines:
-            lines.writelines(json.dumps(row) + "\n" for row in self._rows())
+            lines.writelines(f"{row}\n" for row in self._rows())
 
-    def _rows(self) -> Iterator[dict[str, Any]]:
+    def _rows(self) -> Iterator[str]:
         query = "SELECT row FROM rows WHERE work = ? ORDER BY path"
         for (text,) in self._database.execute(query, (self._work,)):
-            yield json.loads(text)
+            yield text
 
     def _write_parquet(self) -> None:
         import pyarrow as arrow
@@ -117,7 +143,7 @@ class Journal:
         ):
             batch: list[dict[str, Any]] = []
             for row in self._rows():
-                batch.append(row)
+                batch.append(json.loads(row))
                 if len(batch) == BATCH:
                     writer.write_table(arrow.Table.from_pylist(batch, schema))
                     batch = []

@@ -18,6 +18,7 @@ from ..bodies.sibling_files import File, SiblingFiles
 from ..errors import InvalidParameter
 
 READ_ONLY = ("http", "https")
+THIS_MACHINE = LocalFileSystem()
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,19 @@ class Place:
 
     def read(self) -> bytes:
         """The whole file. Raises OSError."""
-        return bytes(self.system.cat_file(self.path))
+        return (
+            Path(self.path).read_bytes() if self.local else bytes(self.system.cat_file(self.path))
+        )
+
+    def is_gone(self) -> bool:
+        """Whether it is certain that nothing is there."""
+        try:
+            self.system.info(self.path)
+        except FileNotFoundError:
+            return True
+        except OSError:
+            return False
+        return False
 
     def is_file(self) -> bool:
         """Whether there is a file."""
@@ -60,8 +73,11 @@ class Place:
         """Write a file whole or not at all: renamed into place, or one put. Raises OSError."""
         if self.local:
             path = Path(self.path)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            replace_file(path, data)
+            try:
+                replace_file(path, data)
+            except FileNotFoundError:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                replace_file(path, data)
         else:
             # Object stores show an object only when its put has ended.
             self.system.pipe_file(self.path, data)
@@ -70,11 +86,11 @@ class Place:
         """The relative paths of all files below a folder, folder by folder in order of name."""
         for folder, folders, names in self._walk():
             folders.sort()
+            inside = posixpath.relpath(folder, self.path)
             for name in sorted(names):
-                inside = posixpath.relpath(posixpath.join(folder, name), self.path)
                 # A single file is what `walk` says of itself on some systems.
-                if name and inside != ".":
-                    yield inside
+                if name and posixpath.join(folder, name) != self.path:
+                    yield name if inside == "." else f"{inside}/{name}"
 
     def _walk(self) -> Iterator[tuple[str, list[str], list[str]]]:
         # A local folder of a million files is names alone, not what fsspec tells of each.
@@ -101,6 +117,8 @@ def place_of(text: str) -> Place:
     Raises:
         InvalidParameter: no file system takes it, or what that needs is not installed.
     """
+    if "://" not in text and "::" not in text:
+        return Place(THIS_MACHINE, str(LocalFileSystem._strip_protocol(text)))
     try:
         system, path = fsspec.core.url_to_fs(text)
     except (ValueError, ImportError) as error:

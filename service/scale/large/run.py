@@ -19,7 +19,7 @@ from pns_common.pieces import LevelTally, reduced_report
 from pns_common.schemes import Scheme
 
 from ...errors import InvalidParameter, ServiceError, WorkerDied
-from ..engines import Engine, Work
+from ..engines.work import Engine, Work
 from . import adjacency, partition
 from .arrays import ArrayMesh, blocks_of
 from .formats import OutputKind, input_mesh, output_kind
@@ -211,10 +211,11 @@ def _do(
     hidden = not console.is_terminal
     with Progress(*columns, console=console, transient=True, disable=hidden) as bar:
         line = bar.add_task("parts", total=parts, completed=parts - len(tasks))
-        for done in engine(iter(tasks)):
-            spent.part_seconds.append(done.seconds)
-            spent.peak_bytes = max(spent.peak_bytes, done.peak_bytes)
-            bar.advance(line)
+        for parts_done in engine(iter(tasks)):
+            for done in parts_done:
+                spent.part_seconds.append(done.seconds)
+                spent.peak_bytes = max(spent.peak_bytes, done.peak_bytes)
+            bar.advance(line, len(parts_done))
 
 
 def _report(

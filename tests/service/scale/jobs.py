@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 from service.scale.job import DONE, Row, Task
@@ -18,15 +19,36 @@ def misbehave(task: Task) -> Row:
     return Row(task.url, task.output, DONE, attempts=task.attempt)
 
 
-def process_of(_: Task) -> int:
+@dataclass(frozen=True)
+class Numbered:
+    """A task that leaves a line for each time that it is done."""
+
+    number: int
+    folder: Path
+    attempt: int = 1
+
+    @property
+    def processes(self) -> list[int]:
+        """The processes that began it."""
+        file = self.folder / str(self.number)
+        return [int(line) for line in file.read_text().split()] if file.exists() else []
+
+
+def process_of(task: Numbered) -> int:
     """Which process does a task."""
+    with (task.folder / str(task.number)).open("a") as lines:
+        lines.write(f"{os.getpid()}\n")
     return os.getpid()
+
+
+def third_dies(task: Numbered) -> tuple[int, int]:
+    """No process survives task 3."""
+    process_of(task)
+    if task.number == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return task.number, task.attempt
 
 
 def ends_at_once() -> None:
     """A worker that cannot begin."""
     os._exit(1)
-
-
-def begins_at_once() -> None:
-    """A worker that has nothing to prepare."""

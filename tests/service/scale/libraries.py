@@ -19,7 +19,7 @@ KINDS = ("glb", "gltf", "obj", "ply", "stl", "off")
 
 def here(tasks):
     """An engine without processes."""
-    return map(run, tasks)
+    return ([run(task)] for task in tasks)
 
 
 def library(folder: Path, names=("a.obj", "b/c.obj", "d.glb")) -> Path:

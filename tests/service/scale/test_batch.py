@@ -4,6 +4,7 @@ import hashlib
 import pickle
 import sqlite3
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,8 @@ from service.errors import InvalidParameter
 from service.meshfiles.convert import converted
 from service.options import Limits, Options
 from service.scale.batch import batch_work, work_hash
-from service.scale.engines import local
+from service.scale.engines.local import local
+from service.scale.engines.work import nothing
 from service.scale.job import Task, run
 from tests.service.scale.jobs import misbehave
 from tests.service.scale.libraries import (
@@ -71,7 +73,7 @@ def test_a_run_that_was_stopped_goes_on(tmp_path):
     library(tmp_path / "in")
 
     def stopped(tasks):
-        yield run(next(tasks))
+        yield [run(next(tasks))]
         raise KeyboardInterrupt
 
     batch = batch_of(tmp_path)
@@ -130,7 +132,7 @@ def test_a_fault_of_ours_is_told_and_the_rest_goes_on(tmp_path, monkeypatch):
 def test_workers_that_die_or_hang_cost_their_file_alone(tmp_path):
     library(tmp_path / "in", ["a.obj", "dies.obj", "dies-once.obj", "hangs.obj", "z.obj"])
     batch = batch_of(tmp_path)
-    summary = refined(batch, local(batch_work(3.0, misbehave), 2))
+    summary = refined(batch, local(replace(batch_work(1.0, misbehave), prepare=nothing), 2))
     by_name = rows(batch)
     assert summary.counts == {"done": 3, "failed": 2}
     assert (by_name["dies.obj"]["code"], by_name["dies.obj"]["attempts"]) == ("worker-died", 2)
@@ -144,6 +146,18 @@ def test_two_sources_of_one_result_are_told(tmp_path):
     summary = refined(batch_of(tmp_path, to="ply"))
     assert summary.counts == {"done": 1, "failed": 1}
     assert summary.failures == [("output-taken", 1)]
+
+
+def test_a_source_that_is_gone_holds_its_result_no_longer(tmp_path):
+    source = library(tmp_path / "in", ["a.obj"])
+    batch = batch_of(tmp_path, to="ply")
+    refined(batch)
+    (source / "a.obj").unlink()
+    (source / "a.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    assert refined(batch).counts == {"done": 1}
+    assert list(rows(batch)) == ["a.off"]
+    (source / "a.obj").write_bytes(TETRAHEDRON)
+    assert refined(batch).failures == [("output-taken", 1)]
 
 
 def test_a_dry_run_writes_nothing_but_its_report(tmp_path):

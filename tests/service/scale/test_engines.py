@@ -2,17 +2,17 @@
 
 import os
 import signal
+import sys
+from types import SimpleNamespace
 
 import pytest
 
 from service.errors import InvalidParameter, WorkerDied
-from service.options import Limits
-from service.scale import engines
 from service.scale.batch import batch_work
-from service.scale.engines import Work, local, on_ray
-from service.scale.job import Task
-from tests.service.scale.jobs import begins_at_once, ends_at_once, process_of
-from tests.service.scale.libraries import LOOP, batch_of, hashes, library, refined
+from service.scale.engines import chunks, local, on_ray
+from service.scale.engines.work import Work
+from tests.service.scale.jobs import Numbered, ends_at_once, process_of, third_dies
+from tests.service.scale.libraries import batch_of, hashes, library, refined
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -23,32 +23,109 @@ def test_ray_makes_the_same_bytes(tmp_path, monkeypatch):
     library(tmp_path / "in", ["a.obj", "b/c.obj"])
     refined(batch_of(tmp_path))
     over = batch_of(tmp_path, destination=str(tmp_path / "ray"), report=tmp_path / "ray.jsonl")
-    assert refined(over, on_ray(batch_work(60.0), None, 1)).counts == {"done": 2}
+    assert refined(over, on_ray.on_ray(batch_work(60.0), None, 1)).counts == {"done": 2}
     assert hashes(tmp_path / "ray") == hashes(tmp_path / "out")
 
 
-def tasks(count):
-    return (Task(f"{k}", "", "obj", "obj", LOOP, None, Limits()) for k in range(count))
+def tasks(folder, count):
+    return [Numbered(number, folder) for number in range(count)]
 
 
 def never(task, error):
     raise AssertionError(task, error)
 
 
-def test_a_worker_that_is_killed_between_two_tasks_costs_nothing(monkeypatch):
-    monkeypatch.setattr(engines, "prepare", begins_at_once)
-    processes = []
-    for process in local(Work(process_of, never, 1, None), 2)(tasks(5)):
-        processes.append(process)
-        os.kill(process, signal.SIGKILL)
-    assert len(set(processes)) == 5
+def test_a_worker_that_is_killed_between_two_tasks_costs_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(chunks, "MOST", 1)
+    processes, killed = [], []
+    sent = local._Worker.sent
+
+    def killed_before(worker, work, chunk):
+        """The one worker has nothing to do before each chunk: time to kill it."""
+        if chunk[0].number == len(killed) + 1:
+            killed.append(all_tasks[len(killed)].processes[-1])
+            os.kill(killed[-1], signal.SIGKILL)
+        return sent(worker, work, chunk)
+
+    monkeypatch.setattr(local._Worker, "sent", killed_before)
+    all_tasks = tasks(tmp_path, 4)
+    work = Work(process_of, never, 1, None)
+    for results in local.local(work, 1)(iter(all_tasks)):
+        processes += results
+    assert processes[:3] == killed
+    assert len(set(processes)) == 4
 
 
-def test_workers_that_never_begin_are_told(monkeypatch):
-    monkeypatch.setattr(engines, "prepare", ends_at_once)
-    monkeypatch.setattr(engines, "MOST_BROKEN", 2)
+def test_workers_that_never_begin_are_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(local, "MOST_BROKEN", 2)
+    work = Work(process_of, never, 1, None, ends_at_once)
     with pytest.raises(WorkerDied, match="2 workers ended"):
-        list(local(Work(process_of, never, 1, None), 1)(tasks(1)))
+        list(local.local(work, 1)(iter(tasks(tmp_path, 1))))
+
+
+def test_of_a_chunk_whose_worker_dies_the_task_it_was_at_is_to_blame(tmp_path, monkeypatch):
+    monkeypatch.setattr(chunks, "FIRST", 6)
+    all_tasks = tasks(tmp_path, 6)
+    work = Work(third_dies, lambda task, _: (task.number, -task.attempt), 2, None)
+    done = [result for results in local.local(work, 1)(iter(all_tasks)) for result in results]
+    assert sorted(done) == [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
+    assert len(all_tasks[3].processes) == 2
+    assert [len(task.processes) for task in all_tasks[4:]] == [1, 1]
+
+
+class Cluster:
+    """Stands in for Ray, connected: does what it is sent when it is asked for it."""
+
+    class exceptions:  # noqa: N801
+        RayError = RuntimeError
+        RayTaskError = type("RayTaskError", (RuntimeError,), {})
+
+    is_initialized = staticmethod(lambda: True)
+    cluster_resources = staticmethod(lambda: {"CPU": 1})
+
+    def __init__(self):
+        self.sent = []
+
+    def remote(self, **_):
+        def send(*arguments):
+            self.sent.append(arguments)
+            return len(self.sent) - 1
+
+        return lambda function: SimpleNamespace(remote=lambda *given: send(function, *given))
+
+    def wait(self, references, num_returns):
+        return references[:num_returns], references[num_returns:]
+
+    def get(self, reference):
+        function, *given = self.sent[reference]
+        return function(*given)
+
+
+def test_of_a_chunk_that_a_cluster_loses_each_task_goes_alone(tmp_path, monkeypatch):
+    def third_is_lost(task):
+        if task.number == 3:
+            raise Cluster.exceptions.RayError
+        return task.number, task.attempt
+
+    monkeypatch.setitem(sys.modules, "ray", Cluster())
+    monkeypatch.setattr(chunks, "FIRST", 6)
+    work = Work(third_is_lost, lambda task, _: (task.number, -task.attempt), 2, None)
+    engine = on_ray.on_ray(work, None, 1)
+    done = [result for results in engine(iter(tasks(tmp_path, 6))) for result in results]
+    assert sorted(done) == [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
+
+
+def test_small_tasks_fill_a_chunk_and_long_ones_go_alone():
+    assert chunks.Done([0] * 3, 0.003).next_size == chunks.MOST
+    assert chunks.Done([0] * 10, 1.0).next_size == 5
+    assert chunks.Done([0], 60.0).next_size == 1
+
+
+def test_a_chunk_ends_when_its_time_is_over(monkeypatch):
+    monkeypatch.setattr(chunks, "SECONDS", -1.0)
+    assert chunks.do(str, [1, 2, 3], None).results == ["1"]
+    monkeypatch.setattr(chunks, "SECONDS", 1e9)
+    assert chunks.do(str, [1, 2, 3], None).results == ["1", "2", "3"]
 
 
 class Ray:
@@ -72,7 +149,7 @@ SLOW = Exception("The current node timed out during startup. This could happen â
 
 def test_a_cluster_that_starts_slowly_is_started_again():
     ray = Ray(SLOW, SLOW)
-    assert engines._connected(ray, None, 1) == "connected"
+    assert on_ray._connected(ray, None, 1) == "connected"
     assert ray.calls == [None, "shutdown", None, "shutdown", None]
 
 
@@ -87,4 +164,4 @@ def test_a_cluster_that_starts_slowly_is_started_again():
 )
 def test_a_cluster_that_cannot_be_had_is_told(address, errors, words):
     with pytest.raises(InvalidParameter, match=words):
-        engines._connected(Ray(*errors), address, 1)
+        on_ray._connected(Ray(*errors), address, 1)

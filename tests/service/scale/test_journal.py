@@ -10,8 +10,8 @@ from service.scale.journal import Journal
 
 def test_a_journal_knows_only_what_was_done_by_the_same_work(tmp_path):
     journal = Journal(tmp_path / "r.jsonl", "one")
-    journal.put(Row("a", "x", "done", input_sha256="1"))
-    journal.put(Row("b", "y", "failed", input_sha256="2"))
+    journal.put([Row("a", "x", "done", input_sha256="1")])
+    journal.put([Row("b", "y", "failed", input_sha256="2")])
     assert (journal.known("a"), journal.known("b")) == ("1", None)
     journal.close()
     other = Journal(tmp_path / "r.jsonl", "two")
@@ -53,9 +53,9 @@ def test_a_journal_is_opened_and_closed_by_one_run_at_a_time(tmp_path, monkeypat
 
 def test_the_last_of_two_runs_reports_the_rows_of_both(tmp_path):
     first, second = (Journal(tmp_path / "r.jsonl", "work") for _ in range(2))
-    first.put(Row("a", "x", "done"))
+    first.put([Row("a", "x", "done")])
     first.close()
-    second.put(Row("b", "y", "done"))
+    second.put([Row("b", "y", "done")])
     second.close()
     lines = (tmp_path / "r.jsonl").read_text().splitlines()
     assert [json.loads(line)["path"] for line in lines] == ["a", "b"]

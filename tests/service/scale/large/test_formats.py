@@ -24,10 +24,10 @@ from service.meshfiles.indexed_triangles import IndexedTriangles
 from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Options
 from service.scale.large import weld as outside_memory
-from service.scale.large.part import run_part
 from service.scale.large.plan import Large
 from service.scale.large.run import run_large
 from service.scale.large.weld import weld_outside_memory
+from tests.service.scale.large.parts import here
 from tests.support.meshes import bent, grid, soups
 
 LOOP = Options(scheme="loop")
@@ -35,7 +35,7 @@ LOOP = Options(scheme="loop")
 
 def refined(source, output, parts=3, options=LOOP):
     large = Large(source, output, options, 2**31, parts)
-    report, _ = run_large(large, lambda tasks: map(run_part, tasks), Console(file=io.StringIO()))
+    report, _ = run_large(large, here, Console(file=io.StringIO()))
     return report
 
 

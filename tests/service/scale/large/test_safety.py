@@ -23,10 +23,10 @@ from service.errors import (
 )
 from service.options import Options
 from service.scale.large.arrays import let_go, new_array, open_mesh, reserve
-from service.scale.large.part import run_part
 from service.scale.large.plan import Large, work_folder
 from service.scale.large.run import run_large
 from service.scale.large.target import new_ply
+from tests.service.scale.large.parts import here
 from tests.support.meshes import bent, grid
 
 LOOP = Options(scheme="loop")
@@ -43,7 +43,7 @@ def source(tmp_path):
 
 def refined(source, output):
     large = Large(source, output, LOOP, 2**31, 2)
-    run_large(large, lambda tasks: map(run_part, tasks), Console(file=io.StringIO()))
+    run_large(large, here, Console(file=io.StringIO()))
 
 
 def header(text):
@@ -225,7 +225,7 @@ def test_a_part_whose_halo_is_too_large_is_told_with_the_vertex_that_makes_it_so
     deep = Options(scheme="loop", levels=6)
     large = Large(tmp_path / "in", tmp_path / "out", deep, 330 * 2**20)
     with pytest.raises(LimitError, match=r"with the halo .* 2,000, .* vertex 2000 alone .* 2,000"):
-        run_large(large, lambda tasks: map(run_part, tasks), Console(file=io.StringIO()))
+        run_large(large, here, Console(file=io.StringIO()))
     assert [file.name for file in tmp_path.iterdir()] == ["in"]
 
 

@@ -1,0 +1,88 @@
+"""What cannot be read, cut, refined or written is told, and says why."""
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh, MeshError
+from service.errors import (
+    InvalidParameter,
+    LimitError,
+    UnreadableError,
+    UnrefinableError,
+)
+from service.scale.large import part
+from service.scale.large.arrays import reserve
+from service.scale.large.run import parts_for
+from tests.service.scale.large.parts import arrays, many_kinds, refined
+from tests.support.meshes import bow_tie
+
+
+def test_memory_says_how_many_parts():
+    assert parts_for(1000, 2**31) == 1
+    assert parts_for(10**9, 2**32) > parts_for(10**9, 2**33) > 10
+    with pytest.raises(InvalidParameter, match="MiB or more"):
+        parts_for(1000, 10**6)
+
+
+def test_more_parts_than_faces_are_refused(tmp_path):
+    with pytest.raises(InvalidParameter, match="parts"):
+        refined(arrays(tmp_path / "in", Mesh(*bow_tie())), tmp_path / "out", 3)
+
+
+@pytest.mark.parametrize("name", ["out.xyz", "in", "missing"])
+def test_what_cannot_be_read_or_written_is_told(tmp_path, name):
+    source = arrays(tmp_path / "in", Mesh(*bow_tie()))
+    with pytest.raises(InvalidParameter):
+        refined(tmp_path / "no" if name == "missing" else source, tmp_path / name, 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "array"),
+    [
+        ("positions", np.zeros((3, 2))),
+        ("positions", np.zeros((3, 3), dtype="<i4")),
+        ("faces", np.zeros((1, 3))),
+        ("faces", np.asfortranarray(np.zeros((2, 3), dtype="<i4"))),
+        ("creases", np.zeros((1, 3), dtype="<i4")),
+        ("faces", None),
+    ],
+)
+def test_arrays_of_another_kind_are_refused(tmp_path, name, array):
+    source = arrays(tmp_path / "in", Mesh(*bow_tie()))
+    if array is None:
+        (source / f"{name}.npy").write_bytes(b"no array")
+    else:
+        np.save(source / f"{name}.npy", array)
+    with pytest.raises(UnreadableError, match=name):
+        refined(source, tmp_path / "out", 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "array", "words"),
+    [
+        ("faces", np.zeros((0, 3), dtype="<i4"), "no faces"),
+        ("faces", np.array([[0, 1, 9]], dtype="<i4"), "face 0"),
+        ("positions", np.full((5, 3), np.nan), "vertex 0"),
+        ("positions", np.eye(5, 3) * 1e-80, "extent"),
+    ],
+)
+def test_meshes_that_cannot_be_refined_are_told(tmp_path, name, array, words):
+    source = arrays(tmp_path / "in", Mesh(*bow_tie()))
+    np.save(source / f"{name}.npy", array)
+    with pytest.raises(UnrefinableError, match=words):
+        refined(source, tmp_path / "out", 1)
+
+
+def test_a_part_that_cannot_be_refined_is_told(tmp_path, monkeypatch):
+    def too_large(*_):
+        raise MeshError("refined coordinates are too large")
+
+    monkeypatch.setattr(part, "refine_piece", too_large)
+    with pytest.raises(UnrefinableError, match="part 0: refined coordinates"):
+        refined(arrays(tmp_path / "in", many_kinds()), tmp_path / "out", 1)
+
+
+def test_a_disk_without_room_is_told_beforehand(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(LimitError, match="GB are needed"):
+        reserve(tmp_path / "file", 2**43)

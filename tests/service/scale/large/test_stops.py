@@ -1,0 +1,100 @@
+"""Drivers that are stopped, workers that are killed: nothing is lost, and nothing done twice."""
+
+import shutil
+from dataclasses import replace
+
+import pytest
+
+from pns_common import Mesh, loop, refine
+from service.errors import (
+    InvalidParameter,
+    WorkerDied,
+)
+from service.scale.engines.local import local
+from service.scale.large import part
+from service.scale.large.part import run_part
+from service.scale.large.run import large_work
+from tests.service.scale.large.jobs import dies_at_first, dies_often
+from tests.service.scale.large.parts import arrays, assert_is, contents, here, many_kinds, refined
+from tests.support.meshes import bent, grid
+
+
+def test_a_driver_that_was_stopped_goes_on(tmp_path):
+    source = arrays(tmp_path / "in", many_kinds())
+    refined(source, tmp_path / "expected", 9)
+    done = []
+
+    def stops(tasks):
+        for number, task in enumerate(tasks):
+            if task.stage == part.REFINE and number == 4:
+                raise KeyboardInterrupt
+            done.append((task.stage, task.part))
+            yield [run_part(task)]
+
+    with pytest.raises(KeyboardInterrupt):
+        refined(source, tmp_path / "out", 9, engine=stops)
+    assert not (tmp_path / "out").exists()
+    first = set(done)
+    done.clear()
+
+    def goes_on(tasks):
+        for task in tasks:
+            done.append((task.stage, task.part))
+            yield [run_part(task)]
+
+    refined(source, tmp_path / "out", 9, engine=goes_on)
+    assert not first & set(done)
+    assert contents(tmp_path / "out") == contents(tmp_path / "expected")
+    assert not (tmp_path / "out.work").exists()
+
+
+def test_another_input_or_option_begins_anew(tmp_path):
+    source = arrays(tmp_path / "in", many_kinds())
+
+    def stops(tasks):
+        yield [run_part(next(tasks))]
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refined(source, tmp_path / "out", 3, engine=stops)
+    shutil.rmtree(source)
+    mesh = Mesh(*grid(9, bent))
+    refined(arrays(tmp_path / "in", mesh), tmp_path / "out", 3)
+    assert_is(tmp_path / "out", refine(mesh, loop(), 2))
+
+
+def test_two_runs_do_not_share_a_work(tmp_path):
+    source = arrays(tmp_path / "in", many_kinds())
+
+    def second(tasks):
+        with pytest.raises(InvalidParameter, match="another run"):
+            refined(source, tmp_path / "out", 3)
+        return here(tasks)
+
+    refined(source, tmp_path / "out", 3, engine=second)
+
+
+def test_workers_that_are_killed_change_nothing(tmp_path):
+    source = arrays(tmp_path / "in", many_kinds())
+    refined(source, tmp_path / "expected", 2)
+    refined(source, tmp_path / "out", 2, engine=local(large_work(dies_at_first), 2))
+    assert contents(tmp_path / "out") == contents(tmp_path / "expected")
+
+
+def test_a_part_that_kills_each_of_its_workers_is_told(tmp_path):
+    source = arrays(tmp_path / "in", many_kinds())
+    work = replace(large_work(dies_often), most_attempts=2)
+    with pytest.raises(WorkerDied, match=r"part 1: its worker ended, twice.*--parts"):
+        refined(source, tmp_path / "out", 2, engine=local(work, 1))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_ray_makes_the_same_bytes(tmp_path, monkeypatch):
+    pytest.importorskip("ray", reason="the extra [ray] is not installed")
+    from service.scale.engines.on_ray import on_ray
+
+    monkeypatch.setenv("RAY_raylet_start_wait_time_s", "300")
+    source = arrays(tmp_path / "in", many_kinds())
+    refined(source, tmp_path / "expected", 3)
+    refined(source, tmp_path / "out", 3, engine=on_ray(large_work(), None, 1))
+    assert contents(tmp_path / "out") == contents(tmp_path / "expected")
