@@ -119,7 +119,7 @@ def create_app(
     app.state.metrics = metrics
     problems.install(app)
     models = ReadOnce(workers[Lane.SHORT], admission, catalogue, metrics.catalogue)
-    service = Service(settings, workers[Lane.ANY], desk, admission, models, book)
+    service = Service(settings, desk, admission, models, book)
     app.include_router(routes.router(service))
     app.include_router(job_routes.router(service))
     app.include_router(docs_page.router())

@@ -65,7 +65,7 @@ def router(service: Service) -> APIRouter:
     async def readyz() -> JSONResponse:
         if service.admission.draining:
             raise DrainingError("no new request is taken", retry_after=5)
-        if not service.workers.ready:
+        if not service.desk.ready:
             raise NoModelError("no worker has loaded the model")
         return JSONResponse({"status": "ready"})
 

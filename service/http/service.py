@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from ..settings import Settings
 from ..workers.desk import Desk
-from ..workers.pool import Workers
 from .admission import Admission
 from .catalogue import ReadOnce
 from .job_book import JobBook
@@ -14,10 +13,9 @@ from .job_book import JobBook
 
 @dataclass(frozen=True)
 class Service:
-    """One service: its settings, its workers, who is inside, and what it keeps."""
+    """One service: its settings, its desk, who is inside, and what it keeps."""
 
     settings: Settings
-    workers: Workers
     desk: Desk
     admission: Admission
     models: ReadOnce

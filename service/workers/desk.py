@@ -59,6 +59,16 @@ class Desk:
         self._slowness = 1.0
 
     @property
+    def ready(self) -> bool:
+        """Whether a job would start at once: all lanes have warmed up, and one for any job lives.
+
+        The lane of short jobs measures each job first. Once warm, it is back within seconds
+        whatever kills its worker; that must not take the service out of a cluster.
+        """
+        pools = self._workers.values()
+        return all(pool.warmed for pool in pools) and self._workers[Lane.ANY].ready
+
+    @property
     def restarts(self) -> Counter[str]:
         """How often a worker was replaced, by cause."""
         return sum((workers.restarts for workers in self._workers.values()), Counter())

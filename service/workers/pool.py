@@ -52,6 +52,8 @@ class Workers:
         self._stopping = False
         self.restarts: Counter[str] = Counter()
         """How often a process was replaced, by cause."""
+        self.warmed = False
+        """Whether a worker has ever warmed up."""
 
     @property
     def ready(self) -> bool:
@@ -174,6 +176,7 @@ class Workers:
             log.warning("a worker did not warm up: %s", error)
         else:
             self._warm.add(pool)
+            self.warmed = True
         self._free.put_nowait(pool)
 
     def _let_go(self, pool: ProcessPool) -> None:

@@ -1,0 +1,55 @@
+"""The desk: when jobs would start at once."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+
+from service.workers.budget import FacesBudget
+from service.workers.desk import Desk
+from service.workers.pool import Workers
+from service.workers.turns import Lane, Turns
+from tests.service.workers.test_pool import run, workers
+from tests.support import stand_in_jobs as jobs
+
+
+def desk_of(many: Workers, short: Workers) -> Desk:
+    return Desk(
+        {Lane.ANY: many, Lane.SHORT: short},
+        Turns(1, 1, 1.0),
+        FacesBudget(),
+        run=jobs.obey,
+        measure=jobs.measure,
+        job_seconds=30,
+    )
+
+
+def test_ready_once_every_lane_has_warmed_up() -> None:
+    """Each job is measured in the lane of short jobs first: the first one would wait for it."""
+
+    async def scenario() -> None:
+        async with workers() as many, workers(warm_up=jobs.refuse) as short:
+            await asyncio.gather(many.run(jobs.nothing), short.run(jobs.nothing))
+            assert many.ready
+            assert not desk_of(many, short).ready
+        async with workers() as many, workers() as short:
+            desk = desk_of(many, short)
+            await asyncio.gather(many.run(jobs.nothing), short.run(jobs.nothing))
+            assert desk.ready
+
+    run(scenario)
+
+
+def test_a_killed_worker_of_the_short_lane_does_not_take_the_service_away() -> None:
+    async def scenario() -> None:
+        async with workers() as many, workers() as short:
+            desk = desk_of(many, short)
+            process = await short.run(jobs.pid)
+            await many.run(jobs.nothing)
+            os.kill(process, signal.SIGKILL)
+            while short.ready:
+                await asyncio.sleep(0.005)
+            assert desk.ready
+
+    run(scenario)
