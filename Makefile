@@ -198,10 +198,10 @@ build/bench/node/.ready: benchmarks/peers/package.json
 	cd $(@D) && npm install --ignore-scripts --no-audit --no-fund
 	touch $@
 
-# Growth of `pns large` and `pns batch` with faces, parts and files, and its plot in docs/: half an hour,
-# 6 GB of disk. What benchmarks/scale.json holds is not measured again.
+# Growth of `pns large` and `pns batch` with faces, parts, files and rows, and its plot in docs/: ten minutes, 6 GB of
+# disk. What benchmarks/scale.json holds is not measured again. SCALE="--share .01" tries it at a hundredth of all sizes.
 scale: $(DEV)/.ready
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m benchmarks.scale
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m benchmarks.scale $(SCALE)
 
 # One by one: a library without a build for this machine keeps no other away.
 $(PEERS)/.ready: benchmarks/peers/requirements.txt

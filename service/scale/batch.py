@@ -104,19 +104,17 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
     faces: Counter[str] = Counter()
     try:
         with _progress(console) as bar:
-            line = bar.add_task("refining", total=None, failed=0)
-            _count_aside(listing, bar, line)
+            work = bar.add_task("refining", total=None, failed=0)
+            _count_aside(listing, bar, work)
 
             def note(rows: list[Row]) -> None:
                 journal.put(rows)
                 for row in rows:
                     counts[row.status] += 1
                     faces[row.status] += row.faces_out
-                    if row.status == PLANNED:
-                        _say_plan(console, row)
-                    if row.status == FAILED:
-                        console.print(f"{row.path}: {row.detail} [{row.code}]", markup=False)
-                bar.update(line, advance=len(rows), failed=counts[FAILED])
+                if lines := [line for row in rows if (line := _line(row))]:
+                    console.print("\n".join(lines), markup=False)
+                bar.update(work, advance=len(rows), failed=counts[FAILED])
 
             for rows in engine(_tasks(batch, listing, destination, journal, note)):
                 note(rows)
@@ -239,7 +237,10 @@ def _count_aside(listing: Callable[[], Iterator[Item]], bar: Progress, line: Tas
     threading.Thread(target=count, daemon=True).start()
 
 
-def _say_plan(console: Console, row: Row) -> None:
-    console.print(
-        f"{row.path} -> {row.output}: {row.faces_in:,} faces to {row.faces_out:,}", markup=False
-    )
+def _line(row: Row) -> str:
+    """What is said of a file at once: why it failed, or what is planned."""
+    if row.status == FAILED:
+        return f"{row.path}: {row.detail} [{row.code}]"
+    if row.status == PLANNED:
+        return f"{row.path} -> {row.output}: {row.faces_in:,} faces to {row.faces_out:,}"
+    return ""

@@ -26,6 +26,7 @@ from .formats import OutputKind, input_mesh, output_kind
 from .numbering import BASES, write_bases
 from .part import COUNT, REFINE, PartDone, PartTask, done_file, run_part, scheme_of
 from .plan import Large, keep, kept, work_folder
+from .room import check_room
 from .survey import Survey, survey, used_vertices
 from .target import Target
 from .tiles import Tiles
@@ -87,6 +88,8 @@ def run_large(
         parts = large.parts or parts_for(about.faces * 4**large.options.levels, large.memory)
         if parts > about.faces:
             raise InvalidParameter("parts", f"{parts} parts of {about.faces} faces")
+        if not (work / partition.ORDER).exists():
+            check_room(work, about, large.options.levels, kind)
         with spent.stage("cut"):
             _cut(mesh, about, parts, work)
         with spent.stage("kernels"):

@@ -1,15 +1,20 @@
 """What a batch works through: manifests, globs and folders, here and behind URLs."""
 
 import json
+import os
 import socket
 import threading
 import tracemalloc
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from service.errors import InvalidParameter
+from service.scale.batch import run_batch
+from service.scale.job import SKIPPED, Row
 from service.scale.sources import items_of
 from tests.service.scale.libraries import (
     KINDS,
@@ -70,6 +75,25 @@ def test_a_long_manifest_takes_no_memory(tmp_path):
         assert tracemalloc.get_traced_memory()[1] < 300_000
     finally:
         tracemalloc.stop()
+
+
+def test_a_driver_holds_no_row_of_a_long_manifest(tmp_path):
+    count = 5000
+    with (tmp_path / "list.txt").open("w") as file:
+        file.writelines(f"folder/file-{number}.obj\n" for number in range(count))
+    batch = batch_of(tmp_path, tmp_path / "list.txt", dry=True)
+
+    def skipped(tasks):
+        return ([Row(task.url, task.output, SKIPPED)] for task in tasks)
+
+    with Path(os.devnull).open("w") as nowhere:
+        tracemalloc.start()
+        try:
+            summary = run_batch(batch, skipped, Console(file=nowhere))
+            assert tracemalloc.get_traced_memory()[1] < 500_000
+        finally:
+            tracemalloc.stop()
+    assert summary.counts == {"skipped": count}
 
 
 @pytest.mark.parametrize("text", ["size\n1\n", "path\n\n"])

@@ -1,5 +1,7 @@
 """What cannot be read, cut, refined or written is told, and says why."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -10,11 +12,13 @@ from service.errors import (
     UnreadableError,
     UnrefinableError,
 )
-from service.scale.large import part
-from service.scale.large.arrays import reserve
+from service.scale.large import part, room
+from service.scale.large.arrays import open_mesh, reserve
+from service.scale.large.formats import output_kind
 from service.scale.large.run import parts_for
+from service.scale.large.survey import survey
 from tests.service.scale.large.parts import arrays, many_kinds, refined
-from tests.support.meshes import bow_tie
+from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid
 
 
 def test_memory_says_how_many_parts():
@@ -80,6 +84,29 @@ def test_a_part_that_cannot_be_refined_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(part, "refine_piece", too_large)
     with pytest.raises(UnrefinableError, match="part 0: refined coordinates"):
         refined(arrays(tmp_path / "in", many_kinds()), tmp_path / "out", 1)
+
+
+def test_a_disk_that_is_too_small_is_told_before_any_part_is_done(tmp_path, monkeypatch):
+    def never(_):
+        raise AssertionError("no part is asked for")
+
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: SimpleNamespace(free=1000))
+    source = arrays(tmp_path / "in", Mesh(*grid(9, bent)))
+    with pytest.raises(LimitError, match=r"out.work.*GB are needed, 0.0 GB are free"):
+        refined(source, tmp_path / "out", 1, engine=never)
+    assert [path.name for path in tmp_path.iterdir()] == ["in"]
+
+
+@pytest.mark.parametrize("name", ["out.ply", "out", "out.3dtiles"])
+def test_the_room_that_is_asked_for_is_what_a_run_takes(tmp_path, name):
+    mesh = Mesh(*bumpy_sphere(subdivisions=3))
+    refined(arrays(tmp_path / "in", mesh), tmp_path / name, 1)
+    files = [tmp_path / name] if name.endswith("ply") else list((tmp_path / name).iterdir())
+    written = sum(path.stat().st_size for path in files)
+    about = survey(open_mesh(tmp_path / "in"))
+    passes = room.PASSES_BYTES_PER_FACE * len(mesh.faces)
+    needed = room.bytes_needed(about, 2, output_kind(tmp_path / "new" / name)) - passes
+    assert 0.9 * written <= needed <= 1.1 * written
 
 
 def test_a_disk_without_room_is_told_beforehand(tmp_path):

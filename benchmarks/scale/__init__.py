@@ -1,0 +1,1 @@
+"""Libraries of files, and meshes larger than memory: what they take."""

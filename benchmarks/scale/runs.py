@@ -1,0 +1,162 @@
+"""The runs: each takes a process of its own, so that its memory is its own."""
+
+from __future__ import annotations
+
+import io
+import os
+import resource
+import shutil
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .meshes import bytes_of, torus
+from .watch import Watch
+
+TETRAHEDRON = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def large(
+    faces: int, levels: int, parts: int | None, workers: int, memory: int, place: Path
+) -> dict[str, Any]:
+    """`pns large`: a torus refined to so many faces outside memory; all files are removed again."""
+    from rich.console import Console
+
+    from service.options import Options
+    from service.scale.engines.local import local
+    from service.scale.large.plan import Large
+    from service.scale.large.run import large_work, run_large
+
+    control = faces // 4**levels
+    # Three fifths of it for each face made: twelve bytes of corners, and half a vertex.
+    needed, free = 26 * faces + bytes_of(control), shutil.disk_usage(place).free
+    if needed > free:
+        raise SystemExit(f"{place}: {needed / 1e9:.0f} GB are needed, {free / 1e9:.0f} are free")
+    with tempfile.TemporaryDirectory(dir=place) as inside:
+        source, output = Path(inside) / "in", Path(inside) / "out"
+        torus(source, control)
+        asked = Large(source, output, Options(levels=levels), memory, parts)
+        began = time.perf_counter()
+        with Watch(Path(inside)) as watch:
+            engine = local(large_work(), workers)
+            report, spent = run_large(asked, engine, Console(file=io.StringIO()))
+        seconds = time.perf_counter() - began
+    return {
+        "faces": report["levels"][-1]["faces"],
+        "control_faces": report["levels"][-1]["faces"] // 4**levels,
+        "levels": levels,
+        "parts": len(spent.part_seconds),
+        "workers": workers,
+        "wall_seconds": seconds,
+        "seconds": spent.seconds,
+        "processor_seconds": processor_seconds(),
+        "driver_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+        "worker_bytes": spent.peak_bytes,
+        "limit_distance": report["limit_distance"],
+        **watch.as_dict(),
+    }
+
+
+def in_memory(threads: int, faces: int, levels: int) -> dict[str, Any]:
+    """`refine` of a torus in memory, the better of two."""
+    from pns_common import Mesh, load_model, pns, refine
+    from pns_common.fused import load_kernels
+
+    load_kernels()
+    with tempfile.TemporaryDirectory() as place:
+        torus(Path(place) / "in", faces // 4**levels)
+        arrays = (np.load(Path(place) / "in" / f"{name}.npy") for name in ("positions", "faces"))
+        mesh, scheme = Mesh(*arrays), pns(load_model())
+        seconds = []
+        for _ in range(2):
+            began = time.perf_counter()
+            made = refine(mesh, scheme, levels, threads=threads)
+            assert made.report["levels"]
+            seconds.append(time.perf_counter() - began)
+    return {"faces": len(mesh.faces) * 4**levels, "threads": threads, "seconds": min(seconds)}
+
+
+def library(workers: int, files: int) -> dict[str, Any]:
+    """`pns batch` of so many small files, beside a bare loop over the same, before and after.
+
+    The loop asks for the report of each file too, whose certificate is in the batch's rows.
+    """
+    from rich.console import Console
+
+    from service.options import Limits, Options
+    from service.scale.batch import Batch, batch_work, run_batch
+    from service.scale.engines.local import local
+
+    options = Options(scheme="loop", levels=3)
+    with tempfile.TemporaryDirectory() as place:
+        source, output = Path(place) / "in", Path(place) / "out"
+        source.mkdir()
+        for number in range(files):
+            (source / f"{number:05}.obj").write_bytes(TETRAHEDRON)
+        # What is imported or compiled at the first files is not of the loop.
+        _loop(source, Path(place) / "warm", options, min(files, 200))
+        before = _loop(source, Path(place) / "before", options, files)
+        report = Path(place) / "report.jsonl"
+        batch = Batch(str(source), str(output), options, Limits(), report)
+        began, used, own = time.perf_counter(), processor_seconds(), time.process_time()
+        summary = run_batch(batch, local(batch_work(60.0), workers), Console(file=io.StringIO()))
+        took, took_processor = time.perf_counter() - began, processor_seconds() - used
+        driver = time.process_time() - own
+        assert summary.counts == {"done": files}
+        after = _loop(source, Path(place) / "after", options, files)
+    return {
+        "files": files,
+        "workers": workers,
+        "loop_seconds": [before[0], after[0]],
+        "loop_processor_seconds": [before[1], after[1]],
+        "batch_seconds": took,
+        "batch_processor_seconds": took_processor,
+        "driver_processor_seconds": driver,
+    }
+
+
+def _loop(source: Path, output: Path, options: Any, files: int) -> tuple[float, float]:
+    """Wall and processor seconds of a bare loop."""
+    from service.meshfiles.convert import converted
+    from service.options import Limits
+
+    output.mkdir()
+    began, used = time.perf_counter(), time.process_time()
+    for path in sorted(source.iterdir())[:files]:
+        made = converted(path.read_bytes(), "obj", "obj", options, None, Limits())
+        assert made.report["levels"]
+        (output / path.name).write_bytes(made.content)
+    return time.perf_counter() - began, time.process_time() - used
+
+
+def manifest(rows: int) -> dict[str, Any]:
+    """The driver's memory over a dry run of a manifest; each second row names a missing file."""
+    from rich.console import Console
+
+    from service.options import Limits, Options
+    from service.scale.batch import Batch, batch_work, run_batch
+    from service.scale.engines.local import local
+
+    with tempfile.TemporaryDirectory() as place, Path(os.devnull).open("w") as nowhere:
+        folder = Path(place)
+        (folder / "a.obj").write_bytes(TETRAHEDRON)
+        with (folder / "list.txt").open("w") as lines:
+            lines.writelines(f"missing/{n}.obj\n" if n % 2 else "a.obj\n" for n in range(rows))
+        source, report = folder / "list.txt", folder / "report.jsonl"
+        options = Options(scheme="loop")
+        batch = Batch(str(source), str(folder / "out"), options, Limits(), report, dry=True)
+        began = time.perf_counter()
+        with Watch(folder) as watch:
+            summary = run_batch(batch, local(batch_work(60.0), 1), Console(file=nowhere))
+        seconds = time.perf_counter() - began
+    assert summary.counts == {"planned": rows - rows // 2, "failed": rows // 2}
+    return {"rows": rows, "seconds": seconds, **watch.as_dict()}
+
+
+def processor_seconds() -> float:
+    """Of this process so far, and of its workers that have ended."""
+    used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(each.ru_utime + each.ru_stime for each in used)
