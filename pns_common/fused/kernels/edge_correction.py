@@ -170,9 +170,12 @@ def shortened(v, longest):
 
 
 @njit(inline="always")
-def ratio_of(v, envelope):
-    """‖δ‖ / ρ; 0 where the envelope is empty."""
-    return norm(v) / envelope if envelope > 0 else 0.0
+def write(index, delta, gate, envelope, displacement, ratio, gates, envelopes):
+    """δ, ‖δ‖ / ρ (0 where the envelope is empty), γ and ρ into their arrays."""
+    for k in range(3):
+        displacement[index, k] = delta[k]
+    ratio[index] = norm(delta) / envelope if envelope > 0 else 0.0
+    gates[index], envelopes[index] = gate, envelope
 
 
 @kernel(
@@ -200,9 +203,7 @@ def correct(
         turned = _rotated(frame, i, in_ball(row(eta, i)))
         size = envelope * gate[i]
         delta = size * turned[0], size * turned[1], size * turned[2]
-        for k in range(3):
-            displacement[e, k] = delta[k]
-        ratio[e], gates[e], envelopes[e] = ratio_of(delta, envelope), gate[i], envelope
+        write(e, delta, gate[i], envelope, displacement, ratio, gates, envelopes)
     return 0
 
 
@@ -266,7 +267,5 @@ def correct_scale_free(
         )
         allowed = shortened(wanted, envelope)
         delta = gate[i] * allowed[0], gate[i] * allowed[1], gate[i] * allowed[2]
-        for k in range(3):
-            displacement[e, k] = delta[k]
-        ratio[e], gates[e], envelopes[e] = ratio_of(delta, envelope), gate[i], envelope
+        write(e, delta, gate[i], envelope, displacement, ratio, gates, envelopes)
     return 0

@@ -16,7 +16,7 @@ from pns_common.fused.kernels.compiled import (
     SIZE,
     kernel,
 )
-from pns_common.fused.kernels.edge_correction import in_ball, ratio_of, shortened
+from pns_common.fused.kernels.edge_correction import in_ball, shortened, write
 from pns_common.fused.kernels.rings import (
     BEND_SQUARE,
     HEIGHT,
@@ -105,9 +105,7 @@ def correct(
         vector = in_ball(_combined(in_ball(row(z, i)), means, fields, v))
         size = envelope * gate[i]
         delta = size * vector[0], size * vector[1], size * vector[2]
-        for k in range(3):
-            displacement[v, k] = delta[k]
-        ratio[v], gates[v], envelopes[v] = ratio_of(delta, envelope), gate[i], envelope
+        write(v, delta, gate[i], envelope, displacement, ratio, gates, envelopes)
     return 0
 
 
@@ -157,7 +155,5 @@ def correct_scale_free(
         )
         allowed = shortened(wanted, envelope)
         delta = gate[i] * allowed[0], gate[i] * allowed[1], gate[i] * allowed[2]
-        for k in range(3):
-            displacement[v, k] = delta[k]
-        ratio[v], gates[v], envelopes[v] = ratio_of(delta, envelope), gate[i], envelope
+        write(v, delta, gate[i], envelope, displacement, ratio, gates, envelopes)
     return 0
