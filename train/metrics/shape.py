@@ -4,7 +4,7 @@ The one-step metrics of `train.metrics.one_step` are the published ones, at inse
 see old vertices too, and their normal error is one that shading would show.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -52,10 +52,6 @@ class LevelErrors:
     normal_jump: float
     ratio: float
     flipped: int
-
-    def as_row(self) -> dict[str, float]:
-        """Return all numbers by name."""
-        return {**asdict(self.shape), **{k: v for k, v in asdict(self).items() if k != "shape"}}
 
 
 @dataclass(frozen=True, slots=True)

@@ -63,13 +63,12 @@ def test_an_unconstrained_network_keeps_nothing():
 def test_the_planar_spectrum_comes_out_as_published(valence):
     network = initial_network(paper())
     exact = subject_of_network(recipe_model(paper(), network)).exact
-    cells = spectral.planar_row(exact, Operator(in_double(network), paper()), valence)
-    row = {column.name: cell for column, cell in zip(spectral.COLUMNS, cells, strict=True)}
-    assert row["tangent"] == pytest.approx(row["published_tangent"], abs=5e-10)
-    assert row["gap_one_ring"] == pytest.approx(row["published_gap"], abs=5e-7)
-    assert row["gap"] == pytest.approx(row["gap_analytic"], abs=1e-9)
-    assert row["departure_autograd"] == 0
-    assert row["departure"] < 1e-9
+    row = spectral.planar_row(exact, Operator(in_double(network), paper()), valence)
+    assert row.tangent == pytest.approx(row.published_tangent, abs=5e-10)
+    assert row.gap_one_ring == pytest.approx(row.published_gap, abs=5e-7)
+    assert row.gap == pytest.approx(row.gap_analytic, abs=1e-9)
+    assert row.departure_autograd == 0
+    assert row.departure < 1e-9
 
 
 def test_the_published_table_is_copied_rightly():
@@ -86,6 +85,6 @@ def test_stars_drift_in_proportion_to_the_budget():
         scheme = subject_of_network(model, budget).exact
         flat, lifted = follow_lift(scheme, 4, np.array([0.0, 0.2]))
         row = lifted_star_row(4, budget, 0.0, flat)
-        assert row[6] == pytest.approx(row[7], abs=1e-9)  # the margin is Loop's gap
-        drift.append(lifted_star_row(4, budget, 0.2, lifted)[4])
+        assert row.margin == pytest.approx(row.loop_gap, abs=1e-9)
+        drift.append(lifted_star_row(4, budget, 0.2, lifted).drift)
     assert drift[1] / drift[0] == pytest.approx(2, rel=0.1)

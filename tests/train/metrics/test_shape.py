@@ -68,12 +68,12 @@ def test_faces_without_area_are_left_out():
 def test_a_level_has_the_report_beside_its_errors():
     instance = ridge_held_out().instances[0]
     refinement = refine(instance.mesh, loop(), levels=2, reference_length=1.0)
-    row = level_errors(instance.surface, refinement, 2).as_row()
+    errors = level_errors(instance.surface, refinement, 2)
     report = refinement.report["levels"][-1]
-    assert row["faces"] == report["faces"] == 16 * 128
-    assert row["normal_jump"] == report["normal_jump_max"]
-    assert row["ratio"] == row["flipped"] == 0
-    assert row["level"] == 2
+    assert errors.faces == report["faces"] == 16 * 128
+    assert errors.normal_jump == report["normal_jump_max"]
+    assert errors.ratio == errors.flipped == 0
+    assert errors.level == 2
     cheap = distance_level(instance.surface, refinement)
-    assert (cheap.distance, cheap.hausdorff) == (row["distance"], row["hausdorff"])
-    assert (cheap.faces, cheap.jump, cheap.ratio) == (row["faces"], row["normal_jump"], 0)
+    assert (cheap.distance, cheap.hausdorff) == (errors.shape.distance, errors.shape.hausdorff)
+    assert (cheap.faces, cheap.jump, cheap.ratio) == (errors.faces, errors.normal_jump, 0)

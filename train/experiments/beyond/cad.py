@@ -2,9 +2,10 @@
 
 from train.data.datasets import Dataset
 from train.data.patches import fillets, rounded_boxes, tori
-from train.experiments.harness.comparison import COLUMNS, LIMIT_NOTE, comparison_rows
-from train.experiments.harness.experiment import Cell, Experiment, Outcome, Table
+from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import table
 from train.metrics.envelope import envelope_limit
 from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import paper
@@ -23,13 +24,13 @@ def run(laboratory: Laboratory) -> Outcome:
     """Measure the default network on the three families."""
     recipe = paper()
     scheme = laboratory.scheme(recipe)
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Comparison] = []
     for family in (fillets(), tori(), rounded_boxes()):
         data = Dataset(family.name, family.instances[: laboratory.scale.instances])
         limit = envelope_limit(data, recipe.budget, recipe.gate_sharpness)
         improvements = compare_with_loop(scheme, data)
         rows += comparison_rows("PNS trained on ridges", data.name, improvements, limit=limit)
-    return Outcome((Table("cad", "One step on CAD patches", COLUMNS, tuple(rows)),), notes=NOTES)
+    return Outcome((table("cad", "One step on CAD patches", Comparison, rows),), notes=NOTES)
 
 
 EXPERIMENT = Experiment(

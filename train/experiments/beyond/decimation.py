@@ -1,5 +1,6 @@
 """The decimation test: simplified meshes, refined, against the dense ones that they come from."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from pns_common.schemes import Scheme, loop
@@ -19,6 +20,7 @@ from train.experiments.beyond.decimation_figures import gains_figure, picture_fi
 from train.experiments.beyond.models import bundled_schemes, model_files
 from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import TITLES
 from train.metrics.decimation import (
     COARSE_FACES,
@@ -33,7 +35,7 @@ from train.metrics.decimation import (
     simplify,
     summaries,
 )
-from train.metrics.surface_distance import SURFACE_METRICS, SurfaceErrors
+from train.metrics.surface_distance import SurfaceErrors
 
 LEVELS = (2, 3)
 SAMPLES_A_DRAW = 10
@@ -42,37 +44,6 @@ SAMPLES_A_DRAW = 10
 MILLI = 1000.0
 """Lengths in tables are thousandths of the dense mesh's diagonal."""
 
-MESH_COLUMNS = (
-    Column("mesh", "Mesh"),
-    Column("kind", "Kind"),
-    Column("dense_vertices", "Dense vertices"),
-    Column("dense_faces", "Dense faces"),
-    Column("coarse_vertices", "Coarse vertices"),
-    Column("coarse_faces", "Coarse faces"),
-    Column("cut_off", "Faces cut off"),
-    Column("left_out", "Left out because"),
-)
-SUMMARY_COLUMNS = (
-    Column("method", "Method"),
-    Column("level", "Level"),
-    Column("mean_percent", "Mean distance %", "+.1f"),
-    Column("p95_percent", "95th percentile %", "+.1f"),
-    Column("hausdorff_percent", "Hausdorff %", "+.1f"),
-    Column("normal_percent", "Normals %", "+.1f"),
-    Column("worst_mesh", "Worst mesh"),
-    Column("worst_percent", "Its mean distance %", "+.1f"),
-    Column("worse", "Meshes worse than Loop"),
-    Column("meshes", "Of"),
-)
-ALL_COLUMNS = (
-    Column("mesh", "Mesh"),
-    Column("level", "Level"),
-    Column("method", "Method"),
-    Column("mean", "Mean distance, 10⁻³", ".4f"),
-    Column("p95", "95th percentile, 10⁻³", ".4f"),
-    Column("hausdorff", "Hausdorff, 10⁻³", ".4f"),
-    Column("normal", "Mean normal error", ".4f"),
-)
 NOTES = (
     "The test of Neural Subdivision (Liu et al. 2020). A dense mesh is simplified by quadric edge "
     f"collapses (fast-simplification) to {COARSE_FACES} faces, about 400 vertices as there, "
@@ -100,6 +71,49 @@ FROM_FILES = (
     f"manifold, has fewer than {FEWEST_FACES} faces or lies in a plane. A file called "
     f"`…_control_mesh` holds a control mesh: its dense mesh is {CONTROL_LEVELS} levels of Loop.",
 )
+
+
+@dataclass(frozen=True, slots=True)
+class MeshRow:
+    """One dense mesh with its coarse one, or why it was left out."""
+
+    mesh: str = column("Mesh")
+    kind: str = column("Kind")
+    dense_vertices: int | None = column("Dense vertices")
+    dense_faces: int | None = column("Dense faces")
+    coarse_vertices: int | None = column("Coarse vertices")
+    coarse_faces: int | None = column("Coarse faces")
+    cut_off: int | None = column("Faces cut off")
+    left_out: str | None = column("Left out because")
+
+
+@dataclass(frozen=True, slots=True)
+class SummaryRow:
+    """One method after so many levels, over all meshes."""
+
+    method: str = column("Method")
+    level: int = column("Level")
+    mean_percent: float = column("Mean distance %", "+.1f")
+    p95_percent: float = column("95th percentile %", "+.1f")
+    hausdorff_percent: float = column("Hausdorff %", "+.1f")
+    normal_percent: float = column("Normals %", "+.1f")
+    worst_mesh: str = column("Worst mesh")
+    worst_percent: float = column("Its mean distance %", "+.1f")
+    worse: int = column("Meshes worse than Loop")
+    meshes: int = column("Of")
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorRow:
+    """One method on one mesh after so many levels."""
+
+    mesh: str = column("Mesh")
+    level: int = column("Level")
+    method: str = column("Method")
+    mean: float = column("Mean distance, 10⁻³", ".4f")
+    p95: float = column("95th percentile, 10⁻³", ".4f")
+    hausdorff: float = column("Hausdorff, 10⁻³", ".4f")
+    normal: float = column("Mean normal error", ".4f")
 
 
 def methods() -> dict[str, Scheme]:
@@ -131,10 +145,10 @@ def run(laboratory: Laboratory) -> Outcome:
     shown = (TITLES["loop"], list(schemes)[-1])
     return Outcome(
         tables=(
-            Table("decimation", "Mean over the meshes", SUMMARY_COLUMNS, _summary_rows(summarised)),
+            table("decimation", "Mean over the meshes", SummaryRow, map(_summary_row, summarised)),
             _mesh_table(rows, list(schemes)),
-            Table("decimation_meshes", "The meshes", MESH_COLUMNS, _pair_rows(pairs, left_out)),
-            Table("decimation_errors", "All errors", ALL_COLUMNS, _error_rows(rows)),
+            table("decimation_meshes", "The meshes", MeshRow, _mesh_rows(pairs, left_out)),
+            table("decimation_errors", "All errors", ErrorRow, map(_error_row, rows)),
         ),
         figures=(
             gains_figure([summary for summary in summarised if summary.level == levels[-1]]),
@@ -160,18 +174,18 @@ def read_files(laboratory: Laboratory) -> list[Path]:
     return [*model_files(laboratory), *(path for path in folder if path.is_file())]
 
 
-def _summary_rows(summarised: list[Summary]) -> tuple[tuple[Cell, ...], ...]:
-    return tuple(
-        (
-            summary.method,
-            summary.level,
-            *(summary.percent[metric] for metric in SURFACE_METRICS),
-            summary.worst,
-            summary.by_mesh[summary.worst],
-            summary.worse,
-            len(summary.by_mesh),
-        )
-        for summary in summarised
+def _summary_row(summary: Summary) -> SummaryRow:
+    return SummaryRow(
+        method=summary.method,
+        level=summary.level,
+        mean_percent=summary.percent["mean"],
+        p95_percent=summary.percent["p95"],
+        hausdorff_percent=summary.percent["hausdorff"],
+        normal_percent=summary.percent["normal"],
+        worst_mesh=summary.worst,
+        worst_percent=summary.by_mesh[summary.worst],
+        worse=summary.worse,
+        meshes=len(summary.by_mesh),
     )
 
 
@@ -197,34 +211,33 @@ def _mesh_table(rows: list[Row], names: list[str]) -> Table:
     return Table("decimation_by_mesh", title, tuple(columns), tuple(cells))
 
 
-def _pair_rows(pairs: list[Pair], left_out: list[LeftOut]) -> tuple[tuple[Cell, ...], ...]:
+def _mesh_rows(pairs: list[Pair], left_out: list[LeftOut]) -> list[MeshRow]:
     taken = [
-        (
-            pair.dense.name,
-            pair.dense.kind,
-            len(pair.dense.mesh.vertices),
-            len(pair.dense.mesh.faces),
-            len(pair.coarse.vertices),
-            len(pair.coarse.faces),
-            pair.cut_off,
-            None,
+        MeshRow(
+            mesh=pair.dense.name,
+            kind=pair.dense.kind,
+            dense_vertices=len(pair.dense.mesh.vertices),
+            dense_faces=len(pair.dense.mesh.faces),
+            coarse_vertices=len(pair.coarse.vertices),
+            coarse_faces=len(pair.coarse.faces),
+            cut_off=pair.cut_off,
+            left_out=None,
         )
         for pair in pairs
     ]
-    others = [(mesh.name, ASSET, *[None] * 5, mesh.reason) for mesh in left_out]
-    return (*taken, *others)
+    others = [MeshRow(mesh.name, ASSET, *[None] * 5, left_out=mesh.reason) for mesh in left_out]
+    return taken + others
 
 
-def _error_rows(rows: list[Row]) -> tuple[tuple[Cell, ...], ...]:
-    return tuple(
-        (
-            row.mesh,
-            row.level,
-            row.method,
-            *(MILLI * getattr(row.errors, metric) for metric in ("mean", "p95", "hausdorff")),
-            row.errors.normal,
-        )
-        for row in rows
+def _error_row(row: Row) -> ErrorRow:
+    return ErrorRow(
+        mesh=row.mesh,
+        level=row.level,
+        method=row.method,
+        mean=MILLI * row.errors.mean,
+        p95=MILLI * row.errors.p95,
+        hausdorff=MILLI * row.errors.hausdorff,
+        normal=row.errors.normal,
     )
 
 

@@ -1,6 +1,7 @@
 """How much more than Loop's a surface bends: ripples that the control mesh does not have."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from pns_common.mesh import Mesh
@@ -9,26 +10,31 @@ from train.data.dense_meshes import CONTROL_ENDING, asset_files, read_mesh
 from train.data.primitives import PRIMITIVES, TRIANGULATED_QUADS
 from train.experiments.beyond.models import model_files
 from train.experiments.harness.contenders import LOOP, contenders
-from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.metrics.fairness import bending
 
 LEVELS = 4
 CAGE, QUADS, PRIMITIVE = "authored cage", "triangulated quads", "primitive"
 
-COLUMNS = (
-    Column("kind", "Kind"),
-    Column("mesh", "Mesh"),
-    Column("method", "Method"),
-    Column("bending", "∫ (κ₁² + κ₂²) dA", ".1f"),
-    Column("to_loop", "/ Loop's", ".2f"),
-    Column("to_n1", "/ N1's", ".2f"),
-)
 NOTE = (
     f"After {LEVELS} levels, from vertex normals that are linear over each face; it has no unit. "
     "A surface nearer to its control mesh has to bend more than Loop's, which shrinks. What the "
     "mesh's diagonals or valences add on top shows as ripples."
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One method on one mesh."""
+
+    kind: str = column("Kind")
+    mesh: str = column("Mesh")
+    method: str = column("Method")
+    bending: float = column("∫ (κ₁² + κ₂²) dA", ".1f")
+    to_loop: float = column("/ Loop's", ".2f")
+    to_n1: float = column("/ N1's", ".2f")
 
 
 def meshes(laboratory: Laboratory) -> Iterator[tuple[str, str, Mesh]]:
@@ -50,16 +56,16 @@ def run(laboratory: Laboratory) -> Outcome:
     for number, (kind, name, mesh) in enumerate(chosen):
         laboratory.progress(f"fairness: {name}", number, len(chosen))
         rows += _rows(kind, name, mesh, min(LEVELS, laboratory.scale.levels))
-    return Outcome((Table("fairness", "Bending", COLUMNS, tuple(rows)),), notes=(NOTE,))
+    return Outcome((table("fairness", "Bending", Row, rows),), notes=(NOTE,))
 
 
-def _rows(kind: str, name: str, mesh: Mesh, levels: int) -> list[tuple[Cell, ...]]:
+def _rows(kind: str, name: str, mesh: Mesh, levels: int) -> list[Row]:
     energies = {
         method: bending(refine(mesh, scheme, levels, threads=1).mesh)
         for method, scheme in contenders().items()
     }
     return [
-        (kind, name, method, energy, energy / energies[LOOP], energy / energies["N1"])
+        Row(kind, name, method, energy, energy / energies[LOOP], energy / energies["N1"])
         for method, energy in energies.items()
     ]
 

@@ -1,26 +1,33 @@
 """The bundled models beyond ridges: families trained on, and families never seen."""
 
+from dataclasses import dataclass
+
 from pns_common.schemes import loop
 from train.data.datasets import Dataset
 from train.data.family_sets import held_out_families, trained_families
 from train.experiments.beyond.models import bundled_schemes, model_files
-from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.metrics.evaluation import compare_with_loop
 from train.metrics.whole_surface import gain, whole_surface
 
 SHALLOW = 1
-COLUMNS = (
-    Column("family", "Family"),
-    Column("seen", "In the stream"),
-    Column("model", "Model"),
-    Column("inserted_percent", "Inserted %", "+.1f"),
-    Column("first_percent", "Level 1 %", "+.1f"),
-    Column("first_worst", "Worst %", "+.1f"),
-    Column("last_percent", "Last level %", "+.1f"),
-    Column("last_worst", "Worst %", "+.1f"),
-    Column("last_normal_percent", "Shading %", "+.1f"),
-)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One model on one family."""
+
+    family: str = column("Family")
+    seen: bool = column("In the stream")
+    model: str = column("Model")
+    inserted_percent: float = column("Inserted %", "+.1f")
+    first_percent: float = column("Level 1 %", "+.1f")
+    first_worst: float = column("Worst %", "+.1f")
+    last_percent: float = column("Last level %", "+.1f")
+    last_worst: float = column("Worst %", "+.1f")
+    last_normal_percent: float = column("Shading %", "+.1f")
 
 
 def run(laboratory: Laboratory) -> Outcome:
@@ -41,13 +48,12 @@ def run(laboratory: Laboratory) -> Outcome:
         "On saddles Loop's edge vertices are already right to 10⁻⁴ of the patch: there is nothing "
         "to gain, and a per cent is a millionth of the patch's size.",
     )
-    table = Table("families", "Families of surfaces", COLUMNS, tuple(rows))
-    return Outcome((table,), notes=notes)
+    return Outcome((table("families", "Families of surfaces", Row, rows),), notes=notes)
 
 
-def _rows(data: Dataset, levels: int, *, seen: bool) -> list[tuple[Cell, ...]]:
+def _rows(data: Dataset, levels: int, *, seen: bool) -> list[Row]:
     reference = {level: whole_surface(loop(), data, level) for level in (SHALLOW, levels)}
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for name, scheme in bundled_schemes().items():
         first, last = (
             gain(whole_surface(scheme, data, level), reference[level])
@@ -55,16 +61,16 @@ def _rows(data: Dataset, levels: int, *, seen: bool) -> list[tuple[Cell, ...]]:
         )
         inserted = compare_with_loop(scheme, data)["distance"].percent
         rows.append(
-            (
-                data.name,
-                seen,
-                name,
-                inserted,
-                first.distance,
-                first.worst,
-                last.distance,
-                last.worst,
-                last.normal,
+            Row(
+                family=data.name,
+                seen=seen,
+                model=name,
+                inserted_percent=inserted,
+                first_percent=first.distance,
+                first_worst=first.worst,
+                last_percent=last.distance,
+                last_worst=last.worst,
+                last_normal_percent=last.normal,
             )
         )
     return rows

@@ -1,13 +1,14 @@
 """Does each group of signed features earn its place? Trained with each left out, and each alone."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import msgspec
 
 from pns_common.refine import refine
 from train.ablations.feature_groups import Choice, features_scheme, fit_features, named
-from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.paper.methods import PAPER_UNITS
 from train.metrics.envelope import envelope_limit
 from train.metrics.evaluation import compare_with_loop
@@ -16,25 +17,28 @@ from train.models.recipes import Recipe, one_step, paper
 SETTINGS = ((0.5, 10.0), (1.0, 100.0))
 """C and c: the paper's, and an envelope in which there is more to gain."""
 
-SHOWN = ("distance_near", "distance", "hausdorff", "normal_near", "normal")
-COLUMNS = (
-    Column("budget", "C", "g"),
-    Column("gate_sharpness", "c", "g"),
-    Column("features", "Features"),
-    Column("count", "Number"),
-    Column("near_percent", "Near %", "+.2f"),
-    Column("global_percent", "All %", "+.2f"),
-    Column("hausdorff_percent", "Hausdorff %", "+.2f"),
-    Column("normal_near_percent", "Normals near %", "+.2f"),
-    Column("normal_percent", "Normals %", "+.2f"),
-    Column("max_ratio", "Max ratio", ".4f"),
-)
 NOTES = (
     "Improvements over Loop on the held-out ridges, all trained by the recipe `paper` with the "
     "orientation `symmetric`; docs/features.md defines the features. *Limit* is the best that any "
     "network could do with the same C and c; there is none for normals.",
     "The paper has no such table: its five features have no sign.",
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One choice of features in one setting, or the setting's limit."""
+
+    budget: float = column("C", "g")
+    gate_sharpness: float = column("c", "g")
+    features: str = column("Features")
+    count: int | None = column("Number")
+    near_percent: float = column("Near %", "+.2f")
+    global_percent: float = column("All %", "+.2f")
+    hausdorff_percent: float = column("Hausdorff %", "+.2f")
+    normal_near_percent: float | None = column("Normals near %", "+.2f")
+    normal_percent: float | None = column("Normals %", "+.2f")
+    max_ratio: float | None = column("Max ratio", ".4f")
 
 
 def setting(budget: float, gate_sharpness: float) -> Recipe:
@@ -59,13 +63,25 @@ def run(laboratory: Laboratory) -> Outcome:
         recipe = replace(recipe, steps=min(recipe.steps, laboratory.scale.training_steps))
         rows += [_row(laboratory, recipe, choice) for choice in named()]
         limit = envelope_limit(laboratory.dataset("ridge-held-out"), budget, gate_sharpness)
-        best = [limit[metric].percent if metric in limit else None for metric in SHOWN]
-        rows.append((budget, gate_sharpness, "*limit*", None, *best, None))
-    table = Table("features", "Feature groups left out, and added", COLUMNS, tuple(rows))
-    return Outcome((table,), notes=NOTES)
+        rows.append(
+            Row(
+                budget=budget,
+                gate_sharpness=gate_sharpness,
+                features="*limit*",
+                count=None,
+                near_percent=limit["distance_near"].percent,
+                global_percent=limit["distance"].percent,
+                hausdorff_percent=limit["hausdorff"].percent,
+                normal_near_percent=None,
+                normal_percent=None,
+                max_ratio=None,
+            )
+        )
+    tried = table("features", "Feature groups left out, and added", Row, rows)
+    return Outcome((tried,), notes=NOTES)
 
 
-def _row(laboratory: Laboratory, recipe: Recipe, choice: Choice) -> tuple[Cell, ...]:
+def _row(laboratory: Laboratory, recipe: Recipe, choice: Choice) -> Row:
     def on_step(done: int, _: float) -> None:
         laboratory.progress(f"training {choice.title}", done, recipe.steps)
 
@@ -77,9 +93,18 @@ def _row(laboratory: Laboratory, recipe: Recipe, choice: Choice) -> tuple[Cell, 
         refine(instance.mesh, scheme, reference_length=PAPER_UNITS).ratio.max()
         for instance in held_out.instances
     )
-    percents = [improvements[metric].percent for metric in SHOWN]
-    count = choice.features.count
-    return recipe.budget, recipe.gate_sharpness, choice.title, count, *percents, float(ratio)
+    return Row(
+        budget=recipe.budget,
+        gate_sharpness=recipe.gate_sharpness,
+        features=choice.title,
+        count=choice.features.count,
+        near_percent=improvements["distance_near"].percent,
+        global_percent=improvements["distance"].percent,
+        hausdorff_percent=improvements["hausdorff"].percent,
+        normal_near_percent=improvements["normal_near"].percent,
+        normal_percent=improvements["normal"].percent,
+        max_ratio=float(ratio),
+    )
 
 
 EXPERIMENT = Experiment(

@@ -7,12 +7,13 @@ import numpy as np
 
 from pns_common.onnx_model import load_model
 from pns_common.refine import Refinement, refine
-from pns_common.schemes import Scheme, loop, pns
+from pns_common.schemes import loop, pns
 from train.data.dense_meshes import DenseMesh, asset_meshes
 from train.data.simplifiers import SIMPLIFIERS, simplified
 from train.experiments.beyond.real_meshes import LEAST_REDUCTION, read_files
-from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.metrics.decimation import gain
 from train.metrics.surface_distance import prepared, surface_errors
 
@@ -28,19 +29,7 @@ SWEPT: tuple[tuple[str, str, tuple[float, ...]], ...] = (
 SIMPLIFIER, SIZES = "quadric", (500, 2000)
 LEVELS = 3
 SAMPLES_A_DRAW = 5
-METRICS = ("mean", "p95", "hausdorff", "normal")
 
-COLUMNS = (
-    Column("number", "Number"),
-    Column("value", "Value", "g"),
-    Column("on_card", "On the card"),
-    Column("mean_percent", "Mean %", "+.1f"),
-    Column("p95_percent", "p95 %", "+.1f"),
-    Column("largest_percent", "Largest %", "+.1f"),
-    Column("normal_percent", "Normals %", "+.1f"),
-    Column("jump", "Jump / Loop's", ".2f"),
-    Column("guarded", "Guarded %", ".2f"),
-)
 NOTE = (
     f"Validation meshes of {' and '.join(map(str, SIZES))} faces (simplifier {SIMPLIFIER}), "
     f"{LEVELS} levels; improvement over Loop on the same mesh, plain mean over meshes. One number "
@@ -48,6 +37,21 @@ NOTE = (
     "training sees, are at their best where the card has them; C, θ and K act in use alone. "
     "*Guarded*: vertices of the learned levels that the fold guard scales back, in all meshes."
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One value of one number, over all meshes."""
+
+    number: str = column("Number")
+    value: float = column("Value", "g")
+    on_card: bool = column("On the card")
+    mean_percent: float = column("Mean %", "+.1f")
+    p95_percent: float = column("p95 %", "+.1f")
+    largest_percent: float = column("Largest %", "+.1f")
+    normal_percent: float = column("Normals %", "+.1f")
+    jump: float = column("Jump / Loop's", ".2f")
+    guarded: float = column("Guarded %", ".2f")
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +72,13 @@ def run(laboratory: Laboratory) -> Outcome:
     dense = list(islice((m for m in files if isinstance(m, DenseMesh)), scale.instances))
     swept = [(*names, values[: scale.instances]) for *names, values in SWEPT]
     levels = min(LEVELS, scale.levels)
-    results: dict[tuple[str, float], list[Result]] = {}
+    model = load_model()
+    schemes = {
+        (symbol, value): pns(replace(model, card=replace(model.card, **{field: value})))
+        for symbol, field, values in swept
+        for value in values
+    }
+    results: dict[tuple[str, float], list[Result]] = {key: [] for key in schemes}
     for number, original in enumerate(dense):
         laboratory.progress(f"form-sweep: {original.name}", number, len(dense))
         true = prepared(original.mesh, samples)
@@ -80,20 +90,17 @@ def run(laboratory: Laboratory) -> Outcome:
                 continue
             plain = refine(coarse, loop(), levels, threads=1)
             reference = surface_errors(true, prepared(plain.mesh, samples))
-            for symbol, field, values in swept:
-                for value in values:
-                    refined = refine(coarse, _scheme(field, value), levels, threads=1)
-                    errors = surface_errors(true, prepared(refined.mesh, samples))
-                    result = _result(gain(reference, errors), refined, plain)
-                    results.setdefault((symbol, value), []).append(result)
-    rows = [_row(symbol, field, v, results[symbol, v]) for symbol, field, vs in swept for v in vs]
-    table = Table("form_sweep", "One number at a time (validation)", COLUMNS, tuple(rows))
-    return Outcome((table,), notes=(NOTE,))
-
-
-def _scheme(field: str, value: float) -> Scheme:
-    model = load_model()
-    return pns(replace(model, card=replace(model.card, **{field: value})))
+            for key, scheme in schemes.items():
+                refined = refine(coarse, scheme, levels, threads=1)
+                errors = surface_errors(true, prepared(refined.mesh, samples))
+                results[key].append(_result(gain(reference, errors), refined, plain))
+    rows = [
+        _row(symbol, value, results[symbol, value], on_card=getattr(model.card, field) == value)
+        for symbol, field, values in swept
+        for value in values
+    ]
+    swept_table = table("form_sweep", "One number at a time (validation)", Row, rows)
+    return Outcome((swept_table,), notes=(NOTE,))
 
 
 def _result(gains: dict[str, float], refined: Refinement, plain: Refinement) -> Result:
@@ -103,14 +110,20 @@ def _result(gains: dict[str, float], refined: Refinement, plain: Refinement) -> 
     return Result(gains, jump / of_loop, guarded, vertices)
 
 
-def _row(symbol: str, field: str, value: float, results: list[Result]) -> tuple[Cell, ...]:
-    return (
-        symbol,
-        value,
-        getattr(load_model().card, field) == value,
-        *(float(np.mean([result.gains[metric] for result in results])) for metric in METRICS),
-        float(np.mean([result.jump for result in results])),
-        100 * sum(result.guarded for result in results) / sum(r.vertices for r in results),
+def _row(symbol: str, value: float, results: list[Result], *, on_card: bool) -> Row:
+    def mean_gain(metric: str) -> float:
+        return float(np.mean([result.gains[metric] for result in results]))
+
+    return Row(
+        number=symbol,
+        value=value,
+        on_card=on_card,
+        mean_percent=mean_gain("mean"),
+        p95_percent=mean_gain("p95"),
+        largest_percent=mean_gain("hausdorff"),
+        normal_percent=mean_gain("normal"),
+        jump=float(np.mean([result.jump for result in results])),
+        guarded=100 * sum(result.guarded for result in results) / sum(r.vertices for r in results),
     )
 
 

@@ -1,6 +1,7 @@
 """Off the plane: tangent-eigenvalue drift and Reif margin of lifted k-stars, k = 3 … 12."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -8,8 +9,9 @@ from matplotlib.figure import Figure as Drawing
 
 from train.certificates.lifted_star import HIGHEST, LIFTS
 from train.certificates.subject import subject_of_network
-from train.experiments.harness.experiment import Cell, Column, Experiment, Figure, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, panels, zero_line
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
@@ -27,17 +29,6 @@ SHOWN: Mapping[int, tuple[str, str]] = MappingProxyType(
 )
 """Valences in the figure, with colour and marker."""
 
-COLUMNS = (
-    Column("valence", "k", "d"),
-    Column("budget", "C", "g"),
-    Column("lift", "Lift", ".2f"),
-    Column("tangent", "Least tangent |λ|", ".5f"),
-    Column("drift", "Drift from Loop's", "+.5f"),
-    Column("third", "Largest other |λ|", ".5f"),
-    Column("margin", "Margin", "+.5f"),
-    Column("loop_gap", "Loop's gap", ".5f"),
-    Column("stable", "All |λ| < 1"),
-)
 NOTES = (
     "The star is embedded in regular rings so that every footprint is complete; spoke 0.25 R, the "
     "centre lifted by so many spokes. The margin is the least |λ| of the six eigenvalues continued "
@@ -46,6 +37,21 @@ NOTES = (
     "fixed point of subdivision: a negative margin is a warning, not a proof of lost smoothness.",
     "One network, trained at C = 0.5, is run at every C.",
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One star at one budget and lift."""
+
+    valence: int = column("k", "d")
+    budget: float = column("C", "g")
+    lift: float = column("Lift", ".2f")
+    tangent: float = column("Least tangent |λ|", ".5f")
+    drift: float = column("Drift from Loop's", "+.5f")
+    third: float = column("Largest other |λ|", ".5f")
+    margin: float = column("Margin", "+.5f")
+    loop_gap: float = column("Loop's gap", ".5f")
+    stable: bool = column("All |λ| < 1")
 
 
 def run(laboratory: Laboratory) -> Outcome:
@@ -59,13 +65,13 @@ def run(laboratory: Laboratory) -> Outcome:
         laboratory.progress(f"lifted stars, k = {valence}, C = {budget:g}", done, len(cases))
         scheme = subject_of_network(model, budget).exact
         followed[valence, budget] = follow_lift(scheme, valence, LIFTS)
-    rows = tuple(
+    rows = (
         lifted_star_row(valence, budget, lift, spectrum)
         for (valence, budget), spectra in followed.items()
         for lift, spectrum in zip(LIFTS, spectra, strict=True)
     )
     return Outcome(
-        tables=(Table("lifted_stars", "Spectra of lifted stars", COLUMNS, rows),),
+        tables=(table("lifted_stars", "Spectra of lifted stars", Row, rows),),
         figures=(
             Figure(
                 "lifted_stars",
@@ -78,16 +84,21 @@ def run(laboratory: Laboratory) -> Outcome:
     )
 
 
-def lifted_star_row(
-    valence: int, budget: float, lift: float, spectrum: Spectrum
-) -> tuple[Cell, ...]:
+def lifted_star_row(valence: int, budget: float, lift: float, spectrum: Spectrum) -> Row:
     """Return one row of the table: tangents, their drift, the margin."""
     size = np.abs(spectrum.values)
-    tangent, third = float(size[spectrum.least_tangent]), float(size[spectrum.largest_other])
-    drift = tangent - loop_eigenvalue(valence)
-    stable = spectrum.largest < 1
-    gap = loop_gap(valence)
-    return (valence, budget, lift, tangent, drift, third, spectrum.margin, gap, stable)
+    tangent = float(size[spectrum.least_tangent])
+    return Row(
+        valence=valence,
+        budget=budget,
+        lift=lift,
+        tangent=tangent,
+        drift=tangent - loop_eigenvalue(valence),
+        third=float(size[spectrum.largest_other]),
+        margin=spectrum.margin,
+        loop_gap=loop_gap(valence),
+        stable=spectrum.largest < 1,
+    )
 
 
 def _draw(followed: Mapping[tuple[int, float], list[Spectrum]]) -> Drawing:

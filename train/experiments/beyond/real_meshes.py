@@ -14,8 +14,9 @@ from train.data.dense_meshes import DenseMesh, asset_meshes, cad_meshes
 from train.data.simplifiers import SIMPLIFIERS, simplified
 from train.experiments.beyond.models import model_files
 from train.experiments.harness.contenders import LOOP, contenders
-from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.metrics.decimation import gain
 from train.metrics.self_intersection import self_intersecting
 from train.metrics.surface_distance import SurfaceErrors, prepared, surface_errors
@@ -33,32 +34,6 @@ LEAST_REDUCTION = 2
 SAMPLES_A_DRAW = 10
 WORSE = 0.0
 
-COLUMNS = (
-    Column("faces", "Faces", "d"),
-    Column("meshes", "Meshes", "d"),
-    Column("method", "Method"),
-    Column("mean_percent", "Mean %", "+.1f"),
-    Column("p95_percent", "p95 %", "+.1f"),
-    Column("largest_percent", "Largest %", "+.1f"),
-    Column("normal_percent", "Normals %", "+.1f"),
-    Column("jump", "Jump / Loop's", ".2f"),
-    Column("intersecting", "Self-intersecting faces", "d"),
-    Column("worse_mean", "Worse in mean", "d"),
-    Column("worse_normal", "Worse in normals", "d"),
-)
-EACH_COLUMNS = (
-    Column("mesh", "Mesh"),
-    Column("simplifier", "Simplifier"),
-    Column("faces", "Faces", "d"),
-    Column("coarse_faces", "Coarse faces", "d"),
-    Column("method", "Method"),
-    Column("mean", "Mean distance", ".3g"),
-    Column("p95", "95th percentile", ".3g"),
-    Column("largest", "Largest", ".3g"),
-    Column("normal", "Normals", ".4f"),
-    Column("jump", "Jump", ".3f"),
-    Column("intersecting", "Self-intersecting", "d"),
-)
 NOTE = (
     "Each dense mesh is simplified by quadric collapses (fast-simplification, and libigl's), by "
     "collapses of the shortest edge, and by clustering, to each size that is at most half of its "
@@ -72,6 +47,40 @@ NOTE = (
     "over all meshes. *Flat* refines nothing; *Q1*, *N1* and *NC* are untrained "
     "(train/baselines/controls)."
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """One method over all coarse meshes of one size."""
+
+    faces: int = column("Faces", "d")
+    meshes: int = column("Meshes", "d")
+    method: str = column("Method")
+    mean_percent: float = column("Mean %", "+.1f")
+    p95_percent: float = column("p95 %", "+.1f")
+    largest_percent: float = column("Largest %", "+.1f")
+    normal_percent: float = column("Normals %", "+.1f")
+    jump: float = column("Jump / Loop's", ".2f")
+    intersecting: int = column("Self-intersecting faces", "d")
+    worse_mean: int = column("Worse in mean", "d")
+    worse_normal: int = column("Worse in normals", "d")
+
+
+@dataclass(frozen=True, slots=True)
+class EachRow:
+    """One method on one coarse mesh."""
+
+    mesh: str = column("Mesh")
+    simplifier: str = column("Simplifier")
+    faces: int = column("Faces", "d")
+    coarse_faces: int = column("Coarse faces", "d")
+    method: str = column("Method")
+    mean: float = column("Mean distance", ".3g")
+    p95: float = column("95th percentile", ".3g")
+    largest: float = column("Largest", ".3g")
+    normal: float = column("Normals", ".4f")
+    jump: float = column("Jump", ".3f")
+    intersecting: int = column("Self-intersecting", "d")
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,30 +137,34 @@ def compared(
     return measured
 
 
-def summary(measured: list[Measured]) -> tuple[tuple[Cell, ...], ...]:
+def summary(measured: list[Measured]) -> list[Summary]:
     """Return one row for each size and method."""
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Summary] = []
     for faces, method in dict.fromkeys((row.coarse.faces, row.method) for row in measured):
         these = [row for row in measured if (row.coarse.faces, row.method) == (faces, method)]
         loops = [row for row in measured if (row.coarse.faces, row.method) == (faces, LOOP)]
         pairs = list(zip(loops, these, strict=True))
         gains = [gain(reference.errors, row.errors) for reference, row in pairs]
         rows.append(
-            (
-                faces,
-                len(these),
-                method,
-                *(
-                    float(np.mean([percents[metric] for percents in gains]))
-                    for metric in ("mean", "p95", "hausdorff", "normal")
-                ),
-                float(np.mean([row.jump / reference.jump for reference, row in pairs])),
-                sum(row.intersecting for row in these),
-                sum(percents["mean"] < WORSE for percents in gains),
-                sum(percents["normal"] < WORSE for percents in gains),
+            Summary(
+                faces=faces,
+                meshes=len(these),
+                method=method,
+                mean_percent=_mean(gains, "mean"),
+                p95_percent=_mean(gains, "p95"),
+                largest_percent=_mean(gains, "hausdorff"),
+                normal_percent=_mean(gains, "normal"),
+                jump=float(np.mean([row.jump / reference.jump for reference, row in pairs])),
+                intersecting=sum(row.intersecting for row in these),
+                worse_mean=sum(percents["mean"] < WORSE for percents in gains),
+                worse_normal=sum(percents["normal"] < WORSE for percents in gains),
             )
         )
-    return tuple(rows)
+    return rows
+
+
+def _mean(gains: list[dict[str, float]], metric: str) -> float:
+    return float(np.mean([percents[metric] for percents in gains]))
 
 
 def _outcome(name: str, title: str, meshes: Iterable[Coarse], laboratory: Laboratory) -> Outcome:
@@ -163,27 +176,27 @@ def _outcome(name: str, title: str, meshes: Iterable[Coarse], laboratory: Labora
         measured += compared(mesh, contenders(), scale.levels, SAMPLES_A_DRAW * scale.samples)
     return Outcome(
         (
-            Table(name, title, COLUMNS, summary(measured)),
-            Table(f"{name}_each", "Each mesh", EACH_COLUMNS, tuple(map(_row, measured))),
+            table(name, title, Summary, summary(measured)),
+            table(f"{name}_each", "Each mesh", EachRow, map(_row, measured)),
         ),
         notes=(NOTE,),
     )
 
 
-def _row(row: Measured) -> tuple[Cell, ...]:
-    errors = row.errors
-    return (
-        row.coarse.dense.title,
-        row.coarse.simplifier,
-        row.coarse.faces,
-        len(row.coarse.mesh.faces),
-        row.method,
-        errors.mean,
-        errors.p95,
-        errors.hausdorff,
-        errors.normal,
-        row.jump,
-        row.intersecting,
+def _row(measured: Measured) -> EachRow:
+    coarse, errors = measured.coarse, measured.errors
+    return EachRow(
+        mesh=coarse.dense.title,
+        simplifier=coarse.simplifier,
+        faces=coarse.faces,
+        coarse_faces=len(coarse.mesh.faces),
+        method=measured.method,
+        mean=errors.mean,
+        p95=errors.p95,
+        largest=errors.hausdorff,
+        normal=errors.normal,
+        jump=measured.jump,
+        intersecting=measured.intersecting,
     )
 
 

@@ -1,6 +1,7 @@
 """The default model, Loop and N1 with highlights: ripples show as wavy reflections."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -14,8 +15,9 @@ from train.data.dense_meshes import read_mesh
 from train.data.primitives import PRIMITIVES
 from train.experiments.beyond.models import model_files
 from train.experiments.harness.contenders import LOOP, OURS, contenders
-from train.experiments.harness.experiment import Cell, Column, Experiment, Figure, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.harness.specular import camera, shaded
 from train.experiments.harness.style import panels
 from train.metrics.fairness import bending
@@ -28,17 +30,21 @@ ASSETS = {
     "alien.glb": camera(60, 12, up=1),
 }
 PLAIN = {"icosphere 80": camera(20, 25), "cube": camera(30, 25)}
-COLUMNS = (
-    Column("mesh", "Mesh"),
-    Column("method", "Method"),
-    Column("bending", "∫ (κ₁² + κ₂²) dA", ".1f"),
-)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One method on one mesh."""
+
+    mesh: str = column("Mesh")
+    method: str = column("Method")
+    bending: float = column("∫ (κ₁² + κ₂²) dA", ".1f")
 
 
 def run(laboratory: Laboratory) -> Outcome:
     """Draw every mesh by each of the three."""
     pictures: dict[tuple[str, str], np.ndarray] = {}
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     schemes = contenders()
     for name, mesh, view in list(_meshes(laboratory))[: laboratory.scale.instances]:
         laboratory.progress(f"shading: {name}", len(pictures), 15)
@@ -47,14 +53,14 @@ def run(laboratory: Laboratory) -> Outcome:
             levels = min(LEVELS, laboratory.scale.levels)
             refined = refine(mesh, schemes[method], levels, threads=1).mesh
             pictures[name, method] = shaded(refined, view, box)
-            rows.append((name, method, bending(refined)))
+            rows.append(Row(name, method, bending(refined)))
     figure = Figure(
         "shading",
         f"Highlights after {LEVELS} levels: the default model, Loop, and N1. Penguin and Spot are "
         "cages that were authored for Loop.",
         partial(_draw, pictures),
     )
-    return Outcome((Table("shading", "What is drawn", COLUMNS, tuple(rows)),), (figure,))
+    return Outcome((table("shading", "What is drawn", Row, rows),), (figure,))
 
 
 def _meshes(laboratory: Laboratory) -> Iterator[tuple[str, Mesh, np.ndarray]]:

@@ -1,59 +1,77 @@
 """The default model on every primitive and asset, after each level, with and without `limit`."""
 
+from dataclasses import dataclass
+from itertools import islice
+
+from pns_common.mesh import Mesh
 from train.experiments.beyond.whole_meshes import (
     MORE,
     REFERENCE,
     Row,
+    crossing,
     meshes,
     read_files,
     rows_of,
 )
 from train.experiments.harness.contenders import LOOP, OURS, contenders
-from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 
 LEVELS = 4
 MOST_FACES = 150_000
 """Of a refined mesh: deeper levels of larger meshes are left out."""
 
-COLUMNS = (
-    Column("levels", "Levels", "d"),
-    Column("limit", "Limit"),
-    Column("meshes", "Meshes", "d"),
-    Column("whole", "Whole", "d"),
-    Column("flipped", "Flipped", "d"),
-    Column("intersecting", "Self-intersecting", "d"),
-    Column("of_loop", "Loop's", "d"),
-    Column("of_n1", "N1's", "d"),
-    Column("crossed", "Meshes with more than Loop's + 2 %", "d"),
-    Column("crossed_before", "Of these crossing before", "d"),
-    Column("overshoot_percent", "Largest overshoot %", ".2f"),
-    Column("volume_to_loop", "Least volume / Loop's", ".3f"),
-    Column("volume_to_n1", "Largest volume / N1's", ".3f"),
-)
 NOTE = (
     f"Meshes of up to {MOST_FACES:,} faces after refinement; words as above. *Of these crossing "
     "before*: their control mesh has self-intersecting faces itself."
 )
 
 
+@dataclass(frozen=True, slots=True)
+class LevelRow:
+    """The default model on all meshes after so many levels."""
+
+    levels: int = column("Levels", "d")
+    limit: bool = column("Limit")
+    meshes: int = column("Meshes", "d")
+    whole: int = column("Whole", "d")
+    flipped: int = column("Flipped", "d")
+    intersecting: int = column("Self-intersecting", "d")
+    of_loop: int = column("Loop's", "d")
+    of_n1: int = column("N1's", "d")
+    crossed: int = column("Meshes with more than Loop's + 2 %", "d")
+    crossed_before: int = column("Of these crossing before", "d")
+    overshoot_percent: float | None = column("Largest overshoot %", ".2f")
+    volume_to_loop: float | None = column("Least volume / Loop's", ".3f")
+    volume_to_n1: float | None = column("Largest volume / N1's", ".3f")
+
+
 def run(laboratory: Laboratory) -> Outcome:
     """Refine all meshes to every level."""
     schemes = {name: contenders()[name] for name in (LOOP, REFERENCE, OURS)}
-    chosen = list(meshes(laboratory))[: laboratory.scale.instances]
-    rows: list[tuple[Cell, ...]] = []
+    chosen = [
+        (name, mesh, crossing(mesh))
+        for name, mesh in islice(meshes(laboratory), laboratory.scale.instances)
+        if _faces(mesh, 1) <= MOST_FACES
+    ]
+    rows: list[LevelRow] = []
     for levels in range(1, min(LEVELS, laboratory.scale.levels) + 1):
         for limit in (False, True):
             each: list[Row] = []
-            for number, (name, mesh) in enumerate(chosen):
+            for number, (name, mesh, control) in enumerate(chosen):
                 laboratory.progress(f"whole-levels {levels}: {name}", number, len(chosen))
-                if len(mesh.faces) * 4**levels <= MOST_FACES:
-                    each += rows_of(name, mesh, levels, schemes, limit=limit)
+                if _faces(mesh, levels) <= MOST_FACES:
+                    each += rows_of(name, mesh, levels, schemes, control=control, limit=limit)
             rows.append(_row(levels, each, limit=limit))
-    return Outcome((Table("whole_levels", "Each level", COLUMNS, tuple(rows)),), notes=(NOTE,))
+    return Outcome((table("whole_levels", "Each level", LevelRow, rows),), notes=(NOTE,))
 
 
-def _row(levels: int, rows: list[Row], *, limit: bool) -> tuple[Cell, ...]:
+def _faces(mesh: Mesh, levels: int) -> int:
+    return len(mesh.faces) * 4**levels
+
+
+def _row(levels: int, rows: list[Row], *, limit: bool) -> LevelRow:
     of = {name: [row for row in rows if row.method == name] for name in (LOOP, REFERENCE, OURS)}
     ours, plain = of[OURS], of[LOOP]
     crossed = [
@@ -61,18 +79,22 @@ def _row(levels: int, rows: list[Row], *, limit: bool) -> tuple[Cell, ...]:
         for row, by_loop in zip(ours, plain, strict=True)
         if row.intersecting > MORE * by_loop.intersecting
     ]
-    return (
-        levels,
-        limit,
-        len(ours),
-        sum(row.whole for row in ours),
-        sum(row.flipped for row in ours),
-        *(sum(row.intersecting for row in of[name]) for name in (OURS, LOOP, REFERENCE)),
-        len(crossed),
-        sum(row.control > 0 for row in crossed),
-        max((row.overshoot_percent for row in ours), default=None),
-        min((r.volume_to_loop for r in ours if r.volume_to_loop is not None), default=None),
-        max((r.volume_to_n1 for r in ours if r.volume_to_n1 is not None), default=None),
+    to_loop = [row.volume_to_loop for row in ours if row.volume_to_loop is not None]
+    to_n1 = [row.volume_to_n1 for row in ours if row.volume_to_n1 is not None]
+    return LevelRow(
+        levels=levels,
+        limit=limit,
+        meshes=len(ours),
+        whole=sum(row.whole for row in ours),
+        flipped=sum(row.flipped for row in ours),
+        intersecting=sum(row.intersecting for row in ours),
+        of_loop=sum(row.intersecting for row in plain),
+        of_n1=sum(row.intersecting for row in of[REFERENCE]),
+        crossed=len(crossed),
+        crossed_before=sum(row.control > 0 for row in crossed),
+        overshoot_percent=max((row.overshoot_percent for row in ours), default=None),
+        volume_to_loop=min(to_loop, default=None),
+        volume_to_n1=max(to_n1, default=None),
     )
 
 

@@ -1,7 +1,7 @@
 """Primitives and whole assets, as they are: does refining them break anything?"""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +16,9 @@ from train.data.dense_meshes import asset_files, read_mesh
 from train.data.primitives import PRIMITIVES
 from train.experiments.beyond.models import model_files
 from train.experiments.harness.contenders import LOOP, OURS, contenders
-from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.metrics.fairness import volume
 from train.metrics.self_intersection import self_intersecting
 
@@ -33,18 +34,6 @@ VOLUME = 1.1
 
 REFERENCE = "N1"
 
-COLUMNS = (
-    Column("mesh", "Mesh"),
-    Column("faces", "Faces", "d"),
-    Column("control", "Self-intersecting before", "d"),
-    Column("method", "Method"),
-    Column("flipped", "Flipped", "d"),
-    Column("intersecting", "Self-intersecting", "d"),
-    Column("overshoot_percent", "Overshoot %", ".2f"),
-    Column("volume_to_loop", "Volume / Loop's", ".3f"),
-    Column("volume_to_n1", "Volume / N1's", ".3f"),
-    Column("whole", "Whole"),
-)
 NOTE = (
     f"{LEVELS} levels. *Flipped*: children whose normal opposes that of their counterpart under "
     "Loop, over all levels. *Overshoot*: how far a result leaves the joint bounding box of the "
@@ -54,6 +43,33 @@ NOTE = (
     "control mesh itself; what stays near such a mesh crosses itself where it does, and only "
     "shrinking away from it, as Loop does, mends that."
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One method on one mesh."""
+
+    mesh: str = column("Mesh")
+    faces: int = column("Faces", "d")
+    control: int = column("Self-intersecting before", "d")
+    method: str = column("Method")
+    flipped: int = column("Flipped", "d")
+    intersecting: int = column("Self-intersecting", "d")
+    overshoot_percent: float = column("Overshoot %", ".2f")
+    volume_to_loop: float | None = column("Volume / Loop's", ".3f")
+    volume_to_n1: float | None = column("Volume / N1's", ".3f")
+    whole: bool = column("Whole")
+
+
+@dataclass(frozen=True, slots=True)
+class Total:
+    """One method on all meshes."""
+
+    method: str = column("Method")
+    whole: int = column("Whole", "d")
+    meshes: int = column("Of", "d")
+    flipped: int = column("Flipped", "d")
+    intersecting: int = column("Self-intersecting faces", "d")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -85,31 +101,26 @@ def measured(refined: Refinement) -> Measured:
     return Measured(
         mesh.vertices,
         sum(level["flipped_faces"] for level in refined.report["levels"]),
-        int(self_intersecting(mesh).sum()),
+        crossing(mesh),
         volume(mesh),
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One line of the table of each mesh: COLUMNS has the meaning."""
-
-    mesh: str
-    faces: int
-    control: int
-    method: str
-    flipped: int
-    intersecting: int
-    overshoot_percent: float
-    volume_to_loop: float | None
-    volume_to_n1: float | None
-    whole: bool
+def crossing(mesh: Mesh) -> int:
+    """Return how many faces cross others."""
+    return int(self_intersecting(mesh).sum())
 
 
 def rows_of(
-    name: str, mesh: Mesh, levels: int, schemes: Mapping[str, Scheme], *, limit: bool = False
+    name: str,
+    mesh: Mesh,
+    levels: int,
+    schemes: Mapping[str, Scheme],
+    *,
+    control: int,
+    limit: bool = False,
 ) -> list[Row]:
-    """Return a row for each method, Loop and N1 among them."""
+    """Return a row for each method, Loop and N1 among them; `control` is `crossing(mesh)`."""
     surfaces = {
         method: measured(refine(mesh, scheme, levels, threads=1, limit=limit))
         for method, scheme in schemes.items()
@@ -120,7 +131,6 @@ def rows_of(
     diagonal = float(np.linalg.norm(high - low)) or 1.0
     topology = build_topology(mesh.faces, len(mesh.vertices))
     closed = bool((topology.edge_class == EdgeClass.INTERIOR).all())
-    control = int(self_intersecting(mesh).sum())
     rows: list[Row] = []
     for method, surface in surfaces.items():
         beyond = np.maximum(low - surface.points, surface.points - high).max(initial=0)
@@ -151,41 +161,32 @@ def rows_of(
 
 def run(laboratory: Laboratory) -> Outcome:
     """Refine all meshes by all methods."""
-    scale, rows = laboratory.scale, []
+    scale, schemes, rows = laboratory.scale, contenders(), []
     chosen = list(meshes(laboratory))[: scale.instances]
     for number, (name, mesh) in enumerate(chosen):
         laboratory.progress(f"whole-meshes: {name}", number, len(chosen))
-        rows += rows_of(name, mesh, min(LEVELS, scale.levels), contenders())
-    totals = tuple(_total(method, rows) for method in contenders())
-    columns = (
-        Column("method", "Method"),
-        Column("whole", "Whole", "d"),
-        Column("meshes", "Of", "d"),
-        Column("flipped", "Flipped", "d"),
-        Column("intersecting", "Self-intersecting faces", "d"),
-    )
+        levels = min(LEVELS, scale.levels)
+        rows += rows_of(name, mesh, levels, schemes, control=crossing(mesh))
+    totals = (_total(method, rows) for method in schemes)
+    ours = [row for row in rows if row.method == OURS]
     return Outcome(
         (
-            Table("whole_meshes", "All meshes", columns, totals),
-            Table("whole_meshes_ours", "Each mesh, PNS", COLUMNS, _those_of(OURS, rows)),
-            Table("whole_meshes_each", "Every method", COLUMNS, tuple(map(astuple, rows))),
+            table("whole_meshes", "All meshes", Total, totals),
+            table("whole_meshes_ours", "Each mesh, PNS", Row, ours),
+            table("whole_meshes_each", "Every method", Row, rows),
         ),
         notes=(NOTE,),
     )
 
 
-def _those_of(method: str, rows: list[Row]) -> tuple[tuple[Cell, ...], ...]:
-    return tuple(astuple(row) for row in rows if row.method == method)
-
-
-def _total(method: str, rows: list[Row]) -> tuple[Cell, ...]:
+def _total(method: str, rows: list[Row]) -> Total:
     these = [row for row in rows if row.method == method]
-    return (
-        method,
-        sum(row.whole for row in these),
-        len(these),
-        sum(row.flipped for row in these),
-        sum(row.intersecting for row in these),
+    return Total(
+        method=method,
+        whole=sum(row.whole for row in these),
+        meshes=len(these),
+        flipped=sum(row.flipped for row in these),
+        intersecting=sum(row.intersecting for row in these),
     )
 
 

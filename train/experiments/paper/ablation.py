@@ -1,6 +1,7 @@
 """The ablation table: one part of the operator taken out at a time."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -11,8 +12,9 @@ from pns_common.schemes import Scheme, loop, pns
 from train.ablations.variants import VARIANTS, variant_recipe, variant_scheme
 from train.data.datasets import Dataset
 from train.data.grid import grid_faces, jittered_grid
-from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.paper.methods import PAPER_UNITS, level_by_level
 from train.experiments.paper.paper_values import PUBLISHED_ABLATION
 from train.metrics.evaluation import compare_with_loop
@@ -31,19 +33,6 @@ TITLES: Mapping[str, str] = MappingProxyType(
         "unconstrained": "unconstrained MLP",
     }
 )
-COLUMNS = (
-    Column("variant", "Variant"),
-    Column("ratio_one_step", "Ratio, 1 step", ".4f"),
-    Column("affine_error", "Affine error", ".1e"),
-    Column("ratio_level3", "Ratio, 3 steps", ".4f"),
-    Column("normal_jump_level3", "Jump, 3 steps", ".4f"),
-    Column("near_percent", "Near fit %", "+.2f"),
-    Column("published_ratio_one_step", "Published ratio 1", ".4f"),
-    Column("published_affine_error", "Published affine", ".1e"),
-    Column("published_ratio_level3", "Published ratio 3", ".4f"),
-    Column("published_normal_jump", "Published jump", ".4f"),
-    Column("published_near_percent", "Published fit %", "+.2f"),
-)
 NOTES = (
     "One-step ratio: the largest over all held-out ridges. Three steps: the largest of the levels "
     "on the first held-out ridge, with the largest normal jump of level 3. The published weights "
@@ -59,8 +48,35 @@ NOTES = (
 )
 
 
-def architecture_numbers(scheme: Scheme, held_out: Dataset, levels: int) -> tuple[float, ...]:
-    """Return ratio after one step, affine error, ratio and normal jump after `levels` steps."""
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One variant of the operator."""
+
+    variant: str = column("Variant")
+    ratio_one_step: float = column("Ratio, 1 step", ".4f")
+    affine_error: float = column("Affine error", ".1e")
+    ratio_level3: float = column("Ratio, 3 steps", ".4f")
+    normal_jump_level3: float = column("Jump, 3 steps", ".4f")
+    near_percent: float = column("Near fit %", "+.2f")
+    published_ratio_one_step: float = column("Published ratio 1", ".4f")
+    published_affine_error: float = column("Published affine", ".1e")
+    published_ratio_level3: float = column("Published ratio 3", ".4f")
+    published_normal_jump: float = column("Published jump", ".4f")
+    published_near_percent: float = column("Published fit %", "+.2f")
+
+
+@dataclass(frozen=True, slots=True)
+class Architecture:
+    """Ratio after one step, affine error; ratio and normal jump after several steps."""
+
+    one_step: float
+    affine: float
+    last: float
+    jump: float
+
+
+def architecture_numbers(scheme: Scheme, held_out: Dataset, levels: int) -> Architecture:
+    """Return what an operator's parts protect, of one step and of `levels`."""
     one_step = max(
         refine(instance.mesh, scheme, reference_length=PAPER_UNITS).ratio.max()
         for instance in held_out.instances
@@ -69,11 +85,11 @@ def architecture_numbers(scheme: Scheme, held_out: Dataset, levels: int) -> tupl
         refinement.report["levels"][0]
         for refinement in level_by_level(held_out.instances[0].mesh, scheme, levels)
     ]
-    return (
-        float(one_step),
-        affine_error(scheme),
-        max(report["proximity_ratio"]["max"] for report in reports),
-        reports[-1]["normal_jump_max"],
+    return Architecture(
+        one_step=float(one_step),
+        affine=affine_error(scheme),
+        last=max(report["proximity_ratio"]["max"] for report in reports),
+        jump=reports[-1]["normal_jump_max"],
     )
 
 
@@ -95,13 +111,27 @@ def run(laboratory: Laboratory) -> Outcome:
         if name not in schemes:
             own = variant_recipe(recipe, variant)
             schemes[name] = variant_scheme(variant, laboratory.network(own, variant), own)
-    rows: list[tuple[Cell, ...]] = []
-    for name, title in TITLES.items():
-        numbers = architecture_numbers(schemes[name], held_out, min(LEVEL, laboratory.scale.levels))
-        fit = compare_with_loop(schemes[name], held_out)["distance_near"].percent
-        rows.append((title, *numbers, fit, *PUBLISHED_ABLATION[name]))
-    table = Table("ablation", "What each part protects", COLUMNS, tuple(rows))
-    return Outcome(tables=(table,), notes=NOTES)
+    levels = min(LEVEL, laboratory.scale.levels)
+    rows = [_row(name, schemes[name], held_out, levels) for name in TITLES]
+    return Outcome((table("ablation", "What each part protects", Row, rows),), notes=NOTES)
+
+
+def _row(name: str, scheme: Scheme, held_out: Dataset, levels: int) -> Row:
+    ours = architecture_numbers(scheme, held_out, levels)
+    one_step, affine, last, jump, near = PUBLISHED_ABLATION[name]
+    return Row(
+        variant=TITLES[name],
+        ratio_one_step=ours.one_step,
+        affine_error=ours.affine,
+        ratio_level3=ours.last,
+        normal_jump_level3=ours.jump,
+        near_percent=compare_with_loop(scheme, held_out)["distance_near"].percent,
+        published_ratio_one_step=one_step,
+        published_affine_error=affine,
+        published_ratio_level3=last,
+        published_normal_jump=jump,
+        published_near_percent=near,
+    )
 
 
 EXPERIMENT = Experiment(

@@ -9,28 +9,33 @@ from matplotlib.figure import Figure as Drawing
 
 from pns_common.refine import refine
 from pns_common.topology import build_topology
-from train.experiments.harness.experiment import Column, Experiment, Figure, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import SEQUENTIAL, panels
 from train.experiments.paper.methods import PAPER_UNITS, hard_instance, ridge_of
 from train.models.recipes import paper
 from train.surfaces.implicit import Ridge
 
 PARALLEL = 0.9
-COLUMNS = (
-    Column("edges", "Interior edges"),
-    Column("count", "Number"),
-    Column("mean_ratio", "Mean ratio", ".3f"),
-    Column("max_ratio", "Max ratio", ".3f"),
-    Column("mean_gate", "Mean gate", ".3f"),
-    Column("ratio_over_gate", "Ratio / gate", ".3f"),
-)
 NOTES = (
     "*Ratio / gate* is the sum of ratios over the sum of gates: the share of what the gate lets "
     "through that the network spends. Parallel to the crest means |T · t| > 0.9.",
     "**Where this differs from the paper.** Nothing of substance: the spending follows the gate, "
     "edges parallel to the crest saturate, edges across it do not.",
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Interior edges of one kind."""
+
+    edges: str = column("Interior edges")
+    count: int = column("Number")
+    mean_ratio: float = column("Mean ratio", ".3f")
+    max_ratio: float = column("Max ratio", ".3f")
+    mean_gate: float = column("Mean gate", ".3f")
+    ratio_over_gate: float = column("Ratio / gate", ".3f")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,13 +63,13 @@ def run(laboratory: Laboratory) -> Outcome:
     for name, chosen in groups.items():
         ratio, gate = spending.ratio[chosen], spending.gate[chosen]
         rows.append(
-            (
-                name,
-                int(chosen.sum()),
-                float(ratio.mean()),
-                float(ratio.max()),
-                float(gate.mean()),
-                float(ratio.sum() / gate.sum()),
+            Row(
+                edges=name,
+                count=int(chosen.sum()),
+                mean_ratio=float(ratio.mean()),
+                max_ratio=float(ratio.max()),
+                mean_gate=float(gate.mean()),
+                ratio_over_gate=float(ratio.sum() / gate.sum()),
             )
         )
     figures = (
@@ -83,8 +88,7 @@ def run(laboratory: Laboratory) -> Outcome:
             lambda: _draw_verification(spending),
         ),
     )
-    table = Table("budget", "Who spends the budget", COLUMNS, tuple(rows))
-    return Outcome((table,), figures, NOTES)
+    return Outcome((table("budget", "Who spends the budget", Row, rows),), figures, NOTES)
 
 
 def measure(laboratory: Laboratory) -> Spending:

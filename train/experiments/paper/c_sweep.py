@@ -1,11 +1,16 @@
 """The sweep of the budget C: gain against the size of the envelope."""
 
+from dataclasses import dataclass
+
 from matplotlib.figure import Figure as Drawing
 
 from pns_common.refine import refine
+from pns_common.schemes import Scheme
+from train.data.datasets import Dataset
 from train.experiments.harness.comparison import LIMIT_NOTE
-from train.experiments.harness.experiment import Column, Experiment, Figure, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, panels
 from train.experiments.paper.methods import PAPER_UNITS
 from train.experiments.paper.paper_values import PUBLISHED_C_SWEEP
@@ -14,23 +19,6 @@ from train.metrics.envelope import envelope_limit
 from train.metrics.evaluation import compare_with_loop
 
 BUDGETS = (0.1, 0.25, 0.5, 1.0)
-COLUMNS = (
-    Column("budget", "C", "g"),
-    Column("near_percent", "Near %", "+.2f"),
-    Column("near_low", "95 % low", "+.2f"),
-    Column("near_high", "95 % high", "+.2f"),
-    Column("near_limit_percent", "Limit %", "+.2f"),
-    Column("near_share_of_limit", "Used", ".0%"),
-    Column("global_percent", "All %", "+.2f"),
-    Column("global_low", "95 % low", "+.2f"),
-    Column("global_high", "95 % high", "+.2f"),
-    Column("global_limit_percent", "Limit %", "+.2f"),
-    Column("global_share_of_limit", "Used", ".0%"),
-    Column("max_ratio", "Max ratio", ".4f"),
-    Column("published_near_percent", "Published near %", "+.2f"),
-    Column("published_global_percent", "Published all %", "+.2f"),
-    Column("published_max_ratio", "Published ratio", ".4f"),
-)
 NOTES = (
     LIMIT_NOTE,
     "**Where this differs from the paper.** Each C has a network of its own, trained by our recipe "
@@ -40,46 +28,84 @@ NOTES = (
 )
 
 
+@dataclass(frozen=True, slots=True)
+class Row:
+    """The network of one budget."""
+
+    budget: float = column("C", "g")
+    near_percent: float = column("Near %", "+.2f")
+    near_low: float = column("95 % low", "+.2f")
+    near_high: float = column("95 % high", "+.2f")
+    near_limit_percent: float = column("Limit %", "+.2f")
+    near_share_of_limit: float = column("Used", ".0%")
+    global_percent: float = column("All %", "+.2f")
+    global_low: float = column("95 % low", "+.2f")
+    global_high: float = column("95 % high", "+.2f")
+    global_limit_percent: float = column("Limit %", "+.2f")
+    global_share_of_limit: float = column("Used", ".0%")
+    max_ratio: float = column("Max ratio", ".4f")
+    published_near_percent: float = column("Published near %", "+.2f")
+    published_global_percent: float = column("Published all %", "+.2f")
+    published_max_ratio: float = column("Published ratio", ".4f")
+
+
 def run(laboratory: Laboratory) -> Outcome:
     """Train one network a budget."""
     held_out = laboratory.dataset("ridge-held-out")
-    rows: list[tuple[float, ...]] = []
-    for budget in BUDGETS:
-        recipe = paper_with_budget(budget)
-        scheme = laboratory.scheme(recipe)
-        improvements = compare_with_loop(scheme, held_out)
-        limit = envelope_limit(held_out, budget, recipe.gate_sharpness)
-        cells: list[float] = [budget]
-        for metric in ("distance_near", "distance"):
-            improvement, best = improvements[metric], limit[metric].percent
-            cells += [
-                improvement.percent,
-                improvement.low,
-                improvement.high,
-                best,
-                improvement.percent / best,
-            ]
-        ratio = max(
-            refine(instance.mesh, scheme, reference_length=PAPER_UNITS).ratio.max()
-            for instance in held_out.instances
-        )
-        rows.append((*cells, float(ratio), *PUBLISHED_C_SWEEP[str(budget)]))
-    table = Table("c_sweep", "Gain and use of the envelope for each C", COLUMNS, tuple(rows))
+    rows = [_row(laboratory.scheme(paper_with_budget(c)), held_out, c) for c in BUDGETS]
     figure = Figure(
         "c_sweep",
         "Left: improvement in distance over Loop against C; dotted, the envelope's limit; bars are "
         "95 % intervals. Right: the largest proximity ratio, whose cap is 1.",
         lambda: _draw(rows),
     )
-    return Outcome((table,), (figure,), NOTES)
+    swept = table("c_sweep", "Gain and use of the envelope for each C", Row, rows)
+    return Outcome((swept,), (figure,), NOTES)
 
 
-def _draw(rows: list[tuple[float, ...]]) -> Drawing:
+def _row(scheme: Scheme, held_out: Dataset, budget: float) -> Row:
+    improvements = compare_with_loop(scheme, held_out)
+    limit = envelope_limit(held_out, budget, paper_with_budget(budget).gate_sharpness)
+    near, everywhere = improvements["distance_near"], improvements["distance"]
+    near_limit, global_limit = limit["distance_near"].percent, limit["distance"].percent
+    ratio = max(
+        refine(instance.mesh, scheme, reference_length=PAPER_UNITS).ratio.max()
+        for instance in held_out.instances
+    )
+    published_near, published_global, published_ratio = PUBLISHED_C_SWEEP[str(budget)]
+    return Row(
+        budget=budget,
+        near_percent=near.percent,
+        near_low=near.low,
+        near_high=near.high,
+        near_limit_percent=near_limit,
+        near_share_of_limit=near.percent / near_limit,
+        global_percent=everywhere.percent,
+        global_low=everywhere.low,
+        global_high=everywhere.high,
+        global_limit_percent=global_limit,
+        global_share_of_limit=everywhere.percent / global_limit,
+        max_ratio=float(ratio),
+        published_near_percent=published_near,
+        published_global_percent=published_global,
+        published_max_ratio=published_ratio,
+    )
+
+
+def _draw(rows: list[Row]) -> Drawing:
     figure, (gain, ratio) = panels(2, height=2.4)
-    budgets = [row[0] for row in rows]
-    series = (("near the feature", 1, "o", COLOURS["pns"]), ("all", 6, "s", COLOURS["loop"]))
-    for shift, (label, first, marker, colour) in zip((-0.008, 0.008), series, strict=True):
-        value, low, high, best = ([row[first + i] for row in rows] for i in range(4))
+    budgets = [row.budget for row in rows]
+    near = [(row.near_percent, row.near_low, row.near_high, row.near_limit_percent) for row in rows]
+    everywhere = [
+        (row.global_percent, row.global_low, row.global_high, row.global_limit_percent)
+        for row in rows
+    ]
+    series = (
+        ("near the feature", near, "o", COLOURS["pns"]),
+        ("all", everywhere, "s", COLOURS["loop"]),
+    )
+    for shift, (label, gains, marker, colour) in zip((-0.008, 0.008), series, strict=True):
+        value, low, high, best = zip(*gains, strict=True)
         below = [v - x for v, x in zip(value, low, strict=True)]
         above = [x - v for v, x in zip(value, high, strict=True)]
         # Side by side, so that neither interval hides the other.
@@ -96,7 +122,7 @@ def _draw(rows: list[tuple[float, ...]]) -> Drawing:
     gain.set(xlabel="Budget C", ylabel="Improvement over Loop (%)", title="Gain", ylim=(0, None))
     gain.legend(loc="upper left", fontsize=6)
     ratio.axhline(1, color="0.3", linewidth=0.8, linestyle="--")
-    ratio.plot(budgets, [row[11] for row in rows], marker="o", color=COLOURS["pns"])
+    ratio.plot(budgets, [row.max_ratio for row in rows], marker="o", color=COLOURS["pns"])
     ratio.set(xlabel="Budget C", ylabel="Max proximity ratio", title="Envelope", ylim=(0, 1.1))
     return figure
 

@@ -1,8 +1,9 @@
 """Capacity control: is it the network or the envelope that limits the gain?"""
 
-from train.experiments.harness.comparison import COLUMNS, LIMIT_NOTE, comparison_rows
-from train.experiments.harness.experiment import Experiment, Outcome, Table
+from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import table
 from train.experiments.paper.paper_values import PUBLISHED_CAPACITY, PUBLISHED_HEADLINE
 from train.experiments.paper.recipes import larger
 from train.metrics.envelope import envelope_limit
@@ -34,8 +35,8 @@ def run(laboratory: Laboratory) -> Outcome:
         f"The limit is {limit['distance_near'].percent:+.2f} % near the feature and "
         f"{limit['distance'].percent:+.2f} % everywhere, whatever the network.",
     )
-    table = Table("capacity", "A network three times as large", COLUMNS, tuple(rows))
-    return Outcome((table,), notes=notes)
+    compared = table("capacity", "A network three times as large", Comparison, rows)
+    return Outcome((compared,), notes=notes)
 
 
 EXPERIMENT = Experiment(

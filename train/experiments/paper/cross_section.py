@@ -1,5 +1,7 @@
 """The cross-section figure: what each learned method does to the crest of one ridge."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
@@ -10,20 +12,24 @@ from trimesh.intersections import mesh_plane
 
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
-from train.experiments.harness.experiment import Column, Experiment, Figure, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, TITLES, method_style, panels, zero_line
 from train.experiments.paper.methods import PAPER_UNITS, hard_instance, learned_methods, ridge_of
 from train.metrics.one_step import NEAR_FEATURE
 from train.surfaces.implicit import Ridge, signed_distance
 
-COLUMNS = (
-    Column("method", "Method"),
-    Column("crest_error", "Largest error near the crest", ".5f"),
-    Column("shoulder_error", "Largest error beyond it", ".5f"),
-    Column("near_rmse", "RMSE near", ".5f"),
-    Column("far_rmse", "RMSE beyond", ".5f"),
-)
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One method's errors at inserted vertices."""
+
+    method: str = column("Method")
+    crest_error: float = column("Largest error near the crest", ".5f")
+    shoulder_error: float = column("Largest error beyond it", ".5f")
+    near_rmse: float = column("RMSE near", ".5f")
+    far_rmse: float = column("RMSE beyond", ".5f")
 
 
 def section(
@@ -51,12 +57,12 @@ def run(laboratory: Laboratory) -> Outcome:
         error = np.abs(signed_distance(instance.surface, mesh.vertices[old:]))
         near = instance.surface.feature_distance(mesh.vertices[old:]) < NEAR_FEATURE
         rows.append(
-            (
-                TITLES[name],
-                float(error[near].max()),
-                float(error[~near].max()),
-                float(np.sqrt((error[near] ** 2).mean())),
-                float(np.sqrt((error[~near] ** 2).mean())),
+            Row(
+                method=TITLES[name],
+                crest_error=float(error[near].max()),
+                shoulder_error=float(error[~near].max()),
+                near_rmse=float(np.sqrt((error[near] ** 2).mean())),
+                far_rmse=float(np.sqrt((error[~near] ** 2).mean())),
             )
         )
     # A section between two corrected vertices would show Loop twice.
@@ -70,8 +76,8 @@ def run(laboratory: Laboratory) -> Outcome:
         "vertex against y'. Grey: near the feature.",
         lambda: _draw(ridge, meshes, old, through),
     )
-    table = Table("cross_section", "Errors at inserted vertices", COLUMNS, tuple(rows))
-    return Outcome((table,), (figure,))
+    errors = table("cross_section", "Errors at inserted vertices", Row, rows)
+    return Outcome((errors,), (figure,))
 
 
 def _draw(

@@ -1,12 +1,15 @@
 """Extended iteration: many levels on a small patch, until the faces run out."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from pns_common.mesh import Mesh
 from train.data.datasets import Instance
-from train.experiments.harness.experiment import Column, Experiment, Figure, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import TITLES, method_style, panels
 from train.experiments.paper.methods import eight_methods, hard_instance, level_by_level, ridge_of
 from train.metrics.shape import DistanceLevel, distance_level
@@ -15,16 +18,6 @@ SIDE = 5
 """Vertices along one side of the reduced patch: 32 faces, half a million at level 7."""
 
 METHODS = ("loop", "butterfly", "pn-triangles", "curvature-adaptive", "pns", "unconstrained")
-COLUMNS = (
-    Column("method", "Method"),
-    Column("level", "Level"),
-    Column("faces", "Faces"),
-    Column("distance", "RMSE", ".5f"),
-    Column("hausdorff", "Max error", ".5f"),
-    Column("normal_jump", "Max jump", ".4f"),
-    Column("ratio", "Max ratio", ".3g"),
-    Column("flipped", "Flipped"),
-)
 NOTES = (
     "The patch is the hard ridge of the repeated table on a 5 × 5 grid, its edges twice as long. "
     "Level 7 has 524,288 faces. PNS's ratio falls with the level, as the paper expects: the gate "
@@ -32,6 +25,20 @@ NOTES = (
     "normal jump halves with each level, as Loop's does. Quadric and normal displacement are left "
     "out for time.",
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One method after so many levels."""
+
+    method: str = column("Method")
+    level: int = column("Level")
+    faces: int = column("Faces")
+    distance: float = column("RMSE", ".5f")
+    hausdorff: float = column("Max error", ".5f")
+    normal_jump: float = column("Max jump", ".4f")
+    ratio: float = column("Max ratio", ".3g")
+    flipped: int = column("Flipped")
 
 
 def reduced_patch() -> Instance:
@@ -58,18 +65,18 @@ def run(laboratory: Laboratory) -> Outcome:
             laboratory.progress(f"extended {TITLES[name]}, level {level}", number, len(METHODS))
             by_method[name].append(distance_level(instance.surface, refinement))
     rows = [
-        (
-            TITLES[name],
-            level,
-            level_errors.faces,
-            level_errors.distance,
-            level_errors.hausdorff,
-            level_errors.jump,
-            level_errors.ratio,
-            level_errors.flipped,
+        Row(
+            method=TITLES[name],
+            level=level,
+            faces=errors.faces,
+            distance=errors.distance,
+            hausdorff=errors.hausdorff,
+            normal_jump=errors.jump,
+            ratio=errors.ratio,
+            flipped=errors.flipped,
         )
         for name in METHODS
-        for level, level_errors in enumerate(by_method[name], start=1)
+        for level, errors in enumerate(by_method[name], start=1)
     ]
     figure = Figure(
         "extended",
@@ -77,8 +84,8 @@ def run(laboratory: Laboratory) -> Outcome:
         "smooth limit halves it with each level. Right: the largest proximity ratio.",
         lambda: _draw(by_method),
     )
-    table = Table("extended", "A reduced patch to half a million faces", COLUMNS, tuple(rows))
-    return Outcome((table,), (figure,), NOTES)
+    levels = table("extended", "A reduced patch to half a million faces", Row, rows)
+    return Outcome((levels,), (figure,), NOTES)
 
 
 def _draw(by_method: dict[str, list[DistanceLevel]]) -> Drawing:

@@ -5,9 +5,10 @@ from collections.abc import Mapping
 from matplotlib.figure import Figure as Drawing
 
 from train.ablations.variants import UNCONSTRAINED, variant_recipe, variant_scheme
-from train.experiments.harness.comparison import COLUMNS, LIMIT_NOTE, comparison_rows
-from train.experiments.harness.experiment import Experiment, Figure, Outcome, Table
+from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
+from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import table
 from train.experiments.harness.style import COLOURS, TITLES, panels, zero_line
 from train.experiments.paper.paper_values import (
     PAPER_HEADLINE,
@@ -63,7 +64,7 @@ def run(laboratory: Laboratory) -> Outcome:
         ),
     ]
     return Outcome(
-        tables=(Table("headline", "One step on held-out ridges", COLUMNS, tuple(rows)),),
+        tables=(table("headline", "One step on held-out ridges", Comparison, rows),),
         figures=(
             Figure(
                 "headline",

@@ -2,43 +2,21 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from pns_common.schemes import Scheme
 from train.data.datasets import Instance
-from train.experiments.harness.experiment import Cell, Column, Experiment, Figure, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import TITLES, method_style, panels
 from train.experiments.paper.methods import eight_methods, hard_instance, level_by_level
 from train.experiments.paper.paper_values import PAPER_REPEATED
 from train.metrics.shape import DistanceLevel, LevelErrors, distance_level, level_errors
 
-SUMMARY_COLUMNS = (
-    Column("method", "Method"),
-    Column("level1_max_error", "L1 max error", ".4f"),
-    Column("last_max_error", "L4 max error", ".4f"),
-    Column("last_normal_jump", "L4 jump", ".3f"),
-    Column("max_ratio", "Max ratio L1–L4", ".4g"),
-    Column("last_flipped", "L4 flipped"),
-    Column("paper_level1_max_error", "Paper L1", ".3f"),
-    Column("paper_last_max_error", "Paper L4", ".3f"),
-    Column("paper_last_normal_jump", "Paper jump", ".3f"),
-    Column("paper_max_ratio", "Paper ratio", ".4g"),
-)
-LEVEL_COLUMNS = (
-    Column("method", "Method"),
-    Column("level", "Level"),
-    Column("faces", "Faces"),
-    Column("distance", "RMSE", ".5f"),
-    Column("hausdorff", "Max error", ".5f"),
-    Column("normal_mean", "Mean normal error", ".4f"),
-    Column("normal_max", "Max normal error", ".4f"),
-    Column("normal_jump", "Max jump", ".4f"),
-    Column("ratio", "Max ratio", ".4g"),
-    Column("flipped", "Flipped"),
-)
 NOTES = (
     "Errors are over all vertices, old ones included; a flipped face opposes its Loop counterpart "
     "of the same step.",
@@ -56,6 +34,38 @@ NOTES = (
 )
 
 
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """One method over all levels."""
+
+    method: str = column("Method")
+    level1_max_error: float = column("L1 max error", ".4f")
+    last_max_error: float = column("L4 max error", ".4f")
+    last_normal_jump: float = column("L4 jump", ".3f")
+    max_ratio: float = column("Max ratio L1–L4", ".4g")
+    last_flipped: int = column("L4 flipped")
+    paper_level1_max_error: float = column("Paper L1", ".3f")
+    paper_last_max_error: float = column("Paper L4", ".3f")
+    paper_last_normal_jump: float | str = column("Paper jump", ".3f")
+    paper_max_ratio: float | str = column("Paper ratio", ".4g")
+
+
+@dataclass(frozen=True, slots=True)
+class LevelRow:
+    """One method after so many levels."""
+
+    method: str = column("Method")
+    level: int = column("Level")
+    faces: int = column("Faces")
+    distance: float = column("RMSE", ".5f")
+    hausdorff: float = column("Max error", ".5f")
+    normal_mean: float = column("Mean normal error", ".4f")
+    normal_max: float = column("Max normal error", ".4f")
+    normal_jump: float = column("Max jump", ".4f")
+    ratio: float = column("Max ratio", ".4g")
+    flipped: int = column("Flipped")
+
+
 def run(laboratory: Laboratory) -> Outcome:
     """Measure each method level by level: one instance in the table, the test set in the figure."""
     methods, levels = eight_methods(laboratory), laboratory.scale.levels
@@ -67,7 +77,18 @@ def run(laboratory: Laboratory) -> Outcome:
         errors_of_levels = measure(hard, scheme, levels)
         summary.append(_summary(name, errors_of_levels))
         by_level += [
-            (TITLES[name], *(errors.as_row()[column.name] for column in LEVEL_COLUMNS[1:]))
+            LevelRow(
+                method=TITLES[name],
+                level=errors.level,
+                faces=errors.faces,
+                distance=errors.shape.distance,
+                hausdorff=errors.shape.hausdorff,
+                normal_mean=errors.shape.normal_mean,
+                normal_max=errors.shape.normal_max,
+                normal_jump=errors.normal_jump,
+                ratio=errors.ratio,
+                flipped=errors.flipped,
+            )
             for errors in errors_of_levels
         ]
         curves[name] = [
@@ -85,8 +106,8 @@ def run(laboratory: Laboratory) -> Outcome:
         lambda: _draw(curves),
     )
     tables = (
-        Table("repeated", "One hard ridge, four levels", SUMMARY_COLUMNS, tuple(summary)),
-        Table("repeated_levels", "The same ridge level by level", LEVEL_COLUMNS, tuple(by_level)),
+        table("repeated", "One hard ridge, four levels", Summary, summary),
+        table("repeated_levels", "The same ridge level by level", LevelRow, by_level),
     )
     return Outcome(tables, (figure,), NOTES)
 
@@ -100,16 +121,20 @@ def measure(instance: Instance, scheme: Scheme, levels: int) -> list[LevelErrors
     ]
 
 
-def _summary(name: str, levels: list[LevelErrors]) -> tuple[Cell, ...]:
+def _summary(name: str, levels: list[LevelErrors]) -> Summary:
     last = levels[-1]
-    return (
-        TITLES[name],
-        levels[0].shape.hausdorff,
-        last.shape.hausdorff,
-        last.normal_jump,
-        max(errors.ratio for errors in levels),
-        last.flipped,
-        *PAPER_REPEATED[name],
+    first_error, last_error, jump, ratio = PAPER_REPEATED[name]
+    return Summary(
+        method=TITLES[name],
+        level1_max_error=levels[0].shape.hausdorff,
+        last_max_error=last.shape.hausdorff,
+        last_normal_jump=last.normal_jump,
+        max_ratio=max(errors.ratio for errors in levels),
+        last_flipped=last.flipped,
+        paper_level1_max_error=first_error,
+        paper_last_max_error=last_error,
+        paper_last_normal_jump=jump,
+        paper_max_ratio=ratio,
     )
 
 

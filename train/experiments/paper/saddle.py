@@ -1,13 +1,16 @@
 """The saddle null result: a smooth surface that Loop fits already."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pns_common.refine import refine
 from pns_common.schemes import Scheme
 from train.data.datasets import Dataset
-from train.experiments.harness.comparison import COLUMNS, LIMIT_NOTE, comparison_rows
-from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
+from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.paper.methods import PAPER_UNITS
 from train.experiments.paper.paper_values import PUBLISHED_SADDLE
 from train.experiments.paper.recipes import saddle
@@ -15,12 +18,6 @@ from train.metrics.envelope import envelope_limit
 from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import paper
 
-GATE_COLUMNS = (
-    Column("dataset", "Data"),
-    Column("mean_gate", "Mean gate", ".4f"),
-    Column("max_gate", "Max gate", ".4f"),
-    Column("share_active", "Gate above 0.01", ".1%"),
-)
 NOTES = (
     LIMIT_NOTE,
     "The gate stays close to zero on saddles, and Loop's own error there is small beside that on "
@@ -34,7 +31,17 @@ NOTES = (
 )
 
 
-def gate_row(scheme: Scheme, dataset: Dataset) -> tuple[Cell, ...]:
+@dataclass(frozen=True, slots=True)
+class GateRow:
+    """How far the gate opens on one data set."""
+
+    dataset: str = column("Data")
+    mean_gate: float = column("Mean gate", ".4f")
+    max_gate: float = column("Max gate", ".4f")
+    share_active: float = column("Gate above 0.01", ".1%")
+
+
+def gate_row(scheme: Scheme, dataset: Dataset) -> GateRow:
     """Return mean, maximum and active share of the gate over a data set's inserted vertices."""
     gates = np.concatenate(
         [
@@ -44,7 +51,12 @@ def gate_row(scheme: Scheme, dataset: Dataset) -> tuple[Cell, ...]:
             for instance in dataset.instances
         ]
     )
-    return (dataset.name, float(gates.mean()), float(gates.max()), float((gates > 0.01).mean()))
+    return GateRow(
+        dataset=dataset.name,
+        mean_gate=float(gates.mean()),
+        max_gate=float(gates.max()),
+        share_active=float((gates > 0.01).mean()),
+    )
 
 
 def run(laboratory: Laboratory) -> Outcome:
@@ -68,13 +80,9 @@ def run(laboratory: Laboratory) -> Outcome:
             limit=limit,
         ),
     ]
-    gates = Table(
-        "saddle_gate",
-        "How far the gate opens",
-        GATE_COLUMNS,
-        (gate_row(scheme, held_out), gate_row(scheme, ridges)),
-    )
-    return Outcome((Table("saddle", "One step on saddles", COLUMNS, tuple(rows)), gates), (), NOTES)
+    opened = (gate_row(scheme, held_out), gate_row(scheme, ridges))
+    gates = table("saddle_gate", "How far the gate opens", GateRow, opened)
+    return Outcome((table("saddle", "One step on saddles", Comparison, rows), gates), (), NOTES)
 
 
 EXPERIMENT = Experiment(

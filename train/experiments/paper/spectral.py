@@ -1,6 +1,6 @@
 """The spectral table: the planar spectrum for k = 3 … 12, and the adversary of the Reif gap."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
@@ -11,8 +11,9 @@ from train.certificates.gap_collapse import GapAttack, gap_attack
 from train.certificates.operator_jacobian import operator_jacobian
 from train.certificates.planar_spectrum import derivative_of_departure, spectrum
 from train.certificates.subject import in_double, subject_of_network
-from train.experiments.harness.experiment import Cell, Column, Experiment, Figure, Outcome, Table
+from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, panels, zero_line
 from train.experiments.paper.paper_values import PUBLISHED_SPECTRAL
 from train.models.recipes import paper
@@ -34,25 +35,6 @@ ATTACKED = 6
 """Valence: at higher ones Loop's tangents cross other eigenvalues before the gap has closed."""
 
 ATTACK_STEPS = 40
-COLUMNS = (
-    Column("valence", "k", "d"),
-    Column("tangent", "λ_t", ".9f"),
-    Column("tangent_analytic", "3/8 + ¼ cos 2π/k", ".9f"),
-    Column("gap", "Reif gap", ".6f"),
-    Column("gap_analytic", "Loop's", ".6f"),
-    Column("gap_one_ring", "One ring only", ".6f"),
-    Column("departure", "Derivative of S − Loop", ".1e"),
-    Column("departure_autograd", "By autograd", ".1e"),
-    Column("published_tangent", "Published λ_t", ".9f"),
-    Column("published_gap", "Published gap", ".6f"),
-)
-ATTACK_COLUMNS = (
-    Column("budget", "C", "g"),
-    Column("valence", "k", "d"),
-    Column("before", "Margin before", ".4f"),
-    Column("after", "Margin after", ".4f"),
-    Column("steps", "Steps", "d"),
-)
 NOTES = (
     "The linearisation differentiates the operator itself, two rings to two rings in all three "
     "coordinates; its departure from Loop's is taken from one side (a kink would cancel in a "
@@ -63,6 +45,33 @@ NOTES = (
     "Off the plane nothing is promised. The adversary moves weights and the star's vertices for "
     "the same number of steps at each C: the smaller C is, the wider a margin it leaves.",
 )
+
+
+@dataclass(frozen=True, slots=True)
+class PlanarRow:
+    """The planar spectrum at one valence."""
+
+    valence: int = column("k", "d")
+    tangent: float = column("λ_t", ".9f")
+    tangent_analytic: float = column("3/8 + ¼ cos 2π/k", ".9f")
+    gap: float = column("Reif gap", ".6f")
+    gap_analytic: float = column("Loop's", ".6f")
+    gap_one_ring: float = column("One ring only", ".6f")
+    departure: float = column("Derivative of S − Loop", ".1e")
+    departure_autograd: float = column("By autograd", ".1e")
+    published_tangent: float = column("Published λ_t", ".9f")
+    published_gap: float = column("Published gap", ".6f")
+
+
+@dataclass(frozen=True, slots=True)
+class AttackRow:
+    """The adversary of the gap at one budget."""
+
+    budget: float = column("C", "g")
+    valence: int = column("k", "d")
+    before: float = column("Margin before", ".4f")
+    after: float = column("Margin after", ".4f")
+    steps: int = column("Steps", "d")
 
 
 def run(laboratory: Laboratory) -> Outcome:
@@ -88,12 +97,15 @@ def run(laboratory: Laboratory) -> Outcome:
     ]
     return Outcome(
         tables=(
-            Table("spectral", "Planar spectrum of the trained operator", COLUMNS, tuple(rows)),
-            Table(
+            table("spectral", "Planar spectrum of the trained operator", PlanarRow, rows),
+            table(
                 "spectral_adversarial",
                 "Adversary of the Reif gap at lift 0.4",
-                ATTACK_COLUMNS,
-                tuple((a.budget, a.valence, a.before, a.after, len(a.margins)) for a in attacks),
+                AttackRow,
+                (
+                    AttackRow(a.budget, a.valence, a.before, a.after, len(a.margins))
+                    for a in attacks
+                ),
             ),
         ),
         figures=(
@@ -108,22 +120,24 @@ def run(laboratory: Laboratory) -> Outcome:
     )
 
 
-def planar_row(exact: Scheme, operator: Operator, valence: int) -> tuple[Cell, ...]:
+def planar_row(exact: Scheme, operator: Operator, valence: int) -> PlanarRow:
     """Return one row of the table, from an operator in double precision and as a scheme."""
     size = spectrum(exact, valence)
     star = closed_star(exact, valence)(0.0)
     without_budget = Operator(operator.network, replace(operator.recipe, budget=0.0))
     by_autograd = operator_jacobian(operator, star) - operator_jacobian(without_budget, star)
-    return (
-        valence,
-        float(size[:TANGENT_COUNT].min()),
-        loop_eigenvalue(valence),
-        float(size[TANGENT_COUNT - 1] - size[TANGENT_COUNT]),
-        loop_gap(valence),
-        one_ring_gap(exact, valence),
-        derivative_of_departure(exact, valence),
-        float(by_autograd.abs().max()),
-        *PUBLISHED_SPECTRAL[str(valence)],
+    published_tangent, published_gap = PUBLISHED_SPECTRAL[str(valence)]
+    return PlanarRow(
+        valence=valence,
+        tangent=float(size[:TANGENT_COUNT].min()),
+        tangent_analytic=loop_eigenvalue(valence),
+        gap=float(size[TANGENT_COUNT - 1] - size[TANGENT_COUNT]),
+        gap_analytic=loop_gap(valence),
+        gap_one_ring=one_ring_gap(exact, valence),
+        departure=derivative_of_departure(exact, valence),
+        departure_autograd=float(by_autograd.abs().max()),
+        published_tangent=published_tangent,
+        published_gap=published_gap,
     )
 
 

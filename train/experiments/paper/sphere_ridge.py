@@ -1,8 +1,9 @@
 """Cross-family: the ridges' network on ridges of spheres, on which nothing was trained."""
 
-from train.experiments.harness.comparison import COLUMNS, LIMIT_NOTE, comparison_rows
-from train.experiments.harness.experiment import Experiment, Outcome, Table
+from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
+from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import table
 from train.experiments.paper.paper_values import PUBLISHED_SPHERE_RIDGE
 from train.metrics.envelope import envelope_limit
 from train.metrics.evaluation import compare_with_loop
@@ -26,8 +27,8 @@ def run(laboratory: Laboratory) -> Outcome:
         limit=envelope_limit(held_out, recipe.budget, recipe.gate_sharpness),
         published=PUBLISHED_SPHERE_RIDGE,
     )
-    table = Table("sphere_ridge", "One step on ridges of spheres", COLUMNS, tuple(rows))
-    return Outcome((table,), notes=NOTES)
+    compared = table("sphere_ridge", "One step on ridges of spheres", Comparison, rows)
+    return Outcome((compared,), notes=NOTES)
 
 
 EXPERIMENT = Experiment(

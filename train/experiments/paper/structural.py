@@ -2,6 +2,7 @@
 
 import copy
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -21,6 +22,7 @@ from train.certificates.certify import run_steps, scheme_steps
 from train.certificates.subject import Subject, in_double, subject_of_network
 from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.rows import column, table
 from train.experiments.paper.paper_values import PUBLISHED_ADVERSARIAL, PUBLISHED_STRUCTURAL
 from train.models.from_recipe import initial_network
 from train.models.networks import BoundedNet
@@ -34,19 +36,6 @@ SCALED = 5.0
 
 ATTACK_STEPS = 200
 
-CERTIFICATE_COLUMNS = (
-    Column("theorem", "Theorem"),
-    Column("property", "Property"),
-    Column("kind", "Kind"),
-    Column("bound", "Bound"),
-    Column("trained", "Trained", ".4g"),
-    Column("random", "Random", ".4g"),
-    Column("random_steep", "Random × 5", ".4g"),
-    Column("adversarial", "Adversarial", ".4g"),
-    Column("all_passed", "All pass"),
-    Column("published", "Published", ".4g"),
-    Column("paper", "Paper", ".4g"),
-)
 REMOVED_TITLES: Mapping[str, str] = MappingProxyType(
     {
         "no-h2": "no h² (one power of h)",
@@ -60,15 +49,6 @@ REMOVED_COLUMNS = (
     *(Column(f"t{number}", f"T{number}") for number in range(1, 9)),
     Column("failed", "Failed"),
 )
-ATTACK_COLUMNS = (
-    Column("attack", "Adversary"),
-    Column("first", "At first", ".3g"),
-    Column("worst", "Worst found", ".15g"),
-    Column("cap", "Cap", ".3g"),
-    Column("held", "Held"),
-    Column("steps", "Steps"),
-    Column("published", "Published", ".3g"),
-)
 NOTES = (
     "Displacements are recomputed from output positions and a Loop step written independently of "
     "the operator. Proximity ratios are a share of C h², so T1 reaches 1 where weights and mesh "
@@ -81,6 +61,36 @@ NOTES = (
     "**Where this differs from the paper.** The Lipschitz slope is taken over moves from 1e-2 to "
     "1e-7, where it is nearer to 1 than the paper's 1.02.",
 )
+
+
+@dataclass(frozen=True, slots=True)
+class CertificateRow:
+    """One certificate of all subjects."""
+
+    theorem: str = column("Theorem")
+    property: str = column("Property")
+    kind: str = column("Kind")
+    bound: str = column("Bound")
+    trained: float = column("Trained", ".4g")
+    random: float = column("Random", ".4g")
+    random_steep: float = column("Random × 5", ".4g")
+    adversarial: float = column("Adversarial", ".4g")
+    all_passed: bool = column("All pass")
+    published: float | None = column("Published", ".4g")
+    paper: float | None = column("Paper", ".4g")
+
+
+@dataclass(frozen=True, slots=True)
+class AttackRow:
+    """One adversary."""
+
+    attack: str = column("Adversary")
+    first: float = column("At first", ".3g")
+    worst: float = column("Worst found", ".15g")
+    cap: float = column("Cap", ".3g")
+    held: bool = column("Held")
+    steps: int = column("Steps")
+    published: float | None = column("Published", ".3g")
 
 
 def run(laboratory: Laboratory) -> Outcome:
@@ -104,11 +114,11 @@ def run(laboratory: Laboratory) -> Outcome:
     ]
     return Outcome(
         tables=(
-            Table(
+            table(
                 "structural",
                 "Certificates T1–T8",
-                CERTIFICATE_COLUMNS,
-                tuple(certificate_row(row) for row in zip(*certified, strict=True)),
+                CertificateRow,
+                (certificate_row(row) for row in zip(*certified, strict=True)),
             ),
             Table(
                 "structural_removed",
@@ -116,11 +126,11 @@ def run(laboratory: Laboratory) -> Outcome:
                 REMOVED_COLUMNS,
                 tuple(_removed_row(name, certificates) for name, certificates in removed),
             ),
-            Table(
+            table(
                 "structural_adversarial",
                 "Adversaries over weights and mesh",
-                ATTACK_COLUMNS,
-                tuple(attack_row(attack) for attack in attacks),
+                AttackRow,
+                map(attack_row, attacks),
             ),
         ),
         notes=NOTES,
@@ -175,21 +185,22 @@ def scaled(network: BoundedNet, factor: float) -> BoundedNet:
     return larger
 
 
-def certificate_row(row: tuple[Certificate, ...]) -> tuple[Cell, ...]:
-    """Return a row of `CERTIFICATE_COLUMNS`: one certificate of several subjects."""
-    first = row[0]
-    published, paper = PUBLISHED_STRUCTURAL.get(first.name, (None, None))
-    passed = all(certificate.passed for certificate in row)
-    values = (certificate.value for certificate in row)
-    return (
-        first.theorem,
-        first.name,
-        str(first.kind),
-        first.bound,
-        *values,
-        passed,
-        published,
-        paper,
+def certificate_row(certificates: tuple[Certificate, ...]) -> CertificateRow:
+    """Return the row of one certificate, of the subjects in the order of the columns."""
+    trained, random, steep, adversarial = certificates
+    published, paper = PUBLISHED_STRUCTURAL.get(trained.name, (None, None))
+    return CertificateRow(
+        theorem=trained.theorem,
+        property=trained.name,
+        kind=str(trained.kind),
+        bound=trained.bound,
+        trained=trained.value,
+        random=random.value,
+        random_steep=steep.value,
+        adversarial=adversarial.value,
+        all_passed=all(certificate.passed for certificate in certificates),
+        published=published,
+        paper=paper,
     )
 
 
@@ -200,12 +211,18 @@ def _removed_row(name: str, certificates: tuple[Certificate, ...]) -> tuple[Cell
     return (REMOVED_TITLES[name], *marks, "; ".join(certificate.name for certificate in failed))
 
 
-def attack_row(attack: Attack) -> tuple[Cell, ...]:
-    """Return a row of `ATTACK_COLUMNS`."""
-    published = PUBLISHED_ADVERSARIAL[attack.name] if attack.cap != TURNED else None
-    name = f"{attack.name}, any plane" if attack.cap == TURNED else attack.name
-    first, count = attack.values[0], len(attack.values)
-    return (name, first, attack.worst, attack.cap, attack.held, count, published)
+def attack_row(attack: Attack) -> AttackRow:
+    """Return the row of one adversary."""
+    turned = attack.cap == TURNED
+    return AttackRow(
+        attack=f"{attack.name}, any plane" if turned else attack.name,
+        first=attack.values[0],
+        worst=attack.worst,
+        cap=attack.cap,
+        held=attack.held,
+        steps=len(attack.values),
+        published=None if turned else PUBLISHED_ADVERSARIAL[attack.name],
+    )
 
 
 EXPERIMENT = Experiment(
