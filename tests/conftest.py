@@ -1,8 +1,8 @@
 """What every test runs with; tests of pns_common alone also with its array annotations enforced.
 
 Shapes and kinds are checked at run time in a run over tests/pns_common and nothing else. It takes
-five times as long, and a shape does not hang on the numbers: few examples serve. A run over all
-tests takes the properties of pns_common with all examples.
+five times as long, and a shape does not hang on the numbers: of each test the first parameters
+serve, of a property a few examples. A run over all tests takes all of both.
 """
 
 from pathlib import Path
@@ -32,8 +32,10 @@ settings.register_profile(
     max_examples=40,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )
-settings.register_profile("shapes", settings.get_profile("ci"), max_examples=6)
+settings.register_profile("shapes", settings.get_profile("ci"), max_examples=4)
 settings.load_profile("ci")
+
+FIRST_ALONE = pytest.StashKey[bool]()
 
 # Which tests are of a kind that `make quick` leaves out, by where they stand.
 KINDS = {
@@ -62,10 +64,18 @@ def pytest_configure(config: pytest.Config) -> None:
     if given and all(path.is_relative_to(TESTS / "pns_common") for path in given):
         install_import_hook(CHECKED, "tests.support.typecheck.check")
         settings.load_profile("shapes")
+        config.stash[FIRST_ALONE] = all(path.is_dir() for path in given)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests by where they stand."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark tests by where they stand; for shapes keep the first parameters of each test."""
+    if config.stash.get(FIRST_ALONE, False):
+        first: dict[str, pytest.Item] = {}
+        for item in items:
+            first.setdefault(item.nodeid.partition("[")[0], item)
+        kept = list(first.values())
+        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+        items[:] = kept
     for item in items:
         for kind, places in KINDS.items():
             if any(item.path.is_relative_to(TESTS / place) for place in places):

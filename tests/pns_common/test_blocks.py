@@ -2,9 +2,10 @@
 
 import sys
 
+import numpy as np
 import pytest
 
-from pns_common.blocks import Blocks
+from pns_common.blocks import Blocks, available_threads
 
 
 @pytest.fixture
@@ -31,3 +32,33 @@ def test_blocks_cover_all_rows_and_are_counted(count, rows):
     assert [row for part in taken for row in range(part.start, part.stop)] == list(range(count))
     assert len(taken) == blocks.count(count)
     assert [blocks.number(part) for part in taken] == list(range(len(taken)))
+
+
+class StopRefiningError(Exception):
+    """Nobody wants it."""
+
+
+def test_an_error_in_a_block_reaches_the_caller():
+    def fail(rows):
+        raise ValueError(f"rows {rows.start}")
+
+    with pytest.raises(ValueError, match="rows"):
+        Blocks(threads=2, rows=3).run(10, fail)
+    assert available_threads() >= 1
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_after_an_error_no_more_blocks_are_begun(threads):
+    begun = []
+
+    def refuse(count):
+        begun.append(count)
+        raise StopRefiningError
+
+    with pytest.raises(StopRefiningError):
+        Blocks(threads, 1, refuse).run(10_000, lambda rows: None)
+    assert len(begun) <= threads
+    begun.clear()
+    with pytest.raises(StopRefiningError):
+        Blocks(threads, 5, refuse).gather(3, lambda rows: (np.zeros(3),))
+    assert begun == [3]

@@ -6,7 +6,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, pns, refine
-from pns_common.correction import curvature_gate, project_to_ball
 from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
 from pns_common.topology import EdgeClass, build_topology
 from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, rotation, soups
@@ -155,58 +154,6 @@ def test_faces_without_area_do_not_disturb_a_plane():
     refined = refine(mesh, pns(MODELS[2]))
     np.testing.assert_array_equal(refined.mesh.vertices, refine(mesh, loop()).mesh.vertices)
     assert refined.report["levels"][0]["degenerate_frames"] == 3
-
-
-def degenerate_frames(points, faces=((0, 1, 2), (1, 0, 3))):
-    return refine(Mesh(np.array(points, dtype=float), np.array(faces)), pns(MODELS[0])).report[
-        "levels"
-    ][0]["degenerate_frames"]
-
-
-@pytest.mark.parametrize(("height", "degenerate"), [(1e-13, 1), (1e-11, 0)])
-def test_a_face_has_no_area_where_rounding_would_make_its_normal(height, degenerate):
-    points = [[0, 0, 0], [1, 0, 0], [0.5, height, 0], [0.5, -1, 0]]
-    assert degenerate_frames(points) == degenerate
-
-
-@pytest.mark.parametrize(("angle", "degenerate"), [(1e-4, 1), (1e-2, 0)])
-def test_faces_folded_onto_each_other_are_antiparallel_within_the_papers_epsilon(angle, degenerate):
-    """1 + n1 · n2 = 1 − cos(angle): 5e-9 within ε = 1e-6, 5e-5 outside."""
-    lifted = [0.5, np.cos(angle), np.sin(angle)]
-    points = [[0, 0, 0], [1, 0, 0], [0.5, 1, 0], lifted]
-    assert degenerate_frames(points) == degenerate
-
-
-def test_gate_and_its_slope_vanish_at_coplanar_faces():
-    vertices, faces = grid(2)
-
-    def gamma(lift):
-        points = vertices.copy()
-        points[0, 2] = lift
-        topology = build_topology(faces, 4)
-        stencil = edge_stencil(
-            points,
-            face_normals(points, faces),
-            topology.stencil[topology.interior],
-            topology.edge_faces[topology.interior],
-        )
-        return curvature_gate(10.0)(edge_frames(stencil))[0]
-
-    assert gamma(0.0) == 0
-    # x ~ lift², γ ~ x² ~ lift⁴: halving the lift divides the gate by 16.
-    assert gamma(0.02) / gamma(0.01) == pytest.approx(16, rel=1e-2)
-    assert 0 < gamma(0.01) < 1e-6
-
-
-@given(st.lists(st.floats(-1e300, 1e300), min_size=3, max_size=3), st.floats(1e-3, 10))
-def test_projection_never_leaves_the_ball_and_keeps_what_is_inside(vector, radius):
-    (projected,) = project_to_ball(np.array([vector]), radius)
-    length = np.linalg.norm(projected)
-    assert length <= radius * ROUNDING
-    if np.linalg.norm(np.array(vector) / max(1.0, *map(abs, vector))) * max(
-        1.0, *map(abs, vector)
-    ) < radius * (1 - 1e-12):
-        np.testing.assert_array_equal(projected, vector)
 
 
 def test_zero_reference_length_switches_the_correction_off():

@@ -84,16 +84,6 @@ def test_tangent_eigenvalue_of_the_star_is_loops(valence):
     np.testing.assert_allclose(moduli[-3:-1], tangent, rtol=0, atol=1e-12)
 
 
-def test_beta_is_the_cosine_formula_not_warrens():
-    valence = np.arange(3, 13)
-    expected = (5 / 8 - (3 / 8 + np.cos(2 * np.pi / valence) / 4) ** 2) / valence
-    np.testing.assert_allclose(loop_beta(valence), expected, rtol=1e-15)
-    warren = np.where(valence == 3, 3 / 16, 3 / (8 * valence))
-    assert (np.abs(loop_beta(valence) - warren) < 1e-12).tolist() == [
-        k in (3, 6) for k in valence.tolist()
-    ]
-
-
 def test_affine_heights_are_reproduced():
     vertices, faces = grid(8, lambda x, y: 2 * x - 3 * y + 1)
     refined = refine(Mesh(vertices, faces), loop(), 2).mesh.vertices

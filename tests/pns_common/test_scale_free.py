@@ -11,18 +11,17 @@ from hypothesis import strategies as st
 from pns_common import Mesh, ModelError, loop, pns, refine
 from pns_common.edge.frames import face_normals
 from pns_common.level import control_level
-from pns_common.linear import refine_linear
 from pns_common.schemes import (
     edge_operator,
     scale_free_form,
     scale_free_scheme,
     vertex_operator,
 )
-from pns_common.side_gate import face_bends, gentle_bend, opened
 from pns_common.step import level_step
 from pns_common.topology import build_topology, split
 from tests.support.meshes import bent, bumpy_sphere, grid, icosphere, manifolds, rotation, soups
 from tests.support.networks import SCALE_FREE_CARD, scale_free_model, vertex_model
+from tests.support.quasi_interpolation import OPEN_GATES, quasi_interpolated, with_card
 
 MODELS = [
     scale_free_model(0),
@@ -58,15 +57,6 @@ def test_no_child_face_turns_by_more_than_the_fold_angle(mesh, model, budget, an
     assert turns(refined.mesh.faces, refined.mesh.vertices, base.mesh.vertices).max(initial=0) < (
         angle + 1e-3
     )
-
-
-def with_card(model, **changes):
-    """The same networks under another card."""
-    return type(model)(model.name, replace(model.card, **changes), model.hash, *rest_of(model))
-
-
-def rest_of(model):
-    return [getattr(model, name) for name in list(model.__dataclass_fields__)[3:]]
 
 
 @given(manifolds() | soups(), models, st.floats(1e-3, 1e6), st.sampled_from(["auto", 0.3]))
@@ -111,119 +101,6 @@ def test_without_a_network_one_level_is_quasi_interpolation():
     found = refine(Mesh(points, faces), pns(with_card(PRIOR_ALONE, **OPEN_GATES)))
     expected = quasi_interpolated(points, faces)
     np.testing.assert_allclose(found.mesh.vertices, expected, rtol=0, atol=1e-12)
-
-
-def test_side_gates_leave_quasi_interpolation_whole_where_two_faces_lie_in_one_plane():
-    """On quads that are plane, cut in two, a gate of the two faces leaves their diagonals out."""
-    points, faces = torus_of_quads(24, 14)
-    expected = quasi_interpolated(points, faces)
-    of_sides, of_faces = both_gates(points, faces)
-    np.testing.assert_allclose(of_sides, expected, rtol=0, atol=1e-12)
-    assert (np.abs(of_faces - expected).max(axis=1) > 1e-4).sum() > 200
-
-
-def test_side_gates_open_the_walls_of_a_prism_of_one_row_and_not_its_lids():
-    points, faces = prism(16)
-    edges = build_topology(faces, len(points)).edges
-    on_lid = np.concatenate([np.arange(len(points)) >= 32, (edges >= 32).any(axis=1)])
-    of_sides, of_faces = both_gates(points, faces)
-    expected = quasi_interpolated(points, faces)
-    np.testing.assert_allclose(of_sides[~on_lid], expected[~on_lid], rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(of_sides[on_lid], of_faces[on_lid])
-    assert (np.abs(of_faces - of_sides).max(axis=1) > 1e-3).sum() == 16
-
-
-def test_side_gates_stay_shut_on_flat_sides_between_right_angles():
-    of_sides, of_faces = both_gates(*box_of_quads(4))
-    np.testing.assert_array_equal(of_sides, of_faces)
-
-
-def test_bends_count_while_they_are_gentle():
-    """Of each face a third of x f(x), f from 1 at 0.3 to 0 at 0.6."""
-    topology = build_topology(np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]), 4)
-    beside = (topology.face_edges == 2).any(axis=1)
-    assert beside.sum() == 2
-    for x, counted in ((0.0, 0.0), (0.2, 0.2), (0.45, 0.225), (0.6, 0.0), (1.3, 0.0)):
-        bends = face_bends(np.where(np.arange(6) == 2, x, 0.0), topology)
-        np.testing.assert_allclose(bends, np.where(beside, counted / 3, 0.0), atol=1e-15)
-
-
-def test_a_side_gate_opens_where_both_faces_bend():
-    first, second = np.array([0, 1e-3, 0.1, 0.1]), np.array([0.1, 0.1, 0.2, 0.0])
-    np.testing.assert_allclose(gentle_bend(first, second, 1e4), [0, 1, 1, 0], atol=1e-8)
-    np.testing.assert_allclose(opened(np.array([0.0, 0.5, 1.0]), np.full(3, 0.5)), [0.5, 0.75, 1])
-
-
-def both_gates(points, faces):
-    """The prior alone on a mesh, with gates that read sides and with gates that do not."""
-    models = (with_card(PRIOR_ALONE, **OPEN_GATES, side_gates=sides) for sides in (True, None))
-    return [refine(Mesh(points, faces), pns(model)).mesh.vertices for model in models]
-
-
-def prism(sides):
-    """A regular prism: two rings of vertices, then the lids' middles."""
-    angle, j = 2 * np.pi * np.arange(sides) / sides, np.arange(sides)
-    ring, after = np.stack([np.cos(angle), np.sin(angle)], axis=1), (j + 1) % sides
-    low, high, middle = np.c_[ring, 0 * angle], np.c_[ring, 0 * angle + 2], 2 * sides + 0 * j
-    walls = [np.c_[j, after, after + sides], np.c_[j, after + sides, j + sides]]
-    lids = [np.c_[after, j, middle], np.c_[j + sides, after + sides, middle + 1]]
-    points = np.concatenate([low, high, [[0, 0, 0], [0, 0, 2]]])
-    return points, np.concatenate(walls + lids)
-
-
-def box_of_quads(side):
-    """A cube with so many quads along each edge, each cut in two."""
-    line = np.arange(side + 1)
-    u, v = (axis.ravel() for axis in np.meshgrid(line, line, indexing="ij"))
-    flat, zero, full = np.arange(len(u)).reshape(side + 1, -1), 0 * u, 0 * u + side
-    corners = flat[:-1, :-1], flat[1:, :-1], flat[1:, 1:], flat[:-1, 1:]
-    quads = np.stack([corner.ravel() for corner in corners], axis=1)
-    sheets, faces = [], []
-    for columns in ((u, v, full), (v, full, u), (full, u, v)):
-        sheets.append(np.stack(columns, axis=1))
-        faces.append(quads)
-    for columns in ((u, v, zero), (v, zero, u), (zero, u, v)):
-        sheets.append(np.stack(columns, axis=1))
-        faces.append(quads[:, ::-1])
-    points = np.concatenate(sheets).astype(float)
-    every = np.concatenate([sheet + k * len(u) for k, sheet in enumerate(faces)])
-    points, number = np.unique(points, axis=0, return_inverse=True)
-    return points, number.reshape(-1)[every][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-
-
-OPEN_GATES = {"gate_sharpness": 1e12, "vertex_gate_sharpness": 1e9, "budget": 1e6}
-
-
-def torus_of_quads(around, across):
-    """Its quads are plane, and all cut the same way."""
-    u, v = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in (around, across)), indexing="ij")
-    radius = 1 + 0.4 * np.cos(v)
-    points = np.stack([radius * np.cos(u), radius * np.sin(u), 0.4 * np.sin(v)], axis=-1)
-    i, j = (axis.ravel() for axis in np.mgrid[:around, :across])
-    next_i, next_j = (i + 1) % around, (j + 1) % across
-    a, b, c, d = i * across + j, next_i * across + j, next_i * across + next_j, i * across + next_j
-    return points.reshape(-1, 3), np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)
-
-
-def quasi_interpolated(points, faces):
-    """Push every vertex along its normal by as much as Loop's limit takes it in, then Loop."""
-    topology = build_topology(faces, len(points))
-    pushed = points.copy()
-    for v in range(len(points)):
-        ring = np.unique(topology.edges[(topology.edges == v).any(axis=1)])
-        ring = ring[ring != v]
-        k = len(ring)
-        beta = (5 / 8 - (3 / 8 + np.cos(2 * np.pi / k) / 4) ** 2) / k
-        limit = (points[v] * 3 / (8 * beta) + points[ring].sum(axis=0)) / (3 / (8 * beta) + k)
-        around = faces[(faces == v).any(axis=1)]
-        u, w = (
-            points[around[:, 1]] - points[around[:, 0]],
-            points[around[:, 2]] - points[around[:, 0]],
-        )
-        normal = np.cross(u, w).sum(axis=0)
-        normal /= np.linalg.norm(normal)
-        pushed[v] += (points[v] - limit) @ normal * normal
-    return refine_linear(pushed, [topology])
 
 
 @pytest.mark.parametrize(("subdivisions", "least"), [(0, 65), (1, 85), (2, 90), (3, 90)])
@@ -306,7 +183,9 @@ def test_torch_differentiates_through_the_guarded_step():
     mesh = Mesh(*bumpy_sphere(0, subdivisions=0, bump=0.5))
     points = torch.tensor(mesh.vertices, requires_grad=True)
     assert (step_on(mesh, torch).guard < 1).any()
-    assert torch.autograd.gradcheck(lambda p: step_on(mesh, torch, p).points, (points,))
+    assert torch.autograd.gradcheck(
+        lambda p: step_on(mesh, torch, p).points, (points,), fast_mode=True
+    )
 
 
 @given(soups())

@@ -290,7 +290,7 @@ def test_torch_differentiates_through_the_vertex_rule():
         return operator.correct(look_around(points, normals, topology), rows, 0.5).displacement
 
     points = torch.tensor(vertices, requires_grad=True)
-    assert torch.autograd.gradcheck(displacement, (points,))
+    assert torch.autograd.gradcheck(displacement, (points,), fast_mode=True)
 
 
 @given(soups())

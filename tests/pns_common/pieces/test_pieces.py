@@ -27,10 +27,10 @@ from tests.support.schemes import along_normal
 SCHEMES = {"loop": loop(), **{name: pns(load_model(name)) for name in bundled_models()}}
 # Small networks, whose rules read as far as the bundled ones' do.
 SMALL = {
+    "scale-free": pns(scale_free_model(0)),
     "loop": loop(),
     "edges": pns(random_model(0)),
     "vertices": pns(vertex_model(0)),
-    "scale-free": pns(scale_free_model(0)),
     "wild": pns(scale_free_model(1, scale=30.0), budget=40.0),
 }
 
