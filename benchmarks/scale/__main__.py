@@ -51,19 +51,27 @@ def everything(share: float, results: Path, picture: Path) -> None:
         measured(results, f"batch-{workers}", "batch", str(workers), "--files", of(FILES))
     for rows in ROWS:
         measured(results, f"manifest-{rows}", "manifest", of(rows))
-    plot(json.loads(results.read_text()), picture)
+    plot(kept(results), picture)
 
 
 def measured(results: Path, name: str, *arguments: str) -> None:
     """Run a measurement in a process of its own, unless it is kept, and keep it."""
-    known: dict[str, Any] = json.loads(results.read_text()) if results.exists() else {}
-    if name in known:
+    if name in kept(results):
         return
     command = [sys.executable, "-m", "benchmarks.scale", *arguments]
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
-    known[name] = json.loads(done.stdout)
-    results.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n")
-    print(name, known[name], flush=True)
+    keep(results, name, json.loads(done.stdout))
+    print(name, done.stdout, flush=True)
+
+
+def kept(results: Path) -> dict[str, Any]:
+    """What was measured before."""
+    return json.loads(results.read_text()) if results.exists() else {}
+
+
+def keep(results: Path, name: str, made: dict[str, Any]) -> None:
+    """Keep what a run took."""
+    results.write_text(json.dumps(kept(results) | {name: made}, indent=1, sort_keys=True) + "\n")
 
 
 def main() -> None:
@@ -79,6 +87,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--memory", type=int, default=2**31, help="bytes a worker may take")
     parser.add_argument("--folder", type=Path, default=Path(tempfile.gettempdir()))
+    parser.add_argument("--keep", action="store_true", help="in scale.json, and in the plot")
     parser.add_argument("--faces", type=int, default=SIZES[0])
     parser.add_argument("--files", type=int, default=FILES)
     given = parser.parse_args()
@@ -86,6 +95,8 @@ def main() -> None:
         case "large":
             asked = given.levels, given.parts, given.workers, given.memory, given.folder
             made = runs.large(given.number, *asked)
+            if given.keep:
+                keep(RESULTS, f"large-{given.number}", made)
         case "memory":
             made = runs.in_memory(given.number, given.faces, given.levels)
         case "batch":
@@ -93,7 +104,7 @@ def main() -> None:
         case "manifest":
             made = runs.manifest(given.number)
         case "plot":
-            plot(json.loads(RESULTS.read_text()), PLOT)
+            plot(kept(RESULTS), PLOT)
             return
         case _ if given.share == 1:
             everything(1.0, RESULTS, PLOT)

@@ -31,7 +31,7 @@ def large(
     from service.scale.large.run import large_work, run_large
 
     control = faces // 4**levels
-    # Three fifths of it for each face made: twelve bytes of corners, and half a vertex.
+    # For each face made: three corners of 4 bytes, half a vertex of 24, and what the passes leave.
     needed, free = 26 * faces + bytes_of(control), shutil.disk_usage(place).free
     if needed > free:
         raise SystemExit(f"{place}: {needed / 1e9:.0f} GB are needed, {free / 1e9:.0f} are free")
