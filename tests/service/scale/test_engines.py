@@ -1,4 +1,4 @@
-"""Where tasks are done: the same bytes on Ray, and what cannot be started is told."""
+"""Where tasks are done: chunks of them, workers that die, clusters that cannot be had."""
 
 import os
 import signal
@@ -8,23 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from service.errors import InvalidParameter, WorkerDied
-from service.scale.batch import batch_work
 from service.scale.engines import chunks, local, on_ray
 from service.scale.engines.work import Work
 from tests.service.scale.jobs import Numbered, ends_at_once, process_of, third_dies
-from tests.service.scale.libraries import batch_of, hashes, library, refined
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_ray_makes_the_same_bytes(tmp_path, monkeypatch):
-    # A busy machine starts its daemons slowly.
-    monkeypatch.setenv("RAY_raylet_start_wait_time_s", "300")
-    pytest.importorskip("ray", reason="the extra [ray] is not installed")
-    library(tmp_path / "in", ["a.obj", "b/c.obj"])
-    refined(batch_of(tmp_path))
-    over = batch_of(tmp_path, destination=str(tmp_path / "ray"), report=tmp_path / "ray.jsonl")
-    assert refined(over, on_ray.on_ray(batch_work(60.0), None, 1)).counts == {"done": 2}
-    assert hashes(tmp_path / "ray") == hashes(tmp_path / "out")
 
 
 def tasks(folder, count):

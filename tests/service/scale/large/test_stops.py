@@ -86,15 +86,3 @@ def test_a_part_that_kills_each_of_its_workers_is_told(tmp_path):
     work = replace(large_work(dies_often), most_attempts=2)
     with pytest.raises(WorkerDied, match=r"part 1: its worker ended, twice.*--parts"):
         refined(source, tmp_path / "out", 2, engine=local(work, 1))
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_ray_makes_the_same_bytes(tmp_path, monkeypatch):
-    pytest.importorskip("ray", reason="the extra [ray] is not installed")
-    from service.scale.engines.on_ray import on_ray
-
-    monkeypatch.setenv("RAY_raylet_start_wait_time_s", "300")
-    source = arrays(tmp_path / "in", many_kinds())
-    refined(source, tmp_path / "expected", 3)
-    refined(source, tmp_path / "out", 3, engine=on_ray(large_work(), None, 1))
-    assert contents(tmp_path / "out") == contents(tmp_path / "expected")
