@@ -17,6 +17,8 @@ from statistics import median
 
 ROOT = Path(__file__).resolve().parents[2]
 PROPORTIONAL = re.compile(r"^Pss: +(\d+) kB$", re.MULTILINE)
+# Results are not kept for a quarter of an hour: they would still be there at the end.
+SETTINGS = {"PNS_WORKERS": "2", "PNS_RESULT_SECONDS": "5"}
 RUNNING = re.compile(r"running on http://([\d.]+):(\d+)")
 
 
@@ -34,9 +36,7 @@ def started(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
     """A server on a free port of 127.0.0.1: its address and process id; its lines go to `log`."""
     command = [sys.executable, "-c", "from service.cli import main; main()", "serve", "--port", "0"]
     with log.open("w") as lines:
-        process = subprocess.Popen(
-            command, cwd=ROOT, stderr=lines, env=os.environ | {"PNS_WORKERS": "2"}
-        )
+        process = subprocess.Popen(command, cwd=ROOT, stderr=lines, env=os.environ | SETTINGS)
     try:
         pause = threading.Event()
         while not (told := RUNNING.search(log.read_text())):
