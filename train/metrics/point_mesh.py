@@ -3,6 +3,10 @@
 Triangles lie in a binary tree of axis-aligned boxes. All points go down the tree at once, level by
 level, and leave out the boxes that are farther than a triangle already seen: none of them can hold
 the nearest one, so that the result is exact but for rounding.
+
+libigl's tree finds the same distances, to 1e-15 of them, in a quarter of the time. Of equally near
+faces it names whichever it comes to first, here it is the lowest: on an edge that decides whose
+normal counts, and improvements of mean normal errors differed by up to 0.4 points.
 """
 
 from dataclasses import dataclass

@@ -68,7 +68,7 @@ def refine_control_mesh(
         raise UnrefinableError("refined positions leave the range of float32", pointer=pointer)
     return RefinedMesh(
         refinement,
-        _followers(control, control.cleaned, options, creases),
+        _skin_and_morph(control, control.cleaned, options, creases),
         _scalars(refinement, options),
         refinement.normals if options.normals == "limit" else None,
     )
@@ -106,7 +106,7 @@ def changes_of_primitive(number: int, kept: Bool[np.ndarray, " F"], pointer: str
     return [Change(f"{pointer}/primitives/{number}", what, int((~kept).sum()))]
 
 
-def _followers(
+def _skin_and_morph(
     control: ControlMesh,
     cleaned: Cleaned,
     options: Options,

@@ -197,14 +197,14 @@ def _refined(
         return None
     if np.abs(made.mesh.vertices).max() > np.finfo(np.float32).max:
         raise MeshError("refined positions leave the range of float32", element="vertices")
-    followers, cut = _followers(control, cleaned, parts, creases, made, options)
+    skin_and_morph, cut = _skin_and_morph(control, cleaned, parts, creases, made, options)
     scalars = {RATIO: made.ratio, GATE: made.gate} if options.diagnostics == "full" else {}
     refinement = Refinement(made.mesh, Deferred(lambda: made.reports[0]), made.ratio, made.gate)
     normals = made.normals if options.normals == "limit" else None
-    return _Refined(RefinedMesh(refinement, followers, scalars, normals), made.reports, cut)
+    return _Refined(RefinedMesh(refinement, skin_and_morph, scalars, normals), made.reports, cut)
 
 
-def _followers(
+def _skin_and_morph(
     control: ControlMesh,
     cleaned: Cleaned,
     parts: Parts,

@@ -6,12 +6,16 @@ import trimesh
 
 import train.experiments.beyond.decimation as experiment
 from pns_common import load_model, loop, pns
+from tests.support.experiments import assert_written
 from tests.support.meshes import bumpy_sphere, grid
 from train.data.dense_meshes import ASSET, CAD, CONTROL
 from train.experiments.beyond.decimation import EXPERIMENT, collected, methods
 from train.experiments.beyond.decimation_figures import pictured
 from train.experiments.harness.laboratory import FULL, SMALL, Laboratory
 from train.experiments.harness.reproduce import content_key, reproduce
+
+# Where it does not matter which methods there are.
+FEW = {"Loop": loop(), "PNS": pns(load_model("paper"))}
 
 
 def laboratory(folder, assets=None, scale=SMALL):
@@ -32,7 +36,8 @@ def assets(tmp_path):
     return folder
 
 
-def test_files_join_the_parts_and_the_page_says_which(tmp_path, assets):
+def test_files_join_the_parts_and_the_page_says_which(tmp_path, assets, monkeypatch):
+    monkeypatch.setattr(experiment, "methods", lambda: FEW)
     record = reproduce(EXPERIMENT, laboratory(tmp_path, assets), tmp_path)
     tables = {table.name: table for table in record.tables}
     listed = {row[0]: row for row in tables["decimation_meshes"].rows}
@@ -46,9 +51,17 @@ def test_files_join_the_parts_and_the_page_says_which(tmp_path, assets):
 
 
 @pytest.fixture(scope="module")
-def parts_alone(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("parts")
-    return reproduce(EXPERIMENT, laboratory(folder), folder)
+def output(tmp_path_factory):
+    return tmp_path_factory.mktemp("parts")
+
+
+@pytest.fixture(scope="module")
+def parts_alone(output):
+    return reproduce(EXPERIMENT, laboratory(output), output)
+
+
+def test_writes_its_tables_and_figures(parts_alone, output):
+    assert_written(parts_alone, output, "decimation")
 
 
 def test_without_a_folder_the_page_says_so(parts_alone):
@@ -84,6 +97,7 @@ def test_what_cannot_be_simplified_is_listed(tmp_path, monkeypatch):
         return experiment.NotSimplified(dense) if dense.name == "torus" else real(dense)
 
     monkeypatch.setattr(experiment, "simplify", all_but_the_torus)
+    monkeypatch.setattr(experiment, "methods", lambda: FEW)
     outcome = experiment.run(laboratory(tmp_path))
     assert outcome.tables[2].rows[-1][0] == "torus"
     assert "manifold" in outcome.tables[2].rows[-1][-1]

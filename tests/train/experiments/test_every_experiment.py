@@ -1,12 +1,10 @@
 """Every experiment runs from end to end, at a scale of seconds where no number means anything."""
 
-import csv
-
 import pytest
 
+from tests.support.experiments import assert_written
 from tests.support.shared import shared_path
 from train.experiments.harness.laboratory import SMALL, Laboratory
-from train.experiments.harness.page import markdown_page
 from train.experiments.harness.reproduce import reproduce
 from train.experiments.registry import EXPERIMENTS
 
@@ -34,29 +32,12 @@ def test_there_is_an_experiment_for_each_table_and_figure():
     assert set(EXPERIMENTS) == set(NAMES.split(", "))
 
 
-@pytest.mark.parametrize("name", EXPERIMENTS)
+# The one of simplified meshes has a file of its own.
+@pytest.mark.parametrize("name", [name for name in EXPERIMENTS if name != "decimation"])
 def test_writes_its_tables_and_figures(name, output):
     experiment = EXPERIMENTS[name]
     record = reproduce(experiment, laboratory_for(experiment, output), output)
-    assert record.tables
-    for table in record.tables:
-        with (output / f"{table.name}.csv").open(encoding="utf-8") as file:
-            header, *rows = csv.reader(file)
-        assert header == [column.name for column in table.columns]
-        assert len(set(header)) == len(header)
-        assert len(rows) == len(table.rows) > 0
-    for figure in record.figures:
-        assert figure.caption
-        png = (output / "figures" / f"{figure.name}.png").read_bytes()
-        pdf = (output / "figures" / f"{figure.name}.pdf").read_bytes()
-        assert png.startswith(b"\x89PNG")
-        assert len(png) > 10_000
-        assert pdf.startswith(b"%PDF")
-    page = markdown_page(EXPERIMENTS, {name: record})
-    assert f"## {experiment.title}" in page
-    assert "no number here means anything" in page
-    assert page.count(".csv)") == len(record.tables)
-    assert page.count("![") == len(record.figures)
+    assert_written(record, output, name)
 
 
 def test_ratios_of_pns_never_pass_one(output):

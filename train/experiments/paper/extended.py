@@ -91,10 +91,10 @@ def run(laboratory: Laboratory) -> Outcome:
 def _draw(by_method: dict[str, list[DistanceLevel]]) -> Drawing:
     figure, (jump, ratio) = panels(2, height=2.8)
     for name, levels in by_method.items():
-        at = range(1, len(levels) + 1)
-        jump.plot(at, [errors.jump for errors in levels], **method_style(name))
+        depths = range(1, len(levels) + 1)
+        jump.plot(depths, [errors.jump for errors in levels], **method_style(name))
         if name != "loop":
-            ratio.plot(at, [errors.ratio for errors in levels], **method_style(name))
+            ratio.plot(depths, [errors.ratio for errors in levels], **method_style(name))
     ratio.axhline(1, color="0.3", linewidth=0.8, linestyle="--")
     jump.set(yscale="log", xlabel="Level", title="Max normal jump (rad)")
     ratio.set(yscale="log", xlabel="Level", title="Max proximity ratio")
