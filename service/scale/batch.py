@@ -174,7 +174,7 @@ def _tasks(
                 try:
                     tasks.append(_task(batch, item, destination, journal))
                 except ServiceError as error:
-                    rejected.append(failed(item.url, "", error))
+                    rejected.append(failed(_shown(item.url), "", error))
         if rejected:
             reject(rejected)
         yield from tasks
@@ -186,6 +186,9 @@ def _task(batch: Batch, item: Item, destination: Place, journal: Journal) -> Tas
     Raises:
         ServiceError: nothing can be made of it, or not there.
     """
+    if _shown(item.url) != item.url:
+        # Neither a journal nor a report can hold it.
+        raise ServiceError("its name is not in UTF-8", code="unreadable-name")
     kind, target, relative = target_of(item.relative, batch.to, KINDS)
     output = destination.below(relative).url
     if not batch.dry and not journal.claim(output, item.url):
@@ -202,6 +205,11 @@ def _task(batch: Batch, item: Item, destination: Place, journal: Journal) -> Tas
         known=journal.known(item.url),
         dry=batch.dry,
     )
+
+
+def _shown(url: str) -> str:
+    """A name as text: bytes of a file's name that are no UTF-8 are spelled out."""
+    return url.encode(errors="backslashreplace").decode()
 
 
 class _Rate(ProgressColumn):

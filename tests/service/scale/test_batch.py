@@ -1,8 +1,10 @@
 """Libraries of files: every file refined once, each fault its own file's, nothing half-written."""
 
 import hashlib
+import os
 import pickle
 import sqlite3
+import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -109,6 +111,15 @@ def test_a_bad_file_costs_itself_alone(tmp_path, content, code):
     assert summary.failures == [(code, 1)]
     assert rows(batch)["bad.glb"]["code"] == code
     assert not (tmp_path / "out" / "bad.glb").exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names there are text")
+def test_a_name_that_is_no_text_costs_its_file_alone(tmp_path):
+    source = library(tmp_path / "in", ["a.obj"])
+    Path(os.fsdecode(os.fsencode(source) + b"/b\xff.obj")).write_bytes(TETRAHEDRON)
+    batch = batch_of(tmp_path)
+    assert refined(batch).counts == {"done": 1, "failed": 1}
+    assert rows(batch)["b\\udcff.obj"]["code"] == "unreadable-name"
 
 
 def test_limits_hold_for_each_file(tmp_path):
