@@ -38,7 +38,7 @@ quick: $(DEV)/.ready
 	$(PYTEST) -m 'not (spawning or training or conformance or retrain)' tests
 
 # The recipes of the quick models give the bundled files again, byte for byte on the machine they were
-# made on; else of the same quality.
+# made on; else of the same quality. And the numbers on cards that take longest to measure.
 verify-models: $(DEV)/.ready
 	$(PYTEST) -m retrain tests/export
 

@@ -207,6 +207,7 @@ JOINTS, SHARES = np.zeros((24, 4), dtype=np.uint8), np.full((24, 4), 0.25)
     ("attributes", "pointer"),
     [
         ({"JOINTS_0": JOINTS}, "/meshes/0/primitives/0/attributes/JOINTS_0"),
+        ({"NORMAL": np.zeros((24, 3), dtype=np.uint8)}, "/accessors/1/componentType"),
         ({"WEIGHTS_1": SHARES}, "/meshes/0/primitives/0/attributes/WEIGHTS_1"),
         ({"JOINTS_0": SHARES, "WEIGHTS_0": SHARES}, "/accessors/5/componentType"),
         ({"JOINTS_0": JOINTS, "WEIGHTS_0": JOINTS}, "/accessors/6/componentType"),

@@ -1,0 +1,81 @@
+"""What a file promises of its Draco data and does not keep is told at its place."""
+
+import DracoPy
+import numpy as np
+import pytest
+
+from service.errors import GltfError
+from service.gltf.read.draco_header import read_header
+from tests.fuzz.seeds import draco
+from tests.service.gltf.read.refused import refine
+from tests.support.gltf import files
+
+PRIMITIVE = "/meshes/0/primitives/0"
+EXTENSION = f"{PRIMITIVE}/extensions/KHR_draco_mesh_compression"
+
+
+def refusal(change):
+    """What is said of a box whose JSON was changed; `change` gets tree, primitive and extension."""
+    tree, packed = draco()
+    primitive = tree["meshes"][0]["primitives"][0]
+    change(tree, primitive, primitive["extensions"]["KHR_draco_mesh_compression"])
+    with pytest.raises(GltfError) as caught:
+        refine(files.pack(tree, packed))
+    return caught.value
+
+
+def test_draco_holds_no_fans():
+    told = refusal(lambda tree, primitive, extension: primitive.update(mode=6))
+    assert (told.pointer, "triangles only" in str(told)) == (f"{PRIMITIVE}/mode", True)
+
+
+def test_an_attribute_without_an_accessor_is_told():
+    told = refusal(lambda tree, primitive, extension: extension["attributes"].update(COLOR_0=1))
+    assert (told.pointer, "COLOR_0 has no accessor" in str(told)) == (
+        f"{EXTENSION}/attributes",
+        True,
+    )
+
+
+@pytest.mark.parametrize("identity", [99, 1])
+def test_an_attribute_that_the_data_lack_is_told(identity):
+    def change(tree, primitive, extension):
+        normal = primitive["attributes"]["NORMAL"]
+        # Neither is another width what was asked for.
+        tree["accessors"][normal]["type"] = "VEC4"
+        primitive["attributes"]["TANGENT"] = primitive["attributes"].pop("NORMAL")
+        del extension["attributes"]["NORMAL"]
+        extension["attributes"]["TANGENT"] = identity
+
+    told = refusal(change)
+    assert told.pointer == f"{EXTENSION}/attributes"
+    assert f"no VEC4 under {identity}" in str(told)
+
+
+def test_values_that_the_accessors_type_cannot_hold_are_told():
+    def change(tree, primitive, extension):
+        tree["extensionsUsed"].append("KHR_mesh_quantization")
+        accessor = tree["accessors"][primitive["attributes"]["POSITION"]]
+        accessor["componentType"] = files.COMPONENTS["u1"]
+
+    told = refusal(change)
+    number = draco()[0]["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
+    assert told.pointer == f"/accessors/{number}/componentType"
+    assert "do not fit uint8" in str(told)
+
+
+def test_points_alone_hold_no_triangle():
+    points = np.random.default_rng(0).random((10, 3))
+    cloud = DracoPy.encode(points)
+    with pytest.raises(GltfError, match="no Draco mesh"):
+        read_header(cloud, "")
+
+
+def test_metadata_nest_so_deep_and_no_deeper():
+    def nested(depth):
+        # No entries, then one child without a name, and so on.
+        return b"DRACO\2\2\1\0\0\x80" + b"\0" + b"\0\1\0" * depth + b"\0\0" + b"\1\3"
+
+    assert read_header(nested(16), "").faces == 1
+    with pytest.raises(GltfError, match="nest too deep"):
+        read_header(nested(17), "")

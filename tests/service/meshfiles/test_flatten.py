@@ -1,0 +1,30 @@
+"""A scene as plain triangles: where its nodes put them, and what shows none."""
+
+import numpy as np
+import pytest
+
+from service.errors import UnrefinableError
+from service.meshfiles.flatten import flatten
+from service.options import Limits
+from tests.support.gltf import files
+from tests.support.gltf.shapes import octahedron
+
+
+def test_a_mesh_stands_where_its_nodes_put_it():
+    tree, binary = files.document([octahedron()])
+    tree["nodes"] = [{"children": [1], "scale": [2, 2, 2]}, {"mesh": 0, "translation": [1, 0, 0]}]
+    tree["scenes"][0]["nodes"] = [0]
+    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
+    own = 2 * (octahedron()["POSITION"] + [1, 0, 0])
+    assert len(flat.faces) == len(np.asarray(octahedron()["indices"]).reshape(-1, 3))
+    for axis in range(3):
+        extent = (flat.vertices[:, axis].min(), flat.vertices[:, axis].max())
+        assert extent == pytest.approx((own[:, axis].min(), own[:, axis].max()), abs=1e-6)
+
+
+def test_a_scene_that_shows_no_triangles_is_told():
+    tree, binary = files.document([octahedron()])
+    tree["scenes"].append({"nodes": []})
+    tree["scene"] = 1
+    with pytest.raises(UnrefinableError, match="shows no triangles"):
+        flatten(files.pack(tree, binary), "obj", Limits())
