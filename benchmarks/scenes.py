@@ -6,7 +6,6 @@ within five seconds, from the request to its answer.
 
 from __future__ import annotations
 
-import gc
 import http.client
 import os
 import sys
@@ -27,7 +26,6 @@ from service.gltf.read.container import write_glb
 from service.gltf.read.json_text import encode
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
-from service.workers.worker import OBJECTS_A_SEARCH
 
 Primitive = dict[str, np.ndarray]
 COMPONENTS = {kind: number for number, kind in COMPONENT_TYPES.items()}
@@ -42,8 +40,6 @@ def main(
     """Refine each scene once, here and by a service with one worker on one core."""
     table = Table("of each", "KiB", "ms of CPU a mesh", "seconds of CPU", "seconds, whole request")
     loaded, limits = load_model(model), Limits()
-    # As a worker has it.
-    gc.set_threshold(OBJECTS_A_SEARCH)
     with served(python, min(os.sched_getaffinity(0))) as port:
         for name, primitives in SCENES.items():
             body = scene(primitives, meshes)

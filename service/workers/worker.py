@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import logging
 import os
 import signal
@@ -20,9 +19,6 @@ T = TypeVar("T")
 # Of 1000. Out of memory, the kernel should take a worker (one request) before the server (all of
 # them).
 OOM_PREFERENCE = 500
-# Objects between two searches for cycles. A scene of thousands of meshes is hundreds of thousands
-# of objects, hardly one of them in a cycle: searched as often as usual, a fifth of its time.
-OBJECTS_A_SEARCH = 50_000
 
 
 class JobFaultError(Exception):
@@ -33,7 +29,6 @@ def prepare() -> None:
     """Set up a fresh worker process."""
     # A Python handler would wait for the next bytecode, and one numpy call may take seconds.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    gc.set_threshold(OBJECTS_A_SEARCH)
     log_lines.configure()
     # It logs what an upload says, word for word.
     logging.getLogger("python_multipart").setLevel(logging.CRITICAL)
