@@ -13,14 +13,17 @@ HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.
 
 PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n 2 --dist loadgroup
 
-.PHONY: bench bench-answers scale image hashes soak manifest serve test lint unit quick verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures paper-hero web
+.PHONY: bench bench-answers scale image hashes soak manifest serve test lint shapes unit quick verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures paper-hero web
 
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
 	@$(SERVE)/bin/python -m pns_common.fused
 	$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
 
-test: lint unit
+# The first two are of one core each.
+test:
+	$(MAKE) --jobs 2 --output-sync=target lint shapes
+	$(MAKE) unit
 
 lint: $(DEV)/.ready
 	$(DEV)/bin/ruff check .
@@ -28,9 +31,11 @@ lint: $(DEV)/.ready
 	$(DEV)/bin/pyright
 	$(DEV)/bin/lint-imports
 
-# First with the shapes of arrays checked, on few examples; then all.
+# Of each test of pns_common the first parameters, with the shapes of arrays checked.
+shapes: $(DEV)/.ready
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest tests/pns_common
+
 unit: $(DEV)/.ready $(CLIENTS)/.ready
-	$(PYTEST) tests/pns_common
 	$(PYTEST) tests
 
 # What neither trains, nor starts programs, nor reads the whole collection of assets.

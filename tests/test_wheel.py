@@ -1,6 +1,7 @@
 """The wheel holds what a user needs and no more, and README's commands work where it is alone."""
 
 import json
+import os
 import re
 import struct
 import subprocess
@@ -127,9 +128,10 @@ def unpack(glb, gltf, binary):
 
 @contextmanager
 def serving(service, folder):
-    """The address of a server of that environment."""
+    """The address of a server of that environment; each worker would compile the kernels."""
     command = [service / "pns", "serve", "--port", "0"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=folder) as process:
+    options = {"stderr": subprocess.PIPE, "text": True, "env": os.environ | {"PNS_WORKERS": "1"}}
+    with subprocess.Popen(command, cwd=folder, **options) as process:
         try:
             yield next(told[1] for line in process.stderr if (told := ADDRESS.search(line)))
         finally:
