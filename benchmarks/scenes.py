@@ -26,6 +26,7 @@ from service.gltf.read.container import write_glb
 from service.gltf.read.json_text import encode
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
+from service.workers.worker import rare_searches
 
 Primitive = dict[str, np.ndarray]
 COMPONENTS = {kind: number for number, kind in COMPONENT_TYPES.items()}
@@ -45,7 +46,8 @@ def main(
             body = scene(primitives, meshes)
 
             def here(body: bytes = body) -> None:
-                subdivide_gltf(body, "glb", Options(), loaded, limits)
+                with rare_searches():
+                    subdivide_gltf(body, "glb", Options(), loaded, limits)
 
             def asked(body: bytes = body) -> None:
                 _ask(port, body, model)
