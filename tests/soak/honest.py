@@ -111,6 +111,10 @@ def slow(address: Address, samples: list[Sample], tally: Tally, ended: threading
             while piece := opened.recv(2**13):
                 answer += piece
                 ended.wait(1 / 8)
+            if not answer:
+                # Cut off, as the slowest of all, for a new connection.
+                tally.answer("slow", 0)
+                continue
             got, _, content = answer.partition(b"\r\n\r\n")
             status = int(got.split(maxsplit=2)[1])
             tally.answer("slow", status)
