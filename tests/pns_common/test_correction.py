@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common.correction import curvature_gate, project_to_ball
+from pns_common import ModelError
+from pns_common.correction import curvature_gate, finite, project_to_ball
 from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
 from pns_common.topology import build_topology
 from tests.support.meshes import grid
@@ -43,3 +44,12 @@ def test_projection_never_leaves_the_ball_and_keeps_what_is_inside(vector, radiu
         1.0, *map(abs, vector)
     ) < radius * (1 - 1e-12):
         np.testing.assert_array_equal(projected, vector)
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [(np.zeros((4, 2)), r"\(4, 2\)"), (np.full((4, 3), np.nan), "NaN"), (np.zeros(12), r"\(12,\)")],
+)
+def test_answers_of_another_shape_or_that_are_no_numbers_are_an_error(answer, says):
+    with pytest.raises(ModelError, match=says):
+        finite(answer, np.zeros((4, 3)))

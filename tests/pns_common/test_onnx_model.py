@@ -242,3 +242,18 @@ def test_a_file_on_disk_is_called_by_its_stem(tmp_path):
 
 def test_the_default_model_is_bundled():
     assert load_model().name in bundled_models()
+
+
+def test_a_sparse_constant_is_refused():
+    constant = helper.make_node("Constant", [], ["c"], value_float=1.0)
+    attribute = constant.attribute[0]
+    attribute.Clear()
+    attribute.name, attribute.type = "sparse_value", onnx.AttributeProto.SPARSE_TENSOR
+    attribute.sparse_tensor.dims.append(1)
+    nodes = through(constant, helper.make_node("Identity", ["three"], ["correction"]))
+    assert refused(model_bytes(nodes, CUT)).found == "a sparse tensor"
+
+
+def test_a_model_of_edges_alone_says_that_it_has_no_vertex_rule():
+    with pytest.raises(ModelError, match="vertex rule"):
+        load_model("paper").vertex_correction(np.zeros((1, 10)), 0.5)

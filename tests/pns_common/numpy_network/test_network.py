@@ -162,6 +162,38 @@ def test_weights_of_a_type_that_no_operator_takes_are_refused():
         open_network(proto.SerializeToString(), "bad")
 
 
+def constant(**fields):
+    """A file with a constant whose attribute has these fields and no others."""
+    proto = onnx.load_from_string(
+        model_bytes([*PASS, make("Constant", [], "c", value_float=1.0), ANSWER], CUT)
+    )
+    attribute = proto.graph.node[1].attribute[0]
+    attribute.Clear()
+    attribute.name = "value"
+    for name, value in fields.items():
+        setattr(attribute, name, value)
+    return proto.SerializeToString()
+
+
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        ({"type": onnx.AttributeProto.TENSOR}, "without its tensor"),
+        ({"type": onnx.AttributeProto.STRINGS}, "of type 8"),
+    ],
+)
+def test_an_attribute_that_holds_nothing_to_read_is_refused(fields, says):
+    with pytest.raises(ModelError, match=says):
+        open_network(constant(**fields), "bad")
+
+
+def test_a_tensor_of_words_is_refused():
+    proto = onnx.load_from_string(model_bytes([*PASS, ANSWER], CUT))
+    proto.graph.initializer.add(name="words", data_type=onnx.TensorProto.STRING, dims=[0])
+    with pytest.raises(ModelError, match="a tensor of type 8"):
+        open_network(proto.SerializeToString(), "bad")
+
+
 def test_a_file_without_a_graph_is_refused():
     with pytest.raises(ModelError, match="no graph"):
         open_network(b"", "empty")
