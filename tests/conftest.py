@@ -49,6 +49,7 @@ KINDS = {
         "service/cli",
         "service/web",
         "service/workers",
+        "soak",
         "test_architecture.py",
         "test_wheel.py",
         "web",
