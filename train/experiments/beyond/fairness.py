@@ -9,7 +9,7 @@ from pns_common.refine import refine
 from train.data.dense_meshes import CONTROL_ENDING, asset_files, read_mesh
 from train.data.primitives import PRIMITIVES, TRIANGULATED_QUADS
 from train.experiments.beyond.models import model_files
-from train.experiments.harness.contenders import LOOP, contenders
+from train.experiments.harness.contenders import LOOP, OURS, contenders
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
@@ -56,7 +56,14 @@ def run(laboratory: Laboratory) -> Outcome:
     for number, (kind, name, mesh) in enumerate(chosen):
         laboratory.progress(f"fairness: {name}", number, len(chosen))
         rows += _rows(kind, name, mesh, min(LEVELS, laboratory.scale.levels))
-    return Outcome((table("fairness", "Bending", Row, rows),), notes=(NOTE,))
+    ours = [row for row in rows if row.method == OURS]
+    return Outcome(
+        (
+            table("fairness_ours", "Bending, PNS", Row, ours),
+            table("fairness", "Every method", Row, rows),
+        ),
+        notes=(NOTE,),
+    )
 
 
 def _rows(kind: str, name: str, mesh: Mesh, levels: int) -> list[Row]:

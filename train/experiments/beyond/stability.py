@@ -29,7 +29,9 @@ NOTES = (
     "The signed Reif margin of a star whose centre is lifted by so many spokes (spoke 0.25 R), the "
     "networks in double precision: the least |λ| of the six eigenvalues continued from Loop's "
     "tangent pair, less the largest of the rest. On the plane every model has Loop's gap, whatever "
-    "its weights. A lifted star is no fixed point of subdivision: the margin is a diagnostic.",
+    "its weights. A lifted star is no fixed point of subdivision: the margin is a diagnostic. "
+    "`general` acts at the first level alone: its learned step is never repeated, and what follows "
+    "has Loop's spectrum.",
 )
 
 
