@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 # Ours first; peers in greys and muted colours behind them.
-OURS = ("#c2410c", "#0f766e", "#7c3aed")
+OURS = ("#c2410c", "#fb923c", "#7c3aed", "#c4b5fd")
 PEERS = ("#475569", "#0369a1", "#64748b", "#a16207", "#94a3b8", "#4d7c0f", "#9ca3af")
 MARKERS = "osD^vP*"
 
@@ -26,7 +26,9 @@ def plot_results(result: dict[str, Any], path: Path) -> None:
         points = [(c["faces"], c["methods"][name]["median"]) for c in cases if name in c["methods"]]
         x, y = zip(*sorted(points), strict=True)
         if name.startswith("pns "):
-            axes.loglog(x, y, color=OURS[ours % 3], marker="o", lw=2.4, label=name, zorder=3)
+            axes.loglog(
+                x, y, color=OURS[ours % len(OURS)], marker="o", lw=2.4, label=name, zorder=3
+            )
             ours += 1
         else:
             colour, marker = PEERS[peers % len(PEERS)], MARKERS[peers % len(MARKERS)]
