@@ -119,8 +119,8 @@ class Crowd:
         return min(told, key=lambda guest: (rates[guest], -self._held_with(guest)), default=None)
 
     def _greediest(self, most: int) -> Guest | None:
-        """The oldest that works for the address with the most connections, if more than `most`."""
-        guest = max(self._working, key=self._held_with, default=None)
+        """The oldest of the address with the most connections, if those are more than `most`."""
+        guest = max((*self._working, *self._slow), key=self._held_with, default=None)
         return guest if guest is not None and self._held_with(guest) > most else None
 
     def _held_with(self, guest: Guest) -> int:

@@ -277,6 +277,15 @@ def test_where_all_are_served_the_greediest_address_gives_way_to_one_that_has_le
     assert "4 connections are open" in crowd.enter(Guest(), "c")
 
 
+def test_a_burst_whose_pace_is_not_yet_known_gives_way_by_address():
+    crowd = Crowd(most=4, most_of_address=3)
+    guests = entered(crowd, *(Guest() for _ in range(4)), addresses="abbb")
+    for guest in guests:
+        crowd.attend(guest)
+    assert crowd.enter(Guest(), "c") is None
+    assert [guest.ended for guest in guests] == [False, True, False, False]
+
+
 def test_a_proxys_requests_never_give_way_to_a_stranger():
     crowd = Crowd(most=3, most_of_address=1, proxies=(ip_network("10.0.0.1/32"),))
     guests = entered(crowd, *(Guest() for _ in range(3)), addresses=["10.0.0.1"] * 3)
