@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit
 
-from pns_common.fused.kernels.rings import cross, dot, row
+from pns_common.fused.kernels.rings import between, cross, dot
 from pns_common.mesh import Mesh
 
 CELL = 1.5
@@ -121,9 +121,9 @@ def _edge_pierces(vertices, edges, triangle):
 @njit(cache=True)
 def _pierces(vertices, start, end, triangle):
     """Whether a segment passes through a triangle (Möller and Trumbore 1997)."""
-    a, b, c = row(vertices, triangle[0]), row(vertices, triangle[1]), row(vertices, triangle[2])
-    p, q = row(vertices, start), row(vertices, end)
-    u, v, along, offset = _from_to(a, b), _from_to(a, c), _from_to(p, q), _from_to(a, p)
+    a, b, c = triangle
+    u, v = between(vertices, a, b), between(vertices, a, c)
+    along, offset = between(vertices, start, end), between(vertices, a, start)
     side = cross(along, v)
     volume = dot(u, side)
     if abs(volume) <= SLACK * math.sqrt(dot(u, u) * dot(v, v) * dot(along, along)):
@@ -133,8 +133,3 @@ def _pierces(vertices, start, end, triangle):
     reach = dot(v, lifted) / volume
     inside = first > SLACK and second > SLACK and first + second < 1 - SLACK
     return inside and SLACK < reach < 1 - SLACK
-
-
-@njit(cache=True)
-def _from_to(p, q):
-    return q[0] - p[0], q[1] - p[1], q[2] - p[2]
