@@ -11,7 +11,6 @@ from starlette.types import Receive, Scope, Send
 
 from ..workers.memory_file import MemoryFile
 from .admission import Admission, CutOffError, DrainingError
-from .head import HEAD_ALONE
 
 log = logging.getLogger("pns.service")
 
@@ -19,7 +18,8 @@ log = logging.getLogger("pns.service")
 class FileAnswer(Response):
     """Sends a memory file piece by piece, then lets go of what the request held.
 
-    A client that takes longer than `stall_seconds` for one piece is cut off: its answer is memory.
+    How fast a client must take it is its connection's business. One who is gone is sent nothing
+    more: the pieces that are left would be read for nobody, and hold the event loop.
     """
 
     def __init__(
@@ -30,7 +30,6 @@ class FileAnswer(Response):
         *,
         media_type: str,
         headers: dict[str, str],
-        stall_seconds: float,
     ) -> None:
         super().__init__(
             media_type=media_type, headers=headers | {"Content-Length": str(content.size)}
@@ -38,7 +37,6 @@ class FileAnswer(Response):
         self._content = content
         self._held = held
         self._admission = admission
-        self._stall_seconds = stall_seconds
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send the answer."""
@@ -46,11 +44,9 @@ class FileAnswer(Response):
             try:
                 async with self._admission.working(), self._admission.answering(self._content.size):
                     await self._send_start(send)
-                    # What nobody gets is not read: it would hold the event loop.
-                    if HEAD_ALONE not in scope.get("extensions", {}):
-                        await self._send_pieces(send)
-            except (TimeoutError, CutOffError):
-                log.warning("a client took too long to read its answer")
+                    await self._send_pieces(send, receive)
+            except CutOffError:
+                log.warning("an answer is cut off: its memory is needed")
             except DrainingError:
                 log.warning("an answer was cut off by the shutdown")
 
@@ -63,9 +59,21 @@ class FileAnswer(Response):
             }
         )
 
-    async def _send_pieces(self, send: Send) -> None:
-        for piece in self._content.pieces():
-            message = {"type": "http.response.body", "body": piece, "more_body": True}
-            async with asyncio.timeout(self._stall_seconds):
-                await send(message)
-        await send({"type": "http.response.body", "body": b""})
+    async def _send_pieces(self, send: Send, receive: Receive) -> None:
+        leaves = asyncio.create_task(_until_gone(receive))
+        pieces, piece = self._content.pieces(), b"."
+        try:
+            while piece:
+                # To one who is gone `send` returns at once, and nobody else would have a turn.
+                await asyncio.sleep(0)
+                if leaves.done():
+                    return
+                piece = next(pieces, b"")
+                await send({"type": "http.response.body", "body": piece, "more_body": piece != b""})
+        finally:
+            leaves.cancel()
+
+
+async def _until_gone(receive: Receive) -> None:
+    while (await receive())["type"] != "http.disconnect":
+        pass

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-HEAD_ALONE = "pns.head_alone"
-"""Name of the ASGI extension that a request has whose answer's body goes nowhere."""
-
 
 class Head:
     """ASGI layer that asks the routes for a GET and sends its head alone.
@@ -39,7 +36,6 @@ class Head:
 
         # The scope stays one: what a route writes into it is for the layers outside, too.
         scope["method"] = "GET"
-        scope.setdefault("extensions", {})[HEAD_ALONE] = {}
         try:
             await self.app(scope, gone, head_only)
         finally:

@@ -185,7 +185,6 @@ def _result(service: Service, job: Job, kind: str) -> Response:
         service.admission,
         media_type=kind,
         headers={"Vary": "Accept", "Cache-Control": "no-store"},
-        stall_seconds=service.settings.stall_seconds,
     )
 
 

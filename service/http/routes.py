@@ -95,7 +95,6 @@ async def _subdivide(
             service.admission,
             media_type=kind,
             headers={"Server-Timing": stages_text, "Vary": "Accept"},
-            stall_seconds=settings.stall_seconds,
         )
 
 

@@ -12,7 +12,6 @@ import httpx2
 import pytest
 
 from service.http import documentation
-from service.workers.memory_file import MemoryFile
 from tests.support.live import served
 from tests.support.stand_in_jobs import files_of_at_most
 
@@ -283,18 +282,6 @@ def test_a_result_that_nobody_takes_is_let_go() -> None:
         with slow.stream("GET", f"/jobs/{job}/result"):
             client.delete(f"/jobs/{job}")
             until(lambda: descriptors() <= before)
-
-
-def test_a_head_of_a_result_reads_nothing_of_it(
-    client: httpx2.Client, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    job = started(client, b"large 1000000")
-    assert ended(client, job)["state"] == "done"
-    read: list[MemoryFile] = []
-    monkeypatch.setattr(MemoryFile, "pieces", lambda file: read.append(file) or iter(()))
-    answer = client.head(f"/jobs/{job}/result")
-    assert (answer.status_code, answer.headers["content-length"]) == (200, "1000000")
-    assert read == []
 
 
 def test_a_result_that_does_not_fit_fails_by_name_and_its_room_is_free(tmp_path: Path) -> None:
