@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.synchronize import Event
 
-from tests.soak.job_attacks import come_and_go, deletes, followers
+from tests.soak.job_attacks import come_and_go, deletes, followers, leavers
 from tests.soak.target import PATIENCE, Target, head, hold_anew, side_by_side
 
 CHUNKED = "Transfer-Encoding: chunked\r\n"
@@ -160,5 +160,6 @@ ATTACKS: dict[str, Attack] = {
     "bombs": bombs,
     "followers": followers,
     "jobs that come and go": come_and_go,
+    "results that are left": leavers,
     "deletes": deletes,
 }

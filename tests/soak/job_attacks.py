@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import socket
+import struct
 from contextlib import suppress
 from multiprocessing.synchronize import Event
 
@@ -34,6 +35,27 @@ def come_and_go(target: Target, ended: Event) -> None:
                 job = _handed_in(target, number, body, "levels=3&scheme=loop")
                 if job is not None:
                     then(target, number, job)
+
+    side_by_side(connect, 4)
+
+
+def leavers(target: Target, ended: Event) -> None:
+    """One large result, asked for again and again and left after its first bytes."""
+    job = None
+    while job is None and not ended.wait(0.5):
+        job = _handed_in(target, 0, large_body(), "levels=4&scheme=loop")
+    if job is None:
+        return
+    _follow(target, 0, job)
+    asks = head("GET", f"/jobs/{job}/result")
+
+    def connect(number: int) -> None:
+        while not ended.wait(0.005):
+            with suppress(OSError), target.connected(number) as opened:
+                # Closed by a reset, with most of the answer still to come.
+                opened.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                opened.sendall(asks)
+                opened.recv(2**10)
 
     side_by_side(connect, 4)
 
@@ -76,11 +98,7 @@ def _strike_out(target: Target, number: int, job: str) -> None:
 
 
 def _fetch_slowly(target: Target, number: int, job: str) -> None:
-    with target.connected(number) as opened:
-        opened.settimeout(PATIENCE)
-        opened.sendall(head("GET", f"/jobs/{job}/events", "Connection: close\r\n"))
-        while opened.recv(2**16):
-            pass
+    _follow(target, number, job)
     with target.connected(number) as opened:
         # Little room at this end: what is not read stays the service's.
         opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2**12)
@@ -88,3 +106,12 @@ def _fetch_slowly(target: Target, number: int, job: str) -> None:
         opened.recv(64)
         _strike_out(target, number, job)
         opened.recv(64)
+
+
+def _follow(target: Target, number: int, job: str) -> None:
+    """Come back when the job has ended."""
+    with target.connected(number) as opened:
+        opened.settimeout(PATIENCE)
+        opened.sendall(head("GET", f"/jobs/{job}/events", "Connection: close\r\n"))
+        while opened.recv(2**16):
+            pass
