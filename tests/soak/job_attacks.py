@@ -14,12 +14,16 @@ from tests.soak.target import PATIENCE, Target, head, hold, side_by_side
 
 
 def followers(target: Target, ended: Event) -> None:
-    """More streams of one job's events than there are places, of which nothing is read."""
+    """More streams of one job's events than there are places, of which nothing is read.
+
+    From fewer addresses than there are places: who has one connection is then never refused.
+    """
     body = large_body()
     while not ended.wait(0.5):
         job = _handed_in(target, 0, body, "levels=4&scheme=loop")
         if job is not None:
-            hold(target, ended, 700, head("GET", f"/jobs/{job}/events"), b"", seconds=5)
+            asks = head("GET", f"/jobs/{job}/events")
+            hold(target, ended, 700, asks, b"", seconds=5, addresses=40)
 
 
 def come_and_go(target: Target, ended: Event) -> None:

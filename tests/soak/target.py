@@ -38,14 +38,21 @@ class Target:
 
 
 def hold(
-    target: Target, ended: Event, count: int, first: bytes, drop: bytes, seconds: int = 15
+    target: Target,
+    ended: Event,
+    count: int,
+    first: bytes,
+    drop: bytes,
+    *,
+    seconds: int = 15,
+    addresses: int = 2**12,
 ) -> None:
-    """Keep `count` connections open for a while, and send each a drop a second."""
+    """Keep `count` connections of so many addresses open for a while, with a drop a second."""
     with ExitStack() as held:
         opened = []
         for number in range(count):
             with suppress(OSError):
-                connection = held.enter_context(target.connected(number))
+                connection = held.enter_context(target.connected(number % addresses))
                 connection.sendall(first)
                 opened.append(connection)
         for _ in range(seconds):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
+from itertools import chain, islice
 from math import inf
 from typing import Protocol
 
@@ -11,6 +13,10 @@ from ..addresses import Network, is_named, site
 LISTENS = "pns.listens"
 """Name of the ASGI extension by which an application says that its answer is a stream that the
 client may ask for again: a function to call before it begins."""
+
+# How many of those that have waited longest are asked whether they are idle, a call of the system
+# each: the others, where these are not, came in one burst, and are read at the next turn.
+LOOKED_AT = 64
 
 
 class Guest(Protocol):
@@ -37,6 +43,7 @@ class Crowd:
     those that there are, the first of:
 
     - the oldest whose client has asked for nothing yet;
+    - of those that listen to a stream, the oldest of the address with the most connections;
     - the slowest of those that the service waits for, and of equally slow ones the oldest of the
       address with the most connections;
     - the oldest of the address with the most connections, if those are more than the newcomer's.
@@ -52,6 +59,7 @@ class Crowd:
         self._of_address: Counter[str | None] = Counter()
         # In the order in which they began it.
         self._waiting: dict[Guest, None] = {}
+        self._listening: dict[Guest, None] = {}
         self._slow: dict[Guest, None] = {}
         self._working: dict[Guest, None] = {}
 
@@ -85,6 +93,10 @@ class Crowd:
         """Note that a connection asks for nothing."""
         self._move(guest, self._waiting)
 
+    def listen(self, guest: Guest) -> None:
+        """Note that a connection takes a stream that its client may ask for again."""
+        self._move(guest, self._listening)
+
     def attend(self, guest: Guest) -> None:
         """Note that a connection has asked, and that the service waits for its client."""
         self._move(guest, self._slow)
@@ -99,13 +111,17 @@ class Crowd:
             to[guest] = None
 
     def _forget(self, guest: Guest) -> None:
-        for state in (self._waiting, self._slow, self._working):
+        for state in (self._waiting, self._listening, self._slow, self._working):
             state.pop(guest, None)
 
     def _make_room(self, newcomer: str | None) -> bool:
-        guest = next((guest for guest in self._waiting if guest.is_idle()), None)
         mine = 0 if newcomer is None else self._of_address[newcomer]
-        guest = guest or self._slowest() or self._greediest(mine + 1)
+        guest = (
+            next((guest for guest in islice(self._waiting, LOOKED_AT) if guest.is_idle()), None)
+            or self._greediest(self._listening)
+            or self._slowest()
+            or self._greediest(chain(self._working, self._slow, self._waiting), more_than=mine + 1)
+        )
         if guest is None:
             return False
         self._forget(guest)
@@ -118,10 +134,10 @@ class Crowd:
         told = [guest for guest, rate in rates.items() if rate < inf]
         return min(told, key=lambda guest: (rates[guest], -self._held_with(guest)), default=None)
 
-    def _greediest(self, most: int) -> Guest | None:
-        """The oldest of the address with the most connections, if those are more than `most`."""
-        guest = max((*self._working, *self._slow), key=self._held_with, default=None)
-        return guest if guest is not None and self._held_with(guest) > most else None
+    def _greediest(self, guests: Iterable[Guest], more_than: int = -1) -> Guest | None:
+        """The oldest of the address with the most connections, if those are more than that."""
+        guest = max(guests, key=self._held_with, default=None)
+        return guest if guest is not None and self._held_with(guest) > more_than else None
 
     def _held_with(self, guest: Guest) -> int:
         """How many connections its address has; none that count, where it is a proxy's."""

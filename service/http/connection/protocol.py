@@ -156,7 +156,9 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
     def _say_to_crowd(self) -> None:
         crowd, state = self._shared.crowd, self.conn.their_state
         goes = self.transport.is_closing()
-        if self._taking.waits or self._listens or (state is h11.SEND_BODY and not goes):
+        if self._listens:
+            crowd.listen(self)
+        elif self._taking.waits or (state is h11.SEND_BODY and not goes):
             crowd.attend(self)
         elif state is h11.IDLE and not goes:
             crowd.wait(self)
@@ -172,9 +174,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         return not readable.poll(0)
 
     def rate(self) -> float:
-        """Bytes a second of its body or its answer; of a stream of events none that count."""
-        if self._listens:
-            return 0.0
+        """Bytes a second of its body or its answer."""
         if self._taking.waits:
             return self._taking.rate(RATE_SECONDS)
         seconds = self.loop.time() - self._asked_at

@@ -253,6 +253,37 @@ def test_of_equally_slow_ones_the_oldest_of_the_greediest_address_gives_way():
     assert [guest.ended for guest in guests] == [False, True, False, False]
 
 
+def test_of_streams_that_of_the_greediest_address_gives_way_before_anyone_slow():
+    crowd = Crowd(most=4, most_of_address=3)
+    guests = entered(crowd, *(Guest(speed=0) for _ in range(4)), addresses="acbb")
+    crowd.attend(guests[0])
+    for guest in guests[1:]:
+        crowd.listen(guest)
+    assert crowd.enter(Guest(), "d") is None
+    assert [guest.ended for guest in guests] == [False, False, True, False]
+
+
+def test_a_burst_whose_heads_are_not_read_yet_gives_way_by_address():
+    crowd = Crowd(most=4, most_of_address=3)
+    guests = entered(crowd, *(Guest(idle=False) for _ in range(4)), addresses="abbb")
+    assert crowd.enter(Guest(), "c") is None
+    assert [guest.ended for guest in guests] == [False, True, False, False]
+
+
+def test_of_a_burst_only_the_oldest_are_asked_whether_they_are_idle():
+    crowd = Crowd(most=1000, most_of_address=1000)
+    asked = []
+
+    class Asked(Guest):
+        def is_idle(self):
+            asked.append(self)
+            return False
+
+    entered(crowd, *(Asked() for _ in range(1000)), addresses="a" * 1000)
+    assert crowd.enter(Guest(), "b") is None
+    assert 0 < len(asked) < 100
+
+
 def test_who_rests_again_gives_way_as_one_who_rests():
     crowd = Crowd(most=2, most_of_address=1)
     resting, slow = entered(crowd, Guest(), Guest(speed=1))
