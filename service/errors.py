@@ -10,15 +10,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+# Of a text and of a pointer, characters. Both may name what an upload calls its parts, and an error
+# is kept, and written into answers, by the process that holds no uploads.
+LONGEST = 8_000
+
 
 class ServiceError(Exception):
-    """Base of everything that the service answers with a problem document."""
+    """Base of everything that the service answers with a problem document.
+
+    A detail and a pointer that are too long are cut: the pointer to what holds the value.
+    """
 
     status = 500
     code = "service-error"
     title = "The request could not be answered"
 
     def __init__(self, detail: str, *, pointer: str | None = None, code: str | None = None) -> None:
+        if len(detail) > LONGEST:
+            detail = f"{detail[:LONGEST]}…"
+        if pointer is not None and len(pointer) > LONGEST:
+            pointer = pointer[:LONGEST].rpartition("/")[0]
         super().__init__(detail)
         self.detail = detail
         self.pointer = pointer

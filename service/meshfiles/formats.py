@@ -28,6 +28,7 @@ HOLDS_UV = frozenset({"obj", *GLTF_KINDS})
 
 _OBJ_UV = re.compile(rb"^[ \t]*vt[ \t]", re.MULTILINE)
 _OBJ_PART = re.compile(rb"^[ \t]*(?:usemtl|o|g)(?:[ \t][^\n]*)?$", re.MULTILINE)
+_STL_PART = re.compile(rb"(?im)^[ \t]*(?:endsolid|solid)(?:[ \t][^\n]*)?\r?$")
 # trimesh takes time in the square of the parts that materials and names divide a file into. They
 # are lost in any case; beyond so many statements they are passed over before it reads.
 MOST_PARTS = 100
@@ -86,6 +87,8 @@ def _scene(data: bytes, kind: str) -> trimesh.Scene:
     text = _as_utf8(data) if kind == "obj" or (kind == "stl" and not _is_binary_stl(data)) else data
     if kind == "obj" and len(_OBJ_PART.findall(text)) > MOST_PARTS:
         text = _OBJ_PART.sub(b"", text)
+    if kind == "stl" and not _is_binary_stl(data) and len(_STL_PART.findall(text)) > MOST_PARTS:
+        text = b"solid\n" + _STL_PART.sub(b"", text) + b"\nendsolid\n"
     try:
         with warnings.catch_warnings():
             # Where a number cannot be read, numpy warns and leaves out all that follows.

@@ -51,6 +51,11 @@ class FacesBudget:
             self._forget(per_minute)
         self._used[client] = (used + faces, self._now())
 
+    def settle(self, client: str, faces: int, per_minute: float | None) -> None:
+        """Take the faces that a job made beyond those that it was charged for."""
+        if per_minute is not None and faces > 0:
+            self._used[client] = (self._used_by(client, per_minute) + faces, self._now())
+
     def _used_by(self, client: str, per_minute: float) -> float:
         used, then = self._used.get(client, (0.0, 0.0))
         return max(used - (self._now() - then) * per_minute / MINUTE, 0.0)

@@ -136,6 +136,7 @@ class Desk:
         async with self._turn(job.waiting, job) as lane:
             job.began, job.state = time.monotonic(), State.RUNNING
             job.done = await self._call(lane, job, self._run)
+        self._budget.settle(job.client, job.done.faces - job.cost.faces, job.faces_per_minute)
         self._learn(job.cost, time.monotonic() - job.began)
 
     @asynccontextmanager
@@ -146,10 +147,11 @@ class Desk:
                 await self.turns.come(waiting)
         except TimeoutError as error:
             raise self.turns.busy("the job's turn did not come in time") from error
+        began = time.monotonic()
         try:
             yield waiting.lane
         finally:
-            self.turns.end(waiting)
+            self.turns.end(waiting, (time.monotonic() - began) / self._slowness)
 
     async def _call(self, lane: Lane, job: Job, function: Callable[[Work], T]) -> T:
         must_end = min(job.must_end, time.monotonic() + self._job_seconds)

@@ -1,4 +1,4 @@
-"""A glance at a document: how many faces it asks for, in how many meshes.
+"""A glance at a document: how many faces it asks for, in how many primitives, and what they carry.
 
 It reads counts and builds nothing else. The limits are checked by the job itself, on the document
 as it really is.
@@ -18,6 +18,9 @@ from .costs import Cost, cost_of
 # Of a format without counts: an OBJ's or PLY's face takes about as many bytes, an STL's 50.
 BYTES_PER_FACE = 30
 
+# Position, normal, tangent, texture coordinates: what a face costs was measured with them.
+USUAL_ATTRIBUTES = 4
+
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
@@ -29,6 +32,7 @@ class _Primitive(msgspec.Struct):
     attributes: dict[str, int] = {}
     indices: int | None = None
     mode: int = _TRIANGLES
+    targets: list[dict[str, int]] = []
 
 
 class _Mesh(msgspec.Struct):
@@ -56,15 +60,18 @@ def cost_of_gltf(
         counts = msgspec.json.decode(text.removeprefix(BOM), type=_Counts)
     except (ServiceError, msgspec.DecodeError, ValueError):
         return cost_of(0, 0, len(data))
-    faces, meshes = 0, 0
+    faces, primitives, values = 0, 0, 0
     for mesh in counts.meshes:
-        triangles = sum(_triangles(primitive, counts.accessors) for primitive in mesh.primitives)
-        faces += triangles
-        meshes += triangles > 0
+        for primitive in mesh.primitives:
+            triangles = _triangles(primitive, counts.accessors)
+            faces += triangles
+            primitives += triangles > 0
+            values += triangles * _unusual(primitive)
     refined = faces * 4**levels
     if refined > limits.max_faces:
         return cost_of(0, 0, len(data))
-    return cost_of(refined, meshes, len(data), _learned(faces, levels, learned_levels))
+    learned = _learned(faces, levels, learned_levels)
+    return cost_of(refined, primitives, len(data), learned, values * 4**levels)
 
 
 def cost_of_other(data: bytes, levels: int, limits: Limits, learned_levels: int = 0) -> Cost:
@@ -75,6 +82,11 @@ def cost_of_other(data: bytes, levels: int, limits: Limits, learned_levels: int 
 
 def _learned(faces: int, levels: int, learned_levels: int) -> int:
     return faces * 4 ** min(levels, learned_levels) if learned_levels else 0
+
+
+def _unusual(primitive: _Primitive) -> int:
+    """How many attributes follow its vertices beside the usual ones, morph targets' among them."""
+    return max(len(primitive.attributes) - USUAL_ATTRIBUTES, 0) + sum(map(len, primitive.targets))
 
 
 def _triangles(primitive: _Primitive, accessors: list[_Accessor]) -> int:

@@ -161,8 +161,18 @@ class Turns:
             # Its turn came in the same moment.
             self.end(waiting)
 
-    def end(self, waiting: Waiting) -> None:
-        """Give a turn back, to whoever is next."""
+    def end(self, waiting: Waiting, spent: float = 0.0) -> None:
+        """Give a turn back, to whoever is next; what it took beyond its prediction is paid for.
+
+        `spent` is in predicted seconds. The client's other jobs stand as much further back.
+        """
+        over = max(spent - waiting.seconds, 0.0)
+        if over:
+            reached = max(self._now, self._reached.get(waiting.client, 0.0))
+            self._reached[waiting.client] = reached + over
+            for job in self._waiting:
+                if job.client == waiting.client:
+                    job.tag = job.tag[0] + over, job.tag[1]
         self.running[waiting.lane] -= 1
         if waiting.lane is Lane.ANY:
             self._running_seconds = max(self._running_seconds - waiting.seconds, 0.0)

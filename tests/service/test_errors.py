@@ -39,6 +39,21 @@ def test_errors_survive_pickling_with_all_their_data(error):
     assert str(copy) == str(error)
 
 
+@pytest.mark.parametrize("error", EXAMPLES, ids=lambda error: type(error).__name__)
+def test_no_error_keeps_more_of_an_upload_than_a_page(error):
+    kind = type(error)
+    if kind is errors.InvalidParameter:
+        long = kind("model", "x" * 10**6)
+    elif kind is errors.LimitError:
+        long = kind("x" * 10**6, limit="faces", allowed=1, found=2, pointer="/a/" + "b" * 10**6)
+    elif kind in (errors.BusyError, errors.JobTimeout, errors.WorkerDied):
+        long = kind("x" * 10**6)
+    else:
+        long = kind("x" * 10**6, pointer="/a/" + "b" * 10**6)
+    assert len(str(long)) < 10_000
+    assert long.pointer in (None, "/a")
+
+
 def test_codes_are_slugs_of_their_own():
     codes = [type(error).code for error in EXAMPLES]
     assert len(set(codes)) == len(codes)

@@ -96,6 +96,7 @@ def _decode(
     need = header.faces * (BYTES_PER_FACE + BYTES_PER_FACE_AND_TABLE * header.tables)
     need += header.points * BYTES_PER_POINT_AND_ATTRIBUTE * len(wanted.attributes)
     check_decoded(need, held, limits)
+    _check_claim(document, primitive, header.faces, pointer)
     try:
         with memory_cap(need + SLACK):
             mesh = DracoPy.decode(data)
@@ -121,6 +122,20 @@ def _decode(
             )
         decoded[name] = _as_type(values, COMPONENT_TYPES[accessor.component_type], index)
     return decoded
+
+
+def _check_claim(document: Document, primitive: Primitive, faces: int, pointer: str) -> None:
+    """Refuse more triangles than the primitive says: a job is measured, and paid for, by that."""
+    index = primitive.indices
+    if index is None or index >= len(document.accessors):
+        raise GltfError("compressed triangles need indices", pointer=pointer)
+    corners = document.accessors[index].count
+    claimed = corners // 3 if primitive.mode == TRIANGLES else corners - 2
+    if faces > claimed:
+        raise GltfError(
+            f"the Draco data hold {faces} triangles, the indices are those of {claimed}",
+            pointer=f"/accessors/{index}/count",
+        )
 
 
 def _as_type(

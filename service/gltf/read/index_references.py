@@ -72,7 +72,8 @@ def unknown_extensions(tree: dict[str, Any], text: bytes) -> list[str]:
         value = pending.pop()
         if isinstance(value, dict):
             if isinstance(value.get("extensions"), dict):
-                names |= value["extensions"].keys()
+                # Not |=, which copies all the names so far for each holder of keys.
+                names.update(value["extensions"])
             # What applications keep in extras is theirs, and no part of the document's structure.
             pending += [part for key, part in value.items() if key != "extras"]
         elif isinstance(value, list):

@@ -59,6 +59,21 @@ def test_an_obj_of_many_materials_is_the_same_surface_as_one_of_few() -> None:
     assert len(corners) == 11 * len(faces)
 
 
+def test_an_stl_of_many_solids_is_the_same_surface_as_one_of_few() -> None:
+    # trimesh alone would take minutes: its time grows with the square of their number.
+    whole = formats.read(formats.write(part(), "stl"), "stl")
+    facets = [
+        "facet normal 0 0 1\nouter loop\n"
+        + "".join(f"vertex {x!r} {y!r} {z!r}\n" for x, y, z in corners.tolist())
+        + "endloop\nendfacet\n"
+        for corners in whole.vertices[whole.faces]
+    ]
+    solids = "".join(f"solid a part\r\n{facet}endsolid a part\r\n" for facet in 11 * facets)
+    read = formats.read(solids.encode(), "stl")
+    assert len(read.faces) == 11 * len(facets) > 20_000
+    assert np.array_equal(read.vertices[read.faces[: len(facets)]], whole.vertices[whole.faces])
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_trimesh_reads_what_is_written(kind: str) -> None:
     mesh = trimesh.load_mesh(io.BytesIO(formats.write(part(), kind)), file_type=kind)

@@ -42,6 +42,19 @@ def test_a_job_larger_than_a_minute_runs_once_and_leaves_a_debt() -> None:
     budget.charge("a", 1, 60)
 
 
+def test_a_job_is_paid_for_by_what_it_made() -> None:
+    clock = Clock()
+    budget = FacesBudget(clock)
+    budget.charge("a", 10, 60)
+    budget.settle("a", 40, 60)
+    with pytest.raises(OverBudgetError, match="10 of 60"):
+        budget.charge("a", 11, 60)
+    # Fewer are no credit: faces that cleaning dropped were work too.
+    budget.settle("a", -30, 60)
+    with pytest.raises(OverBudgetError, match="10 of 60"):
+        budget.charge("a", 11, 60)
+
+
 def test_no_budget_is_no_limit() -> None:
     FacesBudget(Clock()).charge("a", 10**12, None)
 

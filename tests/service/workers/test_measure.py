@@ -21,10 +21,10 @@ def cost(data: bytes, levels: int = 1, limits: Limits | None = None) -> Cost:
     return cost_of_gltf(data, "glb", levels, limits or Limits())
 
 
-def test_faces_and_meshes_are_those_that_the_document_counts() -> None:
+def test_faces_and_primitives_are_those_that_the_document_counts() -> None:
     data = files.pack(*files.document([octahedron(), box()], [octahedron()]))
     measured = cost(data, levels=2)
-    assert (measured.faces, measured.meshes) == (16 * (8 + 12 + 8), 2)
+    assert (measured.faces, measured.primitives) == (16 * (8 + 12 + 8), 3)
 
 
 @pytest.mark.parametrize(("mode", "faces"), [(4, 2), (5, 4), (6, 4), (1, 0)])
@@ -69,6 +69,20 @@ def test_more_levels_and_more_learned_levels_cost_more() -> None:
     # A model cannot act at more levels than there are.
     assert cost_of_gltf(data, "glb", 3, Limits(), 9).seconds == learned[3]
     assert cost(data, levels=3).seconds < cost(data, levels=4).seconds
+
+
+@pytest.mark.parametrize("place", ["targets", "attributes"])
+def test_what_many_attributes_carry_is_no_short_job(place: str) -> None:
+    """A hundred kilobytes that take ten seconds: every target may be the same accessor."""
+    tree, binary = files.document([octahedron()])
+    tree["accessors"][0]["count"] = tree["accessors"][1]["count"] = 15_000
+    (primitive,) = tree["meshes"][0]["primitives"]
+    few = cost(files.pack(tree, binary)).seconds
+    if place == "targets":
+        primitive["targets"] = [{"POSITION": 0}] * 4_000
+    else:
+        primitive["attributes"] |= {f"_A{number}": 0 for number in range(4_000)}
+    assert cost(files.pack(tree, binary)).seconds > 10 > 0.2 > few
 
 
 def test_other_formats_cost_by_their_bytes_within_the_limit() -> None:

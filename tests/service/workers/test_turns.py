@@ -53,6 +53,24 @@ def test_clients_take_turns_by_what_their_jobs_cost() -> None:
     run(scenario)
 
 
+def test_who_takes_more_than_was_predicted_stands_behind_the_others() -> None:
+    async def scenario() -> None:
+        turns = Turns(workers=1, places=9, short_seconds=0)
+        running = turns.join("a", 0.01)
+        many = [turns.join("a", 0.01) for _ in range(3)]
+        lone = turns.join("b", 5)
+        turns.end(running, 60)
+        assert granted(*many, lone) == [False, False, False, True]
+        # What it took is remembered of a client that has nothing in line, too.
+        for waiting in many:
+            turns.leave(waiting)
+        later, fresh = turns.join("a", 0.01), turns.join("c", 20)
+        turns.end(lone, 5)
+        assert granted(later, fresh) == [False, True]
+
+    run(scenario)
+
+
 def test_places_are_bounded_and_one_client_never_takes_all() -> None:
     async def scenario() -> None:
         turns = Turns(workers=1, places=4, short_seconds=0)

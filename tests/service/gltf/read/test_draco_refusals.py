@@ -37,6 +37,23 @@ def test_an_attribute_without_an_accessor_is_told():
     )
 
 
+def test_more_triangles_than_the_indices_say_are_told():
+    """A job is measured by what its JSON says, and short ones have a worker to themselves."""
+
+    def change(tree, primitive, extension):
+        tree["accessors"][primitive["indices"]]["count"] -= 3
+
+    told = refusal(change)
+    assert told.pointer.endswith("/count")
+    assert "hold 12 triangles, the indices are those of 11" in str(told)
+
+
+@pytest.mark.parametrize("change", [lambda p: p.pop("indices"), lambda p: p.update(indices=999)])
+def test_compressed_triangles_without_indices_are_told(change):
+    told = refusal(lambda tree, primitive, extension: change(primitive))
+    assert "indices" in told.pointer or "need indices" in str(told)
+
+
 @pytest.mark.parametrize("identity", [99, 1])
 def test_an_attribute_that_the_data_lack_is_told(identity):
     def change(tree, primitive, extension):

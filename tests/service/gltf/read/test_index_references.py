@@ -3,7 +3,11 @@
 import pytest
 
 from service.errors import GltfError, UnreadableError
-from service.gltf.read.index_references import accessor_references, view_references
+from service.gltf.read.index_references import (
+    accessor_references,
+    unknown_extensions,
+    view_references,
+)
 from tests.fuzz.seeds import draco, skinned, sparse
 from tests.service.gltf.read.refused import refine
 from tests.support.gltf import files
@@ -25,3 +29,10 @@ def test_every_place_that_is_renumbered_is_checked(made):
         reference.point_at(BEYOND)
         with pytest.raises((GltfError, UnreadableError), match=str(BEYOND)):
             refine(files.pack(tree, bytes(binary)))
+
+
+def test_an_extension_for_each_of_many_parts():
+    # To copy the names so far for each part takes most of a minute.
+    names = [f"EXT_{number:06d}" for number in range(50_000)]
+    tree = {"materials": [{"extensions": {name: {}}} for name in names]}
+    assert unknown_extensions(tree, b'"extensions"') == names
