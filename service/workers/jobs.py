@@ -178,6 +178,11 @@ def warm_up(model: Model | str | None) -> None:
 
     load_kernels()
     load_readers()
+    hold_model(model)
+
+
+def hold_model(model: Model | str | None) -> None:
+    """Load the served model. Raises NoModelError."""
     _MODELS.hold(model)
     _MODELS.get()
 

@@ -1,6 +1,7 @@
 """Jobs for the service's tests: each does one thing that a real job may do to its worker.
 
-The request's body says what to do, so that one pool of workers serves all tests.
+The request's body says what to do, so that one pool of workers serves all tests. Each worker that a
+test starts imports this: it asks for nothing that takes long.
 """
 
 from __future__ import annotations
@@ -14,54 +15,33 @@ import signal
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from pns_common import onnx_model
-from pns_common.model_card import ModelCard
-from pns_common.schemes import Model
 from service.errors import GltfError, LimitError, NoModelError, UnreadableError
 from service.options import Limits
 from service.workers import memory_file
 from service.workers.costs import Cost
-from service.workers.jobs import Done, Work, job_memory, warm_up
+from service.workers.jobs import Done, Work, hold_model, job_memory
 from service.workers.progress import Reporter
 
-ZERO_CARD = ModelCard(1, "paper-5", 10.0, 0.5, "first-face", {}, {})
-
-
-@dataclass(frozen=True)
-class ZeroModel:
-    """A model that corrects nothing, and crosses to the workers by pickling."""
-
-    card: ModelCard = ZERO_CARD
-    name: str = "zero"
-    hash: str = "0" * 64
-
-    def __call__(self, features: np.ndarray, budget: float) -> np.ndarray:
-        return np.zeros((len(features), 3))
-
-
-class CountedModel(ZeroModel):
-    """A model that counts how often it is sent somewhere; it arrives as a ZeroModel."""
-
-    pickled = 0
-
-    def __reduce__(self) -> tuple[object, ...]:
-        CountedModel.pickled += 1
-        return (ZeroModel, ())
+if TYPE_CHECKING:
+    from pns_common.schemes import Model
 
 
 def no_warm_up(model: object) -> None:
     pass
 
 
-def warm_up_among(folder: str, model: Model | str | None) -> None:
-    """The real warm-up, in a package whose bundled files are those of another folder."""
+def hold_among(folder: str, model: Model | str | None) -> None:
+    """Load a model, in a package whose bundled files are those of another folder.
+
+    Unlike the real warm-up it loads no kernels and no readers: small meshes do without.
+    """
+    from pns_common import onnx_model
+
     onnx_model.BUNDLED = Path(folder)
-    warm_up(model)
+    hold_model(model)
 
 
 def stay_away(seconds: float, model: object) -> None:
@@ -178,8 +158,8 @@ def digest_step_by_step(work: Work) -> Done:
 
 
 def tell(path: Path) -> None:
-    """Leave a file with the process's number: whole or not at all."""
-    whole = path.with_suffix(".part")
+    """Leave a file with the process's number: whole or not at all, whoever else leaves the same."""
+    whole = path.with_suffix(f".{os.getpid()}")
     whole.write_text(str(os.getpid()))
     whole.replace(path)
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import served
 
-ANSWERS = 2000
+ANSWERS = 600
 # Each costs a worker's life, and the start of its successor.
-DISCONNECTS = 96
+DISCONNECTS = 48
 HONEST = 32
 RUDE = 8
 
@@ -48,7 +48,7 @@ def digest(body: bytes) -> bytes:
     return hashlib.sha256(body).hexdigest().encode()
 
 
-def test_2000_answers_beside_clients_that_disconnect_are_each_of_their_own_input() -> None:
+def test_answers_beside_clients_that_disconnect_are_each_of_their_own_input() -> None:
     chance = random.Random(7)
     bodies = [chance.randbytes(chance.randrange(1, 4096)) for _ in range(ANSWERS)]
     wrong: list[int] = []

@@ -126,7 +126,8 @@ def test_503_with_retry_after_when_every_place_is_taken(
         (tmp_path / f"go-{number}").touch()
     for job in jobs:
         path = job.headers["location"]
-        until(lambda path=path: client.get(path).json()["state"] == "done")
+        until(lambda path=path: client.get(path).json()["state"] not in ("queued", "running"))
+        assert client.get(path).json()["state"] == "done"
 
 
 def test_408_for_an_upload_that_trickles(address: tuple[str, int]) -> None:

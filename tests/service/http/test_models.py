@@ -32,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def served(folder: Path, model: str | None = None) -> Iterator[TestClient]:
-    warm_up = partial(jobs.warm_up_among, str(folder))
+    warm_up = partial(jobs.hold_among, str(folder))
     with TestClient(create_app(Settings(workers=1, model=model), warm_up=warm_up)) as client:
         yield client
 

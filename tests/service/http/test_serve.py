@@ -15,7 +15,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, NamedTuple
 
 import httpx2
 import pytest
@@ -59,10 +59,14 @@ class Server:
     def connect(self) -> http.client.HTTPConnection:
         return http.client.HTTPConnection(self.host, self.port, timeout=30)
 
-    def status(self, path: str) -> int:
+    def get(self, path: str) -> tuple[int, bytes]:
         with closing(self.connect()) as connection:
             connection.request("GET", path)
-            return connection.getresponse().status
+            answer = connection.getresponse()
+            return answer.status, answer.read()
+
+    def status(self, path: str) -> int:
+        return self.get(path)[0]
 
     def wait_until_ready(self) -> None:
         while self.status("/readyz") != 200:
@@ -110,58 +114,80 @@ def begin_upload(
     return connection
 
 
-def refusal(connection: http.client.HTTPConnection) -> tuple[int, bytes]:
+def answered(connection: http.client.HTTPConnection) -> tuple[int, bytes]:
     with closing(connection):
         answer = connection.getresponse()
         return answer.status, answer.read()
 
 
-def test_a_request_under_way_at_sigterm_completes_and_new_ones_are_refused() -> None:
+class Drained(NamedTuple):
+    """What clients were told by a server that had got SIGTERM, and how it ended."""
+
+    default: list[str]
+    late: tuple[int, bytes]
+    healthy: int
+    half_sent: tuple[int, bytes]
+    under_way: tuple[int, bytes]
+    job: tuple[int, bytes]
+    code: int
+
+
+@pytest.fixture(scope="module")
+def drained() -> Drained:
+    """A server with a request that runs, a job that waits and a body that is half sent."""
     body = part_glb()
-    with serving(PNS_WORKERS="1") as server:
+    with serving("--model", "paper", PNS_WORKERS="1", PNS_MODEL="missing.onnx") as server:
         server.wait_until_ready()
+        default = default_models(server)
+        half_sent = begin_upload(server, bytes(1000))
         under_way = begin_upload(server, body, query="levels=5", whole=True)
         server.wait_until_a_job_runs()
+        with closing(server.connect()) as connection:
+            glb = {"Content-Type": "model/gltf-binary"}
+            connection.request("POST", "/jobs?levels=5", body, glb)
+            job = f"/jobs/{json.loads(connection.getresponse().read())['id']}"
         # To the whole group, as a supervisor may do it: the workers must not take it as theirs.
         os.killpg(server.process.pid, signal.SIGTERM)
         while server.status("/readyz") != 503:
             pass
-        assert server.status("/healthz") == 200
-        status, text = refusal(begin_upload(server, body))
-        assert status == 503
-        assert b'"draining"' in text
-
-        answer = under_way.getresponse()
-        assert answer.status == 200
-        assert answer.read(4) == b"glTF"
-        under_way.close()
-        assert server.process.wait(HANGS) == 0
-
-
-def test_a_job_at_sigterm_completes_and_waits_to_be_fetched() -> None:
-    with serving(PNS_WORKERS="1") as server:
-        server.wait_until_ready()
-        with closing(server.connect()) as connection:
-            glb = {"Content-Type": "model/gltf-binary"}
-            connection.request("POST", "/jobs?levels=5", part_glb(), glb)
-            path = f"/jobs/{json.loads(connection.getresponse().read())['id']}"
-        server.process.send_signal(signal.SIGTERM)
-        while server.status("/readyz") != 503:
-            pass
-        while server.status(f"{path}/result") == 409:
+        late = answered(begin_upload(server, body))
+        healthy = server.status("/healthz")
+        refused = answered(half_sent)
+        completed = answered(under_way)
+        # The first that is no 409 is the result: it has been fetched.
+        while (fetched := server.get(f"{job}/result"))[0] == 409:
             time.sleep(0.01)
-        # The first status was that of the result: it has been fetched, and nothing is waited for.
-        assert server.process.wait(HANGS) == 0
+        code = server.process.wait(HANGS)
+    return Drained(default, late, healthy, refused, completed, fetched, code)
 
 
-def test_bodies_that_have_not_arrived_at_sigterm_are_refused() -> None:
-    with serving(PNS_WORKERS="1") as server:
-        hanging = begin_upload(server, bytes(1000))
-        server.process.send_signal(signal.SIGTERM)
-        status, text = refusal(hanging)
-        assert status == 503
-        assert b'"draining"' in text
-        assert server.process.wait(HANGS) == 0
+def default_models(server: Server) -> list[str]:
+    """Names of the listed models that are the default."""
+    listed = json.loads(server.get("/models")[1])
+    return [entry["name"] for entry in listed if entry["default"]]
+
+
+def test_a_request_under_way_at_sigterm_completes(drained: Drained) -> None:
+    status, content = drained.under_way
+    assert (status, content[:4]) == (200, b"glTF")
+
+
+def test_new_requests_after_sigterm_are_refused_and_probes_are_not(drained: Drained) -> None:
+    assert drained.late[0] == 503
+    assert b'"draining"' in drained.late[1]
+    assert drained.healthy == 200
+
+
+def test_a_job_at_sigterm_completes_and_waits_to_be_fetched(drained: Drained) -> None:
+    """It had not even begun. Once it is fetched nothing is waited for."""
+    status, content = drained.job
+    assert (status, content[:4]) == (200, b"glTF")
+    assert drained.code == 0
+
+
+def test_bodies_that_have_not_arrived_at_sigterm_are_refused(drained: Drained) -> None:
+    assert drained.half_sent[0] == 503
+    assert b'"draining"' in drained.half_sent[1]
 
 
 @pytest.mark.parametrize("drain_seconds", ["600", "0.1"])
@@ -177,7 +203,7 @@ def test_a_second_sigterm_and_the_deadline_end_running_jobs_in_order(drain_secon
             while server.status("/readyz") != 503:
                 pass
             server.process.send_signal(signal.SIGTERM)
-        status, text = refusal(under_way)
+        status, text = answered(under_way)
         assert status == 503
         assert b'"draining"' in text
         assert server.process.wait(HANGS) == 0
@@ -190,19 +216,12 @@ def test_an_idle_server_stops_at_once() -> None:
         assert server.process.wait(HANGS) == 0
 
 
-def test_options_win_over_the_environment() -> None:
-    with serving("--host", "127.0.0.2", PNS_HOST="127.0.0.3", PNS_WORKERS="1") as server:
+def test_options_win_over_the_environment(drained: Drained, tmp_path: Path) -> None:
+    """The host, and the served model: a name (of the server before) or a file."""
+    assert drained.default == ["paper"]
+    mine = served_file(tmp_path / "mine.onnx")
+    given = ("--host", "127.0.0.2", "--model", mine)
+    with serving(*given, PNS_HOST="127.0.0.3", PNS_WORKERS="1", PNS_MODEL="missing.onnx") as server:
         assert server.host == "127.0.0.2"
-        assert server.status("/healthz") == 200
-
-
-def test_the_served_model_is_a_name_or_a_file(tmp_path: Path) -> None:
-    for given in ("paper", served_file(tmp_path / "mine.onnx")):
-        arguments = ("--model", given)
-        with serving(*arguments, PNS_WORKERS="1", PNS_MODEL="missing.onnx") as server:
-            server.wait_until_ready()
-            with closing(server.connect()) as connection:
-                connection.request("GET", "/models")
-                listed = json.loads(connection.getresponse().read())
-        default = [entry["name"] for entry in listed if entry["default"]]
-        assert default == [Path(given).stem]
+        server.wait_until_ready()
+        assert default_models(server) == ["mine"]

@@ -21,7 +21,8 @@ from service.meshfiles.example import part_glb
 from service.meshfiles.triangles_glb import as_gltf_json
 from service.options import Limits
 from service.settings import Settings
-from tests.support.stand_in_jobs import CountedModel, ZeroModel
+from service.workers.jobs import hold_model
+from tests.support.stand_in_models import CountedModel
 
 GLB = {"Content-Type": "model/gltf-binary"}
 FACES = 1920
@@ -226,18 +227,14 @@ def test_422_for_a_form_with_two_parts(client: TestClient, part: bytes) -> None:
 
 
 def test_a_model_given_to_the_application_is_the_one_that_runs(part: bytes) -> None:
-    with TestClient(create_app(Settings(workers=1), model=ZeroModel())) as client:
-        report = report_of(client.post("/subdivide", content=part, headers=GLB))
-    assert report["model"] == "zero"
-    assert report["levels"][0]["proximity_ratio"]["max"] == 0
-
-
-def test_a_model_crosses_to_each_worker_once(part: bytes) -> None:
+    """And it crosses to each worker once."""
     before = CountedModel.pickled
-    with TestClient(create_app(Settings(workers=1), model=CountedModel())) as client:
+    app = create_app(Settings(workers=1), model=CountedModel(), warm_up=hold_model)
+    with TestClient(app) as client:
         for _ in range(3):
             report = report_of(client.post("/subdivide", content=part, headers=GLB))
             assert report["model"] == "zero"
+            assert report["levels"][0]["proximity_ratio"]["max"] == 0
     # One worker for any job, and the one for short jobs.
     assert CountedModel.pickled == before + 2
 
@@ -245,7 +242,7 @@ def test_a_model_crosses_to_each_worker_once(part: bytes) -> None:
 def test_what_an_upload_says_is_not_logged(capfd: pytest.CaptureFixture[str]) -> None:
     kind = {"Content-Type": "multipart/form-data; boundary=b"}
     # Its worker starts here, so that it writes to the stream that is captured.
-    with TestClient(create_app(Settings(workers=1))) as client:
+    with TestClient(create_app(Settings(workers=1), warm_up=hold_model)) as client:
         answer = client.post("/subdivide", content=b"--b\r\nNot a header: x", headers=kind)
         assert answer.status_code == 400
     assert "header" not in capfd.readouterr().err
@@ -253,7 +250,7 @@ def test_what_an_upload_says_is_not_logged(capfd: pytest.CaptureFixture[str]) ->
 
 def test_without_a_model_loop_still_works(part: bytes) -> None:
     settings = Settings(workers=1, model="missing.onnx")
-    with TestClient(create_app(settings)) as client:
+    with TestClient(create_app(settings, warm_up=hold_model)) as client:
         refused = client.post("/subdivide", content=part, headers=GLB)
         assert refused.status_code == 503
         assert refused.json()["code"] == "no-model"

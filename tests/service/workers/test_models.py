@@ -16,7 +16,7 @@ from service.errors import InvalidParameter, NoModelError
 from service.workers.catalogue import Catalogue, ModelEntry, catalogue_of
 from service.workers.models import Models
 from tests.support.packages import served_file, several_models
-from tests.support.stand_in_jobs import ZeroModel
+from tests.support.stand_in_models import ZeroModel
 
 NAMES = sorted({"broken", "paper", "vertices", DEFAULT_MODEL})
 
