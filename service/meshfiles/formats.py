@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import re
 import warnings
 from types import ModuleType
@@ -39,6 +40,8 @@ def load_readers() -> ModuleType:
     """Return trimesh. It is loaded when it is first needed: glTF files, and OFF, do without."""
     import trimesh
 
+    # It logs a stack trace for a texture that it does not find; what is lost stands in the report.
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     return trimesh
 
 
@@ -46,7 +49,7 @@ def read(data: bytes, kind: str) -> IndexedTriangles:
     """Read a mesh file; its polygons are split into fans.
 
     Raises:
-        UnreadableError: not a file of this kind, or one without faces.
+        UnreadableError: not a file of this kind, or one without faces, or without all of them.
     """
     if kind == "off":
         return read_off(data)
@@ -57,6 +60,9 @@ def read(data: bytes, kind: str) -> IndexedTriangles:
     faces = disjoint_faces((np.asarray(part.faces), len(part.vertices)) for part in parts)
     uv = _uv(parts)
     count, others = _beside_triangles(data, kind, parts, has_uv=uv is not None)
+    if kind == "ply" and count is not None and len(faces) < count:
+        # trimesh takes what is there of a text that was cut off.
+        raise UnreadableError(f"the PLY file says {count} faces and ends after {len(faces)}")
     return IndexedTriangles(
         vertices=np.concatenate([np.asarray(part.vertices, dtype=np.float64) for part in parts]),
         faces=faces.astype(np.int64),

@@ -140,6 +140,19 @@ POLYGONS = {
 }
 
 
+def test_a_ply_text_that_was_cut_off_is_refused() -> None:
+    triangles = POLYGONS["ply"].replace(b"4 0 1 2 3\n3 0 2 4\n5 3 2 1 0 4\n", 3 * b"3 0 2 4\n")
+    assert len(formats.read(triangles, "ply").faces) == 3
+    with pytest.raises(UnreadableError, match="3 faces and ends after 2"):
+        formats.read(triangles.removesuffix(b"3 0 2 4\n"), "ply")
+
+
+def test_a_texture_that_did_not_come_is_no_stack_trace(caplog: pytest.LogCaptureFixture) -> None:
+    textured = POLYGONS["ply"].replace(b"element", b"comment TextureFile a.png\nelement", 1)
+    assert len(formats.read(textured, "ply").faces) == 6
+    assert not caplog.records
+
+
 @pytest.mark.parametrize("kind", POLYGONS)
 def test_polygons_are_split_and_counted(kind: str) -> None:
     mesh_file = formats.read(POLYGONS[kind], kind)
