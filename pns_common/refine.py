@@ -109,10 +109,12 @@ def refine(
             the refinement, and is raised here.
 
     Raises:
-        ParameterError: levels, reference_length or threads out of range, a crease that is no edge.
+        ParameterError: no Mesh or no Scheme; levels, reference_length or threads out of range; a
+            crease that is no edge.
         ModelError: the network returned something that is not finite, or of another shape.
         MeshError: the refined coordinates are too large.
     """
+    _check_kinds(mesh, scheme)
     _check_levels(levels)
     length = _reference_length(mesh, reference_length)
     workers = _threads(threads)
@@ -228,6 +230,14 @@ def _threads(given: int | None) -> int:
     if not (is_whole(given) and given >= 1):
         raise ParameterError("threads", given, expected="a whole number, at least 1")
     return given
+
+
+def _check_kinds(mesh: object, scheme: object) -> None:
+    if not isinstance(mesh, Mesh):
+        other = "Mesh(vertices, faces); subdivide takes arrays and other libraries' meshes"
+        raise ParameterError("mesh", type(mesh), expected=other)
+    if not isinstance(scheme, Scheme):
+        raise ParameterError("scheme", type(scheme), expected="loop() or pns(load_model())")
 
 
 def _check_levels(levels: int) -> None:

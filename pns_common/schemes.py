@@ -86,9 +86,11 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         budget: C ≥ 0, dimensionless; None takes the one that the model was trained at.
 
     Raises:
-        ParameterError: the budget is negative or not finite.
+        ParameterError: the budget is negative or not finite, or this is no model.
         ModelError: the card names vertex features, and the model has no network for them.
     """
+    if not isinstance(model, Model):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("model", type(model), expected="a model, as load_model() gives it")
     card = model.card
     budget = card.budget if budget is None else budget
     if not (is_number(budget) and budget >= 0):

@@ -45,6 +45,21 @@ def test_threads_out_of_range_are_refused(threads):
         refine(Mesh(*grid(3)), loop(), threads=threads)
 
 
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("mesh", lambda: refine(grid(3), loop())),
+        ("scheme", lambda: refine(Mesh(*grid(3)), "loop")),
+        ("scheme", lambda: pns_common.subdivide(grid(3), scheme=MODEL)),
+        ("model", lambda: pns("general")),
+    ],
+)
+def test_what_is_taken_for_a_mesh_a_scheme_or_a_model_is_told(name, wrong):
+    # Where annotations are enforced, another kind ends there first.
+    with pytest.raises((ParameterError, TypeError), match=name):
+        wrong()
+
+
 def test_a_model_file_keeps_the_model_protocol():
     assert isinstance(MODEL, Model)
 
