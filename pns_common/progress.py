@@ -12,6 +12,15 @@ LEARNED_COST, LIMIT_COST = 6, 3
 ROWS, LEARNED_ROWS = 2.0, 4.0
 
 
+def level_costs(faces: int, levels: int, learned_levels: int | None) -> list[int]:
+    """What each level of a refinement costs, in faces that Loop makes; arguments as below."""
+    learned = levels if learned_levels is None else learned_levels
+    return [
+        faces * 4 ** (depth + 1) * (LEARNED_COST if depth < learned else 1)
+        for depth in range(levels)
+    ]
+
+
 class RefinementProgress:
     """Faces made so far, as the work goes: a level that costs more counts for more.
 
@@ -34,9 +43,7 @@ class RefinementProgress:
     ) -> None:
         made = [faces * 4**level for level in range(1, levels + 1)]
         learned = levels if learned_levels is None else learned_levels
-        self._costs = [
-            count * (LEARNED_COST if depth < learned else 1) for depth, count in enumerate(made)
-        ]
+        self._costs = level_costs(faces, levels, learned_levels)
         self._rows = [
             count * (LEARNED_ROWS if depth < learned else ROWS) for depth, count in enumerate(made)
         ]

@@ -23,7 +23,7 @@ from pns_common.levels import AfterLevel, LevelsReport, RefinedLevels, check_coo
 from pns_common.limit import refined_limit_normals, refined_limit_positions
 from pns_common.mesh import Mesh
 from pns_common.parameters import is_number, is_whole
-from pns_common.progress import RefinementProgress
+from pns_common.progress import RefinementProgress, level_costs
 from pns_common.schemes import Scheme
 
 HIGHEST_LEVELS = 16
@@ -121,9 +121,9 @@ def refine(
     work = RefinementProgress(
         len(mesh.faces), levels, scheme.learned_levels, limit, progress or _nobody_listens
     )
-    total = sum(len(mesh.faces) * 4**level for level in range(1, levels + 1))
+    costs = level_costs(len(mesh.faces), levels, scheme.learned_levels)
     arguments = (mesh, scheme, levels, length, creases)
-    if kernels_can_serve(*arguments) and kernels_pay(total):
+    if kernels_can_serve(*arguments) and kernels_pay(costs):
         # Loads the compiler's runtime, which whoever only imports the package does not need.
         from pns_common.fused.refine import refine_fused
 

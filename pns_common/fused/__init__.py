@@ -1,13 +1,14 @@
 """The operator in compiled kernels: the bits of the array kernels, several times as fast.
 
 Needs numba and a folder for its cache; without them the array kernels serve. Nothing else here is
-loaded before it is needed: reading the kernels takes as long as the array kernels take for a small
-mesh, so these serve until that pays. ``python -m pns_common.fused`` compiles all kernels.
+loaded before it is needed: reading the kernels takes as long as the array kernels take for a
+million faces, so these serve until that pays. ``python -m pns_common.fused`` compiles all kernels.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -18,16 +19,18 @@ from pns_common.fused.storage import cache_folder
 # Rows a block: a kernel has no temporaries that must stay in a cache, and each call costs a little.
 KERNEL_ROWS = 32768
 LARGEST_INDEX = 2**31 - 1
-# Faces that the array kernels make in the time that the kernels take to load.
-FACES_TO_LOAD = 250_000
+# What the array kernels do in the time that reading these takes, in faces that Loop makes; and what
+# a level costs them before its first face. Measured on single meshes of 16 to 2,000,000 faces.
+COST_TO_LOAD = 2_000_000
+COST_OF_LEVEL = 2_000
 LOADED = "pns_common.fused.refine"
 
 
 @dataclass
 class _Work:
-    """Faces that a process has made while the kernels were not loaded."""
+    """What a process has done while the kernels were not loaded."""
 
-    faces: int = 0
+    cost: int = 0
 
 
 _work = _Work()
@@ -54,12 +57,12 @@ def kernels_loaded() -> bool:
     return LOADED in sys.modules
 
 
-def kernels_pay(faces: int) -> bool:
-    """Whether to use the kernels to make so many faces: they are loaded, or soon pay for that."""
+def kernels_pay(costs: Sequence[int]) -> bool:
+    """Whether to use the kernels for levels of such costs: they are loaded, or pay for that now."""
     if kernels_loaded():
         return True
-    _work.faces += faces
-    return _work.faces >= FACES_TO_LOAD
+    _work.cost += sum(costs) + len(costs) * COST_OF_LEVEL
+    return _work.cost >= COST_TO_LOAD
 
 
 def fits(vertex_count: int, face_count: int, levels: int) -> bool:

@@ -7,11 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
-from rich.console import Console
-from rich.progress import Progress
 
 from pns_common import load_model
 from pns_common.schemes import Model
@@ -33,6 +31,9 @@ from .refine_triangles import check_cost, refine_triangles
 from .single_precision import rounding_changes
 from .triangles_glb import as_gltf_json, triangles_glb
 
+if TYPE_CHECKING:
+    from rich.console import Console
+
 KINDS = (*formats.GLTF_KINDS, *formats.MESH_KINDS)
 
 
@@ -52,6 +53,9 @@ def convert(
         ServiceError, PnsError: the file, the model or a parameter cannot be used.
         OSError: a file cannot be read or written.
     """
+    # What only a terminal sees, workers do not load.
+    from rich.console import Console
+
     kind, target = _kind("IN", source), _kind("OUT", output)
     if report_file is not None and report_file.resolve() in (source.resolve(), output.resolve()):
         raise InvalidParameter("report", f"{report_file}: the report would replace a model")
@@ -189,6 +193,8 @@ def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, An
 @contextmanager
 def _progress(console: Console) -> Iterator[Course]:
     """A bar that shows on a terminal while the work goes on, and leaves nothing behind."""
+    from rich.progress import Progress
+
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("refining", total=1.0)
         yield Course(moves=lambda share: bar.update(task, completed=share))

@@ -1,5 +1,6 @@
 """Kernels are kept where nobody else can write, and a read-only package brings its own."""
 
+import itertools
 import os
 import subprocess
 import sys
@@ -7,7 +8,8 @@ import sys
 import pytest
 
 from pns_common import Mesh, loop, refine
-from pns_common.fused import FACES_TO_LOAD, _Work, kernels_pay, storage
+from pns_common.fused import COST_TO_LOAD, _Work, kernels_pay, storage
+from pns_common.progress import level_costs
 from tests.support.kernels import by_arrays
 from tests.support.meshes import bumpy_sphere
 
@@ -73,11 +75,32 @@ def test_built_kernels_are_copied_once(tmp_path):
     }
 
 
-def test_small_meshes_do_not_wait_for_kernels(monkeypatch):
+@pytest.fixture
+def fresh(monkeypatch):
+    """A process that has done nothing yet."""
     monkeypatch.setattr("pns_common.fused.kernels_loaded", lambda: False)
     monkeypatch.setattr("pns_common.fused._work", _Work())
-    assert not kernels_pay(FACES_TO_LOAD - 1)
-    assert kernels_pay(1)
+
+
+@pytest.mark.usefixtures("fresh")
+def test_small_meshes_do_not_wait_for_kernels():
+    costs = level_costs(COST_TO_LOAD // (4 + 16) - 1000, 2, learned_levels=0)
+    assert not kernels_pay(costs)
+    assert kernels_pay(costs)
+
+
+@pytest.mark.usefixtures("fresh")
+def test_a_learned_level_pays_for_kernels_sooner():
+    faces = COST_TO_LOAD // 8
+    assert not kernels_pay(level_costs(faces, 1, learned_levels=0))
+    assert kernels_pay(level_costs(faces, 1, learned_levels=1))
+
+
+@pytest.mark.usefixtures("fresh")
+def test_kernels_pay_for_many_meshes_however_small():
+    levels = level_costs(4, 3, learned_levels=0)
+    meshes = next(count for count in itertools.count(1) if kernels_pay(levels))
+    assert meshes * sum(levels) < COST_TO_LOAD / 10
 
 
 def test_importing_the_package_loads_no_compiler():

@@ -4,6 +4,7 @@ import hashlib
 import os
 import pickle
 import sqlite3
+import subprocess
 import sys
 import threading
 from dataclasses import replace
@@ -237,6 +238,21 @@ def test_what_is_not_refined_is_not_collected(tmp_path):
         return iter(())
 
     assert refined(batch, looks).counts == {"failed": 50}
+
+
+def test_a_parquet_report_without_what_writes_it_is_told_beforehand(tmp_path, monkeypatch):
+    monkeypatch.setattr("service.scale.journal.find_spec", lambda _: None)
+    with pytest.raises(InvalidParameter, match=r"Parquet needs the extra.*\.jsonl needs none"):
+        refined(batch_of(tmp_path, library(tmp_path / "in"), report=tmp_path / "r.parquet"))
+
+
+def test_a_worker_starts_without_what_only_a_driver_needs():
+    code = (
+        "import sys; from service.scale.job import read_libraries; read_libraries()\n"
+        "print({'numba', 'onnxruntime', 'pyarrow', 'rich', 'typer'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, check=True)
+    assert done.stdout == b"set()\n"
 
 
 def test_tasks_cross_to_a_worker_as_they_are():
