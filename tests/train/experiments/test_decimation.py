@@ -1,5 +1,7 @@
 """The decimation experiment: which meshes and methods it shows, and what it depends on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -13,6 +15,8 @@ from train.experiments.beyond.decimation import EXPERIMENT, collected, methods
 from train.experiments.beyond.decimation_figures import pictured
 from train.experiments.harness.laboratory import FULL, SMALL, Laboratory
 from train.experiments.harness.reproduce import content_key, reproduce
+
+pytestmark = pytest.mark.usefixtures("small_figures")
 
 # Where it does not matter which methods there are.
 FEW = {"Loop": loop(), "PNS": pns(load_model("paper"))}
@@ -46,7 +50,8 @@ def test_files_join_the_parts_and_the_page_says_which(tmp_path, assets, monkeypa
     assert listed["torus"][1] == CAD
     assert "plane" in listed["flat.ply"][-1]
     measured = {row[0] for row in tables["decimation_by_mesh"].rows}
-    assert measured == {"spot.ply", "blob_control_mesh.ply", "torus", "pipe"}
+    # At this scale one of a kind.
+    assert measured == {"spot.ply", "blob_control_mesh.ply", "torus"}
     assert not any("--assets" in note for note in record.notes)
 
 
@@ -98,7 +103,7 @@ def test_what_cannot_be_simplified_is_listed(tmp_path, monkeypatch):
 
     monkeypatch.setattr(experiment, "simplify", all_but_the_torus)
     monkeypatch.setattr(experiment, "methods", lambda: FEW)
-    outcome = experiment.run(laboratory(tmp_path))
+    outcome = experiment.run(laboratory(tmp_path, scale=replace(SMALL, instances=2)))
     assert outcome.tables[2].rows[-1][0] == "torus"
     assert "manifold" in outcome.tables[2].rows[-1][-1]
 

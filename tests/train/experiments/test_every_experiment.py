@@ -8,6 +8,8 @@ from train.experiments.harness.laboratory import SMALL, Laboratory
 from train.experiments.harness.reproduce import reproduce
 from train.experiments.registry import EXPERIMENTS
 
+pytestmark = pytest.mark.usefixtures("small_figures")
+
 NAMES = (
     "structural, spectral, ablation, headline, cross-section, repeated, c-sweep, budget, capacity, "
     "saddle, sphere-ridge, features, extended, lifted-stars, cad, models, families, stability, "

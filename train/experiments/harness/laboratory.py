@@ -31,7 +31,8 @@ class Scale:
 
     Attributes:
         name: on the page, where it is not the whole.
-        instances: of each data set, at most.
+        instances: at most, of whatever there are several: surfaces, meshes, valences, values. Of a
+            data set two at least, as intervals need them.
         training_steps: at most.
         levels: of repeated subdivision.
         deepest: level of the extended iteration.
@@ -47,7 +48,7 @@ class Scale:
 
 
 FULL = Scale("full", instances=1000, training_steps=100_000, levels=4, deepest=7, samples=1000)
-SMALL = Scale("small", instances=2, training_steps=2, levels=2, deepest=2, samples=20)
+SMALL = Scale("small", instances=1, training_steps=2, levels=2, deepest=2, samples=10)
 """A few seconds each, for the tests: every line runs, no number means anything."""
 
 
@@ -74,7 +75,7 @@ class Laboratory:
     def dataset(self, name: str) -> Dataset:
         """Return a data set, cut to the scale."""
         dataset = DATASETS[name]()
-        return Dataset(dataset.name, dataset.instances[: self.scale.instances])
+        return Dataset(dataset.name, dataset.instances[: max(2, self.scale.instances)])
 
     def scheme(self, recipe: Recipe) -> Scheme:
         """Return PNS with the network of a recipe."""

@@ -2,9 +2,10 @@
 
 import csv
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import msgspec
 
@@ -14,6 +15,11 @@ from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.sources import code_of, sources_of
 from train.experiments.harness.style import shared_style
 from train.fitting.determinism import deterministic
+
+FORMATS: Mapping[str, Mapping[str, None]] = MappingProxyType(
+    {"png": {"Software": None}, "pdf": {"CreationDate": None}}
+)
+"""What each figure is written as, without what would be another in each run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +111,7 @@ def save_figure(figure: Figure, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with shared_style():
         drawing = figure.draw()
-        for ending, metadata in (("png", {"Software": None}), ("pdf", {"CreationDate": None})):
+        for ending, metadata in FORMATS.items():
             _replace(
                 folder / f"{figure.name}.{ending}",
                 # The temporary name hides the format.
@@ -127,7 +133,7 @@ def formatted(cell: Cell, column: Column) -> str:
 def _written(record: Record, output: Path) -> bool:
     names = [output / f"{table.name}.csv" for table in record.tables]
     for figure in record.figures:
-        names += [output / "figures" / f"{figure.name}.{ending}" for ending in ("png", "pdf")]
+        names += [output / "figures" / f"{figure.name}.{ending}" for ending in FORMATS]
     return all(path.is_file() for path in names)
 
 
