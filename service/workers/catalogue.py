@@ -49,7 +49,7 @@ class ModelEntry(BaseModel):
         description="b of the boundaries' own prior; null where they are Loop's"
     )
     side_gates: bool | None = Field(
-        description="whether gates read rings; null: an edge's reads its two faces"
+        description="whether an edge's gate reads the sides of its two faces; null: the faces alone"
     )
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")
