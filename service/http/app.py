@@ -105,6 +105,8 @@ def create_app(
         summary="Subdivision surfaces with a small, bounded, learned correction",
         version=version("pns-subdivision"),
         lifespan=lifespan,
+        # Else a slash too many is answered with whatever host the request names.
+        redirect_slashes=False,
         docs_url=None,
         redoc_url=None,
         # Its spans would hold paths and queries; ours do not.

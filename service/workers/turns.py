@@ -67,17 +67,34 @@ class Turns:
         """How many wait and take a place."""
         return sum(job.counted for job in self._waiting)
 
-    def backlog(self, before: Waiting | None = None) -> float:
-        """Predicted seconds until one that waits will run; None: one that came last of all."""
-        if before is not None and before.turn.done():
-            return 0.0
-        ahead = [job for job in self._waiting if before is None or job.tag < before.tag]
-        seconds = sum(job.seconds for job in ahead) + self._running_seconds
-        return seconds / self._workers[Lane.ANY]
+    def backlog(self, before: Waiting | None = None, *, short: bool = False) -> float:
+        """Predicted seconds until one that waits will run.
+
+        None: until one that came last of all would, a `short` one or another.
+        """
+        if before is not None:
+            if before.turn.done():
+                return 0.0
+            short = self._is_short(before.seconds)
+        seconds = sum(job.seconds for job in self._ahead(before, short=short))
+        return seconds if short else (seconds + self._running_seconds) / self._workers[Lane.ANY]
 
     def place_of(self, waiting: Waiting) -> int:
         """How many come before one that waits."""
-        return sum(job.counted and job.tag < waiting.tag for job in self._waiting)
+        short = self._is_short(waiting.seconds)
+        return sum(job.counted for job in self._ahead(waiting, short=short))
+
+    def _ahead(self, before: Waiting | None, *, short: bool) -> list[Waiting]:
+        """Those in front of one that waits, or (None) all; no large one is in front of a short."""
+        return [
+            job
+            for job in self._waiting
+            if (before is None or job.tag < before.tag)
+            and (not short or self._is_short(job.seconds))
+        ]
+
+    def _is_short(self, seconds: float) -> bool:
+        return seconds <= self.short_seconds
 
     async def come(self, waiting: Waiting) -> None:
         """Wait until its turn has come; `end` must follow. Cancelled, it leaves the line."""
@@ -112,26 +129,25 @@ class Turns:
 
     def check_room(self, client: str, seconds: float = 0.0) -> None:
         """Raise BusyError where a job of this client would have to wait and finds no place."""
-        short = seconds <= self.short_seconds
+        short = self._is_short(seconds)
         if self._is_free(Lane.ANY) or (short and self._is_free(Lane.SHORT)):
             return
         rivals = [
-            job
-            for job in self._waiting
-            if job.counted and (job.seconds <= self.short_seconds) == short
+            job for job in self._waiting if job.counted and self._is_short(job.seconds) == short
         ]
         if len(rivals) >= self._places:
-            raise self.busy(f"{len(rivals)} jobs wait; no more fit")
+            raise self.busy(f"{len(rivals)} jobs wait; no more fit", short=short)
         mine = sum(job.client == client for job in rivals)
         if mine >= max(1, self._places * 3 // 4):
-            raise self.busy(f"{mine} jobs of this client wait; no more of one client fit")
+            text = f"{mine} jobs of this client wait; no more of one client fit"
+            raise self.busy(text, short=short)
 
     def _is_free(self, lane: Lane) -> bool:
         return self.running[lane] < self._workers[lane]
 
-    def busy(self, detail: str) -> BusyError:
+    def busy(self, detail: str, *, short: bool = False) -> BusyError:
         """The error of who finds no room, with the time until there may be some."""
-        return BusyError(detail, retry_after=max(1, round(self.backlog() + 0.5)))
+        return BusyError(detail, retry_after=max(1, round(self.backlog(short=short) + 0.5)))
 
     def _grant(self) -> None:
         """Give every free worker to the first of those that it may run."""

@@ -187,6 +187,13 @@ def test_415_for_a_compressed_body(client: TestClient) -> None:
     assert_problem(answer, 415, "unsupported-media-type")
 
 
+@pytest.mark.parametrize("path", ["/jobs/", "/models/", "/subdivide/"])
+def test_a_slash_too_many_leads_nowhere(client: TestClient, path: str) -> None:
+    answer = client.get(path, headers={"Host": "elsewhere.example"}, follow_redirects=False)
+    assert_problem(answer, 404, "not-found")
+    assert "location" not in answer.headers
+
+
 def test_404_and_405_are_problems_too(client: TestClient) -> None:
     assert_problem(client.get("/nothing"), 404, "not-found")
     wrong = client.get("/subdivide")

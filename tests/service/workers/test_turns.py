@@ -134,3 +134,25 @@ def test_the_backlog_is_what_is_in_front() -> None:
         assert turns.backlog() == 30
 
     run(scenario)
+
+
+def test_no_large_job_counts_as_in_front_of_a_short_one() -> None:
+    """Else a short one is refused, or told to come back in minutes, though it is next."""
+
+    async def scenario() -> None:
+        turns = Turns(workers=1, places=4, short_seconds=0.5)
+        # Its turn by cost is behind those of the large ones.
+        turns.end(turns.join("a", 0.25), 500)
+        for client in "bcd":
+            turns.join(client, 100)
+        running = turns.join("b", 0.5)
+        first, short = turns.join("c", 0.5), turns.join("a", 0.125)
+        assert granted(running, first, short) == [True, False, False]
+        assert turns.place_of(short) == 1
+        assert turns.backlog(short) == 0.5
+        turns.join("d", 0.5), turns.join("e", 0.5)
+        with pytest.raises(BusyError) as refused:
+            turns.join("f", 0.5)
+        assert refused.value.retry_after == 2
+
+    run(scenario)
