@@ -6,6 +6,8 @@ DEV    := .venv
 BLENDER := .venv-blender
 CLIENTS := .venv-clients
 PEERS := .venv-bench
+# Tests start hundreds of processes: each would compile the sources anew.
+unexport PYTHONDONTWRITEBYTECODE
 # Pins what is installed, and what builds it.
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 # What has one maintainer is pinned by hash, and first.
@@ -13,7 +15,7 @@ HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.
 
 PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n 2 --dist loadgroup
 
-.PHONY: bench bench-answers scale image hashes soak manifest serve test lint shapes unit quick verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures paper-hero web
+.PHONY: bench bench-answers scale image hashes soak manifest serve test lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures paper-hero web
 
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
@@ -31,16 +33,24 @@ lint: $(DEV)/.ready
 	$(DEV)/bin/pyright
 	$(DEV)/bin/lint-imports
 
+# Once, where two test processes and every service that they start would each compile them.
+kernels: $(DEV)/.ready
+	@$(DEV)/bin/python -m pns_common.fused
+
 # Of each test of pns_common the first parameters, with the shapes of arrays checked.
-shapes: $(DEV)/.ready
+shapes: kernels
 	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest tests/pns_common
 
-unit: $(DEV)/.ready $(CLIENTS)/.ready
+unit: kernels $(CLIENTS)/.ready
 	$(PYTEST) tests
 
 # What neither trains, nor starts programs, nor reads the whole collection of assets.
-quick: $(DEV)/.ready
-	$(PYTEST) -m 'not (spawning or training or conformance or retrain)' tests
+quick: kernels
+	$(PYTEST) -m 'not (spawning or training or conformance or retrain or exhaustive)' tests
+
+# What `make test` shows on one of each kind, on all there are.
+exhaustive: kernels
+	$(PYTEST) -m exhaustive tests
 
 # The recipes of the quick models give the bundled files again, byte for byte on the machine they were
 # made on; else of the same quality. And the numbers on cards that take longest to measure.

@@ -13,7 +13,7 @@ import pytest
 
 from pns_common.onnx_model import DEFAULT_MODEL
 from pns_common.version import VERSION
-from tests.support.installed import ROOT, checkout, environment, run
+from tests.support.installed import ROOT, checkout, environment, lend_kernels, run
 
 README = (ROOT / "README.md").read_text()
 ADDRESS = re.compile(r"running on (http://[\d.]+:\d+)")
@@ -42,7 +42,9 @@ def library(wheel, tmp_path_factory):
 @pytest.fixture(scope="module")
 def service(wheel, tmp_path_factory):
     """Programs of an environment with the service too."""
-    return environment(tmp_path_factory.mktemp("service"), wheel, {"service"})
+    programs = environment(tmp_path_factory.mktemp("service"), wheel, {"service"})
+    lend_kernels(programs)
+    return programs
 
 
 def commands(*programs):
@@ -128,7 +130,7 @@ def unpack(glb, gltf, binary):
 
 @contextmanager
 def serving(service, folder):
-    """The address of a server of that environment; each worker would compile the kernels."""
+    """The address of a server of that environment."""
     command = [service / "pns", "serve", "--port", "0"]
     options = {"stderr": subprocess.PIPE, "text": True, "env": os.environ | {"PNS_WORKERS": "1"}}
     with subprocess.Popen(command, cwd=folder, **options) as process:
@@ -146,7 +148,7 @@ def test_readmes_requests_are_answered(service, tmp_path):
     assert len(lines) >= 4
     with serving(service, tmp_path) as address:
         for line in lines:
-            # A fresh service compiles its kernels first; until then it answers 503.
+            # A fresh service loads its kernels first; until then it answers 503.
             here = line.replace("http://127.0.0.1:8000", address)
             run(
                 "bash",

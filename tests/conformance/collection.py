@@ -14,7 +14,10 @@ from service.options import Limits, Options
 from tests.support import node_tools
 from tests.support.shared import SHARED
 
-LEVELS = (1, 2)
+# What `make test` looks at: one level of the default model, and one of Loop. The rest is breadth:
+# tests/service/test_assets.py takes two.
+LOOKED_AT = ((0, None), (1, "pns"), (1, "loop"))
+BREADTH = ((2, "pns"), (2, "loop"))
 # Files that break their promises, or have nothing to refine; tests/service has their refusals.
 REFUSED = {"IndexOutOfRange.gltf", "BoxWithInfinites.glb", "empty_nodes.glb"}
 
@@ -51,7 +54,7 @@ def _model():
 
 
 # Batches: each is refined, validated and loaded in one go, by one test process.
-BATCHES = 8
+BATCHES = 4
 
 
 def batch_of(name):
@@ -66,23 +69,29 @@ class Conformance:
         self.folder, self.paths, self._meshes = folder, {}, {}
         self._messages, self._loaded, self._ready = {}, {}, set()
 
-    def prepare(self, batch):
-        """Refine, validate and load a batch, once."""
-        if batch in self._ready:
+    def prepare(self, batch, settings):
+        """Refine, validate and load a batch, once for some levels and their schemes."""
+        if (batch, settings) in self._ready:
             return
-        self._ready.add(batch)
+        self._ready.add((batch, settings))
         paths = {}
         for name in NAMES[batch::BATCHES]:
-            paths[name, 0, None] = ROWS[name]["path"]
-            for levels in LEVELS:
-                for scheme in ("pns", "loop"):
-                    path = self.folder / f"{Path(name).stem}-{levels}-{scheme}.glb"
-                    path.write_bytes(refined(name, levels, scheme).glb)
-                    paths[name, levels, scheme] = path
+            for levels, scheme in settings:
+                if levels == 0:
+                    paths[name, 0, None] = ROWS[name]["path"]
+                    continue
+                path = self.folder / f"{Path(name).stem}-{levels}-{scheme}.glb"
+                path.write_bytes(refined(name, levels, scheme).glb)
+                paths[name, levels, scheme] = path
         checked = [path for (_, _, scheme), path in paths.items() if scheme != "loop"]
         self.paths |= paths
         self._messages |= node_tools.run("validate.mjs", checked)
         self._loaded |= node_tools.run("load.mjs", paths.values())
+
+    def path(self, name, levels, scheme):
+        """The file of an asset, as it is or refined; its batch is prepared."""
+        self.prepare(batch_of(name), LOOKED_AT if (levels, scheme) in LOOKED_AT else BREADTH)
+        return str(self.paths[name, levels, scheme])
 
     def originals(self):
         """The meshes of all assets as they are."""
@@ -96,14 +105,12 @@ class Conformance:
 
     def errors(self, name, levels, scheme):
         """The validator's error codes."""
-        self.prepare(batch_of(name))
-        messages = self._messages[str(self.paths[name, levels, scheme])]
+        messages = self._messages[self.path(name, levels, scheme)]
         return {message["code"] for message in messages if message["severity"] == 0}
 
     def loaded(self, name, levels, scheme):
         """What three.js made of the file."""
-        self.prepare(batch_of(name))
-        return self._loaded[str(self.paths[name, levels, scheme])]
+        return self._loaded[self.path(name, levels, scheme)]
 
     def meshes(self, name, levels, scheme):
         """The meshes as three.js has them, each a list of primitives as arrays."""

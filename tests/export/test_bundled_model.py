@@ -38,8 +38,9 @@ def test_every_bundled_model_has_a_recipe_and_every_file_is_there():
     assert DEFAULT_MODEL in BY_MODEL
 
 
-# Forty seconds: the nearest points of 32,768 faces on each of ten ridges of spheres.
-SLOW = ("sphere-ridge-held-out after 4 levels",)
+# The nearest points of 32,768 faces on each of ten ridges: seven seconds, and on spheres forty.
+# What is measured here in the same way are saddles.
+SLOW = ("ridge-held-out after 4 levels", "sphere-ridge-held-out after 4 levels")
 CLAIMED = [
     pytest.param(name, measured, marks=[pytest.mark.retrain] if measured in SLOW else [])
     for name in sorted(BY_MODEL)

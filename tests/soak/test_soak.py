@@ -5,7 +5,7 @@ import pytest
 from tests.soak.process import lines_of, started
 from tests.soak.run import soak
 
-SECONDS = 18
+SECONDS = 10
 
 
 @pytest.fixture(scope="module")

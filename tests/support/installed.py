@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from importlib.metadata import distribution
@@ -10,6 +11,8 @@ from typing import Any
 
 from packaging.metadata import Metadata
 from packaging.requirements import Requirement
+
+from pns_common.fused.storage import BUILT, KERNELS, cache_folder, copy_built
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -44,6 +47,20 @@ def environment(folder: Path, wheel: Path, extras: set[str]) -> Path:
     for name in closure(parsed.requires_dist or [], extras, own=parsed.name):
         _link(name, site)
     return folder / "bin"
+
+
+def lend_kernels(programs: Path) -> None:
+    """Give an environment the kernels that this checkout has compiled, if it has.
+
+    numba knows a source by its time and its size: the time has to be lent too.
+    """
+    built = cache_folder()
+    (lent,) = programs.parent.glob("lib/python*/site-packages/pns_common/fused/kernels")
+    if built is None or not built.exists():
+        return
+    for source in KERNELS.glob("*.py"):
+        shutil.copystat(source, lent / source.name)
+    copy_built(built, lent / BUILT.name)
 
 
 def closure(requirements: list[Requirement], extras: set[str], own: str) -> set[str]:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 import trimesh
 
 from pns_common import Mesh, clean
@@ -10,25 +11,32 @@ from pns_common.refine import measure_reference_length
 from pns_common.topology import build_topology
 from tests.support.shared import shared_path
 
-# All that trimesh reads of the shared meshes.
-ASSETS = [
+# One of each kind, by their edges.
+CLOSED, WITH_RIM, IRREGULAR = (
+    "fish_control_mesh.obj",
+    "barrel_large_decorated.glb",
+    "cakeBirthday.glb",
+)
+ONE_SIDED = "moebius.obj"
+# All else that trimesh reads of the shared meshes.
+OTHERS = [
     "AnimatedMorphSphere.glb",
     "Fox.glb",
     "Knight.glb",
     "MorphStressTest.glb",
     "RiggedFigure.glb",
     "alien.glb",
-    "barrel_large_decorated.glb",
-    "cakeBirthday.glb",
     "cow.glb",
-    "fish_control_mesh.obj",
     "frostAxe.glb",
     "fuze.ply",
     "lego.ply",
     "low-poly-tree.glb",
-    "moebius.obj",
     "penguin_control_mesh.obj",
     "spot_control_mesh.obj",
+]
+ASSETS = [
+    *(CLOSED, WITH_RIM, IRREGULAR, ONE_SIDED),
+    *(pytest.param(name, marks=pytest.mark.exhaustive) for name in OTHERS),
 ]
 
 MIRROR = np.array([-1.0, 1, 1])
