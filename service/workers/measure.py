@@ -21,6 +21,9 @@ BYTES_PER_FACE = 30
 # Position, normal, tangent, texture coordinates: what a face costs was measured with them.
 USUAL_ATTRIBUTES = 4
 
+# A further set of joints costs as many other attributes: each vertex mixes all of its neighbours'.
+VALUES_PER_FURTHER_SET = 100
+
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
@@ -86,7 +89,10 @@ def _learned(faces: int, levels: int, learned_levels: int) -> int:
 
 def _unusual(primitive: _Primitive) -> int:
     """How many attributes follow its vertices beside the usual ones, morph targets' among them."""
-    return max(len(primitive.attributes) - USUAL_ATTRIBUTES, 0) + sum(map(len, primitive.targets))
+    sets = sum(name.startswith("JOINTS_") for name in primitive.attributes)
+    further = max(len(primitive.attributes) - USUAL_ATTRIBUTES, 0)
+    further += max(sets - 1, 0) * VALUES_PER_FURTHER_SET
+    return further + sum(map(len, primitive.targets))
 
 
 def _triangles(primitive: _Primitive, accessors: list[_Accessor]) -> int:

@@ -71,7 +71,7 @@ def test_more_levels_and_more_learned_levels_cost_more() -> None:
     assert cost(data, levels=3).seconds < cost(data, levels=4).seconds
 
 
-@pytest.mark.parametrize("place", ["targets", "attributes"])
+@pytest.mark.parametrize("place", ["targets", "attributes", "joints"])
 def test_what_many_attributes_carry_is_no_short_job(place: str) -> None:
     """A hundred kilobytes that take ten seconds: every target may be the same accessor."""
     tree, binary = files.document([octahedron()])
@@ -80,8 +80,11 @@ def test_what_many_attributes_carry_is_no_short_job(place: str) -> None:
     few = cost(files.pack(tree, binary)).seconds
     if place == "targets":
         primitive["targets"] = [{"POSITION": 0}] * 4_000
-    else:
+    elif place == "attributes":
         primitive["attributes"] |= {f"_A{number}": 0 for number in range(4_000)}
+    else:
+        for name in ("JOINTS", "WEIGHTS"):
+            primitive["attributes"] |= {f"{name}_{number}": 0 for number in range(40)}
     assert cost(files.pack(tree, binary)).seconds > 10 > 0.2 > few
 
 
