@@ -21,8 +21,6 @@ from ..options import (
     UvRule,
 )
 
-Finite = Field(allow_inf_nan=False)
-
 
 def _empty_is_absent(value: Any) -> Any:
     """`budget=` in a URL means the same as no budget at all."""

@@ -15,6 +15,7 @@ from .costs import Cost
 from .job import Job, State
 from .jobs import Done, Work
 from .pool import Workers
+from .slowness import Slowness
 from .turns import Lane, Turns, Waiting
 from .worker import JobFaultError
 
@@ -22,10 +23,6 @@ T = TypeVar("T")
 
 # What measuring is counted as: the glance of a worker at a document.
 MEASURING_SECONDS = 0.005
-# How much one job's time tells of how fast this machine is.
-LEARNING = 0.2
-# Below, a job's time is mostly what goes on around it.
-TELLING_SECONDS = 0.05
 
 
 class Desk:
@@ -55,8 +52,7 @@ class Desk:
         self._run = run
         self._measure = measure
         self._job_seconds = job_seconds
-        # Seconds here for each predicted one, learnt from the jobs.
-        self._slowness = 1.0
+        self._slowness = Slowness()
 
     @property
     def ready(self) -> bool:
@@ -115,7 +111,7 @@ class Desk:
             return 0.0
         if job.cost is None:
             return None
-        predicted = job.cost.seconds * self._slowness
+        predicted = job.cost.seconds * self._slowness.factor
         if job.began is None:
             return self._wait(job.waiting) + predicted
         spent = time.monotonic() - job.began
@@ -137,7 +133,7 @@ class Desk:
             job.began, job.state = time.monotonic(), State.RUNNING
             job.done = await self._call(lane, job, self._run)
         self._budget.settle(job.client, job.done.faces - job.cost.faces, job.faces_per_minute)
-        self._learn(job.cost, time.monotonic() - job.began)
+        self._slowness.learn(job.cost.seconds, time.monotonic() - job.began)
 
     @asynccontextmanager
     async def _turn(self, waiting: Waiting, job: Job) -> AsyncIterator[Lane]:
@@ -151,7 +147,7 @@ class Desk:
         try:
             yield waiting.lane
         finally:
-            self.turns.end(waiting, (time.monotonic() - began) / self._slowness)
+            self.turns.end(waiting, (time.monotonic() - began) / self._slowness.factor)
 
     async def _call(self, lane: Lane, job: Job, function: Callable[[Work], T]) -> T:
         must_end = min(job.must_end, time.monotonic() + self._job_seconds)
@@ -160,9 +156,4 @@ class Desk:
         )
 
     def _wait(self, waiting: Waiting | None) -> float:
-        return self.turns.backlog(waiting) * self._slowness
-
-    def _learn(self, cost: Cost, seconds: float) -> None:
-        """Compare a prediction with what it came to."""
-        if seconds > TELLING_SECONDS:
-            self._slowness += LEARNING * (seconds / cost.seconds - self._slowness)
+        return self.turns.backlog(waiting) * self._slowness.factor
