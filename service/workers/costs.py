@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 # Seconds of one core, measured on files of 8,000 to 2,000,000 refined faces in 1 to 1000 meshes: a
-# request, a byte of the upload, a primitive, a refined face, what one of learned levels takes more,
-# and each further attribute or morph target of one (of 100 to 4,000 on 20,480 faces).
+# request, a byte of the upload, a value of its JSON, a primitive, a refined face, what one of
+# learned levels takes more, and each further attribute or morph target of one (of 100 to 4,000 on
+# 20,480 faces).
 SECONDS = 0.01
 SECONDS_PER_BYTE = 2e-8
+SECONDS_PER_ITEM = 5e-7
 SECONDS_PER_PRIMITIVE = 5e-4
 SECONDS_PER_FACE = 1.2e-6
 SECONDS_PER_LEARNED_FACE = 2e-6
@@ -24,13 +26,16 @@ class Cost:
     seconds: float
 
 
-def cost_of(faces: int, primitives: int, size: int, learned: int = 0, values: int = 0) -> Cost:
+def cost_of(
+    faces: int, primitives: int, size: int, learned: int = 0, values: int = 0, items: int = 0
+) -> Cost:
     """The cost of so many refined faces and primitives, from an upload of `size` bytes.
 
     `learned` are the faces after the last level at which a model acts; `values` what refined faces
-    carry beside the usual attributes, an attribute or morph target of a face each.
+    carry beside the usual attributes, an attribute or morph target of a face each; `items` what the
+    JSON holds.
     """
     seconds = SECONDS + SECONDS_PER_BYTE * size + SECONDS_PER_PRIMITIVE * primitives
     seconds += SECONDS_PER_FACE * faces + SECONDS_PER_LEARNED_FACE * learned
-    seconds += SECONDS_PER_VALUE * values
+    seconds += SECONDS_PER_VALUE * values + SECONDS_PER_ITEM * items
     return Cost(faces, primitives, seconds)

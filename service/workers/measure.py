@@ -11,7 +11,7 @@ import msgspec
 from ..bodies.media import Kind
 from ..errors import ServiceError
 from ..gltf.read.container import read_glb
-from ..gltf.read.json_text import BOM, check_size
+from ..gltf.read.json_text import BOM, check_size, json_items
 from ..options import Limits
 from .costs import Cost, cost_of
 
@@ -21,6 +21,8 @@ BYTES_PER_FACE = 30
 # Position, normal, tangent, texture coordinates: what a face costs was measured with them.
 USUAL_ATTRIBUTES = 4
 
+# An array of values costs as many of them before the first.
+LEAST_VALUES = 1_000
 # A further set of joints costs as many other attributes: each vertex mixes all of its neighbours'.
 VALUES_PER_FURTHER_SET = 100
 
@@ -69,12 +71,12 @@ def cost_of_gltf(
             triangles = _triangles(primitive, counts.accessors)
             faces += triangles
             primitives += triangles > 0
-            values += triangles * _unusual(primitive)
+            values += max(triangles * 4**levels, LEAST_VALUES) * _unusual(primitive)
     refined = faces * 4**levels
     if refined > limits.max_faces:
         return cost_of(0, 0, len(data))
     learned = _learned(faces, levels, learned_levels)
-    return cost_of(refined, primitives, len(data), learned, values * 4**levels)
+    return cost_of(refined, primitives, len(data), learned, values, json_items(text))
 
 
 def cost_of_other(data: bytes, levels: int, limits: Limits, learned_levels: int = 0) -> Cost:

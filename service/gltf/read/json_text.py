@@ -84,7 +84,7 @@ def encode(value: Any) -> bytes:
 
 def check_size(text: bytes, limits: Limits) -> None:
     """Count the values that a JSON text may hold, and how deep. Raises LimitError."""
-    items = _items(text)
+    items = json_items(text)
     check_limit("json-items", items, limits.max_json_items, f"the JSON holds {items} separators")
     needed = BYTES_PER_INPUT_BYTE * len(text) + decoded_size(text)
     allowed = limits.max_memory_bytes
@@ -95,10 +95,11 @@ def check_size(text: bytes, limits: Limits) -> None:
 
 def decoded_size(text: bytes) -> int:
     """Bytes that the decoded text and the typed view of it will take, erring upwards."""
-    return BYTES_PER_ITEM * _items(text)
+    return BYTES_PER_ITEM * json_items(text)
 
 
-def _items(text: bytes) -> int:
+def json_items(text: bytes) -> int:
+    """The values that a JSON text may hold, erring upwards."""
     return sum(text.count(mark) for mark in b'{[,:"')
 
 

@@ -54,7 +54,9 @@ def test_a_text_with_a_byte_order_mark_is_the_same() -> None:
     ],
 )
 def test_what_will_be_refused_costs_its_bytes(data: bytes) -> None:
-    assert cost(data) == cost_of(0, 0, len(data))
+    measured, least = cost(data), cost_of(0, 0, len(data))
+    assert (measured.faces, measured.primitives) == (0, 0)
+    assert least.seconds <= measured.seconds < least.seconds + 1e-4
 
 
 def test_what_is_over_the_limit_of_faces_costs_its_bytes() -> None:
@@ -86,6 +88,15 @@ def test_what_many_attributes_carry_is_no_short_job(place: str) -> None:
         for name in ("JOINTS", "WEIGHTS"):
             primitive["attributes"] |= {f"{name}_{number}": 0 for number in range(40)}
     assert cost(files.pack(tree, binary)).seconds > 10 > 0.2 > few
+
+
+def test_every_value_of_the_json_and_every_array_costs_something() -> None:
+    tree, binary = files.document([octahedron()])
+    plain = cost(files.pack(tree, binary)).seconds
+    named = tree | {"animations": [{"channels": [], "samplers": []}] * 100_000}
+    assert cost(files.pack(named, binary)).seconds > plain + 0.3
+    tree["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": 0}] * 8_000
+    assert cost(files.pack(tree, binary)).seconds > plain + 0.5
 
 
 def test_other_formats_cost_by_their_bytes_within_the_limit() -> None:
