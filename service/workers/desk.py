@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import replace
 from typing import TypeVar
 
 from ..errors import ServiceError
@@ -15,12 +16,16 @@ from .costs import Cost
 from .job import Job, State
 from .jobs import Done, Work
 from .pool import Workers
+from .progress import JobStopped
 from .slowness import Slowness
 from .turns import Lane, Turns, Waiting
 from .worker import JobFaultError
 
 T = TypeVar("T")
 
+# A job in the lane of short ones that takes so many times as long as a short one may is none: it is
+# stopped, and stands in line again with the others.
+OVERDUE = 10.0
 # What measuring is counted as: the glance of a worker at a document.
 MEASURING_SECONDS = 0.005
 
@@ -129,11 +134,39 @@ class Desk:
             self.turns.leave(job.waiting)
             raise self.turns.busy("the jobs in front of this one will take too long")
         job.accepted.set()
-        async with self._turn(job.waiting, job) as lane:
-            job.began, job.state = time.monotonic(), State.RUNNING
-            job.done = await self._call(lane, job, self._run)
-        self._budget.settle(job.client, job.done.faces - job.cost.faces, job.faces_per_minute)
-        self._slowness.learn(job.cost.seconds, time.monotonic() - job.began)
+        try:
+            await self._run_in_turn(job, job.waiting)
+        except JobStopped:
+            # Who waits for a job does not stop it: it was overdue.
+            job.page.go_on()
+            job.began, job.state = None, State.QUEUED
+            job.cost = replace(job.cost, seconds=OVERDUE * self.turns.short_seconds)
+            job.waiting = self.turns.join(job.client, job.cost.seconds)
+            await self._run_in_turn(job, job.waiting)
+
+    async def _run_in_turn(self, job: Job, waiting: Waiting) -> None:
+        """Raises JobStopped where a short job is overdue."""
+        cost = job.cost
+        async with self._turn(waiting, job) as lane:
+            began = job.began = time.monotonic()
+            job.state = State.RUNNING
+            with self._overdue(lane, job):
+                done = job.done = await self._call(lane, job, self._run)
+        if cost is not None:
+            self._budget.settle(job.client, done.faces - cost.faces, job.faces_per_minute)
+            self._slowness.learn(cost.seconds, time.monotonic() - began)
+
+    @contextmanager
+    def _overdue(self, lane: Lane, job: Job) -> Iterator[None]:
+        """Ask a job to stop once it has been in the lane of short ones for too long."""
+        seconds = OVERDUE * self.turns.short_seconds * self._slowness.factor
+        clock = asyncio.get_running_loop()
+        timer = clock.call_later(seconds, job.page.stop) if lane is Lane.SHORT else None
+        try:
+            yield
+        finally:
+            if timer is not None:
+                timer.cancel()
 
     @asynccontextmanager
     async def _turn(self, waiting: Waiting, job: Job) -> AsyncIterator[Lane]:

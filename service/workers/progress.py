@@ -82,6 +82,11 @@ class ProgressPage:
         if self._words is not None:
             self._words[_STOP] = 1
 
+    def go_on(self) -> None:
+        """Let the job begin again, once it has stopped."""
+        if self._words is not None:
+            self._words[_STOP] = self._words[_DONE] = 0
+
 
 class Reporter:
     """The worker's side of the page."""

@@ -131,6 +131,19 @@ def take_steps(reporter: Reporter, folder: Path) -> None:
             reporter.reach(number / 4)
 
 
+def stopped_once(work: Work) -> Done:
+    """The process's number, once it has been stopped; `short FOLDER` is where it says that."""
+    reporter = Reporter(work.page)
+    folder = Path(memory_file.read(work.body).decode().partition(" ")[2])
+    if not (folder / "began").exists():
+        tell(folder / "began")
+        while True:
+            reporter.reach(0.5)
+            time.sleep(0.002)
+    fill(work, str(os.getpid()).encode())
+    return Done({}, None)
+
+
 def digest(work: Work) -> Done:
     """The body's SHA-256; it dawdles `before` and `after` it writes, as the content type says."""
     told = dict(part.split("=") for part in work.content_type.split("; ")[1:])

@@ -5,23 +5,64 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
 
+from service.options import Limits, Options
 from service.workers.budget import FacesBudget
 from service.workers.desk import Desk
+from service.workers.job import Job, State
+from service.workers.jobs import Done, Work
+from service.workers.memory_file import MemoryFile
 from service.workers.pool import Workers
+from service.workers.progress import ProgressPage
 from service.workers.turns import Lane, Turns
 from tests.service.workers.test_pool import run, workers
 from tests.support import stand_in_jobs as jobs
 
 
-def desk_of(many: Workers, short: Workers) -> Desk:
+def desk_of(
+    many: Workers,
+    short: Workers,
+    run: Callable[[Work], Done] = jobs.obey,
+    short_seconds: float = 1.0,
+) -> Desk:
     return Desk(
         {Lane.ANY: many, Lane.SHORT: short},
-        Turns(1, 1, 1.0),
+        Turns(1, 1, short_seconds),
         FacesBudget(),
-        run=jobs.obey,
+        run=run,
         measure=jobs.measure,
         job_seconds=30,
+    )
+
+
+def job_of(content: bytes, answer: MemoryFile) -> Job:
+    """A job of these bytes; the desk lets go of its body."""
+    body, page = MemoryFile(), ProgressPage()
+    body.append(content)
+
+    work = Work(
+        body=body.name,
+        answer=answer.name,
+        report=None,
+        page=page.file.name,
+        content_type="model/gltf-binary",
+        options=Options(),
+        model=None,
+        limits=Limits(),
+    )
+    return Job(
+        client="a",
+        faces_per_minute=None,
+        work=work,
+        body=body,
+        answer=answer,
+        report=None,
+        page=page,
+        upload_seconds=0.0,
+        must_end=time.monotonic() + 60,
     )
 
 
@@ -51,5 +92,22 @@ def test_a_killed_worker_of_the_short_lane_does_not_take_the_service_away() -> N
             while short.ready:
                 await asyncio.sleep(0.005)
             assert desk.ready
+
+    run(scenario)
+
+
+def test_a_short_job_that_takes_long_goes_to_the_other_line(tmp_path: Path) -> None:
+    """Whatever was predicted, the worker of the short jobs is soon free; and no worker dies."""
+
+    async def scenario() -> None:
+        async with workers() as many, workers() as short:
+            desk = desk_of(many, short, run=jobs.stopped_once, short_seconds=0.01)
+            first, other = await short.run(jobs.pid), await many.run(jobs.pid)
+            with MemoryFile() as answer:
+                await desk.serve(job := job_of(f"short {tmp_path}".encode(), answer))
+                assert (tmp_path / "began").read_text() == str(first)
+                assert b"".join(answer.pieces()) == str(other).encode()
+            assert job.state is State.DONE
+            assert await short.run(jobs.pid) == first
 
     run(scenario)
