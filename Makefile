@@ -13,7 +13,9 @@ export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 # What has one maintainer is pinned by hash, and first.
 HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.txt
 
-PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n 2 --dist loadgroup
+# A file's tests run in one process: what they share, a service say, is started once. Files come in
+# the order of tests/conftest.py.
+PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 .PHONY: bench bench-answers scale image hashes soak manifest serve test lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures paper-hero web
 

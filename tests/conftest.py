@@ -5,6 +5,7 @@ five times as long, and a shape does not hang on the numbers: of each test the f
 serve, of a property a few examples. A run over all tests takes all of both.
 """
 
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -57,6 +58,19 @@ KINDS = {
     "training": ("export", "train"),
 }
 
+# What takes longest comes first, so that several test processes end together.
+LONGEST = (
+    "train/experiments/test_every_experiment.py",
+    "service/http/test_serve.py",
+    "service/http/test_openapi.py",
+    "train/experiments/test_reproduce.py",
+    "test_wheel.py",
+    "conformance/test_conformance.py",
+    "soak/test_soak.py",
+    "train/fitting/test_limit_training.py",
+    "web/test_bundle.py",
+)
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Check annotations in a run over tests of pns_common; nothing has imported it yet."""
@@ -69,7 +83,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark tests by where they stand; for shapes keep the first parameters of each test."""
+    """Mark and sort tests by where they stand; for shapes keep the first parameters of each."""
     if config.stash.get(FIRST_ALONE, False):
         first: dict[str, pytest.Item] = {}
         for item in items:
@@ -77,7 +91,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         kept = list(first.values())
         config.hook.pytest_deselected(items=[item for item in items if item not in kept])
         items[:] = kept
+    ranks = {TESTS / place: rank for rank, place in enumerate(LONGEST)}
+    items.sort(key=lambda item: ranks.get(item.path, len(ranks)))
     for item in items:
-        for kind, places in KINDS.items():
-            if any(item.path.is_relative_to(TESTS / place) for place in places):
-                item.add_marker(kind)
+        for kind in kinds_of(item.path):
+            item.add_marker(kind)
+
+
+@cache
+def kinds_of(path: Path) -> list[str]:
+    """The kinds of all tests of a file."""
+    return [
+        kind
+        for kind, places in KINDS.items()
+        if any(path.is_relative_to(TESTS / place) for place in places)
+    ]

@@ -53,29 +53,20 @@ def _model():
     return load_model()
 
 
-# Batches: each is refined, validated and loaded in one go, by one test process.
-BATCHES = 4
-
-
-def batch_of(name):
-    """The batch that an asset belongs to."""
-    return NAMES.index(name) % BATCHES
-
-
 class Conformance:
-    """Refined assets as files, and one run each of the validator and of three.js over a batch."""
+    """Refined assets as files, and one run each of the validator and of three.js over all."""
 
     def __init__(self, folder):
         self.folder, self.paths, self._meshes = folder, {}, {}
         self._messages, self._loaded, self._ready = {}, {}, set()
 
-    def prepare(self, batch, settings):
-        """Refine, validate and load a batch, once for some levels and their schemes."""
-        if (batch, settings) in self._ready:
+    def prepare(self, settings):
+        """Refine, validate and load all assets, once for some levels and their schemes."""
+        if settings in self._ready:
             return
-        self._ready.add((batch, settings))
+        self._ready.add(settings)
         paths = {}
-        for name in NAMES[batch::BATCHES]:
+        for name in NAMES:
             for levels, scheme in settings:
                 if levels == 0:
                     paths[name, 0, None] = ROWS[name]["path"]
@@ -89,8 +80,8 @@ class Conformance:
         self._loaded |= node_tools.run("load.mjs", paths.values())
 
     def path(self, name, levels, scheme):
-        """The file of an asset, as it is or refined; its batch is prepared."""
-        self.prepare(batch_of(name), LOOKED_AT if (levels, scheme) in LOOKED_AT else BREADTH)
+        """The file of an asset, as it is or refined."""
+        self.prepare(LOOKED_AT if (levels, scheme) in LOOKED_AT else BREADTH)
         return str(self.paths[name, levels, scheme])
 
     def originals(self):

@@ -7,7 +7,7 @@ import pytest
 
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
-from tests.conformance.collection import NAMES, ROWS, Conformance, batch_of, refined
+from tests.conformance.collection import NAMES, ROWS, Conformance, refined
 from tests.conformance.surfaces import loop_step, open_edges, proper, welded
 from tests.support.gltf import files
 
@@ -16,14 +16,7 @@ pytestmark = [
     pytest.mark.conformance,
 ]
 
-# What a batch of assets becomes is made once: by one test process.
-ASSET = pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.xdist_group(f"conformance {batch_of(name)}"))
-        for name in NAMES
-    ],
-)
+ASSET = pytest.mark.parametrize("name", NAMES)
 # `make exhaustive` takes the second level too.
 LEVEL = pytest.mark.parametrize("levels", [1, pytest.param(2, marks=pytest.mark.exhaustive)])
 # Their values may change: geometry, and what says where it is.

@@ -8,7 +8,7 @@ from service.scale.large.run import large_work
 from tests.service.scale import libraries
 from tests.service.scale.large import parts
 
-pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.filterwarnings("ignore")]
+pytestmark = pytest.mark.filterwarnings("ignore")
 
 
 @pytest.fixture(scope="module")
