@@ -216,9 +216,11 @@ build/bench/node/.ready: benchmarks/peers/package.json
 	touch $@
 
 # Growth of `pns large` and `pns batch` with faces, parts, files and rows, and its plot in docs/: ten minutes, 6 GB of
-# disk. What benchmarks/scale.json holds is not measured again. SCALE="--share .01" tries it at a hundredth of all sizes.
-scale: $(DEV)/.ready
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m benchmarks.scale $(SCALE)
+# disk. What benchmarks/scale.json holds is not measured again. SCALE="--share .01 --results build/scale.json --picture
+# build/scale.png" tries it at a hundredth of all sizes. Runs take place in the environment of `make serve`.
+scale: $(DEV)/.ready $(SERVE)/.ready
+	$(SERVE)/bin/python -m pns_common.fused
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m benchmarks.scale --python $(SERVE)/bin/python $(SCALE)
 
 # One by one: a library without a build for this machine keeps no other away.
 $(PEERS)/.ready: benchmarks/peers/requirements.txt

@@ -1,14 +1,15 @@
 """Time and memory of `pns large` and `pns batch` on this machine: `make scale`.
 
     python -m benchmarks.scale                 all sizes, into scale.json, and docs/scale.png
-    python -m benchmarks.scale --share .01     all, at a hundredth of their sizes, kept nowhere
+    python -m benchmarks.scale --share .01 --results TRIAL.json --picture TRIAL.png
+                                               all, at a hundredth of their sizes
     python -m benchmarks.scale large FACES     one mesh of so many refined faces
     python -m benchmarks.scale memory THREADS  one in memory, to compare with
-    python -m benchmarks.scale batch WORKERS   many small files, beside a bare loop over them
+    python -m benchmarks.scale batch WORKERS   many small files, beside bare loops over them
     python -m benchmarks.scale manifest ROWS   the driver's memory over a dry run of a manifest
 
-Each run is a process of its own, so that its memory is its own. What a size took is kept in
-scale.json: a size that is there already is not run again.
+Each run is a process of its own, so that its memory is its own, in the environment that --python is
+of. What a size took is kept in scale.json: a size that is there already is not run again.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ from pathlib import Path
 from typing import Any
 
 from . import runs
+from .library import library
 from .plot import plot
 
 RESULTS = Path(__file__).resolve().parent.parent / "scale.json"
-PLOT = Path(__file__).resolve().parent.parent.parent / "docs" / "scale.png"
+PICTURE = Path(__file__).resolve().parent.parent.parent / "docs" / "scale.png"
 LEVELS = 2
 # Faces that are made.
 SIZES = [1_300_000, 5_000_000, 20_000_000, 100_000_000]
@@ -35,33 +37,30 @@ FILES = 10_000
 ROWS = [50_000, 100_000]
 
 
-def everything(share: float, results: Path, picture: Path) -> None:
+def everything(share: float, python: str, results: Path) -> None:
     """All that docs/scale.md tells, at a share of its sizes."""
 
     def of(size: int) -> str:
         return str(max(1, round(size * share)))
 
+    def measured(name: str, *arguments: str) -> None:
+        if name in kept(results):
+            return
+        command = [python, "-m", "benchmarks.scale", *arguments]
+        done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+        keep(results, name, json.loads(done.stdout))
+        print(name, done.stdout, flush=True)
+
     for threads in (1, 2):
-        measured(results, f"memory-{threads}", "memory", str(threads), "--faces", of(SIZES[0]))
-    for faces in SIZES:
-        measured(results, f"large-{faces}", "large", of(faces))
-    for parts in PARTS:
-        measured(results, f"parts-{parts}", "large", of(PARTS_AT), "--parts", str(parts))
+        measured(f"memory-{threads}", "memory", str(threads), "--faces", of(SIZES[0]))
     for workers in (1, 2):
-        measured(results, f"batch-{workers}", "batch", str(workers), "--files", of(FILES))
+        measured(f"batch-{workers}", "batch", str(workers), "--files", of(FILES))
+    for faces in SIZES:
+        measured(f"large-{faces}", "large", of(faces))
+    for parts in PARTS:
+        measured(f"parts-{parts}", "large", of(PARTS_AT), "--parts", str(parts))
     for rows in ROWS:
-        measured(results, f"manifest-{rows}", "manifest", of(rows))
-    plot(kept(results), picture)
-
-
-def measured(results: Path, name: str, *arguments: str) -> None:
-    """Run a measurement in a process of its own, unless it is kept, and keep it."""
-    if name in kept(results):
-        return
-    command = [sys.executable, "-m", "benchmarks.scale", *arguments]
-    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
-    keep(results, name, json.loads(done.stdout))
-    print(name, done.stdout, flush=True)
+        measured(f"manifest-{rows}", "manifest", of(rows))
 
 
 def kept(results: Path) -> dict[str, Any]:
@@ -81,7 +80,10 @@ def main() -> None:
     )
     parser.add_argument("what", nargs="?", choices=["large", "memory", "batch", "manifest", "plot"])
     parser.add_argument("number", nargs="?", type=int, default=2)
-    parser.add_argument("--share", type=float, default=1.0, help="of all sizes; 1 is kept")
+    parser.add_argument("--share", type=float, default=1.0, help="of all sizes")
+    parser.add_argument("--python", default=sys.executable, help="of the environment to measure")
+    parser.add_argument("--results", type=Path, default=RESULTS)
+    parser.add_argument("--picture", type=Path, default=PICTURE)
     parser.add_argument("--levels", type=int, default=LEVELS)
     parser.add_argument("--parts", type=int)
     parser.add_argument("--workers", type=int, default=2)
@@ -96,22 +98,21 @@ def main() -> None:
             asked = given.levels, given.parts, given.workers, given.memory, given.folder
             made = runs.large(given.number, *asked)
             if given.keep:
-                keep(RESULTS, f"large-{given.number}", made)
+                keep(given.results, f"large-{given.number}", made)
         case "memory":
             made = runs.in_memory(given.number, given.faces, given.levels)
         case "batch":
-            made = runs.library(given.number, given.files)
+            made = library(given.number, given.files)
         case "manifest":
             made = runs.manifest(given.number)
         case "plot":
-            plot(kept(RESULTS), PLOT)
-            return
-        case _ if given.share == 1:
-            everything(1.0, RESULTS, PLOT)
+            plot(kept(given.results), given.picture)
             return
         case _:
-            with tempfile.TemporaryDirectory() as place:
-                everything(given.share, Path(place) / "scale.json", Path(place) / "scale.png")
+            if given.share != 1 and given.results == RESULTS:
+                parser.error("--share needs --results and --picture of its own")
+            everything(given.share, given.python, given.results)
+            plot(kept(given.results), given.picture)
             return
     print(json.dumps(made, indent=1))
 

@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from .library import TETRAHEDRON
 from .meshes import bytes_of, torus
 from .watch import Watch
-
-TETRAHEDRON = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
 
 def large(
@@ -77,59 +76,6 @@ def in_memory(threads: int, faces: int, levels: int) -> dict[str, Any]:
             assert made.report["levels"]
             seconds.append(time.perf_counter() - began)
     return {"faces": len(mesh.faces) * 4**levels, "threads": threads, "seconds": min(seconds)}
-
-
-def library(workers: int, files: int) -> dict[str, Any]:
-    """`pns batch` of so many small files, beside a bare loop over the same, before and after.
-
-    The loop asks for the report of each file too, whose certificate is in the batch's rows.
-    """
-    from rich.console import Console
-
-    from service.options import Limits, Options
-    from service.scale.batch import Batch, batch_work, run_batch
-    from service.scale.engines.local import local
-
-    options = Options(scheme="loop", levels=3)
-    with tempfile.TemporaryDirectory() as place:
-        source, output = Path(place) / "in", Path(place) / "out"
-        source.mkdir()
-        for number in range(files):
-            (source / f"{number:05}.obj").write_bytes(TETRAHEDRON)
-        # What is imported or compiled at the first files is not of the loop.
-        _loop(source, Path(place) / "warm", options, min(files, 200))
-        before = _loop(source, Path(place) / "before", options, files)
-        report = Path(place) / "report.jsonl"
-        batch = Batch(str(source), str(output), options, Limits(), report)
-        began, used, own = time.perf_counter(), processor_seconds(), time.process_time()
-        summary = run_batch(batch, local(batch_work(60.0), workers), Console(file=io.StringIO()))
-        took, took_processor = time.perf_counter() - began, processor_seconds() - used
-        driver = time.process_time() - own
-        assert summary.counts == {"done": files}
-        after = _loop(source, Path(place) / "after", options, files)
-    return {
-        "files": files,
-        "workers": workers,
-        "loop_seconds": [before[0], after[0]],
-        "loop_processor_seconds": [before[1], after[1]],
-        "batch_seconds": took,
-        "batch_processor_seconds": took_processor,
-        "driver_processor_seconds": driver,
-    }
-
-
-def _loop(source: Path, output: Path, options: Any, files: int) -> tuple[float, float]:
-    """Wall and processor seconds of a bare loop."""
-    from service.meshfiles.convert import converted
-    from service.options import Limits
-
-    output.mkdir()
-    began, used = time.perf_counter(), time.process_time()
-    for path in sorted(source.iterdir())[:files]:
-        made = converted(path.read_bytes(), "obj", "obj", options, None, Limits())
-        assert made.report["levels"]
-        (output / path.name).write_bytes(made.content)
-    return time.perf_counter() - began, time.process_time() - used
 
 
 def manifest(rows: int) -> dict[str, Any]:

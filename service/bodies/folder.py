@@ -14,7 +14,11 @@ def folder_of(document: Path) -> SiblingFiles:
 
 
 def _find(folder: Path, name: str) -> File | None:
-    path = (folder / name).resolve()
-    if not path.is_relative_to(folder) or not path.is_file():
+    try:
+        path = (folder / name).resolve()
+        if not path.is_relative_to(folder) or not path.is_file():
+            return None
+    except OSError:
+        # A name that no file can have, such as a very long one.
         return None
     return File(name, path.read_bytes())

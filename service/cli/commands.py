@@ -139,6 +139,7 @@ def batch(
     from ..scale.batch import Batch, batch_work, print_summary, run_batch
     from ..scale.engines.named import engine_of
     from ..settings import Settings
+    from .stops import stoppable
 
     settings = Settings()
     chosen = Batch(
@@ -154,7 +155,8 @@ def batch(
     work = batch_work(settings.job_seconds)
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     where = engine_of(work, engine, address, workers, console.print)
-    summary = run_batch(chosen, where, console)
+    with stoppable(console):
+        summary = run_batch(chosen, where, console)
     print_summary(summary, console)
     if summary.failed:
         raise typer.Exit(FAILURE)
@@ -195,6 +197,7 @@ def large(
     from ..scale.engines.named import engine_of
     from ..scale.large.plan import Large, keep
     from ..scale.large.run import large_work, run_large
+    from .stops import stoppable
 
     chosen = Large(
         source,
@@ -206,7 +209,8 @@ def large(
     )
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     where = engine_of(large_work(), engine, address, workers, console.print)
-    made, spent = run_large(chosen, where, console)
+    with stoppable(console):
+        made, spent = run_large(chosen, where, console)
     if report is not None:
         keep(report, made)
     stages = ", ".join(f"{name} {seconds:.1f}" for name, seconds in spent.seconds.items())

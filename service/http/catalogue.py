@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 
 from ..errors import check_choice
@@ -28,14 +29,17 @@ class ReadOnce:
         self._read = read
         self._heard = heard
         self._catalogue: Catalogue | None = None
+        self._reading = asyncio.Lock()
 
     async def get(self) -> Catalogue:
         """The catalogue. Raises ServiceError where no worker can read it now."""
-        if self._catalogue is None:
-            async with self._admission.working():
-                self._catalogue = await self._workers.run(self._read)
-            self._heard(self._catalogue)
-        return self._catalogue
+        # One reads, however many ask: it takes the worker that measures every job.
+        async with self._reading:
+            if self._catalogue is None:
+                async with self._admission.working():
+                    self._catalogue = await self._workers.run(self._read)
+                self._heard(self._catalogue)
+            return self._catalogue
 
     async def check(self, name: str | None) -> None:
         """Raises InvalidParameter where there is no model of that name; None is always right."""

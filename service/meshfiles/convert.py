@@ -27,14 +27,13 @@ from ..report import Change
 from . import formats
 from .flatten import flatten
 from .indexed_triangles import IndexedTriangles
+from .kinds import GLTF_KINDS, KINDS
 from .refine_triangles import check_cost, refine_triangles
 from .single_precision import rounding_changes
 from .triangles_glb import as_gltf_json, triangles_glb
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-KINDS = (*formats.GLTF_KINDS, *formats.MESH_KINDS)
 
 
 def convert(
@@ -91,7 +90,7 @@ def converted(
     Raises:
         ServiceError, PnsError: the file or a parameter cannot be used.
     """
-    if kind in formats.GLTF_KINDS:
+    if kind in GLTF_KINDS:
         done = subdivide_gltf(data, kind, options, model, limits, course, siblings=siblings)
         return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
     course = Course() if course is None else course
@@ -113,7 +112,7 @@ def predicted_faces(
     Raises:
         ServiceError: the file cannot be used, or would be over a limit.
     """
-    if kind in formats.GLTF_KINDS:
+    if kind in GLTF_KINDS:
         upload = read_upload(data, kind, options.levels, limits, siblings)
         return sum(mesh.faces for mesh in upload.plans) * 4**options.levels
     faces = len(formats.read(data, kind).faces) * 4**options.levels
@@ -179,7 +178,7 @@ def _of_triangles(
         changes.append(Change("", "not compressed: only a glTF that came as one is", 1))
     report = _with_changes(report, changes)
     faces = len(refined.faces)
-    if target not in formats.GLTF_KINDS:
+    if target not in GLTF_KINDS:
         return Written(formats.write(refined, target), report, faces)
     extras = {} if options.diagnostics == "none" else {REPORT_KEY: report}
     glb = triangles_glb(refined, extras=extras)

@@ -17,13 +17,12 @@ from pns_common.disjoint_union import disjoint_faces
 from ..errors import UnreadableError
 from . import unsupported
 from .indexed_triangles import NUMBER, IndexedTriangles
+from .kinds import GLTF_KINDS
 from .off import read_off, write_off
 
 if TYPE_CHECKING:
     import trimesh
 
-GLTF_KINDS = ("glb", "gltf")
-MESH_KINDS = ("obj", "ply", "stl", "off")
 HOLDS_DOUBLE = frozenset({"obj", "off"})
 HOLDS_UV = frozenset({"obj", *GLTF_KINDS})
 

@@ -11,6 +11,7 @@ from ..options import Limits, Options
 from ..report import Change
 from . import formats
 from .indexed_triangles import IndexedTriangles
+from .kinds import GLTF_KINDS
 from .single_precision import LARGEST, rounding_changes
 from .triangles_glb import triangles_glb
 
@@ -36,7 +37,7 @@ def as_gltf(sent: Sent, options: Options, limits: Limits) -> Sent:
         InvalidParameter: creases by normals, which these formats do not hand on.
         LimitError: reading would take more than `max_memory_bytes`.
     """
-    if sent.kind in formats.GLTF_KINDS:
+    if sent.kind in GLTF_KINDS:
         return sent
     if options.crease == "normals":
         raise InvalidParameter("crease", "crease=normals needs a glTF; use angle:DEGREES here")

@@ -8,7 +8,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
 from rich.console import Console
@@ -26,11 +26,11 @@ from rich.table import Table
 from rich.text import Text
 
 from ..errors import InvalidParameter, NoModelError, ServiceError
-from ..meshfiles.convert import KINDS
+from ..meshfiles.kinds import KINDS
 from ..options import Limits, Options
 from .engines.work import Engine, Work
 from .job import DONE, FAILED, PLANNED, SKIPPED, Row, Task, failed, read_libraries, run, target_of
-from .journal import Journal, check_report
+from .journal import Journal, check_report, open_journal
 from .places import Place, place_of
 from .sources import Item, items_of
 
@@ -59,8 +59,9 @@ class Batch:
 
 @dataclass(frozen=True)
 class Summary:
-    """How many files ended how, the faces of their results, and the failures by code."""
+    """How many files ended how, the faces of their results, the failures by code; the report."""
 
+    report: Path
     counts: dict[str, int]
     faces: dict[str, int]
     failures: list[tuple[str, int]]
@@ -90,38 +91,41 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
     """Refine all files of a source; the report is written at the end, also after an interruption.
 
     Raises:
-        InvalidParameter: the source, the report, the model or a format cannot be used.
+        InvalidParameter: the source, the destination, the report, the model or a format cannot be
+            used.
     """
     check_report(batch.report)
     if batch.to is not None and batch.to not in KINDS:
         raise InvalidParameter("to", f"{batch.to}: it must be one of {', '.join(KINDS)}")
     listing = items_of(batch.source, KINDS)
-    destination = place_of(batch.destination)
-    if destination.read_only and not batch.dry:
-        raise InvalidParameter("DEST", f"{batch.destination}: nothing can be written there")
-    journal = Journal(batch.report, work_hash(batch))
+    items = listing()
+    if (first := next(items, None)) is None:
+        text = f"{batch.source}: there is no file to refine ({', '.join(KINDS)})"
+        raise InvalidParameter("SOURCE", text)
+    work = work_hash(batch)
+    destination = _destination(batch)
     counts: Counter[str] = Counter()
     faces: Counter[str] = Counter()
-    try:
-        with _progress(console) as bar:
-            work = bar.add_task("refining", total=None, failed=0)
-            _count_aside(listing, bar, work)
+    codes: Counter[str] = Counter()
+    with open_journal(batch.report, work) as journal, _progress(console) as bar:
+        line = bar.add_task("refining", total=None, failed=0)
+        _count_aside(listing, bar, line)
 
-            def note(rows: list[Row]) -> None:
-                journal.put(rows)
-                for row in rows:
-                    counts[row.status] += 1
-                    faces[row.status] += row.faces_out
-                if lines := [line for row in rows if (line := _line(row))]:
-                    console.print("\n".join(lines), markup=False)
-                bar.update(work, advance=len(rows), failed=counts[FAILED])
+        def note(rows: list[Row]) -> None:
+            journal.put(rows)
+            for row in rows:
+                counts[row.status] += 1
+                faces[row.status] += row.faces_out
+                if row.status == FAILED:
+                    codes[row.code] += 1
+            if said := [text for row in rows if (text := _line(row))]:
+                console.print("\n".join(said), markup=False)
+            bar.update(line, advance=len(rows), failed=counts[FAILED])
 
-            for rows in engine(_tasks(batch, listing, destination, journal, note)):
-                note(rows)
-    finally:
-        failures = journal.failures()
-        journal.close()
-    return Summary(dict(counts), dict(faces), failures)
+        for rows in engine(_tasks(batch, chain([first], items), destination, journal, note)):
+            note(rows)
+    failures = sorted(codes.items(), key=lambda entry: (-entry[1], entry[0]))
+    return Summary(batch.report, dict(counts), dict(faces), failures)
 
 
 def print_summary(summary: Summary, console: Console) -> None:
@@ -137,6 +141,7 @@ def print_summary(summary: Summary, console: Console) -> None:
         for code, count in summary.failures:
             codes.add_row(f"{count:,}", code)
         console.print(codes)
+    console.print(f"a row for each file: {summary.report}", markup=False)
 
 
 def work_hash(batch: Batch) -> str:
@@ -158,14 +163,30 @@ def work_hash(batch: Batch) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
+def _destination(batch: Batch) -> Place:
+    """Where the results go.
+
+    Raises:
+        InvalidParameter: nothing can be written there.
+    """
+    destination = place_of(batch.destination)
+    if batch.dry:
+        return destination
+    try:
+        destination.check_writable()
+    except OSError as error:
+        text = f"{batch.destination}: nothing can be written there: {error.strerror}"
+        raise InvalidParameter("DEST", text) from error
+    return destination
+
+
 def _tasks(
     batch: Batch,
-    listing: Callable[[], Iterator[Item]],
+    items: Iterator[Item],
     destination: Place,
     journal: Journal,
     reject: Callable[[list[Row]], None],
 ) -> Iterator[Task]:
-    items = listing()
     while block := list(islice(items, LOOK_UP)):
         tasks: list[Task] = []
         rejected: list[Row] = []

@@ -6,6 +6,7 @@ report is written from it at the end, in whole.
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import sqlite3
@@ -18,7 +19,7 @@ from typing import Any
 from pns_common.whole_file import replacing
 
 from ..errors import InvalidParameter
-from .job import FAILED, PLANNED, SKIPPED, Row
+from .job import PLANNED, SKIPPED, Row
 from .places import place_of
 
 SCHEMA = """
@@ -38,7 +39,7 @@ class Journal:
     def __init__(self, report: Path, work: str) -> None:
         self.report = report
         self._work = work
-        self._file = report.with_name(report.name + ".journal")
+        self._file = journal_of(report)
         with _alone_with(self._file):
             self._database = sqlite3.connect(self._file, timeout=BUSY_SECONDS, isolation_level=None)
             self._database.execute("PRAGMA journal_mode=WAL")
@@ -98,17 +99,11 @@ class Journal:
         try:
             yield
         except BaseException:
-            self._database.execute("ROLLBACK")
+            # SQLite has rolled back already where the disk is full.
+            if self._database.in_transaction:
+                self._database.execute("ROLLBACK")
             raise
         self._database.execute("COMMIT")
-
-    def failures(self) -> list[tuple[str, int]]:
-        """How many files of this work failed, by code, the most frequent first."""
-        return self._database.execute(
-            "SELECT code, count(*) FROM rows WHERE work = ? AND status = ? "
-            "GROUP BY code ORDER BY count(*) DESC, code",
-            (self._work, FAILED),
-        ).fetchall()
 
     def close(self) -> None:
         """Write the report of this work, whole, and let go of the file."""
@@ -120,11 +115,16 @@ class Journal:
                 self._database.close()
 
     def _write_report(self) -> None:
-        if self.report.suffix == ".parquet":
-            self._write_parquet()
-            return
-        with replacing(self.report) as temporary, temporary.open("w") as lines:
-            lines.writelines(f"{row}\n" for row in self._rows())
+        try:
+            if self.report.suffix == ".parquet":
+                self._write_parquet()
+                return
+            with replacing(self.report) as temporary, temporary.open("w") as lines:
+                lines.writelines(f"{row}\n" for row in self._rows())
+        except OSError as error:
+            # A write that fails, of a full disk for one, names no file.
+            error.filename = str(self.report)
+            raise
 
     def _rows(self) -> Iterator[str]:
         query = "SELECT row FROM rows WHERE work = ? ORDER BY path"
@@ -149,6 +149,29 @@ class Journal:
                     writer.write_table(arrow.Table.from_pylist(batch, schema))
                     batch = []
             writer.write_table(arrow.Table.from_pylist(batch, schema))
+
+
+@contextmanager
+def open_journal(report: Path, work: str) -> Iterator[Journal]:
+    """A journal whose report is written at the end, also after an interruption.
+
+    Raises:
+        OSError: the journal or the report cannot be read or written; it names which.
+    """
+    try:
+        journal = Journal(report, work)
+        try:
+            yield journal
+        finally:
+            journal.close()
+    except sqlite3.Error as error:
+        file = journal_of(report)
+        raise OSError(errno.EIO, f"it cannot be used as a journal: {error}", str(file)) from error
+
+
+def journal_of(report: Path) -> Path:
+    """The file beside a report that is gone on from."""
+    return report.with_name(report.name + ".journal")
 
 
 def check_report(report: Path) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import posixpath
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import fsspec
@@ -51,14 +54,16 @@ class Place:
 
     def read(self) -> bytes:
         """The whole file. Raises OSError."""
-        return (
-            Path(self.path).read_bytes() if self.local else bytes(self.system.cat_file(self.path))
-        )
+        if self.local:
+            return Path(self.path).read_bytes()
+        with self._foreign():
+            return bytes(self.system.cat_file(self.path))
 
     def is_gone(self) -> bool:
         """Whether it is certain that nothing is there."""
         try:
-            self.system.info(self.path)
+            with self._foreign():
+                self.system.info(self.path)
         except FileNotFoundError:
             return True
         except OSError:
@@ -66,8 +71,19 @@ class Place:
         return False
 
     def is_file(self) -> bool:
-        """Whether there is a file."""
-        return bool(self.system.isfile(self.path))
+        """Whether there is a file. Raises OSError: nobody can say."""
+        with self._foreign():
+            return bool(self.system.isfile(self.path))
+
+    def is_folder(self) -> bool:
+        """Whether there is a folder. Raises OSError: nobody can say."""
+        with self._foreign():
+            return bool(self.system.isdir(self.path))
+
+    def matches(self) -> list[str]:
+        """The paths that its path matches as a glob, in order. Raises OSError."""
+        with self._foreign():
+            return sorted(str(path) for path in self.system.glob(self.path))
 
     def write(self, data: bytes) -> None:
         """Write a file whole or not at all: renamed into place, or one put. Raises OSError."""
@@ -80,21 +96,48 @@ class Place:
                 replace_file(path, data)
         else:
             # Object stores show an object only when its put has ended.
-            self.system.pipe_file(self.path, data)
+            with self._foreign():
+                self.system.pipe_file(self.path, data)
+
+    def check_writable(self) -> None:
+        """Make a folder of this machine and a file in it, which goes again. Raises OSError.
+
+        A store elsewhere is not asked: it may let results be put there, and nothing else.
+        """
+        if self.read_only:
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS), self.url)
+        if self.local:
+            Path(self.path).mkdir(parents=True, exist_ok=True)
+            with TemporaryFile(dir=self.path):
+                pass
 
     def files(self) -> Iterator[str]:
         """The relative paths of all files below a folder, folder by folder in order of name."""
-        for folder, folders, names in self._walk():
-            folders.sort()
-            inside = posixpath.relpath(folder, self.path)
-            for name in sorted(names):
-                # A single file is what `walk` says of itself on some systems.
-                if name and posixpath.join(folder, name) != self.path:
-                    yield name if inside == "." else f"{inside}/{name}"
+        with self._foreign():
+            for folder, folders, names in self._walk():
+                folders.sort()
+                inside = posixpath.relpath(folder, self.path)
+                for name in sorted(names):
+                    # A single file is what `walk` says of itself on some systems.
+                    if name and posixpath.join(folder, name) != self.path:
+                        yield name if inside == "." else f"{inside}/{name}"
 
     def _walk(self) -> Iterator[tuple[str, list[str], list[str]]]:
         # A local folder of a million files is names alone, not what fsspec tells of each.
         return os.walk(self.path) if self.local else self.system.walk(self.path)
+
+    @contextmanager
+    def _foreign(self) -> Iterator[None]:
+        """Errors of a file system elsewhere, each library's own, as an OSError that names it."""
+        try:
+            yield
+        except FileNotFoundError:
+            raise
+        except Exception as error:
+            if self.local:
+                raise
+            number = getattr(error, "errno", None) or errno.EIO
+            raise OSError(number, f"{type(error).__name__}: {error}", self.url) from error
 
     def siblings(self) -> SiblingFiles:
         """The files in the same folder and below it, opened when a document names them."""

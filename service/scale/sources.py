@@ -45,7 +45,7 @@ def items_of(source: str, kinds: tuple[str, ...]) -> Callable[[], Iterator[Item]
         if name.endswith(endings):
             return lambda: iter([Item(place.url, posixpath.basename(place.path))])
         return lambda: (_listed(path, place) for path in _paths(place))
-    if place.system.isdir(place.path):
+    if place.is_folder():
         return lambda: (
             Item(place.below(file).url, file)
             for file in place.files()
@@ -65,7 +65,7 @@ def _globbed(pattern: str, endings: tuple[str, ...]) -> Iterator[Item]:
     for letter in "*?[":
         fixed = fixed.partition(letter)[0]
     root = Place(place.system, posixpath.dirname(fixed))
-    for path in sorted(place.system.glob(place.path)):
+    for path in place.matches():
         if path.lower().endswith(endings):
             yield Item(Place(place.system, path).url, posixpath.relpath(path, root.path))
 

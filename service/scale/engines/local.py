@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from itertools import islice
@@ -125,7 +126,9 @@ class _Worker:
         longest = None if work.seconds is None else work.seconds + chunks.SECONDS + GRACE_SECONDS
         arguments = work.job, chunk, work.seconds
         try:
-            return self, self.pool.schedule(_do, args=arguments, timeout=longest)
+            # The first call starts a process, and the thread that will start others in its place.
+            with _no_interrupt():
+                return self, self.pool.schedule(_do, args=arguments, timeout=longest)
         except RuntimeError:
             return self.replaced(work.prepare).sent(work, chunk)
 
@@ -136,9 +139,19 @@ class _Worker:
         return _Worker.new(prepare)
 
 
+@contextmanager
+def _no_interrupt() -> Iterator[None]:
+    """Keep Ctrl-C from threads and processes that are started inside: it is the driver's to end
+    them, and one that is still importing would say so at length."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _begin(at: Any, prepare: Callable[[], None]) -> None:
     """Set up a process: one thread, since the files are the parallelism."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ["OMP_NUM_THREADS"] = "1"
     _at.set(at)
     prepare()

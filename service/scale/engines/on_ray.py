@@ -118,6 +118,8 @@ def _connected(ray: Any, address: str | None, workers: int | None) -> Any:
         except Exception as error:
             # Ray gives its daemons half a minute, which may be too little on a busy machine, and
             # says so in words alone.
+            if address is not None:
+                raise InvalidParameter("address", f"{address}: {error}") from error
             left -= 1
             if not left or "timed out during startup" not in str(error):
                 raise InvalidParameter("engine", f"Ray cannot be started here: {error}") from error

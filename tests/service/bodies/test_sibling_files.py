@@ -224,3 +224,9 @@ def test_a_folder_that_is_a_link_itself_may_be_used(tmp_path):
     (real / "in.bin").write_bytes(b"in")
     (tmp_path / "alias").symlink_to(real)
     assert folder_of(tmp_path / "alias" / "box.gltf").find("in.bin") is not None
+
+
+def test_a_name_that_no_file_can_have_is_that_of_none(tmp_path):
+    siblings = folder_of(tmp_path / "box.gltf")
+    assert siblings.find("a" * 5000) is None
+    assert siblings.find("a" * 300 + "/b.png") is None

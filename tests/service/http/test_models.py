@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -14,9 +15,12 @@ import pytest
 from fastapi.testclient import TestClient
 
 from pns_common.onnx_model import DEFAULT_MODEL, load_model
+from service.http.admission import Admission
 from service.http.app import create_app
+from service.http.catalogue import ReadOnce
 from service.meshfiles.example import part_glb
 from service.settings import Settings
+from service.workers.catalogue import Catalogue
 from tests.support import stand_in_jobs as jobs
 from tests.support.networks import VERTEX_CARD
 from tests.support.packages import served_file, several_models
@@ -41,6 +45,26 @@ def served(folder: Path, model: str | None = None) -> Iterator[TestClient]:
 def client(folder: Path) -> Iterator[TestClient]:
     with served(folder) as opened:
         yield opened
+
+
+def test_however_many_ask_at_first_one_worker_reads_the_catalogue() -> None:
+    class Counted:
+        reads = 0
+
+        async def run(self, read: Callable[[], Catalogue]) -> Catalogue:
+            self.reads += 1
+            await asyncio.sleep(0)
+            return read()
+
+    async def scenario() -> None:
+        workers = Counted()
+        admission = Admission(uploads=1, body_bytes=1, answer_bytes=1)
+        catalogue = ReadOnce(workers, admission, lambda: Catalogue(("a",), b"[]"))  # pyright: ignore
+        answers = await asyncio.gather(*(catalogue.get() for _ in range(20)))
+        assert {answer.names for answer in answers} == {("a",)}
+        assert workers.reads == 1
+
+    asyncio.run(scenario())
 
 
 def subdivide(client: TestClient, query: str) -> httpx2.Response:

@@ -180,6 +180,14 @@ def test_a_dry_run_writes_nothing_but_its_report(tmp_path):
     assert planned.faces["planned"] == refined(batch_of(tmp_path)).faces["done"] > 0
 
 
+def test_failures_are_those_of_this_run(tmp_path):
+    library(tmp_path / "in")
+    (tmp_path / "in" / "bad.glb").write_bytes(b"no")
+    assert refined(batch_of(tmp_path)).failures == [("unreadable", 1)]
+    (tmp_path / "in" / "bad.glb").unlink()
+    assert refined(batch_of(tmp_path)).failures == []
+
+
 @pytest.mark.parametrize(
     "changes",
     [
@@ -187,13 +195,22 @@ def test_a_dry_run_writes_nothing_but_its_report(tmp_path):
         {"report": Path("/no/such/folder/report.jsonl")},
         {"report": Path("report.txt")},
         {"to": "fbx"},
+        {"source": "{tmp_path}/in/*.stl"},
+        {"source": "{tmp_path}/empty"},
+        {"destination": "{tmp_path}/in/a.obj/out"},
+        {"destination": "{tmp_path}/in/a.obj"},
     ],
 )
 def test_what_cannot_be_used_is_told_before_anything_runs(tmp_path, changes):
     library(tmp_path / "in")
+    (tmp_path / "empty").mkdir()
+    given = {
+        name: value.format(tmp_path=tmp_path) if isinstance(value, str) else value
+        for name, value in changes.items()
+    }
     with pytest.raises(InvalidParameter):
-        refined(batch_of(tmp_path, **changes))
-    assert not (tmp_path / "out").exists()
+        refined(batch_of(tmp_path, **given))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "in"]
 
 
 def test_parquet_reports_hold_the_rows_that_json_lines_hold(tmp_path):
@@ -222,6 +239,7 @@ def test_the_command_says_what_failed_and_ends_with_one(tmp_path, monkeypatch):
     arguments = ["batch", "in", "out", "--scheme", "loop", "--report", "r.jsonl", "--workers", "1"]
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 1
+    assert "a row for each file: r.jsonl" in done.stderr
     assert (tmp_path / "out" / "a.obj").is_file()
 
 

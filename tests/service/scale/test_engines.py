@@ -10,7 +10,13 @@ import pytest
 from service.errors import InvalidParameter, WorkerDied
 from service.scale.engines import chunks, local, on_ray
 from service.scale.engines.work import Work
-from tests.service.scale.jobs import Numbered, ends_at_once, process_of, third_dies
+from tests.service.scale.jobs import (
+    Numbered,
+    ends_at_once,
+    hears_interrupts,
+    process_of,
+    third_dies,
+)
 
 
 def tasks(folder, count):
@@ -47,6 +53,13 @@ def test_workers_that_never_begin_are_told(tmp_path, monkeypatch):
     work = Work(process_of, never, 1, None, ends_at_once)
     with pytest.raises(WorkerDied, match="2 workers ended"):
         list(local.local(work, 1)(iter(tasks(tmp_path, 1))))
+
+
+def test_ctrl_c_is_the_driver_s_alone(tmp_path):
+    """A terminal sends it to all; workers, also those that are starting, leave it alone."""
+    work = Work(hears_interrupts, never, 2, None)
+    assert list(local.local(work, 1)(iter(tasks(tmp_path, 1)))) == [[False]]
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
 def test_of_a_chunk_whose_worker_dies_the_task_it_was_at_is_to_blame(tmp_path, monkeypatch):
@@ -146,6 +159,7 @@ def test_a_cluster_that_starts_slowly_is_started_again():
         (None, [Exception("no room")], "no room"),
         (None, [RuntimeError("no port")], "no port"),
         ("a:1", [ConnectionError("refused")], "a:1: no cluster answers"),
+        ("ray://a:1", [ImportError("it needs ray[client]")], r"ray://a:1: it needs ray\[client\]"),
     ],
 )
 def test_a_cluster_that_cannot_be_had_is_told(address, errors, words):

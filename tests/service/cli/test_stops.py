@@ -1,0 +1,27 @@
+"""A run that is stopped says how to go on, and with a code of its own."""
+
+import io
+import signal
+
+import pytest
+from rich.console import Console
+
+from service.cli.stops import stoppable
+
+
+@pytest.mark.parametrize(
+    ("number", "kind"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)]
+)
+def test_a_signal_ends_what_is_inside_and_tells_how_to_go_on(number, kind):
+    said = io.StringIO()
+    with pytest.raises(kind) as stopped, stoppable(Console(file=said)):
+        signal.raise_signal(number)
+    assert said.getvalue() == "stopped; the same command goes on from here\n"
+    assert kind is KeyboardInterrupt or stopped.value.code == 128 + number
+
+
+def test_signals_are_afterwards_what_they_were():
+    before = signal.getsignal(signal.SIGTERM)
+    with stoppable(Console(file=io.StringIO())):
+        assert signal.getsignal(signal.SIGTERM) != before
+    assert signal.getsignal(signal.SIGTERM) == before

@@ -1,0 +1,45 @@
+"""File systems elsewhere: what goes wrong there is told with the name of the file."""
+
+import pytest
+
+from service.scale.places import Place
+
+
+class ForeignError(Exception):
+    """As the libraries of object stores raise them."""
+
+
+class Broken:
+    """A file system elsewhere that nobody can reach."""
+
+    protocol = "far"
+
+    def unstrip_protocol(self, path):
+        return f"far://{path}"
+
+    def __getattr__(self, name):
+        def fails(*_):
+            raise ForeignError("no route")
+
+        return fails
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        Place.read,
+        Place.is_file,
+        Place.is_folder,
+        Place.matches,
+        lambda place: place.write(b""),
+        lambda place: list(place.files()),
+    ],
+)
+def test_an_error_of_a_library_names_its_file(act):
+    with pytest.raises(OSError, match="ForeignError: no route") as refusal:
+        act(Place(Broken(), "a/b.obj"))
+    assert refusal.value.filename == "far://a/b.obj"
+
+
+def test_what_nobody_can_reach_is_not_taken_to_be_gone():
+    assert not Place(Broken(), "a/b.obj").is_gone()
