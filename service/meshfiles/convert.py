@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
@@ -121,11 +122,16 @@ def predicted_faces(
 
 
 def _lines(report: dict[str, Any]) -> Iterator[str]:
-    """What was changed or lost, and where, each thing once."""
+    """What was changed or lost, each thing once: how often, and where first."""
+    said: Counter[str] = Counter()
+    places: defaultdict[str, list[str]] = defaultdict(list)
     for change in report["changes"]:
-        where = f" ({change['pointer']})" if change["pointer"] else ""
-        yield f"{change['count']} × {change['what']}{where}"
-    said = {change["what"] for change in report["changes"]}
+        said[change["what"]] += change["count"]
+        places[change["what"]] += [change["pointer"]] if change["pointer"] else []
+    for what, count in said.items():
+        first, *others = places[what] or [""]
+        where = f"{first} and {len(others)} more places" if others else first
+        yield f"{count} × {what} ({where})" if where else f"{count} × {what}"
     for name, count in report["dropped"].items():
         what = f"{name.replace('_', ' ')} dropped"
         if count and what not in said:

@@ -16,6 +16,8 @@ from service.meshfiles import formats
 from service.meshfiles.example import part, part_glb
 from service.meshfiles.triangles_glb import triangles_glb
 from tests.service.cli.trees import FACES, tree_of, tree_of_bytes
+from tests.support.gltf import files
+from tests.support.gltf.shapes import box
 
 
 def test_example_then_subdivide_as_the_readme_has_it(pns: Any, tmp_path: Path) -> None:
@@ -39,6 +41,15 @@ def test_options_reach_the_operator(pns: Any, tmp_path: Path, part_file: Path) -
     assert report["meshes"][0]["reference_length"] == 2.5
     attributes = tree_of(tmp_path / "out.glb")["meshes"][0]["primitives"][0]["attributes"]
     assert "_PNS_RATIO" in attributes
+
+
+def test_what_happens_in_many_places_is_said_once(pns: Any, tmp_path: Path) -> None:
+    tree, binary = files.document([{**box(), "mode": 5} for _ in range(3)], [box()])
+    (tmp_path / "strips.glb").write_bytes(files.pack(tree, binary))
+    outcome = pns("subdivide", "strips.glb", "-o", "out.glb", "--scheme", "loop")
+    told = [line for line in outcome.err.splitlines() if "strip" in line and "×" in line]
+    place = "/meshes/0/primitives/0/mode and 2 more places"
+    assert told == [f"3 × triangle strip written as triangles ({place})"]
 
 
 ENDINGS = ("glb", "gltf", "obj", "ply", "stl", "off")
