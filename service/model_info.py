@@ -14,12 +14,16 @@ from pns_common.onnx_model import DEFAULT_MODEL, OnnxModel
 
 # A metric on the card: what was measured, and its improvement over the reference in per cent.
 METRIC_COLUMNS = ("reference_mean", "method_mean", "percent", "low", "high")
-# What models are compared by: the data set, and the metrics with their short headings.
-HEADLINE = "ridge-held-out"
-HEADLINE_COLUMNS = {"distance_near": "near", "distance": "all", "hausdorff": "Haus-\ndorff"}
+# What models are compared by: short headings, each with its data set and metric.
+HEADLINE_COLUMNS = {
+    "near": ("ridge-held-out", "distance_near"),
+    "all": ("ridge-held-out", "distance"),
+    "four\nlevels": ("ridge-held-out after 4 levels", "distance"),
+}
 _LEGEND = """
-* default. C: budget; c: sharpness of the gate. Last columns: improvement over
-Loop on held-out ridges in %: distance near the ridge, everywhere, Hausdorff."""
+* default. C: budget; c: sharpness of the gate. Last columns: how much nearer
+than Loop to held-out ridges, in %: one level, near the ridge and everywhere;
+four levels, everywhere."""
 # More columns than this do not fit a terminal; such data are shown row by row.
 WIDEST_GRID = 5
 
@@ -30,7 +34,7 @@ def print_models(models: Iterable[OnnxModel]) -> None:
     table.add_column("model", overflow="fold")
     for heading in ("features", "orientation", "vertex\nrule"):
         table.add_column(heading)
-    for heading in ("C", "c", *HEADLINE_COLUMNS.values()):
+    for heading in ("C", "c", *HEADLINE_COLUMNS):
         table.add_column(heading, justify="right")
     for model in models:
         card = model.card
@@ -51,7 +55,7 @@ def print_model(model: OnnxModel) -> None:
         "gate sharpness c": card.gate_sharpness,
         "budget C": card.budget,
         "orientation": card.orientation,
-        **_vertex_rows(card),
+        **_further_rows(card),
         "bytes": model.size,
         "sha256": model.hash,
     }
@@ -62,23 +66,29 @@ def print_model(model: OnnxModel) -> None:
             console.print(table)
 
 
-def _vertex_rows(card: ModelCard) -> dict[str, Any]:
-    """What the card says of the vertex rule, where there is one."""
-    if card.vertex_features is None:
-        return {}
-    return {
+def _further_rows(card: ModelCard) -> dict[str, Any]:
+    """What the card says of what not every model has."""
+    rows = {
         "vertex features": card.vertex_features,
         "vertex gate sharpness c": card.vertex_gate_sharpness,
+        "learned levels K": card.learned_levels,
+        "prior strength s": card.prior_strength,
+        "network scale τ": card.network_scale,
+        "fold angle θ": card.fold_angle,
+        "boundary strength b": card.boundary_strength,
+        "side gates": card.side_gates,
     }
+    return {name: value for name, value in rows.items() if value is not None}
 
 
 def _headline(card: ModelCard) -> list[str]:
     """The improvements by which models are compared; a dash for what the card does not hold."""
-    measured = card.metrics.get(HEADLINE)
-    if measured is None or not _is_measured(measured):
-        return ["–"] * len(HEADLINE_COLUMNS)
-    rows = [measured.get(metric) for metric in HEADLINE_COLUMNS]
-    return ["–" if row is None else f"{row['percent']:+.1f}" for row in rows]
+    shown: list[str] = []
+    for dataset, metric in HEADLINE_COLUMNS.values():
+        measured = card.metrics.get(dataset, {})
+        row = measured.get(metric) if _is_measured(measured) else None
+        shown.append("–" if row is None else f"{row['percent']:+.1f}")
+    return shown
 
 
 def _tables(title: str, data: Mapping[str, Any]) -> Iterator[Table]:

@@ -67,6 +67,21 @@ def test_a_vertex_rule_is_shown_where_there_is_one(
     assert "vertex" not in capsys.readouterr().out
 
 
+def test_all_that_a_card_says_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    model = load_model("general")
+    print_model(model)
+    shown = {line.strip("│┃ ") for line in capsys.readouterr().out.splitlines()}
+    values = {tuple(part.strip() for part in line.split("│")) for line in shown if "│" in line}
+    told = {row[0]: row[1] for row in values if len(row) == 2}
+    assert told["fold angle θ"] == f"{model.card.fold_angle:g}"
+    assert told["learned levels K"] == str(model.card.learned_levels)
+    assert told["side gates"] == "true"
+    # A field that is added to the card is added here.
+    elsewhere = {"training", "metrics"}
+    fields = {name for name in vars(model.card) if getattr(model.card, name) is not None}
+    assert len(told.keys() - {"bytes", "sha256"}) >= len(fields - elsewhere)
+
+
 def test_metrics_are_shown_however_deep_they_lie(
     capsys: pytest.CaptureFixture[str], vertices: OnnxModel
 ) -> None:
