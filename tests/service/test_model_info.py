@@ -75,11 +75,9 @@ def test_all_that_a_card_says_is_shown(capsys: pytest.CaptureFixture[str]) -> No
     told = {row[0]: row[1] for row in values if len(row) == 2}
     assert told["fold angle θ"] == f"{model.card.fold_angle:g}"
     assert told["learned levels K"] == str(model.card.learned_levels)
-    assert told["side gates"] == "true"
-    # A field that is added to the card is added here.
-    elsewhere = {"training", "metrics"}
-    fields = {name for name in vars(model.card) if getattr(model.card, name) is not None}
-    assert len(told.keys() - {"bytes", "sha256"}) >= len(fields - elsewhere)
+    fields = {name for name, value in vars(model.card).items() if value is not None}
+    for name in fields - {"training", "metrics"}:
+        assert any(label.startswith(name.replace("_", " ")) for label in told), name
 
 
 def test_metrics_are_shown_however_deep_they_lie(
