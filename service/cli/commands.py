@@ -194,11 +194,14 @@ def large(
 
     from rich.console import Console
 
+    from ..errors import InvalidParameter
     from ..scale.engines.named import engine_of
     from ..scale.large.plan import Large, keep
     from ..scale.large.run import large_work, run_large
     from .stops import stoppable
 
+    if report is not None and not report.parent.is_dir():
+        raise InvalidParameter("report", f"{report.parent}: there is no such folder")
     chosen = Large(
         source,
         output,

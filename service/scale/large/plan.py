@@ -55,9 +55,12 @@ def work_folder(large: Large, model_hash: str | None) -> Iterator[Path]:
     refused; it stays where a run was stopped, or its workers died.
 
     Raises:
-        InvalidParameter: there is no such input, another run has the folder, or it is somebody's.
+        InvalidParameter: there is no such input or no folder for the output, another run has the
+            folder, or it is somebody's.
     """
     source = identity(large.source)
+    if not large.output.parent.is_dir():
+        raise InvalidParameter("OUT", f"{large.output.parent}: there is no such folder")
     work = large.work
     work.mkdir(exist_ok=True)
     if any(work.iterdir()) and not (work / LOCK).exists():

@@ -153,6 +153,8 @@ def read_stl(path: Path, sink: Sink) -> None:
         left = points[whole:]
     if len(left):
         raise UnreadableError(f"{path}: the STL file ends within a face")
+    if not sink.faces:
+        raise UnreadableError(f"{path}: it has no faces as text, and is no whole binary STL")
 
 
 def _add_soup(sink: Sink, points: np.ndarray) -> None:
@@ -206,7 +208,7 @@ def _text_blocks(path: Path) -> Iterator[bytes]:
         left = b""
         while block := file.read(TEXT):
             whole, newline, rest = (left + block).rpartition(b"\n")
-            if not newline:
+            if len(rest) >= TEXT:
                 raise UnreadableError(f"{path}: a line of more than {TEXT} bytes")
             yield whole + newline
             left = rest

@@ -250,6 +250,8 @@ XYZ = b"property float y\nproperty float z\n"
         ("a.ply", PLY + XYZ + FACE + bytes(12) + b"\4" + bytes(16), "face 0 has 4 corners"),
         ("a.ply", PLY + XYZ + FACE + bytes(12) + struct.pack("<B3i", 3, 0, 1, 2), "indices"),
         ("a.stl", b"solid\nvertex 0 0 0\n", "ends within a face"),
+        ("a.stl", b"", "no whole binary STL"),
+        ("a.stl", bytes(80) + struct.pack("<I", 9) + bytes(50 * 8), "no whole binary STL"),
         ("a.stl", b"solid\nvertex 0 0 x\n", "no number"),
         ("a.obj", b"v 0 0 0\nf 1 2 3 4\n", "4 corners"),
         ("a.obj", b"v 0 0 zero\n", "no number"),

@@ -85,6 +85,15 @@ def test_a_missing_input_leaves_nothing(tmp_path):
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("names", [("none/out",), ("out", "--report", "none/r.json")])
+def test_a_folder_that_is_missing_is_told_before_the_work(tmp_path, source, names, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["large", str(source), *names, "--scheme", "loop"])
+    assert isinstance(done.exception, InvalidParameter)
+    assert str(done.exception) == "none: there is no such folder"
+    assert [file.name for file in tmp_path.iterdir()] == ["in"]
+
+
 def test_a_worker_that_outlived_another_plan_writes_nothing_into_this_one(tmp_path, source):
     def plan(levels):
         return Large(source, tmp_path / "out", Options(scheme="loop", levels=levels), 2**31, 2)
