@@ -15,7 +15,8 @@ HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.
 
 # A file's tests run in one process: what they share, a service say, is started once. Files come in
 # the order of tests/conftest.py.
-PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+PROCESSES ?= 2
+PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
 .PHONY: bench bench-answers scale image hashes soak manifest serve test lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures paper-hero web
 

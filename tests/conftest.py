@@ -33,7 +33,7 @@ settings.register_profile(
     max_examples=40,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )
-settings.register_profile("shapes", settings.get_profile("ci"), max_examples=4)
+settings.register_profile("shapes", settings.get_profile("ci"), max_examples=2)
 settings.load_profile("ci")
 
 FIRST_ALONE = pytest.StashKey[bool]()
