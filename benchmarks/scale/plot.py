@@ -28,14 +28,18 @@ def plot(known: dict[str, Any], picture: Path) -> None:
         (run for name, run in known.items() if name.startswith("parts")), key=lambda r: r["parts"]
     )
     parts = [r["parts"] for r in cut]
-    axes[2].semilogx(
-        parts, [r["processor_seconds"] for r in cut], "o-", base=2, label="processor s"
-    )
-    axes[2].semilogx(
-        parts, [r["worker_bytes"] / 2**26 for r in cut], "s--", base=2, label="a worker, 64 MiB"
-    )
-    axes[2].set(xlabel="parts", title=f"{cut[0]['faces'] / 1e6:.1f} M faces", ylim=0)
-    for axis in axes:
+    memory = axes[2].twinx()
+    seconds = [r["processor_seconds"] for r in cut]
+    resident = [r["worker_bytes"] / 2**20 for r in cut]
+    axes[2].semilogx(parts, seconds, "o-", base=2)
+    memory.semilogx(parts, resident, "s--", base=2, color="C1")
+    title = f"Parts of {cut[0]['faces'] / 1e6:.1f} M faces"
+    axes[2].set(xlabel="parts", ylabel="processor seconds (circles)", title=title)
+    axes[2].set_ylim(0, 1.5 * max(seconds))
+    memory.set_ylabel("MiB resident, a worker (squares)")
+    memory.set_ylim(0, 1.2 * max(resident))
+    for axis in axes[:2]:
         axis.legend()
+    for axis in axes:
         axis.grid(alpha=0.3)
     figure.savefig(picture, dpi=110)
