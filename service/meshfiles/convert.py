@@ -59,8 +59,6 @@ def convert(
     kind, target = _kind("IN", source), _kind("OUT", output)
     if report_file is not None and report_file.resolve() in (source.resolve(), output.resolve()):
         raise InvalidParameter("report", f"{report_file}: the report would replace a model")
-    if output.exists() and output.samefile(source):
-        raise InvalidParameter("output", f"{output}: the result would replace what is refined")
     began = time.perf_counter()
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     data = source.read_bytes()

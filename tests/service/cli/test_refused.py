@@ -97,18 +97,6 @@ def test_a_report_never_replaces_a_model(
     assert not (tmp_path / "same.glb").exists()
 
 
-@pytest.mark.parametrize("output", ["part.glb", "sub/../part.glb", "link.glb"])
-def test_a_result_never_replaces_what_is_refined(
-    pns: Any, tmp_path: Path, part_file: Path, output: str
-) -> None:
-    (tmp_path / "sub").mkdir()
-    (tmp_path / "link.glb").symlink_to(part_file)
-    outcome = pns("subdivide", "part.glb", "-o", output)
-    assert outcome.code == 2
-    assert output in outcome.err
-    assert part_file.read_bytes() == part_glb()
-
-
 def test_a_missing_folder_is_named_with_the_file_that_was_asked_for(
     pns: Any, part_file: Path
 ) -> None:
