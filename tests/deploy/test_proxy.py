@@ -69,7 +69,7 @@ def proxy(tmp_path_factory):
 
 
 def ask(address, method, path, body=None, headers=None):
-    with closing(http.client.HTTPConnection(*address, timeout=30)) as connection:
+    with closing(http.client.HTTPConnection(*address, timeout=600)) as connection:
         connection.request(method, path, body, headers or {})
         answer = connection.getresponse()
         return answer, answer.read()
@@ -102,7 +102,7 @@ def test_a_request_id_that_is_no_token_is_replaced(proxy):
 def test_a_body_over_the_limit_ends_at_the_proxy(proxy):
     address, lines, _ = proxy
     del lines[:]
-    with closing(http.client.HTTPConnection(*address, timeout=30)) as connection:
+    with closing(http.client.HTTPConnection(*address, timeout=600)) as connection:
         connection.putrequest("POST", "/subdivide")
         connection.putheader("Content-Length", str(65 * 2**20))
         connection.endheaders()
@@ -120,7 +120,7 @@ def test_a_body_over_the_limit_ends_at_the_proxy(proxy):
 def test_slow_clients_are_the_proxys_to_end_and_the_service_never_hears_of_them(proxy, sent):
     address, lines, _ = proxy
     del lines[:]
-    with socket.create_connection(address, timeout=30) as connection:
+    with socket.create_connection(address, timeout=600) as connection:
         connection.sendall(sent)
         pieces = iter(lambda: connection.recv(4096), b"")
         with suppress(ConnectionResetError):
@@ -138,7 +138,7 @@ def beginning(connection):
 def test_one_address_has_so_many_connections_and_no_more(proxy):
     address, _, _ = proxy
     upload = b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\n"
-    held = [socket.create_connection(address, timeout=30) for _ in range(40)]
+    held = [socket.create_connection(address, timeout=600) for _ in range(40)]
     try:
         for connection in held:
             connection.sendall(upload)

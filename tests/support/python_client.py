@@ -29,7 +29,7 @@ def file():
     return File(BytesIO(Path(source).read_bytes()), "mesh.glb", "model/gltf-binary")
 
 
-with Client(address, timeout=60) as client:
+with Client(address, timeout=600) as client:
     refined = subdivide.sync(
         client=client, body=SubdivideFilesBody(file()), levels=2, scheme=SubdivideScheme("loop")
     )

@@ -64,7 +64,7 @@ def test_the_scheme_is_the_proxys_too():
 
 def test_a_forged_address_is_in_no_line(caplog):
     with caplog.at_level(logging.INFO), served(workers=1) as where:
-        connection = http.client.HTTPConnection(*where, timeout=30)
+        connection = http.client.HTTPConnection(*where, timeout=600)
         with closing(connection):
             connection.request("GET", "/healthz", headers={"X-Forwarded-For": "203.0.113.77"})
             connection.getresponse().read()
@@ -170,7 +170,7 @@ def test_what_costs_something_needs_a_key(client):
 def test_a_target_with_a_host_needs_a_key_as_its_path_does(keys_file):
     with (
         served(workers=1, keys_file=keys_file) as where,
-        closing(http.client.HTTPConnection(*where, timeout=30)) as connection,
+        closing(http.client.HTTPConnection(*where, timeout=600)) as connection,
     ):
         statuses = []
         for target in ("http://b/healthz", "http://b/nothing", "http://healthz/jobs/x"):

@@ -26,7 +26,7 @@ def client() -> Iterator[httpx2.Client]:
 
 
 def opened(where: tuple[str, int]) -> httpx2.Client:
-    return httpx2.Client(base_url=f"http://{where[0]}:{where[1]}", timeout=60)
+    return httpx2.Client(base_url=f"http://{where[0]}:{where[1]}", timeout=600)
 
 
 def hand_in(client: httpx2.Client, body: bytes) -> httpx2.Response:

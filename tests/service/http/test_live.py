@@ -29,7 +29,7 @@ def address() -> Iterator[tuple[str, int]]:
 
 @pytest.fixture
 def client(address: tuple[str, int]) -> Iterator[httpx2.Client]:
-    with httpx2.Client(base_url=f"http://{address[0]}:{address[1]}", timeout=60) as opened:
+    with httpx2.Client(base_url=f"http://{address[0]}:{address[1]}", timeout=600) as opened:
         yield opened
 
 
@@ -169,7 +169,7 @@ def test_503_for_more_uploads_than_are_taken() -> None:
     with (
         served(workers=1, uploads=1) as where,
         socket.create_connection(where) as idle,
-        httpx2.Client(base_url=f"http://{where[0]}:{where[1]}", timeout=60) as client,
+        httpx2.Client(base_url=f"http://{where[0]}:{where[1]}", timeout=600) as client,
     ):
         begin(idle)
         refused = subdivide(client, b"one too many")

@@ -41,7 +41,7 @@ def address():
     while not server.started:
         pause.wait(0.01)
     host, port = server.servers[0].sockets[0].getsockname()
-    connection = http.client.HTTPConnection(host, port, timeout=60)
+    connection = http.client.HTTPConnection(host, port, timeout=600)
     for _ in range(600):
         connection.request("GET", "/readyz")
         answer = connection.getresponse()

@@ -57,7 +57,7 @@ class Server:
         return self.log
 
     def connect(self) -> http.client.HTTPConnection:
-        return http.client.HTTPConnection(self.host, self.port, timeout=30)
+        return http.client.HTTPConnection(self.host, self.port, timeout=600)
 
     def get(self, path: str) -> tuple[int, bytes]:
         with closing(self.connect()) as connection:
