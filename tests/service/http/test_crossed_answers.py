@@ -12,7 +12,7 @@ from pathlib import Path
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import served
 
-ANSWERS = 600
+ANSWERS = 2_000
 # Each costs a worker's life, and the start of its successor.
 DISCONNECTS = 48
 HONEST = 32
