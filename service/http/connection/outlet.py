@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections.abc import Callable
 from typing import Any
 
@@ -27,6 +28,15 @@ class Outlet:
     def taken(self) -> int:
         """Bytes that have left for the client."""
         return self._written - self.real.get_write_buffer_size()
+
+    @property
+    def has_unread(self) -> bool:
+        """Whether bytes of the client wait in the socket; not those of one who has only left."""
+        with self.real.get_extra_info("socket").dup() as opened:
+            try:
+                return opened.recv(1, socket.MSG_PEEK) != b""
+            except OSError:  # nothing yet, or reset
+                return False
 
     def write(self, data: bytes) -> None:
         """Write, unless the end has begun."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import select
 from math import inf
 from typing import Any
 
@@ -167,11 +166,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
 
     def is_idle(self) -> bool:
         """Whether its client has said nothing: a head that waits in the socket is something."""
-        if self.conn.trailing_data[0]:
-            return True
-        readable = select.poll()
-        readable.register(self.transport.get_extra_info("socket").fileno(), select.POLLIN)
-        return not readable.poll(0)
+        return bool(self.conn.trailing_data[0]) or not self._outlet.has_unread
 
     def rate(self) -> float:
         """Bytes a second of its body or its answer."""

@@ -1,6 +1,7 @@
 """What the connection is made of, each part alone: pace, parser, turns, crowd."""
 
 import asyncio
+import socket
 from dataclasses import dataclass
 from ipaddress import ip_network
 from math import inf
@@ -10,6 +11,7 @@ import pytest
 
 from service.http.addresses import is_named, site
 from service.http.connection.crowd import Crowd
+from service.http.connection.outlet import Outlet
 from service.http.connection.pace import Pace
 from service.http.connection.parser import BYTES_A_PIECE, FREE_PIECES, Parser
 from service.http.connection.turns import Turns
@@ -323,3 +325,31 @@ def test_a_proxys_requests_never_give_way_to_a_stranger():
     for guest in guests:
         crowd.work(guest)
     assert "3 connections are open" in crowd.enter(Guest(), "a")
+
+
+class Ends:
+    """A transport, as far as an outlet asks it for its socket."""
+
+    def __init__(self, opened):
+        self.opened = opened
+
+    def get_extra_info(self, name):
+        assert name == "socket"
+        return self.opened
+
+
+@pytest.mark.parametrize(
+    ("said", "leaves", "unread"),
+    [(b"", False, False), (b"GET", False, True), (b"", True, False), (b"GET", True, True)],
+)
+def test_who_has_left_without_a_word_has_nothing_unread(said, leaves, unread):
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        ours.setblocking(False)
+        theirs.sendall(said)
+        if leaves:
+            theirs.close()
+        outlet = Outlet(Ends(ours), lambda: None)
+        assert outlet.has_unread is unread
+        # It was looked at, not taken.
+        assert (ours.recv(10) if said else said) == said
