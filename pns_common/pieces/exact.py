@@ -12,6 +12,7 @@ at most, and through such faces alone.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
@@ -46,12 +47,14 @@ class Guarded:
         loop: where Loop puts its vertices.
         asked: what was to be added.
         cosines: of how far each face may turn.
+        scaled: vertices that the guard scaled on the piece alone.
     """
 
     faces: Int[np.ndarray, "C 3"]
     loop: Float[np.ndarray, "W 3"]
     asked: Float[np.ndarray, "W 3"]
     cosines: Float[np.ndarray, " C"]
+    scaled: Bool[np.ndarray, " W"]
 
 
 def guarded_exact(
@@ -81,22 +84,38 @@ def _follow(
 ) -> Float[np.ndarray, " W"]:
     """Lower s of free vertices as the guard does; what is unknown grows."""
     faces, rounds = guarded.faces, 0
-    watched = np.flatnonzero(~unknown[faces].all(axis=1))
+    faces_at = _faces_at(faces, len(unknown))
+    # Before any scale changes, what is known is on the piece as it is in the whole: a face whose
+    # corners were never scaled there is not folded.
+    beside = (unknown | guarded.scaled)[faces].any(axis=1)
+    watched = np.flatnonzero(beside & ~unknown[faces].all(axis=1))
     while len(watched):
         folded = watched[_folds(guarded, watched, scale, unknown)]
         certain = ~unknown[faces[folded]].any(axis=1)
-        changed = np.zeros_like(unknown)
-        changed[faces[folded].reshape(-1)] = True
-        changed &= free & ~unknown
-        unsure = np.zeros_like(unknown)
-        unsure[faces[folded[~certain]].reshape(-1)] = True
-        unknown |= unsure & changed
-        lower = changed & ~unknown & (scale > 0)
+        sure, unsure = (np.unique(faces[rows]) for rows in (folded[certain], folded[~certain]))
+        newly = unsure[free[unsure] & ~unknown[unsure]]
+        unknown[newly] = True
+        lower = sure[free[sure] & ~unknown[sure] & (scale[sure] > 0)]
         scale[lower] = scale[lower] / 2 if rounds < ROUNDS else 0.0
-        changed = lower | (unsure & changed)
-        watched = np.flatnonzero(changed[faces].any(axis=1)) if changed.any() else watched[:0]
+        watched = faces_at(np.concatenate([newly, lower]))
         rounds += 1
     return scale
+
+
+def _faces_at(
+    faces: Int[np.ndarray, "C 3"], vertex_count: int
+) -> Callable[[Int[np.ndarray, " N"]], Int[np.ndarray, " M"]]:
+    """What finds the faces that have one of some vertices as a corner."""
+    corners = faces.reshape(-1)
+    order = np.argsort(corners, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(corners, minlength=vertex_count))])
+
+    def at(vertices: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
+        begin, count = starts[vertices], starts[vertices + 1] - starts[vertices]
+        first = np.repeat(begin - np.cumsum(count) + count, count)
+        return np.unique(order[first + np.arange(count.sum())] // 3)
+
+    return at
 
 
 def _folds(
@@ -107,8 +126,10 @@ def _folds(
 ) -> Bool[np.ndarray, " N"]:
     """Whether faces are folded, or might be where a corner's scale is unknown."""
     faces, cosines = guarded.faces[rows], guarded.cosines[rows]
-    moved = guarded.loop + scale[:, None] * guarded.asked
-    folds = turned(faces, guarded.loop, moved, cosines)
+    corners = faces.reshape(-1)
+    before = guarded.loop[corners]
+    after = before + scale[corners, None] * guarded.asked[corners]
+    folds = turned(np.arange(len(corners)).reshape(-1, 3), before, after, cosines)
     doubtful = np.flatnonzero(unknown[faces].any(axis=1))
     folds[doubtful] = may_fold(guarded, rows[doubtful], scale, unknown)
     return folds

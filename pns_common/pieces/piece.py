@@ -102,7 +102,9 @@ def refine_piece(
             record = None if step.placed is None else step.placed.record
             if record is not None and step.placed is not None and step.loop is not None:
                 cosines = cosines_of_children(record.turns, links.faces)
-                guarded = Guarded(step.children, step.loop, _asked(step.placed, record), cosines)
+                assert step.placed.guard is not None
+                asked, scaled = _asked(step.placed, record), step.placed.guard < 1
+                guarded = Guarded(step.children, step.loop, asked, cosines, scaled)
                 exact = guarded_exact(exact, guarded, record.first)
         _check_own(level, links, own, own_edges, exact)
         own_vertices = np.concatenate([own_vertices, own_edges])

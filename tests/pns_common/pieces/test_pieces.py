@@ -156,7 +156,9 @@ def test_no_scales_fold_what_may_not_fold(seed, size):
     cosines = np.cos(rng.uniform(0.1, 1.0, 20))
     unknown = rng.random(60) < 0.7
     known = rng.choice([0, 0.25, 0.5, 1], 60)
-    safe = ~may_fold(Guarded(faces, loop_points, asked, cosines), np.arange(20), known, unknown)
+    safe = ~may_fold(
+        Guarded(faces, loop_points, asked, cosines, unknown), np.arange(20), known, unknown
+    )
     for _ in range(20):
         scale = rng.choice([0, 0.25, 0.5, 1], 60) if rng.random() < 0.5 else rng.random(60)
         delta = np.where(unknown, scale, known)[:, None] * asked
@@ -174,7 +176,8 @@ def test_what_is_exact_behind_the_guard_hangs_on_nothing_unknown():
         known = points[faces].mean(axis=1)[:, 0] > rng.uniform(-0.9, 0.5)
         first = rng.random(len(points)) < 0.2 if seed % 2 else None
         cosines = np.cos(rng.uniform(0.3, 1.2, len(faces)))
-        exact = guarded_exact(known, Guarded(faces, points, asked, cosines), first)
+        alone = FoldGuard(1.0)(faces, points, asked, WHOLE, first, cosines) < 1
+        exact = guarded_exact(known, Guarded(faces, points, asked, cosines, alone), first)
         assert not (exact & ~known).any()
         sure = np.unique(faces[exact])
         at_unknown = np.setdiff1d(np.arange(len(points)), np.unique(faces[known]))
