@@ -21,7 +21,7 @@ CARD_KEY = "pns_card"
 FORMAT, VERTEX_FORMAT, SCALE_FREE_FORMAT = 1, 2, 3
 FORMATS = (FORMAT, VERTEX_FORMAT, SCALE_FREE_FORMAT)
 SCALE_FREE_FIELDS = ("learned_levels", "prior_strength", "network_scale", "fold_angle")
-OPTIONAL_FIELDS = ("boundary_strength", "side_gates", "turn_per_bend")
+OPTIONAL_FIELDS = ("boundary_strength", "side_gates")
 MOST_LEARNED_LEVELS = 16
 
 
@@ -48,8 +48,6 @@ class ModelCard:
         boundary_strength: b ≥ 0 of the boundary's prior; None leaves boundaries to Loop.
         side_gates: whether an edge's gate reads the sides of its two faces beside their normals;
             None is false.
-        turn_per_bend: κ > 0 of the fold guard, how far faces may turn for each radian that the mesh
-            bends there; None: as far as ``fold_angle`` says.
     """
 
     format: int
@@ -67,7 +65,6 @@ class ModelCard:
     fold_angle: float | None = None
     boundary_strength: float | None = None
     side_gates: bool | None = None
-    turn_per_bend: float | None = None
 
     def to_json(self) -> str:
         """The card as JSON, keys in the order of the attributes; without those that are None."""
@@ -171,7 +168,7 @@ def _vertex_problem(card: ModelCard) -> str | None:
 def _scale_free_problem(card: ModelCard) -> str | None:
     """What is wrong with the fields of the scale-free rule, or None."""
     values = {name: getattr(card, name) for name in SCALE_FREE_FIELDS}
-    boundary, turn = card.boundary_strength, card.turn_per_bend
+    boundary = card.boundary_strength
     optional = [name for name in OPTIONAL_FIELDS if getattr(card, name) is not None]
     given = [name for name, value in values.items() if value is not None] + optional
     if card.format < SCALE_FREE_FORMAT:
@@ -188,8 +185,6 @@ def _scale_free_problem(card: ModelCard) -> str | None:
         return f"network_scale {scale}, not a finite number > 0"
     if boundary is not None and not (math.isfinite(boundary) and boundary >= 0):
         return f"boundary_strength {boundary}, not a finite number ≥ 0"
-    if turn is not None and not (math.isfinite(turn) and turn > 0):
-        return f"turn_per_bend {turn}, not a finite number > 0"
     if not 0 < angle < 90:
         return f"fold_angle {angle}, not between 0 and 90 degrees"
     return None

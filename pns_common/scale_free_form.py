@@ -17,7 +17,6 @@ class ScaleFreeForm:
         learned_levels: K ≥ 1.
         boundary_strength: b ≥ 0 of the boundary's prior; 1 is full quasi-interpolation.
         side_gates: whether an edge's gate reads the sides of its two faces beside their normals.
-        turn_per_bend: κ > 0 of the fold guard; None: θ alone.
     """
 
     budget: float
@@ -27,4 +26,3 @@ class ScaleFreeForm:
     learned_levels: int
     boundary_strength: float = 0.0
     side_gates: bool = False
-    turn_per_bend: float | None = None

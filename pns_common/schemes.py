@@ -127,7 +127,7 @@ def scale_free_scheme(
         model=model,
         model_hash=model_hash,
         learned_levels=form.learned_levels,
-        guard=FoldGuard(math.radians(form.fold_angle), form.turn_per_bend),
+        guard=FoldGuard(math.radians(form.fold_angle)),
         moves_boundaries=boundary is not None,
     )
 
@@ -139,8 +139,7 @@ def scale_free_form(card: ModelCard, budget: float) -> ScaleFreeForm | None:
     if strength is None or scale is None or angle is None or levels is None:
         return None
     boundary, sides = card.boundary_strength or 0.0, card.side_gates or False
-    turn = card.turn_per_bend
-    return ScaleFreeForm(budget, strength, scale, angle, levels, boundary, sides, turn)
+    return ScaleFreeForm(budget, strength, scale, angle, levels, boundary, sides)
 
 
 def edge_operator(model: Model) -> EdgeOperator:

@@ -8,30 +8,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 
-from pns_common.arrays import Array, as_numpy, beside, namespace
+from pns_common.arrays import Array, beside, namespace
 from pns_common.boundary_prior import on_boundary
 from pns_common.level import ControlLevel
 from pns_common.loop_rules import loop_edge_rule, loop_vertex_rule
 from pns_common.placement import Placement
 from pns_common.schemes import Scheme
 from pns_common.topology import split
-
-
-@dataclass(frozen=True, eq=False)
-class GuardRecord:
-    """What the fold guard was given beside points and displacements, and what it took.
-
-    Attributes:
-        turns: for each old vertex the cosine of how far children at it may turn.
-        first: the new vertices that were settled first, if any.
-        refused: what was to be added to those whose s is 0, in their order.
-    """
-
-    turns: Float[np.ndarray, " V"]
-    first: Bool[np.ndarray, " N"] | None
-    refused: Float[np.ndarray, "M 3"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,14 +28,12 @@ class LevelStep:
         edges: the edge vertices, numbered on from them.
         learned: whether the scheme's own rules made them; else Loop did.
         guard: s of the fold guard for all new vertices; None where there was nothing to guard.
-        record: with it, what it takes to follow the guard again.
     """
 
     vertices: Placement
     edges: Placement
     learned: bool
     guard: Float[np.ndarray, " N"] | None
-    record: GuardRecord | None = None
 
     @property
     def points(self) -> Float[Array, "N 3"]:
@@ -80,25 +63,14 @@ def level_step(level: ControlLevel, scheme: Scheme) -> LevelStep:
     displacement = _joined(*(_displacement(rule) for rule in (step.vertices, step.edges)))
     # Boundaries first, so that what lies inside has no part in where they go.
     first = on_boundary(level.topology) if scheme.moves_boundaries else None
-    turns = scheme.guard.cosines(level.topology, level.normals)
-    cosines = cosines_of_children(turns, level.topology.faces)
-    faces = split(level.topology)
-    scale = scheme.guard(faces, loop_points, displacement, level.blocks, first, cosines)
+    scale = scheme.guard(split(level.topology), loop_points, displacement, level.blocks, first)
     count = level.topology.vertex_count
     return replace(
         step,
         vertices=_scaled(step.vertices, scale[:count]),
         edges=_scaled(step.edges, scale[count:]),
         guard=scale,
-        record=GuardRecord(turns, first, as_numpy(displacement)[scale == 0]),
     )
-
-
-def cosines_of_children(
-    turns: Float[np.ndarray, " V"], faces: Int[np.ndarray, "F 3"]
-) -> Float[np.ndarray, " C"]:
-    """Of how far each child of the faces may turn, from what stands at their corners."""
-    return np.repeat(turns[faces].min(axis=1), 4)
 
 
 def _scaled(placement: Placement, scale: Float[np.ndarray, " N"]) -> Placement:

@@ -77,7 +77,6 @@ def _further_rows(card: ModelCard) -> dict[str, Any]:
         "fold angle θ": card.fold_angle,
         "boundary strength b": card.boundary_strength,
         "side gates": card.side_gates,
-        "turn per bend κ": card.turn_per_bend,
     }
     return {name: value for name, value in rows.items() if value is not None}
 

@@ -10,37 +10,23 @@ from jaxtyping import Bool, Float
 
 from pns_common.blocks import Blocks
 from pns_common.fold_guard import ROUNDS, FoldGuard
-from pns_common.fused.kernels.guard import find_folds, least_bend_cosines
+from pns_common.fused.kernels.guard import find_folds
 from pns_common.fused.mesh_edges import MeshEdges
 
 # For the kernel: all faces are looked at.
 EVERYWHERE = np.zeros(0, dtype=bool)
 
 
-def turn_cosines(
-    guard: FoldGuard, normals: Float[np.ndarray, "F 3"], mesh: MeshEdges
-) -> Float[np.ndarray, " V"]:
-    """``FoldGuard.cosines``."""
-    if guard.turn_per_bend is None:
-        return np.full(mesh.vertex_count, math.cos(guard.angle))
-    least = np.ones(mesh.vertex_count)
-    least_bend_cosines(normals, mesh.edges, mesh.half_edges, mesh.edge_class, least)
-    return guard.cosines_of(least)
-
-
 def guard_scale(
-    turns: Float[np.ndarray, " V"],
+    guard: FoldGuard,
     mesh: MeshEdges,
     loop: Float[np.ndarray, "W 3"],
     displacement: Float[np.ndarray, "W 3"],
     blocks: Blocks,
     first: Bool[np.ndarray, " W"] | None = None,
 ) -> Float[np.ndarray, " W"]:
-    """s for each new vertex of the split of ``mesh``; ``first`` as the guard has it.
-
-    ``turns`` are the cosines of how far children at each vertex may turn (``turn_cosines``).
-    """
-    settings = turns, mesh, loop, displacement
+    """s for each new vertex of the split of ``mesh``; ``first`` as the guard has it."""
+    settings = guard, mesh, loop, displacement
     everywhere = np.ones(len(loop), dtype=bool)
     if first is None:
         return _settled(*settings, np.ones(len(loop)), everywhere, blocks)
@@ -50,7 +36,7 @@ def guard_scale(
 
 
 def _settled(
-    turns: Float[np.ndarray, " V"],
+    guard: FoldGuard,
     mesh: MeshEdges,
     loop: Float[np.ndarray, "W 3"],
     displacement: Float[np.ndarray, "W 3"],
@@ -62,7 +48,7 @@ def _settled(
     """Lower s of free vertices until no child is folded; of those with a ``watched`` corner."""
     changed = watched
     for rounds in count():
-        changed = _touched(turns, mesh, loop, displacement, scale, changed, blocks) & free
+        changed = _touched(guard, mesh, loop, displacement, scale, changed, blocks) & free
         if not changed.any():
             break
         scale[changed] = scale[changed] / 2 if rounds < ROUNDS else 0.0
@@ -70,7 +56,7 @@ def _settled(
 
 
 def _touched(
-    turns: Float[np.ndarray, " V"],
+    guard: FoldGuard,
     mesh: MeshEdges,
     loop: Float[np.ndarray, "W 3"],
     displacement: Float[np.ndarray, "W 3"],
@@ -80,7 +66,7 @@ def _touched(
 ) -> Bool[np.ndarray, " W"]:
     """The corners of folded children; after the first round only those that ``changed`` count."""
     touched = np.zeros(len(loop), dtype=bool)
-    around = loop, displacement, scale, turns
+    around = loop, displacement, scale, math.cos(guard.angle)
     args = mesh.faces, mesh.face_edges, mesh.vertex_count, changed
 
     def look(rows: slice) -> None:

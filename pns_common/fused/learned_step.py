@@ -15,7 +15,7 @@ from pns_common.fused.additions import Additions, Surroundings
 from pns_common.fused.boundary import boundary_of
 from pns_common.fused.child_faces import look_at_children
 from pns_common.fused.edge_rule import add_at_edges
-from pns_common.fused.guard import guard_scale, turn_cosines
+from pns_common.fused.guard import guard_scale
 from pns_common.fused.level import FusedLevel, FusedStep
 from pns_common.fused.loop_points import largest_size, loop_points
 from pns_common.fused.vertex_rule import add_at_vertices
@@ -23,7 +23,7 @@ from pns_common.learned_rules import LearnedEdgeRule, LearnedVertexRule
 from pns_common.placement import Placement
 from pns_common.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
 from pns_common.schemes import Scheme
-from pns_common.step import GuardRecord, LevelStep
+from pns_common.step import LevelStep
 
 # Far above rounding, and the cosine of more than any useful fold angle.
 CLEAR_COSINE = 1e-9
@@ -86,12 +86,10 @@ def learned_points(
     edges = _placement(loop[count:], at_edges, None)
     boundary.move_vertices(vertices)
     boundary.move_edges(edges)
-    scale = record = None
+    scale = None
     if scheme.guard is not None:
         first = boundary.first(count, len(at_edges.ratio))
-        turns = turn_cosines(scheme.guard, seen.faces.normals, mesh)
-        scale = guard_scale(turns, mesh, loop, added.displacement, blocks, first)
-        record = GuardRecord(turns, first, added.displacement[scale == 0])
+        scale = guard_scale(scheme.guard, mesh, loop, added.displacement, blocks, first)
         if scale.min() < 1:
             added.scale(scale)
 
@@ -101,7 +99,7 @@ def learned_points(
     points[moved] += added.displacement[moved]
     # What the guard lets stand is at clearly less than a right angle to Loop's: none is flipped.
     guarded = scheme.guard is not None and math.cos(scheme.guard.angle) > CLEAR_COSINE
-    step = LevelStep(vertices, edges, learned=True, guard=scale, record=record)
+    step = LevelStep(vertices, edges, learned=True, guard=scale)
     return LearnedPoints(points, None if guarded else loop, step, added)
 
 

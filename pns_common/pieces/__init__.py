@@ -1,6 +1,6 @@
 """A mesh refined piece by piece, with the bits of the whole: for meshes larger than memory."""
 
-from pns_common.pieces.halo import ThinHaloError, first_guard_rings, halo_rings, reach
+from pns_common.pieces.halo import ThinHaloError, halo_rings, reach
 from pns_common.pieces.piece import Piece, RefinedPiece, refine_piece
 from pns_common.pieces.tally import LevelTally, ReducedReport, reduced_report
 
@@ -10,7 +10,6 @@ __all__ = [
     "ReducedReport",
     "RefinedPiece",
     "ThinHaloError",
-    "first_guard_rings",
     "halo_rings",
     "reach",
     "reduced_report",

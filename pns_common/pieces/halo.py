@@ -32,9 +32,8 @@ from pns_common.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
 from pns_common.schemes import Scheme
 
 LOOP_REACH, FIELDS_REACH = 1, 2
-# Rings for the fold guard, where nothing is known yet of how far it goes: beside θ alone, and
-# beside bends, where one scaled vertex of thin faces may fold the next.
-GUARD_RINGS, BEND_RINGS = 1, 8
+# Rings for the fold guard, where nothing is known yet of how far it goes.
+GUARD_RINGS = 1
 
 
 class ThinHaloError(PnsError):
@@ -56,12 +55,6 @@ def halo_rings(scheme: Scheme, levels: int, guard_rings: int = GUARD_RINGS) -> i
         own = reach(scheme, level) + guarded * guard_rings
         needed = own + (1 if level == levels - 1 else -(-needed // 2))
     return needed
-
-
-def first_guard_rings(scheme: Scheme) -> int:
-    """How many rings to try first for the guard; more of them where they do not do."""
-    bends = scheme.guard is not None and scheme.guard.turn_per_bend is not None
-    return BEND_RINGS if bends else GUARD_RINGS
 
 
 def reach(scheme: Scheme, level: int) -> int:

@@ -18,13 +18,13 @@ from pns_common.blocks import Blocks
 from pns_common.fused import fits, kernels_available
 from pns_common.fused.known import kernels_know
 from pns_common.levels import check_coordinates
-from pns_common.pieces.exact import Guarded, guarded_exact, shrunk
+from pns_common.pieces.exact import guarded_exact, shrunk
 from pns_common.pieces.halo import ThinHaloError, is_learned, reach
 from pns_common.pieces.steps import Links, Step, array_steps, fused_steps
 from pns_common.pieces.tally import LevelTally
 from pns_common.pieces.tally_of_step import tally_of
 from pns_common.schemes import Scheme
-from pns_common.step import GuardRecord, LevelStep, cosines_of_children
+from pns_common.step import LevelStep
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,13 +99,10 @@ def refine_piece(
             exact = shrunk(exact, links.faces, rim)
         exact = np.repeat(exact, 4)
         if scheme.guard is not None and is_learned(scheme, level) and not exact.all():
-            record = None if step.placed is None else step.placed.record
-            if record is not None and step.placed is not None and step.loop is not None:
-                cosines = cosines_of_children(record.turns, links.faces)
-                assert step.placed.guard is not None
-                asked, scaled = _asked(step.placed, record), step.placed.guard < 1
-                guarded = Guarded(step.children, step.loop, asked, cosines, scaled)
-                exact = guarded_exact(exact, guarded, record.first)
+            asked = _asked(step.placed)
+            if asked is not None and step.loop is not None:
+                angle = scheme.guard.angle
+                exact = guarded_exact(exact, step.children, step.loop, asked, angle)
         _check_own(level, links, own, own_edges, exact)
         own_vertices = np.concatenate([own_vertices, own_edges])
         check_coordinates(float(np.abs(step.points[own_vertices]).max(initial=0)))
@@ -156,15 +153,15 @@ def _check_own(
         raise ThinHaloError(level, int(lacking.sum()))
 
 
-def _asked(placed: LevelStep, record: GuardRecord) -> Float[np.ndarray, "W 3"]:
-    """What was to be added before the guard scaled it."""
-    assert placed.guard is not None
+def _asked(placed: LevelStep | None) -> Float[np.ndarray, "W 3"] | None:
+    """What was to be added before the guard scaled it; not finite where it took all."""
+    if placed is None or placed.guard is None:
+        return None
     added = [
         np.zeros_like(rule.loop) if rule.displacement is None else rule.displacement
         for rule in (placed.vertices, placed.edges)
     ]
-    # Scales are powers of 2: dividing by them gives back what was there.
-    scale = np.where(placed.guard > 0, placed.guard, 1.0)[:, None]
-    asked = np.concatenate(added) / scale
-    asked[placed.guard == 0] = record.refused
-    return asked
+    scale = placed.guard[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Scales are powers of 2: dividing by them gives back what was there.
+        return np.where(scale > 0, np.concatenate(added) / scale, np.inf)

@@ -51,10 +51,6 @@ class ModelEntry(BaseModel):
     side_gates: bool | None = Field(
         description="whether an edge's gate reads the sides of its two faces; null: the faces alone"
     )
-    turn_per_bend: float | None = Field(
-        description="κ of the fold guard: how far faces may turn for each radian of a bend there; "
-        "null: as far as `fold_angle` says"
-    )
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")
 

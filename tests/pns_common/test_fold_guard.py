@@ -90,11 +90,11 @@ def test_a_hopeless_face_ends_as_loops():
 
 def test_faces_without_area_are_left_out_and_shrinking_ones_are_not():
     line = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0]], dtype=float)
-    triangle, half = np.array([[0, 1, 2]]), np.array([0.5])
+    triangle = np.array([[0, 1, 2]])
     lifted = line + np.array([[0, 0, 0], [0, 1, 0], [0, 0, 0]])
-    assert not turned(triangle, line, lifted, half)[0]
-    assert turned(triangle, lifted, line, half)[0]
-    assert not turned(triangle, lifted, lifted, half)[0]
+    assert not turned(triangle, line, lifted, 0.5)[0]
+    assert turned(triangle, lifted, line, 0.5)[0]
+    assert not turned(triangle, lifted, lifted, 0.5)[0]
 
 
 def test_displacements_that_are_no_numbers_do_not_keep_it_busy():

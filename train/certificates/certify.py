@@ -19,7 +19,6 @@ from train.certificates.double_precision import double_model, read_bytes
 from train.certificates.equivariance import equivariance
 from train.certificates.learned_once import (
     fold_free,
-    held_to_bends,
     limit_distance,
     resolution_independence,
     smoothness_class,
@@ -130,12 +129,8 @@ def _steps_of_kind(subject: Subject, bodies: Sequence[Body], valences: Sequence[
     """Schemes that turn into Loop have its spectra; of others lifted stars say more."""
     if subject.scheme.guard is None:
         return [Step("stars", "lifted stars", lambda: lifted_stars(subject, valences))]
-    bends = []
-    if subject.scheme.guard.turn_per_bend is not None:
-        bends = [Step("bends", "held to bends", lambda: held_to_bends(subject, bodies))]
     return [
         Step("folds", "fold-free", lambda: fold_free(subject, bodies)),
-        *bends,
         Step("limit", "limit distance", lambda: limit_distance(subject, bodies)),
         Step("class", "smoothness class", lambda: smoothness_class(subject, bodies)),
         Step("scale", "resolution independence", lambda: resolution_independence(subject, bodies)),

@@ -1,7 +1,7 @@
 """Certificates of schemes that correct at their first K levels and are Loop afterwards.
 
-Fold-free, held to bends, limit distance, smoothness class and resolution independence:
-docs/theorems.md proves them for the scale-free rule and any weights.
+Fold-free, limit distance, smoothness class and resolution independence: docs/theorems.md proves
+them for the scale-free rule and any weights.
 """
 
 import math
@@ -27,9 +27,6 @@ FLAT = 1e-9
 ROUNDING_ANGLE = 1e-5
 """In degrees: what positions rounded to doubles may turn a face by."""
 
-FLAT_TURN = math.degrees(1e-3)
-"""The least that a face may turn, however flat the mesh is."""
-
 SAME = 1e-12
 SCALES = (2.0**-12, 2.0**-3, 2.0**5)
 UNBOUNDED = 1e15
@@ -49,58 +46,10 @@ def fold_free(subject: Subject, bodies: Sequence[Body]) -> Certificate:
     return Certificate("folds", "fold-free", angle, high=allowed, where=place)
 
 
-def held_to_bends(subject: Subject, bodies: Sequence[Body]) -> Certificate:
-    """Certify that no child face turns by more than κ times the largest bend around its parent.
-
-    The value is the largest turn over what is allowed, which is never less than FLAT_TURN.
-    """
-    guard = subject.scheme.guard
-    share = math.nan if guard is None or guard.turn_per_bend is None else guard.turn_per_bend
-    measured = []
-    for body in bodies:
-        base = plain_loop(body.mesh.vertices, body.mesh.faces).positions
-        made = step(subject.scheme, body.mesh)
-        allowed = np.repeat(np.maximum(share * largest_bends(body.mesh), FLAT_TURN), 4)
-        turned = turns(split(made.topology), base, made.positions)
-        measured.append((float(np.max(turned / (allowed + ROUNDING_ANGLE))), body.name))
-    ratio, place = worst(measured)
-    return Certificate("bends", "held to bends", ratio, high=1.0, where=place)
-
-
-def largest_bends(mesh: Mesh) -> Float[np.ndarray, " F"]:
-    """For each face the largest angle across an edge at its corners, in degrees.
-
-    180 where such an edge is not between two faces that run along it in opposite directions.
-    """
-    faces, count = mesh.faces, len(mesh.vertices)
-    start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
-    along, against = start * count + end, end * count + start
-    keys, first, times = np.unique(along, return_index=True, return_counts=True)
-    place = np.minimum(np.searchsorted(keys, against), len(keys) - 1)
-    own = times[np.searchsorted(keys, along)]
-    two = (keys[place] == against) & (times[place] == 1) & (own == 1)
-    a, b, c = mesh.vertices[faces].transpose(1, 0, 2)
-    area = np.cross(b - a, c - a)
-    here, there = np.repeat(area, 3, axis=0), area[first[place] // 3]
-    sine = np.linalg.norm(np.cross(here, there), axis=1)
-    bends = np.where(two, np.degrees(np.arctan2(sine, np.sum(here * there, axis=1))), 180.0)
-    at = np.zeros(count)
-    for corner in (start, end):
-        np.maximum.at(at, corner, bends)
-    return at[faces].max(axis=1)
-
-
 def largest_turn(
     faces: Int[np.ndarray, "F 3"], before: Float[np.ndarray, "V 3"], after: Float[np.ndarray, "V 3"]
 ) -> float:
     """The largest angle between a face's normal before and after, in degrees; 180 for NaN."""
-    return float(np.max(turns(faces, before, after), initial=0.0))
-
-
-def turns(
-    faces: Int[np.ndarray, "F 3"], before: Float[np.ndarray, "V 3"], after: Float[np.ndarray, "V 3"]
-) -> Float[np.ndarray, " F"]:
-    """Angles between faces' normals before and after, in degrees; 0 where there was no area."""
     vectors, longest = [], []
     for points in (before, after):
         a, b, c = points[faces].transpose(1, 0, 2)
@@ -109,9 +58,9 @@ def turns(
     size = [np.linalg.norm(vector, axis=1) for vector in vectors]
     defined = size[0] > FLAT * longest[0]
     # An arctangent: an arc cosine would round small angles away.
-    sine = np.linalg.norm(np.cross(*vectors), axis=1)
-    angle = np.degrees(np.arctan2(sine, np.sum(vectors[0] * vectors[1], axis=1)))
-    return np.where(defined, np.where(np.isnan(angle), 180.0, angle), 0.0)
+    sine = np.linalg.norm(np.cross(*vectors), axis=1)[defined]
+    angle = np.degrees(np.arctan2(sine, np.sum(vectors[0] * vectors[1], axis=1)[defined]))
+    return float(np.max(np.where(np.isnan(angle), 180.0, angle), initial=0.0))
 
 
 def limit_distance(subject: Subject, bodies: Sequence[Body], levels: int = 2) -> Certificate:

@@ -97,8 +97,6 @@ def vertex_rule_operator(rule: VertexRule, network: BoundedNet) -> VertexOperato
 def recipe_scheme(recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet | None) -> Scheme:
     """Return the scheme that a scale-free recipe trains, differentiable in its networks' weights.
 
-    The fold guard holds to θ alone: where κ would act, there is little that training could see.
-
     Raises:
         ParameterError: the recipe is not scale-free, or has no vertex rule.
     """

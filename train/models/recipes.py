@@ -70,7 +70,6 @@ class ScaleFree:
         learned_levels: K; training sees the first.
         boundary_strength: b of the boundary's prior; None leaves boundaries to Loop.
         side_gates: whether an edge's gate reads the sides of its two faces too.
-        turn_per_bend: κ of the fold guard, which acts in use; training sees θ alone.
     """
 
     prior_strength: float
@@ -79,7 +78,6 @@ class ScaleFree:
     learned_levels: int
     boundary_strength: float | None = None
     side_gates: bool | None = None
-    turn_per_bend: float | None = None
 
 
 class OneStep(msgspec.Struct, frozen=True, tag=True):
@@ -279,7 +277,6 @@ def general(seed: int = 0) -> Recipe:
             learned_levels=1,
             boundary_strength=1.0,
             side_gates=True,
-            turn_per_bend=0.75,
         ),
     )
 

@@ -9,17 +9,15 @@ from numba import njit
 from pns_common.edge.frames import NO_AREA
 from pns_common.fold_guard import LEAST_AREA
 from pns_common.fused.kernels.compiled import (
-    CLASSES,
     FLAGS,
     FLAGS_OUT,
     INDICES,
     NUMBERS,
-    NUMBERS_OUT,
     POINTS,
+    REAL,
     SIZE,
     kernel,
 )
-from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.normals import COSINE_MARGIN, clearly_less
 from pns_common.fused.kernels.rings import cross, dot, row
 
@@ -69,13 +67,13 @@ def _touch(scale, touched, v):
 
 @kernel(
     SIZE,
-    *(POINTS, POINTS, NUMBERS, NUMBERS, INDICES, INDICES, SIZE, FLAGS, SIZE, SIZE, FLAGS_OUT),
+    *(POINTS, POINTS, NUMBERS, REAL, INDICES, INDICES, SIZE, FLAGS, SIZE, SIZE, FLAGS_OUT),
 )
 def find_folds(
     loop,
     displacement,
     scale,
-    turns,
+    cosine,
     faces,
     face_edges,
     vertex_count,
@@ -87,14 +85,12 @@ def find_folds(
     """Mark the corners of folded children of faces begin … end − 1 whose s is not 0 yet.
 
     Args:
-        turns: for each old vertex the cosine of how far children at it may turn.
         changed: vertices whose s changed in the last round: other faces are as they were. Empty in
             the first round.
         touched: out, False on entry; threads may write the same True at once.
     """
+    clear = (cosine + COSINE_MARGIN) * (cosine + COSINE_MARGIN)
     for f in range(begin, end):
-        cosine = min(turns[faces[f, 0]], turns[faces[f, 1]], turns[faces[f, 2]])
-        clear = (cosine + COSINE_MARGIN) * (cosine + COSINE_MARGIN)
         ab = vertex_count + face_edges[f, 0]
         bc = vertex_count + face_edges[f, 1]
         ca = vertex_count + face_edges[f, 2]
@@ -124,26 +120,4 @@ def find_folds(
                 _touch(scale, touched, v)
                 _touch(scale, touched, s)
                 _touch(scale, touched, t)
-    return 0
-
-
-@kernel(SIZE, POINTS, INDICES, INDICES, CLASSES, NUMBERS_OUT)
-def least_bend_cosines(normals, edges, half_edges, edge_class, least):
-    """For each vertex the cosine of the largest bend at it (``fold_guard.bend_cosines``).
-
-    One thread: edges share their ends.
-
-    Args:
-        least: out, 1 on entry.
-    """
-    for e in range(len(edges)):
-        cosine = -1.0
-        if edge_class[e] == INTERIOR:
-            first, second = row(normals, half_edges[e, 0] // 3), row(normals, half_edges[e, 1] // 3)
-            if dot(first, first) > 0 and dot(second, second) > 0:
-                cosine = dot(first, second)
-        for end in range(2):
-            v = edges[e, end]
-            if cosine < least[v]:
-                least[v] = cosine
     return 0

@@ -17,14 +17,7 @@ from pns_common.blocks import Blocks
 from pns_common.errors import PnsError
 from pns_common.fused import KERNEL_ROWS, load_kernels
 from pns_common.mesh import Mesh
-from pns_common.pieces import (
-    Piece,
-    RefinedPiece,
-    ThinHaloError,
-    first_guard_rings,
-    halo_rings,
-    refine_piece,
-)
+from pns_common.pieces import Piece, RefinedPiece, ThinHaloError, halo_rings, refine_piece
 from pns_common.schemes import Scheme
 from pns_common.whole_file import replace_file, replacing
 
@@ -155,7 +148,7 @@ def _surely_refined(
         PnsError: it cannot be refined.
         LimitError: with its halo it is larger than its memory.
     """
-    levels, guard_rings = task.options.levels, first_guard_rings(scheme)
+    levels, guard_rings = task.options.levels, 1
     while True:
         rings = halo_rings(scheme, levels, guard_rings)
         cut = cutout(mesh, adjacency, own, rings)

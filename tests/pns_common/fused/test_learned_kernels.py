@@ -58,7 +58,6 @@ SCHEMES = {
         scale_free_model(boundary_strength=1.0, fold_angle=3.0)
     ),
     "format 3, side gates": pns(scale_free_model(side_gates=True, boundary_strength=1.0)),
-    "format 3, held to bends": pns(scale_free_model(3, 20.0, turn_per_bend=0.2)),
     "format 3, side gates, tight": pns(scale_free_model(side_gates=True), budget=0.3),
     "format 3, no budget": pns(scale_free_model(), budget=0.0),
 }

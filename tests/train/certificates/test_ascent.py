@@ -41,7 +41,7 @@ def test_the_searches_climb():
 
 
 def test_without_the_guard_the_same_search_folds_faces(monkeypatch):
-    def open_guard(self, faces, loop, displacement, *settings):
+    def open_guard(self, faces, loop, displacement, blocks=None, first=None):
         return np.ones(len(loop))
 
     monkeypatch.setattr(FoldGuard, "__call__", open_guard)

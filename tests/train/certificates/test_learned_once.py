@@ -10,14 +10,12 @@ from pns_common import Mesh, load_model, loop, pns
 from pns_common.placement import Placement
 from pns_common.scale_free import ScaleFreeEdgeRule
 from pns_common.schemes import loop_edge_rule, loop_vertex_rule, scale_free_form
-from tests.support.meshes import bumpy_sphere, grid, icosphere
+from tests.support.meshes import bumpy_sphere, icosphere
 from tests.support.networks import SCALE_FREE_CARD, scale_free_model
 from train.certificates.bodies import Body, synthetic_bodies
 from train.certificates.certify import scheme_steps
 from train.certificates.learned_once import (
     fold_free,
-    held_to_bends,
-    largest_bends,
     largest_turn,
     limit_distance,
     resolution_independence,
@@ -62,44 +60,6 @@ def test_a_guard_that_is_looser_than_it_says_is_found():
 
 def fold_free_value(wild, guard):
     return fold_free(replace(wild, scheme=replace(wild.scheme, guard=guard)), BODIES).value
-
-
-@pytest.mark.parametrize("scale", [0.0, 2.0, 200.0])
-@pytest.mark.parametrize("share", [0.05, 0.75])
-def test_any_weights_turn_no_further_than_bends_allow(scale, share):
-    result = held_to_bends(subject(scale, turn_per_bend=share), BODIES)
-    assert result.passed, (result.value, result.where)
-
-
-def test_a_guard_that_knows_no_bends_is_found():
-    held = subject(200.0, turn_per_bend=0.05)
-    assert not held_to_bends(subject(200.0), BODIES).passed
-    guard = replace(held.scheme.guard, turn_per_bend=0.2)
-    loose = held_to_bends(replace(held, scheme=replace(held.scheme, guard=guard)), BODIES)
-    assert loose.passed
-    # What it turned by, beside what was claimed.
-    assert loose.value * 0.2 / 0.05 > 1
-
-
-def test_bends_around_a_face_are_those_of_all_edges_at_its_corners():
-    # Every face of a small open grid touches its border, where no two faces meet.
-    assert (largest_bends(Mesh(*grid(3))) == 180).all()
-    mesh = Mesh(*icosphere(1))
-    normals = np.cross(
-        mesh.vertices[mesh.faces[:, 1]] - mesh.vertices[mesh.faces[:, 0]],
-        mesh.vertices[mesh.faces[:, 2]] - mesh.vertices[mesh.faces[:, 0]],
-    )
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    for face, found in enumerate(largest_bends(mesh)):
-        near = [f for f in range(len(mesh.faces)) if set(mesh.faces[f]) & set(mesh.faces[face])]
-        pairs = [
-            np.degrees(np.arccos(np.clip(normals[f] @ normals[g], -1, 1)))
-            for f in near
-            for g in range(len(mesh.faces))
-            if len(set(mesh.faces[f]) & set(mesh.faces[g])) == 2
-            and set(mesh.faces[f]) & set(mesh.faces[g]) & set(mesh.faces[face])
-        ]
-        assert found == pytest.approx(max(pairs))
 
 
 def test_a_displacement_that_the_report_hides_breaks_the_limit_distance():

@@ -22,7 +22,6 @@ SWEPT: tuple[tuple[str, str, tuple[float, ...]], ...] = (
     ("s", "prior_strength", (0, 0.5, 0.75, 1, 1.25)),
     ("τ", "network_scale", (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)),
     ("θ", "fold_angle", (30, 45, 60, 75, 85)),
-    ("κ", "turn_per_bend", (0.25, 0.5, 0.75, 1, 2)),
     ("K", "learned_levels", (1, 2, 3)),
 )
 """Symbol, field of the card, values."""
@@ -35,7 +34,7 @@ NOTE = (
     f"Validation meshes of {' and '.join(map(str, SIZES))} faces (simplifier {SIMPLIFIER}), "
     f"{LEVELS} levels; improvement over Loop on the same mesh, plain mean over meshes. One number "
     "of the card is changed at a time and nothing is trained again, so that s and τ, which "
-    "training sees, are at their best where the card has them; C, θ, κ and K act in use alone. "
+    "training sees, are at their best where the card has them; C, θ and K act in use alone. "
     "*Guarded*: vertices of the learned levels that the fold guard scales back, in all meshes."
 )
 
