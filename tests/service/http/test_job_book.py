@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Awaitable, Callable
 
 import pytest
 
 from service.http.job_book import JobBook, NoSuchJobError
-from service.options import Limits, Options
 from service.workers.job import Job, State
-from service.workers.jobs import Work
 from service.workers.memory_file import MemoryFile
-from service.workers.progress import ProgressPage
+from tests.support.handed_in import job_of
 
 
 def run(scenario: Callable[[], Awaitable[None]]) -> None:
@@ -21,22 +18,11 @@ def run(scenario: Callable[[], Awaitable[None]]) -> None:
 
 
 def job(client: str, size: int = 0) -> Job:
-    body, answer, page = MemoryFile(), MemoryFile(), ProgressPage()
+    answer = MemoryFile()
     answer.append(bytes(size))
-    work = Work(body.name, answer.name, None, page.file.name, "", Options(), None, Limits())
-    made = Job(
-        client=client,
-        faces_per_minute=None,
-        work=work,
-        body=body,
-        answer=answer,
-        report=None,
-        page=page,
-        upload_seconds=0,
-        must_end=time.monotonic(),
-    )
-    body.release()
-    page.close()
+    made = job_of(b"", answer, client, seconds=0)
+    made.body.release()
+    made.page.close()
     made.state = State.DONE
     return made
 

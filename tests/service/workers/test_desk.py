@@ -5,21 +5,19 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import time
 from collections.abc import Callable
 from pathlib import Path
 
-from service.options import Limits, Options
 from service.workers.budget import FacesBudget
 from service.workers.desk import Desk
-from service.workers.job import Job, State
+from service.workers.job import State
 from service.workers.jobs import Done, Work
 from service.workers.memory_file import MemoryFile
 from service.workers.pool import Workers
-from service.workers.progress import ProgressPage
 from service.workers.turns import Lane, Turns
 from tests.service.workers.test_pool import run, workers
 from tests.support import stand_in_jobs as jobs
+from tests.support.handed_in import job_of
 
 
 def desk_of(
@@ -35,34 +33,6 @@ def desk_of(
         run=run,
         measure=jobs.measure,
         job_seconds=30,
-    )
-
-
-def job_of(content: bytes, answer: MemoryFile) -> Job:
-    """A job of these bytes; the desk lets go of its body."""
-    body, page = MemoryFile(), ProgressPage()
-    body.append(content)
-
-    work = Work(
-        body=body.name,
-        answer=answer.name,
-        report=None,
-        page=page.file.name,
-        content_type="model/gltf-binary",
-        options=Options(),
-        model=None,
-        limits=Limits(),
-    )
-    return Job(
-        client="a",
-        faces_per_minute=None,
-        work=work,
-        body=body,
-        answer=answer,
-        report=None,
-        page=page,
-        upload_seconds=0.0,
-        must_end=time.monotonic() + 60,
     )
 
 
