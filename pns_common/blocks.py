@@ -16,7 +16,7 @@ from pns_common.arrays import Array, namespace
 T = TypeVar("T")
 
 # Rows a block: a dozen (rows, 3) float64 temporaries stay in the second-level cache.
-ROWS = 8192
+BLOCK_ROWS = 8192
 MOST_THREADS = 8
 
 
@@ -33,7 +33,7 @@ class Blocks:
     """
 
     threads: int
-    rows: int = ROWS
+    rows: int = BLOCK_ROWS
     before: Callable[[int], None] = _nobody_listens
 
     def of_rows(self, rows: int) -> Blocks:

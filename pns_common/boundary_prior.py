@@ -67,7 +67,7 @@ def boundary_pushes(
     return scatter(pushes, vertices, points.shape[0])
 
 
-def boundary_reach(
+def boundary_square(
     points: Float[Array, "V 3"], topology: Topology, vertices: Int[np.ndarray, " N"]
 ) -> Float[Array, " N"]:
     """h² of boundary vertices: the mean square of their two boundary edges."""

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.arrays import Array, dot, gather, namespace, scatter
-from pns_common.boundary_prior import boundary_pushes, boundary_reach, boundary_vertices
+from pns_common.boundary_prior import boundary_pushes, boundary_square, boundary_vertices
 from pns_common.correction import Correction, proximity_ratio, shortened
 from pns_common.level import ControlLevel
 from pns_common.placement import Placement
@@ -35,7 +35,7 @@ class BoundaryRule:
         movable = boundary_vertices(topology)
         rows = np.flatnonzero(movable)
         wanted = gather(loop_vertex_vertices(self.pushes(level), topology), rows)
-        square = boundary_reach(level.points, topology, rows)
+        square = boundary_square(level.points, topology, rows)
         budget_per_length = level.budget_per_length(rows, self.form.budget)
         moved = self._within(placed, rows, wanted, budget_per_length * square)
         corrected = movable if placed.corrected is None else placed.corrected | movable

@@ -1,13 +1,22 @@
 """What PNS adds to Loop's edge vertices, and the bound that it never leaves.
 
-    format 3    q = q0 + γ Π_ρ(D + τ h F z(φ))      ‖z‖ ≤ 1,       ρ = C h² / R
-    format 1    q = q0 + h² γ F η(φ)                ‖η‖ ≤ C / R    (the paper's equation 1)
+    the paper's equation 1 (models of formats 1 and 2), by ``correct``:
+
+        q = q0 + h² γ F η(φ)                ‖η‖ ≤ C / R
+
+    the default model's (format 3), by ``correct_scale_free``:
+
+        q = q0 + γ Π_ρ(D + τ h F z(φ))      ‖z‖ ≤ 1,  ρ = C h² / R
 
     γ = tanh(c x²),  x = 1 − n1 · n2
 
-Old vertices get the like of it (vertex_operator.py): p' = p0 + γ_v Π_ρ(D + τ h_v Σ z_i e_i), and in
-format 2 p' = p0 + h_v² γ_v (C / R) v. R is the unit of length (refine.py), h the edge's length. The
-bound is enforced here, in float64 and whatever the network returns: ‖δ‖ ≤ C h² / R for any weights.
+q0 is Loop's edge vertex (stencils.py), h the edge's length, F its frame (edge/frames.py), φ what
+the network reads of its surroundings (edge/features.py), η and z what it answers, D a prior without
+weights (prior.py), C the budget and R the mesh's unit of length (refine.py). Π_ρ shortens to ρ. Old
+vertices get the like of it in vertex/operator.py, and fold_guard.py scales back what would fold.
+
+The bound is enforced here, in float64 and whatever the network returns: ‖δ‖ ≤ C h² / R for any
+weights.
 """
 
 from __future__ import annotations
@@ -22,11 +31,11 @@ from pns_common.arrays import Array, as_numpy, namespace, norm
 from pns_common.edge.frames import EdgeFrames, EdgeStencil, edge_frames, rotate
 from pns_common.errors import ModelError
 
-# Features (N, K) -> local corrections (N, 3) for a budget of 1.
+# Features (N, K) -> local vectors (N, 3), η for C / R = 1, or z; shortened to length 1 afterwards.
 Network = Callable[[Array], Array]
-# Points and normals (N) -> features (N, K).
+# Points, normals and frames of N edges -> their features φ (N, K).
 Features = Callable[[EdgeStencil, EdgeFrames], Array]
-# Curvature x and frames -> γ ∈ [0, 1].
+# The frames of N edges, with their curvature x -> γ (N,) ∈ [0, 1].
 Gate = Callable[[EdgeFrames], Array]
 # C / R, per unit of length: one number, or one for each row where parts have their own R.
 BudgetPerLength = float | Float[np.ndarray, " N"]
@@ -37,8 +46,8 @@ class Correction:
     """What N interior edges add to Loop's edge vertices.
 
     Attributes:
-        displacement: δ, world coordinates.
-        envelope: C h² / R, the largest length that δ may have.
+        displacement: δ, in the mesh's coordinates.
+        envelope: ρ = C h² / R, the largest length that δ may have, in the mesh's units.
         gate: γ ∈ [0, 1].
         degenerate: edges whose frame is the fallback.
     """
@@ -59,7 +68,7 @@ def curvature_gate(gate_sharpness: float) -> Gate:
 
 
 def project_to_ball(vectors: Float[Array, "N 3"], radius: float = 1.0) -> Float[Array, "N 3"]:
-    """Vectors longer than ``radius`` are shortened to it; none is lengthened."""
+    """Vectors longer than ``radius`` are shortened to it, also huge ones; none is lengthened."""
     xp = namespace(vectors)
     # Dividing by the largest component first keeps the square of a huge vector finite.
     size = xp.abs(vectors)
@@ -77,10 +86,10 @@ def correct(
     budget_per_length: BudgetPerLength,
     frames_of: Callable[[EdgeStencil], EdgeFrames] = edge_frames,
 ) -> Correction:
-    """δ = h² γ F η(φ) for interior edges; ``budget_per_length`` is C / R.
+    """δ = h² γ F η(φ) for interior edges (equation 1); ``budget_per_length`` is C / R.
 
     Raises:
-        ModelError: the network returned something that is not finite.
+        ModelError: the network returned something that is not finite, or of another shape.
     """
     frames = frames_of(stencil)
     gamma = gate(frames)
@@ -109,13 +118,14 @@ def correct_scale_free(
     network_scale: float,
     prior: Float[Array, "N 3"],
 ) -> Correction:
-    """δ = γ Π_ρ(D + τ h F z(φ)), ρ = h² C / R; ``budget`` is C / R, ``network_scale`` is τ.
+    """δ = γ Π_ρ(D + τ h F z(φ)), ρ = h² C / R, for interior edges.
 
     It is equation 1 with η = Π_C(R (Fᵀ D + τ h z) / h²) / R: the bound is the same, and the network
-    speaks in units of h, so what it says holds at every resolution. ``prior`` is D.
+    speaks in units of h, so what it says holds at every resolution. ``budget_per_length`` is C / R,
+    ``network_scale`` is τ, ``prior`` is D.
 
     Raises:
-        ModelError: the network returned something that is not finite.
+        ModelError: the network returned something that is not finite, or of another shape.
     """
     frames = frames_of(stencil)
     gamma = gate(frames)
@@ -132,7 +142,10 @@ def where_open(
     """The network's answers, ``finite``; 0 in rows whose gate is shut, for which it is not run.
 
     Nothing is added there whatever it says, and no other row is changed by their absence. Tensors,
-    which may keep a gradient, are all run.
+    which may keep a gradient, are all run. ``like`` has the type and precision of the geometry.
+
+    Raises:
+        ModelError: the network returned something that is not finite, or of another shape.
     """
     rows = np.flatnonzero(as_numpy(gate))
     if len(rows) == gate.shape[0] or as_numpy(like) is not like:
@@ -144,7 +157,11 @@ def where_open(
 
 
 def finite(eta: Array, like: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
-    """The network's answer in the geometry's precision, refused unless (N, 3) and finite."""
+    """The network's answer in the geometry's precision, refused unless (N, 3) and finite.
+
+    Raises:
+        ModelError: it is not.
+    """
     xp = namespace(like)
     if tuple(eta.shape) != tuple(like.shape):
         raise ModelError(

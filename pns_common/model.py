@@ -28,7 +28,7 @@ class Model(Protocol):
         ...
 
     def __call__(self, features: Array, budget: float) -> Array:
-        """Corrections (N, 3) in the edge frame for features (N, K)."""
+        """η of equation 1, or z in format 3: (N, 3) in the edge frame for features (N, K)."""
         ...
 
 

@@ -18,7 +18,7 @@ from pns_common.vertex.rings import RING_FEATURE_SETS
 
 # Rows that one call of a network sees. Always the same shape, so that a row's bits depend neither
 # on how many rows there are nor on how they are divided.
-ROWS = 1024
+CALL_ROWS = 1024
 # Bytes of all tensors that a call makes, as if none were freed before its end.
 LARGEST_CALL = 256 * 2**20
 

@@ -14,7 +14,7 @@ from typing import Any
 import onnx
 
 from pns_common.errors import ModelError
-from pns_common.model_contract import LARGEST_CALL, ROWS, Signature
+from pns_common.model_contract import CALL_ROWS, LARGEST_CALL, Signature
 
 
 def signature(value: onnx.ValueInfoProto) -> Signature:
@@ -32,12 +32,12 @@ def check_calls(proto: onnx.ModelProto, answers: Sequence[tuple[str, str]], name
     Args:
         proto: a valid file, whose graph has the inputs and outputs of its card.
         answers: the inputs that are features, each with the output that it is read for. A call
-            gives one of them ROWS rows and the others one.
+            gives one of them CALL_ROWS rows and the others one.
         name: what errors call the file.
 
     Raises:
         ModelError: a shape does not follow from the file, the tensors of a call are too large, or
-            the answers have another shape than (ROWS, 3).
+            the answers have another shape than (CALL_ROWS, 3).
     """
     graph = proto.graph
     # What a file says of its own tensors is not believed: not of those in between, and not of
@@ -53,7 +53,7 @@ def check_calls(proto: onnx.ModelProto, answers: Sequence[tuple[str, str]], name
     for given, output in answers:
         for value in graph.input:
             if value.type.tensor_type.shape.dim:
-                rows = ROWS if value.name == given else 1
+                rows = CALL_ROWS if value.name == given else 1
                 value.type.tensor_type.shape.dim[0].dim_value = rows
         _check_call(proto, output, name)
 
@@ -71,8 +71,8 @@ def _check_call(proto: onnx.ModelProto, output: str, name: str) -> None:
             name, expected=f"at most {LARGEST_CALL} bytes in one call", found=str(held)
         )
     shape = signature(known[output])[2]
-    if shape != [ROWS, 3]:
-        raise ModelError(name, expected=f"{output} of shape {[ROWS, 3]}", found=str(shape))
+    if shape != [CALL_ROWS, 3]:
+        raise ModelError(name, expected=f"{output} of shape {[CALL_ROWS, 3]}", found=str(shape))
 
 
 def _inferred(proto: onnx.ModelProto, name: str) -> Iterator[onnx.ValueInfoProto]:

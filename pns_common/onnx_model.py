@@ -19,7 +19,7 @@ from jaxtyping import Float
 
 from pns_common.errors import ModelError
 from pns_common.model_card import ModelCard
-from pns_common.model_contract import ROWS, answer_to, feature_inputs
+from pns_common.model_contract import CALL_ROWS, answer_to, feature_inputs
 from pns_common.model_manifest import check_listed
 
 DEFAULT_MODEL = "general"
@@ -86,14 +86,18 @@ class OnnxModel:
         return model_from_bytes, (self._data, self.name)
 
     def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
-        """Corrections (N, 3) float32, for features (N, K) and a dimensionless budget."""
+        """Corrections (N, 3) float32, for features (N, K) and a dimensionless budget.
+
+        Raises:
+            ModelError: the graph does not run to its end, or answers in another shape.
+        """
         return self._answers("features", features, budget)
 
     def vertex_correction(self, features: Float[np.ndarray, "N L"], budget: float) -> np.ndarray:
         """Weights (N, 3) float32 for the rings of old vertices, where the card has features.
 
         Raises:
-            ModelError: the model has no vertex rule.
+            ModelError: the model has no vertex rule; and as for edges.
         """
         if self.card.vertex_features is None:
             raise ModelError(self.name, expected="a vertex rule", found="none")
@@ -106,12 +110,13 @@ class OnnxModel:
         widths = feature_inputs(self.card)
         inputs = {name: np.zeros((1, width), dtype=np.float32) for name, width in widths}
         inputs["budget"] = np.asarray(budget, dtype=np.float32)
-        for start in range(0, len(rows), ROWS):
-            piece = rows[start : start + ROWS]
-            if len(piece) < ROWS:
-                piece = np.concatenate([piece, np.zeros((ROWS - len(piece), piece.shape[1]), "f4")])
+        for start in range(0, len(rows), CALL_ROWS):
+            piece = rows[start : start + CALL_ROWS]
+            if len(piece) < CALL_ROWS:
+                missing = np.zeros((CALL_ROWS - len(piece), piece.shape[1]), dtype=np.float32)
+                piece = np.concatenate([piece, missing])
             answer = self._run(answer_to(given), inputs | {given: piece})
-            corrections[start : start + ROWS] = answer[: len(rows) - start]
+            corrections[start : start + CALL_ROWS] = answer[: len(rows) - start]
         return corrections
 
     def _run(self, output: str, inputs: dict[str, np.ndarray]) -> np.ndarray:
@@ -122,9 +127,11 @@ class OnnxModel:
             raise ModelError(
                 self.name, expected="a graph that runs to its end", found=reason
             ) from error
-        if answer.shape != (ROWS, 3):
+        if answer.shape != (CALL_ROWS, 3):
             raise ModelError(
-                self.name, expected=f"corrections of shape ({ROWS}, 3)", found=f"{answer.shape}"
+                self.name,
+                expected=f"corrections of shape ({CALL_ROWS}, 3)",
+                found=f"{answer.shape}",
             )
         return answer
 

@@ -9,11 +9,14 @@ from threading import Lock
 # does, where making it by Loop costs 1: measured on 80,000 faces, compiled and not.
 LEARNED_COST, LIMIT_COST = 6, 3
 # Rows that the passes of a level go over for each face that they make, likewise.
-ROWS, LEARNED_ROWS = 2.0, 4.0
+ROWS_PER_FACE, LEARNED_ROWS_PER_FACE = 2.0, 4.0
 
 
 def level_costs(faces: int, levels: int, learned_levels: int | None) -> list[int]:
-    """What each level of a refinement costs, in faces that Loop makes; arguments as below."""
+    """What each level of a refinement costs, in faces that Loop makes.
+
+    Arguments as of ``RefinementProgress``.
+    """
     learned = levels if learned_levels is None else learned_levels
     return [
         faces * 4 ** (depth + 1) * (LEARNED_COST if depth < learned else 1)
@@ -45,7 +48,8 @@ class RefinementProgress:
         learned = levels if learned_levels is None else learned_levels
         self._costs = level_costs(faces, levels, learned_levels)
         self._rows = [
-            count * (LEARNED_ROWS if depth < learned else ROWS) for depth, count in enumerate(made)
+            count * (LEARNED_ROWS_PER_FACE if depth < learned else ROWS_PER_FACE)
+            for depth, count in enumerate(made)
         ]
         if limit:
             self._costs.append(made[-1] * LIMIT_COST)

@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 
 from pns_common.array_steps import array_steps
 from pns_common.arrays import norm
-from pns_common.blocks import ROWS, Blocks, available_threads
+from pns_common.blocks import BLOCK_ROWS, Blocks, available_threads
 from pns_common.deferred import Deferred
 from pns_common.diagnostics import LevelReport, level_report, limit_distances
 from pns_common.errors import ParameterError
@@ -129,10 +129,10 @@ def refine(
 
         made = refine_fused(*arguments, Blocks(workers, KERNEL_ROWS, work.rows), work.level_ends)
     else:
-        made = refine_arrays(*arguments, Blocks(workers, ROWS, work.rows), work.level_ends)
+        made = refine_arrays(*arguments, Blocks(workers, BLOCK_ROWS, work.rows), work.level_ends)
     points, normals = made.points, None
     if limit:
-        topology, blocks = made.split_topology(), Blocks(workers, ROWS, work.rows)
+        topology, blocks = made.split_topology(), Blocks(workers, BLOCK_ROWS, work.rows)
         points = refined_limit_positions(made.points, topology, blocks)
         normals = refined_limit_normals(made.points, topology, blocks)
         work.level_ends()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.blocks import ROWS, Blocks
+from pns_common.blocks import BLOCK_ROWS, Blocks
 from pns_common.errors import ParameterError
 from pns_common.fused import KERNEL_ROWS
 from pns_common.limit import refined_limit_normals, refined_limit_positions
@@ -82,7 +82,7 @@ def refine_parts(
     made = refine_parts_fused(mesh, part_faces, scheme, levels, lengths, creases, blocks)
     points, normals = made.points, None
     if limit:
-        topology, blocks = made.split_topology(), Blocks(workers, ROWS)
+        topology, blocks = made.split_topology(), Blocks(workers, BLOCK_ROWS)
         points = refined_limit_positions(made.points, topology, blocks)
         normals = refined_limit_normals(made.points, topology, blocks)
     return PartsRefinement(

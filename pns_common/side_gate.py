@@ -20,8 +20,8 @@ from pns_common.correction import Gate
 from pns_common.edge.frames import EdgeFrames
 from pns_common.topology import Topology
 
+# x of bends of 46 and 66 degrees.
 GENTLE_TO_SHARP = (0.3, 0.6)
-"""x of bends of 46 and 66 degrees."""
 
 
 def face_bends(jumps: Float[Array, " E"], topology: Topology) -> Float[Array, " F"]:

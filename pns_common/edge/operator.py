@@ -47,7 +47,7 @@ class EdgeOperator:
         """δ = h² γ F η(φ); ``budget_per_length`` is C / R.
 
         Raises:
-            ModelError: the network returned something that is not finite.
+            ModelError: the network returned something that is not finite, or of another shape.
         """
         return correct(
             stencil,

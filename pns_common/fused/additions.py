@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.blocks import ROWS, Blocks
+from pns_common.blocks import BLOCK_ROWS, Blocks
 from pns_common.fused.boundary import NO_RULE, Boundary
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.fused.rings import (
@@ -67,7 +67,7 @@ class Surroundings:
     @property
     def network_blocks(self) -> Blocks:
         """How rows are divided that a network sees: as the array kernels divide them."""
-        return self.blocks.of_rows(min(ROWS, self.blocks.rows))
+        return self.blocks.of_rows(min(BLOCK_ROWS, self.blocks.rows))
 
 
 @dataclass(frozen=True, eq=False)

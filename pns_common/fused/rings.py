@@ -1,4 +1,4 @@
-"""What a learned level reads of every vertex's ring, with the bits of ring_features.py."""
+"""What a learned level reads of every vertex's ring, with the bits of vertex/rings.py."""
 
 from __future__ import annotations
 

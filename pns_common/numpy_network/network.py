@@ -15,8 +15,8 @@ from pns_common.errors import ModelError
 from pns_common.model_card import CARD_KEY, ModelCard
 from pns_common.model_contract import (
     ALLOWED_OPERATORS,
+    CALL_ROWS,
     LARGEST_CALL,
-    ROWS,
     Signature,
     answer_to,
     check_interface,
@@ -195,12 +195,12 @@ def _check_calls(network: NumpyNetwork, card: ModelCard) -> None:
     """Measure each call, and look at the shape that it answers with, before any is made."""
     widths = dict(feature_inputs(card))
     for given in widths:
-        rows = {what: ROWS if what == given else 1 for what in widths}
+        rows = {what: CALL_ROWS if what == given else 1 for what in widths}
         inputs = {what: outline_of((rows[what], width), float) for what, width in widths.items()}
         output = answer_to(given)
         shape = _outlines(network, inputs | {"budget": outline_of((), float)})[output].shape
-        if list(shape) != [ROWS, 3]:
-            raise _RefusedError(f"{output} of shape {[ROWS, 3]}", str(list(shape)))
+        if list(shape) != [CALL_ROWS, 3]:
+            raise _RefusedError(f"{output} of shape {[CALL_ROWS, 3]}", str(list(shape)))
 
 
 def _outlines(network: NumpyNetwork, inputs: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -1,12 +1,12 @@
 """The learned vertex rule: what PNS adds to Loop's old vertices, where a model has it.
 
     format 3    p' = p0 + γ_v Π_ρ(D + τ h_v Σ z_i e_i)      ‖z‖ ≤ 1,  ρ = C h_v² / R
-    format 2    p' = p0 + h_v² γ_v (C / R) v                ‖v‖ ≤ 1,  γ_v = tanh(c x_v)
+    format 2    p' = p0 + h_v² γ_v (C / R) v                ‖v‖ ≤ 1,  γ_v = tanh(c_v x_v)
 
 h_v² is the mean of the squared lengths of the ring's edges, so h_v is no longer than the longest.
 x_v is the mean over the ring's edges of ‖n − n'‖² / 2: O(ε²) for a bump of height ε on a plane, so
 that γ_v and its derivative vanish there. v = Σ z_i e_i is a sum of three equivariant vectors of
-length ≤ 1 (see ring_features.py) with the network's z as weights, shortened to the unit ball where
+length ≤ 1 (rings.ring_vectors) with the network's z as weights, shortened to the unit ball where
 it is longer. So ‖p' − p0‖ ≤ (C / R) h_v² for any weights, and each factor is Lipschitz.
 
 The rule is off at vertices on boundary, irregular or crease edges, where several fans meet, and at
@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from pns_common.arrays import Array, gather, namespace
 from pns_common.correction import (
@@ -29,7 +29,6 @@ from pns_common.correction import (
     shortened,
     where_open,
 )
-from pns_common.topology import Topology
 from pns_common.vertex.rings import RingFeatureSet, Rings, ring_vectors
 
 
@@ -40,7 +39,7 @@ class VertexOperator:
     Attributes:
         features: of the ring.
         network: features (N, K) to weights z (N, 3), ‖z‖ ≤ 1.
-        gate_sharpness: c of the gate tanh(c x_v).
+        gate_sharpness: c_v of the gate tanh(c_v x_v).
     """
 
     features: RingFeatureSet
@@ -53,7 +52,7 @@ class VertexOperator:
         """What is added at some vertices; ``budget_per_length`` is C / R.
 
         Raises:
-            ModelError: the network returned something that is not finite.
+            ModelError: the network returned something that is not finite, or of another shape.
         """
         xp = namespace(rings.normal)
         gamma, envelope, learned = self._evaluated(rings, vertices, budget_per_length)
@@ -75,7 +74,7 @@ class VertexOperator:
         """δ = γ_v Π_ρ(D + τ h_v Σ z_i e_i), ρ = h_v² C / R; likewise, with τ and D.
 
         Raises:
-            ModelError: the network returned something that is not finite.
+            ModelError: the network returned something that is not finite, or of another shape.
         """
         xp = namespace(rings.normal)
         gamma, envelope, learned = self._evaluated(rings, vertices, budget_per_length)
@@ -95,8 +94,3 @@ class VertexOperator:
         features = gather(self.features(rings), vertices)
         weights = project_to_ball(where_open(self.network, features, gamma, like=basis[:, 0]))
         return gamma, envelope, xp.sum(weights[:, :, None] * basis, axis=1)
-
-
-def smooth_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
-    """Vertices with a closed ring of interior edges: those that the rule may move."""
-    return topology.smooth_vertices

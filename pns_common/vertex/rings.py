@@ -27,6 +27,8 @@ from pns_common.symmetry import Feature, Generator, Symmetries, symmetries
 from pns_common.topology import Topology, sharp_edge_count
 from pns_common.vertex.fields import divided, mean_normals, neighbour_mean, spokes
 
+# The square of a spoke without length, so that the root has a gradient.
+SHORTEST_SQUARE = 1e-300
 # Turned-over faces: the mean normal changes sign, sums of spokes do not.
 RING_TURN_OVER = Generator("turn_over", "", "", (-1, 1, 1))
 
@@ -70,7 +72,7 @@ class Rings:
     @property
     def edge_jumps(self) -> Float[Array, " E"]:
         """x of each edge, likewise."""
-        return self.jump[::2, 0]
+        return self.jump[::2, 0]  # both spokes of an edge stand side by side, with the same x
 
     @property
     def bend(self) -> Float[Array, "S 1"]:
@@ -114,13 +116,6 @@ class Rings:
         return _across_edges(self.points, self.face_normals, self.topology)
 
 
-def look_around(
-    points: Float[Array, "V 3"], normals: Float[Array, "F 3"], topology: Topology
-) -> Rings:
-    """The rings of a level; ``normals`` are its faces'."""
-    return Rings(topology, points, normals)
-
-
 def ring_vectors(rings: Rings) -> Float[Array, "V 3 3"]:
     """Rows e1, e2, e3 of each vertex, polar vectors that turn with the mesh, none longer than 1.
 
@@ -136,7 +131,8 @@ def ring_features(rings: Rings) -> Float[Array, "V 10"]:
     """The features of ``ring-10``, in the order of RING_10."""
     xp = namespace(rings.normal)
     reach, height = rings.reach, rings.height
-    length = xp.sqrt(xp.where(_square(rings.spokes) > 0, _square(rings.spokes), 1e-300))
+    square = _square(rings.spokes)
+    length = xp.sqrt(xp.where(square > 0, square, SHORTEST_SQUARE))
     tilt = rings.of_neighbour(rings.normal) - rings.of_centre(rings.normal)
     opening = rings.mean(dot(tilt, rings.spokes)[:, None])
     columns = [

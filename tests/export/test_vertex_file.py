@@ -14,7 +14,7 @@ from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, ParityError, check_parity
 from pns_common import Mesh, ModelError, load_model, pns, refine
 from pns_common.model_card import ModelCard
-from pns_common.model_contract import ALLOWED_OPERATORS, ROWS
+from pns_common.model_contract import ALLOWED_OPERATORS, CALL_ROWS
 from pns_common.onnx_model import model_from_bytes
 from pns_common.schemes import vertex_operator
 from pns_common.topology import build_topology
@@ -98,9 +98,11 @@ def test_a_second_network_that_differs_is_not_written(tmp_path):
 
 def test_rows_do_not_depend_on_how_many_there_are():
     loaded = model_from_bytes(file_bytes(two_networks()), "two")
-    rows = np.random.default_rng(0).uniform(-1, 1, (ROWS + 7, RING_10.count))
+    rows = np.random.default_rng(0).uniform(-1, 1, (CALL_ROWS + 7, RING_10.count))
     whole = loaded.vertex_correction(rows, 1.0)
-    np.testing.assert_array_equal(loaded.vertex_correction(rows[ROWS:], 1.0), whole[ROWS:])
+    np.testing.assert_array_equal(
+        loaded.vertex_correction(rows[CALL_ROWS:], 1.0), whole[CALL_ROWS:]
+    )
     assert loaded.vertex_correction(rows[:0], 1.0).shape == (0, 3)
 
 

@@ -7,7 +7,7 @@ from onnx import TensorProto, helper
 
 from benchmarks.memory import peak_mib, reset_peak
 from pns_common import ModelError
-from pns_common.model_contract import LARGEST_CALL, ROWS
+from pns_common.model_contract import CALL_ROWS, LARGEST_CALL
 from pns_common.numpy_network import open_network
 from pns_common.onnx_model import load_model, model_from_bytes
 from pns_common.onnx_session import open_session
@@ -18,7 +18,7 @@ CUT = {"from": np.array([0]), "to": np.array([3]), "axis": np.array([1])}
 THREE = node("Slice", ["features", "from", "to", "axis"], ["three"])
 PLAIN = [THREE, node("Mul", ["three", "budget"], ["correction"])]
 # Columns that fill a call: two tensors of them and two of three columns, four bytes a number.
-WIDEST = LARGEST_CALL // (4 * ROWS * 2) - 3
+WIDEST = LARGEST_CALL // (4 * CALL_ROWS * 2) - 3
 
 
 def refused(data, *, in_numpy=None):
@@ -120,7 +120,7 @@ def test_a_split_into_other_parts_than_its_outputs_is_refused():
 def test_what_a_file_says_of_its_own_tensors_is_not_believed():
     width = 8 * WIDEST
     proto = onnx.load_from_string(two_wide(width))
-    small = helper.make_tensor_value_info("wide", TensorProto.FLOAT, [ROWS, 2])
+    small = helper.make_tensor_value_info("wide", TensorProto.FLOAT, [CALL_ROWS, 2])
     proto.graph.value_info.append(small)
     assert "bytes in one call" in refused(proto.SerializeToString()).expected
     # Before version 4 weights are inputs too, with a shape of their own.

@@ -13,7 +13,7 @@ from onnx import helper
 
 from pns_common import Mesh, ModelError, load_model, pns, refine
 from pns_common.model_card import ModelCard
-from pns_common.model_contract import ROWS
+from pns_common.model_contract import CALL_ROWS
 from pns_common.numpy_network import open_network
 from pns_common.onnx_model import bundled_models, model_from_bytes
 from pns_common.onnx_session import open_session
@@ -168,7 +168,7 @@ def test_answers_of_another_shape_are_refused():
     """The file declares [edges, 3] and returns fewer rows."""
     nodes = through(helper.make_node("Slice", ["three", "from", "to", "first"], ["correction"]))
     error = refused(model_bytes(nodes, CUT | {"first": np.array([0])}))
-    assert (error.expected, error.found) == (f"correction of shape [{ROWS}, 3]", "[3, 3]")
+    assert (error.expected, error.found) == (f"correction of shape [{CALL_ROWS}, 3]", "[3, 3]")
 
 
 def test_a_runtime_that_answers_otherwise_than_the_file_says_is_an_error():
@@ -197,9 +197,9 @@ def test_a_graph_that_breaks_off_while_running_is_an_error_of_the_model():
 
 def test_a_rows_bits_depend_on_nothing_but_the_row():
     model = random_model(0)
-    features = np.random.default_rng(0).uniform(-2, 2, (3 * ROWS + 17, 5))
+    features = np.random.default_rng(0).uniform(-2, 2, (3 * CALL_ROWS + 17, 5))
     together = model(features, 1.0)
-    for rows in (slice(0, 1), slice(5, ROWS + 6), slice(2 * ROWS + 3, None)):
+    for rows in (slice(0, 1), slice(5, CALL_ROWS + 6), slice(2 * CALL_ROWS + 3, None)):
         np.testing.assert_array_equal(model(features[rows], 1.0), together[rows])
     assert model(features[:0], 1.0).shape == (0, 3)
 

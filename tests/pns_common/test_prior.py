@@ -5,13 +5,13 @@ import numpy as np
 from pns_common.edge.frames import face_normals
 from pns_common.prior import normal_pushes
 from pns_common.topology import build_topology
-from pns_common.vertex.rings import look_around
+from pns_common.vertex.rings import Rings
 from tests.support.meshes import grid, icosphere
 
 
 def pushes(points, faces):
     topology = build_topology(faces, len(points))
-    return normal_pushes(look_around(points, face_normals(points, faces), topology))
+    return normal_pushes(Rings(topology, points, face_normals(points, faces)))
 
 
 def test_an_icosahedrons_vertices_are_pushed_by_what_loop_takes_them_in():

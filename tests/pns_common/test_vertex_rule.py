@@ -12,8 +12,7 @@ from pns_common import Mesh, ModelError, loop, pns, refine
 from pns_common.edge.frames import face_normals
 from pns_common.schemes import VertexModel, vertex_operator
 from pns_common.topology import EdgeClass, build_topology, split
-from pns_common.vertex.operator import smooth_vertices
-from pns_common.vertex.rings import RING_10, look_around, ring_vectors
+from pns_common.vertex.rings import RING_10, Rings, ring_vectors
 from tests.support.meshes import (
     bent,
     bow_tie,
@@ -109,7 +108,7 @@ def test_only_closed_rings_of_interior_edges_are_moved(mesh, model):
     fixed = np.ones(len(mesh.vertices), dtype=bool)
     fixed[topology.edges.reshape(-1)] = False
     fixed[sharp] = True
-    assert not smooth_vertices(topology)[fixed].any()
+    assert not topology.smooth_vertices[fixed].any()
     refined = refine(mesh, pns(model))
     base = refine(mesh, loop()).mesh.vertices
     np.testing.assert_array_equal(
@@ -129,7 +128,7 @@ def test_a_vertex_of_two_closed_fans_follows_loop():
     moved = np.linalg.norm(departure(mesh, MODELS[0]), axis=1) > 0
     assert not moved[0]
     assert moved[1:].any()
-    assert not smooth_vertices(build_topology(*bow_tie()[1:], 5)).any()
+    assert not build_topology(*bow_tie()[1:], 5).smooth_vertices.any()
 
 
 @given(manifolds(), st.integers(0, 2**31))
@@ -252,7 +251,7 @@ def test_numbering_mirrors_and_turned_faces_change_nothing_on_assets(name):
 @given(soups() | manifolds())
 def test_features_keep_their_ranges_and_vectors_their_length(mesh):
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    rings = look_around(mesh.vertices, face_normals(mesh.vertices, mesh.faces), topology)
+    rings = Rings(topology, mesh.vertices, face_normals(mesh.vertices, mesh.faces))
     rows = RING_10(rings)
     limits = np.array([feature.limit for feature in RING_10.features])
     assert (np.abs(rows) <= limits * ROUNDING).all()
@@ -263,13 +262,13 @@ def test_features_keep_their_ranges_and_vectors_their_length(mesh):
 def test_numpy_and_torch_agree(mesh):
     weights = np.random.default_rng(0).standard_normal((RING_10.count, 3))
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    rows = np.flatnonzero(smooth_vertices(topology))
+    rows = np.flatnonzero(topology.smooth_vertices)
 
     def step(points, xp):
         tensor = xp.asarray(weights)
         operator = replace(vertex_operator(MODELS[0]), network=lambda f: xp.tanh(f @ tensor))
         normals = face_normals(points, topology.faces)
-        result = operator.correct(look_around(points, normals, topology), rows, 0.5)
+        result = operator.correct(Rings(topology, points, normals), rows, 0.5)
         return result.displacement, result.gate
 
     ours, theirs = step(mesh.vertices, np), step(torch.tensor(mesh.vertices), torch)
@@ -287,7 +286,7 @@ def test_torch_differentiates_through_the_vertex_rule():
 
     def displacement(points):
         normals = face_normals(points, topology.faces)
-        return operator.correct(look_around(points, normals, topology), rows, 0.5).displacement
+        return operator.correct(Rings(topology, points, normals), rows, 0.5).displacement
 
     points = torch.tensor(vertices, requires_grad=True)
     assert torch.autograd.gradcheck(displacement, (points,), fast_mode=True)
@@ -297,7 +296,7 @@ def test_torch_differentiates_through_the_vertex_rule():
 def test_gradients_are_finite_on_degenerate_meshes(mesh):
     topology = build_topology(mesh.faces, len(mesh.vertices))
     points = torch.tensor(mesh.vertices / np.abs(mesh.vertices).max(), requires_grad=True)
-    rings = look_around(points, face_normals(points, topology.faces), topology)
+    rings = Rings(topology, points, face_normals(points, topology.faces))
     (RING_10(rings).sum() + ring_vectors(rings).sum()).backward()
     assert torch.isfinite(points.grad).all()
 

@@ -1,4 +1,4 @@
-"""Sums around vertices, with the bits of ring_features.py and vertex_fields.py.
+"""Sums around vertices, with the bits of vertex/rings.py and vertex/fields.py.
 
 A sum runs over its faces or edges in ascending order: each thread owns the vertices begin … end − 1
 and reads all faces or edges.

@@ -7,7 +7,7 @@ from pns_common.edge.features import FEATURE_COUNT, FEATURE_SETS
 from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
 from pns_common.edge.orientation import FIRST_FACE, SYMMETRIC
 from pns_common.topology import build_topology
-from pns_common.vertex.rings import look_around
+from pns_common.vertex.rings import Rings
 from tests.support.meshes import bumpy_sphere
 
 # A roof: the edge from 0 to 1 is its crest, 4 units long; both sides fall by 3 over 4.
@@ -20,7 +20,7 @@ def row(name, points=ROOF, faces=SIDES):
     features, topology = FEATURE_SETS[name], build_topology(faces, len(points))
     edges = SYMMETRIC.order(topology, topology.interior)
     normals = face_normals(points, faces)
-    fields = features.fields(look_around(points, normals, topology))
+    fields = features.fields(Rings(topology, points, normals))
     stencil = edge_stencil(points, normals, edges.stencil, edges.faces, fields)
     names = [f"{feature.kind} {feature.vertices}".strip() for feature in features.features]
     values = features(stencil, edge_frames(stencil))
@@ -57,7 +57,7 @@ def test_scale_changes_no_feature_and_all_keep_their_limits(name):
     def values(points):
         edges = FIRST_FACE.order(topology, topology.interior)
         normals = face_normals(points, faces)
-        fields = features.fields(look_around(points, normals, topology))
+        fields = features.fields(Rings(topology, points, normals))
         stencil = edge_stencil(points, normals, edges.stencil, edges.faces, fields)
         return features(stencil, FIRST_FACE.frames(stencil))
 

@@ -13,7 +13,7 @@ from pns_common.edge.features import FEATURE_SETS
 from pns_common.edge.frames import edge_stencil, face_normals, shut_where_degenerate
 from pns_common.edge.orientation import FIRST_FACE, SYMMETRIC
 from pns_common.topology import build_topology
-from pns_common.vertex.rings import look_around
+from pns_common.vertex.rings import Rings
 from tests.support.meshes import TETRAHEDRON, bumpy_sphere, manifolds, soups
 from tests.support.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
 from train.certificates.equivariance import well_conditioned
@@ -113,7 +113,7 @@ def test_degenerate_edges_are_left_alone_and_their_features_finite(features, mes
     topology = build_topology(mesh.faces, len(mesh.vertices))
     ordered = SYMMETRIC.order(topology, topology.interior)
     fields = FEATURE_SETS[features].fields(
-        look_around(mesh.vertices, face_normals(mesh.vertices, mesh.faces), topology)
+        Rings(topology, mesh.vertices, face_normals(mesh.vertices, mesh.faces))
     )
     normals = face_normals(mesh.vertices, mesh.faces)
     stencil = edge_stencil(mesh.vertices, normals, ordered.stencil, ordered.faces, fields)

@@ -6,7 +6,7 @@ import pytest
 from benchmarks.generated import torus
 from benchmarks.memory import peak_mib, reset_peak
 from pns_common import Mesh, loop, pns, refine
-from pns_common.blocks import ROWS
+from pns_common.blocks import BLOCK_ROWS
 from service.errors import LimitError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshes.weld import weld
@@ -169,7 +169,7 @@ def test_mesh_files_are_refined_by_the_same_rule():
 
 
 def test_the_result_does_not_depend_on_the_number_of_threads():
-    mesh = torus(2 * ROWS)
+    mesh = torus(2 * BLOCK_ROWS)
     alone, several = (refine(mesh, pns(MODEL), threads=threads).mesh for threads in (1, 4))
     np.testing.assert_array_equal(alone.vertices, several.vertices)
     by_loop = refine(mesh, loop(), threads=1).mesh.vertices
