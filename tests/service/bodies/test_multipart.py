@@ -45,6 +45,13 @@ def test_a_body_without_one_whole_part_named_file_is_refused(
         sent_files(body, TYPE)
 
 
+def test_the_headers_of_a_part_are_short_together_too() -> None:
+    """Each of these is one that the parser takes."""
+    lines = [b"A: " + b"b" * 4096 + b"\r\n"] * (MAX_HEADER_BYTES // 4096)
+    with pytest.raises(UnreadableError, match="headers are too long"):
+        sent_files(part(HEAD + b"".join(lines), b"") + b"--X--\r\n", TYPE)
+
+
 def other(name: str, filename: str, content: bytes) -> bytes:
     head = f'Content-Disposition: form-data; name="{name}"; filename="{filename}"\r\n'
     return part(head.encode(), content)

@@ -1,9 +1,11 @@
 """Who asks: addresses behind proxies, and keys."""
 
+import asyncio
 import base64
 import hashlib
 import http.client
 import logging
+import threading
 from contextlib import closing
 from ipaddress import ip_network
 
@@ -12,9 +14,10 @@ import pytest
 from fastapi.testclient import TestClient
 from starlette.responses import PlainTextResponse
 
-from service.http.access.bearer import WRONG_A_MINUTE
+from service.http.access import bearer as bearer_layer
+from service.http.access.bearer import MOST_WAITING, WRONG_A_MINUTE, Bearer
 from service.http.access.forwarded import Forwarded
-from service.http.access.keys import Entry, KeysError, hash_of, matches, new_key, read_keys
+from service.http.access.keys import Entry, Keyring, KeysError, hash_of, matches, new_key, read_keys
 from service.http.access.keys import toml_entry as written
 from service.http.app import create_app
 from service.settings import Settings
@@ -223,6 +226,41 @@ def test_guessing_ends_and_keys_that_were_right_stay_right(keys_file):
     assert (refused.status_code, refused.json()["code"]) == (429, "too-many-wrong-keys")
     assert int(refused.headers["retry-after"]) >= 1
     assert client.get("/healthz", headers=bearer(KEY)).status_code == 200
+
+
+def test_few_keys_wait_for_their_check_and_the_next_is_told_to_come_back(monkeypatch):
+    let_go = threading.Event()
+
+    class Slow(Keyring):
+        def find(self, key, name):
+            assert let_go.wait(600)
+            return super().find(key, name)
+
+    async def refused(number):
+        said = []
+
+        async def send(message):
+            said.append(message.get("status"))
+
+        key = f"Bearer pns_x_{number:043d}".encode()
+        scope = {"type": "http", "headers": [(b"authorization", key)], "path": "/jobs"}
+        await layer(scope | {"client": (f"192.0.2.{number}", 1)}, None, send)
+        return said[0]
+
+    async def scenario():
+        waiting = [asyncio.create_task(refused(number)) for number in range(MOST_WAITING + 1)]
+        for _ in range(3):  # nothing is awaited on the way to a refusal
+            await asyncio.sleep(0)
+        ended = [task.done() for task in waiting]
+        let_go.set()
+        assert ended == [False] * MOST_WAITING + [True]
+        assert await asyncio.gather(*waiting) == [401] * MOST_WAITING + [503]
+        # Those that waited are gone: there is room again.
+        assert await refused(100) == 401
+
+    monkeypatch.setattr(bearer_layer, "Keyring", Slow)
+    layer = Bearer(PlainTextResponse("never"), {})
+    asyncio.run(scenario())
 
 
 def hashed_by(key, log_n):

@@ -103,6 +103,22 @@ def test_who_is_told_to_leave_leaves_with_a_reason() -> None:
     run(scenario)
 
 
+def test_while_draining_no_upload_begins_and_what_has_begun_goes_on() -> None:
+    async def scenario() -> None:
+        admission = Admission(uploads=2, body_bytes=10, answer_bytes=10)
+        async with admission.upload():
+            admission.draining = True
+            with pytest.raises(DrainingError, match="no new request"):
+                async with admission.upload():
+                    pass
+            assert admission.admitted == 1
+            # A job whose body is here may still begin.
+            async with admission.working():
+                assert admission.admitted == 2
+
+    run(scenario)
+
+
 def test_a_timeout_of_the_work_itself_stays_one() -> None:
     async def scenario() -> None:
         admission = Admission(uploads=1, body_bytes=10, answer_bytes=10)

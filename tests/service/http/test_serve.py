@@ -175,6 +175,8 @@ def test_a_request_under_way_at_sigterm_completes(drained: Drained) -> None:
 def test_new_requests_after_sigterm_are_refused_and_probes_are_not(drained: Drained) -> None:
     assert drained.late[0] == 503
     assert b'"draining"' in drained.late[1]
+    # Before its body, not with those whose body has not arrived.
+    assert b"no new request is taken" in drained.late[1]
     assert drained.healthy == 200
 
 
@@ -188,6 +190,7 @@ def test_a_job_at_sigterm_completes_and_waits_to_be_fetched(drained: Drained) ->
 def test_bodies_that_have_not_arrived_at_sigterm_are_refused(drained: Drained) -> None:
     assert drained.half_sent[0] == 503
     assert b'"draining"' in drained.half_sent[1]
+    assert b"the request was ended" in drained.half_sent[1]
 
 
 @pytest.mark.parametrize("drain_seconds", ["600", "0.1"])
