@@ -8,7 +8,16 @@ from hypothesis import strategies as st
 from pns_common import Mesh, loop, pns, refine
 from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
 from pns_common.topology import EdgeClass, build_topology
-from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, rotation, soups
+from tests.support.meshes import (
+    axis_planes,
+    bent,
+    bumpy_sphere,
+    grid,
+    manifolds,
+    rotation,
+    soups,
+    tilted_plane,
+)
 from tests.support.networks import Float64Model, huge_model, random_layers, random_model
 from train.certificates.plain_loop import plain_loop
 
@@ -79,13 +88,7 @@ def test_commutes_with_rigid_motion_through_a_model_file(mesh, seed):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_planar_input_gives_loop_exactly_on_axis_aligned_planes(model):
-    vertices, faces = grid(6)
-    rng = np.random.default_rng(0)
-    for axis in range(3):
-        plane = vertices.copy()
-        plane[:, :2] += 0.1 * rng.standard_normal((len(plane), 2))
-        plane[:, 2] = rng.uniform(-5, 5)
-        mesh = Mesh(np.roll(plane, axis, axis=1), faces)
+    for mesh in axis_planes():
         for levels in (1, 3):
             refined, base = refine(mesh, pns(model), levels), refine(mesh, loop(), levels)
             np.testing.assert_array_equal(refined.mesh.vertices, base.mesh.vertices)
@@ -93,10 +96,7 @@ def test_planar_input_gives_loop_exactly_on_axis_aligned_planes(model):
 
 @given(models, st.integers(0, 2**31))
 def test_planar_input_gives_loop_in_any_orientation(model, seed):
-    rng = np.random.default_rng(seed)
-    vertices, faces = grid(5)
-    vertices[:, :2] += rng.uniform(-0.1, 0.1, (len(vertices), 2))
-    mesh = Mesh(vertices @ rotation(rng).T, faces)
+    mesh = tilted_plane(seed)
     scheme = pns(model)
     refined = refine(mesh, scheme)
     topology = build_topology(mesh.faces, len(mesh.vertices))
@@ -107,7 +107,7 @@ def test_planar_input_gives_loop_in_any_orientation(model, seed):
         topology.edge_faces[topology.interior],
     )
     length = edge_frames(stencil).length
-    delta = refined.ratio[len(vertices) :][topology.interior] * model.card.budget * length**2
+    delta = refined.ratio[len(mesh.vertices) :][topology.interior] * model.card.budget * length**2
     assert (delta < 1e-28 * length**2).all()
 
 

@@ -19,7 +19,16 @@ from pns_common.schemes import (
 )
 from pns_common.step import level_step
 from pns_common.topology import build_topology, split
-from tests.support.meshes import bent, bumpy_sphere, grid, icosphere, manifolds, rotation, soups
+from tests.support.meshes import (
+    bent,
+    bumpy_sphere,
+    grid,
+    icosphere,
+    manifolds,
+    rotation,
+    soups,
+    tilted_plane,
+)
 from tests.support.networks import SCALE_FREE_CARD, scale_free_model, vertex_model
 from tests.support.quasi_interpolation import OPEN_GATES, quasi_interpolated, with_card
 
@@ -115,10 +124,7 @@ def test_the_prior_alone_halves_the_error_on_spheres_of_any_resolution(subdivisi
 
 @given(models, st.integers(0, 2**31))
 def test_planar_input_gives_loop_in_any_orientation(model, seed):
-    rng = np.random.default_rng(seed)
-    vertices, faces = grid(5)
-    vertices[:, :2] += rng.uniform(-0.1, 0.1, (len(vertices), 2))
-    mesh = Mesh(vertices @ rotation(rng).T, faces)
+    mesh = tilted_plane(seed)
     corrected, base = (refine(mesh, scheme, 3).mesh.vertices for scheme in (pns(model), loop()))
     np.testing.assert_allclose(corrected, base, rtol=0, atol=1e-14)
 

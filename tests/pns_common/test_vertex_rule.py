@@ -14,6 +14,7 @@ from pns_common.schemes import VertexModel, vertex_operator
 from pns_common.topology import EdgeClass, build_topology, split
 from pns_common.vertex.rings import RING_10, Rings, ring_vectors
 from tests.support.meshes import (
+    axis_planes,
     bent,
     bow_tie,
     bumpy_sphere,
@@ -22,6 +23,7 @@ from tests.support.meshes import (
     manifolds,
     rotation,
     soups,
+    tilted_plane,
 )
 from tests.support.networks import CARD, Float64Model, float64_network, random_layers
 from tests.support.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
@@ -142,13 +144,7 @@ def test_commutes_with_rigid_motion(mesh, seed):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_planar_input_gives_loop_exactly_on_axis_aligned_planes(model):
-    vertices, faces = grid(6)
-    rng = np.random.default_rng(0)
-    for axis in range(3):
-        plane = vertices.copy()
-        plane[:, :2] += 0.1 * rng.standard_normal((len(plane), 2))
-        plane[:, 2] = rng.uniform(-5, 5)
-        mesh = Mesh(np.roll(plane, axis, axis=1), faces)
+    for mesh in axis_planes():
         for levels in (1, 3):
             refined, base = refine(mesh, pns(model), levels), refine(mesh, loop(), levels)
             np.testing.assert_array_equal(refined.mesh.vertices, base.mesh.vertices)
@@ -156,13 +152,10 @@ def test_planar_input_gives_loop_exactly_on_axis_aligned_planes(model):
 
 @given(models, st.integers(0, 2**31))
 def test_planar_input_gives_loop_in_any_orientation(model, seed):
-    rng = np.random.default_rng(seed)
-    vertices, faces = grid(5)
-    vertices[:, :2] += rng.uniform(-0.1, 0.1, (len(vertices), 2))
-    mesh = Mesh(vertices @ rotation(rng).T, faces)
+    mesh = tilted_plane(seed)
     refined = refine(mesh, pns(model))
     # δ ≤ C γ_v h_v², and γ_v is what the ratio cannot exceed.
-    assert refined.gate[: len(vertices)].max() * model.card.budget < 1e-28
+    assert refined.gate[: len(mesh.vertices)].max() * model.card.budget < 1e-28
 
 
 def test_faces_without_area_do_not_disturb_a_plane():

@@ -15,6 +15,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
 from .crowd import LISTENS
+from .deadline import Deadline
 from .outlet import Outlet
 from .parser import FLOODED, Parser
 from .refusal import refusal
@@ -66,8 +67,8 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         self.app = self._application
         self._shared = shared
         self._has_place = False
-        self._head_timer: asyncio.TimerHandle | None = None
-        self._end_timer: asyncio.TimerHandle | None = None
+        self._head_deadline = Deadline(self.loop, self._head_is_late)
+        self._end_deadline = Deadline(self.loop, self._abort)
         self._listens = False
         self._lingering = False
         self._linger_left = 0
@@ -93,9 +94,8 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         """Give back whatever it held."""
         self._outlet.forget()
         self._taking.forget()
-        for timer in (self._head_timer, self._end_timer):
-            if timer is not None:
-                timer.cancel()
+        self._head_deadline.stop()
+        self._end_deadline.stop()
         self._shared.turns.remove(self._more)
         self._shared.crowd.leave(self)
         super().connection_lost(exc)
@@ -129,7 +129,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         self.conn.breathe(EVENTS_A_TURN)
         super().handle_events()
         if self.conn.their_state is not h11.IDLE:
-            self._forget_head()
+            self._head_deadline.stop()
             self._say_to_crowd()
         if self.transport.is_closing():
             return
@@ -205,18 +205,11 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
     # The head
 
     def _await_head(self) -> None:
-        """Start the clock of a head, where it does not run and no request is under way."""
-        if self._head_timer is None and self.conn.their_state is h11.IDLE:
-            seconds = self._shared.bounds.head_seconds
-            self._head_timer = self.loop.call_later(seconds, self._head_is_late)
-
-    def _forget_head(self) -> None:
-        if self._head_timer is not None:
-            self._head_timer.cancel()
-            self._head_timer = None
+        """Start the clock of a head, where no request is under way."""
+        if self.conn.their_state is h11.IDLE:
+            self._head_deadline.start(self._shared.bounds.head_seconds)
 
     def _head_is_late(self) -> None:
-        self._head_timer = None
         if self.conn.trailing_data[0]:
             seconds = self._shared.bounds.head_seconds
             self._say(408, "head-timeout", f"no request within {seconds:g} seconds")
@@ -270,14 +263,14 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         self._taking.catch_up()
         self._say_to_crowd()
         if self.transport.is_closing():
-            self._abort_after(self._shared.bounds.answer.idle)
+            self._end_deadline.start(self._shared.bounds.answer.idle)
         super().resume_writing()
 
     # The end
 
     def _end(self) -> None:
         """Close; where the client may still be sending, half, until it has heard."""
-        self._forget_head()
+        self._head_deadline.stop()
         self._unset_keepalive_if_required()
         self._listens = False
         self._say_to_crowd()
@@ -285,11 +278,11 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         if self._is_heard():
             real.close()
             if not self._taking.waits:
-                self._abort_after(bounds.answer.idle)
+                self._end_deadline.start(bounds.answer.idle)
         elif not real.is_closing():
             self._lingering = True
             self._linger_left = bounds.body_bytes - self.conn.body_bytes
-            self._abort_after(bounds.linger_seconds)
+            self._end_deadline.start(bounds.linger_seconds)
             if real.can_write_eof():
                 real.write_eof()
             if not real.is_reading():
@@ -306,11 +299,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
     def eof_received(self) -> None:
         """The client sends no more; asyncio closes, once what is written is taken."""
         if not self._taking.waits:
-            self._abort_after(self._shared.bounds.answer.idle)
-
-    def _abort_after(self, seconds: float) -> None:
-        if self._end_timer is None:
-            self._end_timer = self.loop.call_later(seconds, self._abort)
+            self._end_deadline.start(self._shared.bounds.answer.idle)
 
     def _abort(self) -> None:
         self._outlet.real.abort()

@@ -11,6 +11,7 @@ import pytest
 
 from service.http.addresses import is_named, site
 from service.http.connection.crowd import Crowd
+from service.http.connection.deadline import Deadline
 from service.http.connection.outlet import Outlet
 from service.http.connection.pace import Pace
 from service.http.connection.parser import BYTES_A_PIECE, FREE_PIECES, Parser
@@ -35,6 +36,25 @@ def test_a_client_may_be_late_but_not_slow(moved, waited, patience, excuse):
     assert PACE.patience(moved, waited) == patience
     if excuse is not None:
         assert PACE.excuse(moved, waited) == excuse
+
+
+def test_a_deadline_comes_once_unless_it_is_stopped_and_may_run_again():
+    async def scenario():
+        came = []
+        deadline = Deadline(asyncio.get_running_loop(), lambda: came.append(1))
+        deadline.start(0)
+        deadline.start(0)
+        await asyncio.sleep(0.001)
+        first = len(came)
+        deadline.start(0)
+        deadline.stop()
+        await asyncio.sleep(0.001)
+        stopped = len(came)
+        deadline.start(0)
+        await asyncio.sleep(0.001)
+        return first, stopped, len(came)
+
+    assert asyncio.run(scenario()) == (1, 1, 2)
 
 
 def events(parser, most):
