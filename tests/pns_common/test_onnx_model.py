@@ -195,6 +195,20 @@ def test_a_graph_that_breaks_off_while_running_is_an_error_of_the_model():
         refine(Mesh(*bumpy_sphere()), pns(model))
 
 
+def test_what_onnxruntime_has_no_kernel_for_is_refused_before_it_is_asked():
+    """Allowed, valid, and the numbers are there: but not of this operator in this precision."""
+    nodes = [
+        helper.make_node("Cast", ["three"], ["wide"], to=onnx.TensorProto.DOUBLE),
+        helper.make_node("Erf", ["wide"], ["made"]),
+        helper.make_node("Cast", ["made"], ["correction"], to=onnx.TensorProto.FLOAT),
+    ]
+    data = model_bytes(through(*nodes), CUT)
+    with pytest.raises(ModelError, match="Erf") as refusal:
+        model_from_bytes(data, "double", open_session)
+    assert refusal.value.expected == "a graph that onnxruntime runs"
+    assert model_from_bytes(data, "double", open_network).size == len(data)
+
+
 def test_a_rows_bits_depend_on_nothing_but_the_row():
     model = random_model(0)
     features = np.random.default_rng(0).uniform(-2, 2, (3 * CALL_ROWS + 17, 5))

@@ -12,13 +12,13 @@ import DracoPy
 import numpy as np
 from jaxtyping import Shaped
 
-from ...errors import GltfError
+from ...errors import GltfError, LimitError
 from ...options import Limits
 from ..constants import COMPONENT_COUNTS, COMPONENT_TYPES, UNSIGNED_INT
 from .draco_header import read_header
 from .extensions import withdraw
 from .memory_cap import memory_cap
-from .plan import check_decoded, over_memory
+from .plan import check_decoded
 from .schema import Document, Index, Part, Primitive, checked
 
 EXTENSION = "KHR_draco_mesh_compression"
@@ -101,7 +101,12 @@ def _decode(
         with memory_cap(need + SLACK):
             mesh = DracoPy.decode(data)
     except MemoryError as error:
-        raise over_memory(limits.max_memory_bytes, need + SLACK) from error
+        raise LimitError(
+            f"the Draco data take more than {need + SLACK} bytes, which their header accounts for",
+            limit="memory",
+            allowed=need + SLACK,
+            found=need + SLACK + 1,
+        ) from error
     except (DracoPy.FileTypeException, TypeError, ValueError) as error:
         raise GltfError(f"the data do not decode: {error}", pointer=here) from error
     faces = getattr(mesh, "faces", None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...errors import LimitError, UnrefinableError, check_limit
+from ...errors import UnrefinableError, check_limit
 from ...options import BYTES_PER_INPUT_BYTE, Limits
 from .accessors import element_size
 from .modes import SURFACES, triangle_count
@@ -95,16 +95,6 @@ def check_decoded(decoded: int, size: int, limits: Limits) -> None:
 def check_memory(needed: int, limits: Limits) -> None:
     """Check bytes that work will take, before it takes them. Raises LimitError."""
     check_limit("memory", needed, limits.max_memory_bytes, f"the work would take {needed} bytes")
-
-
-def over_memory(allowed: int, needed: int) -> LimitError:
-    """The error of work that took more memory than was predicted."""
-    return LimitError(
-        f"the work would take {needed} bytes, more than {allowed}",
-        limit="memory",
-        allowed=allowed,
-        found=needed,
-    )
 
 
 def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, levels: int) -> int:

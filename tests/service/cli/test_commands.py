@@ -15,12 +15,33 @@ import trimesh
 
 from pns_common.onnx_model import DEFAULT_MODEL, bundled_models, load_model
 from pns_common.stencils import limit_ring_weight
+from service import cli
+from service.__main__ import main
 from service.gltf.read.container import read_glb
 from service.http.access import keys
 from service.meshfiles.example import part_glb
 from tests.service.cli.trees import FACES, tree_of
 from tests.support.meshes import icosphere
 from tests.support.networks import vertex_model_bytes
+
+
+@pytest.mark.parametrize(
+    ("lost", "error", "text"),
+    [
+        ("pns_common.gone", ModuleNotFoundError, "no module"),
+        ("service.gone", ModuleNotFoundError, "no module"),
+        ("typer", SystemExit, "typer is missing: pip install"),
+    ],
+)
+def test_only_what_others_make_can_be_missing(
+    monkeypatch: pytest.MonkeyPatch, lost: str, error: type[BaseException], text: str
+) -> None:
+    def loses_a_module() -> None:
+        raise ModuleNotFoundError("no module", name=lost)
+
+    monkeypatch.setattr(cli, "main", loses_a_module)
+    with pytest.raises(error, match=text):
+        main()
 
 
 def test_a_model_is_a_name_or_a_file_and_the_name_wins(

@@ -122,8 +122,9 @@ def test_while_draining_no_upload_begins_and_what_has_begun_goes_on() -> None:
 def test_a_timeout_of_the_work_itself_stays_one() -> None:
     async def scenario() -> None:
         admission = Admission(uploads=1, body_bytes=10, answer_bytes=10)
-        with pytest.raises(TimeoutError):
-            async with admission.working(), asyncio.timeout(0):
-                await asyncio.sleep(60)
+        for held in (admission.upload(), admission.working(), admission.answering(1)):
+            with pytest.raises(TimeoutError):
+                async with held, asyncio.timeout(0):
+                    await asyncio.sleep(60)
 
     run(scenario)

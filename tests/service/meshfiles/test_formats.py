@@ -45,6 +45,15 @@ def test_written_and_read_again_is_the_same_surface(kind: str) -> None:
     assert (again.uv is not None) == (kind == "obj")
 
 
+def test_memory_that_runs_out_is_no_fault_of_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    def takes_too_much(*_: object, **__: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(formats.load_readers(), "load_scene", takes_too_much)
+    with pytest.raises(MemoryError):
+        formats.read(formats.write(part(), "ply"), "ply")
+
+
 def test_an_obj_of_many_materials_is_the_same_surface_as_one_of_few() -> None:
     # trimesh alone would take minutes: its time grows with the square of their number.
     whole = formats.read(formats.write(part(), "obj"), "obj")

@@ -1,4 +1,4 @@
-"""The desk: when jobs would start at once."""
+"""The desk: when jobs would start at once, and which are not worth waiting for."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, cast
 
+import pytest
+
+from service.errors import BusyError
 from service.workers.budget import FacesBudget
 from service.workers.desk import Desk
 from service.workers.job import State
@@ -62,6 +66,55 @@ def test_a_killed_worker_of_the_short_lane_does_not_take_the_service_away() -> N
             while short.ready:
                 await asyncio.sleep(0.005)
             assert desk.ready
+
+    run(scenario)
+
+
+class AtOnce:
+    """Workers that do what they are told where they are told."""
+
+    async def run(self, function: Callable[[Work], Any], work: Work, **_: object) -> Any:
+        return function(work)
+
+
+def desk_with_a_line(seconds: float) -> Desk:
+    """One whose workers are busy, with a job of so many seconds."""
+    now = AtOnce()
+    desk = desk_of(cast(Workers, now), cast(Workers, now), short_seconds=0.5)
+    desk.turns.join("another", seconds)
+    assert desk.running == 1
+    return desk
+
+
+async def refused(desk: Desk, seconds: float) -> BusyError:
+    """What a job of a second is told, that is to be done within so many."""
+    with MemoryFile() as answer:
+        job = job_of(b"", answer, seconds=seconds)
+        with pytest.raises(BusyError) as refusal:
+            await desk.serve(job)
+        assert (job.state, job.error) == (State.FAILED, refusal.value)
+        assert job.body.closed
+    return refusal.value
+
+
+def test_a_job_that_would_come_too_late_is_told_before_it_waits() -> None:
+    async def scenario() -> None:
+        desk = desk_with_a_line(100)
+        told = await refused(desk, 60)
+        assert "too long" in told.detail
+        assert told.retry_after >= 100
+        assert (desk.waiting, desk.running) == (0, 1)
+
+    run(scenario)
+
+
+def test_a_job_whose_turn_does_not_come_in_time_leaves_the_line() -> None:
+    async def scenario() -> None:
+        desk = desk_with_a_line(100)
+        desk.turns.join("another", 0.5, counted=False)
+        assert desk.running == 2
+        assert "in time" in (await refused(desk, 0)).detail
+        assert (desk.waiting, desk.running) == (0, 2)
 
     run(scenario)
 

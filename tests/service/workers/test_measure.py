@@ -8,6 +8,8 @@ import zipfile
 import numpy as np
 import pytest
 
+from service.bodies.multipart import MAX_PARTS
+from service.errors import LimitError
 from service.options import BYTES_PER_INPUT_BYTE, Limits, Options
 from service.workers.costs import Cost, cost_of
 from service.workers.jobs import GLANCE_BYTES, Work, measure
@@ -109,7 +111,20 @@ def test_an_archive_too_large_for_a_glance_is_taken_for_the_largest() -> None:
     with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr("a.gltf", b"{" + bytes(GLANCE_BYTES // BYTES_PER_INPUT_BYTE) + b"}")
     limits = Limits(max_faces=1000)
+    assert measured(content.getvalue(), "application/zip", limits).faces == 1000
+
+
+def test_a_form_of_too_many_parts_is_refused_at_a_glance() -> None:
+    part = b'--X\r\nContent-Disposition: form-data; name="%d"\r\n\r\n\r\n'
+    form = b"".join(part % number for number in range(MAX_PARTS + 1)) + b"--X--\r\n"
+    with pytest.raises(LimitError) as refusal:
+        measured(form, "multipart/form-data; boundary=X")
+    assert refusal.value.limit == "parts"
+
+
+def measured(content: bytes, kind: str, limits: Limits | None = None) -> Cost:
+    """The cost of a body, as the worker of short jobs measures it."""
     with MemoryFile() as body, MemoryFile() as page:
-        body.append(content.getvalue())
-        work = Work(body.name, None, None, page.name, "application/zip", Options(), None, limits)
-        assert measure(work).faces == 1000
+        body.append(content)
+        limits = limits or Limits()
+        return measure(Work(body.name, None, None, page.name, kind, Options(), None, limits))

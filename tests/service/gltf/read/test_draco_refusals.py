@@ -4,12 +4,15 @@ import DracoPy
 import numpy as np
 import pytest
 
-from service.errors import GltfError
+from service.errors import GltfError, LimitError
+from service.gltf.read.draco import SLACK
 from service.gltf.read.draco_header import read_header
 from tests.fuzz.seeds import draco
 from tests.service.gltf.read.refused import refine
 from tests.support.gltf import files
 
+# Making it asks the decoder which number it gave to what.
+STORED = draco()
 PRIMITIVE = "/meshes/0/primitives/0"
 EXTENSION = f"{PRIMITIVE}/extensions/KHR_draco_mesh_compression"
 
@@ -86,6 +89,34 @@ def test_points_alone_hold_no_triangle():
     cloud = DracoPy.encode(points)
     with pytest.raises(GltfError, match="no Draco mesh"):
         read_header(cloud, "")
+
+
+def test_data_without_a_triangle_are_told():
+    data = DracoPy.encode(np.eye(3), np.array([[0, 1, 2]], np.uint32), compression_level=0)
+    # Sequentially: the count of faces, of points, a method, and three indices of a byte.
+    assert (data[11], data[12]) == (1, 3)
+    empty = data[:11] + b"\0" + data[12:13] + data[16:]
+    tree, _ = draco()
+    tree["meshes"], tree["nodes"] = tree["meshes"][:1], tree["nodes"][:1]
+    tree["scenes"] = [{"nodes": [0]}]
+    tree["bufferViews"] = [{"buffer": 0, "byteLength": len(empty)}]
+    tree["buffers"] = [{"byteLength": len(empty)}]
+    with pytest.raises(GltfError, match="hold no triangle") as caught:
+        refine(files.pack(tree, empty))
+    assert caught.value.pointer == EXTENSION
+
+
+def test_a_decoder_that_takes_more_than_was_counted_meets_a_limit(monkeypatch):
+    def takes_more(data):
+        raise MemoryError
+
+    monkeypatch.setattr(DracoPy, "decode", takes_more)
+    tree, packed = STORED
+    with pytest.raises(LimitError, match="header accounts for") as caught:
+        refine(files.pack(tree, packed))
+    assert caught.value.limit == "memory"
+    # Of a box, hardly more than what the allocator may reserve.
+    assert SLACK < caught.value.allowed < SLACK + 2**20
 
 
 def test_metadata_nest_so_deep_and_no_deeper():

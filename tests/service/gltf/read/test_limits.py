@@ -20,6 +20,8 @@ from tests.support.gltf import files
 from tests.support.gltf.shapes import box, octahedron
 from tests.support.networks import random_model
 
+LOUD = random_model(0, scale=30.0)
+
 
 def test_predicted_faces_are_checked_at_the_limit():
     data = files.glb([octahedron()], [octahedron(), octahedron()])
@@ -89,6 +91,15 @@ def test_positions_that_leave_float32_are_refused():
     with pytest.raises(UnrefinableError) as refusal:
         subdivide_gltf(
             files.glb([shape]), "glb", Options(budget=1e4, levels=2), random_model(0), Limits()
+        )
+    assert refusal.value.pointer == "/meshes/0"
+
+
+def test_positions_that_leave_what_can_be_computed_with_are_refused():
+    """An edge of 10³⁰ lets the next level move its vertex by 10⁶⁰ and more."""
+    with pytest.raises(UnrefinableError, match="too large") as refusal:
+        subdivide_gltf(
+            files.glb([octahedron()]), "glb", Options(budget=1e30, levels=3), LOUD, Limits()
         )
     assert refusal.value.pointer == "/meshes/0"
 
