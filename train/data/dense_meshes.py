@@ -130,21 +130,22 @@ def read_mesh(path: Path) -> Mesh:
     Raises:
         MeshError: it cannot be read, or has no triangles.
     """
-    if path.suffix.lower() == ".npz":
-        return _read_arrays(path)
+    read = _arrays_of_numpy if path.suffix.lower() == ".npz" else _arrays_of_scene
     try:
-        # Coordinates that are no numbers are refused just below.
-        with np.errstate(invalid="ignore"):
-            scene = trimesh.load_scene(path, process=False, skip_materials=True).to_mesh()
+        vertices, faces = read(path)
     except Exception as error:  # on a broken file these readers fail as it comes
         raise MeshError("it cannot be read", element="file") from error
-    return welded(Mesh(scene.vertices, scene.faces))
+    return welded(Mesh(vertices, faces))
 
 
-def _read_arrays(path: Path) -> Mesh:
-    try:
-        with np.load(path) as arrays:
-            vertices, faces = arrays["vertices"], arrays["faces"]
-    except (OSError, ValueError, KeyError) as error:
-        raise MeshError("it cannot be read", element="file") from error
-    return welded(Mesh(vertices.astype(np.float64), faces))
+def _arrays_of_scene(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    # Coordinates that are no numbers are refused by the mesh.
+    with np.errstate(invalid="ignore"):
+        scene = trimesh.load_scene(path, process=False, skip_materials=True).to_mesh()
+    return scene.vertices, scene.faces
+
+
+def _arrays_of_numpy(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    # Opened here: of a broken archive numpy leaves the file open.
+    with path.open("rb") as file, np.load(file) as arrays:
+        return arrays["vertices"], arrays["faces"]

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from service.cli import app
-from service.errors import InvalidParameter
+from service.errors import InvalidParameter, NoModelError
 from service.meshfiles.convert import converted
 from service.options import Limits, Options
 from service.scale.batch import batch_work, work_hash
@@ -30,6 +30,7 @@ from tests.service.scale.libraries import (
     refined,
     rows,
 )
+from tests.support.networks import breaking_off_bytes
 
 
 def test_each_file_is_what_subdivide_makes_of_it(tmp_path):
@@ -139,6 +140,38 @@ def test_a_fault_of_ours_is_told_and_the_rest_goes_on(tmp_path, monkeypatch):
     batch = batch_of(tmp_path)
     assert refined(batch).failures == [("internal-error", 1)]
     assert "ZeroDivisionError: ours" in rows(batch)["a.obj"]["detail"]
+
+
+def test_what_a_model_cannot_do_is_the_row_of_its_file(tmp_path):
+    library(tmp_path / "in", ["a.obj"])
+    breaks = tmp_path / "breaks.onnx"
+    breaks.write_bytes(breaking_off_bytes())
+    batch = batch_of(tmp_path, options=Options(), model=str(breaks))
+    assert refined(batch).failures == [("unrefinable", 1)]
+    assert "runs to its end" in rows(batch)["a.obj"]["detail"]
+
+
+def test_a_model_that_is_gone_is_told_before_the_work_and_by_each_file(tmp_path):
+    source = library(tmp_path / "in", ["a.obj"])
+    gone = str(tmp_path / "gone.onnx")
+    with pytest.raises(NoModelError, match="gone"):
+        refined(batch_of(tmp_path, options=Options(), model=gone))
+    task = Task(
+        str(source / "a.obj"), str(tmp_path / "o.obj"), "obj", "obj", Options(), gone, Limits()
+    )
+    assert (run(task).status, run(task).code) == ("failed", "no-model")
+
+
+def test_memory_that_runs_out_costs_its_file_alone(tmp_path, monkeypatch):
+    library(tmp_path / "in", ["a.obj"])
+
+    def takes_too_much(*_):
+        raise MemoryError
+
+    monkeypatch.setattr("service.meshfiles.formats.read", takes_too_much)
+    batch = batch_of(tmp_path)
+    assert refined(batch).failures == [("limit-exceeded", 1)]
+    assert f"{Limits().max_memory_bytes} bytes" in rows(batch)["a.obj"]["detail"]
 
 
 def test_workers_that_die_or_hang_cost_their_file_alone(tmp_path):

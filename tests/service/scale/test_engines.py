@@ -72,12 +72,19 @@ def test_of_a_chunk_whose_worker_dies_the_task_it_was_at_is_to_blame(tmp_path, m
     assert [len(task.processes) for task in all_tasks[4:]] == [1, 1]
 
 
+class TaskError(RuntimeError):
+    """As Ray wraps what a task raised."""
+
+    def as_instanceof_cause(self):
+        return ZeroDivisionError("ours")
+
+
 class Cluster:
     """Stands in for Ray, connected: does what it is sent when it is asked for it."""
 
     class exceptions:  # noqa: N801
         RayError = RuntimeError
-        RayTaskError = type("RayTaskError", (RuntimeError,), {})
+        RayTaskError = TaskError
 
     is_initialized = staticmethod(lambda: True)
     cluster_resources = staticmethod(lambda: {"CPU": 1})
@@ -112,6 +119,22 @@ def test_of_a_chunk_that_a_cluster_loses_each_task_goes_alone(tmp_path, monkeypa
     engine = on_ray.on_ray(work, None, 1)
     done = [result for results in engine(iter(tasks(tmp_path, 6))) for result in results]
     assert sorted(done) == [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
+
+
+def test_a_fault_of_a_task_on_a_cluster_is_raised_as_it_was(tmp_path, monkeypatch):
+    def breaks(task):
+        raise Cluster.exceptions.RayTaskError
+
+    monkeypatch.setitem(sys.modules, "ray", Cluster())
+    engine = on_ray.on_ray(Work(breaks, never, 2, None), None, 1)
+    with pytest.raises(ZeroDivisionError, match="ours"):
+        list(engine(iter(tasks(tmp_path, 1))))
+
+
+def test_without_ray_its_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(InvalidParameter, match=r"pns-subdivision\[ray\]"):
+        on_ray.on_ray(Work(str, never, 2, None), None, 1)
 
 
 def test_small_tasks_fill_a_chunk_and_long_ones_go_alone():

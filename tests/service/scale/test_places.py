@@ -1,8 +1,10 @@
 """File systems elsewhere: what goes wrong there is told with the name of the file."""
 
+import errno
+
 import pytest
 
-from service.scale.places import Place
+from service.scale.places import Place, place_of
 
 
 class ForeignError(Exception):
@@ -39,6 +41,12 @@ def test_an_error_of_a_library_names_its_file(act):
     with pytest.raises(OSError, match="ForeignError: no route") as refusal:
         act(Place(Broken(), "a/b.obj"))
     assert refusal.value.filename == "far://a/b.obj"
+
+
+def test_an_error_of_this_machine_is_its_own(tmp_path):
+    with pytest.raises(IsADirectoryError) as refusal:
+        place_of(str(tmp_path)).read()
+    assert refusal.value.errno == errno.EISDIR
 
 
 def test_what_nobody_can_reach_is_not_taken_to_be_gone():

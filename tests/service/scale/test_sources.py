@@ -3,6 +3,7 @@
 import json
 import os
 import socket
+import sys
 import threading
 import tracemalloc
 from functools import partial
@@ -122,6 +123,23 @@ def test_a_manifest_that_is_none_is_told(tmp_path, name, text):
     (tmp_path / name).write_bytes(text)
     with pytest.raises(InvalidParameter, match=name):
         list(items_of(str(tmp_path / name), KINDS)())
+
+
+def test_a_file_that_is_neither_mesh_nor_manifest_is_told(tmp_path):
+    (tmp_path / "list.lst").write_text("a.obj\n")
+    with pytest.raises(InvalidParameter, match="a manifest's name ends in"):
+        items_of(str(tmp_path / "list.lst"), KINDS)
+
+
+def test_a_parquet_manifest_needs_a_column_of_paths_and_what_reads_it(tmp_path, monkeypatch):
+    arrow = pytest.importorskip("pyarrow", reason="the extra [ray] is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet.write_table(arrow.table({"size": [1]}), tmp_path / "list.parquet")
+    with pytest.raises(InvalidParameter, match="no column 'path'"):
+        list(items_of(str(tmp_path / "list.parquet"), KINDS)())
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    with pytest.raises(InvalidParameter, match=r"pns-subdivision\[ray\]"):
+        list(items_of(str(tmp_path / "list.parquet"), KINDS)())
 
 
 def test_a_parquet_row_without_a_path_is_told(tmp_path):

@@ -19,6 +19,7 @@ from train.data.dense_meshes import (
     dense_asset,
     is_manifold,
     largest_part,
+    read_mesh,
     welded,
 )
 
@@ -181,3 +182,14 @@ def test_the_dense_shared_meshes_are_taken():
     np.testing.assert_allclose(
         np.sort(taken["spot"].mesh.vertices, axis=0), np.sort(again.vertices, axis=0), atol=1e-12
     )
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\3\4", b"no arrays"])
+def test_an_archive_of_arrays_that_is_none_is_told(tmp_path, content):
+    path = tmp_path / "mesh.npz"
+    path.write_bytes(content)
+    with pytest.raises(MeshError, match="cannot be read"):
+        read_mesh(path)
+    np.savez(path, vertices=SPHERE[0])
+    with pytest.raises(MeshError, match="cannot be read"):
+        read_mesh(path)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pns_common.errors import MeshError
 from pns_common.mesh import Mesh
 from train.data.primitives import icosphere
 from train.data.simplifiers import SIMPLIFIERS, clustered, fast_quadric, simplified
@@ -36,5 +37,9 @@ def test_is_left_out_where_the_target_is_missed_or_little_hangs_together():
 
 
 def test_clustering_that_leaves_nothing_is_left_out():
-    sliver = Mesh(np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-9, 0]]), np.array([[0, 1, 2]]))
-    assert simplified(sliver, clustered, 5) is None
+    """Two specks far apart: whatever the grid, each of them lies in two cells at the most."""
+    speck = 1e-6 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    specks = Mesh(np.concatenate([speck, [1, 0, 0] - speck]), np.arange(6).reshape(2, 3))
+    with pytest.raises(MeshError, match="leaves nothing"):
+        clustered(specks, 5)
+    assert simplified(specks, clustered, 5) is None

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 import train.experiments.command as command
 import train.run
+from pns_common.errors import MeshError
 from train.data.datasets import DATASETS
 from train.experiments.harness.experiment import Column, Experiment, Figure, Outcome, Table
 from train.experiments.harness.laboratory import FULL, SMALL, Laboratory
@@ -185,6 +186,20 @@ def test_the_command_refuses_what_it_cannot_do(tmp_path, monkeypatch, counting, 
     everything = runner.invoke(train.run.app, ["reproduce", *output])
     assert everything.exit_code == 0
     assert counting.runs == 1
+
+
+def test_what_an_experiment_cannot_use_is_told_and_ends_the_command(
+    tmp_path, monkeypatch, experiment
+):
+    def cannot(laboratory):
+        raise MeshError("no file that can be used", element="folder")
+
+    cannot.__module__ = Counting.__module__
+    monkeypatch.setattr(command, "EXPERIMENTS", {"cannot": replace(experiment, run=cannot)})
+    arguments = ["reproduce", "cannot", "--output", str(tmp_path)]
+    outcome = CliRunner().invoke(train.run.app, arguments)
+    assert outcome.exit_code == 1
+    assert "folder: no file that can be used" in outcome.output
 
 
 @pytest.mark.spawning

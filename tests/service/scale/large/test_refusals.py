@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, MeshError
+from pns_common.pieces import ThinHaloError
 from service.errors import (
     InvalidParameter,
     LimitError,
+    NoModelError,
     UnreadableError,
     UnrefinableError,
 )
+from service.options import Options
 from service.scale.large import part, room
 from service.scale.large.arrays import open_mesh, reserve
 from service.scale.large.formats import output_kind
@@ -84,6 +87,34 @@ def test_a_part_that_cannot_be_refined_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(part, "refine_piece", too_large)
     with pytest.raises(UnrefinableError, match="part 0: refined coordinates"):
         refined(arrays(tmp_path / "in", many_kinds()), tmp_path / "out", 1)
+
+
+def test_a_part_that_stays_uncertain_ends_with_all_of_the_mesh_around_it(tmp_path, monkeypatch):
+    seen = []
+
+    def never_certain(piece, *_):
+        seen.append(len(piece.faces))
+        raise ThinHaloError(0, 1)
+
+    monkeypatch.setattr(part, "refine_piece", never_certain)
+    source = arrays(tmp_path / "in", Mesh(*grid(16, bent)))
+    with pytest.raises(UnrefinableError, match="not certain"):
+        refined(source, tmp_path / "out", 2, Options(levels=1), model="general")
+    # Of a part, and of more and more around it.
+    assert seen == sorted(set(seen))
+    assert seen[-1] == 2 * 15**2
+
+
+def test_a_model_that_is_gone_is_told(tmp_path):
+    source = arrays(tmp_path / "in", Mesh(*grid(3, bent)))
+    with pytest.raises(NoModelError, match="gone"):
+        refined(source, tmp_path / "out", 1, Options(), model=str(tmp_path / "gone.onnx"))
+
+
+def test_a_tile_beyond_single_precision_is_told(tmp_path):
+    far = Mesh(1e39 * np.eye(3), np.array([[0, 1, 2]]))
+    with pytest.raises(UnrefinableError, match="float32"):
+        refined(arrays(tmp_path / "in", far), tmp_path / "out.3dtiles", 1)
 
 
 def test_a_disk_that_is_too_small_is_told_before_any_part_is_done(tmp_path, monkeypatch):

@@ -145,6 +145,17 @@ def test_a_disk_that_fills_while_room_is_taken_is_empty_again(tmp_path, monkeypa
     assert (tmp_path / "file").stat().st_size == 0
 
 
+def test_a_disk_that_breaks_is_not_called_full(tmp_path, monkeypatch):
+    def breaks(*_):
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr("os.posix_fallocate", breaks, raising=False)
+    (tmp_path / "file").touch()
+    with pytest.raises(OSError, match="Input/output") as refusal:
+        reserve(tmp_path / "file", 1000)
+    assert refusal.value.errno == errno.EIO
+
+
 def test_room_that_is_not_there_is_not_asked_for(tmp_path, monkeypatch):
     asked = []
     monkeypatch.setattr("os.posix_fallocate", lambda *size: asked.append(size), raising=False)
