@@ -6,7 +6,7 @@
 
     the default model's (format 3), by ``correct_scale_free``:
 
-        q = q0 + γ Π_ρ(D + τ h F z(φ))      ‖z‖ ≤ 1,  ρ = C h² / R
+        q = q0 + γ Π_ρ(D + τ ℓ F z(φ))      ‖z‖ ≤ 1,  ρ = C h² / R
 
     γ = tanh(c x²),  x = 1 − n1 · n2
 
@@ -30,6 +30,7 @@ from jaxtyping import Bool, Float
 from pns_common.arrays import Array, as_numpy, namespace, norm
 from pns_common.edge.frames import EdgeFrames, EdgeStencil, edge_frames, rotate
 from pns_common.errors import ModelError
+from pns_common.thin_faces import longest_side
 
 # Features (N, K) -> local vectors (N, 3), η for C / R = 1, or z; shortened to length 1 afterwards.
 Network = Callable[[Array], Array]
@@ -115,14 +116,16 @@ def correct_scale_free(
     gate: Gate,
     budget_per_length: BudgetPerLength,
     frames_of: Callable[[EdgeStencil], EdgeFrames],
-    network_scale: float,
+    asked: Float[Array, " N"],
     prior: Float[Array, "N 3"],
+    wide_bound: bool,
 ) -> Correction:
-    """δ = γ Π_ρ(D + τ h F z(φ)), ρ = h² C / R, for interior edges.
+    """δ = γ Π_ρ(D + τ ℓ F z(φ)), ρ = h² C / R, for interior edges.
 
-    It is equation 1 with η = Π_C(R (Fᵀ D + τ h z) / h²) / R: the bound is the same, and the network
+    It is equation 1 with η = Π_C(R (Fᵀ D + τ ℓ z) / h²) / R: the bound is the same, and the network
     speaks in units of h, so what it says holds at every resolution. ``budget_per_length`` is C / R,
-    ``network_scale`` is τ, ``prior`` is D.
+    ``asked`` is τ ℓ, ``prior`` is D. Beside thin faces ℓ is shorter than h, and with a
+    ``wide_bound`` h is h̄ (thin_faces.py).
 
     Raises:
         ModelError: the network returned something that is not finite, or of another shape.
@@ -130,8 +133,9 @@ def correct_scale_free(
     frames = frames_of(stencil)
     gamma = gate(frames)
     z = project_to_ball(where_open(network, features(stencil, frames), gamma, like=stencil.a))
-    wanted = prior + (network_scale * frames.length)[:, None] * rotate(frames, z)
-    envelope = budget_per_length * frames.length**2
+    wanted = prior + asked[:, None] * rotate(frames, z)
+    length = longest_side(stencil, frames) if wide_bound else frames.length
+    envelope = budget_per_length * length**2
     displacement = gamma[:, None] * shortened(wanted, envelope)
     return Correction(displacement, envelope, gamma, frames.degenerate)
 

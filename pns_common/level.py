@@ -15,6 +15,7 @@ from pns_common.correction import BudgetPerLength
 from pns_common.edge.frames import face_normals
 from pns_common.placement import Placement
 from pns_common.prior import normal_pushes
+from pns_common.thin_faces import NetworkLengths, network_lengths
 from pns_common.topology import Topology
 from pns_common.vertex.rings import Rings
 
@@ -56,6 +57,17 @@ class ControlLevel:
     def pushes(self) -> Float[Array, "V 3"]:
         """d_v of the prior at s = 1, likewise."""
         return normal_pushes(self.rings)
+
+    def network_lengths(self, altitudes: float | None) -> NetworkLengths:
+        """ℓ of the scale-free rules, which have one α for both: computed once."""
+        known = self._lengths.get(altitudes)
+        if known is None:
+            known = self._lengths[altitudes] = network_lengths(self.rings, altitudes)
+        return known
+
+    @cached_property
+    def _lengths(self) -> dict[float | None, NetworkLengths]:
+        return {}
 
 
 def control_level(

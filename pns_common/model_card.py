@@ -21,7 +21,7 @@ CARD_KEY = "pns_card"
 FORMAT, VERTEX_FORMAT, SCALE_FREE_FORMAT = 1, 2, 3
 FORMATS = (FORMAT, VERTEX_FORMAT, SCALE_FREE_FORMAT)
 SCALE_FREE_FIELDS = ("learned_levels", "prior_strength", "network_scale", "fold_angle")
-OPTIONAL_FIELDS = ("boundary_strength", "side_gates")
+OPTIONAL_FIELDS = ("boundary_strength", "side_gates", "network_altitudes", "wide_bound")
 MOST_LEARNED_LEVELS = 16
 
 
@@ -48,6 +48,10 @@ class ModelCard:
         boundary_strength: b ≥ 0 of the boundary's prior; None leaves boundaries to Loop.
         side_gates: whether an edge's gate reads the sides of its two faces beside their normals;
             None is false.
+        network_altitudes: α > 0, the longest that τ's unit may be, in altitudes of an edge's
+            thinner face; None counts edge lengths alone.
+        wide_bound: whether h of an edge's bound is the longest edge of its two faces; None is
+            false.
     """
 
     format: int
@@ -65,6 +69,8 @@ class ModelCard:
     fold_angle: float | None = None
     boundary_strength: float | None = None
     side_gates: bool | None = None
+    network_altitudes: float | None = None
+    wide_bound: bool | None = None
 
     def to_json(self) -> str:
         """The card as JSON, keys in the order of the attributes; without those that are None."""
@@ -185,6 +191,9 @@ def _scale_free_problem(card: ModelCard) -> str | None:
         return f"network_scale {scale}, not a finite number > 0"
     if boundary is not None and not (math.isfinite(boundary) and boundary >= 0):
         return f"boundary_strength {boundary}, not a finite number ≥ 0"
+    altitudes = card.network_altitudes
+    if altitudes is not None and not (math.isfinite(altitudes) and altitudes > 0):
+        return f"network_altitudes {altitudes}, not a finite number > 0"
     if not 0 < angle < 90:
         return f"fold_angle {angle}, not between 0 and 90 degrees"
     return None

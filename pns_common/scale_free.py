@@ -1,8 +1,9 @@
 """The rules of models of format 3: a fixed prior and a network that speaks in units of h.
 
-    q  = q0 + γ   Π_ρ(D_e + τ h   F z(φ))          ‖z‖ ≤ 1, ρ = C h² / R
-    p' = p0 + γ_v Π_ρ(D_v + τ h_v Σ z_i e_i)       h_v the root mean square of the spokes
+    q  = q0 + γ   Π_ρ(D_e + τ ℓ_e F z(φ))          ‖z‖ ≤ 1, ρ = C h² / R
+    p' = p0 + γ_v Π_ρ(D_v + τ ℓ_v Σ z_i e_i)       h_v the root mean square of the spokes
 
+ℓ is h, but shorter beside thin faces (thin_faces.py), where the form says so.
 They act at the first K levels, are followed by the fold guard, and Loop takes over after them.
 Where the form has a boundary strength, boundary vertices and edges get Π_ρ of a prior of their own,
 made of the boundary alone; where it has none they are Loop's.
@@ -50,6 +51,7 @@ class ScaleFreeEdgeRule:
         fields = self.operator.features.fields(level.rings)
         pushes, strength = level.pushes, self.form.prior_strength
         of_boundary = None if self.boundary is None else self.boundary.pushes(level)
+        lengths = level.network_lengths(self.form.network_altitudes).at_edges
         bends = None
         if self.form.side_gates:
             bends = face_bends(level.rings.edge_jumps, topology)
@@ -61,8 +63,11 @@ class ScaleFreeEdgeRule:
             if of_boundary is not None:
                 prior = prior + _at_edges(of_boundary, topology, edges)
             budget_per_length = level.budget_per_length(topology.edges[edges, 0], self.form.budget)
-            scale, gate = self.form.network_scale, self._gate(bends, topology, edges)
-            return self.operator.correct_scale_free(stencil, budget_per_length, scale, prior, gate)
+            asked = self.form.network_scale * gather(lengths, edges)
+            gate, wide = self._gate(bends, topology, edges), self.form.wide_bound
+            return self.operator.correct_scale_free(
+                stencil, budget_per_length, asked, prior, gate, wide
+            )
 
         made = correct_in_blocks(level.blocks, len(interior), correct)
         placed = with_correction(base, interior, made)
@@ -100,9 +105,9 @@ class ScaleFreeVertexRule:
             of_boundary = loop_vertex_vertices(self.boundary.pushes(level), level.topology)
             prior = prior + gather(of_boundary, rows)
         budget_per_length = level.budget_per_length(rows, self.form.budget)
-        made = self.operator.correct_scale_free(
-            level.rings, rows, budget_per_length, self.form.network_scale, prior
-        )
+        lengths = level.network_lengths(self.form.network_altitudes).at_vertices
+        asked = self.form.network_scale * gather(lengths, rows)
+        made = self.operator.correct_scale_free(level.rings, rows, budget_per_length, asked, prior)
         placed = replace(with_correction(base, rows, made), corrected=smooth)
         return placed if self.boundary is None else self.boundary.move_vertices(level, placed)
 

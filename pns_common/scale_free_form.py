@@ -10,13 +10,16 @@ class ScaleFreeForm:
     """The numbers of the rule, as they stand on a card of format 3.
 
     Attributes:
-        budget: C ≥ 0; C / R bounds the displacement per squared edge length.
+        budget: C ≥ 0; C / R bounds the displacement per squared length.
         prior_strength: s ≥ 0 of the prior D; 1 is full quasi-interpolation.
         network_scale: τ > 0, the longest that the network may ask for, in edge lengths.
         fold_angle: θ of the fold guard in degrees, 0 < θ < 90.
         learned_levels: K ≥ 1.
         boundary_strength: b ≥ 0 of the boundary's prior; 1 is full quasi-interpolation.
         side_gates: whether an edge's gate reads the sides of its two faces beside their normals.
+        network_altitudes: α > 0, the longest that τ's unit may be, in altitudes of the thinner
+            face; None counts edge lengths alone.
+        wide_bound: whether h of an edge's bound is the longest edge of its two faces.
     """
 
     budget: float
@@ -26,3 +29,5 @@ class ScaleFreeForm:
     learned_levels: int
     boundary_strength: float = 0.0
     side_gates: bool = False
+    network_altitudes: float | None = None
+    wide_bound: bool = False

@@ -60,6 +60,7 @@ class Scheme:
         learned_levels: K, the levels at which the rules act; after them it is Loop. None: at all.
         guard: what scales the displacements of a level back where a child face would fold.
         moves_boundaries: whether the rules move boundaries, by the boundary alone.
+        wide_bound: whether h of an edge's bound C h² / R is the longest edge of its two faces.
     """
 
     name: str
@@ -71,6 +72,7 @@ class Scheme:
     learned_levels: int | None = None
     guard: FoldGuard | None = None
     moves_boundaries: bool = False
+    wide_bound: bool = False
 
 
 def loop() -> Scheme:
@@ -129,6 +131,7 @@ def scale_free_scheme(
         learned_levels=form.learned_levels,
         guard=FoldGuard(math.radians(form.fold_angle)),
         moves_boundaries=boundary is not None,
+        wide_bound=form.wide_bound,
     )
 
 
@@ -138,8 +141,17 @@ def scale_free_form(card: ModelCard, budget: float) -> ScaleFreeForm | None:
     angle, levels = card.fold_angle, card.learned_levels
     if strength is None or scale is None or angle is None or levels is None:
         return None
-    boundary, sides = card.boundary_strength or 0.0, card.side_gates or False
-    return ScaleFreeForm(budget, strength, scale, angle, levels, boundary, sides)
+    return ScaleFreeForm(
+        budget,
+        strength,
+        scale,
+        angle,
+        levels,
+        boundary_strength=card.boundary_strength or 0.0,
+        side_gates=card.side_gates or False,
+        network_altitudes=card.network_altitudes,
+        wide_bound=card.wide_bound or False,
+    )
 
 
 def edge_operator(model: Model) -> EdgeOperator:

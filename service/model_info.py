@@ -77,6 +77,8 @@ def _further_rows(card: ModelCard) -> dict[str, Any]:
         "fold angle θ": card.fold_angle,
         "boundary strength b": card.boundary_strength,
         "side gates": card.side_gates,
+        "network altitudes α": card.network_altitudes,
+        "wide bound": card.wide_bound,
     }
     return {name: value for name, value in rows.items() if value is not None}
 

@@ -62,18 +62,20 @@ class EdgeOperator:
         self,
         stencil: EdgeStencil,
         budget_per_length: BudgetPerLength,
-        network_scale: float,
+        asked: Float[Array, " N"],
         prior: Float[Array, "N 3"],
-        gate: Gate | None = None,
+        gate: Gate,
+        wide_bound: bool,
     ) -> Correction:
-        """δ = γ Π_ρ(D + τ h F z(φ)); likewise, with τ and D, and ``gate`` in place of its own."""
+        """δ = γ Π_ρ(D + τ ℓ F z(φ)); likewise, with τ ℓ and D, and ``gate`` in place of its own."""
         return correct_scale_free(
             stencil,
             self.features,
             self.network,
-            self.gate if gate is None else gate,
+            gate,
             budget_per_length,
             self.orientation.frames,
-            network_scale,
+            asked,
             prior,
+            wide_bound,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,7 +27,8 @@ class Surroundings:
     """A level's mesh with what the rules ask of it: each part computed once, if it is asked for.
 
     ``reference_length`` is R > 0, the unit of length of the budget: of the whole mesh, or of each
-    vertex, where parts that share no vertex have their own.
+    vertex, where parts that share no vertex have their own. ``altitudes`` is α of the network's
+    lengths, infinite where these are h whatever the faces.
     """
 
     points: Float[np.ndarray, "V 3"]
@@ -35,6 +37,7 @@ class Surroundings:
     reference_length: float | Float[np.ndarray, " V"]
     blocks: Blocks
     boundary: Boundary = NO_RULE
+    altitudes: float = math.inf
 
     def budget_per_length(
         self, vertices: Int[np.ndarray, " N"], budget: float
@@ -52,7 +55,8 @@ class Surroundings:
     @cached_property
     def rings(self) -> RingMeasures:
         """The rings of all vertices."""
-        return measure_rings(self.points, self.mesh, self.faces, self.several_fans, self.blocks)
+        mesh, fans = self.mesh, self.several_fans
+        return measure_rings(self.points, mesh, self.faces, fans, self.altitudes, self.blocks)
 
     @cached_property
     def pushes(self) -> Float[np.ndarray, "V 3"]:

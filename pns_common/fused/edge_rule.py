@@ -45,10 +45,11 @@ def add_at_edges(
     def add(rows: slice) -> None:
         count = rows.stop - rows.start
         frame, features = np.empty((count, 9)), np.empty((count, rule.operator.features.count))
-        length, curvature, lengths = np.empty(count), np.empty(count), np.empty((LENGTHS, count))
+        length, longest, curvature = np.empty(count), np.empty(count), np.empty(count)
+        lengths = np.empty((LENGTHS, count))
         degenerate = np.empty(count, dtype=bool)
         symmetric = int(rule.operator.orientation is SYMMETRIC)
-        looked = frame, length, curvature, degenerate, lengths, features
+        looked = frame, length, longest, curvature, degenerate, lengths, features
         look(level.points, normals, fields, *args, rows.start, rows.stop, symmetric, *looked)
         # numpy's logarithm and hyperbolic tangent run on vectors, and have the array kernels' bits.
         fill_log_ratios(np.log(lengths), features)
@@ -68,14 +69,18 @@ def add_at_edges(
             correct(eta, frame, length, gate, budget_per_length, mesh.interior, rows.start, *out)
         else:
             form = rule.form
-            answer = eta, frame, length, gate, level.budget_per_length(ends[:, 0], form.budget)
+            bounded = longest if form.wide_bound else length
+            budget_per_length = level.budget_per_length(ends[:, 0], form.budget)
+            answer = eta, frame, length, bounded, gate, budget_per_length
             prior = (
                 pushes,
                 bounds.pushes,
                 bounds.nothing,
+                level.faces.areas,
                 *args[:3],
                 form.prior_strength,
                 form.network_scale,
+                level.altitudes,
             )
             correct_scale_free(*answer, mesh.interior, rows.start, *prior, *out)
 

@@ -70,7 +70,8 @@ def learned_points(
     """
     mesh, count = level.mesh, level.mesh.vertex_count
     boundary = boundary_of(_boundary_rule(scheme), level.points, mesh, length)
-    seen = Surroundings(level.points, mesh, level.several_fans, length, blocks, boundary)
+    of_level = level.points, mesh, level.several_fans
+    seen = Surroundings(*of_level, length, blocks, boundary, _altitudes(scheme))
     loop = loop_points(level.points, mesh, blocks)
     added = Additions.nothing(len(loop))
     at_vertices, at_edges = added.part(slice(0, count)), added.part(slice(count, None))
@@ -106,6 +107,13 @@ def learned_points(
 def _boundary_rule(scheme: Scheme) -> BoundaryRule | None:
     rule = scheme.edge_rule
     return rule.boundary if isinstance(rule, ScaleFreeEdgeRule) else None
+
+
+def _altitudes(scheme: Scheme) -> float:
+    """α of the network's lengths; infinite where they are h."""
+    rule = scheme.edge_rule
+    altitudes = rule.form.network_altitudes if isinstance(rule, ScaleFreeEdgeRule) else None
+    return math.inf if altitudes is None else altitudes
 
 
 def _placement(

@@ -83,16 +83,18 @@ def measure_rings(
     mesh: MeshEdges,
     at_faces: FaceMeasures,
     several_fans: Bool[np.ndarray, " V"],
+    altitudes: float,
     blocks: Blocks,
 ) -> RingMeasures:
-    """Look around every vertex of a level."""
+    """Look around every vertex of a level; ``altitudes`` is α of the network's lengths."""
     count, by_owner = mesh.vertex_count, owners(blocks, mesh.vertex_count)
     fields, measured = np.zeros((count, 4)), np.empty((len(mesh.edges), EDGE_COLUMNS))
     means, valence = np.zeros((count, VERTEX_COLUMNS)), np.zeros(count, dtype=np.int32)
     args = mesh.faces, mesh.edges, mesh.half_edges, mesh.edge_class
+    of_faces = at_faces.normals, at_faces.areas
 
     def edges(rows: slice) -> None:
-        measure_edges(points, at_faces.normals, *args, rows.start, rows.stop, measured)
+        measure_edges(points, *of_faces, *args, altitudes, rows.start, rows.stop, measured)
 
     def around(rows: slice) -> None:
         mean_normals(mesh.faces, at_faces.areas, rows.start, rows.stop, fields)

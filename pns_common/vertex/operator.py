@@ -68,17 +68,17 @@ class VertexOperator:
         rings: Rings,
         vertices: Int[np.ndarray, " N"],
         budget_per_length: BudgetPerLength,
-        network_scale: float,
+        asked: Float[Array, "N 1"],
         prior: Float[Array, "N 3"],
     ) -> Correction:
-        """δ = γ_v Π_ρ(D + τ h_v Σ z_i e_i), ρ = h_v² C / R; likewise, with τ and D.
+        """δ = γ_v Π_ρ(D + τ ℓ_v Σ z_i e_i), ρ = h_v² C / R; likewise, with τ ℓ_v and D.
 
         Raises:
             ModelError: the network returned something that is not finite, or of another shape.
         """
         xp = namespace(rings.normal)
         gamma, envelope, learned = self._evaluated(rings, vertices, budget_per_length)
-        wanted = prior + network_scale * gather(rings.reach, vertices) * learned
+        wanted = prior + asked * learned
         displacement = gamma[:, None] * shortened(wanted, envelope)
         degenerate = xp.zeros_like(gamma, dtype=xp.bool)
         return Correction(displacement, envelope, gamma, degenerate)

@@ -21,7 +21,7 @@ from types import MappingProxyType
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.arrays import Array, beside, cross, dot, gather, namespace, segment_sum, unit
+from pns_common.arrays import Array, beside, cross, dot, gather, namespace, norm, segment_sum, unit
 from pns_common.edge_order import left_face_order
 from pns_common.symmetry import Feature, Generator, Symmetries, symmetries
 from pns_common.topology import Topology, sharp_edge_count
@@ -65,6 +65,19 @@ class Rings:
         return self.mean(_square(self.spokes))
 
     @property
+    def edge_squares(self) -> Float[Array, " E"]:
+        """Squared lengths of all edges."""
+        spokes = self.spokes[::2]
+        return dot(spokes, spokes)
+
+    @cached_property
+    def double_areas(self) -> Float[Array, " F"]:
+        """Twice the areas of the faces."""
+        faces = self.topology.faces
+        a, b, c = (gather(self.points, faces[:, corner]) for corner in range(3))
+        return norm(cross(b - a, c - a))
+
+    @property
     def jump(self) -> Float[Array, "S 1"]:
         """x of each spoke; 0 where it is not interior or a face has no area."""
         return self._across_edges[0]
@@ -87,9 +100,7 @@ class Rings:
     @cached_property
     def reach(self) -> Float[Array, "V 1"]:
         """r_v, with gradient 0 at 0."""
-        xp = namespace(self.square)
-        positive = self.square > 0
-        return xp.where(positive, xp.sqrt(xp.where(positive, self.square, 1.0)), 0.0)
+        return root(self.square)
 
     @cached_property
     def height(self) -> Float[Array, "V 1"]:
@@ -103,6 +114,11 @@ class Rings:
         """The mean over each vertex's spokes."""
         return neighbour_mean(values, self.topology)
 
+    def mean_of_edges(self, values: Float[Array, " E"]) -> Float[Array, "V 1"]:
+        """The same of what both directions of an edge have in common."""
+        both = np.repeat(np.arange(len(self.topology.edges)), 2)
+        return self.mean(gather(values[:, None], both))
+
     def of_neighbour(self, values: Float[Array, "V K"]) -> Float[Array, "S K"]:
         """For each spoke the value at its far end."""
         return gather(values, self.topology.edges[:, ::-1].reshape(-1))
@@ -114,6 +130,13 @@ class Rings:
     @cached_property
     def _across_edges(self) -> tuple[Float[Array, "S 1"], Float[Array, "S 1"]]:
         return _across_edges(self.points, self.face_normals, self.topology)
+
+
+def root(square: Float[Array, "N 1"]) -> Float[Array, "N 1"]:
+    """Its square root, with gradient 0 at 0."""
+    xp = namespace(square)
+    positive = square > 0
+    return xp.where(positive, xp.sqrt(xp.where(positive, square, 1.0)), 0.0)
 
 
 def ring_vectors(rings: Rings) -> Float[Array, "V 3 3"]:

@@ -51,6 +51,13 @@ class ModelEntry(BaseModel):
     side_gates: bool | None = Field(
         description="whether an edge's gate reads the sides of its two faces; null: the faces alone"
     )
+    network_altitudes: float | None = Field(
+        description="the longest that the network's unit may be, in altitudes of an edge's thinner "
+        "face; null: edge lengths alone"
+    )
+    wide_bound: bool | None = Field(
+        description="whether h of an edge's bound is the longest edge of both faces; null: its own"
+    )
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")
 

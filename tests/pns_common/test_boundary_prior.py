@@ -129,6 +129,7 @@ def test_torch_differentiates_through_it():
         ({"fold_angle": None}, "without fold_angle"),
         ({"format": 2}, "learned_levels in format 2"),
         ({"side_gates": 1}, "side_gates of type int"),
+        ({"network_altitudes": 0.0}, "network_altitudes 0.0, not a finite number > 0"),
     ],
 )
 def test_a_wrong_number_on_a_card_is_named(changes, says):
@@ -137,5 +138,6 @@ def test_a_wrong_number_on_a_card_is_named(changes, says):
 
 
 def test_a_card_reads_back_as_it_was_written():
-    for card in (SCALE_FREE_CARD, STRONG.card, replace(SCALE_FREE_CARD, side_gates=True)):
+    thin = replace(SCALE_FREE_CARD, side_gates=True, network_altitudes=3.0, wide_bound=True)
+    for card in (SCALE_FREE_CARD, STRONG.card, thin):
         assert ModelCard.from_json(card.to_json()) == card

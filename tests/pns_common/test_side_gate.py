@@ -5,6 +5,7 @@ import numpy as np
 from pns_common import Mesh, pns, refine
 from pns_common.side_gate import face_bends, gentle_bend, opened
 from pns_common.topology import build_topology
+from tests.support.meshes import torus_of_quads
 from tests.support.networks import scale_free_model
 from tests.support.quasi_interpolation import OPEN_GATES, quasi_interpolated, with_card
 
@@ -87,14 +88,3 @@ def box_of_quads(side):
     every = np.concatenate([sheet + k * len(u) for k, sheet in enumerate(faces)])
     points, number = np.unique(points, axis=0, return_inverse=True)
     return points, number.reshape(-1)[every][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-
-
-def torus_of_quads(around, across):
-    """Its quads are plane, and all cut the same way."""
-    u, v = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in (around, across)), indexing="ij")
-    radius = 1 + 0.4 * np.cos(v)
-    points = np.stack([radius * np.cos(u), radius * np.sin(u), 0.4 * np.sin(v)], axis=-1)
-    i, j = (axis.ravel() for axis in np.mgrid[:around, :across])
-    next_i, next_j = (i + 1) % around, (j + 1) % across
-    a, b, c, d = i * across + j, next_i * across + j, next_i * across + next_j, i * across + next_j
-    return points.reshape(-1, 3), np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)

@@ -65,6 +65,17 @@ def bent(x, y):
     return 0.4 * np.exp(-6 * (x + 0.3 * y) ** 2) + 0.1 * np.sin(3 * y)
 
 
+def torus_of_quads(around, across):
+    """Its quads are plane, and all cut the same way."""
+    u, v = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in (around, across)), indexing="ij")
+    radius = 1 + 0.4 * np.cos(v)
+    points = np.stack([radius * np.cos(u), radius * np.sin(u), 0.4 * np.sin(v)], axis=-1)
+    i, j = (axis.ravel() for axis in np.mgrid[:around, :across])
+    next_i, next_j = (i + 1) % around, (j + 1) % across
+    a, b, c, d = i * across + j, next_i * across + j, next_i * across + next_j, i * across + next_j
+    return points.reshape(-1, 3), np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)
+
+
 def bow_tie():
     """Two triangles that share one vertex only."""
     vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0.5], [-1, -1, 0]]

@@ -1,8 +1,8 @@
 """T1, bounded displacement: no vertex leaves Loop's by more than C h² / R.
 
-h is the edge's length at an edge vertex and the root mean square edge around an old vertex;
-irregular edges, and the vertices on them, are not moved at all, nor are boundaries but by a rule of
-their own.
+h is the edge's length at an edge vertex, or the longest edge of its two faces where the scheme says
+so, and the root mean square edge around an old vertex; irregular edges, and the vertices on them,
+are not moved at all, nor are boundaries but by a rule of their own.
 """
 
 from collections.abc import Sequence
@@ -42,7 +42,8 @@ def bounded_displacement(
                 mesh,
                 refined.vertices,
                 subject.budget / reference_length,
-                subject.scheme.moves_boundaries,
+                moves_boundaries=subject.scheme.moves_boundaries,
+                wide_bound=subject.scheme.wide_bound,
             )
             measured.append((ratio, f"{body.name}, level {level}, {place}"))
             mesh = refined
@@ -54,12 +55,19 @@ def worst_ratio(
     control: Mesh,
     refined: Float[np.ndarray, "N 3"],
     curvature: float,
+    *,
     moves_boundaries: bool = False,
+    wide_bound: bool = False,
 ) -> tuple[float, str]:
-    """The largest ratio ‖p − p_Loop‖ / (C h² / R) of one step, and at which vertex."""
+    """The largest ratio ‖p − p_Loop‖ / (C h² / R) of one step, and at which vertex.
+
+    ``curvature`` is C / R; what the rule moves and what its bound counts: as in ``Scheme``.
+    """
     base = plain_loop(control.vertices, control.faces)
     apart = np.linalg.norm(refined - base.positions, axis=1)
-    reach = base.reach + base.boundary_reach if moves_boundaries else base.reach
+    reach = base.wide_reach if wide_bound else base.reach
+    if moves_boundaries:
+        reach = reach + base.boundary_reach
     ratio = apart / (curvature * reach**2 + rounding(control))
     place = int(np.argmax(ratio))  # numpy's argmax finds a NaN first
     return float(ratio[place]), base.labels[place]

@@ -20,6 +20,7 @@ class PlainLoop:
         reach: the displacement's h there: the edge's length at an interior edge, the root mean
             square length of the edges around an old vertex with interior edges only, and 0 where
             no correction is allowed.
+        wide_reach: the same with the longest edge of both faces at an interior edge.
         boundary_reach: the same where a rule for boundaries may move what lies on them: a boundary
             edge's length, and the root mean square of both at a vertex on two of them and no other
             sharp edge; 0 elsewhere.
@@ -28,6 +29,7 @@ class PlainLoop:
 
     positions: Float[np.ndarray, "N 3"]
     reach: Float[np.ndarray, " N"]
+    wide_reach: Float[np.ndarray, " N"]
     boundary_reach: Float[np.ndarray, " N"]
     labels: list[str]
 
@@ -43,7 +45,7 @@ def plain_loop(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
     neighbours: list[list[int]] = [[] for _ in vertices]
     sharp: list[list[int]] = [[] for _ in vertices]
     borders: list[list[int]] = [[] for _ in vertices]
-    edge_positions, edge_reach, border_reach = [], [], []
+    edge_positions, edge_reach, wide_reach, border_reach = [], [], [], []
     labels = [f"vertex {v}" for v in range(len(vertices))]
     for (a, b), sides in opposites.items():
         for vertex, neighbour in ((a, b), (b, a)):
@@ -54,10 +56,13 @@ def plain_loop(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
             ends, wings = vertices[a] + vertices[b], vertices[c] + vertices[d]
             edge_positions.append((3 * ends + wings) / 8)
             edge_reach.append(math.dist(vertices[a], vertices[b]))
+            sides_of_faces = ((a, b), (a, c), (b, c), (a, d), (b, d))
+            wide_reach.append(max(math.dist(vertices[i], vertices[j]) for i, j in sides_of_faces))
             border_reach.append(0.0)
         else:
             edge_positions.append((vertices[a] + vertices[b]) / 2)
             edge_reach.append(0.0)
+            wide_reach.append(0.0)
             border_reach.append(math.dist(vertices[a], vertices[b]) if len(sides) == 1 else 0.0)
             for vertex, neighbour in ((a, b), (b, a)):
                 sharp[vertex].append(neighbour)
@@ -85,6 +90,7 @@ def plain_loop(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
     return PlainLoop(
         positions,
         np.array([*reach, *edge_reach]),
+        np.array([*reach, *wide_reach]),
         np.array([*on_border, *border_reach]),
         labels,
     )

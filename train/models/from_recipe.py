@@ -97,6 +97,9 @@ def vertex_rule_operator(rule: VertexRule, network: BoundedNet) -> VertexOperato
 def recipe_scheme(recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet | None) -> Scheme:
     """Return the scheme that a scale-free recipe trains, differentiable in its networks' weights.
 
+    What the card says of thin faces acts in use alone: a network that is trained with it asks for
+    more beside them, and is rougher there.
+
     Raises:
         ParameterError: the recipe is not scale-free, or has no vertex rule.
     """

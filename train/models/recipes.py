@@ -70,6 +70,9 @@ class ScaleFree:
         learned_levels: K; training sees the first.
         boundary_strength: b of the boundary's prior; None leaves boundaries to Loop.
         side_gates: whether an edge's gate reads the sides of its two faces too.
+        network_altitudes: α, the longest that τ's unit may be, in altitudes; None for no limit. As
+            the next, it acts in use, and not in training.
+        wide_bound: whether h of an edge's bound is the longest edge of its two faces.
     """
 
     prior_strength: float
@@ -78,6 +81,8 @@ class ScaleFree:
     learned_levels: int
     boundary_strength: float | None = None
     side_gates: bool | None = None
+    network_altitudes: float | None = None
+    wide_bound: bool | None = None
 
 
 class OneStep(msgspec.Struct, frozen=True, tag=True):
@@ -277,6 +282,8 @@ def general(seed: int = 0) -> Recipe:
             learned_levels=1,
             boundary_strength=1.0,
             side_gates=True,
+            network_altitudes=3.0,
+            wide_bound=True,
         ),
     )
 

@@ -21,7 +21,16 @@ from pns_common.fused.kernels.compiled import (
     kernel,
 )
 from pns_common.fused.kernels.masks import opposite
-from pns_common.fused.kernels.rings import HEIGHT, between, cross, dot, norm, row
+from pns_common.fused.kernels.rings import (
+    AREA,
+    HEIGHT,
+    between,
+    cross,
+    dot,
+    network_length,
+    norm,
+    row,
+)
 from pns_common.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
 
 # Feature columns: curvature, four log ratios, then those with a sign.
@@ -45,7 +54,7 @@ def _no_shorter(length):
 @kernel(
     SIZE,
     *(POINTS, POINTS, POINTS, INDICES, INDICES, INDICES, INDEX, SIZE, SIZE, SIZE),
-    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, FLAGS_OUT, POINTS_OUT, POINTS_OUT),
+    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT, FLAGS_OUT, POINTS_OUT, POINTS_OUT),
 )
 def look(
     points,
@@ -60,6 +69,7 @@ def look(
     symmetric,
     frame,
     length,
+    longest,
     curvature,
     degenerate,
     lengths,
@@ -71,7 +81,8 @@ def look(
         fields: (V, 4) mean normal and umbrella height; read where ``features`` has signed columns.
         symmetric: 1 where c lies to the left of a → b and degenerate edges have x = 0, else 0.
         frame: (N, 9) out: T, N, B.
-        length, curvature, degenerate: out: h, x, and whether the frame is the fallback.
+        length, longest: out: h and h̄, the longest edge of both faces.
+        curvature, degenerate: out: x, and whether the frame is the fallback.
         lengths: (5, N) out: of which the logarithms are to be taken.
         features: (N, K) out: all columns but those of the log ratios.
     """
@@ -110,10 +121,13 @@ def look(
         length[i], curvature[i], degenerate[i] = h, x, fallback
 
         features[i, 0] = x
-        lengths[0, i] = _no_shorter(norm(between(points, a, c)))
-        lengths[1, i] = _no_shorter(norm(between(points, b, c)))
-        lengths[2, i] = _no_shorter(norm(between(points, a, d)))
-        lengths[3, i] = _no_shorter(norm(between(points, b, d)))
+        ac, bc = norm(between(points, a, c)), norm(between(points, b, c))
+        ad, bd = norm(between(points, a, d)), norm(between(points, b, d))
+        longest[i] = max(max(max(max(h, ac), bc), ad), bd)
+        lengths[0, i] = _no_shorter(ac)
+        lengths[1, i] = _no_shorter(bc)
+        lengths[2, i] = _no_shorter(ad)
+        lengths[3, i] = _no_shorter(bd)
         lengths[4, i] = _no_shorter(h)
         if wide > DIHEDRAL:
             features[i, DIHEDRAL] = dot(cross(n1, n2), tangent)
@@ -223,14 +237,15 @@ def _prior(pushes, of_boundary, nothing, a, b, c, d, k, strength):
 
 @kernel(
     SIZE,
-    *(POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS, INDEX, SIZE),
-    *(POINTS, POINTS, REAL, INDICES, INDICES, INDICES, REAL, REAL),
+    *(POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, INDEX, SIZE),
+    *(POINTS, POINTS, REAL, POINTS, INDICES, INDICES, INDICES, REAL, REAL, REAL),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
 )
 def correct_scale_free(
     z,
     frame,
     length,
+    bound_length,
     gate,
     budget_per_length,
     interior,
@@ -238,18 +253,21 @@ def correct_scale_free(
     pushes,
     of_boundary,
     nothing,
+    areas,
     faces,
     edges,
     half_edges,
     strength,
     scale,
+    altitudes,
     displacement,
     ratio,
     gates,
     envelopes,
 ):
-    """δ = γ Π_ρ(D + τ h F z) into the rows of the edges (``correction.correct_scale_free``).
+    """δ = γ Π_ρ(D + τ ℓ F z) into the rows of the edges (``correction.correct_scale_free``).
 
+    ``bound_length`` is h of the bound, ``areas`` and ``altitudes`` make ℓ, as in ``measure_edges``.
     ``of_boundary`` are the boundary's pushes; (0, 3) where there are none. Then ``nothing`` is
     added in their place: 0, or −0 where there is no rule for boundaries, which changes no −0.
     """
@@ -257,9 +275,10 @@ def correct_scale_free(
         e = interior[begin + i]
         a, b = edges[e, 0], edges[e, 1]
         c, d = opposite(faces, half_edges[e, 0]), opposite(faces, half_edges[e, 1])
-        envelope = budget_per_length[i] * (length[i] * length[i])
+        first, second = areas[half_edges[e, 0] // 3, AREA], areas[half_edges[e, 1] // 3, AREA]
+        envelope = budget_per_length[i] * (bound_length[i] * bound_length[i])
         turned = _rotated(frame, i, in_ball(row(z, i)))
-        asked = scale * length[i]
+        asked = scale * network_length(length[i], first, second, altitudes)
         wanted = (
             _prior(pushes, of_boundary, nothing, a, b, c, d, 0, strength) + asked * turned[0],
             _prior(pushes, of_boundary, nothing, a, b, c, d, 1, strength) + asked * turned[1],

@@ -28,12 +28,13 @@ from pns_common.fused.kernels.normals import squared_chord, unit_normal
 from pns_common.prior import CLEAR_NORMAL
 
 # Columns of an edge's row.
-SPOKE, SQUARE, JUMP, BEND = 0, 3, 4, 5
-EDGE_COLUMNS = 6
+SPOKE, SQUARE, JUMP, BEND, NETWORK_SQUARE = 0, 3, 4, 5, 6
+EDGE_COLUMNS = 7
 # Columns of a vertex's sums, which become means.
 UMBRELLA, RING_SQUARE, MEAN_JUMP, MEAN_BEND, BEND_SQUARE, LENGTH, PULL = 0, 3, 4, 5, 6, 7, 8
-OPENING, NEAR_HEIGHT, NEAR_JUMP = 11, 12, 13
-VERTEX_COLUMNS = 14
+MEAN_NETWORK_SQUARE = 11
+OPENING, NEAR_HEIGHT, NEAR_JUMP = 12, 13, 14
+VERTEX_COLUMNS = 15
 # Of a face: twice its area vector, and the length of that.
 AREA = 3
 # Of a vertex: mean normal and umbrella height.
@@ -106,15 +107,31 @@ def mean_normals(faces, areas, begin, end, fields):
     return 0
 
 
-@kernel(SIZE, POINTS, POINTS, INDICES, INDICES, INDICES, CLASSES, SIZE, SIZE, POINTS_OUT)
-def measure_edges(points, normals, faces, edges, half_edges, edge_class, begin, end, measured):
-    """Spoke b − a, its square, x and s of edges begin … end − 1; ``measured`` is (E, 6)."""
+@njit(inline="always")
+def network_length(length, first_area, second_area, altitudes):
+    """ℓ of an interior edge between faces of these double areas (``thin_faces``)."""
+    wide = altitudes * min(first_area, second_area) / length if length > 0 else 0.0
+    return wide if wide < length else length
+
+
+@kernel(
+    SIZE,
+    *(POINTS, POINTS, POINTS, INDICES, INDICES, INDICES, CLASSES, REAL, SIZE, SIZE, POINTS_OUT),
+)
+def measure_edges(
+    points, normals, areas, faces, edges, half_edges, edge_class, altitudes, begin, end, measured
+):
+    """Spoke b − a, its square, x, s and ℓ² of edges begin … end − 1; ``measured`` is (E, 7).
+
+    ``altitudes`` is α, infinite where the network speaks in units of h whatever the faces.
+    """
     for e in range(begin, end):
         spoke = between(points, edges[e, 0], edges[e, 1])
         square = dot(spoke, spoke)
         for k in range(3):
             measured[e, SPOKE + k] = spoke[k]
         measured[e, SQUARE] = square
+        measured[e, NETWORK_SQUARE] = square
         measured[e, JUMP] = measured[e, BEND] = 0.0
         if edge_class[e] != INTERIOR:
             continue
@@ -127,6 +144,9 @@ def measure_edges(points, normals, faces, edges, half_edges, edge_class, begin, 
             measured[e, JUMP] = dot(chord, chord) / 2 + 0.0
         length = math.sqrt(square) if square > 0 else math.inf
         direction = spoke[0] / length, spoke[1] / length, spoke[2] / length
+        ell = network_length(norm(spoke), areas[f, AREA], areas[g, AREA], altitudes)
+        if ell < norm(spoke):
+            measured[e, NETWORK_SQUARE] = ell * ell
         # Beside 0 there is no −0 in the array kernels' sums either.
         measured[e, BEND] = dot(cross(n, m), direction) + 0.0
     return 0
@@ -166,11 +186,12 @@ def _add_spoke(sums, v, sign, measured, e, length):
     sums[v, MEAN_BEND] += bend
     sums[v, BEND_SQUARE] += bend * bend
     sums[v, LENGTH] += length
+    sums[v, MEAN_NETWORK_SQUARE] += measured[e, NETWORK_SQUARE]
 
 
 @kernel(SIZE, INDICES, POINTS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
 def mean_spokes(edges, measured, begin, end, means, valence):
-    """Means over the spokes of vertices begin … end − 1; ``means`` (V, 14), 0 on entry."""
+    """Means over the spokes of vertices begin … end − 1; ``means`` (V, 15), 0 on entry."""
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
         mine, theirs = begin <= a < end, begin <= b < end

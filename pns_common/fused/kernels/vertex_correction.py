@@ -23,6 +23,7 @@ from pns_common.fused.kernels.rings import (
     LENGTH,
     MEAN_BEND,
     MEAN_JUMP,
+    MEAN_NETWORK_SQUARE,
     NEAR_HEIGHT,
     NEAR_JUMP,
     OPENING,
@@ -40,9 +41,13 @@ def _divided(value, by):
 
 
 @njit(inline="always")
-def _reach(means, v):
-    square = means[v, RING_SQUARE]
+def _root(square):
     return math.sqrt(square) if square > 0 else 0.0
+
+
+@njit(inline="always")
+def _reach(means, v):
+    return _root(means[v, RING_SQUARE])
 
 
 @kernel(SIZE, POINTS, POINTS, INDEX, SIZE, SIZE, POINTS_OUT, NUMBERS_OUT)
@@ -139,7 +144,7 @@ def correct_scale_free(
     gates,
     envelopes,
 ):
-    """δ = γ_v Π_ρ(D + τ h_v Σ z_i e_i) likewise.
+    """δ = γ_v Π_ρ(D + τ ℓ_v Σ z_i e_i) likewise.
 
     ``pushes`` are Loop's vertex mask of d, ``of_boundary`` and ``nothing`` as at edges.
     """
@@ -147,7 +152,7 @@ def correct_scale_free(
         v = vertices[begin + i]
         envelope = budget_per_length[i] * means[v, RING_SQUARE]
         learned = _combined(in_ball(row(z, i)), means, fields, v)
-        asked = scale * _reach(means, v)
+        asked = scale * _root(means[v, MEAN_NETWORK_SQUARE])
         wanted = (
             _prior(pushes, of_boundary, nothing, v, 0, strength) + asked * learned[0],
             _prior(pushes, of_boundary, nothing, v, 1, strength) + asked * learned[1],

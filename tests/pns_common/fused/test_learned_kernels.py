@@ -59,6 +59,11 @@ SCHEMES = {
     ),
     "format 3, side gates": pns(scale_free_model(side_gates=True, boundary_strength=1.0)),
     "format 3, side gates, tight": pns(scale_free_model(side_gates=True), budget=0.3),
+    "format 3, thin faces": pns(scale_free_model(network_altitudes=1.5, wide_bound=True)),
+    "format 3, thin faces, tight": pns(
+        scale_free_model(network_altitudes=0.4, side_gates=True, boundary_strength=1.0), budget=0.3
+    ),
+    "format 3, wide bound, tight": pns(scale_free_model(wide_bound=True), budget=0.3),
     "format 3, no budget": pns(scale_free_model(), budget=0.0),
 }
 SHAPES = {

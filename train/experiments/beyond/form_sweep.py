@@ -21,6 +21,7 @@ SWEPT: tuple[tuple[str, str, tuple[float, ...]], ...] = (
     ("C", "budget", (1, 2, 5, 10, 20, 50)),
     ("s", "prior_strength", (0, 0.5, 0.75, 1, 1.25)),
     ("τ", "network_scale", (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)),
+    ("α", "network_altitudes", (1, 2, 3, 5)),
     ("θ", "fold_angle", (30, 45, 60, 75, 85)),
     ("K", "learned_levels", (1, 2, 3)),
 )
