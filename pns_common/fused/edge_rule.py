@@ -71,16 +71,14 @@ def add_at_edges(
             form = rule.form
             bounded = longest if form.wide_bound else length
             budget_per_length = level.budget_per_length(ends[:, 0], form.budget)
-            answer = eta, frame, length, bounded, gate, budget_per_length
+            answer = eta, frame, level.rings.network_lengths, bounded, gate, budget_per_length
             prior = (
                 pushes,
                 bounds.pushes,
                 bounds.nothing,
-                level.faces.areas,
                 *args[:3],
                 form.prior_strength,
                 form.network_scale,
-                level.altitudes,
             )
             correct_scale_free(*answer, mesh.interior, rows.start, *prior, *out)
 

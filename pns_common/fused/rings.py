@@ -41,11 +41,13 @@ class RingMeasures:
     Attributes:
         fields: mean normal and umbrella height.
         means: over the spokes of each vertex.
+        network_lengths: ℓ of each edge.
         smooth: vertices with one closed ring of interior edges.
     """
 
     fields: Float[np.ndarray, "V 4"]
     means: Float[np.ndarray, "V M"]
+    network_lengths: Float[np.ndarray, " E"]
     valence: Int[np.ndarray, " V"]
     smooth: Bool[np.ndarray, " V"]
 
@@ -92,13 +94,14 @@ def measure_rings(
     means, valence = np.zeros((count, VERTEX_COLUMNS)), np.zeros(count, dtype=np.int32)
     args = mesh.faces, mesh.edges, mesh.half_edges, mesh.edge_class
     of_faces = at_faces.normals, at_faces.areas
+    to = measured, np.empty(len(mesh.edges))
 
     def edges(rows: slice) -> None:
-        measure_edges(points, *of_faces, *args, altitudes, rows.start, rows.stop, measured)
+        measure_edges(points, *of_faces, *args, altitudes, rows.start, rows.stop, *to)
 
     def around(rows: slice) -> None:
         mean_normals(mesh.faces, at_faces.areas, rows.start, rows.stop, fields)
-        mean_spokes(mesh.edges, measured, rows.start, rows.stop, means, valence)
+        mean_spokes(mesh.edges, *to, rows.start, rows.stop, means, valence)
         umbrella_heights(means, mesh.sharp, rows.start, rows.stop, fields)
 
     def beyond(rows: slice) -> None:
@@ -110,7 +113,7 @@ def measure_rings(
     smooth = (valence > 0) & ~several_fans
     if len(mesh.sharp):
         smooth &= mesh.sharp == 0
-    return RingMeasures(fields, means, valence, smooth)
+    return RingMeasures(fields, means, to[1], valence, smooth)
 
 
 def measure_pushes(rings: RingMeasures, blocks: Blocks) -> Float[np.ndarray, "V 3"]:

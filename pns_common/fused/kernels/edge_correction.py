@@ -21,16 +21,7 @@ from pns_common.fused.kernels.compiled import (
     kernel,
 )
 from pns_common.fused.kernels.masks import opposite
-from pns_common.fused.kernels.rings import (
-    AREA,
-    HEIGHT,
-    between,
-    cross,
-    dot,
-    network_length,
-    norm,
-    row,
-)
+from pns_common.fused.kernels.rings import HEIGHT, between, cross, dot, norm, row
 from pns_common.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
 
 # Feature columns: curvature, four log ratios, then those with a sign.
@@ -238,13 +229,13 @@ def _prior(pushes, of_boundary, nothing, a, b, c, d, k, strength):
 @kernel(
     SIZE,
     *(POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, INDEX, SIZE),
-    *(POINTS, POINTS, REAL, POINTS, INDICES, INDICES, INDICES, REAL, REAL, REAL),
+    *(POINTS, POINTS, REAL, INDICES, INDICES, INDICES, REAL, REAL),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
 )
 def correct_scale_free(
     z,
     frame,
-    length,
+    network_lengths,
     bound_length,
     gate,
     budget_per_length,
@@ -253,13 +244,11 @@ def correct_scale_free(
     pushes,
     of_boundary,
     nothing,
-    areas,
     faces,
     edges,
     half_edges,
     strength,
     scale,
-    altitudes,
     displacement,
     ratio,
     gates,
@@ -267,7 +256,7 @@ def correct_scale_free(
 ):
     """δ = γ Π_ρ(D + τ ℓ F z) into the rows of the edges (``correction.correct_scale_free``).
 
-    ``bound_length`` is h of the bound, ``areas`` and ``altitudes`` make ℓ, as in ``measure_edges``.
+    ``network_lengths`` are ℓ of all edges, ``bound_length`` is h of the bound.
     ``of_boundary`` are the boundary's pushes; (0, 3) where there are none. Then ``nothing`` is
     added in their place: 0, or −0 where there is no rule for boundaries, which changes no −0.
     """
@@ -275,10 +264,9 @@ def correct_scale_free(
         e = interior[begin + i]
         a, b = edges[e, 0], edges[e, 1]
         c, d = opposite(faces, half_edges[e, 0]), opposite(faces, half_edges[e, 1])
-        first, second = areas[half_edges[e, 0] // 3, AREA], areas[half_edges[e, 1] // 3, AREA]
         envelope = budget_per_length[i] * (bound_length[i] * bound_length[i])
         turned = _rotated(frame, i, in_ball(row(z, i)))
-        asked = scale * network_length(length[i], first, second, altitudes)
+        asked = scale * network_lengths[e]
         wanted = (
             _prior(pushes, of_boundary, nothing, a, b, c, d, 0, strength) + asked * turned[0],
             _prior(pushes, of_boundary, nothing, a, b, c, d, 1, strength) + asked * turned[1],

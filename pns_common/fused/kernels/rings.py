@@ -28,8 +28,8 @@ from pns_common.fused.kernels.normals import squared_chord, unit_normal
 from pns_common.prior import CLEAR_NORMAL
 
 # Columns of an edge's row.
-SPOKE, SQUARE, JUMP, BEND, NETWORK_SQUARE = 0, 3, 4, 5, 6
-EDGE_COLUMNS = 7
+SPOKE, SQUARE, JUMP, BEND = 0, 3, 4, 5
+EDGE_COLUMNS = 6
 # Columns of a vertex's sums, which become means.
 UMBRELLA, RING_SQUARE, MEAN_JUMP, MEAN_BEND, BEND_SQUARE, LENGTH, PULL = 0, 3, 4, 5, 6, 7, 8
 MEAN_NETWORK_SQUARE = 11
@@ -107,21 +107,26 @@ def mean_normals(faces, areas, begin, end, fields):
     return 0
 
 
-@njit(inline="always")
-def network_length(length, first_area, second_area, altitudes):
-    """ℓ of an interior edge between faces of these double areas (``thin_faces``)."""
-    wide = altitudes * min(first_area, second_area) / length if length > 0 else 0.0
-    return wide if wide < length else length
-
-
 @kernel(
     SIZE,
-    *(POINTS, POINTS, POINTS, INDICES, INDICES, INDICES, CLASSES, REAL, SIZE, SIZE, POINTS_OUT),
+    *(POINTS, POINTS, POINTS, INDICES, INDICES, INDICES, CLASSES, REAL, SIZE, SIZE),
+    *(POINTS_OUT, NUMBERS_OUT),
 )
 def measure_edges(
-    points, normals, areas, faces, edges, half_edges, edge_class, altitudes, begin, end, measured
+    points,
+    normals,
+    areas,
+    faces,
+    edges,
+    half_edges,
+    edge_class,
+    altitudes,
+    begin,
+    end,
+    measured,
+    network_lengths,
 ):
-    """Spoke b − a, its square, x, s and ℓ² of edges begin … end − 1; ``measured`` is (E, 7).
+    """Spoke b − a, its square, x and s (``measured``, (E, 6)) and ℓ of edges begin … end − 1.
 
     ``altitudes`` is α, infinite where the network speaks in units of h whatever the faces.
     """
@@ -131,7 +136,8 @@ def measure_edges(
         for k in range(3):
             measured[e, SPOKE + k] = spoke[k]
         measured[e, SQUARE] = square
-        measured[e, NETWORK_SQUARE] = square
+        length = math.sqrt(square) if square > 0 else math.inf
+        network_lengths[e] = math.sqrt(square)
         measured[e, JUMP] = measured[e, BEND] = 0.0
         if edge_class[e] != INTERIOR:
             continue
@@ -142,11 +148,10 @@ def measure_edges(
         if dot(n, n) > 0 and dot(m, m) > 0:
             chord = n[0] - m[0], n[1] - m[1], n[2] - m[2]
             measured[e, JUMP] = dot(chord, chord) / 2 + 0.0
-        length = math.sqrt(square) if square > 0 else math.inf
         direction = spoke[0] / length, spoke[1] / length, spoke[2] / length
-        ell = network_length(norm(spoke), areas[f, AREA], areas[g, AREA], altitudes)
-        if ell < norm(spoke):
-            measured[e, NETWORK_SQUARE] = ell * ell
+        wide = altitudes * min(areas[f, AREA], areas[g, AREA]) / length
+        if wide < network_lengths[e]:
+            network_lengths[e] = wide
         # Beside 0 there is no −0 in the array kernels' sums either.
         measured[e, BEND] = dot(cross(n, m), direction) + 0.0
     return 0
@@ -175,7 +180,7 @@ def face_bends(normals, face_edges, half_edges, edge_class, gentle, sharp, begin
 
 
 @njit(inline="always")
-def _add_spoke(sums, v, sign, measured, e, length):
+def _add_spoke(sums, v, sign, measured, e, length, network_square):
     for k in range(3):
         spoke = sign * measured[e, SPOKE + k]
         sums[v, UMBRELLA + k] += spoke
@@ -186,11 +191,11 @@ def _add_spoke(sums, v, sign, measured, e, length):
     sums[v, MEAN_BEND] += bend
     sums[v, BEND_SQUARE] += bend * bend
     sums[v, LENGTH] += length
-    sums[v, MEAN_NETWORK_SQUARE] += measured[e, NETWORK_SQUARE]
+    sums[v, MEAN_NETWORK_SQUARE] += network_square
 
 
-@kernel(SIZE, INDICES, POINTS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
-def mean_spokes(edges, measured, begin, end, means, valence):
+@kernel(SIZE, INDICES, POINTS, NUMBERS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
+def mean_spokes(edges, measured, network_lengths, begin, end, means, valence):
     """Means over the spokes of vertices begin … end − 1; ``means`` (V, 15), 0 on entry."""
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
@@ -198,12 +203,14 @@ def mean_spokes(edges, measured, begin, end, means, valence):
         if mine or theirs:
             square = measured[e, SQUARE]
             length = math.sqrt(square if square > 0 else 1e-300)
+            ell = network_lengths[e]
+            network_square = ell * ell if ell < length else square
             if mine:
                 valence[a] += 1
-                _add_spoke(means, a, 1.0, measured, e, length)
+                _add_spoke(means, a, 1.0, measured, e, length, network_square)
             if theirs:
                 valence[b] += 1
-                _add_spoke(means, b, -1.0, measured, e, length)
+                _add_spoke(means, b, -1.0, measured, e, length, network_square)
     for v in range(begin, end):
         count = float(max(valence[v], 1))
         for k in range(OPENING):
