@@ -162,7 +162,7 @@ def test_the_generated_typescript_client_works(document, address, tmp_path):
     source, output = tmp_path / "part.glb", tmp_path / "refined.glb"
     source.write_bytes(part_glb())
     tools = tmp_path / "node_modules" / ".bin"
-    compile_ = "--strict --target es2022 --module nodenext --types node --skipLibCheck"
+    compile_ = "--strict --target es2022 --module nodenext --lib es2022 --types node --skipLibCheck"
     for command in (
         [tools / "openapi-typescript", "openapi.json", "--output", "openapi.d.ts"],
         [tools / "tsc", *compile_.split(), "--rewriteRelativeImportExtensions", "client.mts"],

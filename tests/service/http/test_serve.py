@@ -144,7 +144,7 @@ def drained() -> Drained:
         server.wait_until_a_job_runs()
         with closing(server.connect()) as connection:
             glb = {"Content-Type": "model/gltf-binary"}
-            connection.request("POST", "/jobs?levels=5", body, glb)
+            connection.request("POST", "/jobs?levels=4", body, glb)
             job = f"/jobs/{json.loads(connection.getresponse().read())['id']}"
         # To the whole group, as a supervisor may do it: the workers must not take it as theirs.
         os.killpg(server.process.pid, signal.SIGTERM)
