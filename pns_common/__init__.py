@@ -9,7 +9,8 @@ Where to read:
 
     the formula         correction.py (edges), vertex/operator.py (old vertices)
     its parts           edge/frames.py F, edge/features.py φ, side_gate.py γ, prior.py D,
-                        fold_guard.py G; at boundaries boundary_prior.py, boundary_rule.py
+                        thin_faces.py ℓ, fold_guard.py G; at boundaries boundary_prior.py and
+                        boundary_rule.py
     Loop                stencils.py (masks), topology.py (split), limit/ (limit surface)
     a rule, a scheme    level.py what a rule sees, placement.py what it answers; loop_rules.py,
                         learned_rules.py (the paper's), scale_free.py (the default's), schemes.py

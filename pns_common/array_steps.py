@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.blocks import Blocks
+from pns_common.child_faces import ChildFaces, child_faces
 from pns_common.creases import crease_children, with_creases
-from pns_common.diagnostics import ChildFaces, child_faces
 from pns_common.edge.frames import face_normals
 from pns_common.level import ControlLevel
 from pns_common.schemes import Scheme

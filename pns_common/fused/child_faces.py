@@ -1,14 +1,12 @@
-"""The faces that a step made: how many are flipped, and the largest jump, as in diagnostics.py."""
+"""The faces that a step made, as ``pns_common.child_faces`` looks at them."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from jaxtyping import Float
 
 from pns_common.blocks import Blocks
-from pns_common.diagnostics import ChildAngles
+from pns_common.child_faces import ChildAngles, angle_between
 from pns_common.fused.kernels.normals import (
     flipped_children,
     largest_jump_across,
@@ -23,7 +21,7 @@ def look_at_children(
     loop_points: Float[np.ndarray, "W 3"] | None,
     blocks: Blocks,
 ) -> ChildAngles:
-    """Look at the faces that ``parent`` was split into (see ``diagnostics.child_faces``)."""
+    """Look at the faces that ``parent`` was split into (see ``pns_common.child_faces``)."""
     count, edge_count = len(parent.faces), len(parent.edges)
     inside, across = np.zeros(blocks.count(count)), np.zeros(blocks.count(edge_count))
     flipped, largest_yet = np.zeros(blocks.count(count), dtype=np.int64), np.zeros(1)
@@ -45,9 +43,4 @@ def look_at_children(
     blocks.run(count, look_inside)
     blocks.run(edge_count, look_across)
     chord = max(inside.max(initial=0), across.max(initial=0))
-    return ChildAngles(int(flipped.sum()), jump_of(chord))
-
-
-def jump_of(chord: float) -> float:
-    """The angle between two unit normals, from their squared distance."""
-    return float(2 * np.arcsin(min(1.0, math.sqrt(chord) / 2)))
+    return ChildAngles(int(flipped.sum()), angle_between(chord))

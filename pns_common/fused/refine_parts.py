@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.blocks import Blocks
-from pns_common.diagnostics import ChildAngles, LevelReport, level_report
-from pns_common.fused.child_faces import jump_of
+from pns_common.child_faces import ChildAngles, angle_between
+from pns_common.diagnostics import LevelReport, level_report
 from pns_common.fused.kernels.normals import (
     flipped_children,
     largest_jump_across,
@@ -204,5 +204,5 @@ def _children(
         flipped = 0
         if counterpart is not None:
             flipped = flipped_children(points, counterpart, *faces, count, *at_faces)
-        seen.append(ChildAngles(int(flipped), jump_of(max(inside, across))))
+        seen.append(ChildAngles(int(flipped), angle_between(max(inside, across))))
     return seen

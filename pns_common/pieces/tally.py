@@ -7,7 +7,6 @@ value or a sum in steps of 2⁻⁴⁰: exact, in any order and for any number of
 
 from __future__ import annotations
 
-import math
 import operator
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
@@ -17,6 +16,7 @@ from typing import Any, NotRequired, TypedDict
 import numpy as np
 from jaxtyping import Float
 
+from pns_common.child_faces import angle_between
 from pns_common.diagnostics import GATE_ACTIVE, EdgeCounts
 
 STEPS = 2**40
@@ -187,7 +187,7 @@ def _reduced(level: LevelTally) -> ReducedLevel:
         "flipped_faces": level.flipped_faces,
         "proximity_ratio": _ratio(level.ratio),
         "gate": _gate(level.gate),
-        "normal_jump_max": float(2 * np.arcsin(min(1.0, math.sqrt(level.chord) / 2))),
+        "normal_jump_max": angle_between(level.chord),
     }
     if level.vertex_ratio is not None and level.vertex_gate is not None:
         report["vertex_rule"] = {

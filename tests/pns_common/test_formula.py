@@ -49,17 +49,16 @@ class Model:
 
 def plain_edge(card, a, b, answer):
     """q."""
-    edge = POINTS[b] - POINTS[a]
-    square = edge @ edge
+    bound = PLAIN.longest_side(a, b) if card.wide_bound else PLAIN.length(a, b, None)
     gate = tanh(card.gate_sharpness * PLAIN.jump(a, b) ** 2)
     asked = np.transpose(PLAIN.frame(a, b)) @ answer
-    longest = card.budget / R * square
+    longest = card.budget / R * bound**2
     if card is FORMAT_2:
         return PLAIN.loop_edge(a, b, POINTS) + gate * longest * asked
     if card.side_gates:
         gate += (1 - gate) * PLAIN.side_gate(a, b, card.vertex_gate_sharpness)
     prior = card.prior_strength * PLAIN.loop_edge(a, b, PUSHES)
-    asked = prior + card.network_scale * square**0.5 * asked
+    asked = prior + card.network_scale * PLAIN.length(a, b, card.network_altitudes) * asked
     return PLAIN.loop_edge(a, b, POINTS) + gate * shortened(asked, longest)
 
 
@@ -72,13 +71,19 @@ def plain_vertex(card, v, answer):
     if card is FORMAT_2:
         return PLAIN.loop_vertex(v, POINTS) + gate * longest * shortened(asked, 1)
     prior = card.prior_strength * PLAIN.loop_vertex(v, PUSHES)
-    asked = prior + card.network_scale * spread * asked
+    asked = prior + card.network_scale * PLAIN.length_at(v, card.network_altitudes) * asked
     return PLAIN.loop_vertex(v, POINTS) + gate * shortened(asked, longest)
 
 
-@pytest.mark.parametrize(
-    "card", [FORMAT_2, FORMAT_3, replace(FORMAT_3, side_gates=True)], ids=["2", "3", "3, sides"]
-)
+CARDS = {
+    "format 2": FORMAT_2,
+    "format 3": FORMAT_3,
+    "sides": replace(FORMAT_3, side_gates=True),
+    "thin faces": replace(FORMAT_3, network_altitudes=1.1, wide_bound=True, budget=0.15),
+}
+
+
+@pytest.mark.parametrize("card", CARDS.values(), ids=CARDS)
 def test_a_level_is_the_formula(card):
     model = Model(card)
     step = level_step(LEVEL, replace(pns(model), guard=None))

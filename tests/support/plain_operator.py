@@ -131,6 +131,24 @@ class PlainMesh:
         m = m / max(np.linalg.norm(m), 1 / 4)
         return -(self.umbrella(v) @ m) * m / (1 + 3 / (8 * k * beta))
 
+    def length(self, a, b, altitudes):
+        """ℓ: h, or so many times the lower of both faces' altitudes over the edge."""
+        h = np.linalg.norm(self.points[b] - self.points[a])
+        if altitudes is None:
+            return h
+        areas = [np.linalg.norm(self.area(*edge, self.across[edge])) for edge in ((a, b), (b, a))]
+        return min(h, altitudes * min(areas) / h)
+
+    def length_at(self, v, altitudes):
+        """ℓ_v."""
+        return np.mean([self.length(v, j, altitudes) ** 2 for j in self.ring[v]]) ** 0.5
+
+    def longest_side(self, a, b):
+        """Of both faces of an edge."""
+        c, d = self.across[a, b], self.across[b, a]
+        sides = [(a, b), (b, c), (c, a), (b, d), (d, a)]
+        return max(np.linalg.norm(self.points[j] - self.points[i]) for i, j in sides)
+
     def side_gate(self, a, b, sharpness):
         """w: what the sides of both faces open."""
 
