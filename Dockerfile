@@ -22,9 +22,7 @@ RUN (cd pns_common/models && sha256sum --check --strict SHA256SUMS) \
 # Kernels for any processor of the architecture, not only the one that builds.
 ENV NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=
 # From elsewhere than /src, whose package would be compiled instead of the installed one.
-# A layer keeps whole seconds of a file's time, and numba compiles again where it differs.
-RUN find /opt/pns -path '*/pns_common/fused/*' -name '*.py' -exec touch -d '2000-01-01 00:00:00' {} + \
- && cd / && /opt/pns/bin/python -m pns_common.fused
+RUN cd / && /opt/pns/bin/python -m pns_common.fused
 
 # Run: the environment alone, as a user without a name, on a root that may be read-only.
 FROM ${BASE}

@@ -1,8 +1,8 @@
 """The operator in compiled kernels: the bits of the array kernels, several times as fast.
 
-Needs numba and a folder for its cache; without them the array kernels serve. Nothing else here is
-loaded before it is needed: reading the kernels takes as long as the array kernels take for a
-million faces, so these serve until that pays. ``python -m pns_common.fused`` compiles all kernels.
+numba compiles them once (compiler.py); llvmlite alone loads what it made (library.py), and is not
+loaded before that pays: until then the array kernels serve, as they do without numba or a folder to
+keep code in. ``python -m pns_common.fused`` compiles all kernels.
 """
 
 from __future__ import annotations
@@ -14,16 +14,17 @@ from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 
-from pns_common.fused.storage import cache_folder
+from pns_common.fused.storage import cache_folder, kernels_are_kept
 
 # Rows a block: a kernel has no temporaries that must stay in a cache, and each call costs a little.
 KERNEL_ROWS = 32768
 LARGEST_INDEX = 2**31 - 1
-# What the array kernels do in the time that reading these takes, in faces that Loop makes; and what
-# a level costs them before its first face. Measured on single meshes of 16 to 2,000,000 faces.
-COST_TO_LOAD = 2_000_000
+# What the array kernels do in the time that loading these takes, in faces that Loop makes; and what
+# a level costs them before its first face. Measured on meshes of 24 to 80,000 faces. Compiling
+# takes a hundred times as long, but once for all processes: some of that has to be this one's.
+COST_TO_LOAD, COST_TO_COMPILE = 250_000, 2_000_000
 COST_OF_LEVEL = 2_000
-LOADED = "pns_common.fused.refine"
+LIBRARY = "pns_common.fused.library"
 
 
 @dataclass
@@ -46,15 +47,15 @@ def load_kernels() -> bool:
     """Load the kernels now, as a process that lives long does at its start; False without numba."""
     if not kernels_available():
         return False
-    import_module(LOADED)
-    import_module("pns_common.fused.learned_step")
-
+    import_module(LIBRARY).library()
+    for learned_or_not in ("refine", "learned_step", "extent"):
+        import_module(f"{__name__}.{learned_or_not}")
     return True
 
 
 def kernels_loaded() -> bool:
     """Whether they are loaded."""
-    return LOADED in sys.modules
+    return LIBRARY in sys.modules
 
 
 def kernels_pay(costs: Sequence[int]) -> bool:
@@ -62,7 +63,7 @@ def kernels_pay(costs: Sequence[int]) -> bool:
     if kernels_loaded():
         return True
     _work.cost += sum(costs) + len(costs) * COST_OF_LEVEL
-    return _work.cost >= COST_TO_LOAD
+    return _work.cost >= (COST_TO_LOAD if kernels_are_kept() else COST_TO_COMPILE)
 
 
 def fits(vertex_count: int, face_count: int, levels: int) -> bool:

@@ -9,7 +9,12 @@ import numpy as np
 from jaxtyping import Int
 
 from pns_common.blocks import Blocks
-from pns_common.fused.kernels.children import number_halves, split_edges, split_faces
+from pns_common.fused.kernels.children import (
+    number_halves,
+    split_edges,
+    split_faces,
+    split_faces_long,
+)
 from pns_common.fused.kernels.edges import (
     INTERIOR,
     NONE,
@@ -142,11 +147,10 @@ def split_mesh_faces(
 ) -> Int[np.ndarray, "C 3"]:
     """The children of the faces, as ``topology.split`` orders them."""
     faces = np.empty((4 * len(parent.faces), 3), dtype=dtype)
+    split = split_faces if dtype is np.int32 else split_faces_long
 
     def fill(rows: slice) -> None:
-        split_faces(
-            parent.faces, parent.face_edges, parent.vertex_count, rows.start, rows.stop, faces
-        )
+        split(parent.faces, parent.face_edges, parent.vertex_count, rows.start, rows.stop, faces)
 
     blocks.run(len(parent.faces), fill)
     return faces

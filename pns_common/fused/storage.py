@@ -1,34 +1,45 @@
 """Where compiled kernels are kept: beside their source, else in a folder of the user's.
 
-numba refuses to compile for a cache that it cannot write. An image with a read-only root brings
-kernels compiled when it was built; they are copied to the temporary folder, which only their owner
-may touch: what is read from a cache is run.
+Only its owner may touch that one: what is read from there is run. An image with a read-only root
+brings kernels compiled when it was built, beside their source.
 """
 
 from __future__ import annotations
 
 import os
-import shutil
 import stat
 import tempfile
 from functools import cache
 from pathlib import Path
 
-from pns_common.whole_file import replacing
-
 KERNELS = Path(__file__).resolve().parent / "kernels"
 BUILT = KERNELS / "__pycache__"
+STEM = "kernels-"
 
 
 @cache
 def cache_folder() -> Path | None:
-    """The folder that kernels are kept in; None where there is none to write to."""
+    """The folder that new kernels are written to; None where there is none."""
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given:
         return Path(given)
     if _is_writable(BUILT if BUILT.exists() else KERNELS):
         return BUILT
     return private_folder(Path(tempfile.gettempdir()))
+
+
+def kernel_file(key: str) -> Path | None:
+    """The file of that key: with the package, if it came with it; else in ``cache_folder``."""
+    name, folder = f"{STEM}{key}.o", cache_folder()
+    if (BUILT / name).exists():
+        return BUILT / name
+    return folder / name if folder is not None else None
+
+
+def kernels_are_kept() -> bool:
+    """Whether kernels were compiled here before; for another processor or version, perhaps."""
+    folder = cache_folder()
+    return any(any(each.glob(f"{STEM}*.o")) for each in (BUILT, folder) if each is not None)
 
 
 def private_folder(parent: Path) -> Path | None:
@@ -43,15 +54,6 @@ def private_folder(parent: Path) -> Path | None:
     mine = stat.S_ISDIR(status.st_mode) and (not hasattr(os, "getuid") or status.st_uid == user)
     # Whoever else may write there could have us run anything.
     return folder if mine and not status.st_mode & 0o022 and _is_writable(folder) else None
-
-
-def copy_built(built: Path, to: Path) -> None:
-    """Copy compiled kernels that are not there yet, each under another name first."""
-    to.mkdir(mode=0o700, parents=True, exist_ok=True)
-    for source in [*built.glob("*.nbi"), *built.glob("*.nbc")]:
-        if not (to / source.name).exists():
-            with replacing(to / source.name) as temporary:
-                shutil.copyfile(source, temporary)
 
 
 def _is_writable(folder: Path) -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 from packaging.metadata import Metadata
 from packaging.requirements import Requirement
 
-from pns_common.fused.storage import BUILT, KERNELS, cache_folder, copy_built
+from pns_common.fused.storage import BUILT, cache_folder
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -50,17 +50,14 @@ def environment(folder: Path, wheel: Path, extras: set[str]) -> Path:
 
 
 def lend_kernels(programs: Path) -> None:
-    """Give an environment the kernels that this checkout has compiled, if it has.
-
-    numba knows a source by its time and its size: the time has to be lent too.
-    """
+    """Give an environment the kernels that this checkout has compiled, if it has."""
     built = cache_folder()
     (lent,) = programs.parent.glob("lib/python*/site-packages/pns_common/fused/kernels")
     if built is None or not built.exists():
         return
-    for source in KERNELS.glob("*.py"):
-        shutil.copystat(source, lent / source.name)
-    copy_built(built, lent / BUILT.name)
+    (lent / BUILT.name).mkdir(exist_ok=True)
+    for code in built.glob("*.o"):
+        shutil.copy(code, lent / BUILT.name)
 
 
 def closure(requirements: list[Requirement], extras: set[str], own: str) -> set[str]:

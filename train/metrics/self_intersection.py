@@ -5,6 +5,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit
+from numba.extending import register_jitable
 
 from pns_common.fused.kernels.rings import between, cross, dot
 from pns_common.mesh import Mesh
@@ -19,6 +20,9 @@ SLACK = 1e-12
 """Crossings this close to a border, as a share of a triangle, are no crossings."""
 
 Corners = Float[np.ndarray, "N 3 3"]
+
+for helper in (between, cross, dot):
+    register_jitable(helper)
 
 
 def self_intersecting(mesh: Mesh) -> Bool[np.ndarray, " F"]:

@@ -13,8 +13,6 @@ children are plain too.
 
 from __future__ import annotations
 
-from numba import njit
-
 from pns_common.fused.kernels.compiled import (
     CLASSES,
     CLASSES_OUT,
@@ -23,12 +21,10 @@ from pns_common.fused.kernels.compiled import (
     LONG_INDICES_OUT,
     SIZE,
     kernel,
-    kernels,
 )
 from pns_common.fused.kernels.edges import INTERIOR
 
 
-@njit(inline="always")
 def _opened_before(half_edges, face):
     """How many edges first appear in an earlier face (they ascend by their first half-edge)."""
     least, most = 0, half_edges.shape[0]
@@ -41,12 +37,10 @@ def _opened_before(half_edges, face):
     return least
 
 
-@njit(inline="always")
 def _after(i):
     return i + 1 if i < 2 else 0
 
 
-@njit(inline="always")
 def _before(i):
     return i - 1 if i > 0 else 2
 
@@ -73,7 +67,6 @@ def number_halves(faces, face_edges, edges, half_edges, begin, end, halves):
     return following
 
 
-@njit(inline="always")
 def _at_vertex(half_edge, faces, vertex):
     """The child at ``vertex`` of a parent's half-edge."""
     f = half_edge // 3
@@ -83,7 +76,6 @@ def _at_vertex(half_edge, faces, vertex):
     return 12 * f + 3 * _after(i) + 2
 
 
-@njit(inline="always")
 def _fill_half(
     e, vertex, child, faces, vertex_count, half_edges, kind, to_edges, to_halves, to_kind
 ):
@@ -166,13 +158,7 @@ def split_edges(
     return following
 
 
-@kernels(
-    SIZE,
-    (INDICES, INDICES, SIZE, SIZE, SIZE, INDICES_OUT),
-    (INDICES, INDICES, SIZE, SIZE, SIZE, LONG_INDICES_OUT),
-)
-def split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
-    """The children 4 f … 4 f + 3 of faces begin … end − 1."""
+def _split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
     for f in range(begin, end):
         for i in range(3):
             middle = vertex_count + face_edges[f, i]
@@ -180,4 +166,17 @@ def split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
             to_faces[4 * f + i, 1] = middle
             to_faces[4 * f + i, 2] = vertex_count + face_edges[f, _before(i)]
             to_faces[4 * f + 3, i] = middle
+
+
+@kernel(SIZE, INDICES, INDICES, SIZE, SIZE, SIZE, INDICES_OUT)
+def split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
+    """The children 4 f … 4 f + 3 of faces begin … end − 1."""
+    _split_faces(faces, face_edges, vertex_count, begin, end, to_faces)
+    return 0
+
+
+@kernel(SIZE, INDICES, INDICES, SIZE, SIZE, SIZE, LONG_INDICES_OUT)
+def split_faces_long(faces, face_edges, vertex_count, begin, end, to_faces):
+    """The same in int64."""
+    _split_faces(faces, face_edges, vertex_count, begin, end, to_faces)
     return 0

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import numba
-from numba import float64, njit
-
-from pns_common.fused.kernels.compiled import INDICES, POINTS, SIZE, kernel
+from pns_common.fused.kernels.compiled import INDICES, LONG_INDEX, POINTS, REAL, SIZE, kernel
 from pns_common.fused.kernels.normals import squared_chord, unit_normal
 
-ROWS = numba.types.Array(numba.int64, 1, "C", readonly=True)
 
-
-@njit(inline="always")
 def _normal(points, children, f):
     return unit_normal(points, children[f, 0], children[f, 1], children[f, 2])
 
 
-@kernel(float64, POINTS, INDICES, ROWS)
+@kernel(REAL, POINTS, INDICES, LONG_INDEX)
 def chords_inside(points, children, faces):
     """The largest squared chord between the middle child and the others of some faces."""
     largest = 0.0
@@ -28,7 +22,7 @@ def chords_inside(points, children, faces):
     return largest
 
 
-@kernel(float64, POINTS, INDICES, ROWS, ROWS)
+@kernel(REAL, POINTS, INDICES, LONG_INDEX, LONG_INDEX)
 def chords_between(points, children, first, second):
     """The same between pairs of children."""
     largest = 0.0
@@ -38,7 +32,7 @@ def chords_between(points, children, first, second):
     return largest
 
 
-@kernel(SIZE, POINTS, POINTS, INDICES, ROWS)
+@kernel(SIZE, POINTS, POINTS, INDICES, LONG_INDEX)
 def flipped_among(points, loop_points, children, faces):
     """How many children of some faces have a normal that opposes Loop's."""
     flipped = 0

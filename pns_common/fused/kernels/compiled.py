@@ -1,59 +1,104 @@
-"""How kernels of this package are compiled: to plain IEEE arithmetic, once, and without the GIL."""
+"""How a kernel is declared and called: plain functions until they are asked for.
+
+Nothing here loads a compiler. A kernel's machine code is read from where it is kept, or made once
+(library.py). A plain function in these modules is a helper: it becomes part of the kernels that
+call it.
+"""
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
 
-import numba
-from numba.core import caching
-
-from pns_common.fused.storage import BUILT, KERNELS, cache_folder, copy_built
-
-# Read-only arrays in: numba takes writable ones there too, so that each kernel is compiled once.
-POINTS = numba.types.Array(numba.float64, 2, "C", readonly=True)
-INDICES = numba.types.Array(numba.int32, 2, "C", readonly=True)
-LONG_INDICES = numba.types.Array(numba.int64, 2, "C", readonly=True)
-INDEX = numba.types.Array(numba.int32, 1, "C", readonly=True)
-CLASSES = numba.types.Array(numba.int8, 1, "C", readonly=True)
-NUMBERS = numba.types.Array(numba.float64, 1, "C", readonly=True)
-# Written by a kernel.
-POINTS_OUT = numba.float64[:, ::1]
-NUMBERS_OUT = numba.float64[::1]
-INDICES_OUT = numba.int32[:, ::1]
-INDEX_OUT = numba.int32[::1]
-LONG_INDICES_OUT = numba.int64[:, ::1]
-CLASSES_OUT = numba.int8[::1]
-FLAGS = numba.types.Array(numba.boolean, 1, "C", readonly=True)
-FLAGS_OUT = numba.boolean[::1]
-SIZE = numba.int64
-REAL = numba.float64
+import numpy as np
 
 
-def _use_cache() -> None:
-    """Tell numba where its cache is, with the kernels that came with the package in it."""
-    folder = cache_folder()
-    if folder is None or folder == BUILT:
-        return  # numba's own choice, and there it can write
-    numba.config.CACHE_DIR = str(folder)
-    # numba's cache has a folder for each folder of sources.
-    locator = caching._CacheLocator
-    copy_built(BUILT, folder / locator.get_suitable_cache_subpath(str(KERNELS / "edges.py")))
+@dataclass(frozen=True)
+class Array:
+    """An array in C's order; ``written``: by the kernel."""
+
+    dtype: str
+    ndim: int
+    written: bool = False
+
+    def checked(self, value: np.ndarray) -> np.ndarray:
+        """The value. Raises TypeError where a kernel would read it wrongly."""
+        flags = value.flags
+        suits = flags.carray if self.written else flags.c_contiguous and flags.aligned
+        if not suits or value.ndim != self.ndim or value.dtype != self.dtype:
+            found = f"{value.dtype}, {value.ndim} dimensions"
+            raise TypeError(f"a kernel takes {self}, not {found}, {flags}")
+        return value
 
 
-_use_cache()
+POINTS, POINTS_OUT = Array("float64", 2), Array("float64", 2, written=True)
+NUMBERS, NUMBERS_OUT = Array("float64", 1), Array("float64", 1, written=True)
+INDICES, INDICES_OUT = Array("int32", 2), Array("int32", 2, written=True)
+INDEX, INDEX_OUT = Array("int32", 1), Array("int32", 1, written=True)
+LONG_INDICES, LONG_INDICES_OUT = Array("int64", 2), Array("int64", 2, written=True)
+LONG_INDEX = Array("int64", 1)
+CLASSES, CLASSES_OUT = Array("int8", 1), Array("int8", 1, written=True)
+FLAGS, FLAGS_OUT = Array("bool", 1), Array("bool", 1, written=True)
+
+# The mark of helpers that do not become part of a loop.
+SELDOM = "called_seldom"
+
+Scalar = Literal["int64", "float64"]
+SIZE: Scalar = "int64"
+REAL: Scalar = "float64"
+_NUMBERS: dict[str, tuple[type, type]] = {
+    SIZE: (int, ctypes.c_int64),
+    REAL: (float, ctypes.c_double),
+}
 
 
-def kernel(result: Any, *arguments: Any) -> Callable[[Any], Any]:
-    """Compile a function for one signature when it is defined, or read it from the cache.
+class Kernel:
+    """A function of arrays and numbers whose machine code runs without the GIL.
+
+    Attributes:
+        function: what is compiled, for arguments of these types.
+        name: of its code in the library.
+    """
+
+    def __init__(
+        self, function: Callable[..., Any], result: Scalar, arguments: tuple[Array | Scalar, ...]
+    ) -> None:
+        self.function, self.result, self.arguments = function, result, arguments
+        self.name = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
+        self.__doc__ = function.__doc__
+        self._take = [
+            each.checked if isinstance(each, Array) else _NUMBERS[each][0] for each in arguments
+        ]
+
+    def __call__(self, *values: Any) -> Any:
+        """Run it. Raises TypeError where an argument is of another type."""
+        return self._code(*[take(value) for take, value in zip(self._take, values, strict=True)])
+
+    @cached_property
+    def _code(self) -> Callable[..., Any]:
+        from pns_common.fused.library import library
+
+        types = [
+            ctypes.py_object if isinstance(each, Array) else _NUMBERS[each][1]
+            for each in self.arguments
+        ]
+        prototype = ctypes.CFUNCTYPE(_NUMBERS[self.result][1], *types)
+        return prototype(library()[self.name])
+
+
+def called_seldom(helper: Callable[..., Any]) -> Callable[..., Any]:
+    """Declare a helper that is kept out of the loop of the kernel that calls it."""
+    setattr(helper, SELDOM, True)
+    return helper
+
+
+def kernel(result: Scalar, *arguments: Array | Scalar) -> Callable[[Callable[..., Any]], Kernel]:
+    """Declare a kernel.
 
     No fast-math: nothing is reordered or contracted, so a kernel has the bits of the same formula
     in numpy, on any machine.
     """
-    return kernels(result, arguments)
-
-
-def kernels(result: Any, *arguments: Any) -> Callable[[Any], Any]:
-    """The same for several signatures, tried in order."""
-    signatures = [result(*types) for types in arguments]
-    return numba.njit(signatures, nogil=True, cache=True, error_model="numpy")
+    return lambda function: Kernel(function, result, arguments)

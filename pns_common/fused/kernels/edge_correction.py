@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from pns_common.edge.features import SHORTEST
 from pns_common.edge.frames import ANTIPARALLEL
 from pns_common.fused.kernels.compiled import (
@@ -30,14 +28,12 @@ LOGS, DIHEDRAL, ENDS, WINGS, UMBRELLAS = 1, 5, 6, 10, 14
 LENGTHS = 5
 
 
-@njit(inline="always")
 def _unit(v):
     square = dot(v, v)
     length = math.sqrt(square) if square > 0 else math.inf
     return v[0] / length, v[1] / length, v[2] / length
 
 
-@njit(inline="always")
 def _no_shorter(length):
     return length if length > SHORTEST else SHORTEST
 
@@ -147,7 +143,6 @@ def fill_log_ratios(logs, features):
     return 0
 
 
-@njit(inline="always")
 def in_ball(z):
     """A vector shortened to length 1, as ``correction.project_to_ball`` does."""
     largest = max(max(abs(z[0]), abs(z[1])), abs(z[2]))
@@ -157,7 +152,6 @@ def in_ball(z):
     return z[0] * factor, z[1] * factor, z[2] * factor
 
 
-@njit(inline="always")
 def _rotated(frame, i, z):
     return (
         z[0] * frame[i, 0] + z[1] * frame[i, 3] + z[2] * frame[i, 6],
@@ -166,7 +160,6 @@ def _rotated(frame, i, z):
     )
 
 
-@njit(inline="always")
 def shortened(v, longest):
     """A vector shortened to ``longest``, as ``correction.shortened`` does."""
     length = norm(v)
@@ -174,7 +167,6 @@ def shortened(v, longest):
     return v[0] * factor, v[1] * factor, v[2] * factor
 
 
-@njit(inline="always")
 def write(index, delta, gate, envelope, displacement, ratio, gates, envelopes):
     """δ, ‖δ‖ / ρ (0 where the envelope is empty), γ and ρ into their arrays."""
     for k in range(3):
@@ -212,14 +204,12 @@ def correct(
     return 0
 
 
-@njit(inline="always")
 def _at_edge(pushes, a, b, c, d, k):
     """A coordinate of what Loop's edge mask makes of pushes."""
     ends, sides = pushes[a, k] + pushes[b, k], pushes[c, k] + pushes[d, k]
     return EDGE_ENDPOINT * ends + EDGE_OPPOSITE * sides
 
 
-@njit(inline="always")
 def _prior(pushes, of_boundary, nothing, a, b, c, d, k, strength):
     """A coordinate of D_e, with the boundary's part."""
     part = _at_edge(of_boundary, a, b, c, d, k) if len(of_boundary) else nothing

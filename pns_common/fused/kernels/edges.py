@@ -6,8 +6,6 @@ The numbering is that of ``pns_common.topology``: by first appearance over the f
 
 from __future__ import annotations
 
-from numba import njit
-
 from pns_common.fused.kernels.compiled import (
     CLASSES_OUT,
     INDEX,
@@ -32,7 +30,6 @@ NONE, SEVERAL = -1, -2
 TOO_LONG = -1
 
 
-@njit(inline="always")
 def _may_repeat(f, links, face_edges):
     """Whether an earlier face may have the three edges of face f; yes where that is not known."""
     for i in range(3):
@@ -47,7 +44,6 @@ def _may_repeat(f, links, face_edges):
     return True
 
 
-@njit(inline="always")
 def _repeats(faces, f):
     return faces[f, 0] == faces[f, 1] or faces[f, 1] == faces[f, 2] or faces[f, 2] == faces[f, 0]
 

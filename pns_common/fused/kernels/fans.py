@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from pns_common.fused.kernels.compiled import (
     CLASSES,
     FLAGS_OUT,
@@ -19,7 +17,6 @@ from pns_common.fused.kernels.edges import CREASE, INTERIOR
 SMALLEST_RING = 3
 
 
-@njit(inline="always")
 def _across(face_edges, half_edges, edge_class, half_edge):
     """The other half-edge of an interior or crease edge, else −1: a crease parts no fan."""
     f = half_edge // 3

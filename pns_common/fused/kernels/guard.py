@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from pns_common.edge.frames import NO_AREA
 from pns_common.fold_guard import LEAST_AREA
 from pns_common.fused.kernels.compiled import (
@@ -22,7 +20,6 @@ from pns_common.fused.kernels.normals import COSINE_MARGIN, clearly_less
 from pns_common.fused.kernels.rings import cross, dot, row
 
 
-@njit(inline="always")
 def _moved(p, displacement, scale, v):
     s = scale[v]
     return (
@@ -32,12 +29,10 @@ def _moved(p, displacement, scale, v):
     )
 
 
-@njit(inline="always")
 def _difference(p, q):
     return q[0] - p[0], q[1] - p[1], q[2] - p[2]
 
 
-@njit(inline="always")
 def _turned(a, b, c, moved_a, moved_b, moved_c, cosine, clear):
     """Whether a face turned or shrank too much; False where it had no area (``turned``).
 
@@ -59,7 +54,6 @@ def _turned(a, b, c, moved_a, moved_b, moved_c, cosine, clear):
     return not dot(old, new) >= cosine * size
 
 
-@njit(inline="always")
 def _touch(scale, touched, v):
     if scale[v] > 0:
         touched[v] = True

@@ -6,8 +6,6 @@ a range of vertices and reads all edges.
 
 from __future__ import annotations
 
-from numba import float64, njit
-
 from pns_common.fused.kernels.compiled import (
     CLASSES,
     INDEX,
@@ -16,6 +14,7 @@ from pns_common.fused.kernels.compiled import (
     NUMBERS,
     POINTS,
     POINTS_OUT,
+    REAL,
     SIZE,
     kernel,
 )
@@ -29,7 +28,6 @@ from pns_common.stencils import (
 )
 
 
-@njit(inline="always")
 def opposite(faces, half_edge):
     """The vertex of a half-edge's face that is not on it."""
     f = half_edge // 3
@@ -116,7 +114,7 @@ def blend_vertices(points, valence, sharp, beta, begin, end, sums):
     return 0
 
 
-@kernel(float64, POINTS, SIZE, SIZE)
+@kernel(REAL, POINTS, SIZE, SIZE)
 def largest_coordinate(points, begin, end):
     """The largest absolute coordinate of rows begin … end − 1; NaN where one is."""
     largest = 0.0

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from pns_common.edge.frames import NO_AREA
 from pns_common.fused.kernels.compiled import (
     CLASSES,
@@ -18,6 +16,7 @@ from pns_common.fused.kernels.compiled import (
     POINTS,
     REAL,
     SIZE,
+    called_seldom,
     kernel,
 )
 from pns_common.fused.kernels.edges import INTERIOR
@@ -29,7 +28,6 @@ CLEARLY_SAME_SIDE = 1e-20
 NORMAL_NUMBERS = 1e-300
 
 
-@njit(inline="always")
 def unit_normal(points, a, b, c):
     """The unit normal of a triangle; zeros where it has no area (``frames.triangle_normals``)."""
     u0, u1, u2 = (
@@ -51,7 +49,6 @@ def unit_normal(points, a, b, c):
     return 0.0, 0.0, 0.0
 
 
-@njit(inline="always")
 def squared_chord(n, m):
     """The squared distance between two unit normals; 0 where one is undefined."""
     if n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0 and m[0] * m[0] + m[1] * m[1] + m[2] * m[2] > 0:
@@ -60,22 +57,19 @@ def squared_chord(n, m):
     return 0.0
 
 
-@njit(inline="always")
 def _after(i):
     return i + 1 if i < 2 else 0
 
 
-@njit(inline="always")
 def _before(i):
     return i - 1 if i > 0 else 2
 
 
-@njit(inline="always")
 def _row(points, i):
     return points[i, 0], points[i, 1], points[i, 2]
 
 
-@njit
+@called_seldom
 def _child_normal(points, vertex_count, faces, face_edges, f, i):
     """The normal of the child at corner i; of the one in the middle for i = 3."""
     if i == 3:
@@ -93,7 +87,6 @@ def _child_normal(points, vertex_count, faces, face_edges, f, i):
     )
 
 
-@njit(inline="always")
 def area(p, q, r):
     """Twice the area vector of a triangle, and its square."""
     u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
@@ -102,21 +95,19 @@ def area(p, q, r):
     return x, y, z, x * x + y * y + z * z
 
 
-@njit(inline="always")
 def clearly_less(n, m, bound):
     """Whether the angle of two area vectors has a cosine above √bound; False where in doubt."""
     inner, squares = n[0] * m[0] + n[1] * m[1] + n[2] * m[2], n[3] * m[3]
     return inner > 0 and squares > NORMAL_NUMBERS and inner * inner > bound * squares
 
 
-@njit(inline="always")
 def _bound(chord):
     """What ``clearly_less`` takes for angles below that of a squared chord."""
     cosine = max(1 - chord / 2 + COSINE_MARGIN, 0.0)
     return cosine * cosine
 
 
-@njit
+@called_seldom
 def _chord_inside(points, vertex_count, faces, face_edges, f):
     """The largest squared chord between the child in the middle of face f and the others."""
     centre, largest = _child_normal(points, vertex_count, faces, face_edges, f, 3), 0.0
@@ -153,7 +144,7 @@ def largest_jump_inside(points, faces, face_edges, vertex_count, begin, end, lar
     return largest
 
 
-@njit
+@called_seldom
 def _chord_across(points, vertex_count, faces, face_edges, f, i, g, j):
     """The larger squared chord across corner i's edge of face f, which is corner j's of face g."""
     return max(

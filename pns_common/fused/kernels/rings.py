@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from pns_common.fused.kernels.compiled import (
     CLASSES,
     INDEX,
@@ -41,13 +39,11 @@ AREA = 3
 HEIGHT = 3
 
 
-@njit(inline="always")
 def dot(u, v):
     """The inner product, summed in the order of ``arrays.dot``."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-@njit(inline="always")
 def cross(u, v):
     """The cross product, as ``arrays.cross`` has it."""
     return (
@@ -57,20 +53,17 @@ def cross(u, v):
     )
 
 
-@njit(inline="always")
 def between(points, a, b):
     """The vector from row a to row b."""
     return points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
 
 
-@njit(inline="always")
 def norm(v):
     """The length of a vector, 0 for zero vectors and NaN, as in ``arrays.norm``."""
     square = dot(v, v)
     return math.sqrt(square) if square > 0 else 0.0
 
 
-@njit(inline="always")
 def row(values, i):
     """The first three columns of a row."""
     return values[i, 0], values[i, 1], values[i, 2]
@@ -179,7 +172,6 @@ def face_bends(normals, face_edges, half_edges, edge_class, gentle, sharp, begin
     return 0
 
 
-@njit(inline="always")
 def _add_spoke(sums, v, sign, measured, e, length, network_square):
     for k in range(3):
         spoke = sign * measured[e, SPOKE + k]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from pns_common.fused.kernels.compiled import (
     INDEX,
     NUMBERS,
@@ -35,17 +33,14 @@ from pns_common.fused.kernels.rings import (
 )
 
 
-@njit(inline="always")
 def _divided(value, by):
     return value / by if by > 0 else 0.0
 
 
-@njit(inline="always")
 def _root(square):
     return math.sqrt(square) if square > 0 else 0.0
 
 
-@njit(inline="always")
 def _reach(means, v):
     return _root(means[v, RING_SQUARE])
 
@@ -70,13 +65,11 @@ def look_around(means, fields, vertices, begin, end, features, mean_jump):
     return 0
 
 
-@njit(inline="always")
 def _component(z, means, fields, v, reach, k):
     umbrella, pull = means[v, UMBRELLA + k], means[v, PULL + k]
     return z[0] * fields[v, k] + z[1] * _divided(umbrella, reach) + z[2] * _divided(pull, reach)
 
 
-@njit(inline="always")
 def _combined(z, means, fields, v):
     """Σ z_i e_i over the ring's three vectors."""
     reach = _reach(means, v)
@@ -114,7 +107,6 @@ def correct(
     return 0
 
 
-@njit(inline="always")
 def _prior(pushes, of_boundary, nothing, v, k, strength):
     """A coordinate of D_v, with the boundary's part."""
     part = of_boundary[v, k] if len(of_boundary) else nothing

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from pns_common import Mesh, loop, refine
-from pns_common.fused import COST_TO_LOAD, _Work, kernels_pay, storage
+from pns_common.fused import COST_TO_COMPILE, COST_TO_LOAD, _Work, kernels_pay, storage
 from pns_common.progress import level_costs
 from tests.support.kernels import by_arrays
 from tests.support.meshes import bumpy_sphere
@@ -60,19 +60,17 @@ def test_without_any_folder_there_are_no_kernels(monkeypatch):
     assert storage.cache_folder() is None
 
 
-def test_built_kernels_are_copied_once(tmp_path):
-    built, to = tmp_path / "built", tmp_path / "to"
+def test_kernels_that_came_with_the_package_are_taken_before_any_others(monkeypatch, tmp_path):
+    built, written = tmp_path / "built", tmp_path / "written"
     built.mkdir()
-    (built / "edges.nbi").write_bytes(b"index")
-    (built / "edges.nbc").write_bytes(b"code")
-    (built / "edges.pyc").write_bytes(b"python")
-    storage.copy_built(built, to)
-    (to / "edges.nbc").write_bytes(b"newer")
-    storage.copy_built(built, to)
-    assert {f.name: f.read_bytes() for f in to.iterdir()} == {
-        "edges.nbi": b"index",
-        "edges.nbc": b"newer",
-    }
+    monkeypatch.setattr(storage, "BUILT", built)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(written))
+    assert storage.kernel_file("1").parent == written
+    assert not storage.kernels_are_kept()
+    (built / storage.kernel_file("1").name).write_bytes(b"code")
+    assert storage.kernel_file("1").parent == built
+    assert storage.kernel_file("2").parent == written
+    assert storage.kernels_are_kept()
 
 
 @pytest.fixture
@@ -80,6 +78,7 @@ def fresh(monkeypatch):
     """A process that has done nothing yet."""
     monkeypatch.setattr("pns_common.fused.kernels_loaded", lambda: False)
     monkeypatch.setattr("pns_common.fused._work", _Work())
+    monkeypatch.setattr("pns_common.fused.kernels_are_kept", lambda: True)
 
 
 @pytest.mark.usefixtures("fresh")
@@ -103,8 +102,15 @@ def test_kernels_pay_for_many_meshes_however_small():
     assert meshes * sum(levels) < COST_TO_LOAD / 10
 
 
+@pytest.mark.usefixtures("fresh")
+def test_kernels_that_must_be_compiled_pay_later(monkeypatch):
+    monkeypatch.setattr("pns_common.fused.kernels_are_kept", lambda: False)
+    assert not kernels_pay([COST_TO_LOAD])
+    assert kernels_pay([COST_TO_COMPILE])
+
+
 def test_importing_the_package_loads_no_compiler():
-    code = "import sys, pns_common; sys.exit('numba' in sys.modules)"
+    code = "import sys, pns_common; sys.exit(bool({'numba', 'llvmlite'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
