@@ -62,13 +62,23 @@ KINDS = {
 LONGEST = (
     "train/experiments/test_every_experiment.py",
     "service/http/test_serve.py",
-    "service/http/test_openapi.py",
-    "train/experiments/test_reproduce.py",
     "test_wheel.py",
     "conformance/test_conformance.py",
+    "train/experiments/test_reproduce.py",
+    "service/http/test_jobs.py",
+    "service/http/test_crossed_answers.py",
+    "service/http/test_openapi.py",
     "soak/test_soak.py",
-    "train/fitting/test_limit_training.py",
+    "service/http/connection/test_bounds.py",
+    "service/test_assets.py",
+    "service/workers/test_pool.py",
     "web/test_bundle.py",
+    "docs/test_site.py",
+    "train/certificates/test_ascent.py",
+    "train/certificates/test_adversary.py",
+    "train/data/test_pair_stream.py",
+    "train/test_train_command.py",
+    "train/fitting/test_limit_training.py",
 )
 
 
