@@ -5,6 +5,7 @@ from __future__ import annotations
 import cProfile
 import pstats
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,7 @@ from rich.table import Table
 from benchmarks.generated import ORDERS
 from pns_common import load_model, loop, pns, refine
 from pns_common.fused import load_kernels
+from pns_common.fused.library import kernel_modules, kernels_of
 
 ROWS = 24
 
@@ -27,6 +29,7 @@ def main(
 ) -> None:
     """Profile a warm call by processor time."""
     load_kernels()
+    name_kernels()
     mesh = ORDERS[order](faces)
     scheme = loop() if model == "loop" else pns(load_model(model))
     refine(mesh, scheme, levels, threads=1)  # warm
@@ -40,6 +43,17 @@ def main(
     for seconds, name, file in own[:ROWS]:
         table.add_row(f"{1000 * seconds:.1f}", f"{seconds / total:.0%}", name, file)
     Console().print(table)
+
+
+def name_kernels() -> None:
+    """Give each kernel's code a frame of its own name: the profiler sees no machine code."""
+    for kernel in kernels_of(kernel_modules()):
+
+        def run(*values: object, code: Callable[..., object] = kernel.code) -> object:
+            return code(*values)
+
+        run.__code__ = run.__code__.replace(co_name=kernel.name)
+        vars(kernel)["code"] = run
 
 
 if __name__ == "__main__":

@@ -75,10 +75,11 @@ class Kernel:
 
     def __call__(self, *values: Any) -> Any:
         """Run it. Raises TypeError where an argument is of another type."""
-        return self._code(*[take(value) for take, value in zip(self._take, values, strict=True)])
+        return self.code(*[take(value) for take, value in zip(self._take, values, strict=True)])
 
     @cached_property
-    def _code(self) -> Callable[..., Any]:
+    def code(self) -> Callable[..., Any]:
+        """Its machine code; loads the library."""
         from pns_common.fused.library import library
 
         types = [
