@@ -4,12 +4,12 @@
     ℓ_v = root mean square of ℓ_e over the spokes of an old vertex
     h̄   = the longest edge of both faces
 
-A child of a face turns by what its corners are moved apart over its altitude. On faces as wide as
-they are long that is a share of the bend that is there; on a face of aspect 40 an answer of the
-network that is right to a twentieth of h turns children by a right angle. In units of ℓ no answer
-turns them further than on wide faces. And a short edge between two long ones has to go where these
-go: ρ of its own h would hold it back, and leave teeth as high as the correction. So the bound
-counts h̄, which is as good an h for everything that is proved with it (docs/theorems.md).
+A child of a face turns by what its corners are moved apart over its altitude. Where faces are 40
+times as long as wide, an answer of the network that is right to a twentieth of h turns children by
+a right angle; in units of ℓ it turns them no further than on faces as wide as long. And a short
+edge between two long ones has to go where these go: ρ of its own h would hold it back, and leave
+teeth as high as the correction. So the bound counts h̄, which is as good an h for everything that is
+proved with it (docs/theorems.md, 9).
 """
 
 from __future__ import annotations
