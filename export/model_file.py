@@ -67,6 +67,7 @@ ORDER = (
     "faces",
     "pool",
     "reuse",
+    "trained_strength",
     "learning_rate",
     "final_learning_rate",
     "seed",

@@ -9,7 +9,7 @@ from pns_common.edge.frames import face_normals
 from pns_common.thin_faces import network_lengths
 from pns_common.topology import EdgeClass, build_topology
 from pns_common.vertex.rings import Rings
-from tests.support.meshes import icosphere, manifolds, soups, torus_of_quads
+from tests.support.meshes import icosphere, manifolds, proper_faces, soups, torus_of_quads
 from tests.support.networks import scale_free_model
 from tests.support.quasi_interpolation import quasi_interpolated, with_card
 
@@ -20,6 +20,7 @@ OF_LONG_EDGES = {"network_altitudes": None, "wide_bound": None}
 @given(manifolds() | soups())
 def test_lengths_are_those_of_their_definition(mesh):
     """h ℓ_e = min(h², α h a) edge for edge, areas from another corner; ℓ_v vertex for vertex."""
+    mesh = proper_faces(mesh)
     topology = build_topology(mesh.faces, len(mesh.vertices))
     normals = face_normals(mesh.vertices, mesh.faces)
     lengths = network_lengths(Rings(topology, mesh.vertices, normals), ALTITUDES)

@@ -65,6 +65,15 @@ def bent(x, y):
     return 0.4 * np.exp(-6 * (x + 0.3 * y) ** 2) + 0.1 * np.sin(3 * y)
 
 
+def proper_faces(mesh):
+    """A mesh without faces that name a vertex twice, or the same three as an earlier one."""
+    three = np.sort(mesh.faces, axis=1)
+    distinct = (np.diff(three, axis=1) > 0).all(axis=1)
+    _, first = np.unique(three, axis=0, return_index=True)
+    kept = distinct & np.isin(np.arange(len(three)), first)
+    return Mesh(mesh.vertices, mesh.faces[kept]) if kept.any() else Mesh(*icosphere(0))
+
+
 def torus_of_quads(around, across):
     """Its quads are plane, and all cut the same way."""
     u, v = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in (around, across)), indexing="ij")

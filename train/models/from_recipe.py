@@ -17,7 +17,7 @@ from pns_common.schemes import Scheme, scale_free_scheme
 from pns_common.vertex.operator import VertexOperator
 from pns_common.vertex.rings import RING_FEATURE_SETS, RingFeatureSet
 from train.models.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_correction
-from train.models.recipes import Recipe, VertexRule
+from train.models.recipes import Recipe, ToLimit, VertexRule
 from train.models.tied import TiedNet
 
 FEATURE_SIZES: Mapping[str, float] = MappingProxyType(
@@ -97,18 +97,18 @@ def vertex_rule_operator(rule: VertexRule, network: BoundedNet) -> VertexOperato
 def recipe_scheme(recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet | None) -> Scheme:
     """Return the scheme that a scale-free recipe trains, differentiable in its networks' weights.
 
-    What the card says of thin faces acts in use alone: a network that is trained with it asks for
-    more beside them, and is rougher there.
+    s is that of training. What the card says of thin faces acts in use alone: a network that is
+    trained with it asks for more beside them, and is rougher there.
 
     Raises:
         ParameterError: the recipe is not scale-free, or has no vertex rule.
     """
-    form, rule = recipe.scale_free, recipe.vertex
-    if form is None or rule is None or vertex_network is None:
+    form, rule, plan = recipe.scale_free, recipe.vertex, recipe.training
+    if form is None or rule is None or not isinstance(plan, ToLimit) or vertex_network is None:
         raise ParameterError("recipe", recipe.name, expected="a scale-free one with a vertex rule")
     numbers = ScaleFreeForm(
         recipe.budget,
-        form.prior_strength,
+        plan.trained_strength,
         form.network_scale,
         form.fold_angle,
         form.learned_levels,
