@@ -239,9 +239,10 @@ def general(seed: int = 0) -> Recipe:
     """Return the default model's recipe: any mesh, at any scale, corrected once.
 
     It starts from quasi-interpolation along the normal (s = 1), which a network of zeros leaves as
-    it is; in use s is a tenth less, since vertices of simplified meshes lie outside already. C = 20 leaves room for all that is right on meshes as coarse as a cube; what must not
-    happen there, the fold guard prevents. The gates open where faces are bent by two hundredths of
-    a radian, so that fine meshes gain as well.
+    it is; in use s is a tenth less: vertices of simplified meshes lie outside a little already.
+    C = 20 leaves room for all that is right on meshes as coarse as a cube; what must not happen
+    there, the fold guard prevents. The gates open where faces are bent by two hundredths of a
+    radian, so that fine meshes gain as well.
     """
     return Recipe(
         name="general",
