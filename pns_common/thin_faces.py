@@ -46,14 +46,14 @@ def network_lengths(rings: Rings, altitudes: float | None) -> NetworkLengths:
     interior, count = topology.interior, len(topology.edges)
     faces = topology.edge_faces[interior]
     areas = (gather(rings.double_areas, faces[:, side]) for side in range(2))
-    inner, square = gather(length, interior), gather(rings.edge_squares, interior)
+    square, inner = rings.edge_squares, gather(length, interior)
     wide = altitudes * xp.minimum(*areas) / xp.where(inner > 0, inner, 1.0)
     ell = xp.minimum(wide, inner)
     is_interior = beside(length, topology.edge_class == EdgeClass.INTERIOR)
     at_edges = xp.where(is_interior, scatter(ell, interior, count), length)
-    squares = scatter(xp.where(ell < inner, ell * ell, square), interior, count)
-    mean = rings.mean_of_edges(xp.where(is_interior, squares, rings.edge_squares))
-    return NetworkLengths(at_edges, root(mean))
+    # Where nothing is shorter the square is h's own, so that ℓ_v has the bits of h_v.
+    squares = xp.where(at_edges < length, at_edges * at_edges, square)
+    return NetworkLengths(at_edges, root(rings.mean_of_edges(squares)))
 
 
 def longest_side(stencil: EdgeStencil, frames: EdgeFrames) -> Float[Array, " N"]:

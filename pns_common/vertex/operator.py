@@ -1,6 +1,6 @@
 """The learned vertex rule: what PNS adds to Loop's old vertices, where a model has it.
 
-    format 3    p' = p0 + γ_v Π_ρ(D + τ h_v Σ z_i e_i)      ‖z‖ ≤ 1,  ρ = C h_v² / R
+    format 3    p' = p0 + γ_v Π_ρ(D + τ ℓ_v Σ z_i e_i)      ‖z‖ ≤ 1,  ρ = C h_v² / R
     format 2    p' = p0 + h_v² γ_v (C / R) v                ‖v‖ ≤ 1,  γ_v = tanh(c_v x_v)
 
 h_v² is the mean of the squared lengths of the ring's edges, so h_v is no longer than the longest.
