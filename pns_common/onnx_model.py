@@ -1,7 +1,9 @@
 """A model file as a callable η: loaded from the package or a path, and called in pieces.
 
-onnxruntime runs it where it and the package onnx are installed, numpy where they are not: the same
-files are taken and refused, and the answers differ by the rounding of single precision.
+A network whose weights are tied is run by the project's own program (tied_network/), whatever is
+installed, with the same bits everywhere. Any other is run by onnxruntime where it and the package
+onnx are installed, by numpy where they are not: the same files are taken and refused, and the
+answers differ by the rounding of single precision.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from pns_common.errors import ModelError
 from pns_common.model_card import ModelCard
 from pns_common.model_contract import CALL_ROWS, answer_to, feature_inputs
 from pns_common.model_manifest import check_listed
+from pns_common.tied_network import open_tied_network
 
 DEFAULT_MODEL = "general"
 LARGEST_FILE = 64 * 2**20
@@ -48,12 +51,32 @@ class Network(Protocol):
         ...
 
 
+@runtime_checkable
+class RowNetwork(Protocol):
+    """A program that takes any number of rows, and gives each the bits that it has alone."""
+
+    def answers(
+        self, given: str, features: Float[np.ndarray, "N K"], budget: float
+    ) -> Float[np.ndarray, "N 3"]:
+        """Return what the network answers that reads the input ``given``. Raises ValueError."""
+        ...
+
+
 # The bytes of a file and what errors call it -> its card and its network; raises ModelError.
-Runtime = Callable[[bytes, str], tuple[ModelCard, Network]]
+Runtime = Callable[[bytes, str], tuple[ModelCard, Network | RowNetwork]]
+
+
+def open_model(data: bytes, name: str) -> tuple[ModelCard, Network | RowNetwork]:
+    """Open a model file by the project's own program where it can be, else as is installed.
+
+    Raises:
+        ModelError: the file breaks the contract.
+    """
+    return open_tied_network(data, name) or installed_runtime()(data, name)
 
 
 def installed_runtime() -> Runtime:
-    """Return what opens model files here: onnxruntime where it is installed, else numpy."""
+    """Return what runs any graph here: onnxruntime where it is installed, else numpy."""
     if find_spec("onnxruntime") is not None and find_spec("onnx") is not None:
         from pns_common.onnx_session import open_session
 
@@ -79,7 +102,7 @@ class OnnxModel:
     hash: str
     size: int
     _data: bytes = field(repr=False)
-    _network: Network = field(repr=False)
+    _network: Network | RowNetwork = field(repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A network cannot travel to a worker process; the file it was made from can.
@@ -104,6 +127,16 @@ class OnnxModel:
         return self._answers("vertex_features", features, budget)
 
     def _answers(self, given: str, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
+        if isinstance(self._network, RowNetwork):
+            try:
+                return self._network.answers(given, features, budget)
+            except ValueError as error:
+                raise _broken_off(self.name, str(error)) from error
+        return self._answers_in_calls(self._network, given, features, budget)
+
+    def _answers_in_calls(
+        self, network: Network, given: str, features: Float[np.ndarray, "N K"], budget: float
+    ) -> np.ndarray:
         rows = np.asarray(features, dtype=np.float32)
         corrections = np.empty((len(rows), 3), dtype=np.float32)
         # The runtime wants every input, also those that this output does not need: one row each.
@@ -115,18 +148,16 @@ class OnnxModel:
             if len(piece) < CALL_ROWS:
                 missing = np.zeros((CALL_ROWS - len(piece), piece.shape[1]), dtype=np.float32)
                 piece = np.concatenate([piece, missing])
-            answer = self._run(answer_to(given), inputs | {given: piece})
+            answer = self._run(network, answer_to(given), inputs | {given: piece})
             corrections[start : start + CALL_ROWS] = answer[: len(rows) - start]
         return corrections
 
-    def _run(self, output: str, inputs: dict[str, np.ndarray]) -> np.ndarray:
+    def _run(self, network: Network, output: str, inputs: dict[str, np.ndarray]) -> np.ndarray:
         try:
-            answer = np.asarray(self._network.run(output, inputs))
+            answer = np.asarray(network.run(output, inputs))
         except Exception as error:  # onnxruntime's errors share no base below Exception
             reason = [*str(error).splitlines(), type(error).__name__][0]
-            raise ModelError(
-                self.name, expected="a graph that runs to its end", found=reason
-            ) from error
+            raise _broken_off(self.name, reason) from error
         if answer.shape != (CALL_ROWS, 3):
             raise ModelError(
                 self.name,
@@ -134,6 +165,10 @@ class OnnxModel:
                 found=f"{answer.shape}",
             )
         return answer
+
+
+def _broken_off(name: str, reason: str) -> ModelError:
+    return ModelError(name, expected="a graph that runs to its end", found=reason)
 
 
 def bundled_models() -> list[str]:
@@ -188,11 +223,11 @@ def model_from_bytes(data: bytes, name: str, runtime: Runtime | None = None) -> 
     Args:
         data: the file.
         name: what the model is called.
-        runtime: what opens it; None for the one that is installed.
+        runtime: what opens it; None for what ``open_model`` chooses.
 
     Raises:
         ModelError: the file breaks the contract.
     """
-    card, network = (runtime or installed_runtime())(data, name)
+    card, network = (runtime or open_model)(data, name)
     digest = hashlib.sha256(data).hexdigest()
     return OnnxModel(name, card, digest, len(data), data, network)

@@ -61,7 +61,7 @@ class NumpyNetwork:
         values |= {name: np.asarray(array, dtype=np.float64) for name, array in inputs.items()}
         try:
             with np.errstate(all="ignore"):  # what is not finite is refused by the caller
-                for step in self._leading_to(output):
+                for step in self.leading_to(output):
                     given = [values[name] if name else None for name in step.inputs]
                     made = OPERATORS[step.operator].compute(given, step.attributes)
                     values.update(zip(step.outputs, made, strict=True))
@@ -69,7 +69,7 @@ class NumpyNetwork:
         except FAULTS as error:
             raise ValueError(str(error)) from error
 
-    def _leading_to(self, output: str) -> list[Node]:
+    def leading_to(self, output: str) -> list[Node]:
         """The nodes that an output depends on, in order."""
         wanted = {output}
         steps: list[Node] = []

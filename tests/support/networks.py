@@ -22,7 +22,9 @@ SCALE_FREE_CARD = ModelCard(
 VERTEX_CARD = ModelCard(2, "signed-18", 40.0, 0.25, "symmetric", {}, {}, "ring-10", 20.0)
 
 
-def model_bytes(nodes, weights, *, card=CARD, width=5, inputs=None, outputs=None, domains=()):
+def model_bytes(
+    nodes, weights, *, card=CARD, width=5, inputs=None, outputs=None, domains=(), opset=20
+):
     """An ONNX file with the given nodes; ``weights`` maps names to arrays."""
     inputs = inputs or [("features", ["edges", width]), ("budget", [])]
     outputs = outputs or [("correction", ["edges", 3])]
@@ -33,7 +35,7 @@ def model_bytes(nodes, weights, *, card=CARD, width=5, inputs=None, outputs=None
         [helper.make_tensor_value_info(n, TensorProto.FLOAT, s) for n, s in outputs],
         [numpy_helper.from_array(_tensor(w), n) for n, w in weights.items()],
     )
-    opsets = [helper.make_opsetid("", 20), *(helper.make_opsetid(d, 1) for d in domains)]
+    opsets = [helper.make_opsetid("", opset), *(helper.make_opsetid(d, 1) for d in domains)]
     model = helper.make_model(graph, opset_imports=opsets, ir_version=10)
     if card is not None:
         entry = model.metadata_props.add()

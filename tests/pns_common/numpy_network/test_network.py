@@ -220,8 +220,9 @@ importlib.util.find_spec = find_spec
 import numpy as np
 from pns_common import Mesh, load_model, pns, refine
 mesh = Mesh(np.eye(3), [[0, 1, 2]])
-refined = refine(mesh, pns(load_model()), levels=2)
-print(type(load_model()._network).__name__, len(refined.mesh.faces))
+for name in ("paper", "general"):
+    refined = refine(mesh, pns(load_model(name)), levels=2)
+    print(type(load_model(name)._network).__name__, len(refined.mesh.faces))
 """
 
 
@@ -231,16 +232,16 @@ def test_the_library_works_with_numpy_alone():
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["NumpyNetwork", "16"]
+    assert done.stdout.split() == ["NumpyNetwork", "16", "TiedNetwork", "16"]
 
 
-def test_importing_the_library_loads_no_runtime():
-    code = "import sys, pns_common; print(*sys.modules)"
+def test_importing_the_library_and_loading_its_default_model_loads_no_runtime():
+    code = "import sys, pns_common; pns_common.load_model(); print(*sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
     )
     assert not set(done.stdout.split()) & {"onnx", "onnxruntime", "msgspec", "google.protobuf"}
 
 
-def test_onnxruntime_runs_models_where_it_is_installed():
+def test_onnxruntime_runs_other_models_where_it_is_installed():
     assert installed_runtime() is open_session

@@ -12,6 +12,7 @@ from pns_common import Mesh, pns, refine
 from pns_common.edge.features import FEATURE_SETS
 from pns_common.model_card import ModelCard
 from pns_common.onnx_model import model_from_bytes
+from pns_common.tied_network import TiedNetwork
 from pns_common.vertex.rings import RING_10
 from tests.support.meshes import bumpy_sphere
 from tests.support.networks import SCALE_FREE_CARD
@@ -124,6 +125,7 @@ def test_the_file_is_an_ordinary_dense_network_that_says_the_same():
     edges, vertices = trained(tied("edges")), trained(tied("vertices", (12, 12)))
     data = model_bytes(edges, card(), vertices)
     loaded = model_from_bytes(data, "tied")
+    assert isinstance(loaded._network, TiedNetwork)  # proved to be tied, entry by entry
     parity = check_parity(loaded, edges, vertex_network=vertices)
     assert parity.difference <= TOLERANCE
     # One row an edge from end to end: nothing is averaged.
