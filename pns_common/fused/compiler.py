@@ -16,7 +16,7 @@ import numba  # pyright: ignore[reportMissingTypeStubs]
 from numba.extending import register_jitable  # pyright: ignore[reportMissingTypeStubs]
 
 from pns_common.fused.kernels.compiled import SELDOM, Array, Kernel
-from pns_common.fused.library import kernels_of, target_machine
+from pns_common.fused.library import kernels_of, processor, target_machine
 
 # numba's own names are not typed.
 _numba: Any = numba
@@ -30,6 +30,8 @@ DATA, SHAPE, STRIDES = (object.__basicsize__ + offset for offset in (0, 16, 24))
 
 def compile_kernels(modules: Sequence[ModuleType]) -> bytes:
     """The object file of all kernels of some modules."""
+    # numba optimises for the processor that the code is made for.
+    _numba.config.CPU_NAME, _numba.config.CPU_FEATURES = processor()
     for helper in _helpers(modules):
         register_jitable(forceinline=not hasattr(helper, SELDOM))(helper)
     whole = _llvm.parse_assembly("")

@@ -87,22 +87,26 @@ def target_machine() -> Any:
     """The processor that code is made for: this one, or that of NUMBA_CPU_NAME."""
     _llvm.initialize_native_target()
     _llvm.initialize_native_asmprinter()
-    name, features = _processor()
+    name, features = processor()
     target = _llvm.Target.from_default_triple()
     # Position-independent, since it is loaded anywhere.
     return target.create_target_machine(cpu=name, features=features, opt=3, reloc="pic")
 
 
-def _processor() -> tuple[str, str]:
+def processor() -> tuple[str, str]:
+    """Its name and its features, as LLVM calls them."""
     name, features = (os.environ.get(f"NUMBA_CPU_{what}") for what in ("NAME", "FEATURES"))
     if features is None:
         features = "" if name else _llvm.get_host_cpu_features().flatten()
+        if "+avx512f" in features:
+            # LLVM would take half of what such a processor can at once.
+            features += ",-prefer-256-bit"
     return name or _llvm.get_host_cpu_name(), features
 
 
 def key_of(modules: Sequence[ModuleType]) -> str:
     """What tells the code of these modules from any other."""
-    parts = [_llvm.get_default_triple(), *_processor(), object.__basicsize__]
+    parts = [_llvm.get_default_triple(), *processor(), object.__basicsize__]
     parts += [metadata.version("numba"), metadata.version("llvmlite")]
     parts += [COMPILER.read_bytes()]
     for module in modules:
