@@ -34,7 +34,7 @@ from pns_common.errors import ModelError
 from pns_common.thin_faces import longest_side
 
 # Features (N, K) -> local vectors (N, 3), η for C / R = 1, or z; shortened to length 1 afterwards.
-Network = Callable[[Array], Array]
+NetworkFunction = Callable[[Array], Array]
 # Points, normals and frames of N edges -> their features φ (N, K).
 Features = Callable[[EdgeStencil, EdgeFrames], Array]
 # The frames of N edges, with their curvature x -> γ (N,) ∈ [0, 1].
@@ -83,7 +83,7 @@ def project_to_ball(vectors: Float[Array, "N 3"], radius: float = 1.0) -> Float[
 def correct(
     stencil: EdgeStencil,
     features: Features,
-    network: Network,
+    network: NetworkFunction,
     gate: Gate,
     budget_per_length: BudgetPerLength,
     frames_of: Callable[[EdgeStencil], EdgeFrames] = edge_frames,
@@ -113,7 +113,7 @@ def shortened(vectors: Float[Array, "N 3"], longest: Float[Array, " N"]) -> Floa
 def correct_scale_free(
     stencil: EdgeStencil,
     features: Features,
-    network: Network,
+    network: NetworkFunction,
     gate: Gate,
     budget_per_length: BudgetPerLength,
     frames_of: Callable[[EdgeStencil], EdgeFrames],
@@ -142,9 +142,9 @@ def correct_scale_free(
 
 
 def where_open(
-    network: Network, features: Array, gate: Float[Array, " N"], like: Float[Array, "N 3"]
+    network: NetworkFunction, features: Array, gate: Float[Array, " N"], like: Float[Array, "N 3"]
 ) -> Array:
-    """The network's answers, ``finite``; 0 in rows whose gate is shut, for which it is not run.
+    """The network's answers, checked; 0 in rows whose gate is shut, for which it is not run.
 
     Nothing is added there whatever it says, and no other row is changed by their absence. Tensors,
     which may keep a gradient, are all run. ``like`` has the type and precision of the geometry.
@@ -154,14 +154,14 @@ def where_open(
     """
     rows = np.flatnonzero(as_numpy(gate))
     if len(rows) == gate.shape[0] or as_numpy(like) is not like:
-        return finite(network(features), like)
+        return checked_answer(network(features), like)
     answers = np.zeros(like.shape)
     if len(rows):
-        answers[rows] = finite(network(features[rows]), like[rows])
+        answers[rows] = checked_answer(network(features[rows]), like[rows])
     return answers
 
 
-def finite(eta: Array, like: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
+def checked_answer(eta: Array, like: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
     """The network's answer in the geometry's precision, refused unless (N, 3) and finite.
 
     Raises:

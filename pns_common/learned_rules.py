@@ -33,7 +33,7 @@ class LearnedEdgeRule:
         fields, interior = self.operator.features.fields(level.rings), level.topology.interior
 
         def correct(rows: slice) -> Correction:
-            stencil = self.operator.look(
+            stencil = self.operator.stencil(
                 level.points, level.normals, fields, level.topology, interior[rows]
             )
             budget_per_length = level.budget_per_length(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -58,16 +58,10 @@ class ControlLevel:
         """d_v of the prior at s = 1, likewise."""
         return normal_pushes(self.rings)
 
-    def network_lengths(self, altitudes: float | None) -> NetworkLengths:
-        """ℓ of the scale-free rules, which have one α for both: computed once."""
-        known = self._lengths.get(altitudes)
-        if known is None:
-            known = self._lengths[altitudes] = network_lengths(self.rings, altitudes)
-        return known
-
     @cached_property
-    def _lengths(self) -> dict[float | None, NetworkLengths]:
-        return {}
+    def network_lengths(self) -> Callable[[float | None], NetworkLengths]:
+        """ℓ of the scale-free rules as a function of α: computed once, since both have the same."""
+        return cache(partial(network_lengths, self.rings))
 
 
 def control_level(

@@ -58,7 +58,7 @@ class ScaleFreeEdgeRule:
 
         def correct(rows: slice) -> Correction:
             edges = interior[rows]
-            stencil = self.operator.look(level.points, level.normals, fields, topology, edges)
+            stencil = self.operator.stencil(level.points, level.normals, fields, topology, edges)
             prior = strength * _at_edges(pushes, topology, edges)
             if of_boundary is not None:
                 prior = prior + _at_edges(of_boundary, topology, edges)

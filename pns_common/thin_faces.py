@@ -41,7 +41,7 @@ def network_lengths(rings: Rings, altitudes: float | None) -> NetworkLengths:
     """ℓ of a level; ``altitudes`` is α > 0, or None for h and h_v whatever the faces."""
     length = norm(rings.spokes[::2])
     if altitudes is None:
-        return NetworkLengths(length, rings.reach)
+        return NetworkLengths(length, rings.spoke_length)
     xp, topology = namespace(length), rings.topology
     interior, count = topology.interior, len(topology.edges)
     faces = topology.edge_faces[interior]

@@ -192,9 +192,9 @@ def multi_fan_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
     corners = np.arange(len(following))
     label, hop = corners.copy(), following.copy()
     for _ in range(int(corner_count.max()).bit_length()):
-        reach = np.where(hop >= 0, hop, corners)
-        label = np.minimum(label, label[reach])
-        hop = np.where(hop >= 0, hop[reach], -1)
+        ahead = np.where(hop >= 0, hop, corners)
+        label = np.minimum(label, label[ahead])
+        hop = np.where(hop >= 0, hop[ahead], -1)
     leaders = ((hop >= 0) & (label == corners)) | (following < 0)
     fans = np.bincount(topology.faces.reshape(-1)[leaders], minlength=topology.vertex_count)
     return fans > 1

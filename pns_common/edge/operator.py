@@ -12,7 +12,7 @@ from pns_common.correction import (
     BudgetPerLength,
     Correction,
     Gate,
-    Network,
+    NetworkFunction,
     correct,
     correct_scale_free,
 )
@@ -28,10 +28,10 @@ class EdgeOperator:
 
     features: FeatureSet
     orientation: Orientation
-    network: Network
+    network: NetworkFunction
     gate: Gate
 
-    def look(
+    def stencil(
         self,
         points: Float[Array, "V 3"],
         normals: Float[Array, "F 3"],

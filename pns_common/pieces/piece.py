@@ -20,7 +20,7 @@ from pns_common.fused.known import kernels_know
 from pns_common.levels import check_coordinates
 from pns_common.pieces.exact import guarded_exact, shrunk
 from pns_common.pieces.halo import ThinHaloError, is_learned, reach
-from pns_common.pieces.steps import Links, Step, array_steps, fused_steps
+from pns_common.pieces.steps import Links, Step, steps_by_arrays, steps_by_kernels
 from pns_common.pieces.tally import LevelTally
 from pns_common.pieces.tally_of_step import tally_of
 from pns_common.schemes import Scheme
@@ -120,7 +120,7 @@ def steps_of(
     """The steps of a piece, one after the other as they are asked for."""
     known = scheme.learned_levels == 0 or (length > 0 and kernels_know(scheme))
     fused = known and kernels_available() and fits(len(piece.points), len(piece.faces), levels)
-    steps = fused_steps if fused else array_steps
+    steps = steps_by_kernels if fused else steps_by_arrays
     return steps(piece.points, piece.faces, piece.creases, scheme, length, blocks)
 
 

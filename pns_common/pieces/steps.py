@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.array_steps import array_steps as all_steps
+from pns_common.array_steps import array_steps
 from pns_common.blocks import Blocks
 from pns_common.schemes import Scheme
 from pns_common.step import LevelStep
@@ -52,7 +52,7 @@ class Step:
     may_flip: bool
 
 
-def array_steps(
+def steps_by_arrays(
     points: Float[np.ndarray, "V 3"],
     faces: Int[np.ndarray, "F 3"],
     creases: Int[np.ndarray, "N 2"] | None,
@@ -61,13 +61,13 @@ def array_steps(
     blocks: Blocks,
 ) -> Iterator[Step]:
     """The steps of ``array_steps``, with what is asked of them here."""
-    for step in all_steps(points, faces, creases, scheme, length, blocks):
+    for step in array_steps(points, faces, creases, scheme, length, blocks):
         links, loop = _links(step.topology, step.several_fans), step.placed.loop_points
         kept = step.placed if step.placed.learned else None
         yield Step(links, step.placed.points, step.faces, kept, loop, loop is not None)
 
 
-def fused_steps(
+def steps_by_kernels(
     points: Float[np.ndarray, "V 3"],
     faces: Int[np.ndarray, "F 3"],
     creases: Int[np.ndarray, "N 2"] | None,

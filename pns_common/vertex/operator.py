@@ -24,7 +24,7 @@ from pns_common.arrays import Array, gather, namespace
 from pns_common.correction import (
     BudgetPerLength,
     Correction,
-    Network,
+    NetworkFunction,
     project_to_ball,
     shortened,
     where_open,
@@ -43,7 +43,7 @@ class VertexOperator:
     """
 
     features: RingFeatureSet
-    network: Network
+    network: NetworkFunction
     gate_sharpness: float
 
     def correct(

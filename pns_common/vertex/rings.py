@@ -98,8 +98,8 @@ class Rings:
         return self.mean(self.jump)
 
     @cached_property
-    def reach(self) -> Float[Array, "V 1"]:
-        """r_v, with gradient 0 at 0."""
+    def spoke_length(self) -> Float[Array, "V 1"]:
+        """r_v, which is h_v of the rule; with gradient 0 at 0."""
         return root(self.square)
 
     @cached_property
@@ -108,7 +108,7 @@ class Rings:
         # An open ring leans to one side: its umbrella says nothing of curvature.
         closed = beside(self.points, sharp_edge_count(self.topology) == 0)[:, None]
         lean = dot(self.umbrella, self.normal)[:, None]
-        return namespace(lean).where(closed, divided(lean, self.reach), 0.0)
+        return namespace(lean).where(closed, divided(lean, self.spoke_length), 0.0)
 
     def mean(self, values: Float[Array, "S K"]) -> Float[Array, "V K"]:
         """The mean over each vertex's spokes."""
@@ -146,14 +146,15 @@ def ring_vectors(rings: Rings) -> Float[Array, "V 3 3"]:
     Lipschitz also where a symmetric ring makes it vanish.
     """
     pull = rings.mean(rings.jump / 2 * rings.spokes)
-    rows = [rings.normal, divided(rings.umbrella, rings.reach), divided(pull, rings.reach)]
+    length = rings.spoke_length
+    rows = [rings.normal, divided(rings.umbrella, length), divided(pull, length)]
     return namespace(rings.normal).stack(rows, axis=1)
 
 
 def ring_features(rings: Rings) -> Float[Array, "V 10"]:
     """The features of ``ring-10``, in the order of RING_10."""
     xp = namespace(rings.normal)
-    reach, height = rings.reach, rings.height
+    spread, height = rings.spoke_length, rings.height
     square = _square(rings.spokes)
     length = xp.sqrt(xp.where(square > 0, square, SHORTEST_SQUARE))
     tilt = rings.of_neighbour(rings.normal) - rings.of_centre(rings.normal)
@@ -166,8 +167,8 @@ def ring_features(rings: Rings) -> Float[Array, "V 10"]:
         divided(_square(rings.umbrella), rings.square),
         _square(rings.normal),
         rings.mean(rings.of_neighbour(height)),
-        divided(opening, reach),
-        divided(rings.mean(length), reach),
+        divided(opening, spread),
+        divided(rings.mean(length), spread),
         rings.mean(rings.of_neighbour(rings.mean_jump)),
     ]
     return xp.concat(columns, axis=1)

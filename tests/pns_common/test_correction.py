@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import ModelError
-from pns_common.correction import curvature_gate, finite, project_to_ball
+from pns_common.correction import checked_answer, curvature_gate, project_to_ball
 from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
 from pns_common.topology import build_topology
 from tests.support.meshes import grid
@@ -52,4 +52,4 @@ def test_projection_never_leaves_the_ball_and_keeps_what_is_inside(vector, radiu
 )
 def test_answers_of_another_shape_or_that_are_no_numbers_are_an_error(answer, says):
     with pytest.raises(ModelError, match=says):
-        finite(answer, np.zeros((4, 3)))
+        checked_answer(answer, np.zeros((4, 3)))

@@ -106,7 +106,7 @@ def test_what_the_networks_read_is_as_it_is_defined():
     """docs/features.md."""
     rows = signed_features.fields(LEVEL.rings)
     operator = pns(Model(FORMAT_3)).edge_rule.operator
-    stencil = operator.look(POINTS, LEVEL.normals, rows, LEVEL.topology, np.arange(len(EDGES)))
+    stencil = operator.stencil(POINTS, LEVEL.normals, rows, LEVEL.topology, np.arange(len(EDGES)))
     seen = signed_features(stencil, operator.orientation.frames(stencil))
     np.testing.assert_allclose(seen, AT_EDGES, rtol=0, atol=1e-13)
     np.testing.assert_allclose(RING_10(LEVEL.rings), AT_VERTICES, rtol=0, atol=1e-13)
