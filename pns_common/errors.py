@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class PnsError(Exception):
     """Base of everything that the operator raises on purpose."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Exceptions are made again from their text, which is not what these are made from.
+        return _restored, (type(self), self.args, self.__dict__)
 
 
 class MeshError(PnsError):
@@ -36,3 +42,11 @@ class ParameterError(PnsError, ValueError):
         self.value = value
         self.expected = expected
         super().__init__(f"{name} = {value!r}: expected {expected}")
+
+
+def _restored(kind: type[PnsError], args: tuple[Any, ...], values: dict[str, Any]) -> PnsError:
+    """The error that crossed from another process."""
+    error = kind.__new__(kind)
+    error.args = args
+    error.__dict__.update(values)
+    return error
