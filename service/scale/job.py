@@ -137,8 +137,12 @@ def _refine(task: Task) -> Row:
         raise ServiceError(str(error), code="unrefinable") from error
     except MemoryError as error:
         allowed = task.limits.max_memory_bytes
+        # Where it stopped is not known; it asked for a byte more than was left, or for many.
         raise LimitError(
-            f"refining took more than {allowed} bytes", limit="memory", allowed=allowed, found=0
+            f"refining took more than {allowed} bytes",
+            limit="memory",
+            allowed=allowed,
+            found=allowed + 1,
         ) from error
     output.write(written.content)
     return Row(
