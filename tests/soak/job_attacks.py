@@ -19,11 +19,12 @@ def followers(target: Target, ended: Event) -> None:
     From fewer addresses than there are places: who has one connection is then never refused.
     """
     body = large_body()
-    while not ended.wait(0.5):
-        job = _handed_in(target, 0, body, "levels=4&scheme=loop")
+    while not ended.is_set():
+        job = _handed_in(target, 0, body, "levels=4&scheme=loop", prepares=True)
         if job is not None:
             asks = head("GET", f"/jobs/{job}/events")
             hold(target, ended, 700, asks, b"", seconds=5, addresses=40)
+        ended.wait(0.5)
 
 
 def come_and_go(target: Target, ended: Event) -> None:
@@ -46,10 +47,10 @@ def come_and_go(target: Target, ended: Event) -> None:
 def leavers(target: Target, ended: Event) -> None:
     """One large result, asked for again and again and left after its first bytes."""
     job = None
-    while job is None and not ended.wait(0.5):
-        job = _handed_in(target, 0, large_body(), "levels=4&scheme=loop")
-    if job is None:
-        return
+    while job is None:
+        if ended.wait(0.1):
+            return
+        job = _handed_in(target, 0, large_body(), "levels=4&scheme=loop", prepares=True)
     _follow(target, 0, job)
     asks = head("GET", f"/jobs/{job}/result")
 
@@ -79,9 +80,11 @@ def deletes(target: Target, ended: Event) -> None:
     side_by_side(connect, 4)
 
 
-def _handed_in(target: Target, number: int, body: bytes, query: str) -> str | None:
+def _handed_in(
+    target: Target, number: int, body: bytes, query: str, *, prepares: bool = False
+) -> str | None:
     """The id of a new job, where it is accepted."""
-    with suppress(OSError), target.connected(number) as opened:
+    with suppress(OSError), target.connected(number, prepares=prepares) as opened:
         asks = head("POST", f"/jobs?{query}", f"Content-Length: {len(body)}\r\n")
         opened.sendall(asks + body)
         said = opened.recv(2**16)
@@ -114,7 +117,7 @@ def _fetch_slowly(target: Target, number: int, job: str) -> None:
 
 def _follow(target: Target, number: int, job: str) -> None:
     """Come back when the job has ended."""
-    with target.connected(number) as opened:
+    with target.connected(number, prepares=True) as opened:
         opened.settimeout(PATIENCE)
         opened.sendall(head("GET", f"/jobs/{job}/events", "Connection: close\r\n"))
         while opened.recv(2**16):

@@ -6,9 +6,10 @@ import multiprocessing
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from multiprocessing.synchronize import Event
 
 from tests.soak import honest
 from tests.soak.attacks import ATTACKS, Attack
@@ -20,6 +21,8 @@ from tests.soak.target import Target
 
 Address = tuple[str, int]
 QUIET = "quiet"
+# What an attack may take to strike for the first time, where a job has to be done before.
+PATIENCE = 120
 
 
 @dataclass(frozen=True)
@@ -66,18 +69,19 @@ def soak(
         stack.enter_context(_probing(address, tally, excused=503 if one_source else 200))
         for thread in threads:
             thread.start()
-        target, each = Target(address, one_source), 1 / max(len(attacks), 1)
+        attack_for = stack.enter_context(_attacking(address, one_source))
+        each = 1 / max(len(attacks), 1)
         if warm_seconds:
             say("… warming")
             tally.phase = "warming"
             for attack in attacks.values():
-                _attack(attack, target, warm_seconds * each)
+                attack_for(attack, warm_seconds * each)
             tally.phase = QUIET
         before = _quiet(seconds / 10, pid)
         for name, attack in attacks.items():
             say(f"… {name}")
             tally.phase = name
-            _attack(attack, target, 0.8 * seconds * each)
+            attack_for(attack, 0.8 * seconds * each)
             tally.phase = QUIET
         after = _quiet(seconds / 10, pid)
     return Soaked(tally, before, after)
@@ -97,19 +101,49 @@ def _end(ended: threading.Event, threads: list[threading.Thread]) -> None:
         thread.join()
 
 
-def _attack(attack: Attack, target: Target, seconds: float) -> None:
-    """In a process of its own: its threads must not keep the honest clients' waiting."""
+@contextmanager
+def _attacking(address: Address, one_source: bool) -> Iterator[Callable[[Attack, float], None]]:
+    """Attacks for so many seconds each, and for as long as they take to strike.
+
+    They run in a process of their own, so that their threads keep no honest client waiting; in one
+    for all, so that their seconds are not those that a process takes to start.
+    """
     context = multiprocessing.get_context("spawn")
-    over = context.Event()
-    process = context.Process(target=attack, args=(target, over))
+    over, struck, (here, there) = context.Event(), context.Event(), context.Pipe()
+    target = Target(address, one_source, struck)
+    process = context.Process(target=_attack_in_turn, args=(target, over, there))
     process.start()
+    there.close()
+
+    def attack_for(attack: Attack, seconds: float) -> None:
+        over.clear()
+        struck.clear()
+        here.send(attack)
+        here.poll(seconds)
+        has_struck = struck.wait(PATIENCE)
+        over.set()
+        try:
+            here.recv()
+        except EOFError:
+            raise RuntimeError(f"{attack.__name__} failed") from None
+        if not has_struck:
+            raise RuntimeError(f"{attack.__name__} never struck")
+
     try:
-        process.join(seconds)
+        yield attack_for
     finally:
         over.set()
+        here.close()
         process.join()
-    if process.exitcode:
-        raise RuntimeError(f"{attack.__name__} failed: {process.exitcode}")
+
+
+def _attack_in_turn(target: Target, over: Event, orders: Connection) -> None:
+    """Each attack that is sent, until it is over; then say so."""
+    with suppress(EOFError):
+        while True:
+            attack: Attack = orders.recv()
+            attack(target, over)
+            orders.send(None)
 
 
 @contextmanager

@@ -23,17 +23,24 @@ def head(method: str, path: str, more: str = "") -> bytes:
 class Target:
     """What is attacked, and from where: many addresses of this machine, or (`one_source`) its own.
 
-    A container's bridge carries no loopback address but the one that it listens on.
+    A container's bridge carries no loopback address but the one that it listens on. `struck` is set
+    by the first connection that is an attack.
     """
 
     address: Address
-    one_source: bool = False
+    one_source: bool
+    struck: Event
 
     @contextmanager
-    def connected(self, number: int) -> Iterator[socket.socket]:
-        """A connection from one of the attackers' addresses, none of them an honest client's."""
+    def connected(self, number: int, *, prepares: bool = False) -> Iterator[socket.socket]:
+        """A connection from one of the attackers' addresses, none of them an honest client's.
+
+        One that only `prepares` an attack is none.
+        """
         source = None if self.one_source else (f"127.9.{number // 16}.{1 + number % 16}", 0)
         with socket.create_connection(self.address, PATIENCE, source_address=source) as opened:
+            if not prepares:
+                self.struck.set()
             yield opened
 
 
