@@ -1,6 +1,5 @@
 """The boundary's prior: made of the boundary alone, bounded, and nothing where it is straight."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,6 @@ from pns_common import Mesh, loop, pns, refine
 from pns_common.boundary_prior import boundary_pushes, boundary_vertices
 from pns_common.level import control_level
 from pns_common.limit import limit_positions
-from pns_common.model_card import ModelCard
 from pns_common.schemes import (
     edge_operator,
     scale_free_form,
@@ -116,28 +114,3 @@ def test_torch_differentiates_through_it():
     assert torch.autograd.gradcheck(
         lambda p: step_on(p, topology, torch), (tensor,), fast_mode=True
     )
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"boundary_strength": -1.0}, "boundary_strength -1.0"),
-        ({"learned_levels": 0}, "learned_levels 0"),
-        ({"prior_strength": -0.5}, "prior_strength"),
-        ({"network_scale": 0.0}, "network_scale"),
-        ({"fold_angle": 90.0}, "fold_angle"),
-        ({"fold_angle": None}, "without fold_angle"),
-        ({"format": 2}, "learned_levels in format 2"),
-        ({"side_gates": 1}, "side_gates of type int"),
-        ({"network_altitudes": 0.0}, "network_altitudes 0.0, not a finite number > 0"),
-    ],
-)
-def test_a_wrong_number_on_a_card_is_named(changes, says):
-    with pytest.raises(ValueError, match=says):
-        ModelCard.from_json(json.dumps(json.loads(SCALE_FREE_CARD.to_json()) | changes))
-
-
-def test_a_card_reads_back_as_it_was_written():
-    thin = replace(SCALE_FREE_CARD, side_gates=True, network_altitudes=3.0, wide_bound=True)
-    for card in (SCALE_FREE_CARD, STRONG.card, thin):
-        assert ModelCard.from_json(card.to_json()) == card

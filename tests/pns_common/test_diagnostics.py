@@ -3,30 +3,12 @@
 import numpy as np
 import pytest
 
-from pns_common import Mesh, loop, pns, refine
-from pns_common.topology import build_topology
-from tests.support.meshes import bent, bumpy_sphere, grid, icosphere
+from pns_common import Mesh, pns, refine
+from pns_common.diagnostics import edge_counts, limit_distances
+from tests.support.meshes import bumpy_sphere
 from tests.support.networks import random_model
 
 MODEL = random_model(0, scale=30.0)
-
-
-def slow_normal_jump(vertices, faces):
-    topology = build_topology(faces, len(vertices))
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    normals = np.cross(b - a, c - a)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    n1, n2 = (normals[topology.edge_faces[topology.interior, side]] for side in (0, 1))
-    sine = np.linalg.norm(np.cross(n1, n2), axis=1)
-    return np.arctan2(sine, np.sum(n1 * n2, axis=1)).max()
-
-
-@pytest.mark.parametrize("shape", [icosphere(1), grid(7, bent), bumpy_sphere(3)])
-def test_normal_jump_is_the_largest_angle_across_an_edge(shape):
-    refined = refine(Mesh(*shape), pns(MODEL), 2)
-    expected = slow_normal_jump(refined.mesh.vertices, refined.mesh.faces)
-    reported = refined.report["levels"][-1]["normal_jump_max"]
-    assert reported == pytest.approx(expected, rel=1e-9)
 
 
 def test_summaries_are_the_percentile_and_the_share_that_they_name():
@@ -45,14 +27,20 @@ def test_summaries_are_the_percentile_and_the_share_that_they_name():
     assert np.mean(gate > 0.5) != level["gate"]["active"]
 
 
-def test_flipped_faces_are_those_that_oppose_their_loop_counterpart():
-    mesh = Mesh(*bumpy_sphere(0, bump=0.4))
-    refined, base = refine(mesh, pns(MODEL, 60.0)), refine(mesh, loop())
+def test_edges_are_counted_by_class_and_creases_where_there_are_some():
+    classes = np.array([0, 1, 0, 2, 1, 0], dtype=np.int8)
+    assert edge_counts(classes) == {"interior": 3, "boundary": 2, "irregular": 1}
+    assert edge_counts(np.append(classes, np.int8(3)))["crease"] == 1
 
-    def area_vectors(vertices):
-        a, b, c = (vertices[refined.mesh.faces[:, i]] for i in range(3))
-        return np.cross(b - a, c - a)
 
-    opposed = np.sum(area_vectors(refined.mesh.vertices) * area_vectors(base.mesh.vertices), axis=1)
-    assert refined.report["levels"][0]["flipped_faces"] == (opposed < 0).sum() > 0
-    assert base.report["levels"][0]["flipped_faces"] == 0
+def test_distances_of_learned_levels_add_up_and_one_without_a_bound_leaves_none():
+    first, second = (
+        {"displacement_max": moved, "envelope_max": bound}
+        for moved, bound in ((1.0, 3.0), (0.5, 1.0))
+    )
+    assert limit_distances([first, second, {}]) == {
+        "learned_levels": 2,
+        "limit_distance": 1.5,
+        "limit_distance_bound": 4.0,
+    }
+    assert limit_distances([first, second | {"envelope_max": None}])["limit_distance_bound"] is None

@@ -8,7 +8,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Mesh, ModelError, loop, pns, refine
+from pns_common import Mesh, loop, pns, refine
 from pns_common.edge.frames import face_normals
 from pns_common.level import control_level
 from pns_common.schemes import (
@@ -30,7 +30,7 @@ from tests.support.meshes import (
     soups,
     tilted_plane,
 )
-from tests.support.networks import SCALE_FREE_CARD, scale_free_model, vertex_model
+from tests.support.networks import SCALE_FREE_CARD, scale_free_model
 from tests.support.quasi_interpolation import OPEN_GATES, quasi_interpolated, with_card
 
 MODELS = [
@@ -229,18 +229,3 @@ def test_threads_do_not_change_a_bit(threads):
     alone, many = (refine(mesh, pns(MODELS[0]), threads=count) for count in (1, threads))
     np.testing.assert_array_equal(alone.mesh.vertices, many.mesh.vertices)
     assert alone.report == many.report
-
-
-def test_older_formats_have_no_scale_free_numbers():
-    assert scale_free_form(vertex_model().card, 1.0) is None
-
-
-def test_a_card_of_format_3_needs_a_vertex_network():
-    class Without:
-        name, hash, card = "without", "0" * 64, SCALE_FREE_CARD
-
-        def __call__(self, features, budget):
-            return np.zeros((len(features), 3))
-
-    with pytest.raises(ModelError, match="vertex network"):
-        pns(Without())

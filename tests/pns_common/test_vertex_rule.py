@@ -4,15 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, ModelError, loop, pns, refine
 from pns_common.edge.frames import face_normals
-from pns_common.schemes import VertexModel, vertex_operator
+from pns_common.schemes import VertexModel
 from pns_common.topology import EdgeClass, build_topology, split
-from pns_common.vertex.rings import RING_10, Rings, ring_vectors
+from pns_common.vertex.rings import RING_10
 from tests.support.meshes import (
     axis_planes,
     bent,
@@ -239,59 +238,6 @@ def test_numbering_mirrors_and_turned_faces_change_nothing_on_assets(name):
     assert vertices_apart(mesh, renumbered(mesh, 0)) < 1e-11
     assert vertices_apart(mesh, mirrored(mesh), reflected) < 1e-11
     assert vertices_apart(mesh, turned_over(mesh)) < 1e-11
-
-
-@given(soups() | manifolds())
-def test_features_keep_their_ranges_and_vectors_their_length(mesh):
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    rings = Rings(topology, mesh.vertices, face_normals(mesh.vertices, mesh.faces))
-    rows = RING_10(rings)
-    limits = np.array([feature.limit for feature in RING_10.features])
-    assert (np.abs(rows) <= limits * ROUNDING).all()
-    assert np.linalg.norm(ring_vectors(rings), axis=2).max() <= ROUNDING
-
-
-@given(soups() | manifolds())
-def test_numpy_and_torch_agree(mesh):
-    weights = np.random.default_rng(0).standard_normal((RING_10.count, 3))
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    rows = np.flatnonzero(topology.smooth_vertices)
-
-    def step(points, xp):
-        tensor = xp.asarray(weights)
-        operator = replace(vertex_operator(MODELS[0]), network=lambda f: xp.tanh(f @ tensor))
-        normals = face_normals(points, topology.faces)
-        result = operator.correct(Rings(topology, points, normals), rows, 0.5)
-        return result.displacement, result.gate
-
-    ours, theirs = step(mesh.vertices, np), step(torch.tensor(mesh.vertices), torch)
-    scale = max(1.0, np.abs(mesh.vertices).max()) ** 2
-    for own, twin in zip(ours, theirs, strict=True):
-        np.testing.assert_allclose(own, twin.numpy(), rtol=1e-10, atol=1e-12 * scale)
-
-
-def test_torch_differentiates_through_the_vertex_rule():
-    vertices, faces = bumpy_sphere(0, subdivisions=0)
-    topology = build_topology(faces, len(vertices))
-    rows = np.arange(len(vertices))
-    weights = torch.from_numpy(np.random.default_rng(0).standard_normal((RING_10.count, 3)))
-    operator = replace(vertex_operator(MODELS[0]), network=lambda f: torch.tanh(f @ weights))
-
-    def displacement(points):
-        normals = face_normals(points, topology.faces)
-        return operator.correct(Rings(topology, points, normals), rows, 0.5).displacement
-
-    points = torch.tensor(vertices, requires_grad=True)
-    assert torch.autograd.gradcheck(displacement, (points,), fast_mode=True)
-
-
-@given(soups())
-def test_gradients_are_finite_on_degenerate_meshes(mesh):
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    points = torch.tensor(mesh.vertices / np.abs(mesh.vertices).max(), requires_grad=True)
-    rings = Rings(topology, points, face_normals(points, topology.faces))
-    (RING_10(rings).sum() + ring_vectors(rings).sum()).backward()
-    assert torch.isfinite(points.grad).all()
 
 
 def test_the_report_says_what_the_vertex_rule_did():

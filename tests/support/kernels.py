@@ -7,6 +7,7 @@ import numpy as np
 from pns_common import loop
 from pns_common.blocks import Blocks
 from pns_common.fused import KERNEL_ROWS
+from pns_common.fused.mesh_edges import build_edges
 from pns_common.fused.refine import refine_fused
 from pns_common.refine import refine_arrays
 
@@ -43,3 +44,12 @@ def edges_of(mesh, count, seed):
     """A few edges of a mesh, as vertex pairs."""
     rng = np.random.default_rng(seed)
     return mesh.faces[rng.integers(0, len(mesh.faces), count)][:, :2]
+
+
+def edges_built(mesh):
+    """A mesh's connectivity as kernels read it."""
+    return build_edges(np.asarray(mesh.faces).astype(np.int32), len(mesh.vertices), Blocks(1))
+
+
+# A kernel as it is compiled, and as the Python that it is written in.
+WAYS = {"compiled": lambda kernel: kernel, "plain": lambda kernel: kernel.function}

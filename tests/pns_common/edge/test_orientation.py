@@ -1,29 +1,30 @@
-"""Which vertex is a and which is c, on two triangles, by hand."""
+"""The two ways to read an edge, as cards name them."""
+
+from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from pns_common.edge.orientation import FIRST_FACE, ORIENTATIONS, SYMMETRIC
 from pns_common.topology import build_topology
-
-
-@pytest.mark.parametrize(
-    ("faces", "first", "left"),
-    [
-        # c lies in the face of lower index; to the left of 0 → 1 runs the face (0, 1, 2).
-        ([[0, 1, 2], [1, 0, 3]], [0, 1, 2, 3], [0, 1, 2, 3]),
-        ([[1, 0, 3], [0, 1, 2]], [0, 1, 3, 2], [0, 1, 2, 3]),
-        ([[3, 1, 0], [2, 0, 1]], [0, 1, 3, 2], [0, 1, 2, 3]),
-    ],
-)
-def test_c_lies_in_the_first_face_or_to_the_left(faces, first, left):
-    topology = build_topology(np.array(faces), 4)
-    for orientation, expected in ((FIRST_FACE, first), (SYMMETRIC, left)):
-        edges = orientation.order(topology, topology.interior)
-        assert edges.stencil.tolist() == [expected]
-        for vertex, face in zip(edges.stencil[0, 2:], edges.faces[0], strict=True):
-            assert vertex in faces[face]
+from tests.pns_common.edge.test_frames import CREST
 
 
 def test_cards_name_both():
     assert {"first-face": FIRST_FACE, "symmetric": SYMMETRIC} == ORIENTATIONS
+
+
+def test_only_one_of_them_depends_on_the_order_of_the_faces():
+    faces = np.array([[0, 1, 2], [1, 0, 3]])
+    read = [build_topology(faces[order], 4) for order in ([0, 1], [1, 0])]
+    first, left = (
+        [orientation.order(topology, topology.interior).stencil.tolist() for topology in read]
+        for orientation in (FIRST_FACE, SYMMETRIC)
+    )
+    assert first[0] != first[1]
+    assert left[0] == left[1]
+
+
+def test_faces_folded_onto_each_other_have_no_curvature_in_the_symmetric_reading():
+    folded = replace(CREST, n2=-CREST.n1)
+    curvatures = [ORIENTATIONS[name].frames(folded).curvature[0] for name in ORIENTATIONS]
+    assert curvatures == [2, 0]

@@ -1,7 +1,6 @@
 """Compiled learned levels have the bits of the array kernels: every format, guard and report."""
 
 import sys
-from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -9,17 +8,8 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Mesh, ModelError, load_model, loop, pns, refine
-from pns_common.blocks import Blocks
-from pns_common.creases import with_creases
-from pns_common.edge.feature_set import FeatureSet
+from pns_common import Mesh, load_model, pns, refine
 from pns_common.fused import load_kernels
-from pns_common.fused.known import kernels_know
-from pns_common.fused.level import control_level
-from pns_common.onnx_model import bundled_models
-from pns_common.schemes import Scheme
-from pns_common.topology import Topology, build_topology
-from pns_common.vertex.rings import RingFeatureSet
 from tests.support.kernels import (
     assert_kernels_agree,
     assert_same_bits,
@@ -38,8 +28,6 @@ from tests.support.meshes import (
     three_pages,
 )
 from tests.support.networks import (
-    SCALE_FREE_CARD,
-    VERTEX_CARD,
     random_model,
     scale_free_model,
     vertex_model,
@@ -107,82 +95,6 @@ def test_kernels_agree_for_bundled_models_on_real_meshes(name, asset):
     loaded = trimesh.load(shared_path("assets") / asset, force="mesh", process=False)
     mesh = Mesh(loaded.vertices, loaded.faces)
     assert_kernels_agree(mesh, 1, scheme=pns(load_model(name)))
-
-
-@given(soups() | manifolds(), SEEDS)
-def test_a_levels_topology_is_the_array_kernels(mesh, seed):
-    creases = edges_of(mesh, 3, seed)
-    level = control_level(mesh.vertices, mesh.faces, creases, Blocks(1))
-    expected = with_creases(build_topology(mesh.faces, len(mesh.vertices)), creases)
-    compiled = level.topology()
-    for field in fields(Topology):
-        assert np.array_equal(getattr(compiled, field.name), getattr(expected, field.name)), (
-            field.name
-        )
-
-
-def test_every_bundled_model_has_kernels():
-    assert all(kernels_know(pns(load_model(name))) for name in bundled_models())
-
-
-def test_the_guard_takes_rounds_and_both_ways_take_the_same():
-    mesh = Mesh(*bumpy_sphere(3, bump=0.5))
-    scheme = SCHEMES["format 3, guarded hard"]
-    made, free = by_kernels(mesh, 1, scheme=scheme), replace(scheme, guard=None)
-    assert not np.array_equal(made.points, by_kernels(mesh, 1, scheme=free).points)
-    assert_kernels_agree(mesh, 1, scheme=scheme)
-
-
-class Broken:
-    """A model whose network for edges or for vertices returns NaN."""
-
-    name, hash = "broken", "0" * 64
-
-    def __init__(self, card, edges, vertices):
-        self.card, self.edges, self.vertices = card, edges, vertices
-
-    def __call__(self, features, budget):
-        return np.full((len(features), 3), self.edges)
-
-    def vertex_correction(self, features, budget):
-        return np.full((len(features), 3), self.vertices)
-
-
-@pytest.mark.parametrize("card", [VERTEX_CARD, SCALE_FREE_CARD])
-@pytest.mark.parametrize(("edges", "vertices"), [(np.nan, 0.0), (0.0, np.inf)])
-def test_what_a_network_may_not_return_is_refused(card, edges, vertices):
-    with pytest.raises(ModelError, match="finite"):
-        by_kernels(Mesh(*bumpy_sphere(0)), 1, scheme=pns(Broken(card, edges, vertices)))
-
-
-def test_schemes_without_kernels_are_left_to_the_arrays():
-    known = SCHEMES["format 3"]
-    assert kernels_know(known)
-    edges, vertices = known.edge_rule, known.vertex_rule
-    other = FeatureSet("other", edges.operator.features.groups[:1])
-    assert not kernels_know(
-        replace(known, edge_rule=replace(edges, operator=replace(edges.operator, features=other)))
-    )
-    rings = RingFeatureSet("other", (), lambda rings: rings.mean_jump)
-    strange = replace(vertices, operator=replace(vertices.operator, features=rings))
-    assert not kernels_know(replace(known, vertex_rule=strange))
-    assert not kernels_know(replace(known, vertex_rule=lambda level: vertices(level)))
-    assert not kernels_know(Scheme("by hand", loop().vertex_rule, loop().edge_rule))
-
-
-def with_boundary_rule(mesh):
-    card = replace(SCALE_FREE_CARD, boundary_strength=1.0)
-    scheme = pns(Broken(card, 0.3, 0.2))
-    return by_arrays(mesh, 2, scheme=scheme), by_kernels(mesh, 2, scheme=scheme)
-
-
-def test_a_boundary_rule_changes_nothing_where_there_is_no_boundary():
-    assert_same_bits(*with_boundary_rule(Mesh(*bumpy_sphere(1))))
-
-
-def test_a_boundary_rule_has_the_same_bits_where_there_is_one():
-    sphere = Mesh(*bumpy_sphere(1))
-    assert_same_bits(*with_boundary_rule(Mesh(sphere.vertices, sphere.faces[2:])))
 
 
 def test_refine_takes_the_kernels_for_models(monkeypatch):

@@ -1,0 +1,67 @@
+"""Folded children are those that turn too far or all but vanish, told one by one."""
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh
+from pns_common.blocks import Blocks
+from pns_common.fused.kernels.guard import find_folds
+from pns_common.fused.loop_points import loop_points
+from pns_common.topology import build_topology, split
+from tests.support.kernels import WAYS, edges_built
+from tests.support.meshes import bent, grid
+
+POINTS, FACES = grid(4, bent)
+MESH = edges_built(Mesh(POINTS, FACES))
+LOOP = loop_points(POINTS, MESH, Blocks(1))
+CHILDREN = split(build_topology(FACES, 16))
+COSINE = np.cos(1.0)
+
+
+def areas(points):
+    a, b, c = (points[CHILDREN[:, i]] for i in range(3))
+    return np.cross(b - a, c - a)
+
+
+def folded(moved):
+    before, after = areas(LOOP), areas(moved)
+    sizes = np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)
+    turned = np.sum(before * after, axis=1) < COSINE * sizes[0] * sizes[1]
+    return turned | (sizes[1] < 1e-3 * sizes[0])
+
+
+def touched(way, displacement, scale, changed):
+    marks = np.zeros(len(LOOP), dtype=bool)
+    around = LOOP, displacement, scale, COSINE
+    mesh = MESH.faces, MESH.face_edges, MESH.vertex_count
+    WAYS[way](find_folds)(*around, *mesh, changed, 0, len(FACES), marks)
+    return marks
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("size", [0.0, 0.05, 0.2, 50.0])
+def test_corners_of_folded_children_are_marked(way, size):
+    rng = np.random.default_rng(1)
+    displacement, scale = size * rng.standard_normal(LOOP.shape), rng.choice([0, 0.5, 1], len(LOOP))
+    bad = folded(LOOP + scale[:, None] * displacement)
+    expected = np.zeros(len(LOOP), dtype=bool)
+    expected[CHILDREN[bad]] = True
+    everywhere = np.zeros(0, dtype=bool)
+    # Who has nothing left to give is not asked again.
+    marks = touched(way, displacement, scale, everywhere)
+    np.testing.assert_array_equal(marks, expected & (scale > 0))
+    changed = rng.random(len(LOOP)) < 0.2
+    again = np.zeros(len(LOOP), dtype=bool)
+    again[CHILDREN[bad & changed[CHILDREN].any(axis=1)]] = True
+    marks = touched(way, displacement, scale, changed)
+    np.testing.assert_array_equal(marks, again & (scale > 0))
+    assert bad.any() == (size >= 0.2)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_child_that_all_but_vanishes_is_folded(way):
+    centre = LOOP[CHILDREN[3]].mean(axis=0)
+    displacement = np.zeros_like(LOOP)
+    displacement[CHILDREN[3]] = 0.99 * (centre - LOOP[CHILDREN[3]])
+    marks = touched(way, displacement, np.ones(len(LOOP)), np.zeros(0, dtype=bool))
+    assert marks[CHILDREN[3]].all()

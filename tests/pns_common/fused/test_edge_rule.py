@@ -1,0 +1,36 @@
+"""What kernels add at edges is what the rule adds, bit for bit, in any blocks."""
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh, pns
+from pns_common.blocks import Blocks
+from pns_common.fused.additions import Additions, Surroundings
+from pns_common.fused.edge_rule import add_at_edges
+from pns_common.level import control_level
+from pns_common.topology import build_topology
+from tests.support.kernels import edges_built
+from tests.support.meshes import bent, grid
+from tests.support.networks import random_model, scale_free_model, vertex_model
+
+MESH = Mesh(*grid(5, bent))
+LEVEL = control_level(MESH.vertices, build_topology(MESH.faces, 25), 0.8)
+MODELS = {
+    "format 1": random_model(0, scale=30.0),
+    "format 2": vertex_model(0),
+    "format 3": scale_free_model(0),
+    "side gates": scale_free_model(0, side_gates=True, wide_bound=True),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("rows", [7, 10_000])
+def test_kernels_add_what_the_rule_adds(name, rows):
+    rule, edges = pns(MODELS[name]).edge_rule, edges_built(MESH)
+    fans = np.zeros(25, dtype=bool)
+    added = Additions.nothing(len(edges.edges))
+    add_at_edges(rule, Surroundings(MESH.vertices, edges, fans, 0.8, Blocks(2, rows)), added)
+    placed = rule(LEVEL)
+    for part in ("displacement", "ratio", "gate", "envelope", "degenerate"):
+        np.testing.assert_array_equal(getattr(added, part), getattr(placed, part), err_msg=part)
+    assert added.displacement.any()

@@ -1,0 +1,51 @@
+"""A level of the kernels has the connectivity of the array kernels, level after level."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pns_common import Mesh, ParameterError
+from pns_common.blocks import Blocks
+from pns_common.creases import crease_children, with_creases
+from pns_common.fused.level import control_level, loop_step, next_level
+from pns_common.topology import Topology, build_topology, split
+from tests.support.kernels import by_arrays, by_kernels, edges_of
+from tests.support.meshes import TETRAHEDRON, bent, grid, manifolds, soups
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def assert_same_topology(compiled, expected):
+    for field in fields(Topology):
+        ours, theirs = (getattr(each, field.name) for each in (compiled, expected))
+        assert np.array_equal(ours, theirs), field.name
+
+
+@given(soups() | manifolds(), SEEDS)
+def test_a_levels_topology_is_the_array_kernels(mesh, seed):
+    creases = edges_of(mesh, 3, seed)
+    level = control_level(mesh.vertices, mesh.faces, creases, Blocks(1))
+    expected = with_creases(build_topology(mesh.faces, len(mesh.vertices)), creases)
+    assert_same_topology(level.topology(), expected)
+    below = next_level(level, np.zeros((len(mesh.vertices) + len(expected.edges), 3)), Blocks(1))
+    after = build_topology(split(expected), expected.vertex_count + len(expected.edges))
+    assert_same_topology(below.topology(), with_creases(after, crease_children(expected)))
+
+
+def test_a_crease_that_is_no_edge_is_refused():
+    mesh = Mesh(np.random.default_rng(0).standard_normal((5, 3)), TETRAHEDRON)
+    with pytest.raises(ParameterError, match="creases"):
+        by_kernels(mesh, 1, creases=np.array([[0, 4]]))
+
+
+def test_a_step_of_loop_adds_nothing_and_reports_what_the_arrays_do():
+    mesh = Mesh(*grid(4, bent))
+    step = loop_step(control_level(mesh.vertices, mesh.faces, None, Blocks(1)), Blocks(1))
+    arrays = by_arrays(mesh, 1)
+    assert step.added is None
+    np.testing.assert_array_equal(step.points, arrays.points)
+    assert step.largest == np.abs(arrays.points).max()
+    assert [step.report()] == arrays.reports

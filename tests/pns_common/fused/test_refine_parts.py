@@ -1,0 +1,39 @@
+"""Parts refined at once: each has its own unit of length and its own report."""
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh, ParameterError, loop, pns
+from pns_common.blocks import Blocks
+from pns_common.fused.refine_parts import refine_parts_fused
+from tests.support.kernels import by_kernels
+from tests.support.meshes import bow_tie, bumpy_sphere
+from tests.support.networks import scale_free_model
+
+PARTS = [Mesh(*bumpy_sphere(1, subdivisions=0)), Mesh(*bow_tie())]
+BOTH = Mesh(
+    np.concatenate([part.vertices for part in PARTS]),
+    np.concatenate([PARTS[0].faces, PARTS[1].faces + 12]),
+)
+STARTS, LENGTHS = np.array([0, 20, 22]), np.array([0.5, 3.0])
+
+
+@pytest.mark.parametrize("scheme", [loop(), pns(scale_free_model(0))], ids=["loop", "pns"])
+def test_each_part_is_what_it_is_alone(scheme):
+    made = refine_parts_fused(BOTH, STARTS, scheme, 2, LENGTHS, None, Blocks(1))
+    alone = [
+        by_kernels(part, 2, scheme=scheme, length=length)
+        for part, length in zip(PARTS, LENGTHS.tolist(), strict=True)
+    ]
+    assert made.reports == [part.reports for part in alone]
+    assert made.several_fans == [0, 1]
+    corners = np.concatenate([part.points[part.faces] for part in alone])
+    np.testing.assert_array_equal(made.points[made.faces], corners)
+    gates = np.concatenate([part.gate[part.faces] for part in alone])
+    np.testing.assert_array_equal(made.gate[made.faces], gates)
+    np.testing.assert_array_equal(made.split_topology().vertex_count, len(BOTH.vertices) + 36)
+
+
+def test_a_crease_across_parts_is_no_edge():
+    with pytest.raises(ParameterError, match="creases"):
+        refine_parts_fused(BOTH, STARTS, loop(), 1, LENGTHS, np.array([[0, 12]]), Blocks(1))

@@ -1,0 +1,53 @@
+"""How far a level's rules read, and how many rings a piece needs for that."""
+
+import pytest
+
+from pns_common import Mesh, ParameterError, load_model, loop, pns, refine
+from pns_common.onnx_model import bundled_models
+from pns_common.pieces.halo import halo_rings, is_learned, reach
+from tests.support.meshes import bumpy_sphere
+from tests.support.networks import scale_free_model
+from tests.support.pieces import adjacent
+from tests.support.schemes import along_normal
+
+SCHEMES = {"loop": loop(), **{name: pns(load_model(name)) for name in bundled_models()}}
+
+
+def test_rings_that_a_piece_needs():
+    needed = {
+        name: [halo_rings(scheme, n) for n in (1, 2, 3, 6)] for name, scheme in SCHEMES.items()
+    }
+    assert needed == {
+        "loop": [2, 2, 2, 2],
+        "paper": [2, 2, 2, 2],
+        "signed": [3, 4, 4, 4],
+        "full": [3, 4, 4, 4],
+        "general": [4, 4, 4, 4],
+    }
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+def test_a_level_reads_as_far_as_its_reach_and_no_farther(name):
+    scheme = SCHEMES[name]
+    points, faces = bumpy_sphere(3, 2)
+    before = refine(Mesh(points, faces), scheme, 1, 1.0).mesh
+    moved = points.copy()
+    moved[0] *= 1.001
+    after = refine(Mesh(moved, faces), scheme, 1, 1.0).mesh
+    changed = (before.vertices != after.vertices).any(axis=1)[before.faces].any(axis=1)
+    parents = changed.reshape(-1, 4).any(axis=1)
+    at_vertex = (faces == 0).any(axis=1)
+    assert not (parents & ~adjacent(faces, at_vertex, reach(scheme, 0))).any()
+    assert (parents & ~adjacent(faces, at_vertex, reach(scheme, 0) - 1)).any()
+
+
+def test_a_scheme_of_unknown_rules_has_no_known_reach():
+    with pytest.raises(ParameterError, match="scheme"):
+        halo_rings(along_normal(0.1), 1)
+
+
+def test_a_level_is_learned_while_the_scheme_says_so():
+    two = pns(scale_free_model(0, learned_levels=2))
+    assert [is_learned(two, level) for level in range(4)] == [True, True, False, False]
+    assert not is_learned(loop(), 0)
+    assert is_learned(SCHEMES["paper"], 15)

@@ -1,0 +1,62 @@
+"""One piece: what is its own, and what it says where its halo is too thin."""
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh, MeshError, load_model, loop, pns
+from pns_common.blocks import Blocks
+from pns_common.onnx_model import bundled_models
+from pns_common.pieces import ThinHaloError, halo_rings, refine_piece
+from pns_common.pieces.piece import first_at_own, steps_of
+from tests.support.meshes import bumpy_sphere, grid
+from tests.support.networks import scale_free_model
+from tests.support.pieces import piece_of
+
+SCHEMES = {"loop": loop(), **{name: pns(load_model(name)) for name in bundled_models()}}
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+def test_a_halo_that_is_too_thin_is_told(name):
+    scheme = SCHEMES[name]
+    mesh = Mesh(*bumpy_sphere(5, 2))
+    own = mesh.vertices[mesh.faces].mean(axis=1)[:, 2] > 0.85
+    for levels in (1, 2):
+        rings = halo_rings(scheme, levels, guard_rings=0)
+        with pytest.raises(ThinHaloError) as told:
+            refine_piece(piece_of(mesh, own, rings - 1).piece, scheme, levels, 1.0, Blocks(1))
+        assert told.value.faces > 0
+
+
+def left_half(scheme=None, levels=1):
+    mesh = Mesh(*grid(7))
+    own = mesh.vertices[mesh.faces].mean(axis=1)[:, 0] < 0
+    return mesh, own, piece_of(mesh, own, halo_rings(scheme or loop(), levels))
+
+
+def test_a_vertex_is_the_pieces_own_where_it_first_appears_in_an_own_face():
+    mesh, own, cut = left_half()
+    step = next(steps_of(cut.piece, loop(), 1, 1.0, Blocks(1)))
+    mine = first_at_own(step.links, cut.piece.own)
+    numbers = np.unique(mesh.faces[cut.faces])
+    first = [np.flatnonzero((mesh.faces == v).any(axis=1))[0] for v in numbers]
+    np.testing.assert_array_equal(mine, own[first])
+
+
+def test_openers_are_the_first_face_of_each_edge_in_faces_of_the_control_piece():
+    _, _, cut = left_half(levels=2)
+    once, twice = (refine_piece(cut.piece, loop(), levels, 1.0, Blocks(1)) for levels in (1, 2))
+    for level, faces in enumerate((cut.piece.faces, once.faces)):
+        first = {}
+        for number, (a, b, c) in enumerate(faces.tolist()):
+            for edge in ((a, b), (b, c), (c, a)):
+                first.setdefault(tuple(sorted(edge)), number // 4**level)
+        assert twice.openers[level].tolist() == list(first.values())
+
+
+def test_coordinates_that_outgrow_the_operator_are_an_error_in_a_piece_too():
+    mesh = Mesh(*bumpy_sphere(0, subdivisions=0))
+    whole = piece_of(mesh, np.ones(len(mesh.faces), dtype=bool), 0).piece
+    with pytest.raises(MeshError, match="too large"):
+        refine_piece(whole, pns(load_model("paper"), 1e80), 1, 1.0, Blocks(1))
+    wide = pns(scale_free_model(0))
+    assert refine_piece(whole, wide, 1, 1.0, Blocks(1)).own_vertices.all()

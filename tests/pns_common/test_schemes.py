@@ -1,0 +1,91 @@
+"""Schemes are put together from a card as it says, with every number in its place."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pns_common import ModelError, loop, pns
+from pns_common.schemes import edge_operator, loop_vertex_rule, scale_free_form, vertex_operator
+from tests.support.networks import (
+    SCALE_FREE_CARD,
+    Float64Model,
+    random_layers,
+    scale_free_model,
+    vertex_model,
+)
+
+# Every number another, so that none can stand in another's place.
+NUMBERS = {
+    "prior_strength": 0.9,
+    "network_scale": 0.3,
+    "fold_angle": 60.0,
+    "learned_levels": 2,
+    "boundary_strength": 0.7,
+    "side_gates": True,
+    "network_altitudes": 2.5,
+    "wide_bound": True,
+}
+
+
+def test_the_form_has_each_number_of_the_card_and_the_callers_budget():
+    form = scale_free_form(replace(SCALE_FREE_CARD, **NUMBERS), 0.125)
+    assert {name: getattr(form, name) for name in NUMBERS} == NUMBERS
+    assert form.budget == 0.125
+
+
+def test_a_scheme_says_what_its_rules_do():
+    scheme = pns(scale_free_model(0, **NUMBERS), 4)
+    assert (scheme.name, scheme.budget, scheme.model) == ("pns", 4.0, "scale-free")
+    assert (scheme.learned_levels, scheme.moves_boundaries, scheme.wide_bound) == (2, True, True)
+    assert scheme.guard.angle == math.radians(60)
+    assert scheme.edge_rule.boundary == scheme.vertex_rule.boundary is not None
+    plain = pns(scale_free_model(0))
+    assert (plain.moves_boundaries, plain.wide_bound, plain.edge_rule.boundary) == (
+        *(False, False),
+        None,
+    )
+
+
+def test_loop_has_no_learned_level_and_a_model_of_edges_leaves_vertices_to_it():
+    assert loop().learned_levels == 0
+    edges_alone = pns(Float64Model(random_layers(0)))
+    assert edges_alone.vertex_rule is loop_vertex_rule
+    assert (edges_alone.learned_levels, edges_alone.guard) == (None, None)
+
+
+def test_networks_are_asked_at_a_budget_of_one():
+    """What they answer is scaled afterwards, so one file serves every C / R."""
+    asked = []
+
+    class Asked(Float64Model):
+        card = vertex_model().card
+
+        def __init__(self):
+            pass
+
+        def __call__(self, features, budget):
+            asked.append(("edges", budget))
+
+        def vertex_correction(self, features, budget):
+            asked.append(("vertices", budget))
+
+    edge_operator(Asked()).network(np.zeros((1, 18)))
+    vertex_operator(Asked()).network(np.zeros((1, 10)))
+    assert asked == [("edges", 1.0), ("vertices", 1.0)]
+
+
+def test_older_formats_have_no_scale_free_numbers():
+    assert scale_free_form(vertex_model().card, 1.0) is None
+
+
+def test_a_card_of_format_3_needs_a_vertex_network():
+    class Without:
+        name, hash, card = "without", "0" * 64, SCALE_FREE_CARD
+
+        def __call__(self, features, budget):
+            return np.zeros((len(features), 3))
+
+    with pytest.raises(ModelError, match="vertex network"):
+        pns(Without())
