@@ -55,9 +55,11 @@ class TiedForm:
 def tied_form(layers: Sequence[Layer], group: Symmetries) -> TiedForm | None:
     """What remains of a perceptron; None where it is not tied by the group, or there is none."""
     size = len(group.order)
+    if size == 1 or len(layers) < 2:
+        return None
     first, *hidden, last = layers
     widths = [len(layer.weight) // size for layer in (first, *hidden)]
-    if size == 1 or len(layers) < 2 or not _is_tied(layers, widths, group):
+    if not _is_tied(layers, widths, group):
         return None
     # Dividing by n, a power of two, is exact.
     mean = character_table(size) / size
