@@ -52,6 +52,8 @@ def test_each_quantity_is_as_it_is_defined():
         np.testing.assert_allclose(getattr(rings, name), expected, atol=1e-13, err_msg=name)
     features = [plain.ring_features(v) for v in vertices]
     np.testing.assert_allclose(RING_10(rings), features, atol=1e-13)
+    vectors = [plain.ring_vectors(v) for v in vertices]
+    np.testing.assert_allclose(ring_vectors(rings), vectors, atol=1e-13)
 
 
 def test_both_spokes_of_an_edge_have_its_bend_and_values_of_their_ends():
