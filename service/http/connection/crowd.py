@@ -26,6 +26,10 @@ class Guest(Protocol):
         """Whether its client has really said nothing: not even what is yet unread."""
         ...
 
+    def has_left(self) -> bool:
+        """Whether its client will say nothing more, and what it said last is yet to be read."""
+        ...
+
     def rate(self) -> float:
         """Bytes a second that its client sends or takes; infinite while it is early to tell."""
         ...
@@ -47,6 +51,10 @@ class Crowd:
     - the slowest of those that the service waits for, and of equally slow ones the oldest of the
       address with the most connections;
     - the oldest of the address with the most connections, if those are more than the newcomer's.
+
+    Where an address has its share, the oldest of its own whose client has left gives way: a client
+    that comes and goes would else lock its neighbours out until the service, busy with others, sees
+    it. Not one that has been heard: a client may have ended what it sends, and wait for its answer.
     """
 
     def __init__(self, most: int, most_of_address: int, proxies: tuple[Network, ...] = ()) -> None:
@@ -69,7 +77,11 @@ class Crowd:
     def enter(self, guest: Guest, address: str) -> str | None:
         """Take a place for a connection; where there is none, say why and take none."""
         name = None if is_named(address, self.proxies) else site(address)
-        if name is not None and self._of_address[name] >= self.most_of_address:
+        if (
+            name is not None
+            and self._of_address[name] >= self.most_of_address
+            and not self._give_way(self._who_left(name))
+        ):
             self.refused += 1
             return f"{self.most_of_address} connections of your address are open"
         if len(self) >= self.most and not self._make_room(name):
@@ -122,11 +134,20 @@ class Crowd:
             or self._slowest()
             or self._greediest(chain(self._working, self._slow, self._waiting), more_than=mine + 1)
         )
+        return self._give_way(guest)
+
+    def _give_way(self, guest: Guest | None) -> bool:
         if guest is None:
             return False
         self._forget(guest)
         guest.give_way()
         return True
+
+    def _who_left(self, name: str) -> Guest | None:
+        """The oldest of an address whose client has left, unheard or a listener."""
+        free = chain(self._waiting, self._listening)
+        own = (guest for guest in free if self._names[guest] == name)
+        return next((guest for guest in own if guest.has_left()), None)
 
     def _slowest(self) -> Guest | None:
         """The slowest, where there is one whose rate can be told."""

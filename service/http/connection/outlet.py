@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import select
 import socket
 from collections.abc import Callable
 from typing import Any
+
+TELLS_END = hasattr(select, "POLLRDHUP")
+"""Whether the system tells that a client has ended before all it said is read (Linux does)."""
 
 
 class Outlet:
@@ -37,6 +41,19 @@ class Outlet:
                 return opened.recv(1, socket.MSG_PEEK) != b""
             except OSError:  # nothing yet, or reset
                 return False
+
+    @property
+    def has_left(self) -> bool:
+        """Whether the client has ended what it sends, also behind bytes that wait to be read.
+
+        False where the system does not tell.
+        """
+        if not TELLS_END:
+            return False
+        looked = select.poll()
+        # An error is told unasked.
+        looked.register(self.real.get_extra_info("socket").fileno(), select.POLLRDHUP)
+        return bool(looked.poll(0))
 
     def write(self, data: bytes) -> None:
         """Write, unless the end has begun."""

@@ -168,6 +168,10 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         """Whether its client has said nothing: a head that waits in the socket is something."""
         return bool(self.conn.trailing_data[0]) or not self._outlet.has_unread
 
+    def has_left(self) -> bool:
+        """Whether its client has ended what it sends."""
+        return self._outlet.has_left
+
     def rate(self) -> float:
         """Bytes a second of its body or its answer."""
         if self._taking.waits:

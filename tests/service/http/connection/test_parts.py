@@ -1,6 +1,7 @@
 """What the connection is made of, each part alone: pace, parser, turns, crowd."""
 
 import asyncio
+import select
 import socket
 from dataclasses import dataclass
 from ipaddress import ip_network
@@ -12,7 +13,7 @@ import pytest
 from service.http.addresses import is_named, site
 from service.http.connection.crowd import Crowd
 from service.http.connection.deadline import Deadline
-from service.http.connection.outlet import Outlet
+from service.http.connection.outlet import TELLS_END, Outlet
 from service.http.connection.pace import Pace
 from service.http.connection.parser import BYTES_A_PIECE, FREE_PIECES, Parser
 from service.http.connection.turns import Turns
@@ -203,9 +204,13 @@ class Guest:
     idle: bool = True
     speed: float = inf
     ended: bool = False
+    left: bool = False
 
     def is_idle(self):
         return self.idle
+
+    def has_left(self):
+        return self.left
 
     def rate(self):
         return self.speed
@@ -231,6 +236,31 @@ def test_an_address_has_its_share_and_a_proxy_has_none():
     crowd.leave(first)
     assert len(crowd) == 5
     assert crowd.enter(Guest(), "a") is None
+
+
+def test_in_a_full_share_the_oldest_whose_client_has_left_gives_way_to_its_own_address_alone():
+    crowd = Crowd(most=10, most_of_address=3)
+    stays, left, left_too, other = entered(
+        crowd, Guest(), Guest(left=True), Guest(left=True), Guest(left=True), addresses="aaab"
+    )
+    assert crowd.enter(Guest(), "a") is None
+    assert crowd.enter(Guest(), "a") is None
+    assert "3 connections of your address" in crowd.enter(Guest(), "a")
+    assert [guest.ended for guest in (stays, left, left_too, other)] == [False, True, True, False]
+
+
+def test_in_a_full_share_who_has_asked_does_not_give_way_but_who_listens_no_more():
+    """A client may end what it sends and wait for its answer, or still take it."""
+    crowd = Crowd(most=10, most_of_address=3)
+    works, takes, listens = entered(
+        crowd, Guest(left=True), Guest(left=True), Guest(left=True), addresses="aaa"
+    )
+    crowd.work(works)
+    crowd.attend(takes)
+    crowd.listen(listens)
+    assert crowd.enter(Guest(), "a") is None
+    assert "3 connections of your address" in crowd.enter(Guest(), "a")
+    assert [works.ended, takes.ended, listens.ended] == [False, False, True]
 
 
 def test_who_has_waited_longest_gives_way():
@@ -373,3 +403,21 @@ def test_who_has_left_without_a_word_has_nothing_unread(said, leaves, unread):
         assert outlet.has_unread is unread
         # It was looked at, not taken.
         assert (ours.recv(10) if said else said) == said
+
+
+@pytest.mark.skipif(not TELLS_END, reason="the system does not tell before all is read")
+@pytest.mark.parametrize("said", [b"", b"GET / HTTP/1.1\r\n\r\n"])
+@pytest.mark.parametrize("leaves", [False, True])
+def test_who_has_left_is_seen_behind_what_it_said(said, leaves):
+    """Over TCP, as clients come."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        theirs = socket.create_connection(server.getsockname())
+        ours, _ = server.accept()
+        with theirs, ours:
+            theirs.sendall(said)
+            if leaves:
+                theirs.close()
+                come = select.poll()
+                come.register(ours.fileno(), select.POLLRDHUP)
+                come.poll()
+            assert Outlet(Ends(ours), lambda: None).has_left is leaves
