@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from pns_common.arrays import cross, dot, norm
 from pns_common.edge.frames import face_normals
 from pns_common.mesh import Mesh
-from train.metrics.point_mesh import BoxTree, box_tree, farthest, nearest
+from train.metrics.point_mesh import FaceTree, face_tree, nearest
 
 SAMPLES = 10_000
 """Sample points on each of the two surfaces."""
@@ -47,8 +47,7 @@ class Surface:
         faces: the faces that they lie in.
     """
 
-    tree: BoxTree
-    vertices: Float[np.ndarray, "V 3"]
+    tree: FaceTree
     normals: Float[np.ndarray, "F 3"]
     points: Float[np.ndarray, "P 3"]
     faces: Int[np.ndarray, " P"]
@@ -56,14 +55,14 @@ class Surface:
     @property
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal."""
-        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+        return float(np.linalg.norm(np.ptp(self.tree.vertices, axis=0)))
 
 
 def prepared(mesh: Mesh, samples: int = SAMPLES) -> Surface:
     """Return a mesh with its tree and so many sample points; the same mesh gives the same ones."""
     points, faces = surface_samples(mesh, samples, np.random.default_rng(SEED))
     normals = face_normals(mesh.vertices, mesh.faces)
-    return Surface(box_tree(mesh), mesh.vertices, normals, points, faces)
+    return Surface(face_tree(mesh), normals, points, faces)
 
 
 def surface_samples(
@@ -101,10 +100,10 @@ def _one_way(source: Surface, target: Surface) -> SurfaceErrors:
     closest = nearest(target.tree, source.points)
     here, there = source.normals[source.faces], target.normals[closest.face]
     angle = np.arctan2(norm(cross(here, there)), dot(here, there))
-    largest = float(closest.distance.max())
+    at_vertices = nearest(target.tree, source.tree.vertices).distance
     return SurfaceErrors(
         mean=float(closest.distance.mean()),
         p95=float(np.percentile(closest.distance, 95)),
-        hausdorff=farthest(target.tree, source.vertices, largest),
+        hausdorff=float(max(closest.distance.max(), at_vertices.max())),
         normal=float(angle.mean()),
     )

@@ -1,19 +1,36 @@
-"""Exact distances to triangles, against libigl's and closed forms."""
+"""Exact distances to triangles, against the formula on every triangle; ties by the lowest face."""
 
-import igl
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, refine
-from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, soups
-from train.metrics.point_mesh import BLOCK, LEAF, box_tree, farthest, nearest, squared_distance
+from tests.support.meshes import bent, bumpy_sphere, grid, manifolds
+from train.metrics.point_mesh import face_tree, nearest
 
 
-def igl_distance(points, mesh):
-    squared, _, _ = igl.point_mesh_squared_distance(points, mesh.vertices, mesh.faces)
-    return np.sqrt(squared)
+def squared_distance(points, corners):
+    """Of each point to its triangle: to the foot on its plane if that is inside, else to a side."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normal = np.cross(b - a, c - a)
+    area2 = (normal**2).sum(axis=1)
+    height = ((points - a) * normal).sum(axis=1)
+    inside, least = area2 > 0, np.full(len(points), np.inf)
+    for start, end in ((a, b), (b, c), (c, a)):
+        side, from_start = end - start, points - start
+        length2 = (side**2).sum(axis=1)
+        along = (from_start * side).sum(axis=1) / np.where(length2 > 0, length2, 1)
+        off = from_start - np.clip(along, 0, 1)[:, None] * side
+        least = np.minimum(least, (off**2).sum(axis=1))
+        inside &= (np.cross(side, from_start) * normal).sum(axis=1) >= 0
+    return np.where(inside, height**2 / np.where(area2 > 0, area2, 1), least)
+
+
+def distances_to_all(points, mesh):
+    every = np.tile(mesh.vertices[mesh.faces], (len(points), 1, 1))
+    pairs = squared_distance(np.repeat(points, len(mesh.faces), axis=0), every)
+    return np.sqrt(pairs.reshape(len(points), -1))
 
 
 def points_near(mesh, count, rng):
@@ -25,36 +42,24 @@ def points_near(mesh, count, rng):
 
 
 @pytest.mark.parametrize("shape", [bumpy_sphere(), grid(9, bent)], ids=["sphere", "patch"])
-def test_distances_of_refined_meshes_are_libigls(shape):
-    mesh = refine(Mesh(*shape), loop(), 2, threads=1).mesh
-    points = points_near(mesh, 2000, np.random.default_rng(0))
-    distances = nearest(box_tree(mesh), points).distance
-    np.testing.assert_allclose(distances, igl_distance(points, mesh), rtol=1e-12, atol=1e-14)
+def test_distances_of_refined_meshes_are_the_least_of_all_triangles(shape):
+    mesh = refine(Mesh(*shape), loop(), 1, threads=1).mesh
+    points = points_near(mesh, 300, np.random.default_rng(0))
+    distances = nearest(face_tree(mesh), points).distance
+    least = distances_to_all(points, mesh).min(axis=1)
+    np.testing.assert_allclose(distances, least, rtol=1e-12, atol=1e-14)
 
 
 @given(manifolds(), st.integers(0, 2**32 - 1))
-def test_distances_of_any_manifold_are_libigls(mesh, seed):
-    points = points_near(mesh, 50, np.random.default_rng(seed))
-    distances = nearest(box_tree(mesh), points).distance
-    np.testing.assert_allclose(distances, igl_distance(points, mesh), rtol=1e-9, atol=1e-12)
-
-
-@given(soups(), st.integers(0, 2**32 - 1))
-def test_no_box_is_left_out_that_holds_the_nearest_triangle(mesh, seed):
-    """Also where triangles have no area: the same formula on every triangle, without the tree."""
+def test_distance_point_and_face_of_any_manifold_belong_together(mesh, seed):
     points = points_near(mesh, 20, np.random.default_rng(seed))
-    every = np.tile(mesh.vertices[mesh.faces], (len(points), 1, 1))
-    pairs = squared_distance(np.repeat(points, len(mesh.faces), axis=0), every)
-    least = np.sqrt(pairs.reshape(len(points), -1).min(axis=1))
-    np.testing.assert_array_equal(nearest(box_tree(mesh), points).distance, least)
-
-
-def test_the_face_that_is_named_is_as_near_as_the_distance_says():
-    mesh = Mesh(*bumpy_sphere())
-    points = points_near(mesh, 500, np.random.default_rng(0))
-    closest = nearest(box_tree(mesh), points)
-    there = squared_distance(points, mesh.vertices[mesh.faces[closest.face]])
-    np.testing.assert_array_equal(np.sqrt(there), closest.distance)
+    closest, every = nearest(face_tree(mesh), points), distances_to_all(points, mesh)
+    size = np.ptp(mesh.vertices)
+    np.testing.assert_allclose(closest.distance, every.min(axis=1), rtol=1e-9, atol=1e-9 * size)
+    away = np.linalg.norm(points - closest.point, axis=1)
+    np.testing.assert_allclose(away, closest.distance, rtol=1e-9, atol=1e-9 * size)
+    named = every[np.arange(len(points)), closest.face]
+    np.testing.assert_allclose(named, closest.distance, rtol=1e-6, atol=1e-7 * size)
 
 
 TRIANGLE = np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0]])
@@ -72,45 +77,32 @@ TRIANGLE = np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0]])
     ],
 )
 def test_the_nearest_point_lies_inside_on_a_side_or_at_a_corner(point, distance):
-    squares = squared_distance(np.array([point], dtype=float), TRIANGLE[None])
-    np.testing.assert_allclose(np.sqrt(squares), [distance], atol=1e-15)
+    closest = nearest(
+        face_tree(Mesh(TRIANGLE, np.array([[0, 1, 2]]))), np.array([point], dtype=float)
+    )
+    np.testing.assert_allclose(closest.distance, [distance], atol=1e-15)
+    assert closest.face == [0]
 
 
-@pytest.mark.parametrize(
-    "corners", [[[0, 0, 0], [2, 0, 0], [1, 0, 0]], [[0, 0, 0], [2, 0, 0], [2, 0, 0]]]
-)
-def test_a_triangle_without_area_is_its_longest_side(corners):
-    corners = np.array([corners], dtype=float)
-    for point, distance in (((1, 0, 3), 3), ((3, 0, 0), 1), ((-3, 4, 0), 5)):
-        squares = squared_distance(np.array([point], dtype=float), corners)
-        np.testing.assert_allclose(np.sqrt(squares), [distance], atol=1e-15)
+@pytest.mark.parametrize("turn", range(6))
+def test_of_equally_near_faces_the_lowest_is_named(turn):
+    """Above the vertices, the edges' middles and the faces' of an octahedron in any numbering."""
+    points = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = np.array([[i, j, k] for i in (0, 3) for j in (1, 4) for k in (2, 5)])
+    inward = np.linalg.det(points[faces]) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    faces = faces[np.random.default_rng(turn).permutation(len(faces))]
+    ends = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+    for corners in (np.arange(6)[:, None], ends, faces):
+        above = 1.5 * points[corners].mean(axis=1)
+        belongs = np.array([[np.isin(own, face).all() for face in faces] for own in corners])
+        closest = nearest(face_tree(Mesh(points, faces)), above)
+        np.testing.assert_array_equal(closest.face, belongs.argmax(axis=1))
 
 
-def test_one_triangle_is_a_tree_of_one_box():
-    tree = box_tree(Mesh(TRIANGLE, [[0, 1, 2]]))
-    assert len(tree.lower) == 1
-    assert len(tree.order) == LEAF
-    closest = nearest(tree, np.array([[1.0, 1, 2]]))
-    np.testing.assert_array_equal(closest.distance, [2])
-    np.testing.assert_array_equal(closest.face, [0])
-
-
-def test_blocks_of_points_change_nothing():
-    mesh = Mesh(*grid(3, bent))
-    tree = box_tree(mesh)
-    points = points_near(mesh, BLOCK + 5, np.random.default_rng(0))
-    closest = nearest(tree, points)
-    last = nearest(tree, points[-10:])
-    assert closest.distance.shape == closest.face.shape == (BLOCK + 5,)
-    np.testing.assert_array_equal(closest.distance[-10:], last.distance)
-    np.testing.assert_array_equal(closest.face[-10:], last.face)
-
-
-def test_the_farthest_point_is_found_without_all_distances():
-    mesh = refine(Mesh(*bumpy_sphere()), loop(), 1, threads=1).mesh
-    tree, rng = box_tree(mesh), np.random.default_rng(0)
-    for count in (1, 50, 5000):
-        points = points_near(mesh, count, rng)
-        largest = igl_distance(points, mesh).max()
-        assert farthest(tree, points, 0.0) == pytest.approx(largest, rel=1e-12)
-        assert farthest(tree, points, 1e3) == 1e3
+def test_points_alone_give_what_they_give_together():
+    mesh = Mesh(*grid(5, bent))
+    tree, points = face_tree(mesh), points_near(Mesh(*grid(5, bent)), 400, np.random.default_rng(0))
+    together, alone = nearest(tree, points), nearest(tree, points[-10:])
+    np.testing.assert_array_equal(together.distance[-10:], alone.distance)
+    np.testing.assert_array_equal(together.face[-10:], alone.face)

@@ -18,7 +18,7 @@ from train.experiments.harness.experiment import Figure
 from train.experiments.harness.render import ASPECT, CENTRE, HALF_WIDTH, Camera, shaded_image
 from train.experiments.harness.style import COLOURS, MARKERS, SEQUENTIAL, TITLES, panels
 from train.metrics.decimation import Pair, Summary
-from train.metrics.point_mesh import box_tree, nearest
+from train.metrics.point_mesh import face_tree, nearest
 
 ELEVATION = 25.0
 FILLED = 0.95
@@ -82,7 +82,7 @@ def gains_figure(summarised: Sequence[Summary]) -> Figure:
 
 def _views(pair: Pair, schemes: Mapping[str, Scheme], level: int) -> list[View]:
     dense = pair.dense.mesh
-    tree, diagonal = box_tree(dense), np.linalg.norm(np.ptp(dense.vertices, axis=0))
+    tree, diagonal = face_tree(dense), np.linalg.norm(np.ptp(dense.vertices, axis=0))
     turn = np.eye(3) if pair.dense.kind == CAD else UPRIGHT
     camera = Camera(PICTURED.get(pair.dense.title, AZIMUTH), ELEVATION)
     seen = dense.vertices @ turn.T @ camera.axes().T
