@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from pns_common.child_faces import angle_between
+from pns_common.edge.frames import face_normals
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
 from pns_common.schemes import Scheme
+from pns_common.topology import build_topology
 from train.data.dense_meshes import DenseMesh, asset_meshes, cad_meshes
 from train.data.simplifiers import SIMPLIFIERS, simplified
 from train.experiments.beyond.models import model_files
@@ -18,6 +21,7 @@ from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.metrics.decimation import gain
+from train.metrics.point_mesh import face_tree, nearest
 from train.metrics.self_intersection import self_intersecting
 from train.metrics.surface_distance import SurfaceErrors, prepared, surface_errors
 
@@ -30,6 +34,9 @@ FINENESS = 2
 
 LEAST_REDUCTION = 2
 """The dense mesh has at least so many times the coarse one's faces."""
+
+ON_SURFACE = "On the surface"
+"""No method: how far vertices alone can take a mesh of so many faces."""
 
 SAMPLES_A_DRAW = 10
 WORSE = 0.0
@@ -45,7 +52,9 @@ NOTE = (
     "alone, made four times as fine: no file is dense enough. *Jump* is the mean over meshes of "
     "the largest angle between neighbouring faces over Loop's; self-intersecting faces are summed "
     "over all meshes. *Flat* refines nothing; *Q1*, *N1* and *NC* are untrained "
-    "(train/baselines/controls)."
+    "(train/baselines/controls). *On the surface* is no method: Loop's mesh with each vertex at "
+    "the nearest point of the dense mesh, which nobody knows who has the coarse one alone. It says "
+    "how much of Loop's error is its vertices' and how much its faces'."
 )
 
 
@@ -122,19 +131,37 @@ def compared(
     coarse: Coarse, schemes: Mapping[str, Scheme], deepest: int, samples: int
 ) -> list[Measured]:
     """Refine a coarse mesh by all schemes, to its size's level or to `deepest`, and measure it."""
-    true, measured = prepared(coarse.dense.mesh, samples), []
-    for method, scheme in schemes.items():
-        refined = refine(coarse.mesh, scheme, min(SIZES[coarse.faces], deepest), threads=1)
-        measured.append(
-            Measured(
-                coarse,
-                method,
-                surface_errors(true, prepared(refined.mesh, samples)),
-                refined.report["levels"][-1]["normal_jump_max"],
-                int(self_intersecting(refined.mesh).sum()),
-            )
+    true = prepared(coarse.dense.mesh, samples)
+    level = min(SIZES[coarse.faces], deepest)
+    refined = {
+        name: refine(coarse.mesh, scheme, level, threads=1) for name, scheme in schemes.items()
+    }
+    meshes = {name: refinement.mesh for name, refinement in refined.items()}
+    meshes[ON_SURFACE] = on_surface(meshes[LOOP], coarse.dense.mesh)
+    return [
+        Measured(
+            coarse,
+            method,
+            surface_errors(true, prepared(mesh, samples)),
+            largest_turn(mesh),
+            int(self_intersecting(mesh).sum()),
         )
-    return measured
+        for method, mesh in meshes.items()
+    ]
+
+
+def on_surface(mesh: Mesh, surface: Mesh) -> Mesh:
+    """Return a mesh with each vertex at the nearest point of a surface."""
+    return Mesh(nearest(face_tree(surface), mesh.vertices).point, mesh.faces)
+
+
+def largest_turn(mesh: Mesh) -> float:
+    """Return the largest angle between neighbouring faces that have an area, in radians."""
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    normals = face_normals(mesh.vertices, mesh.faces)
+    first, second = (normals[faces] for faces in topology.edge_faces[topology.interior].T)
+    both = first.any(axis=1) & second.any(axis=1)
+    return angle_between(float(np.max(((first - second) ** 2).sum(axis=1), initial=0, where=both)))
 
 
 def summary(measured: list[Measured]) -> list[Summary]:
