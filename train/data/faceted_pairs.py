@@ -10,9 +10,9 @@ from scipy.spatial import ConvexHull
 
 from pns_common.mesh import Mesh
 from pns_common.topology import build_topology, split
+from train.data.coarsened import coarsened
 from train.data.dense_meshes import is_manifold, largest_part
 from train.data.references import Pair, Reference
-from train.data.solid_pairs import collapsed
 
 FEWEST_FACES, MOST_FACES = 1500, 8000
 """Of the split polyhedron that is then simplified."""
@@ -48,7 +48,7 @@ def faceted_pair(rng: np.random.Generator) -> Pair | None:
     # A breath of noise: exact planes leave the order of the collapses to rounding.
     noise = 1e-4 * np.ptp(dense) * rng.normal(size=dense.shape)
     count = int(np.exp(rng.uniform(np.log(FEWEST), np.log(MOST))))
-    coarse = collapsed(dense + noise, triangles, min(count, len(triangles) // 2), rng)
+    coarse = coarsened(dense + noise, triangles, min(count, len(triangles) // 2), rng)
     if coarse is None:
         return None
     return Pair("faceted", coarse, sampled(points, faces, rng))

@@ -7,7 +7,7 @@ exactly these meshes, so that training has to see them. Poles have 5 … 29 neig
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from pns_common.mesh import Mesh
 from train.data.references import Pair, Reference
@@ -18,7 +18,10 @@ Parametrised = Callable[[Float[np.ndarray, " N"], Float[np.ndarray, " N"]], np.n
 
 KINDS = {"globe": 0.4, "ring": 0.35, "tube": 0.25}
 CUTS = {"one way": 0.75, "in turn": 0.1, "at random": 0.15}
-FINE = 160
+THIN = 0.25
+"""How often one of rows and columns is many, and the other few."""
+
+FINE = 200
 """Rows and columns, at least, of the mesh that stands for the surface itself."""
 
 
@@ -26,38 +29,53 @@ def grid_pair(rng: np.random.Generator) -> Pair:
     """Return a coarse grid on a random surface of one of the kinds, turned at random."""
     kind = str(rng.choice(list(KINDS), p=list(KINDS.values())))
     rows, columns = int(rng.integers(4, 30)), int(rng.integers(5, 30))
+    if rng.random() < THIN:
+        rows, columns = rng.permutation([rng.integers(4, 12), rng.integers(50, 110)]).tolist()
     at = {"globe": _globe, "ring": _ring, "tube": _tube}[kind](rng)
-    cut = str(rng.choice(list(CUTS), p=list(CUTS.values())))
-    cell = np.arange(rows * columns)
-    other_way = {
-        "one way": np.zeros(rows * columns, dtype=bool),
-        "in turn": (cell // columns + cell % columns) % 2 == 1,
-        "at random": rng.random(rows * columns) < 0.5,
-    }[cut]
-    coarse = grid_mesh(at, kind, rows, columns, other_way)
-    down, along = (max(1, FINE // count) * count for count in (rows, columns))
+    coarse = grid_mesh(at, kind, rows, columns, random_cut(rows, columns, rng))
+    down, along = (-(-FINE // count) * count for count in (rows, columns))
     fine = grid_mesh(at, kind, down, along, np.zeros(down * along, dtype=bool))
     turn = random_rotation(rng)
     surface = Reference(fine.vertices @ turn, vertex_normals(fine) @ turn)
     return Pair("grid", Mesh(coarse.vertices @ turn, coarse.faces), surface)
 
 
-def grid_mesh(at: Parametrised, kind: str, rows: int, columns: int, other_way: np.ndarray) -> Mesh:
+def random_cut(rows: int, columns: int, rng: np.random.Generator) -> Bool[np.ndarray, " Q"]:
+    """Return for each quad of a grid whether its diagonal runs the other way."""
+    cell = np.arange(rows * columns)
+    return {
+        "one way": np.zeros(rows * columns, dtype=bool),
+        "in turn": (cell // columns + cell % columns) % 2 == 1,
+        "at random": rng.random(rows * columns) < 0.5,
+    }[str(rng.choice(list(CUTS), p=list(CUTS.values())))]
+
+
+def grid_mesh(
+    at: Parametrised, kind: str, rows: int, columns: int, other_way: Bool[np.ndarray, " Q"]
+) -> Mesh:
     """Return the mesh of a parametrised surface; a globe's ends are poles, a tube's are open."""
     lines = rows if kind == "ring" else rows + 1
     u, v = (axis.ravel() for axis in np.mgrid[:lines, :columns])
     points = at(u / rows, v / columns)
-    i, j = (axis.ravel() for axis in np.mgrid[:rows, :columns])
     number = np.arange(len(points)).reshape(lines, columns)
     if kind == "globe":
         number[0], number[-1] = number[0, 0], number[-1, 0]
-    after, right = (i + 1) % lines, (j + 1) % columns
-    a, b, c, d = number[i, j], number[after, j], number[after, right], number[i, right]
-    rising, falling = np.stack([a, b, c, a, c, d], axis=1), np.stack([a, b, d, b, c, d], axis=1)
-    faces = np.where(other_way[:, None], falling, rising).reshape(-1, 3)
-    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    number = np.c_[number, number[:, :1]]
+    number = np.r_[number, number[:1]] if kind == "ring" else number
+    faces = cut_quads(number, other_way)
     used, renumbered = np.unique(faces, return_inverse=True)
     return _outwards(points[used], renumbered.reshape(-1, 3))
+
+
+def cut_quads(
+    number: Int[np.ndarray, "R C"], other_way: Bool[np.ndarray, " Q"]
+) -> Int[np.ndarray, "F 3"]:
+    """Return the triangles of the quads between a lattice's points, without those of no area."""
+    low, high = number[:-1], number[1:]
+    a, b, c, d = (part.ravel() for part in (low[:, :-1], high[:, :-1], high[:, 1:], low[:, 1:]))
+    rising, falling = np.stack([a, b, c, a, c, d], axis=1), np.stack([a, b, d, b, c, d], axis=1)
+    faces = np.where(other_way[:, None], falling, rising).reshape(-1, 3)
+    return faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
 
 
 def _globe(rng: np.random.Generator) -> Parametrised:

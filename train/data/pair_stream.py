@@ -1,7 +1,7 @@
 """An endless, seeded stream of coarse meshes with their surfaces, for training to limit surfaces.
 
 Closed solids of every size first, then open patches on analytic surfaces, grids of quads, spheres,
-solids of plane faces, control meshes that were made for Loop, and parts of a lathe.
+solids of plane faces, control meshes that were made for Loop, parts of a lathe, and swept profiles.
 """
 
 from collections.abc import Iterator, Mapping
@@ -19,16 +19,18 @@ from train.data.references import Pair, Reference, moved
 from train.data.solid_pairs import solid_pairs
 from train.data.sphere_pairs import sphere_pair
 from train.data.stream import random_instance
+from train.data.swept_pairs import swept_pair
 from train.surfaces.implicit import unit_normal
 
 SHARES: Mapping[str, float] = MappingProxyType(
     {
-        "patches": 0.16,
+        "patches": 0.14,
         "grids": 0.12,
         "spheres": 0.05,
-        "faceted": 0.16,
-        "authored": 0.09,
-        "lathes": 0.10,
+        "faceted": 0.14,
+        "authored": 0.08,
+        "lathes": 0.09,
+        "swept": 0.10,
     }
 )
 """Of these kinds; the rest are solids."""
@@ -41,7 +43,15 @@ def pair_stream(seed: int) -> Iterator[Pair]:
     """Yield all pairs of a seed, without end: centred, with reference length R = 1."""
     rng = np.random.default_rng(seed)
     waiting: list[Pair] = []
-    makers = (patch_pair, grid_pair, sphere_pair, faceted_pair, authored_pair, lathe_pair)
+    makers = (
+        patch_pair,
+        grid_pair,
+        sphere_pair,
+        faceted_pair,
+        authored_pair,
+        lathe_pair,
+        swept_pair,
+    )
     shares = np.cumsum(list(SHARES.values()))
     while True:
         kind = int(np.searchsorted(shares, rng.random()))

@@ -13,6 +13,9 @@ AUTHORED = "authored"
 LATHE = "lathe"
 """The kind of few-faced parts that are to be no sharper than quasi-interpolation leaves them."""
 
+SWEPT = "swept"
+"""The kind of parts of machined surfaces: smooth, most of it bent one way alone."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Reference:

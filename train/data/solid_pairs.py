@@ -2,13 +2,11 @@
 
 from collections.abc import Iterator
 
-import fast_simplification
 import numpy as np
-from jaxtyping import Float, Int
 
 from pns_common.errors import MeshError
-from pns_common.mesh import Mesh, clean
-from train.data.dense_meshes import is_manifold
+from pns_common.mesh import Mesh
+from train.data.coarsened import coarsened
 from train.data.references import Pair, Reference
 from train.surfaces.marching import laid_onto, marched, unit_gradient
 from train.surfaces.solids import Field, random_solid
@@ -29,7 +27,6 @@ USUAL, USUALLY = (300, 2000), 0.5
 ON_SURFACE = 0.16
 """How often the collapsed vertices are laid onto the surface; collapses leave them beside it."""
 
-AGGRESSIVENESS = (3.0, 5.0, 7.0)
 EACH = 5
 """Coarse meshes made of one solid."""
 
@@ -47,29 +44,12 @@ def solid_pairs(rng: np.random.Generator) -> Iterator[Pair]:
     surface = Reference(points, unit_gradient(field, points))
     for _ in range(EACH):
         on_surface = rng.random() < ON_SURFACE
-        coarse = collapsed(points, dense.faces, _size(rng, len(dense.faces)), rng)
+        coarse = coarsened(points, dense.faces, _size(rng, len(dense.faces)), rng)
         if coarse is None:
             continue
         if on_surface:
             coarse = Mesh(laid_onto(field, coarse.vertices), coarse.faces)
         yield Pair("laid" if on_surface else "collapsed", coarse, surface)
-
-
-def collapsed(
-    points: Float[np.ndarray, "V 3"],
-    faces: Int[np.ndarray, "F 3"],
-    count: int,
-    rng: np.random.Generator,
-) -> Mesh | None:
-    """Return a mesh after quadric edge collapses; None where it is no closed manifold any more."""
-    vertices, triangles = fast_simplification.simplify(
-        points.copy(), faces.copy(), target_count=count, agg=float(rng.choice(AGGRESSIVENESS))
-    )[:2]
-    try:
-        mesh = clean(Mesh(np.asarray(vertices, dtype=np.float64), np.asarray(triangles))).mesh
-    except MeshError:
-        return None
-    return mesh if len(mesh.faces) >= 8 and is_manifold(mesh) else None
 
 
 def _framed(field: Field) -> Field | None:

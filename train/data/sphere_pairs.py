@@ -3,9 +3,9 @@
 import numpy as np
 
 from pns_common.mesh import Mesh
+from train.data.coarsened import coarsened
 from train.data.primitives import icosphere
 from train.data.references import Pair, Reference
-from train.data.solid_pairs import collapsed
 
 ICOSPHERE, ON_SURFACE = 0.4, 0.3
 """How often it is an icosphere; and collapsed with its vertices laid back onto the surface."""
@@ -25,7 +25,7 @@ def sphere_pair(rng: np.random.Generator) -> Pair | None:
         coarse = Mesh(coarse.vertices * axes, coarse.faces)
     else:
         count = int(np.exp(rng.uniform(np.log(FEWEST), np.log(MOST))))
-        coarse = collapsed(dense.vertices * axes, dense.faces, count, rng)
+        coarse = coarsened(dense.vertices * axes, dense.faces, count, rng)
         if coarse is not None and kind < ICOSPHERE + ON_SURFACE:
             unit = coarse.vertices / axes
             unit /= np.linalg.norm(unit, axis=1, keepdims=True)

@@ -13,7 +13,7 @@ from pns_common.arrays import segment_sum
 from pns_common.disjoint_union import disjoint_faces
 from pns_common.level import ControlLevel, control_level
 from pns_common.topology import Topology, build_topology, split
-from train.data.references import AUTHORED, LATHE, Pair
+from train.data.references import AUTHORED, LATHE, SWEPT, Pair
 from train.fitting.limit_maps import LimitMaps, applied, limit_maps, loop_matrix
 
 FINER = 1
@@ -28,7 +28,7 @@ SEEN_BACK = 6000
 FAIR = 2
 """Levels of Loop between the learned level and the vertices between which bending is measured."""
 
-SMOOTH_KINDS = ("grid", "sphere", LATHE)
+SMOOTH_KINDS = ("grid", "sphere", LATHE, SWEPT)
 """Kinds that are to bend no more than quasi-interpolation makes them: smooth ones, and lathes'."""
 
 

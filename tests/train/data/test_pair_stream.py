@@ -20,9 +20,19 @@ from train.data.pair_stream import pair_stream, patch_pair
 from train.data.references import Pair, Reference, moved
 from train.data.solid_pairs import solid_pairs
 from train.data.sphere_pairs import sphere_pair
+from train.data.swept_pairs import swept_pair
 from train.metrics.fairness import volume
 
-KINDS = [solid_pairs, grid_pair, sphere_pair, faceted_pair, patch_pair, authored_pair, lathe_pair]
+KINDS = [
+    solid_pairs,
+    grid_pair,
+    sphere_pair,
+    faceted_pair,
+    patch_pair,
+    authored_pair,
+    lathe_pair,
+    swept_pair,
+]
 
 CLOSED = [solid_pairs, sphere_pair, faceted_pair, authored_pair, lathe_pair]
 
