@@ -30,7 +30,7 @@ SURFACE = Reference(SHAPES["torus"].vertices, vertex_normals(SHAPES["torus"]))
 @pytest.fixture(scope="module")
 def no_solids():
     """The stream of pairs without curved solids, which take a second each to make, and patches."""
-    shares = [0.0, 0.3, 0.3, 0.2, 0.1, 0.1]
+    shares = [0.0, 0.3, 0.3, 0.2, 0.1, 0.1, 0.0]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(stream, "SHARES", dict(zip(stream.SHARES, shares, strict=True)))
         yield
