@@ -120,7 +120,8 @@ def test_custom_normals_are_rebuilt():
     new = refined(obj)
     assert new.data.has_custom_normals
     normals = numbers(new.data.corner_normals, "vector", 3)
-    np.testing.assert_allclose(normals, np.tile([0, 0, 1], (len(normals), 1)), atol=5e-3)
+    # Blender keeps two angles for each, and takes those whose cosine is above 1 − 10⁻⁴ for none.
+    np.testing.assert_allclose(normals, np.tile([0, 0, 1], (len(normals), 1)), atol=np.sqrt(2e-4))
     assert any("normals" in note for note in notes(new))
 
 
