@@ -140,28 +140,23 @@ def leaving(
         tally.answer("leaving", 0)
 
 
-def probe(address: Address, ended: Event, answers: Connection, *, one_source: bool) -> None:
+def probe(address: Address, ended: Event, answers: Connection) -> None:
     """GET /healthz, ten times a second, each on a new connection; tells status and seconds.
 
     Who has connected and said nothing while as many others came as there are places gives way to
     them. A process that waits for its processor between the two may be that one: it asks again, as
     clients do where a connection ends before the answer begins. Three times in a row is no chance.
-
-    It has an address of its own, as a monitor has: clients that leave still count in the share of
-    theirs until the service, busy with others, notices.
     """
     while not ended.is_set():
         began = time.perf_counter()
-        source = None if one_source else ("127.0.0.2", 0)
-        status = next(filter(None, (_healthz(address, source) for _ in range(3))), 0)
+        status = _healthz(address) or _healthz(address) or _healthz(address)
         answers.send((status, time.perf_counter() - began))
         ended.wait(0.1)
 
 
-def _healthz(address: Address, source: Address | None) -> int:
+def _healthz(address: Address) -> int:
     """The status; 0 where there is no answer."""
-    opened = http.client.HTTPConnection(*address, timeout=PATIENCE, source_address=source)
-    with closing(opened), suppress(OSError, http.client.HTTPException):
+    with closing(connection(address)) as opened, suppress(OSError, http.client.HTTPException):
         opened.request("GET", "/healthz")
         return opened.getresponse().status
     return 0

@@ -66,7 +66,7 @@ def soak(
     threads = [threading.Thread(target=client) for client in clients]
     with ExitStack() as stack:
         stack.callback(_end, ended, threads)
-        stack.enter_context(_probing(address, tally, one_source))
+        stack.enter_context(_probing(address, tally, excused=503 if one_source else 200))
         for thread in threads:
             thread.start()
         attack_for = stack.enter_context(_attacking(address, one_source))
@@ -147,18 +147,14 @@ def _attack_in_turn(target: Target, over: Event, orders: Connection) -> None:
 
 
 @contextmanager
-def _probing(address: Address, tally: Tally, one_source: bool) -> Iterator[None]:
+def _probing(address: Address, tally: Tally, excused: int) -> Iterator[None]:
     """The probe, in a process of its own: what it measures is the service, not its clients.
 
-    Of one source, attackers have the probe's own places: that it is busy then is no mistake.
+    An `excused` status is no mistake: of one source, attackers have the probe's own places.
     """
     context = multiprocessing.get_context("spawn")
     over, (receiver, sender) = context.Event(), context.Pipe(duplex=False)
-    arguments = (address, over, sender)
-    process = context.Process(
-        target=honest.probe, args=arguments, kwargs={"one_source": one_source}
-    )
-    excused = 503 if one_source else 200
+    process = context.Process(target=honest.probe, args=(address, over, sender))
     process.start()
     reader = threading.Thread(target=_collect, args=(receiver, tally, excused))
     reader.start()
