@@ -1,13 +1,12 @@
 """Dense meshes made coarse in one of several ways: in practice it may have been any of them."""
 
-import fast_simplification
 import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.errors import MeshError
-from pns_common.mesh import Mesh, clean
+from pns_common.mesh import Mesh
 from train.data.dense_meshes import is_manifold
-from train.data.simplifiers import SIMPLIFIERS
+from train.data.simplifiers import SIMPLIFIERS, fast_quadric
 
 WAYS = {"fast-quadric": 0.5, "quadric": 0.3, "shortest-edges": 0.12, "clustered": 0.08}
 """How often each of `train.data.simplifiers`.
@@ -31,23 +30,12 @@ def coarsened(
     """Return a mesh of about `count` faces; None where it is no manifold any more."""
     way = str(rng.choice(list(WAYS), p=list(WAYS.values())))
     aggressiveness = float(rng.choice(AGGRESSIVENESS))
+    dense = Mesh(points, faces)
     try:
         if way == "fast-quadric":
-            mesh = _swept(points, faces, count, aggressiveness)
+            mesh = fast_quadric(dense, count, aggressiveness)
         else:
-            mesh = SIMPLIFIERS[way](Mesh(points, faces), count)
+            mesh = SIMPLIFIERS[way](dense, count)
     except MeshError:
         return None
     return mesh if len(mesh.faces) >= FEWEST and is_manifold(mesh) else None
-
-
-def _swept(
-    points: Float[np.ndarray, "V 3"],
-    faces: Int[np.ndarray, "F 3"],
-    count: int,
-    aggressiveness: float,
-) -> Mesh:
-    vertices, triangles = fast_simplification.simplify(
-        points.copy(), faces.copy(), target_count=count, agg=aggressiveness
-    )[:2]
-    return clean(Mesh(np.asarray(vertices, dtype=np.float64), np.asarray(triangles))).mesh

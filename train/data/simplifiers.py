@@ -25,10 +25,10 @@ CLOSENESS = 1.6
 Simplifier = Callable[[Mesh, int], Mesh]
 
 
-def fast_quadric(mesh: Mesh, faces: int) -> Mesh:
+def fast_quadric(mesh: Mesh, faces: int, aggressiveness: float = AGGRESSIVENESS) -> Mesh:
     """Quadric edge collapses in sweeps with a rising threshold (fast-simplification)."""
     vertices, triangles = fast_simplification.simplify(
-        mesh.vertices.copy(), mesh.faces.copy(), target_count=faces, agg=AGGRESSIVENESS
+        mesh.vertices.copy(), mesh.faces.copy(), target_count=faces, agg=aggressiveness
     )[:2]
     return _mesh(vertices, triangles)
 

@@ -41,7 +41,9 @@ def test_every_way_of_the_table_is_taken_about_as_often_as_it_says(monkeypatch):
         for name in SIMPLIFIERS
     }
     monkeypatch.setattr(subject, "SIMPLIFIERS", noted)
-    monkeypatch.setattr(subject, "_swept", lambda *_: (seen.update(["fast-quadric"]), SPHERE)[1])
+    monkeypatch.setattr(
+        subject, "fast_quadric", lambda *_: (seen.update(["fast-quadric"]), SPHERE)[1]
+    )
     rng = np.random.default_rng(0)
     for _ in range(400):
         coarsened(SPHERE.vertices, SPHERE.faces, 100, rng)
@@ -53,5 +55,5 @@ def test_what_is_no_manifold_any_more_is_left_out(monkeypatch):
     """Two triangles on one edge of a third."""
     fan = Mesh(np.eye(5)[:, :3], np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]] * 3))
     monkeypatch.setattr(subject, "SIMPLIFIERS", {name: lambda *_: fan for name in SIMPLIFIERS})
-    monkeypatch.setattr(subject, "_swept", lambda *_: fan)
+    monkeypatch.setattr(subject, "fast_quadric", lambda *_: fan)
     assert made(0) is None
