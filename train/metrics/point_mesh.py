@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 
 from pns_common.arrays import cross, dot
 from pns_common.mesh import Mesh
+from pns_common.topology import build_topology
 
 ON_BORDER = 1e-9
 """Barycentric coordinates up to here are none."""
@@ -51,14 +52,15 @@ def face_tree(mesh: Mesh) -> FaceTree:
     tree = igl.AABB()
     tree.init(vertices, faces)
     corners = np.repeat(np.arange(len(faces)), 3)
-    ends = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]], axis=2)
-    edges = (ends[..., 0] * len(vertices) + ends[..., 1]).reshape(-1)
-    _, edge = np.unique(edges, return_inverse=True)
+    topology = build_topology(faces, len(vertices))
+    edges = topology.face_edges.reshape(-1)
+    # The edges of a face begin with the one opposite its last corner.
+    opposite = np.roll(topology.face_edges, -1, axis=1)
     return FaceTree(
         vertices=vertices,
         faces=faces,
         tree=tree,
-        across=_lowest(edge, corners, edge.max(initial=0) + 1)[edge].reshape(-1, 3),
+        across=_lowest(edges, corners, len(topology.edges))[opposite],
         at_vertex=_lowest(faces.reshape(-1), corners, len(vertices)),
     )
 

@@ -93,11 +93,15 @@ def surface_jump(instance: Instance, levels: int) -> float:
 
 
 def normal_jump(mesh: Mesh) -> float:
-    """Return the largest angle between faces that share an interior edge, radians."""
+    """Return the largest angle between faces that share an interior edge, radians.
+
+    Faces without area have no normal, and turn from none.
+    """
     topology = build_topology(mesh.faces, len(mesh.vertices))
     normals = face_normals(mesh.vertices, mesh.faces)
     left, right = (normals[side] for side in topology.edge_faces[topology.interior].T)
-    chord = np.linalg.norm(left - right, axis=1).max(initial=0)
+    both = left.any(axis=1) & right.any(axis=1)
+    chord = np.linalg.norm(left - right, axis=1).max(initial=0, where=both)
     return float(2 * np.arcsin(min(1.0, chord / 2)))
 
 

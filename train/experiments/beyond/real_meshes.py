@@ -7,12 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pns_common.child_faces import angle_between
-from pns_common.edge.frames import face_normals
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
 from pns_common.schemes import Scheme
-from pns_common.topology import build_topology
 from train.data.dense_meshes import DenseMesh, asset_meshes, cad_meshes
 from train.data.simplifiers import SIMPLIFIERS, simplified
 from train.experiments.beyond.models import model_files
@@ -24,6 +21,7 @@ from train.metrics.decimation import gain
 from train.metrics.point_mesh import face_tree, nearest
 from train.metrics.self_intersection import self_intersecting
 from train.metrics.surface_distance import SurfaceErrors, prepared, surface_errors
+from train.metrics.whole_surface import normal_jump
 
 SIZES: Mapping[int, int] = {500: 3, 2000: 3, 5000: 2, 20000: 1}
 """Faces of the coarse mesh, and the levels after which it is measured."""
@@ -143,7 +141,7 @@ def compared(
             coarse,
             method,
             surface_errors(true, prepared(mesh, samples)),
-            largest_turn(mesh),
+            normal_jump(mesh),
             int(self_intersecting(mesh).sum()),
         )
         for method, mesh in meshes.items()
@@ -153,15 +151,6 @@ def compared(
 def on_surface(mesh: Mesh, surface: Mesh) -> Mesh:
     """Return a mesh with each vertex at the nearest point of a surface."""
     return Mesh(nearest(face_tree(surface), mesh.vertices).point, mesh.faces)
-
-
-def largest_turn(mesh: Mesh) -> float:
-    """Return the largest angle between neighbouring faces that have an area, in radians."""
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    normals = face_normals(mesh.vertices, mesh.faces)
-    first, second = (normals[faces] for faces in topology.edge_faces[topology.interior].T)
-    both = first.any(axis=1) & second.any(axis=1)
-    return angle_between(float(np.max(((first - second) ** 2).sum(axis=1), initial=0, where=both)))
 
 
 def summary(measured: list[Measured]) -> list[Summary]:
