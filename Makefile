@@ -102,7 +102,7 @@ hashes:
 
 # After a bundled model was put in its place by hand.
 manifest: $(DEV)/.ready
-	$(DEV)/bin/python -c "from pathlib import Path; from pns_common.model_manifest import write_manifest; write_manifest(Path('pns_common/models'))"
+	$(DEV)/bin/python -c "from pathlib import Path; from pns_common.models.manifest import write_manifest; write_manifest(Path('pns_common/models'))"
 
 # Blender as a module, a version each in an environment of its own: 350 MB, and each for one version of
 # Python. 4.2 has the numpy that Blender 4.2 comes with. A missing Python leaves its version out.

@@ -19,8 +19,8 @@ from rich.table import Table
 from benchmarks.contest import OURS, Case, contest, ours
 from benchmarks.peers.available import available_peers
 from benchmarks.plot import plot_results
-from pns_common.onnx_model import DEFAULT_MODEL, bundled_models
-from pns_common.whole_file import replace_file
+from pns_common.base.whole_file import replace_file
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL, bundled_models
 
 HERE = Path(__file__).parent
 RESULTS, PICTURE = HERE / "results.json", HERE / "speed.png"

@@ -18,7 +18,7 @@ from benchmarks.generated import torus
 from benchmarks.yardsticks import numpy_second
 from pns_common import load_model, loop, pns, refine
 from pns_common.fused import load_kernels
-from pns_common.onnx_model import DEFAULT_MODEL
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL
 
 FACES, RUNS = 80_000, 7
 # Processor seconds over the yardstick's: about twice what was measured.

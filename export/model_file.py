@@ -10,9 +10,9 @@ import msgspec
 
 from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, Parity, check_parity
-from pns_common.model_card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
-from pns_common.onnx_model import model_from_bytes
-from pns_common.whole_file import replace_file
+from pns_common.base.whole_file import replace_file
+from pns_common.models.card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
+from pns_common.runtimes.onnx_model import model_from_bytes
 from train.models.checkpoint import Checkpoint
 from train.models.networks import BoundedNet
 

@@ -7,7 +7,7 @@ import onnx
 from onnx import NodeProto, TensorProto, ValueInfoProto, helper, numpy_helper
 from torch import Tensor
 
-from pns_common.model_card import CARD_KEY, ModelCard
+from pns_common.models.card import CARD_KEY, ModelCard
 from train.models.networks import BoundedNet, SymmetricNet
 
 OPSET = 17

@@ -8,11 +8,11 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from pns_common.edge.features import FEATURE_SETS
 from pns_common.errors import ModelError, PnsError
-from pns_common.onnx_model import OnnxModel
-from pns_common.symmetry import Feature
-from pns_common.vertex.rings import RING_FEATURE_SETS
+from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.geometry.rings import RING_FEATURE_SETS
+from pns_common.geometry.symmetry import Feature
+from pns_common.runtimes.onnx_model import OnnxModel
 from train.models.networks import BoundedNet
 
 TOLERANCE = 3e-6

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from export.model_file import Exported, write_model
 from pns_common.errors import ModelError
-from pns_common.model_card import FORMAT, ModelCard
+from pns_common.models.card import FORMAT, ModelCard
 from train.models.published import GATE_SHARPNESS, is_operator, load_published, published_budget
 
 SOURCE = "https://github.com/ugail/Proximity-Preserving-Neural-Subdivision"

@@ -12,7 +12,7 @@ from rich.console import Console
 from export.model_file import Exported, export_model
 from export.published import export_published
 from pns_common.errors import PnsError
-from pns_common.model_manifest import write_manifest
+from pns_common.models.manifest import write_manifest
 from train.models.checkpoint import load_checkpoint
 from train.models.recipes import RECIPES, Recipe
 

@@ -5,27 +5,31 @@
     refined = refine(Mesh(vertices, faces), pns(load_model()), levels=2)
     refined.mesh.vertices, refined.mesh.faces, refined.report
 
-Where to read:
+Where to read, each room seeing only those above it:
 
-    the formula         correction.py (edges), vertex/operator.py (old vertices)
-    its parts           edge/frames.py F, edge/features.py φ, side_gate.py γ, prior.py D,
-                        thin_faces.py ℓ, fold_guard.py G; at boundaries boundary_prior.py and
-                        boundary_rule.py
-    Loop                stencils.py (masks), topology.py (split), limit/ (limit surface)
-    a rule, a scheme    level.py what a rule sees, placement.py what it answers; loop_rules.py,
-                        learned_rules.py (the paper's), scale_free.py (the default's), schemes.py
-    one level           step.py in formulas, array_steps.py one after the other
-    all levels          refine.py; refine_parts.py many meshes at once, pieces/ one mesh in pieces
-    model files         model_card.py, model_contract.py, onnx_model.py, numpy_network/
-    other libraries     interop/
-    the same compiled   fused/: each module names the one whose bits it has
+    base/           arrays of any backend, row blocks, whole files; errors.py beside it
+    mesh.py         the control mesh; connectivity/ what follows from its faces: topology.py (split)
+    geometry/       what is measured on it: frames.py F, rings.py, thin_faces.py ℓ
+    masks/          Loop: stencils.py one step's masks, limit/ those of the limit surface
+    features/       φ, what the network reads of an edge
+    formula/        correction.py (edges) and vertex_operator.py (old vertices); side_gate.py γ,
+                    prior.py D, fold_guard.py G, boundary_prior.py
+    models/         what a model says of itself: card.py, contract.py; the bundled files
+    rules/          level.py what a rule sees, placement.py what it answers; loop.py, learned.py
+                    (the paper's), scale_free.py (the default's), boundary.py
+    schemes.py      a rule for old vertices and one for edges
+    levels/         step.py one level in formulas, array_steps.py one after the other; the report
+    fused/          the same compiled: each module names the one whose bits it has
+    runtimes/       what runs a model file: onnx_model.py loads it, and finds who does
+    refine.py       all levels; refine_parts.py many meshes at once, pieces/ one mesh in pieces
+    interop/        meshes of other libraries
 """
 
 from pns_common.errors import MeshError, ModelError, ParameterError, PnsError
 from pns_common.interop.subdivide import subdivide
 from pns_common.mesh import Mesh, clean
-from pns_common.onnx_model import load_model
 from pns_common.refine import Refinement, refine
+from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import Scheme, loop, pns
 
 __all__ = [

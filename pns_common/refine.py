@@ -11,19 +11,24 @@ from typing import TypedDict
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.array_steps import array_steps
-from pns_common.arrays import norm
-from pns_common.blocks import BLOCK_ROWS, Blocks, available_threads
-from pns_common.deferred import Deferred
-from pns_common.diagnostics import LevelReport, level_report, limit_distances
+from pns_common.base.arrays import norm
+from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
+from pns_common.base.deferred import Deferred
+from pns_common.base.parameters import is_number, is_whole
+from pns_common.base.progress import RefinementProgress, level_costs
 from pns_common.errors import ParameterError
 from pns_common.fused import KERNEL_ROWS, fits, kernels_available, kernels_loaded, kernels_pay
 from pns_common.fused.known import kernels_know
-from pns_common.levels import AfterLevel, LevelsReport, RefinedLevels, check_coordinates
-from pns_common.limit import refined_limit_normals, refined_limit_positions
+from pns_common.levels.array_steps import array_steps
+from pns_common.levels.diagnostics import LevelReport, level_report, limit_distances
+from pns_common.levels.refined_levels import (
+    AfterLevel,
+    LevelsReport,
+    RefinedLevels,
+    check_coordinates,
+)
+from pns_common.masks.limit import refined_limit_normals, refined_limit_positions
 from pns_common.mesh import Mesh
-from pns_common.parameters import is_number, is_whole
-from pns_common.progress import RefinementProgress, level_costs
 from pns_common.schemes import Scheme
 
 HIGHEST_LEVELS = 16

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.blocks import BLOCK_ROWS, Blocks
+from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.errors import ParameterError
 from pns_common.fused import KERNEL_ROWS
-from pns_common.limit import refined_limit_normals, refined_limit_positions
+from pns_common.masks.limit import refined_limit_normals, refined_limit_positions
 from pns_common.mesh import Mesh
 from pns_common.refine import (
     Report,

@@ -9,25 +9,25 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pns_common.arrays import Array
-from pns_common.boundary_rule import BoundaryRule
-from pns_common.correction import curvature_gate
-from pns_common.edge.features import FEATURE_SETS
-from pns_common.edge.operator import EdgeOperator
-from pns_common.edge.orientation import ORIENTATIONS
+from pns_common.base.arrays import Array
+from pns_common.base.parameters import is_number
 from pns_common.errors import ModelError, ParameterError
-from pns_common.fold_guard import FoldGuard
-from pns_common.learned_rules import LearnedEdgeRule, LearnedVertexRule
-from pns_common.level import ControlLevel, Rule
-from pns_common.loop_rules import loop_edge_rule, loop_vertex_rule
-from pns_common.model import Model, VertexModel
-from pns_common.model_card import ModelCard
-from pns_common.parameters import is_number
-from pns_common.placement import Placement, without_correction
-from pns_common.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
-from pns_common.scale_free_form import ScaleFreeForm
-from pns_common.vertex.operator import VertexOperator
-from pns_common.vertex.rings import RING_FEATURE_SETS
+from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.features.orientation import ORIENTATIONS
+from pns_common.formula.correction import curvature_gate
+from pns_common.formula.edge_operator import EdgeOperator
+from pns_common.formula.fold_guard import FoldGuard
+from pns_common.formula.vertex_operator import VertexOperator
+from pns_common.geometry.rings import RING_FEATURE_SETS
+from pns_common.models.card import ModelCard
+from pns_common.models.model import Model, VertexModel
+from pns_common.rules.boundary import BoundaryRule
+from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
+from pns_common.rules.level import ControlLevel, Rule
+from pns_common.rules.loop import loop_edge_rule, loop_vertex_rule
+from pns_common.rules.placement import Placement, without_correction
+from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
+from pns_common.rules.scale_free_form import ScaleFreeForm
 
 __all__ = [
     "ControlLevel",

@@ -9,8 +9,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from pns_common.model_card import ModelCard
-from pns_common.onnx_model import DEFAULT_MODEL, OnnxModel
+from pns_common.models.card import ModelCard
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL, OnnxModel
 
 # A metric on the card: what was measured, and its improvement over the reference in per cent.
 METRIC_COLUMNS = ("reference_mean", "method_mean", "percent", "low", "high")

@@ -11,7 +11,7 @@ from benchmarks.answers import upload
 from benchmarks.contest import ROOT, Case, contest, ours
 from benchmarks.generated import ORDERS
 from benchmarks.peers.protocol import read_mesh, write_mesh
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.connectivity.topology import EdgeClass, build_topology
 
 
 @pytest.mark.parametrize("order", ORDERS)

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from pns_common.onnx_model import DEFAULT_MODEL
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL
 from pns_common.version import VERSION
 from tests.support.installed import ROOT, checkout, environment, lend_kernels, run
 
@@ -62,7 +62,7 @@ def test_both_distributions_are_fit_to_publish(distributions):
 
 def test_the_wheel_holds_two_packages_models_page_and_licence(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
-    wanted = {"pns_common/py.typed", "pns_common/numpy_network/wire.py"}
+    wanted = {"pns_common/py.typed", "pns_common/runtimes/numpy_network/wire.py"}
     wanted |= {"pns_service/cli/commands.py", "pns_service/http/routes.py"}
     wanted |= {"pns_service/web/index.html"}
     wanted |= {f"pns_common/models/{name}.onnx" for name in ("paper", DEFAULT_MODEL)}

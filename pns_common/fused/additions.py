@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.blocks import BLOCK_ROWS, Blocks
+from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.fused.boundary import NO_RULE, Boundary
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.fused.rings import (

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.boundary_prior import on_boundary
-from pns_common.boundary_rule import BoundaryRule
+from pns_common.connectivity.topology import Topology
+from pns_common.formula.boundary_prior import on_boundary
 from pns_common.fused.mesh_edges import MeshEdges, has_boundary
-from pns_common.level import ControlLevel
-from pns_common.placement import Placement
-from pns_common.topology import Topology
+from pns_common.rules.boundary import BoundaryRule
+from pns_common.rules.level import ControlLevel
+from pns_common.rules.placement import Placement
 
 Move = Callable[[ControlLevel, Placement], Placement]
 

@@ -1,18 +1,18 @@
-"""The faces that a step made, as ``pns_common.child_faces`` looks at them."""
+"""The faces that a step made, as ``pns_common.geometry.child_faces`` looks at them."""
 
 from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.blocks import Blocks
-from pns_common.child_faces import ChildAngles, angle_between
+from pns_common.base.blocks import Blocks
 from pns_common.fused.kernels.normals import (
     flipped_children,
     largest_jump_across,
     largest_jump_inside,
 )
 from pns_common.fused.mesh_edges import MeshEdges
+from pns_common.geometry.child_faces import ChildAngles, angle_between
 
 
 def look_at_children(
@@ -21,7 +21,7 @@ def look_at_children(
     loop_points: Float[np.ndarray, "W 3"] | None,
     blocks: Blocks,
 ) -> ChildAngles:
-    """Look at the faces that ``parent`` was split into (see ``pns_common.child_faces``)."""
+    """Look at the faces that ``parent`` was split into, as pns_common.geometry.child_faces does."""
     count, edge_count = len(parent.faces), len(parent.edges)
     inside, across = np.zeros(blocks.count(count)), np.zeros(blocks.count(edge_count))
     flipped, largest_yet = np.zeros(blocks.count(count), dtype=np.int64), np.zeros(1)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pns_common.correction import where_open
-from pns_common.edge.frames import EdgeFrames
-from pns_common.edge.orientation import SYMMETRIC
+from pns_common.features.orientation import SYMMETRIC
+from pns_common.formula.correction import where_open
+from pns_common.formula.side_gate import gentle_bend, opened
 from pns_common.fused.additions import Additions, Surroundings
 from pns_common.fused.kernels.edge_correction import (
     DIHEDRAL,
@@ -16,9 +16,9 @@ from pns_common.fused.kernels.edge_correction import (
     fill_log_ratios,
     look,
 )
-from pns_common.learned_rules import LearnedEdgeRule
-from pns_common.scale_free import ScaleFreeEdgeRule
-from pns_common.side_gate import gentle_bend, opened
+from pns_common.geometry.frames import EdgeFrames
+from pns_common.rules.learned import LearnedEdgeRule
+from pns_common.rules.scale_free import ScaleFreeEdgeRule
 
 NO_FIELDS = np.zeros((0, 4))
 

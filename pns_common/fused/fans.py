@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool
 
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
 from pns_common.fused.kernels.fans import count_corners, several_fans
 from pns_common.fused.mesh_edges import MeshEdges
 

@@ -8,8 +8,8 @@ from itertools import count
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pns_common.blocks import Blocks
-from pns_common.fold_guard import ROUNDS, FoldGuard
+from pns_common.base.blocks import Blocks
+from pns_common.formula.fold_guard import ROUNDS, FoldGuard
 from pns_common.fused.kernels.guard import find_folds
 from pns_common.fused.mesh_edges import MeshEdges
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pns_common.boundary_rule import BoundaryRule
-from pns_common.edge.features import FEATURE_SETS
-from pns_common.edge.orientation import FIRST_FACE, SYMMETRIC
-from pns_common.learned_rules import LearnedEdgeRule, LearnedVertexRule
-from pns_common.loop_rules import loop_vertex_rule
-from pns_common.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
+from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.features.orientation import FIRST_FACE, SYMMETRIC
+from pns_common.geometry.rings import RING_10
+from pns_common.rules.boundary import BoundaryRule
+from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
+from pns_common.rules.loop import loop_vertex_rule
+from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
 from pns_common.schemes import Rule, Scheme
-from pns_common.vertex.rings import RING_10
 
 
 def kernels_know(scheme: Scheme) -> bool:

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.blocks import Blocks
-from pns_common.boundary_rule import BoundaryRule
-from pns_common.diagnostics import LevelReport, level_report
+from pns_common.base.blocks import Blocks
 from pns_common.fused.additions import Additions, Surroundings
 from pns_common.fused.boundary import boundary_of
 from pns_common.fused.child_faces import look_at_children
@@ -19,11 +17,13 @@ from pns_common.fused.guard import guard_scale
 from pns_common.fused.level import FusedLevel, FusedStep
 from pns_common.fused.loop_points import largest_size, loop_points
 from pns_common.fused.vertex_rule import add_at_vertices
-from pns_common.learned_rules import LearnedEdgeRule, LearnedVertexRule
-from pns_common.placement import Placement
-from pns_common.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
+from pns_common.levels.diagnostics import LevelReport, level_report
+from pns_common.levels.step import LevelStep
+from pns_common.rules.boundary import BoundaryRule
+from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
+from pns_common.rules.placement import Placement
+from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
 from pns_common.schemes import Scheme
-from pns_common.step import LevelStep
 
 # Far above rounding, and the cosine of more than any useful fold angle.
 CLEAR_COSINE = 1e-9

@@ -9,15 +9,15 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.blocks import Blocks
-from pns_common.creases import crease_classes, crease_halves
-from pns_common.diagnostics import LevelReport, edge_counts
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import crease_classes, crease_halves
+from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.fused.additions import Additions
 from pns_common.fused.child_faces import look_at_children
 from pns_common.fused.fans import multi_fan_vertices
 from pns_common.fused.loop_points import largest_size, loop_points
 from pns_common.fused.mesh_edges import MeshEdges, build_edges, split_mesh_edges
-from pns_common.topology import EdgeClass, Topology
+from pns_common.levels.diagnostics import LevelReport, edge_counts
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,10 +20,10 @@ from typing import Any
 
 import llvmlite.binding  # pyright: ignore[reportMissingTypeStubs]
 
+from pns_common.base.whole_file import replace_file
 from pns_common.fused import kernels
 from pns_common.fused.kernels.compiled import Kernel
 from pns_common.fused.storage import kernel_file
-from pns_common.whole_file import replace_file
 
 # llvmlite ships no types.
 _llvm: Any = llvmlite.binding

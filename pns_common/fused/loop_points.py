@@ -1,11 +1,11 @@
-"""Where Loop puts a level's vertices, with the bits of ``pns_common.stencils``."""
+"""Where Loop puts a level's vertices, with the bits of ``pns_common.masks.stencils``."""
 
 from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
 from pns_common.fused.kernels.masks import (
     blend_vertices,
     largest_coordinate,
@@ -14,7 +14,7 @@ from pns_common.fused.kernels.masks import (
     sum_rings,
 )
 from pns_common.fused.mesh_edges import MeshEdges
-from pns_common.stencils import loop_beta
+from pns_common.masks.stencils import loop_beta
 
 
 def loop_points(

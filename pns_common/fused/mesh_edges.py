@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.fused.kernels.children import (
     number_halves,
     split_edges,
@@ -24,7 +25,6 @@ from pns_common.fused.kernels.edges import (
     classify,
 )
 from pns_common.mesh import repeated_vertex
-from pns_common.topology import EdgeClass, build_topology
 
 # Steps along chains that an edge may take on average: more, and a sort is as fast.
 STEPS = 32

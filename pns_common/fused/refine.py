@@ -7,12 +7,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.blocks import Blocks
-from pns_common.deferred import Deferred
-from pns_common.diagnostics import LevelReport
+from pns_common.base.blocks import Blocks
+from pns_common.base.deferred import Deferred
 from pns_common.fused.level import FusedLevel, FusedStep, control_level, loop_step, next_level
 from pns_common.fused.mesh_edges import split_mesh_faces
-from pns_common.levels import AfterLevel, LevelsReport, RefinedLevels, check_coordinates
+from pns_common.levels.diagnostics import LevelReport
+from pns_common.levels.refined_levels import (
+    AfterLevel,
+    LevelsReport,
+    RefinedLevels,
+    check_coordinates,
+)
 from pns_common.mesh import Mesh
 from pns_common.schemes import Scheme
 

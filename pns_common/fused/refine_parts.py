@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.blocks import Blocks
-from pns_common.child_faces import ChildAngles, angle_between
-from pns_common.diagnostics import LevelReport, level_report
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import Topology
 from pns_common.fused.kernels.normals import (
     flipped_children,
     largest_jump_across,
@@ -24,12 +23,13 @@ from pns_common.fused.learned_step import learned_points
 from pns_common.fused.level import FusedLevel, control_level, next_level
 from pns_common.fused.loop_points import largest_size, loop_points
 from pns_common.fused.mesh_edges import MeshEdges, split_mesh_faces
-from pns_common.levels import check_coordinates
+from pns_common.geometry.child_faces import ChildAngles, angle_between
+from pns_common.levels.diagnostics import LevelReport, level_report
+from pns_common.levels.refined_levels import check_coordinates
+from pns_common.levels.step import LevelStep
 from pns_common.mesh import Mesh
-from pns_common.placement import without_correction
+from pns_common.rules.placement import without_correction
 from pns_common.schemes import Scheme
-from pns_common.step import LevelStep
-from pns_common.topology import Topology
 
 
 @dataclass(frozen=True, eq=False)

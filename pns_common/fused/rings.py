@@ -1,4 +1,4 @@
-"""What a learned level reads of every vertex's ring, with the bits of vertex/rings.py."""
+"""What a learned level reads of every vertex's ring, with the bits of geometry/rings.py."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
+from pns_common.formula.side_gate import GENTLE_TO_SHARP
 from pns_common.fused.kernels.rings import (
     EDGE_COLUMNS,
     VERTEX_COLUMNS,
@@ -22,8 +23,7 @@ from pns_common.fused.kernels.rings import (
 )
 from pns_common.fused.loop_points import owners
 from pns_common.fused.mesh_edges import MeshEdges
-from pns_common.side_gate import GENTLE_TO_SHARP
-from pns_common.stencils import limit_ring_weight
+from pns_common.masks.stencils import limit_ring_weight
 
 
 @dataclass(frozen=True, eq=False)

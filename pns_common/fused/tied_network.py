@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from pns_common.fused.kernels.tied_network import LANES, answer
-from pns_common.tied_network.form import TiedForm
+from pns_common.models.tied_form import TiedForm
 
 CACHE_LINE = 64
 

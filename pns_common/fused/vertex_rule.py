@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pns_common.correction import where_open
+from pns_common.formula.correction import where_open
 from pns_common.fused.additions import Additions, Surroundings
 from pns_common.fused.kernels.vertex_correction import correct, correct_scale_free, look_around
 from pns_common.fused.loop_points import place_vertices
-from pns_common.learned_rules import LearnedVertexRule
-from pns_common.scale_free import ScaleFreeVertexRule
+from pns_common.rules.learned import LearnedVertexRule
+from pns_common.rules.scale_free import ScaleFreeVertexRule
 
 
 def add_at_vertices(

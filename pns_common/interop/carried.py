@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.linear import level_topologies
+from pns_common.connectivity.topology import CHILDREN, split
+from pns_common.masks.linear import level_topologies
 from pns_common.mesh import Mesh
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme
-from pns_common.topology import CHILDREN, split
 
 Data = Mapping[str, np.ndarray]
 

@@ -16,8 +16,8 @@ from pns_common.interop.of_open3d import read_open3d, write_open3d
 from pns_common.interop.of_pyvista import read_pyvista, write_pyvista
 from pns_common.interop.of_trimesh import read_trimesh, write_trimesh
 from pns_common.mesh import Mesh
-from pns_common.onnx_model import load_model
 from pns_common.refine import refine
+from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import Scheme, pns
 
 AnyMesh = TypeVar("AnyMesh")

@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.arrays import cross, dot, norm
-from pns_common.edge.frames import NO_AREA
+from pns_common.base.arrays import cross, dot, norm
+from pns_common.geometry.frames import NO_AREA
 
 # Beside the rounding of a few products; angles are not that near to θ by chance.
 CAUTION = 1 - 1e-9

@@ -24,11 +24,11 @@ rings at any depth.
 
 from __future__ import annotations
 
-from pns_common.edge.features import paper_features
 from pns_common.errors import ParameterError, PnsError
-from pns_common.learned_rules import LearnedEdgeRule, LearnedVertexRule
-from pns_common.loop_rules import loop_vertex_rule
-from pns_common.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
+from pns_common.features.edge_features import paper_features
+from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
+from pns_common.rules.loop import loop_vertex_rule
+from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
 from pns_common.schemes import Scheme
 
 LOOP_REACH, FIELDS_REACH = 1, 2

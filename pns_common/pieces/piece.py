@@ -14,17 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
 from pns_common.fused import fits, kernels_available
 from pns_common.fused.known import kernels_know
-from pns_common.levels import check_coordinates
+from pns_common.levels.refined_levels import check_coordinates
+from pns_common.levels.step import LevelStep
 from pns_common.pieces.exact import guarded_exact, shrunk
 from pns_common.pieces.halo import ThinHaloError, is_learned, reach
 from pns_common.pieces.steps import Links, Step, steps_by_arrays, steps_by_kernels
 from pns_common.pieces.tally import LevelTally
 from pns_common.pieces.tally_of_step import tally_of
 from pns_common.schemes import Scheme
-from pns_common.step import LevelStep
 
 
 @dataclass(frozen=True, eq=False)

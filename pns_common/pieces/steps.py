@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.array_steps import array_steps
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import Topology
+from pns_common.levels.array_steps import array_steps
+from pns_common.levels.step import LevelStep
 from pns_common.schemes import Scheme
-from pns_common.step import LevelStep
-from pns_common.topology import Topology
 
 
 @dataclass(frozen=True, eq=False)

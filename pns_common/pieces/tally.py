@@ -16,8 +16,8 @@ from typing import Any, NotRequired, TypedDict
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.child_faces import angle_between
-from pns_common.diagnostics import GATE_ACTIVE, EdgeCounts
+from pns_common.geometry.child_faces import angle_between
+from pns_common.levels.diagnostics import GATE_ACTIVE, EdgeCounts
 
 STEPS = 2**40
 # Steps are summed in two halves: one sum of them all would leave 63 bits at 2²³ numbers near 1.

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.arrays import dot, norm
-from pns_common.edge.frames import face_normals
+from pns_common.base.arrays import dot, norm
+from pns_common.connectivity.topology import EdgeClass, next_corner
+from pns_common.geometry.frames import face_normals
+from pns_common.levels.step import LevelStep
 from pns_common.pieces.steps import Links, Step
 from pns_common.pieces.tally import LevelTally, Summed
-from pns_common.placement import Placement
-from pns_common.step import LevelStep
-from pns_common.topology import EdgeClass, next_corner
+from pns_common.rules.placement import Placement
 
 
 def tally_of(

@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.topology import build_topology, split
+from pns_common.connectivity.topology import build_topology, split
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.arrays import dot
-from pns_common.edge.frames import face_normals
+from pns_common.base.arrays import dot
+from pns_common.connectivity.topology import build_topology
+from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
-from pns_common.topology import build_topology
 
 
 def edges_sharper_than(mesh: Mesh, angle: float) -> Int[np.ndarray, "N 2"]:

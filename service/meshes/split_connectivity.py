@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.topology import build_topology
+from pns_common.connectivity.topology import build_topology
 
 from .barycentric_grid import BarycentricGrid
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.linear import level_topologies
-from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
-from pns_common.topology import Topology, sharp_edge_count, split
+from pns_common.connectivity.topology import Topology, sharp_edge_count, split
+from pns_common.masks.linear import level_topologies
+from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 
 from ..options import Options
 from .split_connectivity import SplitConnectivity

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.disjoint_union import disjoint_faces
+from pns_common.connectivity.disjoint_union import disjoint_faces
 
 from ..errors import UnreadableError
 from . import unsupported

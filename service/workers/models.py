@@ -28,14 +28,14 @@ class Models:
     @property
     def served(self) -> Model | str:
         """The model that a request without a name gets, or its name or file."""
-        from pns_common.onnx_model import DEFAULT_MODEL
+        from pns_common.runtimes.onnx_model import DEFAULT_MODEL
 
         return DEFAULT_MODEL if self._source is None else self._source
 
     @property
     def sources(self) -> dict[str, Model | str]:
         """What each name stands for; a bundled name wins over that of a served file."""
-        from pns_common.onnx_model import bundled_models, model_name
+        from pns_common.runtimes.onnx_model import bundled_models, model_name
 
         served = self.served
         name = model_name(served) if isinstance(served, str) else served.name

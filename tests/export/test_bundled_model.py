@@ -9,7 +9,7 @@ import export.run
 from export.model_file import RECORDED, checkpoint_card
 from export.run import FILE_OF_RECIPE
 from pns_common import load_model, pns
-from pns_common.onnx_model import DEFAULT_MODEL, bundled_models
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL, bundled_models
 from tests.support.recipes import tiny
 from train.data.datasets import ridge_held_out
 from train.fitting.determinism import machine_fingerprint

@@ -9,7 +9,7 @@ import torch
 from export.model_file import checkpoint_card, export_model, write_model
 from export.onnx_graph import OPSET, model_bytes
 from export.parity import BUDGETS, ROWS, TOLERANCE, ParityError, check_parity, sample_features
-from pns_common.onnx_model import load_model, model_from_bytes
+from pns_common.runtimes.onnx_model import load_model, model_from_bytes
 from train.models.checkpoint import Checkpoint
 from train.models.from_recipe import initial_network
 from train.models.recipes import paper, paper_text

@@ -10,10 +10,10 @@ import torch
 from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, check_parity
 from pns_common import Mesh, pns, refine
-from pns_common.edge.features import FEATURE_SETS
-from pns_common.model_contract import ALLOWED_OPERATORS
-from pns_common.onnx_model import model_from_bytes
-from pns_common.topology import build_topology
+from pns_common.connectivity.topology import build_topology
+from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.models.contract import ALLOWED_OPERATORS
+from pns_common.runtimes.onnx_model import model_from_bytes
 from tests.support.meshes import bent, bumpy_sphere, grid
 from tests.support.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
 from train.certificates.equivariance import well_conditioned

@@ -13,12 +13,12 @@ from export.model_file import write_model
 from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, ParityError, check_parity
 from pns_common import Mesh, ModelError, load_model, pns, refine
-from pns_common.model_card import ModelCard
-from pns_common.model_contract import ALLOWED_OPERATORS, CALL_ROWS
-from pns_common.onnx_model import model_from_bytes
+from pns_common.connectivity.topology import build_topology
+from pns_common.geometry.rings import RING_10
+from pns_common.models.card import ModelCard
+from pns_common.models.contract import ALLOWED_OPERATORS, CALL_ROWS
+from pns_common.runtimes.onnx_model import model_from_bytes
 from pns_common.schemes import vertex_operator
-from pns_common.topology import build_topology
-from pns_common.vertex.rings import RING_10
 from tests.support.meshes import bent, bumpy_sphere, grid
 from tests.support.networks import perceptron_bytes, random_layers
 from train.certificates.certify import certify_scheme

@@ -4,11 +4,11 @@ import numpy as np
 import torch
 from hypothesis import given
 
-from pns_common.correction import correct, curvature_gate
-from pns_common.edge.features import paper_features
-from pns_common.edge.frames import edge_stencil, face_normals
-from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
-from pns_common.topology import build_topology
+from pns_common.connectivity.topology import build_topology
+from pns_common.features.edge_features import paper_features
+from pns_common.formula.correction import correct, curvature_gate
+from pns_common.geometry.frames import edge_stencil, face_normals
+from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 from tests.support.meshes import bumpy_sphere, manifolds, soups
 
 WEIGHTS = np.random.default_rng(0).standard_normal((5, 3))

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from pns_common import pns
-from pns_common.edge.features import signed_features
-from pns_common.level import control_level
-from pns_common.step import level_step
-from pns_common.topology import build_topology
-from pns_common.vertex.rings import RING_10, ring_vectors
+from pns_common.connectivity.topology import build_topology
+from pns_common.features.edge_features import signed_features
+from pns_common.geometry.rings import RING_10, ring_vectors
+from pns_common.levels.step import level_step
+from pns_common.rules.level import control_level
 from tests.support.meshes import bumpy_sphere
 from tests.support.networks import SCALE_FREE_CARD, VERTEX_CARD, float64_network, random_layers
 from tests.support.plain_operator import PlainMesh, shortened

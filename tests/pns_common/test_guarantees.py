@@ -6,8 +6,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, pns, refine
-from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
 from tests.support.meshes import (
     axis_planes,
     bent,

@@ -6,12 +6,12 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common.creases import with_creases
-from pns_common.limit import (
+from pns_common.connectivity.creases import with_creases
+from pns_common.connectivity.topology import build_topology, sharp_edge_count
+from pns_common.masks.limit import (
     limit_normals,
     limit_positions,
 )
-from pns_common.topology import build_topology, sharp_edge_count
 from tests.support.meshes import bent, grid, manifolds, soups
 from tests.support.stars import creased, star, stepped
 

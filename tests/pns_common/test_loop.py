@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, refine
-from pns_common.stencils import loop_beta
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.masks.stencils import loop_beta
 from tests.support.meshes import (
     TETRAHEDRON,
     bent,

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, loop, pns, refine
-from pns_common.correction import correct, curvature_gate
-from pns_common.edge.features import paper_features
-from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
-from pns_common.stencils import loop_edge_point
-from pns_common.topology import build_topology
+from pns_common.connectivity.topology import build_topology
+from pns_common.features.edge_features import paper_features
+from pns_common.formula.correction import correct, curvature_gate
+from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
+from pns_common.masks.stencils import loop_edge_point
 from tests.support.networks import (
     PUBLISHED_BUDGET,
     PUBLISHED_GATE_SHARPNESS,

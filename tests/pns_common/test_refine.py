@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 import pns_common
 from pns_common import Mesh, MeshError, ParameterError, loop, pns, refine
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import build_topology
 from pns_common.refine import measure_reference_length
 from pns_common.schemes import Model
-from pns_common.topology import build_topology
 from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid, soups, three_pages
 from tests.support.networks import random_model
 

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pns_common import Mesh, load_model, loop, pns, refine
-from pns_common.diagnostics import _p99
-from pns_common.disjoint_union import disjoint_faces
+from pns_common.connectivity.disjoint_union import disjoint_faces
 from pns_common.errors import MeshError, ParameterError
 from pns_common.fused import kernels_available
+from pns_common.levels.diagnostics import _p99
 from pns_common.refine_parts import refine_parts
 from tests.support.meshes import bumpy_sphere
 

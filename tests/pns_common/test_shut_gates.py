@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, load_model, pns, refine
-from pns_common.correction import checked_answer
 from pns_common.errors import ModelError
+from pns_common.formula.correction import checked_answer
 from pns_common.fused import load_kernels
 from tests.support.meshes import grid
 from tests.support.networks import scale_free_model
@@ -16,8 +16,8 @@ from tests.support.networks import scale_free_model
 WHERE = (
     "pns_common.fused.edge_rule",
     "pns_common.fused.vertex_rule",
-    "pns_common.vertex.operator",
-    "pns_common.correction",
+    "pns_common.formula.vertex_operator",
+    "pns_common.formula.correction",
 )
 MODELS = {
     "paper": load_model("paper"),

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from pns_common.onnx_model import DEFAULT_MODEL, OnnxModel, load_model, model_from_bytes
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL, OnnxModel, load_model, model_from_bytes
 from service.model_info import print_model, print_models
 from tests.support.networks import vertex_model_bytes
 

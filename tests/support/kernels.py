@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from pns_common import loop
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
 from pns_common.fused import KERNEL_ROWS
 from pns_common.fused.mesh_edges import build_edges
 from pns_common.fused.refine import refine_fused

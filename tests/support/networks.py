@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 from onnx import TensorProto, helper, numpy_helper
 
-from pns_common.edge.features import FEATURE_COUNT
-from pns_common.model_card import CARD_KEY, ModelCard
-from pns_common.onnx_model import model_from_bytes
-from pns_common.vertex.rings import RING_10
+from pns_common.features.edge_features import FEATURE_COUNT
+from pns_common.geometry.rings import RING_10
+from pns_common.models.card import CARD_KEY, ModelCard
+from pns_common.runtimes.onnx_model import model_from_bytes
 
 PUBLISHED_BUDGET, PUBLISHED_GATE_SHARPNESS = 0.5, 10.0
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pns_common.model_manifest import write_manifest
-from pns_common.onnx_model import BUNDLED, DEFAULT_MODEL
+from pns_common.models.manifest import write_manifest
+from pns_common.runtimes.onnx_model import BUNDLED, DEFAULT_MODEL
 from tests.support.networks import perceptron_bytes, random_layers, vertex_model_bytes
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
 from pns_common.pieces import Piece, RefinedPiece, ThinHaloError, halo_rings, refine_piece
 
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pns_common.linear import refine_linear
-from pns_common.topology import build_topology
+from pns_common.connectivity.topology import build_topology
+from pns_common.masks.linear import refine_linear
 
 OPEN_GATES = {"gate_sharpness": 1e12, "vertex_gate_sharpness": 1e9, "budget": 1e6}
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from pns_common.edge.features import FEATURE_COUNT, FEATURE_SETS
-from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
-from pns_common.edge.orientation import SYMMETRIC
-from pns_common.topology import build_topology
-from pns_common.vertex.rings import Rings
+from pns_common.connectivity.topology import build_topology
+from pns_common.features.edge_features import FEATURE_COUNT, FEATURE_SETS
+from pns_common.features.orientation import SYMMETRIC
+from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
+from pns_common.geometry.rings import Rings
 
 # A roof: the edge from 0 to 1 is its crest, 4 units long; both sides fall by 3 over 4.
 ROOF = np.array([[0.0, 0, 3], [4, 0, 3], [2, -4, 0], [2, 4, 0]])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pns_common.edge.frames import edge_frames, edge_stencil
+from pns_common.geometry.frames import edge_frames, edge_stencil
 from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule
 
 BUDGET, GATE_SHARPNESS = 0.5, 10.0

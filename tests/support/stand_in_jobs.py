@@ -38,7 +38,7 @@ def hold_among(folder: str, model: Model | str | None) -> None:
 
     Unlike the real warm-up it loads no kernels and no readers: small meshes do without.
     """
-    from pns_common import onnx_model
+    from pns_common.runtimes import onnx_model
 
     onnx_model.BUNDLED = Path(folder)
     hold_model(model)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pns_common.model_card import ModelCard
+from pns_common.models.card import ModelCard
 
 ZERO_CARD = ModelCard(1, "paper-5", 10.0, 0.5, "first-face", {}, {})
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pns_common.creases import crease_children, with_creases
-from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
-from pns_common.topology import build_topology, split
+from pns_common.connectivity.creases import crease_children, with_creases
+from pns_common.connectivity.topology import build_topology, split
+from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 
 
 def star(k, closed, seed=0):

@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 from onnx import helper
 
-from pns_common.edge.features import FEATURE_SETS
-from pns_common.vertex.rings import RING_10
+from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.geometry.rings import RING_10
 from tests.support.networks import SCALE_FREE_CARD, model_bytes
 
 EDGES, VERTICES = FEATURE_SETS["signed-18"].symmetries, RING_10.symmetries

@@ -11,11 +11,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.correction import curvature_gate
-from pns_common.edge.feature_set import FeatureSet
-from pns_common.edge.features import FEATURE_SETS
-from pns_common.edge.operator import EdgeOperator
-from pns_common.edge.orientation import SYMMETRIC
+from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.features.feature_set import FeatureSet
+from pns_common.features.orientation import SYMMETRIC
+from pns_common.formula.correction import curvature_gate
+from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.schemes import LearnedEdgeRule, Scheme, loop_vertex_rule
 from train.data.batch import Batch
 from train.fitting.one_step import refine_once

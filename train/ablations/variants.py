@@ -14,9 +14,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.correction import Correction, correct, curvature_gate, proximity_ratio
-from pns_common.edge.features import FEATURE_SETS
-from pns_common.edge.frames import (
+from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.formula.correction import Correction, correct, curvature_gate, proximity_ratio
+from pns_common.geometry.frames import (
     EdgeFrames,
     EdgeStencil,
     edge_frames,

@@ -7,14 +7,14 @@ topology. On the regular grid this is the eight-point butterfly of Dyn, Levin an
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.schemes import ControlLevel, Placement, Scheme
-from pns_common.topology import (
+from pns_common.connectivity.topology import (
     EdgeClass,
     Topology,
     multi_fan_vertices,
     next_corner,
     sharp_edge_count,
 )
+from pns_common.schemes import ControlLevel, Placement, Scheme
 from train.baselines.placement import kept_vertices, placed_edges
 
 REGULAR_VALENCE = 6

@@ -12,8 +12,9 @@ v), m_v the unit normal of the faces at v, weighted by area:
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.arrays import norm
-from pns_common.edge.frames import edge_frames, edge_stencil
+from pns_common.base.arrays import norm
+from pns_common.geometry.frames import edge_frames, edge_stencil
+from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 from pns_common.schemes import (
     ControlLevel,
     Placement,
@@ -21,7 +22,6 @@ from pns_common.schemes import (
     loop_edge_rule,
     loop_vertex_rule,
 )
-from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
 from train.baselines.placement import kept_vertices, midpoints, placed_edges
 from train.surfaces.quasi_interpolation import added_to, normal_push
 

@@ -6,8 +6,8 @@ vertices follow Loop's rule, as they do in PNS. Source: paper, Setup, baselines,
 
 import numpy as np
 
-from pns_common.correction import curvature_gate
-from pns_common.edge.frames import edge_frames, edge_stencil
+from pns_common.formula.correction import curvature_gate
+from pns_common.geometry.frames import edge_frames, edge_stencil
 from pns_common.schemes import ControlLevel, Placement, Scheme, loop_edge_rule, loop_vertex_rule
 from train.baselines.butterfly import butterfly_edge_vertices
 from train.baselines.placement import placed_edges

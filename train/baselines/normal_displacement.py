@@ -8,11 +8,11 @@ not depend on the unit of length.
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.arrays import dot
-from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
+from pns_common.base.arrays import dot
+from pns_common.connectivity.topology import Topology, build_topology
+from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
+from pns_common.masks.stencils import loop_edge_vertices
 from pns_common.schemes import ControlLevel, Placement, Scheme, loop_edge_rule, loop_vertex_rule
-from pns_common.stencils import loop_edge_vertices
-from pns_common.topology import Topology, build_topology
 from train.baselines.placement import placed_edges
 from train.data.datasets import Dataset
 from train.surfaces.implicit import signed_distance, unit_normal

@@ -3,14 +3,14 @@
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.arrays import norm
+from pns_common.base.arrays import norm
+from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.schemes import (
     ControlLevel,
     Placement,
     loop_edge_rule,
     loop_vertex_rule,
 )
-from pns_common.topology import EdgeClass, Topology
 
 COMPARED_BUDGET = 0.5
 """The C of the envelope that methods without a budget are measured against."""

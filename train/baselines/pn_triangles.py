@@ -7,9 +7,9 @@ triangle at its edges' midpoints; repeated steps estimate the normals anew.
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.arrays import dot
+from pns_common.base.arrays import dot
+from pns_common.connectivity.topology import EdgeClass
 from pns_common.schemes import ControlLevel, Placement, Scheme
-from pns_common.topology import EdgeClass
 from train.baselines.placement import kept_vertices, midpoints, placed_edges
 from train.surfaces.quasi_interpolation import vertex_normals
 

@@ -13,9 +13,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.edge.frames import edge_stencil, face_normals
+from pns_common.connectivity.topology import Topology, build_topology
+from pns_common.geometry.frames import edge_stencil, face_normals
 from pns_common.mesh import Mesh
-from pns_common.topology import Topology, build_topology
 from train.certificates.affine import TURNED
 from train.certificates.bodies import bumpy_sphere, random_motion
 from train.certificates.displacement import AT_MOST, worst_ratio

@@ -13,20 +13,20 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.correction import curvature_gate
-from pns_common.edge.features import FEATURE_SETS
-from pns_common.edge.frames import face_normals
-from pns_common.edge.operator import EdgeOperator
-from pns_common.edge.orientation import SYMMETRIC
-from pns_common.level import control_level
-from pns_common.limit import refined_limit_positions
+from pns_common.connectivity.topology import Topology, build_topology, split
+from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.features.orientation import SYMMETRIC
+from pns_common.formula.correction import curvature_gate
+from pns_common.formula.edge_operator import EdgeOperator
+from pns_common.formula.vertex_operator import VertexOperator
+from pns_common.geometry.frames import face_normals
+from pns_common.geometry.rings import RING_10
+from pns_common.levels.step import LevelStep, level_step
+from pns_common.masks.limit import refined_limit_positions
 from pns_common.mesh import Mesh
-from pns_common.scale_free_form import ScaleFreeForm
+from pns_common.rules.level import control_level
+from pns_common.rules.scale_free_form import ScaleFreeForm
 from pns_common.schemes import Scheme, loop, scale_free_scheme
-from pns_common.step import LevelStep, level_step
-from pns_common.topology import Topology, build_topology, split
-from pns_common.vertex.operator import VertexOperator
-from pns_common.vertex.rings import RING_10
 from train.certificates.learned_once import largest_turn
 from train.models.networks import unit_correction
 from train.models.tied import TiedNet

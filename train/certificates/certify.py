@@ -10,7 +10,7 @@ import msgspec
 from rich.table import Table
 
 from pns_common.errors import ModelError, PnsError
-from pns_common.onnx_model import DEFAULT_MODEL, load_model
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL, load_model
 from train.certificates.affine import affine_reproduction
 from train.certificates.bodies import Body, flat_bodies, synthetic_bodies
 from train.certificates.certificate import Certificate

@@ -17,9 +17,9 @@ from onnx.reference import ReferenceEvaluator
 from onnx.reference.op_run import OpRun
 
 from pns_common.errors import ModelError
-from pns_common.model_card import ModelCard
-from pns_common.model_contract import feature_inputs
-from pns_common.onnx_model import BUNDLED, OnnxModel, bundled_models
+from pns_common.models.card import ModelCard
+from pns_common.models.contract import feature_inputs
+from pns_common.runtimes.onnx_model import BUNDLED, OnnxModel, bundled_models
 
 
 class Erf(OpRun):

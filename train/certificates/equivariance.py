@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pns_common.edge.frames import edge_stencil, face_normals
+from pns_common.connectivity.topology import Topology, build_topology
+from pns_common.geometry.frames import edge_stencil, face_normals
 from pns_common.mesh import Mesh
 from pns_common.schemes import Scheme
-from pns_common.topology import Topology, build_topology
 from train.certificates.bodies import Body, random_motion
 from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop

@@ -10,8 +10,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from pns_common.connectivity.topology import build_topology
 from pns_common.schemes import pns
-from pns_common.topology import build_topology
 from train.certificates.adversary import OnStep, Operator, ascend, initial_operator
 from train.certificates.lifted_star import LIFTS
 from train.models.networks import BoundedNet

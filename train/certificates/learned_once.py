@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common.connectivity.topology import split
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
-from pns_common.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
+from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
 from pns_common.schemes import Scheme, loop
-from pns_common.topology import split
 from train.certificates.bodies import Body
 from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop

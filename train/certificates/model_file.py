@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.edge.features import FEATURE_SETS
+from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.geometry.rings import RING_FEATURE_SETS
 from pns_common.schemes import Model, VertexModel, pns
-from pns_common.vertex.rings import RING_FEATURE_SETS
 from train.certificates.certificate import Certificate
 from train.metrics.card import MEASURES
 

@@ -4,7 +4,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.topology import build_topology
+from pns_common.connectivity.topology import build_topology
 from train.certificates.adversary import Operator
 from train.spectra.stars import Star
 

@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.edge.frames import face_normals
+from pns_common.connectivity.topology import split
+from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
 from pns_common.schemes import Scheme, loop
-from pns_common.topology import split
 from train.certificates.bodies import Body
 from train.certificates.certificate import Certificate, farthest
 from train.certificates.step import step

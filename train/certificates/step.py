@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pns_common.level import control_level
+from pns_common.connectivity.topology import Topology, build_topology
+from pns_common.levels.step import level_step
 from pns_common.mesh import Mesh
-from pns_common.placement import Placement
+from pns_common.rules.level import control_level
+from pns_common.rules.placement import Placement
 from pns_common.schemes import Scheme, loop
-from pns_common.step import level_step
-from pns_common.topology import Topology, build_topology
 
 
 @dataclass(frozen=True, eq=False)

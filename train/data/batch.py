@@ -8,8 +8,8 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from pns_common.disjoint_union import disjoint_faces
-from pns_common.topology import Topology, build_topology, split
+from pns_common.connectivity.disjoint_union import disjoint_faces
+from pns_common.connectivity.topology import Topology, build_topology, split
 from train.data.datasets import Instance
 from train.surfaces.implicit import Surface
 

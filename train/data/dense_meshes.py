@@ -9,11 +9,11 @@ import trimesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from pns_common.connectivity.topology import EdgeClass, build_topology, multi_fan_vertices
 from pns_common.errors import MeshError
 from pns_common.mesh import Mesh, clean
 from pns_common.refine import refine
 from pns_common.schemes import loop
-from pns_common.topology import EdgeClass, build_topology, multi_fan_vertices
 from train.data.parts import CAD_PARTS
 
 FORMATS = (".glb", ".gltf", ".npz", ".obj", ".off", ".ply", ".stl")

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull
 
+from pns_common.connectivity.topology import build_topology, split
 from pns_common.mesh import Mesh
-from pns_common.topology import build_topology, split
 from train.data.coarsened import coarsened
 from train.data.dense_meshes import is_manifold, largest_part
 from train.data.references import Pair, Reference

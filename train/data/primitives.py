@@ -6,8 +6,8 @@ from types import MappingProxyType
 import numpy as np
 from jaxtyping import Float
 
+from pns_common.connectivity.topology import build_topology, split
 from pns_common.mesh import Mesh
-from pns_common.topology import build_topology, split
 
 
 def box(x: float = 1.0, y: float = 1.0, z: float = 1.0) -> Mesh:

@@ -13,7 +13,15 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from pns_common.stencils import (
+from pns_common.connectivity.topology import (
+    EdgeClass,
+    Topology,
+    build_topology,
+    next_corner,
+    sharp_edge_count,
+    split,
+)
+from pns_common.masks.stencils import (
     CURVE_CENTRE,
     CURVE_NEIGHBOUR,
     EDGE_ENDPOINT,
@@ -21,14 +29,6 @@ from pns_common.stencils import (
     MIDPOINT,
     limit_ring_weight,
     loop_beta,
-)
-from pns_common.topology import (
-    EdgeClass,
-    Topology,
-    build_topology,
-    next_corner,
-    sharp_edge_count,
-    split,
 )
 
 LIMIT_CENTRE, LIMIT_NEIGHBOUR = 4 / 6, 1 / 6

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import torch
 
+from pns_common.levels.step import level_step
 from pns_common.schemes import Scheme
-from pns_common.step import level_step
 from train.data.pair_stream import pair_stream
 from train.data.references import Pair
 from train.fitting.determinism import deterministic

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from pns_common.arrays import dot, gather
+from pns_common.base.arrays import dot, gather
 from train.models.recipes import LossWeights
 
 

@@ -7,16 +7,16 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from pns_common.arrays import beside, cross, gather, segment_sum, unit
-from pns_common.edge.operator import EdgeOperator
-from pns_common.learned_rules import LearnedEdgeRule, LearnedVertexRule
-from pns_common.level import control_level
-from pns_common.loop_rules import loop_vertex_rule
+from pns_common.base.arrays import beside, cross, gather, segment_sum, unit
+from pns_common.connectivity.topology import Topology
+from pns_common.formula.edge_operator import EdgeOperator
+from pns_common.formula.vertex_operator import VertexOperator
+from pns_common.levels.step import level_step
+from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
+from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
+from pns_common.rules.level import control_level
+from pns_common.rules.loop import loop_vertex_rule
 from pns_common.schemes import Scheme
-from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
-from pns_common.step import level_step
-from pns_common.topology import Topology
-from pns_common.vertex.operator import VertexOperator
 
 
 @dataclass(frozen=True, slots=True)

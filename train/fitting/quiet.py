@@ -13,10 +13,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.edge.features import FeatureSet
-from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
+from pns_common.connectivity.topology import build_topology
+from pns_common.features.edge_features import FeatureSet
+from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
 from pns_common.mesh import Mesh
-from pns_common.topology import build_topology
 from train.models.networks import BoundedNet
 
 # Half of the draws: a training edge, bent by any curvature x ∈ [0, 2], its shape moved a little.

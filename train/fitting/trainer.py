@@ -8,8 +8,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.arrays import gather
-from pns_common.edge.features import FEATURE_SETS
+from pns_common.base.arrays import gather
+from pns_common.features.edge_features import FEATURE_SETS
 from train.data.batch import Batch, disjoint_union
 from train.data.datasets import DATASETS, Instance
 from train.fitting.determinism import deterministic

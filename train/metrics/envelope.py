@@ -7,9 +7,9 @@ Whatever the weights, an edge vertex stays in the ball of radius C h² γ round 
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.arrays import norm
-from pns_common.correction import curvature_gate
-from pns_common.edge.frames import edge_frames, edge_stencil, face_normals
+from pns_common.base.arrays import norm
+from pns_common.formula.correction import curvature_gate
+from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
 from pns_common.schemes import ControlLevel, Placement, Scheme, loop_edge_rule, loop_vertex_rule
 from train.data.datasets import Dataset, Instance
 from train.metrics.evaluation import compare_with_loop

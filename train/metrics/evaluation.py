@@ -5,9 +5,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from jaxtyping import Float
 
+from pns_common.connectivity.topology import build_topology
 from pns_common.refine import refine
 from pns_common.schemes import Scheme, loop
-from pns_common.topology import build_topology
 from train.data.datasets import Dataset, Instance
 from train.metrics.one_step import METRICS, Errors, Improvement, improvement, one_step_errors
 

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.arrays import cross, dot, norm, unit
+from pns_common.base.arrays import cross, dot, norm, unit
 from pns_common.mesh import Mesh
 
 NO_AREA = 1e-12

@@ -10,9 +10,9 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from pns_common.arrays import cross, dot, norm, unit
-from pns_common.edge.frames import edge_stencil, face_normals
-from pns_common.topology import Topology
+from pns_common.base.arrays import cross, dot, norm, unit
+from pns_common.connectivity.topology import Topology
+from pns_common.geometry.frames import edge_stencil, face_normals
 from train.surfaces.implicit import Surface, signed_distance
 
 NEAR_FEATURE = 0.3

@@ -10,9 +10,9 @@ import igl
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.arrays import cross, dot
+from pns_common.base.arrays import cross, dot
+from pns_common.connectivity.topology import build_topology
 from pns_common.mesh import Mesh
-from pns_common.topology import build_topology
 
 ON_BORDER = 1e-9
 """Barycentric coordinates up to here are none."""

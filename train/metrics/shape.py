@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.arrays import cross, dot, norm
-from pns_common.edge.frames import face_normals
+from pns_common.base.arrays import cross, dot, norm
+from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
 from pns_common.refine import Refinement
 from train.surfaces.implicit import Surface, signed_distance, unit_normal

@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.arrays import cross, dot, norm
-from pns_common.edge.frames import face_normals
+from pns_common.base.arrays import cross, dot, norm
+from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
 from train.metrics.point_mesh import FaceTree, face_tree, nearest
 

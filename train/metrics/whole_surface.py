@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.edge.frames import face_normals
+from pns_common.connectivity.topology import build_topology
+from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme, loop
-from pns_common.topology import build_topology
 from train.data.datasets import Dataset, Instance
 from train.metrics.shape import face_normal_error, nearest_points
 from train.surfaces.implicit import signed_distance

@@ -10,8 +10,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from pns_common.edge.features import FEATURE_COUNT
-from pns_common.symmetry import Symmetries
+from pns_common.features.edge_features import FEATURE_COUNT
+from pns_common.geometry.symmetry import Symmetries
 
 RAW_COORDINATES = "raw-12"
 """The coordinates of a, b, c, d: what the unconstrained network sees instead of features."""

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float
 
 from pns_common.errors import ModelError
-from pns_common.model_card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
+from pns_common.models.card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
 from train.models.networks import BoundedNet, unit_correction
 from train.models.recipes import Recipe
 

@@ -6,8 +6,8 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common.connectivity.topology import build_topology
 from pns_common.mesh import Mesh
-from pns_common.topology import build_topology
 
 # Place (sector, i, j) is i steps along the sector's first spoke and j along its second.
 Place = tuple[int, int, int]

@@ -9,7 +9,9 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.arrays import dot, norm
+from pns_common.base.arrays import dot, norm
+from pns_common.connectivity.topology import EdgeClass, sharp_edge_count
+from pns_common.masks.stencils import loop_beta, loop_edge_vertices, loop_vertex_vertices
 from pns_common.schemes import (
     ControlLevel,
     Placement,
@@ -17,8 +19,6 @@ from pns_common.schemes import (
     loop_edge_rule,
     loop_vertex_rule,
 )
-from pns_common.stencils import loop_beta, loop_edge_vertices, loop_vertex_vertices
-from pns_common.topology import EdgeClass, sharp_edge_count
 
 Push = Callable[[ControlLevel], Float[np.ndarray, "V 3"]]
 CURVE_LIMIT_CENTRE, CURVE_LIMIT_NEIGHBOUR = 4 / 6, 1 / 6

@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from pns_common.arrays import gather
+from pns_common.base.arrays import gather
 from train.surfaces.implicit import Surface
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, Refinement, load_model, loop, pns, refine
-from pns_common.arrays import norm
-from pns_common.edge.frames import face_normals
-from pns_common.prior import normal_pushes
-from pns_common.topology import build_topology
-from pns_common.vertex.rings import Rings
+from pns_common.base.arrays import norm
+from pns_common.connectivity.topology import build_topology
+from pns_common.formula.prior import normal_pushes
+from pns_common.geometry.frames import face_normals
+from pns_common.geometry.rings import Rings
 
 
 @dataclass(frozen=True, eq=False)

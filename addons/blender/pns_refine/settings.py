@@ -10,7 +10,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from pns_common import load_model
-from pns_common.onnx_model import DEFAULT_MODEL, OnnxModel, bundled_models
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL, OnnxModel, bundled_models
 
 from .refining.compute import Choice
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pns_common.edge.features import SHORTEST
-from pns_common.edge.frames import ANTIPARALLEL
+from pns_common.features.edge_features import SHORTEST
 from pns_common.fused.kernels.compiled import (
     FLAGS_OUT,
     INDEX,
@@ -20,7 +19,8 @@ from pns_common.fused.kernels.compiled import (
 )
 from pns_common.fused.kernels.masks import opposite
 from pns_common.fused.kernels.rings import HEIGHT, between, cross, dot, norm, row
-from pns_common.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
+from pns_common.geometry.frames import ANTIPARALLEL
+from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
 
 # Feature columns: curvature, four log ratios, then those with a sign.
 LOGS, DIHEDRAL, ENDS, WINGS, UMBRELLAS = 1, 5, 6, 10, 14

@@ -1,11 +1,12 @@
 """Edges of a face list without a sort: a linked chain of edges at each edge's lower vertex.
 
-The numbering is that of ``pns_common.topology``: by first appearance over the faces' (a, b),
-(b, c), (c, a). Indices are int32.
+The numbering is that of ``pns_common.connectivity.topology``: by first appearance over the faces'
+(a, b), (b, c), (c, a). Indices are int32.
 """
 
 from __future__ import annotations
 
+from pns_common.connectivity.topology import EdgeClass
 from pns_common.fused.kernels.compiled import (
     CLASSES_OUT,
     INDEX,
@@ -15,7 +16,6 @@ from pns_common.fused.kernels.compiled import (
     SIZE,
     kernel,
 )
-from pns_common.topology import EdgeClass
 
 INTERIOR, BOUNDARY, IRREGULAR, CREASE = (
     int(EdgeClass.INTERIOR),

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pns_common.edge.frames import NO_AREA
-from pns_common.fold_guard import LEAST_AREA
+from pns_common.formula.fold_guard import LEAST_AREA
 from pns_common.fused.kernels.compiled import (
     FLAGS,
     FLAGS_OUT,
@@ -18,6 +17,7 @@ from pns_common.fused.kernels.compiled import (
 )
 from pns_common.fused.kernels.normals import COSINE_MARGIN, clearly_less
 from pns_common.fused.kernels.rings import cross, dot, row
+from pns_common.geometry.frames import NO_AREA
 
 
 def _moved(p, displacement, scale, v):

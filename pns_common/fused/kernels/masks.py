@@ -1,4 +1,4 @@
-"""Loop's masks on arrays, with the bits of ``pns_common.stencils``.
+"""Loop's masks on arrays, with the bits of ``pns_common.masks.stencils``.
 
 Sums around a vertex run over its edges in ascending order, whoever computes them: each thread owns
 a range of vertices and reads all edges.
@@ -19,7 +19,7 @@ from pns_common.fused.kernels.compiled import (
     kernel,
 )
 from pns_common.fused.kernels.edges import INTERIOR
-from pns_common.stencils import (
+from pns_common.masks.stencils import (
     CURVE_CENTRE,
     CURVE_NEIGHBOUR,
     EDGE_ENDPOINT,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-from pns_common.edge.frames import NO_AREA
 from pns_common.fused.kernels.compiled import (
     CLASSES,
     INDICES,
@@ -20,6 +19,7 @@ from pns_common.fused.kernels.compiled import (
     kernel,
 )
 from pns_common.fused.kernels.edges import INTERIOR
+from pns_common.geometry.frames import NO_AREA
 
 # Far more than the cosine of two computed area vectors is wrong by, and what it counts for.
 COSINE_MARGIN = 1e-14

@@ -1,4 +1,4 @@
-"""Sums around vertices, with the bits of vertex/rings.py and vertex/fields.py.
+"""Sums around vertices, with the bits of geometry/rings.py and ring_fields.py.
 
 A sum runs over its faces or edges in ascending order: each thread owns the vertices begin … end − 1
 and reads all faces or edges.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from pns_common.formula.prior import CLEAR_NORMAL
 from pns_common.fused.kernels.compiled import (
     CLASSES,
     INDEX,
@@ -23,7 +24,6 @@ from pns_common.fused.kernels.compiled import (
 )
 from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.normals import squared_chord, unit_normal
-from pns_common.prior import CLEAR_NORMAL
 
 # Columns of an edge's row.
 SPOKE, SQUARE, JUMP, BEND = 0, 3, 4, 5

@@ -1,4 +1,4 @@
-"""What old vertices see and what is added there, with the bits of vertex/operator.py."""
+"""What old vertices see and what is added there, with the bits of formula/vertex_operator.py."""
 
 from __future__ import annotations
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Int
 
+from pns_common.connectivity.topology import build_topology, next_corner
 from pns_common.mesh import Cleaned
-from pns_common.topology import build_topology, next_corner
 
 from .control_mesh import ControlMesh
 from .smoothing import joined_normals

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.arrays import dot, norm, unit
-from pns_common.blocks import Blocks
+from pns_common.base.arrays import dot, norm, unit
+from pns_common.base.blocks import Blocks
 
 # A sum of unit normals times angles below this has no direction that could be trusted.
 NO_DIRECTION = 1e-9

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from pns_common.errors import MeshError
-from pns_common.linear import LinearRefinement, level_topologies
+from pns_common.masks.linear import LinearRefinement, level_topologies
 from pns_common.mesh import Cleaned
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.linear import LinearRefinement
+from pns_common.masks.linear import LinearRefinement
 
 from ...meshes.weld import as_words, canonical_zero, distinct_rows
 from ..read.primitives import TrianglePrimitive

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.linear import LinearRefinement
+from pns_common.masks.linear import LinearRefinement
 
 from ..read.primitives import TrianglePrimitive
 from ..read.quantization import as_float

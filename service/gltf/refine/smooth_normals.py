@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.blocks import Blocks, available_threads
+from pns_common.base.blocks import Blocks, available_threads
+from pns_common.connectivity.topology import build_topology, next_corner
 from pns_common.mesh import Cleaned
-from pns_common.topology import build_topology, next_corner
 
 from ...meshes.weld import number_by_first_appearance
 from ..constants import FLOAT

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.arrays import dot, norm
-from pns_common.blocks import Blocks, available_threads
+from pns_common.base.arrays import dot, norm
+from pns_common.base.blocks import Blocks, available_threads
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.deferred import Deferred
+from pns_common.base.deferred import Deferred
 from pns_common.errors import MeshError
-from pns_common.linear import LinearRefinement, level_topologies
+from pns_common.masks.linear import LinearRefinement, level_topologies
 from pns_common.mesh import Cleaned
 from pns_common.refine import Refinement, Report
 from pns_common.refine_parts import PartsRefinement, refine_parts

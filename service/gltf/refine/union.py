@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int, Shaped
 
-from pns_common.disjoint_union import disjoint_faces
+from pns_common.connectivity.disjoint_union import disjoint_faces
 
 from ...meshes.weld import distinct_rows
 from ..read.primitives import TrianglePrimitive

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.topology import stable_sort
+from pns_common.connectivity.topology import stable_sort
 
 from ...errors import UnrefinableError
 from .arrays import ArrayMesh, blocks_of, finished_array, let_go

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.linear import level_topologies
+from pns_common.connectivity.topology import Topology, build_topology
+from pns_common.masks.linear import level_topologies
 from pns_common.mesh import repeated_vertex
 from pns_common.pieces import Piece
-from pns_common.topology import Topology, build_topology
 
 from .arrays import blocks_of, finished_array, let_go
 

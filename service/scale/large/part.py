@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
+from pns_common.base.whole_file import replace_file, replacing
 from pns_common.errors import PnsError
 from pns_common.fused import KERNEL_ROWS, load_kernels
 from pns_common.mesh import Mesh
 from pns_common.pieces import Piece, RefinedPiece, ThinHaloError, halo_rings, refine_piece
 from pns_common.schemes import Scheme
-from pns_common.whole_file import replace_file, replacing
 
 from ...errors import LimitError, NoModelError, UnrefinableError
 from ...gltf.subdivide import make_scheme

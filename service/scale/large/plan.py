@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pns_common.whole_file import replace_file
+from pns_common.base.whole_file import replace_file
 
 from ...errors import InvalidParameter, ServiceError, WorkerDied
 from ...options import Options

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.arrays import norm
+from pns_common.base.arrays import norm
 from pns_common.mesh import LARGEST_COORDINATE, SMALLEST_EXTENT
 
 from ...errors import UnrefinableError

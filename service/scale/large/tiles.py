@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from pns_common.base.whole_file import replace_file
 from pns_common.pieces import RefinedPiece
-from pns_common.whole_file import replace_file
 
 from ...errors import UnrefinableError
 from ...meshfiles.indexed_triangles import IndexedTriangles

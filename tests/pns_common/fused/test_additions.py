@@ -3,7 +3,7 @@
 import numpy as np
 
 from pns_common import Mesh
-from pns_common.blocks import BLOCK_ROWS, Blocks
+from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.fused.additions import Additions, Surroundings
 from tests.support.kernels import edges_built
 from tests.support.meshes import bumpy_sphere

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
-from pns_common.blocks import WHOLE, Blocks
-from pns_common.child_faces import child_faces
+from pns_common.base.blocks import WHOLE, Blocks
+from pns_common.connectivity.topology import build_topology
 from pns_common.fused.child_faces import look_at_children
 from pns_common.fused.loop_points import loop_points
-from pns_common.topology import build_topology
+from pns_common.geometry.child_faces import child_faces
 from tests.support.kernels import edges_built
 from tests.support.meshes import bent, bumpy_sphere, grid, three_pages
 

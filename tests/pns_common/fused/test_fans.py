@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import build_topology
+from pns_common.connectivity.topology import multi_fan_vertices as by_doubling
 from pns_common.fused.fans import multi_fan_vertices
-from pns_common.topology import build_topology
-from pns_common.topology import multi_fan_vertices as by_doubling
 from tests.support.kernels import assert_kernels_agree, by_kernels, edges_built
 from tests.support.meshes import bow_tie, icosphere, one_way_pair, three_pages
 

@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh
-from pns_common.blocks import Blocks
-from pns_common.fold_guard import FoldGuard
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import build_topology, split
+from pns_common.formula.fold_guard import FoldGuard
 from pns_common.fused.guard import guard_scale
 from pns_common.fused.loop_points import loop_points
-from pns_common.topology import build_topology, split
 from tests.support.kernels import edges_built
 from tests.support.meshes import bent, bumpy_sphere, grid
 

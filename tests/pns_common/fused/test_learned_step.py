@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, ModelError, pns
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import build_topology
 from pns_common.fused.learned_step import learned_points
 from pns_common.fused.level import control_level
-from pns_common.level import control_level as array_level
-from pns_common.step import level_step
-from pns_common.topology import build_topology
+from pns_common.levels.step import level_step
+from pns_common.rules.level import control_level as array_level
 from tests.support.kernels import assert_kernels_agree, by_kernels
 from tests.support.meshes import bumpy_sphere
 from tests.support.networks import SCALE_FREE_CARD, VERTEX_CARD, scale_free_model, vertex_model

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, ParameterError
-from pns_common.blocks import Blocks
-from pns_common.creases import crease_children, with_creases
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import crease_children, with_creases
+from pns_common.connectivity.topology import Topology, build_topology, split
 from pns_common.fused.level import control_level, loop_step, next_level
-from pns_common.topology import Topology, build_topology, split
 from tests.support.kernels import by_arrays, by_kernels, edges_of
 from tests.support.meshes import TETRAHEDRON, bent, grid, manifolds, soups
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, MeshError
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import build_topology
 from pns_common.fused.loop_points import largest_size, loop_points, owners, place_vertices
-from pns_common.levels import check_coordinates
-from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
-from pns_common.topology import build_topology
+from pns_common.levels.refined_levels import check_coordinates
+from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 from tests.support.kernels import edges_built
 from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid, three_pages
 

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 
 from pns_common import Mesh
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import EdgeClass, build_topology, split
 from pns_common.fused.mesh_edges import (
     _sorted_edges,
     has_boundary,
     split_mesh_edges,
     split_mesh_faces,
 )
-from pns_common.topology import EdgeClass, build_topology, split
 from tests.support.kernels import assert_kernels_agree, edges_built
 from tests.support.meshes import bumpy_sphere, grid, manifolds, soups
 

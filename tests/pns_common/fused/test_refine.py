@@ -3,9 +3,9 @@
 import numpy as np
 
 from pns_common import Mesh, loop, pns
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import build_topology
 from pns_common.fused.refine import refine_fused
-from pns_common.topology import build_topology
 from tests.support.kernels import by_arrays
 from tests.support.meshes import bumpy_sphere
 from tests.support.networks import scale_free_model

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, ParameterError, loop, pns
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
 from pns_common.fused.refine_parts import refine_parts_fused
 from tests.support.kernels import by_kernels
 from tests.support.meshes import bow_tie, bumpy_sphere

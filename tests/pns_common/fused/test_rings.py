@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
 from pns_common.fused.kernels import rings as columns
 from pns_common.fused.rings import measure_bends, measure_normals, measure_pushes, measure_rings
 from tests.support.kernels import edges_built

@@ -5,9 +5,8 @@ import pytest
 
 from pns_common.fused.kernels.tied_network import LANES
 from pns_common.fused.tied_network import answers_of
-from pns_common.tied_network import arrays
-from pns_common.tied_network.form import tied_form
-from pns_common.tied_network.perceptron import Layer
+from pns_common.models.tied_form import Layer, tied_form
+from pns_common.runtimes.tied_network import arrays
 from tests.support.tied import GROUPS, tied_layers
 
 

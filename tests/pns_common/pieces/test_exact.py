@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common.fold_guard import FoldGuard
+from pns_common.formula.fold_guard import FoldGuard
 from pns_common.pieces.exact import guarded_exact, may_fold, shrunk
 from tests.support.meshes import grid
 

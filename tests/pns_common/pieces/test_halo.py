@@ -3,8 +3,8 @@
 import pytest
 
 from pns_common import Mesh, ParameterError, load_model, loop, pns, refine
-from pns_common.onnx_model import bundled_models
 from pns_common.pieces.halo import halo_rings, is_learned, reach
+from pns_common.runtimes.onnx_model import bundled_models
 from tests.support.meshes import bumpy_sphere
 from tests.support.networks import scale_free_model
 from tests.support.pieces import adjacent

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, MeshError, load_model, loop, pns
-from pns_common.blocks import Blocks
-from pns_common.onnx_model import bundled_models
+from pns_common.base.blocks import Blocks
 from pns_common.pieces import ThinHaloError, halo_rings, refine_piece
 from pns_common.pieces.piece import first_at_own, steps_of
+from pns_common.runtimes.onnx_model import bundled_models
 from tests.support.meshes import bumpy_sphere, grid
 from tests.support.networks import scale_free_model
 from tests.support.pieces import piece_of

@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pns_common import Mesh, load_model, loop, pns, refine
-from pns_common.onnx_model import bundled_models
+from pns_common.connectivity.topology import build_topology
 from pns_common.pieces import (
     reduced_report,
 )
-from pns_common.topology import build_topology
+from pns_common.runtimes.onnx_model import bundled_models
 from tests.support.meshes import bent, grid, manifolds, soups
 from tests.support.networks import random_model, scale_free_model, vertex_model
 from tests.support.pieces import pieces_refined

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pns_common import loop, pns
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
 from pns_common.pieces.steps import steps_by_arrays, steps_by_kernels
 from tests.support.meshes import bent, bow_tie, grid, three_pages
 from tests.support.networks import scale_free_model, vertex_model

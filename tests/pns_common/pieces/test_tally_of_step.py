@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, pns, refine
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
 from pns_common.pieces.steps import steps_by_arrays, steps_by_kernels
 from pns_common.pieces.tally import reduced_report
 from pns_common.pieces.tally_of_step import tally_of

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from pns_common.onnx_model import DEFAULT_MODEL, bundled_models, load_model
-from pns_common.stencils import limit_ring_weight
+from pns_common.masks.stencils import limit_ring_weight
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL, bundled_models, load_model
 from service import cli
 from service.__main__ import main
 from service.gltf.read.container import read_glb

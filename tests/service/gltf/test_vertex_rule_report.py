@@ -4,7 +4,7 @@ import pytest
 
 from pns_common import Mesh, loop, pns, refine
 from service.report import total_level
-from tests.pns_common.test_vertex_rule import MODELS
+from tests.pns_common.formula.test_vertex_rule import MODELS
 from tests.support.meshes import bent, bumpy_sphere, grid
 
 

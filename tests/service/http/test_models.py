@@ -14,7 +14,7 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
-from pns_common.onnx_model import DEFAULT_MODEL, load_model
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL, load_model
 from service.http.admission import Admission
 from service.http.app import create_app
 from service.http.catalogue import ReadOnce

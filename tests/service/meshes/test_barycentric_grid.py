@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pns_common.topology import build_topology, split
+from pns_common.connectivity.topology import build_topology, split
 from service.meshes.barycentric_grid import barycentric_grid
 from service.meshes.split_connectivity import split_connectivity
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from pns_common import onnx_model
-from pns_common.model_card import ModelCard
-from pns_common.onnx_model import DEFAULT_MODEL, load_model
+from pns_common.models.card import ModelCard
+from pns_common.runtimes import onnx_model
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL, load_model
 from service.errors import InvalidParameter, NoModelError
 from service.workers.catalogue import Catalogue, ModelEntry, catalogue_of
 from service.workers.models import Models

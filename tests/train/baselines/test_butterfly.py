@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, refine
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.connectivity.topology import EdgeClass, build_topology
 from tests.support.meshes import bent, grid
 from train.baselines.butterfly import butterfly_edge_vertices, modified_butterfly, star_weights
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from pns_common.level import control_level
+from pns_common.connectivity.topology import build_topology
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
+from pns_common.rules.level import control_level
 from pns_common.schemes import loop
-from pns_common.topology import build_topology
 from train.baselines.controls import flat, nc
 from train.data.primitives import box, globe, icosphere, torus
 from train.surfaces.quasi_interpolation import limit_positions, n1, q1, vertex_normals

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 
 from pns_common import Mesh, loop, refine
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.connectivity.topology import EdgeClass, build_topology
 from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, rotation, soups, three_pages
 from tests.support.methods import BASELINES, INTERPOLATING
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, loop, refine
-from pns_common.topology import build_topology
+from pns_common.connectivity.topology import build_topology
 from tests.support.meshes import bent, grid, icosphere
 from train.baselines.butterfly import modified_butterfly
 from train.baselines.curvature_adaptive import curvature_adaptive

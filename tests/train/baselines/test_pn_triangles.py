@@ -1,7 +1,7 @@
 import numpy as np
 
 from pns_common import Mesh, refine
-from pns_common.topology import build_topology
+from pns_common.connectivity.topology import build_topology
 from tests.support.meshes import icosphere
 from train.baselines.pn_triangles import cubic_control_point, pn_triangles
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, refine
-from pns_common.topology import build_topology
+from pns_common.connectivity.topology import build_topology
 from tests.support.meshes import grid
 from train.baselines.quadric import quadric_edge_points, quadric_fit
 

@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from pns_common import Mesh
-from pns_common.fold_guard import FoldGuard
-from pns_common.scale_free_form import ScaleFreeForm
+from pns_common.formula.fold_guard import FoldGuard
+from pns_common.rules.scale_free_form import ScaleFreeForm
 from tests.support.meshes import TETRAHEDRON, bent, bumpy_sphere, grid
 from train.certificates import ascent
 from train.certificates.ascent import GOALS, ascend
@@ -50,7 +50,7 @@ def test_without_the_guard_the_same_search_folds_faces(monkeypatch):
 
 
 def test_without_the_projection_the_same_search_leaves_the_envelope(monkeypatch):
-    import pns_common.correction as correction
+    import pns_common.formula.correction as correction
 
     tight = replace(FORM, budget=0.05)
     held = ascend(GOALS["limit distance"], MESHES["sphere"], tight, seed=0, steps=10)

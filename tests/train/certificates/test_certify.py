@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import train.run
 from pns_common import pns
-from pns_common.onnx_model import DEFAULT_MODEL, load_model, model_from_bytes
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL, load_model, model_from_bytes
 from tests.support.networks import (
     CARD,
     Float64Model,

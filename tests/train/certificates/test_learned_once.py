@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, load_model, loop, pns
-from pns_common.placement import Placement
-from pns_common.scale_free import ScaleFreeEdgeRule
+from pns_common.rules.placement import Placement
+from pns_common.rules.scale_free import ScaleFreeEdgeRule
 from pns_common.schemes import loop_edge_rule, loop_vertex_rule, scale_free_form
 from tests.support.meshes import bumpy_sphere, icosphere
 from tests.support.networks import SCALE_FREE_CARD, scale_free_model

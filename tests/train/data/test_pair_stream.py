@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from pns_common.edge.frames import face_normals
+from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
 from pns_common.refine import measure_reference_length, refine
 from pns_common.schemes import loop
-from pns_common.topology import EdgeClass, build_topology
 from train.data.authored_pairs import authored_pair
 from train.data.faceted_pairs import faceted_pair
 from train.data.grid_pairs import grid_pair

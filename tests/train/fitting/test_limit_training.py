@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import torch
 
+from pns_common.connectivity.topology import build_topology
 from pns_common.refine import refine
 from pns_common.schemes import loop
-from pns_common.topology import build_topology
 from train.data import pair_stream as stream
 from train.data.grid_pairs import grid_pair
 from train.data.primitives import box, globe, torus

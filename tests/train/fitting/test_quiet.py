@@ -6,7 +6,7 @@ import torch
 import trimesh
 
 from pns_common import Mesh, clean, load_model, loop, pns, refine
-from pns_common.edge.features import FEATURE_SETS
+from pns_common.features.edge_features import FEATURE_SETS
 from service.meshes.weld import weld
 from tests.support.shared import shared_path
 from train.data.datasets import DATASETS

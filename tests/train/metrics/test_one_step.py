@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
+from pns_common.connectivity.topology import build_topology
 from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule, pns
-from pns_common.topology import build_topology
 from tests.support.networks import published_model
 from tests.support.shared import published
 from train.data.datasets import ridge_held_out, saddle_held_out, sphere_ridge_held_out

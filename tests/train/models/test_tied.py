@@ -9,11 +9,11 @@ import torch
 from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, check_parity
 from pns_common import Mesh, pns, refine
-from pns_common.edge.features import FEATURE_SETS
-from pns_common.model_card import ModelCard
-from pns_common.onnx_model import model_from_bytes
-from pns_common.tied_network import TiedNetwork
-from pns_common.vertex.rings import RING_10
+from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.geometry.rings import RING_10
+from pns_common.models.card import ModelCard
+from pns_common.runtimes.onnx_model import model_from_bytes
+from pns_common.runtimes.tied_network import TiedNetwork
 from tests.support.meshes import bumpy_sphere
 from tests.support.networks import SCALE_FREE_CARD
 from train.models.networks import unit_correction

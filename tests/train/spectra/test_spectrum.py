@@ -7,9 +7,9 @@ import pytest
 import torch
 
 from pns_common import loop, pns, refine
+from pns_common.connectivity.topology import build_topology
 from pns_common.errors import ParameterError
 from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule
-from pns_common.topology import build_topology
 from train.certificates.adversary import Operator
 from train.certificates.operator_jacobian import operator_jacobian
 from train.models.networks import BoundedNet

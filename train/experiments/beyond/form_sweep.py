@@ -5,8 +5,8 @@ from itertools import islice
 
 import numpy as np
 
-from pns_common.onnx_model import load_model
 from pns_common.refine import Refinement, refine
+from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import loop, pns
 from train.data.dense_meshes import DenseMesh, asset_meshes
 from train.data.simplifiers import SIMPLIFIERS, simplified

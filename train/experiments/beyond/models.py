@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.onnx_model import BUNDLED, DEFAULT_MODEL, bundled_models, load_model
+from pns_common.runtimes.onnx_model import BUNDLED, DEFAULT_MODEL, bundled_models, load_model
 from pns_common.schemes import Scheme, loop, pns
 from train.data.datasets import Dataset
 from train.experiments.harness.experiment import Experiment, Figure, Outcome

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pns_common.connectivity.topology import build_topology
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
-from pns_common.topology import build_topology
 from train.data.primitives import globe, icosphere, tetrahedron
 from train.experiments.beyond.models import model_files
 from train.experiments.harness.contenders import LOOP, contenders

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.errors import MeshError
 from pns_common.mesh import Mesh
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme
-from pns_common.topology import EdgeClass, build_topology
 from train.data.dense_meshes import asset_files, read_mesh
 from train.data.primitives import PRIMITIVES
 from train.experiments.beyond.models import model_files

@@ -1,6 +1,6 @@
 """Who is compared everywhere: the untrained controls, Butterfly, Loop, and the default model."""
 
-from pns_common.onnx_model import load_model
+from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import Scheme, loop, pns
 from train.baselines.butterfly import modified_butterfly
 from train.baselines.controls import flat, nc

@@ -7,8 +7,8 @@ from jaxtyping import Float
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure as Drawing
 
+from pns_common.connectivity.topology import build_topology
 from pns_common.refine import refine
-from pns_common.topology import build_topology
 from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table

@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, Scheme, loop, pns
-from pns_common.arrays import norm
-from pns_common.edge.frames import face_normals
-from pns_common.limit import limit_positions
+from pns_common.base.arrays import norm
+from pns_common.connectivity.topology import EdgeClass, Topology, build_topology
+from pns_common.geometry.frames import face_normals
+from pns_common.masks.limit import limit_positions
 from pns_common.schemes import VertexModel
-from pns_common.topology import EdgeClass, Topology, build_topology
 
 from .corners import refine_corners
 from .edges import edge_parents

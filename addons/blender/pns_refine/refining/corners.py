@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.creases import crease_children, with_creases
-from pns_common.topology import Topology, build_topology, sharp_edge_count, split
+from pns_common.connectivity.creases import crease_children, with_creases
+from pns_common.connectivity.topology import Topology, build_topology, sharp_edge_count, split
 
 from .snapshot import edge_keys
 from .steps import one_level

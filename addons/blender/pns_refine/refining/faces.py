@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.topology import Topology
+from pns_common.connectivity.topology import Topology
 
 from .snapshot import Faces, Snapshot
 

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, Refinement, Scheme, loop, refine
-from pns_common.limit import limit_normals, limit_positions
+from pns_common.masks.limit import limit_normals, limit_positions
 from pns_common.refine import measure_reference_length
 
 from .steps import Steps

@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.creases import with_creases
-from pns_common.stencils import loop_edge_vertices, loop_vertex_vertices
-from pns_common.topology import Topology, build_topology, split
+from pns_common.connectivity.creases import with_creases
+from pns_common.connectivity.topology import Topology, build_topology, split
+from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 
 from .snapshot import edge_keys
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Int, Shaped
 
-from pns_common.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
-from pns_common.topology import CHILDREN, Topology
+from pns_common.connectivity.topology import CHILDREN, Topology
+from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
 
 from .steps import Steps
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.model_card import ModelCard
+from pns_common.models.card import ModelCard
 from pns_common.schemes import VertexModel
 
 

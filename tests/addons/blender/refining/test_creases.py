@@ -13,8 +13,8 @@ from addons.blender.pns_refine.refining.steps import (
     refine_columns,
 )
 from pns_common import Mesh, load_model, loop, pns, refine
-from pns_common.linear import level_topologies, refine_linear
-from pns_common.onnx_model import DEFAULT_MODEL
+from pns_common.masks.linear import level_topologies, refine_linear
+from pns_common.runtimes.onnx_model import DEFAULT_MODEL
 from tests.addons.blender.quads import cube, grid
 
 

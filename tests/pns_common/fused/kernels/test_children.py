@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
+from pns_common.connectivity.topology import build_topology, split
 from pns_common.fused.kernels.children import (
     number_halves,
     split_edges,
     split_faces,
     split_faces_long,
 )
-from pns_common.topology import build_topology, split
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bent, bumpy_sphere, grid, three_pages
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pns_common.edge.frames import face_normals
 from pns_common.fused.kernels.chords import chords_between, chords_inside, flipped_among
+from pns_common.geometry.frames import face_normals
 from tests.support.kernels import WAYS
 
 RNG = np.random.default_rng(0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
-from pns_common.creases import crease_classes
+from pns_common.connectivity.creases import crease_classes
 from pns_common.fused.kernels.fans import count_corners, several_fans
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bow_tie, icosphere, one_way_pair

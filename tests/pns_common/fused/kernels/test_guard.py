@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import build_topology, split
 from pns_common.fused.kernels.guard import find_folds
 from pns_common.fused.loop_points import loop_points
-from pns_common.topology import build_topology, split
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bent, grid
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
+from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.fused.kernels.masks import (
     blend_vertices,
     largest_coordinate,
@@ -12,8 +13,7 @@ from pns_common.fused.kernels.masks import (
     sum_along_curves,
     sum_rings,
 )
-from pns_common.stencils import loop_beta
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.masks.stencils import loop_beta
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bent, grid
 

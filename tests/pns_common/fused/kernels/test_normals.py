@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh
+from pns_common.connectivity.topology import build_topology, split
 from pns_common.fused.kernels.normals import (
     area,
     clearly_less,
@@ -15,7 +16,6 @@ from pns_common.fused.kernels.normals import (
     squared_chord,
     unit_normal,
 )
-from pns_common.topology import build_topology, split
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bent, grid
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common.fused.kernels.tied_network import LANES, SEEN, _read, _transform, _write
-from pns_common.tied_network.form import character_table
+from pns_common.models.tied_form import character_table
 
 RNG = np.random.default_rng(0)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
 from pns_common.fused.kernels.vertex_correction import correct, correct_scale_free, look_around
 from pns_common.fused.rings import measure_normals, measure_rings
 from tests.support.kernels import WAYS, edges_built

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from pns_common.blocks import Blocks
+from pns_common.base.blocks import Blocks
 from service.gltf.refine.normals import angle_weighted_normals, perpendicular_tangents, safe_unit
 from service.gltf.refine.smoothing import joined_normals
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pns_common import load_model
-from pns_common.linear import LinearRefinement
+from pns_common.masks.linear import LinearRefinement
 from service.course import Course
 from service.gltf.read.plan import MeshPlan
 from service.gltf.refine import meshes, together

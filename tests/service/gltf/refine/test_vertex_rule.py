@@ -6,7 +6,7 @@ import pytest
 from benchmarks.generated import torus
 from benchmarks.memory import peak_mib, reset_peak
 from pns_common import Mesh, loop, pns, refine
-from pns_common.blocks import BLOCK_ROWS
+from pns_common.base.blocks import BLOCK_ROWS
 from service.errors import LimitError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshes.weld import weld

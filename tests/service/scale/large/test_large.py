@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from pns_common import Mesh, load_model, loop, pns, refine
-from pns_common.topology import build_topology
+from pns_common.connectivity.topology import build_topology
 from service.cli import app
 from service.options import Options
 from tests.service.scale.large.parts import arrays, assert_is, contents, many_kinds, refined

@@ -1,0 +1,136 @@
+"""Work over rows in cache-sized blocks, on several threads, with the same bits for any number."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextvars import copy_context
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import TypeVar
+
+from pns_common.base.arrays import Array, namespace
+
+T = TypeVar("T")
+
+# Rows a block: a dozen (rows, 3) float64 temporaries stay in the second-level cache.
+BLOCK_ROWS = 8192
+MOST_THREADS = 8
+
+
+def _nobody_listens(rows: int) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """How to run row-wise work: ``threads`` workers over blocks of ``rows`` rows.
+
+    ``before`` is called with the number of rows of each block before it is begun, from whichever
+    thread that is; what it raises ends the work.
+    """
+
+    threads: int
+    rows: int = BLOCK_ROWS
+    before: Callable[[int], None] = _nobody_listens
+
+    def of_rows(self, rows: int) -> Blocks:
+        """The same with blocks of another size."""
+        return replace(self, rows=rows)
+
+    def unheard(self) -> Blocks:
+        """The same for work after the end, of which nobody is told."""
+        return replace(self, before=_nobody_listens)
+
+    def run(self, count: int, work: Callable[[slice], None]) -> None:
+        """Call ``work`` once for each block of range(count); each writes its own rows."""
+        slices = deque(self._slices(count))
+
+        def following() -> slice | None:
+            try:
+                return slices.popleft()
+            except IndexError:  # another thread took the last
+                return None
+
+        def drain() -> None:
+            try:
+                while rows := following():
+                    self._begin(work, rows)
+            except BaseException:
+                slices.clear()  # nobody waits for the rest
+                raise
+
+        helpers = min(self.threads, len(slices)) - 1
+        if helpers < 1:
+            drain()
+            return
+        # Each helper in the caller's context: numpy's error state is part of it.
+        jobs = [_pool(self.threads - 1).submit(copy_context().run, drain) for _ in range(helpers)]
+        try:
+            drain()
+        finally:
+            # A helper that others keep from starting has nothing left to do.
+            running = [job for job in jobs if not job.cancel()]
+            wait(running)
+        for job in running:
+            job.result()
+
+    def _begin(self, work: Callable[[slice], T], rows: slice) -> T:
+        self.before(rows.stop - rows.start)
+        return work(rows)
+
+    def gather(self, count: int, work: Callable[[slice], tuple[Array, ...]]) -> tuple[Array, ...]:
+        """Arrays whose rows ``work`` makes block by block, joined in order.
+
+        It is called for no rows where there are none.
+        """
+        if self.count(count) < 2:
+            return self._begin(work, slice(0, count))
+        parts: list[tuple[Array, ...]] = [()] * self.count(count)
+
+        def keep(rows: slice) -> None:
+            parts[self.number(rows)] = work(rows)
+
+        self.run(count, keep)
+        return tuple(namespace(*pieces).concat(pieces) for pieces in zip(*parts, strict=True))
+
+    def count(self, rows: int) -> int:
+        """How many blocks ``run`` makes of so many rows."""
+        return -(-rows // self.rows)
+
+    def number(self, rows: slice) -> int:
+        """Which block it is."""
+        return rows.start // self.rows
+
+    def _slices(self, count: int) -> Iterator[slice]:
+        for start in range(0, count, self.rows):
+            yield slice(start, min(start + self.rows, count))
+
+
+@cache
+def _pool(helpers: int) -> ThreadPoolExecutor:
+    """Threads that wait for work beside the caller: starting them takes as long as a block."""
+    return ThreadPoolExecutor(helpers, thread_name_prefix="pns")
+
+
+if hasattr(os, "register_at_fork"):
+    # A forked child has the pools, but not their threads.
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
+def available_threads() -> int:
+    """Return the processors that this process may use, up to where memory is the limit.
+
+    OMP_NUM_THREADS, where it is set, is a bound here as it is for the libraries below.
+    """
+    known = hasattr(os, "sched_getaffinity")
+    processors = len(os.sched_getaffinity(0)) if known else os.cpu_count() or 1
+    bound = os.environ.get("OMP_NUM_THREADS", "")
+    most = int(bound) if bound.isdecimal() and int(bound) > 0 else MOST_THREADS
+    return min(processors, most, MOST_THREADS)
+
+
+# For arrays that keep a gradient: all rows at once.
+WHOLE = Blocks(threads=1, rows=2**62)

@@ -1,0 +1,1 @@
+"""What follows from the faces alone: edges and stencils, creases, orders, unions."""

@@ -1,1 +1,0 @@
-"""What an interior edge sees, and what is learned about it."""

@@ -1,0 +1,1 @@
+"""What the network reads of an edge's surroundings, and in which order."""

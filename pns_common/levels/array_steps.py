@@ -1,0 +1,78 @@
+"""Level after level with the array kernels, which serve every scheme."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import crease_children, with_creases
+from pns_common.connectivity.topology import Topology, build_topology, multi_fan_vertices, split
+from pns_common.geometry.child_faces import ChildFaces, child_faces
+from pns_common.geometry.frames import face_normals
+from pns_common.levels.step import LevelStep, level_step
+from pns_common.rules.level import ControlLevel
+from pns_common.schemes import Scheme
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayStep:
+    """One step of all rows.
+
+    Attributes:
+        topology: the connectivity that it split, creases marked.
+        placed: what the rules placed.
+        several_fans: of the control mesh the vertices with more than one fan; None later.
+        blocks: how row-wise work is divided.
+    """
+
+    topology: Topology
+    placed: LevelStep
+    several_fans: Bool[np.ndarray, " V"] | None
+    blocks: Blocks
+
+    @cached_property
+    def faces(self) -> Int[np.ndarray, "C 3"]:
+        """The faces that it made."""
+        return split(self.topology)
+
+    @cached_property
+    def children(self) -> ChildFaces:
+        """Their normals, and how they lie to those that they came from."""
+        return child_faces(self.topology, self.placed.points, self.placed.loop_points, self.blocks)
+
+
+def array_steps(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    creases: Int[np.ndarray, "N 2"] | None,
+    scheme: Scheme,
+    reference_length: float,
+    blocks: Blocks,
+) -> Iterator[ArrayStep]:
+    """The steps from a control mesh on, without end; coordinates that overflow are not finite.
+
+    Raises:
+        ParameterError: a crease is no edge.
+        ModelError: the network returned something that is not finite, or of another shape.
+    """
+    (normals,) = blocks.gather(len(faces), lambda rows: (face_normals(points, faces[rows]),))
+    depth = 0
+    while True:
+        topology = build_topology(faces, len(points))
+        several_fans = multi_fan_vertices(topology) if depth == 0 else None
+        if creases is not None:
+            topology = with_creases(topology, creases)
+            creases = crease_children(topology)
+        control = ControlLevel(points, topology, normals, reference_length, blocks, depth)
+        # What overflows under an absurd budget is for the caller to find.
+        with np.errstate(over="ignore", invalid="ignore"):
+            placed = level_step(control, scheme)
+        step = ArrayStep(topology, placed, several_fans, blocks)
+        yield step
+        points, faces, normals = placed.points, step.faces, step.children.normals
+        depth += 1

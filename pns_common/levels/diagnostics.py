@@ -1,0 +1,202 @@
+"""The report of one step: counts, proximity ratio, gate use, flipped faces, normal jump."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NotRequired, TypedDict
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.base.arrays import dot
+from pns_common.connectivity.topology import Connectivity, EdgeClass
+from pns_common.geometry.child_faces import ChildAngles
+from pns_common.levels.step import LevelStep
+from pns_common.rules.placement import Placement
+
+# A gate above this counts as active.
+GATE_ACTIVE = 0.01
+
+
+class EdgeCounts(TypedDict):
+    """The edges that a level refined, by class; ``crease`` only where there are some."""
+
+    interior: int
+    boundary: int
+    irregular: int
+    crease: NotRequired[int]
+
+
+class RatioSummary(TypedDict):
+    """Proximity ratio ‖δ‖ R / (C h²) over the level's interior edges; above 1 by rounding only."""
+
+    max: float
+    mean: float
+    p99: float
+
+
+class GateSummary(TypedDict):
+    """Gate γ over the level's interior edges; ``active`` is the share above 0.01."""
+
+    mean: float
+    max: float
+    active: float
+
+
+class VertexSummary(TypedDict):
+    """The vertex rule: how many old vertices it may move, ‖δ‖ R / (C h_v²) and γ_v."""
+
+    vertices: int
+    proximity_ratio: RatioSummary
+    gate: GateSummary
+
+
+class LevelReport(TypedDict):
+    """One level: counts of the mesh it made and diagnostics of the step that made it.
+
+    ``vertex_rule`` stands only where the model has one; ``proximity_ratio`` and ``gate`` are the
+    interior edges'. Of learned levels alone: ``displacement_max``, the longest δ, and
+    ``envelope_max``, the longest that the budget allows (None where the rules name no bound), both
+    in the mesh's units; ``shut``, at how many interior edges and movable vertices the gate is 0, so
+    that the network was not run for them; and ``guarded``, how many vertices the fold guard scaled,
+    where there is one.
+    """
+
+    vertices: int
+    faces: int
+    edges: EdgeCounts
+    degenerate_frames: int
+    flipped_faces: int
+    proximity_ratio: RatioSummary
+    gate: GateSummary
+    normal_jump_max: float
+    vertex_rule: NotRequired[VertexSummary]
+    displacement_max: NotRequired[float]
+    envelope_max: NotRequired[float | None]
+    shut: NotRequired[int]
+    guarded: NotRequired[int]
+
+
+class LimitDistances(TypedDict):
+    """How far all levels together left Loop; see ``refine.Report``."""
+
+    learned_levels: int
+    limit_distance: float
+    limit_distance_bound: float | None
+
+
+def level_report(topology: Connectivity, step: LevelStep, children: ChildAngles) -> LevelReport:
+    """Summarise the step that refined ``topology``."""
+    vertices, edges = step.vertices, step.edges
+    interior = topology.interior
+    report: LevelReport = {
+        "vertices": topology.vertex_count + len(topology.edge_class),
+        "faces": 4 * len(topology.faces),
+        "edges": edge_counts(topology.edge_class),
+        "degenerate_frames": int(edges.degenerate.sum() + vertices.degenerate.sum()),
+        "flipped_faces": children.flipped,
+        "proximity_ratio": _ratio_summary(edges.ratio[interior]),
+        "gate": _gate_summary(edges.gate[interior]),
+        "normal_jump_max": children.normal_jump_max,
+    }
+    if vertices.corrected is not None:
+        report["vertex_rule"] = {
+            "vertices": int(vertices.corrected.sum()),
+            "proximity_ratio": _ratio_summary(vertices.ratio[vertices.corrected]),
+            "gate": _gate_summary(vertices.gate[vertices.corrected]),
+        }
+    if step.learned:
+        rules = (vertices, edges)
+        report["displacement_max"] = max(_longest(rule.displacement) for rule in rules)
+        envelopes = [_largest(rule) for rule in rules]
+        bounds = [bound for bound in envelopes if bound is not None]
+        report["envelope_max"] = max(bounds) if len(bounds) == len(rules) else None
+        report["shut"] = _shut(edges, interior) + _shut(vertices, vertices.corrected)
+    if step.guard is not None:
+        report["guarded"] = int((step.guard < 1).sum())
+    return report
+
+
+def limit_distances(levels: Sequence[LevelReport]) -> LimitDistances:
+    """Sum what the levels' displacements may add up to.
+
+    Loop's masks and limit masks are non-negative and sum to 1, so a displacement at one level moves
+    no later vertex, and no point of the limit, by more than its own length.
+    """
+    distances = [level["displacement_max"] for level in levels if "displacement_max" in level]
+    bounds = [level["envelope_max"] for level in levels if "envelope_max" in level]
+    known = [bound for bound in bounds if bound is not None]
+    return {
+        "learned_levels": len(distances),
+        "limit_distance": float(sum(distances)),
+        "limit_distance_bound": float(sum(known)) if len(known) == len(bounds) else None,
+    }
+
+
+def _longest(displacement: Float[np.ndarray, "N 3"] | None) -> float:
+    """The largest length; of the squares, since a root keeps their order."""
+    if displacement is None:
+        return 0.0
+    return math.sqrt(dot(displacement, displacement).max(initial=0))
+
+
+def _largest(rule: Placement) -> float | None:
+    """The largest displacement that a rule may make; None where it may make any."""
+    if rule.displacement is None:
+        return 0.0
+    return None if rule.envelope is None else float(rule.envelope.max(initial=0))
+
+
+def _shut(rule: Placement, rows: np.ndarray | None) -> int:
+    """Of some vertices, how many have a gate of 0."""
+    return 0 if rows is None else int(np.count_nonzero(rule.gate[rows] == 0))
+
+
+def edge_counts(edge_class: Int[np.ndarray, " E"]) -> EdgeCounts:
+    """How many edges there are of each class."""
+    count = np.bincount(edge_class, minlength=len(EdgeClass)).tolist()
+    counts: EdgeCounts = {
+        "interior": count[EdgeClass.INTERIOR],
+        "boundary": count[EdgeClass.BOUNDARY],
+        "irregular": count[EdgeClass.IRREGULAR],
+    }
+    rest = len(edge_class) - counts["interior"] - counts["boundary"] - counts["irregular"]
+    if rest:
+        counts["crease"] = rest
+    return counts
+
+
+def _ratio_summary(ratio: Float[np.ndarray, " N"]) -> RatioSummary:
+    some = len(ratio) > 0
+    return {
+        "max": float(ratio.max(initial=0)),
+        "mean": _mean(ratio) if some else 0.0,
+        "p99": _p99(ratio) if some else 0.0,
+    }
+
+
+def _mean(values: Float[np.ndarray, " N"]) -> float:
+    """``values.mean()``, without what surrounds its sum."""
+    return float(np.add.reduce(values)) / len(values)
+
+
+def _p99(values: Float[np.ndarray, " N"]) -> float:
+    """``np.percentile(values, 99)``, whose checks would take longest of all in a small mesh."""
+    position = (len(values) - 1) * 0.99
+    below = int(position)
+    above = min(below + 1, len(values) - 1)
+    ordered = np.partition(values, [below, above])
+    low, high = ordered[below], ordered[above]
+    t = position - below
+    # From the nearer side, as numpy does it.
+    return float(high - (high - low) * (1 - t) if t >= 0.5 else low + (high - low) * t)
+
+
+def _gate_summary(gate: Float[np.ndarray, " N"]) -> GateSummary:
+    some = len(gate) > 0
+    return {
+        "mean": _mean(gate) if some else 0.0,
+        "max": float(gate.max(initial=0)),
+        "active": int(np.count_nonzero(gate > GATE_ACTIVE)) / len(gate) if some else 0.0,
+    }

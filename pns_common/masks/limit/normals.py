@@ -1,0 +1,95 @@
+"""Exact normals of Loop's limit surface at the vertices of a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.base.arrays import (
+    Array,
+    beside,
+    cross,
+    dot,
+    gather,
+    namespace,
+    norm,
+    segment_sum,
+    unit,
+)
+from pns_common.connectivity.topology import Topology, sharp_edge_count
+from pns_common.masks.limit.neighbours import Neighbours, own_neighbours
+from pns_common.masks.limit.sectors import sectors
+from pns_common.masks.limit.tangents import tangent_masks
+
+# Tangents that span less than this, of the product of their lengths, span no plane.
+NO_PLANE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class LimitNormals:
+    """Unit normals; 0 where there is no area.
+
+    Attributes:
+        vertices: of each vertex; on a crease or where fans meet the unit mean of its sectors'.
+        sectors: of each sector: one-sided at boundaries and creases.
+        sector_of_corner: the sector of corner 3 f + i, for a normal at each face's corner.
+    """
+
+    vertices: Float[Array, "V 3"]
+    sectors: Float[Array, "S 3"]
+    sector_of_corner: Int[np.ndarray, " C"]
+
+
+def limit_normals(points: Float[Array, "V 3"], topology: Topology) -> LimitNormals:
+    """The normals of the limit surface at the limits of the vertices."""
+    return normals_of_vertices(points, own_neighbours(topology))
+
+
+def normals_of_vertices(points: Float[Array, "W 3"], neighbours: Neighbours) -> LimitNormals:
+    """The normals at the first of ``points``, a mesh's vertices, with neighbours among them all."""
+    topology = neighbours.topology
+    around = sectors(topology)
+    masks = tangent_masks(topology, around)
+    count = len(around.size)
+    corner = gather(points, topology.faces.reshape(-1))
+    leaving = gather(points, neighbours.leaving) - corner
+    arriving = gather(points, neighbours.arriving) - corner
+
+    def tangent(which: int) -> Float[Array, "S 3"]:
+        # Spokes in place of points: the centre's weight is minus the sum of the others.
+        along = [
+            beside(points, weights[:, which], points.dtype)[:, None] * spokes
+            for weights, spokes in ((masks.leaving, leaving), (masks.arriving, arriving))
+        ]
+        return segment_sum(along[0] + along[1], around.of_corner, count)
+
+    area = segment_sum(cross(leaving, arriving), around.of_corner, count)
+    corners = ~around.closed & (sharp_edge_count(topology)[around.vertex] > 2)
+    normals = plane_normals(tangent(0), tangent(1), area, corners)
+    return LimitNormals(
+        vertices=unit(segment_sum(normals, around.vertex, topology.vertex_count)),
+        sectors=normals,
+        sector_of_corner=around.of_corner,
+    )
+
+
+def plane_normals(
+    first: Float[Array, "S 3"],
+    second: Float[Array, "S 3"],
+    area: Float[Array, "S 3"],
+    corners: np.ndarray | None = None,
+) -> Float[Array, "S 3"]:
+    """Unit normals of the planes of two tangents; the way ``area`` points where they span none.
+
+    The tangents of a corner wider than half a turn stand the other way round: there ``area`` says
+    which way is out.
+    """
+    xp = namespace(first)
+    across = cross(first, second)
+    if corners is not None:
+        turned = beside(first, corners) & (dot(across, area) < 0)
+        across = xp.where(turned[:, None], -across, across)
+    plane = norm(across) > NO_PLANE * norm(first) * norm(second)
+    return unit(xp.where(plane[:, None], across, area))

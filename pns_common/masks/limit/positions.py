@@ -1,0 +1,66 @@
+"""Where the vertices of a mesh end when Loop's rules go on for ever.
+
+A limit mask is a left eigenvector of the local subdivision matrix for its eigenvalue 1. By the
+number of sharp edges (boundary, irregular, crease) at a vertex:
+
+    none       (1 − w_k) p + w_k (mean of the neighbours), w_k = 1 / (1 + 3 / (8 k β_k))
+    one        (a dart) what its own matrix has, found by solving for it
+    two        (4 p + the two neighbours along the curve) / 6
+    more       p, which never moves
+
+All weights are ≥ 0 and sum to 1, so two control meshes that are ε apart have limits within ε.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.base.arrays import Array, beside, gather, namespace, scatter, segment_sum
+from pns_common.connectivity.topology import EdgeClass, Topology, sharp_edge_count
+from pns_common.masks.limit.darts import dart_masks
+from pns_common.masks.limit.neighbours import Neighbours, own_neighbours
+from pns_common.masks.stencils import CURVE_LIMIT_CENTRE, CURVE_LIMIT_NEIGHBOUR, limit_ring_weight
+
+
+def limit_positions(points: Float[Array, "V K"], topology: Topology) -> Float[Array, "V K"]:
+    """The limit of each vertex; of any columns that Loop's masks refine, not positions alone."""
+    return limits_of_vertices(points, own_neighbours(topology))
+
+
+def limits_of_vertices(points: Float[Array, "W K"], around: Neighbours) -> Float[Array, "V K"]:
+    """The limits of the first of ``points``, a mesh's vertices, with neighbours among them all."""
+    xp, topology = namespace(points), around.topology
+    sharp, valence = sharp_edge_count(topology), topology.valence
+    ring = limit_ring_weight(valence)
+    smooth, curve = sharp == 0, sharp == 2
+    centre = np.where(curve, CURVE_LIMIT_CENTRE, np.where(smooth, 1 - ring, 1.0))
+    mean = ring / np.maximum(valence, 1)
+    weight = np.where(curve, CURVE_LIMIT_NEIGHBOUR, np.where(smooth, mean, 0.0))
+
+    every = slice(None)
+    neighbours = _neighbour_sum(points, around, every)
+    along = topology.edge_class != EdgeClass.INTERIOR
+    if along.any():
+        spokes = np.flatnonzero(np.repeat(along, 2))
+        on_curve = beside(points, curve)[:, None]
+        neighbours = xp.where(on_curve, _neighbour_sum(points, around, spokes), neighbours)
+    centre, weight = (beside(points, part, points.dtype)[:, None] for part in (centre, weight))
+    limits = centre * points[: topology.vertex_count] + weight * neighbours
+    for mask in dart_masks(topology):
+        columns = np.concatenate([mask.vertices[:, None], around.of_spokes[mask.spokes]], axis=1)
+        weights = beside(points, mask.weights, points.dtype)[:, :, None]
+        at_darts = xp.sum(weights * gather(points, columns), axis=1)
+        is_dart = np.zeros(topology.vertex_count, dtype=bool)
+        is_dart[mask.vertices] = True
+        placed = scatter(at_darts, mask.vertices, topology.vertex_count)
+        limits = xp.where(beside(points, is_dart)[:, None], placed, limits)
+    return limits
+
+
+def _neighbour_sum(
+    points: Float[Array, "W K"], around: Neighbours, spokes: slice | Int[np.ndarray, " S"]
+) -> Float[Array, "V K"]:
+    ends = around.topology.edges.reshape(-1)[spokes]
+    values = gather(points, around.of_spokes[spokes])
+    return segment_sum(values, ends, around.topology.vertex_count)

@@ -1,0 +1,111 @@
+"""The limit of a refined mesh, from the connectivity of the mesh that was split.
+
+An edge vertex is regular: six neighbours around it on an interior edge, four in each sector on any
+other. So no ring has to be found in the refined mesh, which is four times as large.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.base.arrays import (
+    Array,
+    beside,
+    cross,
+    gather,
+    namespace,
+    scatter,
+    segment_sum,
+    unit,
+)
+from pns_common.base.blocks import WHOLE, Blocks
+from pns_common.connectivity.topology import EdgeClass, Topology, next_corner
+from pns_common.masks.limit.neighbours import split_neighbours
+from pns_common.masks.limit.normals import normals_of_vertices, plane_normals
+from pns_common.masks.limit.positions import limits_of_vertices
+from pns_common.masks.stencils import CURVE_LIMIT_CENTRE, CURVE_LIMIT_NEIGHBOUR
+
+# w_6 = 1/2, shared by six.
+REGULAR_CENTRE, REGULAR_NEIGHBOUR = 1 / 2, 1 / 12
+ROOT_3 = 3**0.5
+
+
+def refined_limit_positions(
+    points: Float[Array, "W K"], topology: Topology, blocks: Blocks = WHOLE
+) -> Float[Array, "W K"]:
+    """Limits of the vertices that ``topology`` was split into: old vertices, then edge vertices."""
+    xp = namespace(points)
+    count, edges = topology.vertex_count, topology.edges
+
+    def at_edges(rows: slice) -> tuple[Array]:
+        middle = points[count:][rows]
+        ends = gather(points, edges[rows, 0]) + gather(points, edges[rows, 1])
+        return (CURVE_LIMIT_CENTRE * middle + CURVE_LIMIT_NEIGHBOUR * ends,)
+
+    def at_interior(rows: slice) -> tuple[Array]:
+        ring = [gather(points, row) for row in _rings(topology, topology.interior[rows])]
+        middle = gather(points, count + topology.interior[rows])
+        total = (ring[0] + ring[1]) + (ring[2] + ring[3]) + (ring[4] + ring[5])
+        return (REGULAR_CENTRE * middle + REGULAR_NEIGHBOUR * total,)
+
+    (on_curve,) = blocks.gather(len(edges), at_edges)
+    (inside,) = blocks.gather(len(topology.interior), at_interior)
+    is_interior = beside(points, topology.edge_class == EdgeClass.INTERIOR)[:, None]
+    middle = xp.where(is_interior, scatter(inside, topology.interior, len(edges)), on_curve)
+    return xp.concat([limits_of_vertices(points, split_neighbours(topology)), middle])
+
+
+def refined_limit_normals(
+    points: Float[Array, "W 3"], topology: Topology, blocks: Blocks = WHOLE
+) -> Float[Array, "W 3"]:
+    """Unit normals of the limit surface there; on creases the unit mean of both sides'."""
+    xp = namespace(points)
+    count = topology.vertex_count
+
+    def at_interior(rows: slice) -> tuple[Array]:
+        edges = topology.interior[rows]
+        middle = gather(points, count + edges)
+        b, bc, ca, a, ad, db = (gather(points, row) - middle for row in _rings(topology, edges))
+        first = (b - a) + (bc - ca - ad + db) / 2
+        second = ROOT_3 / 2 * (bc + ca - ad - db)
+        return (plane_normals(first, second, cross(first, second)),)
+
+    (inside,) = blocks.gather(len(topology.interior), at_interior)
+    normals = scatter(inside, topology.interior, len(topology.edges))
+    edge_of_corner = topology.face_edges.reshape(-1)
+    beside_curves = np.flatnonzero(topology.edge_class[edge_of_corner] != EdgeClass.INTERIOR)
+    if len(beside_curves):
+        one_sided = _one_sided(points, topology, beside_curves)
+        owners = edge_of_corner[beside_curves]
+        normals = normals + unit(segment_sum(one_sided, owners, len(topology.edges)))
+    return xp.concat([normals_of_vertices(points, split_neighbours(topology)).vertices, normals])
+
+
+def _one_sided(
+    points: Float[Array, "W 3"], topology: Topology, half_edges: Int[np.ndarray, " H"]
+) -> Float[Array, "H 3"]:
+    """Normals at the middles of half-edges that are not interior, on their faces' side."""
+    middle = gather(points, topology.vertex_count + topology.face_edges.reshape(-1)[half_edges])
+    rows = _half_ring(topology, half_edges)
+    b, bc, ca = (gather(points, row) - middle for row in rows)
+    a = gather(points, topology.faces.reshape(-1)[half_edges]) - middle
+    # The masks of three faces: 1, 0, 0, −1 along and −1, 2, 2, −1 across, −2 in the middle.
+    area = cross(b, bc) + cross(bc, ca) + cross(ca, a)
+    return plane_normals(b - a, 2 * (bc + ca) - (a + b), area)
+
+
+def _rings(topology: Topology, edges: Int[np.ndarray, " N"]) -> list[Int[np.ndarray, " N"]]:
+    """The six neighbours of the middle of interior edges, anticlockwise."""
+    sides = topology.half_edges[edges]
+    return [row for side in (0, 1) for row in _half_ring(topology, sides[:, side])]
+
+
+def _half_ring(
+    topology: Topology, half_edges: Int[np.ndarray, " H"]
+) -> list[Int[np.ndarray, " H"]]:
+    """Around the middle of half-edge a → b of face a, b, c: b, and the middles of bc and ca."""
+    following = next_corner(half_edges)
+    middles = topology.vertex_count + topology.face_edges.reshape(-1)
+    after = topology.faces.reshape(-1)[following]
+    return [after, middles[following], middles[next_corner(following)]]

@@ -1,0 +1,121 @@
+"""Limit tangents of a sector: two masks whose cross product is the surface's normal there.
+
+Tangent masks are left eigenvectors of the local subdivision matrix for its subdominant eigenvalues.
+With q_0 … q_k the neighbours of p in a sector of k faces, anticlockwise:
+
+    closed       Σ cos(2πj/k) q_j  and  Σ sin(2πj/k) q_j
+    curve        q_0 − q_k  and  c p + a (q_0 + q_k) + Σ sin(πj/k) q_j       0 < j < k
+                 a = (sin(π/k) − S) / (8 λ − 2), c = −S − 2 a, S = Σ sin(πj/k),
+                 λ = 3/8 + cos(π/k) / 4; for k = 1 the second difference, a = 1/2, c = −1
+    corner       q_0 − p  and  q_k − p
+    dart         Σ sin(2πj/k) q_j and the even eigenvector, found by solving for it
+
+At k = 3 the curve's are the masks of Hoppe et al. 1994 for a regular crease; elsewhere theirs
+belong to their own rules next to creases, which are not the ones used here. Beyond k = 3 the
+surface bends back faster across a boundary than along it: the plane of both tangents is then what
+we call its tangent plane, and likewise at corners.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.connectivity.topology import Topology, sharp_edge_count
+from pns_common.masks.limit.sectors import Sectors
+from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE, MIDPOINT, loop_beta
+
+
+@dataclass(frozen=True, eq=False)
+class TangentMasks:
+    """Weights of both tangents (the last axis).
+
+    Attributes:
+        leaving: of a corner's next vertex in its face: q_j of the j-th corner.
+        arriving: of the vertex before it, q_{j+1}; 0 but at the last corner of open sectors.
+        centre: of p, for each sector.
+    """
+
+    leaving: Float[np.ndarray, "C 2"]
+    arriving: Float[np.ndarray, "C 2"]
+    centre: Float[np.ndarray, "S 2"]
+
+
+def tangent_masks(topology: Topology, around: Sectors) -> TangentMasks:
+    """The masks of all sectors."""
+    sharp = sharp_edge_count(topology)[around.vertex]
+    size = around.size
+    rank, k = around.rank, size[around.of_corner]
+    leaving = np.zeros((len(rank), 2))
+    arriving = np.zeros((len(rank), 2))
+    centre = np.zeros((len(size), 2))
+    first = rank == 0
+
+    closed = around.closed[around.of_corner]
+    angle = 2 * np.pi * rank / k
+    leaving[closed] = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[closed]
+
+    is_curve = ~around.closed & (sharp == 2)
+    curve = is_curve[around.of_corner]
+    end, middle = _curve_weights(size)
+    centre[is_curve, 1] = middle[is_curve]
+    leaving[curve, 0] = first[curve]
+    across = np.where(first, end[around.of_corner], np.sin(np.pi * rank / k))
+    leaving[curve, 1] = across[curve]
+    ends = curve & around.last
+    arriving[ends, 0], arriving[ends, 1] = -1, end[around.of_corner][ends]
+
+    is_corner = ~around.closed & (sharp > 2)
+    corner = is_corner[around.of_corner]
+    centre[is_corner] = -1
+    leaving[corner, 0] = first[corner]
+    arriving[corner & around.last, 1] = 1
+
+    is_dart = ~around.closed & (sharp == 1)
+    for valence in np.unique(size[is_dart]):
+        even, odd = dart_tangents(int(valence))
+        chosen = is_dart & (size == valence)
+        rows = chosen[around.of_corner]
+        centre[chosen] = even[0], 0.0
+        leaving[rows, 0], leaving[rows, 1] = even[1:][rank[rows]], odd[rank[rows]]
+    return TangentMasks(leaving, arriving, centre)
+
+
+def _curve_weights(
+    size: np.ndarray,
+) -> tuple[Float[np.ndarray, " S"], Float[np.ndarray, " S"]]:
+    """a and c of the mask across a curve."""
+    k = size.astype(float)
+    step = np.pi / k
+    total = np.where(size > 1, 1 / np.tan(step / 2), 0.0)
+    end = (np.sin(step) - total) / (8 * (EDGE_ENDPOINT + np.cos(step) / 4) - 2)
+    end = np.where(size > 1, end, 0.5)
+    return end, np.where(size > 1, -total - 2 * end, -1.0)
+
+
+@lru_cache(maxsize=256)
+def dart_tangents(valence: int) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " K"]]:
+    """The even mask (centre first) and the odd one (neighbours alone), the crease at q_0."""
+    k = valence
+    angle = 2 * np.pi * np.arange(k) / k
+    beta = float(loop_beta(np.array([k]))[0])
+    matrix = np.zeros((k + 1, k + 1))
+    matrix[0, 0], matrix[0, 1:] = 1 - k * beta, beta
+    matrix[1, :2] = MIDPOINT
+    for j in range(1, k):
+        matrix[1 + j, 0] = matrix[1 + j, 1 + j] = EDGE_ENDPOINT
+        for beside in (j - 1, j + 1):
+            matrix[1 + j, 1 + beside % k] += EDGE_OPPOSITE
+    # Orthonormal coordinates of what reads the same both ways round.
+    fold = np.zeros((k // 2 + 2, k + 1))
+    fold[0, 0] = 1
+    for j in range(k):
+        fold[1 + min(j, k - j), 1 + j] = 1
+    fold /= np.linalg.norm(fold, axis=1, keepdims=True)
+    values, vectors = np.linalg.eig(fold @ matrix.T @ fold.T)
+    second = np.argsort(-np.real(values))[1]
+    even: np.ndarray = fold.T @ np.real(vectors[:, second])
+    return even * np.sign(even[1:] @ np.cos(angle)), np.sin(angle)

@@ -1,0 +1,70 @@
+"""Loop's masks alone, over any columns: what follows a mesh's vertices without being a position.
+
+Skin weights and morph deltas go through the stencils that move the vertices; the learned correction
+is no part of it, so the result is linear in the columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.connectivity.creases import crease_children, with_creases
+from pns_common.connectivity.topology import Topology, build_topology, split
+from pns_common.masks.limit import refined_limit_positions
+from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
+
+
+def level_topologies(
+    faces: Int[np.ndarray, "F 3"],
+    vertex_count: int,
+    levels: int,
+    creases: Int[np.ndarray, "N 2"] | None = None,
+) -> list[Topology]:
+    """The topologies that ``levels`` steps of ``refine`` go through, control mesh first."""
+    topologies: list[Topology] = []
+    for _ in range(levels):
+        topology = build_topology(faces, vertex_count)
+        if creases is not None:
+            topology = with_creases(topology, creases)
+            creases = crease_children(topology)
+        topologies.append(topology)
+        faces, vertex_count = split(topology), vertex_count + len(topology.edges)
+    return topologies
+
+
+def refine_linear(
+    columns: Float[np.ndarray, "V K"], topologies: Sequence[Topology]
+) -> Float[np.ndarray, "W K"]:
+    """Columns at the refined vertices: Loop's masks, level by level."""
+    for topology in topologies:
+        vertices = loop_vertex_vertices(columns, topology)
+        columns = np.concatenate([vertices, loop_edge_vertices(columns, topology)])
+    return columns
+
+
+@dataclass(frozen=True, eq=False)
+class LinearRefinement:
+    """What happens to columns when a mesh is refined, on its way to the limit surface or not.
+
+    Attributes:
+        topologies: those of the steps, control mesh first.
+        limit: whether the last level's vertices are put on the limit surface.
+    """
+
+    topologies: Sequence[Topology]
+    limit: bool
+
+    @property
+    def count(self) -> int:
+        """How many refined vertices there are."""
+        last = self.topologies[-1]
+        return last.vertex_count + len(last.edges)
+
+    def __call__(self, columns: Float[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
+        """Columns at the refined vertices."""
+        refined = refine_linear(columns, self.topologies)
+        return refined_limit_positions(refined, self.topologies[-1]) if self.limit else refined

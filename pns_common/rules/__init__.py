@@ -1,0 +1,1 @@
+"""The rules for old vertices and for edges: Loop's, the paper's, the default's."""

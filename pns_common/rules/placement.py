@@ -1,0 +1,81 @@
+"""Where a rule puts its vertices: Loop's positions, and what is added to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.base.arrays import Array, namespace, scatter
+from pns_common.base.blocks import Blocks
+from pns_common.formula.correction import Correction, proximity_ratio
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where a rule puts its N vertices: Loop's position plus a displacement.
+
+    Attributes:
+        loop: Loop's positions q0.
+        displacement: what is added to them; None where the rule is Loop's.
+        ratio: proximity ratio ‖δ‖ R / (C h²), 0 for Loop.
+        gate: γ, 0 where there is no correction.
+        degenerate: vertices whose frame was the fallback.
+        corrected: of a vertex rule that is not Loop's, the vertices that it may move.
+        envelope: ρ = C h² / R, the longest that δ may be; None where the rule names no bound.
+    """
+
+    loop: Float[Array, "N 3"]
+    displacement: Float[Array, "N 3"] | None
+    ratio: Float[Array, " N"]
+    gate: Float[Array, " N"]
+    degenerate: Bool[Array, " N"]
+    corrected: Bool[Array, " N"] | None = None
+    envelope: Float[Array, " N"] | None = None
+
+    @property
+    def positions(self) -> Float[Array, "N 3"]:
+        """q = q0 + δ."""
+        return self.loop if self.displacement is None else self.loop + self.displacement
+
+    def rows(self, rows: slice | Int[np.ndarray, " N"]) -> Placement:
+        """Some of the vertices; of arrays, views for a slice and copies for indices."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return Placement(**{n: None if v is None else v[rows] for n, v in values.items()})
+
+
+def without_correction(positions: Float[Array, "N 3"]) -> Placement:
+    """A placement that is Loop's."""
+    xp = namespace(positions)
+    nothing = xp.zeros_like(positions[:, 0])
+    return Placement(positions, None, nothing, nothing, xp.zeros_like(nothing, dtype=xp.bool))
+
+
+def with_correction(
+    base: Placement, rows: Int[np.ndarray, " N"], correction: Correction
+) -> Placement:
+    """Loop's placement with a correction added at some of its vertices."""
+    count = base.loop.shape[0]
+    return Placement(
+        loop=base.loop,
+        displacement=scatter(correction.displacement, rows, count),
+        ratio=scatter(proximity_ratio(correction), rows, count),
+        gate=scatter(correction.gate, rows, count),
+        degenerate=scatter(correction.degenerate, rows, count),
+        envelope=scatter(correction.envelope, rows, count),
+    )
+
+
+def correct_in_blocks(
+    blocks: Blocks, count: int, correct: Callable[[slice], Correction]
+) -> Correction:
+    """The correction of ``count`` rows, made block by block."""
+    names = [field.name for field in fields(Correction)]
+
+    def columns(rows: slice) -> tuple[Array, ...]:
+        made = correct(rows)
+        return tuple(getattr(made, name) for name in names)
+
+    return Correction(*blocks.gather(count, columns))

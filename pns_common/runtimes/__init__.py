@@ -1,0 +1,1 @@
+"""What runs a model file: a program of our own, onnxruntime, or numpy."""

@@ -1,0 +1,64 @@
+"""Blocks of rows on several threads: each block once, whichever thread comes to it."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from pns_common.base.blocks import Blocks, available_threads
+
+
+@pytest.fixture
+def hasty():
+    """Threads that take turns after every few instructions."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+def test_threads_in_haste_take_each_block_once(hasty):
+    for _ in range(3):
+        taken = []
+        Blocks(threads=4, rows=1).run(5000, taken.append)
+        assert sorted(rows.start for rows in taken) == list(range(5000))
+
+
+@pytest.mark.parametrize(("count", "rows"), [(0, 5), (3, 5), (5, 5), (11, 5)])
+def test_blocks_cover_all_rows_and_are_counted(count, rows):
+    taken = []
+    blocks = Blocks(threads=1, rows=rows)
+    blocks.run(count, taken.append)
+    assert [row for part in taken for row in range(part.start, part.stop)] == list(range(count))
+    assert len(taken) == blocks.count(count)
+    assert [blocks.number(part) for part in taken] == list(range(len(taken)))
+
+
+class StopRefiningError(Exception):
+    """Nobody wants it."""
+
+
+def test_an_error_in_a_block_reaches_the_caller():
+    def fail(rows):
+        raise ValueError(f"rows {rows.start}")
+
+    with pytest.raises(ValueError, match="rows"):
+        Blocks(threads=2, rows=3).run(10, fail)
+    assert available_threads() >= 1
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_after_an_error_no_more_blocks_are_begun(threads):
+    begun = []
+
+    def refuse(count):
+        begun.append(count)
+        raise StopRefiningError
+
+    with pytest.raises(StopRefiningError):
+        Blocks(threads, 1, refuse).run(10_000, lambda rows: None)
+    assert len(begun) <= threads
+    begun.clear()
+    with pytest.raises(StopRefiningError):
+        Blocks(threads, 5, refuse).gather(3, lambda rows: (np.zeros(3),))
+    assert begun == [3]

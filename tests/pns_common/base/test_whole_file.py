@@ -1,0 +1,46 @@
+"""A file is written whole or not at all."""
+
+import pytest
+
+from pns_common.base.whole_file import replace_file, replacing
+
+
+def test_a_file_is_replaced_and_nothing_else_is_left(tmp_path):
+    path = tmp_path / "report.json"
+    replace_file(path, b"first")
+    replace_file(path, b"second")
+    assert path.read_bytes() == b"second"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_nobody_sees_a_file_before_it_is_whole(tmp_path):
+    path = tmp_path / "rows.jsonl"
+    path.write_text("old")
+    with replacing(path) as temporary, temporary.open("w") as rows:
+        rows.write("new")
+        rows.flush()
+        assert path.read_text() == "old"
+    assert path.read_text() == "new"
+
+
+def test_where_writing_fails_the_old_file_stays_alone(tmp_path):
+    path = tmp_path / "rows.jsonl"
+    path.write_text("old")
+    with pytest.raises(ZeroDivisionError), replacing(path) as temporary:
+        temporary.write_text(str(1 / 0))
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_may_be_read_by_whom_any_other_may(tmp_path):
+    (tmp_path / "plain").touch()
+    replace_file(tmp_path / "replaced", b"")
+    modes = {path.stat().st_mode for path in tmp_path.iterdir()}
+    assert len(modes) == 1
+
+
+def test_a_missing_folder_is_named_by_the_file_that_was_asked_for(tmp_path):
+    path = tmp_path / "none" / "report.json"
+    with pytest.raises(FileNotFoundError) as refusal:
+        replace_file(path, b"")
+    assert refusal.value.filename == str(path)

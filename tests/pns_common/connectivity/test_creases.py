@@ -1,0 +1,98 @@
+"""Creases: Hoppe's rules, held against the boundary rules that they equal on each side."""
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh, ParameterError, loop, pns, refine
+from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.masks.linear import level_topologies
+from tests.support.meshes import bent, bumpy_sphere, grid
+from tests.support.networks import random_model
+
+
+def halves():
+    """A bumpy sphere, the loop of edges between two parts of it, and the faces of each part."""
+    vertices, faces = bumpy_sphere(subdivisions=2)
+    upper = vertices[faces].mean(axis=1)[:, 2] > 0.05
+    topology = build_topology(faces, len(vertices))
+    sides = upper[topology.edge_faces]
+    return vertices, faces, topology.edges[sides[:, 0] != sides[:, 1]], upper
+
+
+@pytest.mark.parametrize("levels", [1, 2, 3])
+def test_a_closed_crease_refines_each_side_as_if_it_were_cut_open(levels):
+    vertices, faces, rim, upper = halves()
+    whole = refine(Mesh(vertices, faces), loop(), levels, creases=rim).mesh
+    triangles = whole.vertices[whole.faces].reshape(len(faces), -1, 3)
+    for side in (upper, ~upper):
+        part = refine(Mesh(vertices, faces[side]), loop(), levels).mesh
+        expected = part.vertices[part.faces].reshape(side.sum(), -1, 3)
+        np.testing.assert_allclose(triangles[side], expected, atol=1e-14)
+
+
+def test_crease_edges_get_no_correction_and_are_counted():
+    vertices, faces, rim, _ = halves()
+    refined = refine(Mesh(vertices, faces), pns(random_model(0)), 2, creases=rim)
+    counts = [level["edges"] for level in refined.report["levels"]]
+    assert [count["crease"] for count in counts] == [len(rim), 2 * len(rim)]
+    assert sum(counts[0].values()) == 3 * len(faces) // 2
+    control, fine = level_topologies(faces, len(vertices), 2, rim)
+    crease = fine.vertex_count + np.flatnonzero(fine.edge_class == EdgeClass.CREASE)
+    assert len(crease) == 2 * len(rim)
+    assert not refined.ratio[crease].any()
+    assert not refined.gate[crease].any()
+    # The crease is a curve of its own: its vertices are Loop's on the rim alone.
+    by_loop = refine(Mesh(vertices, faces), loop(), 2, creases=rim).mesh.vertices
+    np.testing.assert_array_equal(refined.mesh.vertices[crease], by_loop[crease])
+    assert control.vertex_count == len(vertices)
+
+
+def test_without_creases_the_report_has_no_such_class():
+    mesh = Mesh(*grid(4, bent))
+    assert set(refine(mesh, loop()).report["levels"][0]["edges"]) == {
+        "interior",
+        "boundary",
+        "irregular",
+    }
+    plain = refine(mesh, loop(), 2).mesh.vertices
+    empty = refine(mesh, loop(), 2, creases=np.zeros((0, 2), dtype=np.int64)).mesh.vertices
+    np.testing.assert_array_equal(plain, empty)
+
+
+def test_one_crease_is_a_dart_and_three_make_a_corner():
+    vertices, faces = grid(5, bent)
+    ring = build_topology(faces, len(vertices)).edges
+    at_centre = ring[(ring == 12).any(axis=1)]
+    smooth = refine(Mesh(vertices, faces), loop()).mesh.vertices[12]
+    for count, expected in ((1, smooth), (3, vertices[12])):
+        creases = at_centre[:count]
+        refined = refine(Mesh(vertices, faces), loop(), creases=creases).mesh.vertices
+        np.testing.assert_allclose(refined[12], expected, atol=1e-15)
+        edges = build_topology(faces, len(vertices)).edges
+        number = np.flatnonzero((edges == creases[0]).all(axis=1))[0]
+        middle = vertices[creases[0]].mean(axis=0)
+        np.testing.assert_array_equal(refined[len(vertices) + number], middle)
+
+
+def test_a_boundary_edge_stays_a_boundary():
+    vertices, faces = grid(4, bent)
+    topology = build_topology(faces, len(vertices))
+    rim = topology.edges[topology.edge_class == EdgeClass.BOUNDARY]
+    report = refine(Mesh(vertices, faces), loop(), creases=rim).report
+    assert report["levels"][0]["edges"]["boundary"] == len(rim)
+
+
+@pytest.mark.parametrize(
+    "creases",
+    [
+        np.array([[0, 99]]),
+        np.array([[-1, 0]]),
+        np.array([[0, 3]]),
+        np.array([0, 1]),
+        np.array([[0.0, 1.0]]),
+    ],
+)
+def test_a_crease_that_is_no_edge_is_refused(creases):
+    # Where annotations are enforced, as in these tests, a wrong shape or type ends there first.
+    with pytest.raises((ParameterError, TypeError)):
+        refine(Mesh(*grid(4)), loop(), creases=creases)

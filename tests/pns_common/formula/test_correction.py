@@ -1,0 +1,55 @@
+"""The gate and the ball: where nothing is added, and how much at most."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pns_common import ModelError
+from pns_common.connectivity.topology import build_topology
+from pns_common.formula.correction import checked_answer, curvature_gate, project_to_ball
+from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
+from tests.support.meshes import grid
+
+ROUNDING = 1 + 1e-12
+
+
+def test_gate_and_its_slope_vanish_at_coplanar_faces():
+    vertices, faces = grid(2)
+
+    def gamma(lift):
+        points = vertices.copy()
+        points[0, 2] = lift
+        topology = build_topology(faces, 4)
+        stencil = edge_stencil(
+            points,
+            face_normals(points, faces),
+            topology.stencil[topology.interior],
+            topology.edge_faces[topology.interior],
+        )
+        return curvature_gate(10.0)(edge_frames(stencil))[0]
+
+    assert gamma(0.0) == 0
+    # x ~ lift², γ ~ x² ~ lift⁴: halving the lift divides the gate by 16.
+    assert gamma(0.02) / gamma(0.01) == pytest.approx(16, rel=1e-2)
+    assert 0 < gamma(0.01) < 1e-6
+
+
+@given(st.lists(st.floats(-1e300, 1e300), min_size=3, max_size=3), st.floats(1e-3, 10))
+def test_projection_never_leaves_the_ball_and_keeps_what_is_inside(vector, radius):
+    (projected,) = project_to_ball(np.array([vector]), radius)
+    length = np.linalg.norm(projected)
+    assert length <= radius * ROUNDING
+    if np.linalg.norm(np.array(vector) / max(1.0, *map(abs, vector))) * max(
+        1.0, *map(abs, vector)
+    ) < radius * (1 - 1e-12):
+        np.testing.assert_array_equal(projected, vector)
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [(np.zeros((4, 2)), r"\(4, 2\)"), (np.full((4, 3), np.nan), "NaN"), (np.zeros(12), r"\(12,\)")],
+)
+def test_answers_of_another_shape_or_that_are_no_numbers_are_an_error(answer, says):
+    with pytest.raises(ModelError, match=says):
+        checked_answer(answer, np.zeros((4, 3)))

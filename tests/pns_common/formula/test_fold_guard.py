@@ -1,0 +1,102 @@
+"""The fold guard: scales that end every fold, found without an order."""
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pns_common.base.blocks import Blocks
+from pns_common.formula.fold_guard import FoldGuard, turned
+from tests.support.meshes import bumpy_sphere, grid, rotation
+
+FLAT, FACES = grid(5)
+
+
+def angles(faces, before, after):
+    normals = []
+    for points in (before, after):
+        a, b, c = points[faces].transpose(1, 0, 2)
+        area = np.cross(b - a, c - a)
+        normals.append(area / np.linalg.norm(area, axis=1, keepdims=True))
+    return np.arccos(np.clip(np.sum(normals[0] * normals[1], axis=1), -1, 1))
+
+
+@given(st.integers(0, 2**31), st.floats(0.01, 1e6), st.floats(0.05, 1.5))
+def test_no_face_turns_by_more_than_the_angle(seed, size, angle):
+    delta = size * np.random.default_rng(seed).standard_normal(FLAT.shape)
+    scale = FoldGuard(angle)(FACES, FLAT, delta)
+    moved = FLAT + scale[:, None] * delta
+    assert angles(FACES, FLAT, moved).max() <= angle + 1e-7
+    assert set(np.unique(scale)) <= {0.0, *0.5 ** np.arange(31)}
+
+
+def test_what_does_not_fold_is_left_alone():
+    delta = np.zeros_like(FLAT)
+    delta[12] = [0, 0, 0.4]  # 39 degrees at most, where a grid cell is 0.5 wide
+    assert (FoldGuard(np.radians(75))(FACES, FLAT, delta) == 1).all()
+    common = np.tile([3.0, -8.0, 5.0], (len(FLAT), 1))
+    assert (FoldGuard(0.01)(FACES, FLAT, common) == 1).all()
+
+
+def test_only_the_corners_of_folded_faces_are_scaled():
+    points, faces = grid(9)
+    delta = np.zeros_like(points)
+    delta[40] = [2.0, 0, 0]  # the middle vertex, pushed over its neighbours
+    scale = FoldGuard(np.radians(75))(faces, points, delta)
+    near = np.unique(faces[(faces == 40).any(axis=1)])
+    assert scale[40] < 1
+    assert np.isin(np.flatnonzero(scale < 1), near).all()
+
+
+@given(st.integers(0, 2**31))
+def test_knows_no_numbering_and_no_pose(seed):
+    rng = np.random.default_rng(seed)
+    points, faces = bumpy_sphere(seed)
+    delta = 0.5 * rng.standard_normal(points.shape)
+    guard = FoldGuard(np.radians(60))
+    scale = guard(faces, points, delta)
+    order = rng.permutation(len(points))
+    place = np.argsort(order)
+    shuffled = rng.permutation(place[faces])
+    np.testing.assert_array_equal(guard(shuffled, points[order], delta[order]), scale[order])
+    turn = rotation(rng)
+    np.testing.assert_array_equal(guard(faces, 4 * points, 4 * delta), scale)
+    moved = guard(faces, points @ turn.T, delta @ turn.T)
+    assert (moved != scale).mean() < 0.05  # an angle may equal the limit to the last bit
+
+
+@pytest.mark.parametrize("blocks", [Blocks(1, 7), Blocks(3, 50)])
+def test_blocks_threads_and_backends_find_the_same_scales(blocks):
+    points, faces = bumpy_sphere(0, subdivisions=2)
+    delta = np.random.default_rng(0).standard_normal(points.shape)
+    guard = FoldGuard(np.radians(75))
+    scale = guard(faces, points, delta)
+    assert (scale < 1).any()
+    np.testing.assert_array_equal(guard(faces, points, delta, blocks), scale)
+    on_torch = guard(faces, torch.tensor(points), torch.tensor(delta))
+    np.testing.assert_array_equal(on_torch, scale)
+
+
+def test_a_hopeless_face_ends_as_loops():
+    """A sliver that folds at any scale that halving reaches: it is switched off, and it alone."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-11, 0], [0.5, -1, 0]], dtype=float)
+    faces = np.array([[0, 1, 2], [1, 0, 3]])
+    delta = np.array([[0, 0, 0], [0, 0, 0], [0, -1, 0.3], [0, 0, 0.0]], dtype=float)
+    scale = FoldGuard(np.radians(75))(faces, points, delta)
+    np.testing.assert_array_equal(scale[:3], 0.0)
+    assert scale[3] == 1
+
+
+def test_faces_without_area_are_left_out_and_shrinking_ones_are_not():
+    line = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0]], dtype=float)
+    triangle = np.array([[0, 1, 2]])
+    lifted = line + np.array([[0, 0, 0], [0, 1, 0], [0, 0, 0]])
+    assert not turned(triangle, line, lifted, 0.5)[0]
+    assert turned(triangle, lifted, line, 0.5)[0]
+    assert not turned(triangle, lifted, lifted, 0.5)[0]
+
+
+def test_displacements_that_are_no_numbers_do_not_keep_it_busy():
+    delta = np.full_like(FLAT, np.nan)
+    assert len(FoldGuard(1.0)(FACES, FLAT, delta)) == len(FLAT)

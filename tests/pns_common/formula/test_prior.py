@@ -1,0 +1,38 @@
+"""The prior's pushes: on a regular solid by hand, and 0 where Loop shrinks nothing."""
+
+import numpy as np
+
+from pns_common.connectivity.topology import build_topology
+from pns_common.formula.prior import normal_pushes
+from pns_common.geometry.frames import face_normals
+from pns_common.geometry.rings import Rings
+from tests.support.meshes import grid, icosphere
+
+
+def pushes(points, faces):
+    topology = build_topology(faces, len(points))
+    return normal_pushes(Rings(topology, points, face_normals(points, faces)))
+
+
+def test_an_icosahedrons_vertices_are_pushed_by_what_loop_takes_them_in():
+    points, faces = icosphere(0)
+    made = pushes(points, faces)
+    # The mean of a vertex's five neighbours stands at 1 / √5 of its radius.
+    beta = (5 / 8 - (3 / 8 + np.cos(2 * np.pi / 5) / 4) ** 2) / 5
+    weight = 5 / (3 / (8 * beta) + 5)
+    np.testing.assert_allclose(made, weight * (1 - 1 / np.sqrt(5)) * points, atol=1e-14)
+
+
+def test_planes_and_boundaries_are_not_pushed():
+    assert not pushes(*grid(5)).any()
+    # A tent: all of it but the middle lies on the boundary.
+    points, faces = grid(3, lambda x, y: 1 - np.maximum(np.abs(x), np.abs(y)))
+    made = pushes(points, faces)
+    assert made[4, 2] > 0
+    assert not np.delete(made, 4, axis=0).any()
+
+
+def test_a_mesh_turned_over_is_pushed_the_same_way():
+    points, faces = icosphere(1)
+    points = points * [1, 2, 3]
+    np.testing.assert_allclose(pushes(points, faces[:, ::-1]), pushes(points, faces), atol=1e-14)

@@ -1,0 +1,90 @@
+"""Gates that read the sides of an edge's faces: open on a bent wall's quads, shut on a box."""
+
+import numpy as np
+
+from pns_common import Mesh, pns, refine
+from pns_common.connectivity.topology import build_topology
+from pns_common.formula.side_gate import face_bends, gentle_bend, opened
+from tests.support.meshes import torus_of_quads
+from tests.support.networks import scale_free_model
+from tests.support.quasi_interpolation import OPEN_GATES, quasi_interpolated, with_card
+
+PRIOR_ALONE = scale_free_model(0, 0.0)
+
+
+def test_side_gates_leave_quasi_interpolation_whole_where_two_faces_lie_in_one_plane():
+    """On quads that are plane, cut in two, a gate of the two faces leaves their diagonals out."""
+    points, faces = torus_of_quads(24, 14)
+    expected = quasi_interpolated(points, faces)
+    of_sides, of_faces = both_gates(points, faces)
+    np.testing.assert_allclose(of_sides, expected, rtol=0, atol=1e-12)
+    assert (np.abs(of_faces - expected).max(axis=1) > 1e-4).sum() > 200
+
+
+def test_side_gates_open_the_walls_of_a_prism_of_one_row_and_not_its_lids():
+    points, faces = prism(16)
+    edges = build_topology(faces, len(points)).edges
+    on_lid = np.concatenate([np.arange(len(points)) >= 32, (edges >= 32).any(axis=1)])
+    of_sides, of_faces = both_gates(points, faces)
+    expected = quasi_interpolated(points, faces)
+    np.testing.assert_allclose(of_sides[~on_lid], expected[~on_lid], rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(of_sides[on_lid], of_faces[on_lid])
+    assert (np.abs(of_faces - of_sides).max(axis=1) > 1e-3).sum() == 16
+
+
+def test_side_gates_stay_shut_on_flat_sides_between_right_angles():
+    of_sides, of_faces = both_gates(*box_of_quads(4))
+    np.testing.assert_array_equal(of_sides, of_faces)
+
+
+def test_bends_count_while_they_are_gentle():
+    """Of each face a third of x f(x), f from 1 at 0.3 to 0 at 0.6."""
+    topology = build_topology(np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]), 4)
+    beside = (topology.face_edges == 2).any(axis=1)
+    assert beside.sum() == 2
+    for x, counted in ((0.0, 0.0), (0.2, 0.2), (0.45, 0.225), (0.6, 0.0), (1.3, 0.0)):
+        bends = face_bends(np.where(np.arange(6) == 2, x, 0.0), topology)
+        np.testing.assert_allclose(bends, np.where(beside, counted / 3, 0.0), atol=1e-15)
+
+
+def test_a_side_gate_opens_where_both_faces_bend():
+    first, second = np.array([0, 1e-3, 0.1, 0.1]), np.array([0.1, 0.1, 0.2, 0.0])
+    np.testing.assert_allclose(gentle_bend(first, second, 1e4), [0, 1, 1, 0], atol=1e-8)
+    np.testing.assert_allclose(opened(np.array([0.0, 0.5, 1.0]), np.full(3, 0.5)), [0.5, 0.75, 1])
+
+
+def both_gates(points, faces):
+    """The prior alone on a mesh, with gates that read sides and with gates that do not."""
+    models = (with_card(PRIOR_ALONE, **OPEN_GATES, side_gates=sides) for sides in (True, None))
+    return [refine(Mesh(points, faces), pns(model)).mesh.vertices for model in models]
+
+
+def prism(sides):
+    """A regular prism: two rings of vertices, then the lids' middles."""
+    angle, j = 2 * np.pi * np.arange(sides) / sides, np.arange(sides)
+    ring, after = np.stack([np.cos(angle), np.sin(angle)], axis=1), (j + 1) % sides
+    low, high, middle = np.c_[ring, 0 * angle], np.c_[ring, 0 * angle + 2], 2 * sides + 0 * j
+    walls = [np.c_[j, after, after + sides], np.c_[j, after + sides, j + sides]]
+    lids = [np.c_[after, j, middle], np.c_[j + sides, after + sides, middle + 1]]
+    points = np.concatenate([low, high, [[0, 0, 0], [0, 0, 2]]])
+    return points, np.concatenate(walls + lids)
+
+
+def box_of_quads(side):
+    """A cube with so many quads along each edge, each cut in two."""
+    line = np.arange(side + 1)
+    u, v = (axis.ravel() for axis in np.meshgrid(line, line, indexing="ij"))
+    flat, zero, full = np.arange(len(u)).reshape(side + 1, -1), 0 * u, 0 * u + side
+    corners = flat[:-1, :-1], flat[1:, :-1], flat[1:, 1:], flat[:-1, 1:]
+    quads = np.stack([corner.ravel() for corner in corners], axis=1)
+    sheets, faces = [], []
+    for columns in ((u, v, full), (v, full, u), (full, u, v)):
+        sheets.append(np.stack(columns, axis=1))
+        faces.append(quads)
+    for columns in ((u, v, zero), (v, zero, u), (zero, u, v)):
+        sheets.append(np.stack(columns, axis=1))
+        faces.append(quads[:, ::-1])
+    points = np.concatenate(sheets).astype(float)
+    every = np.concatenate([sheet + k * len(u) for k, sheet in enumerate(faces)])
+    points, number = np.unique(points, axis=0, return_inverse=True)
+    return points, number.reshape(-1)[every][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)

@@ -1,0 +1,55 @@
+"""Normals of the limit surface: known on simple surfaces, and where many steps lead."""
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh, loop, refine
+from pns_common.connectivity.creases import with_creases
+from pns_common.connectivity.topology import build_topology
+from pns_common.geometry.frames import face_normals
+from pns_common.masks.limit import limit_normals
+from pns_common.masks.limit.normals import plane_normals
+from tests.support.meshes import bent, bumpy_sphere, grid, icosphere
+
+
+def test_on_a_sphere_normals_point_outwards_and_on_a_plane_along_its_normal():
+    points, faces = icosphere(2)
+    normals = limit_normals(points, build_topology(faces, len(points))).vertices
+    assert np.sum(normals * points, axis=1).min() > np.cos(0.03)
+    flat, faces = grid(5)
+    normals = limit_normals(flat, build_topology(faces, len(flat))).vertices
+    np.testing.assert_allclose(normals, np.tile([0, 0, 1.0], (len(flat), 1)), atol=1e-14)
+
+
+def test_both_sides_of_a_crease_have_their_own_normal():
+    """A roof: its ridge is a crease, and the slopes stay flat beside it."""
+    points, faces = grid(5, lambda x, y: -np.abs(x))
+    topology = build_topology(faces, len(points))
+    ridge = np.flatnonzero(points[:, 0] == 0)
+    topology = with_creases(topology, np.stack([ridge[:-1], ridge[1:]], axis=1))
+    normals = limit_normals(points, topology)
+    middle = ridge[2]
+    sides = normals.sectors[normals.sector_of_corner][topology.faces.reshape(-1) == middle]
+    slopes = np.unique(np.round(sides * np.sqrt(2), 9), axis=0)
+    np.testing.assert_allclose(slopes, [[-1, 0, 1], [1, 0, 1]], atol=1e-9)
+    np.testing.assert_allclose(normals.vertices[middle], [0, 0, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("mesh", [bumpy_sphere(3), grid(5, bent), icosphere(0)])
+def test_normals_are_those_of_the_faces_of_a_deep_refinement(mesh):
+    points, faces = mesh
+    deep = refine(Mesh(points, faces), loop(), 6).mesh
+    topology = build_topology(np.array(faces), len(points))
+    exact = limit_normals(points, topology).vertices
+    normals = face_normals(deep.vertices, deep.faces)
+    for v in range(len(points)):
+        around = normals[(deep.faces == v).any(axis=1)]
+        assert (around @ exact[v]).min() > np.cos(0.06)
+
+
+def test_tangents_that_span_no_plane_leave_it_to_the_faces():
+    first, second = np.array([[1.0, 0, 0], [1, 0, 0]]), np.array([[0.0, 2, 0], [3, 0, 0]])
+    area = np.array([[0.0, 0, -5], [0, -4, 0]])
+    assert plane_normals(first, second, area).tolist() == [[0, 0, 1], [0, -1, 0]]
+    # A corner wider than half a turn: its faces say which way is out.
+    assert plane_normals(first, second, area, np.array([True, False]))[0].tolist() == [0, 0, -1]
