@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 from pns_common.errors import ModelError, PnsError
 from pns_common.features.edge_features import FEATURE_SETS
-from pns_common.geometry.rings import RING_FEATURE_SETS
-from pns_common.geometry.symmetry import Feature
+from pns_common.features.ring_features import RING_FEATURE_SETS
+from pns_common.features.symmetry import Feature
 from pns_common.runtimes.onnx_model import OnnxModel
 from train.models.networks import BoundedNet
 

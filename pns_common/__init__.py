@@ -11,12 +11,12 @@ Where to read, each room seeing only those above it:
     mesh.py         the control mesh; connectivity/ what follows from its faces: topology.py (split)
     geometry/       what is measured on it: frames.py F, rings.py, thin_faces.py ℓ
     masks/          Loop: stencils.py one step's masks, limit/ those of the limit surface
-    features/       φ, what the network reads of an edge
+    features/       φ, what the networks read of an edge and of a vertex's ring
     formula/        correction.py (edges) and vertex_operator.py (old vertices); side_gate.py γ,
                     prior.py D, fold_guard.py G, boundary_prior.py
     models/         what a model says of itself: card.py, contract.py; the bundled files
-    rules/          level.py what a rule sees, placement.py what it answers; loop.py, learned.py
-                    (the paper's), scale_free.py (the default's), boundary.py
+    rules/          control_level.py what a rule sees, placement.py what it answers; loop.py,
+                    learned.py (the paper's), scale_free.py (the default's), boundary.py
     schemes.py      a rule for old vertices and one for edges
     levels/         step.py one level in formulas, array_steps.py one after the other; the report
     fused/          the same compiled: each module names the one whose bits it has

@@ -15,12 +15,12 @@ from pns_common.base.arrays import norm
 from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
 from pns_common.base.deferred import Deferred
 from pns_common.base.parameters import is_number, is_whole
-from pns_common.base.progress import RefinementProgress, level_costs
 from pns_common.errors import ParameterError
 from pns_common.fused import KERNEL_ROWS, fits, kernels_available, kernels_loaded, kernels_pay
 from pns_common.fused.known import kernels_know
 from pns_common.levels.array_steps import array_steps
 from pns_common.levels.diagnostics import LevelReport, level_report, limit_distances
+from pns_common.levels.progress import RefinementProgress, level_costs
 from pns_common.levels.refined_levels import (
     AfterLevel,
     LevelsReport,

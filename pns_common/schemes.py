@@ -14,16 +14,16 @@ from pns_common.base.parameters import is_number
 from pns_common.errors import ModelError, ParameterError
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.orientation import ORIENTATIONS
+from pns_common.features.ring_features import RING_FEATURE_SETS
 from pns_common.formula.correction import curvature_gate
 from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.formula.fold_guard import FoldGuard
 from pns_common.formula.vertex_operator import VertexOperator
-from pns_common.geometry.rings import RING_FEATURE_SETS
 from pns_common.models.card import ModelCard
-from pns_common.models.model import Model, VertexModel
+from pns_common.models.protocol import Model, VertexModel
 from pns_common.rules.boundary import BoundaryRule
+from pns_common.rules.control_level import ControlLevel, Rule
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
-from pns_common.rules.level import ControlLevel, Rule
 from pns_common.rules.loop import loop_edge_rule, loop_vertex_rule
 from pns_common.rules.placement import Placement, without_correction
 from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule

@@ -1,1 +1,1 @@
-"""What knows no geometry: arrays of any backend, work in row blocks, whole files, progress."""
+"""What knows no geometry: arrays of any backend, work in row blocks, whole files."""

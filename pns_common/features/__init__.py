@@ -1,1 +1,1 @@
-"""What the network reads of an edge's surroundings, and in which order."""
+"""What the networks read of an edge and of a vertex's ring, and in which order."""

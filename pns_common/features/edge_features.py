@@ -29,8 +29,8 @@ from pns_common.features.signed_features import (
     normal_fields,
     vertex_fields,
 )
+from pns_common.features.symmetry import Feature
 from pns_common.geometry.frames import EdgeFrames, EdgeStencil
-from pns_common.geometry.symmetry import Feature
 
 # Lengths of zero are read as this, so that every logarithm is finite.
 SHORTEST = 1e-150

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from jaxtyping import Float
 
 from pns_common.base.arrays import Array, namespace
+from pns_common.features.symmetry import Feature, Symmetries, edge_symmetries
 from pns_common.geometry.frames import EdgeFrames, EdgeStencil
 from pns_common.geometry.rings import Rings
-from pns_common.geometry.symmetry import Feature, Symmetries, edge_symmetries
 
 # Rings of V vertices -> (V, M): what the features want to know of each vertex.
 VertexFields = Callable[[Rings], Array]

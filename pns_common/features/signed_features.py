@@ -1,15 +1,15 @@
 """Features with a sign: they tell a crest from a trough. Definitions: docs/features.md.
 
-With m_v the mean normal of vertex v's faces, u_v the mean of its neighbours less itself and r_v the
+With m_v the mean normal of vertex v's faces, u_v the mean of its neighbours less itself and h_v the
 root mean square of its spokes, beside the five of ``paper-5``:
 
     dihedral   (n1 × n2) · T                 positive on a crest
     ends       m_a · T, m_b · T, m_a · B, m_b · B
     wings      m_c · T, m_d · T, m_c · B, m_d · B
-    umbrella   u_v · m_v / r_v               for v = a, b, c, d; negative on a crest
+    umbrella   u_v · m_v / h_v               for v = a, b, c, d; negative on a crest
 
 All lie in [−1, 1]; none sees scale. Vertex data is read from ``EdgeStencil.fields``: m_v in the
-first three columns, u_v · m_v / r_v in the fourth where the set has the umbrella.
+first three columns, u_v · m_v / h_v in the fourth where the set has the umbrella.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from jaxtyping import Float
 
 from pns_common.base.arrays import Array, cross, dot, namespace
 from pns_common.features.feature_set import FeatureGroup
+from pns_common.features.symmetry import Feature
 from pns_common.geometry.frames import EdgeFrames, EdgeStencil
 from pns_common.geometry.rings import Rings
-from pns_common.geometry.symmetry import Feature
 
 
 def normal_fields(rings: Rings) -> Float[Array, "V 3"]:
@@ -29,7 +29,7 @@ def normal_fields(rings: Rings) -> Float[Array, "V 3"]:
 
 
 def vertex_fields(rings: Rings) -> Float[Array, "V 4"]:
-    """m_v and u_v · m_v / r_v; the latter 0 on boundary, irregular and crease edges."""
+    """m_v and u_v · m_v / h_v; the latter 0 on boundary, irregular and crease edges."""
     return namespace(rings.normal).concat([rings.normal, rings.height], axis=1)
 
 

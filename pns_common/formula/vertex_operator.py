@@ -21,6 +21,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.arrays import Array, gather, namespace
+from pns_common.features.ring_features import RingFeatureSet
 from pns_common.formula.correction import (
     BudgetPerLength,
     Correction,
@@ -29,7 +30,7 @@ from pns_common.formula.correction import (
     shortened,
     where_open,
 )
-from pns_common.geometry.rings import RingFeatureSet, Rings, ring_vectors
+from pns_common.geometry.rings import Rings, ring_vectors
 
 
 @dataclass(frozen=True)

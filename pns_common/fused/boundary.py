@@ -16,7 +16,7 @@ from pns_common.connectivity.topology import Topology
 from pns_common.formula.boundary_prior import on_boundary
 from pns_common.fused.mesh_edges import MeshEdges, has_boundary
 from pns_common.rules.boundary import BoundaryRule
-from pns_common.rules.level import ControlLevel
+from pns_common.rules.control_level import ControlLevel
 from pns_common.rules.placement import Placement
 
 Move = Callable[[ControlLevel, Placement], Placement]

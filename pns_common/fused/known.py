@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.orientation import FIRST_FACE, SYMMETRIC
-from pns_common.geometry.rings import RING_10
+from pns_common.features.ring_features import RING_10
 from pns_common.rules.boundary import BoundaryRule
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
 from pns_common.rules.loop import loop_vertex_rule

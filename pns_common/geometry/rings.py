@@ -1,22 +1,18 @@
-"""What an old vertex sees of its ring: invariant features, three equivariant vectors, its own gate.
+"""What is measured of the ring of an old vertex, and three vectors that turn with it.
 
 Everything is a mean over the spokes p_j − p_v of a vertex, so nothing depends on where the ring
 starts, on its direction or on its length. With n, n' the unit normals on both sides of a spoke,
-T its direction, m_v the mean normal of the faces and u_v, r_v the mean and the root mean square of
+T its direction, m_v the mean normal of the faces and u_v, h_v the mean and the root mean square of
 the spokes:
 
     x = ‖n − n'‖² / 2          (= 1 − n · n', without its rounding: 0 on any plane to 1e-31)
     s = (n × n') · T           positive on a crest, whichever end it is read from
-
-Definitions, ranges and signs of the features: docs/features.md.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -34,13 +30,7 @@ from pns_common.base.arrays import (
 )
 from pns_common.connectivity.edge_order import left_face_order
 from pns_common.connectivity.topology import Topology, sharp_edge_count
-from pns_common.geometry.ring_fields import divided, mean_normals, neighbour_mean, spokes
-from pns_common.geometry.symmetry import Feature, Generator, Symmetries, symmetries
-
-# The square of a spoke without length, so that the root has a gradient.
-SHORTEST_SQUARE = 1e-300
-# Turned-over faces: the mean normal changes sign, sums of spokes do not.
-RING_TURN_OVER = Generator("turn_over", "", "", (-1, 1, 1))
+from pns_common.geometry.ring_sums import divided, mean_normals, neighbour_mean, spokes
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +61,8 @@ class Rings:
 
     @cached_property
     def square(self) -> Float[Array, "V 1"]:
-        """r_v²."""
-        return self.mean(_square(self.spokes))
+        """h_v²."""
+        return self.mean(squared(self.spokes))
 
     @property
     def edge_squares(self) -> Float[Array, " E"]:
@@ -109,12 +99,12 @@ class Rings:
 
     @cached_property
     def spoke_length(self) -> Float[Array, "V 1"]:
-        """r_v, which is h_v of the rule; with gradient 0 at 0."""
+        """h_v, with gradient 0 at 0."""
         return root(self.square)
 
     @cached_property
     def height(self) -> Float[Array, "V 1"]:
-        """u_v · m_v / r_v; 0 on boundary, irregular and crease edges."""
+        """u_v · m_v / h_v; 0 on boundary, irregular and crease edges."""
         # An open ring leans to one side: its umbrella says nothing of curvature.
         closed = beside(self.points, sharp_edge_count(self.topology) == 0)[:, None]
         lean = dot(self.umbrella, self.normal)[:, None]
@@ -142,6 +132,11 @@ class Rings:
         return _across_edges(self.points, self.face_normals, self.topology)
 
 
+def squared(vectors: Float[Array, "N 3"]) -> Float[Array, "N 1"]:
+    """Their squared lengths."""
+    return dot(vectors, vectors)[:, None]
+
+
 def root(square: Float[Array, "N 1"]) -> Float[Array, "N 1"]:
     """Its square root, with gradient 0 at 0."""
     xp = namespace(square)
@@ -152,78 +147,13 @@ def root(square: Float[Array, "N 1"]) -> Float[Array, "N 1"]:
 def ring_vectors(rings: Rings) -> Float[Array, "V 3 3"]:
     """Rows e1, e2, e3 of each vertex, polar vectors that turn with the mesh, none longer than 1.
 
-    e1 = m_v, e2 = u_v / r_v, e3 = mean of (x / 2) (p_j − p_v) / r_v. None is normalised: each is
+    e1 = m_v, e2 = u_v / h_v, e3 = mean of (x / 2) (p_j − p_v) / h_v. None is normalised: each is
     Lipschitz also where a symmetric ring makes it vanish.
     """
     pull = rings.mean(rings.jump / 2 * rings.spokes)
     length = rings.spoke_length
     rows = [rings.normal, divided(rings.umbrella, length), divided(pull, length)]
     return namespace(rings.normal).stack(rows, axis=1)
-
-
-def ring_features(rings: Rings) -> Float[Array, "V 10"]:
-    """The features of ``ring-10``, in the order of RING_10."""
-    xp = namespace(rings.normal)
-    spread, height = rings.spoke_length, rings.height
-    square = _square(rings.spokes)
-    length = xp.sqrt(xp.where(square > 0, square, SHORTEST_SQUARE))
-    tilt = rings.of_neighbour(rings.normal) - rings.of_centre(rings.normal)
-    opening = rings.mean(dot(tilt, rings.spokes)[:, None])
-    columns = [
-        rings.mean_jump,
-        rings.mean(rings.bend),
-        rings.mean(rings.bend**2),
-        height,
-        divided(_square(rings.umbrella), rings.square),
-        _square(rings.normal),
-        rings.mean(rings.of_neighbour(height)),
-        divided(opening, spread),
-        divided(rings.mean(length), spread),
-        rings.mean(rings.of_neighbour(rings.mean_jump)),
-    ]
-    return xp.concat(columns, axis=1)
-
-
-@dataclass(frozen=True)
-class RingFeatureSet:
-    """Features of a vertex's ring; the name stands on the model card."""
-
-    name: str
-    features: tuple[Feature, ...]
-    columns: Callable[[Rings], Array]
-
-    def __call__(self, rings: Rings) -> Float[Array, "V K"]:
-        """φ, one row for each vertex."""
-        return self.columns(rings)
-
-    @property
-    def count(self) -> int:
-        """K."""
-        return len(self.features)
-
-    @property
-    def symmetries(self) -> Symmetries:
-        """The group that a network over these features is averaged over."""
-        return symmetries(self.features, [RING_TURN_OVER])
-
-
-RING_10 = RingFeatureSet(
-    "ring-10",
-    (
-        Feature("mean jump", limit=2.0),
-        Feature("bend", turn_over=-1),
-        Feature("bend squared"),
-        Feature("umbrella height", turn_over=-1),
-        Feature("umbrella length"),
-        Feature("normal agreement"),
-        Feature("neighbours' umbrella height", turn_over=-1),
-        Feature("opening", turn_over=-1, limit=2.0),
-        Feature("evenness"),
-        Feature("neighbours' mean jump", limit=2.0),
-    ),
-    ring_features,
-)
-RING_FEATURE_SETS: Mapping[str, RingFeatureSet] = MappingProxyType({RING_10.name: RING_10})
 
 
 def _across_edges(
@@ -236,7 +166,7 @@ def _across_edges(
     direction = unit(gather(points, left.stencil[:, 1]) - gather(points, left.stencil[:, 0]))
     defined = ((dot(first, first) > 0) & (dot(second, second) > 0))[:, None]
     difference = first - second
-    jump = xp.where(defined, _square(difference) / 2, 0.0)
+    jump = xp.where(defined, squared(difference) / 2, 0.0)
     bend = dot(cross(first, second), direction)[:, None]
     return _on_spokes(jump, topology), _on_spokes(bend, topology)
 
@@ -245,7 +175,3 @@ def _on_spokes(values: Float[Array, "I 1"], topology: Topology) -> Float[Array, 
     """Values of interior edges at both spokes of each edge; 0 at other edges."""
     edges: Int[np.ndarray, " S"] = np.repeat(np.arange(len(topology.edges)), 2)
     return gather(segment_sum(values, topology.interior, len(topology.edges)), edges)
-
-
-def _square(vectors: Float[Array, "N 3"]) -> Float[Array, "N 1"]:
-    return dot(vectors, vectors)[:, None]

@@ -1,1 +1,1 @@
-"""One step of a scheme, one after the other, and what is reported of each."""
+"""One step of a scheme, one after the other, and what is told and reported of each."""

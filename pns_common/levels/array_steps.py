@@ -15,7 +15,7 @@ from pns_common.connectivity.topology import Topology, build_topology, multi_fan
 from pns_common.geometry.child_faces import ChildFaces, child_faces
 from pns_common.geometry.frames import face_normals
 from pns_common.levels.step import LevelStep, level_step
-from pns_common.rules.level import ControlLevel
+from pns_common.rules.control_level import ControlLevel
 from pns_common.schemes import Scheme
 
 

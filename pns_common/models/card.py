@@ -14,7 +14,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.orientation import ORIENTATIONS
-from pns_common.geometry.rings import RING_FEATURE_SETS
+from pns_common.features.ring_features import RING_FEATURE_SETS
 
 # The metadata key of an ONNX file that holds the card.
 CARD_KEY = "pns_card"

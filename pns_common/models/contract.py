@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 from pns_common.errors import ModelError
 from pns_common.features.edge_features import FEATURE_COUNT
-from pns_common.geometry.rings import RING_FEATURE_SETS
+from pns_common.features.ring_features import RING_FEATURE_SETS
 from pns_common.models.card import CARD_KEY, FORMATS, ModelCard
 
 # Rows that one call of a network sees. Always the same shape, so that a row's bits depend neither

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Float32, Int, Int32
 
-from pns_common.geometry.symmetry import Symmetries
+from pns_common.features.symmetry import Symmetries
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from pns_common.connectivity.topology import EdgeClass
 from pns_common.formula.boundary_prior import boundary_pushes, boundary_square, boundary_vertices
 from pns_common.formula.correction import Correction, proximity_ratio, shortened
 from pns_common.masks.stencils import MIDPOINT, loop_vertex_vertices
-from pns_common.rules.level import ControlLevel
+from pns_common.rules.control_level import ControlLevel
 from pns_common.rules.placement import Placement
 from pns_common.rules.scale_free_form import ScaleFreeForm
 

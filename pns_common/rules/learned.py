@@ -13,7 +13,7 @@ import numpy as np
 from pns_common.formula.correction import Correction
 from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.formula.vertex_operator import VertexOperator
-from pns_common.rules.level import ControlLevel
+from pns_common.rules.control_level import ControlLevel
 from pns_common.rules.loop import loop_edge_rule, loop_vertex_rule
 from pns_common.rules.placement import Placement, correct_in_blocks, with_correction
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
-from pns_common.rules.level import ControlLevel
+from pns_common.rules.control_level import ControlLevel
 from pns_common.rules.placement import Placement, without_correction
 
 

@@ -24,7 +24,7 @@ from pns_common.formula.side_gate import face_bends, gentle_bend, opened_gate
 from pns_common.formula.vertex_operator import VertexOperator
 from pns_common.masks.stencils import loop_edge_point, loop_vertex_vertices
 from pns_common.rules.boundary import BoundaryRule
-from pns_common.rules.level import ControlLevel
+from pns_common.rules.control_level import ControlLevel
 from pns_common.rules.loop import loop_edge_rule, loop_vertex_rule
 from pns_common.rules.placement import Placement, correct_in_blocks, with_correction
 from pns_common.rules.scale_free_form import ScaleFreeForm

@@ -20,7 +20,7 @@ from pns_common.models.contract import (
     feature_inputs,
     read_card,
 )
-from pns_common.models.shapes import check_calls, signature
+from pns_common.runtimes.call_shapes import check_calls, signature
 
 
 def check_file(data: bytes, name: str) -> ModelCard:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import accumulate
 
-from pns_common.base.progress import LEARNED_COST
+from pns_common.levels.progress import LEARNED_COST
 from pns_common.schemes import Scheme
 
 from ..options import Options

@@ -14,7 +14,7 @@ from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, ParityError, check_parity
 from pns_common import Mesh, ModelError, load_model, pns, refine
 from pns_common.connectivity.topology import build_topology
-from pns_common.geometry.rings import RING_10
+from pns_common.features.ring_features import RING_10
 from pns_common.models.card import ModelCard
 from pns_common.models.contract import ALLOWED_OPERATORS, CALL_ROWS
 from pns_common.runtimes.onnx_model import model_from_bytes

@@ -9,9 +9,10 @@ import pytest
 from pns_common import pns
 from pns_common.connectivity.topology import build_topology
 from pns_common.features.edge_features import signed_features
-from pns_common.geometry.rings import RING_10, ring_vectors
+from pns_common.features.ring_features import RING_10
+from pns_common.geometry.rings import ring_vectors
 from pns_common.levels.step import level_step
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from tests.support.meshes import bumpy_sphere
 from tests.support.networks import SCALE_FREE_CARD, VERTEX_CARD, float64_network, random_layers
 from tests.support.plain_operator import PlainMesh, shortened
@@ -64,10 +65,10 @@ def plain_edge(card, a, b, answer):
 
 def plain_vertex(card, v, answer):
     """p'."""
-    spread = PLAIN.spread(v)
+    spoke_length = PLAIN.spoke_length(v)
     gate = tanh(card.vertex_gate_sharpness * PLAIN.mean_jump[v])
     asked = answer @ np.array(PLAIN.ring_vectors(v))
-    longest = card.budget / R * spread**2
+    longest = card.budget / R * spoke_length**2
     if card is FORMAT_2:
         return PLAIN.loop_vertex(v, POINTS) + gate * longest * shortened(asked, 1)
     prior = card.prior_strength * PLAIN.loop_vertex(v, PUSHES)

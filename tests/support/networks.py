@@ -8,7 +8,7 @@ import numpy as np
 from onnx import TensorProto, helper, numpy_helper
 
 from pns_common.features.edge_features import FEATURE_COUNT
-from pns_common.geometry.rings import RING_10
+from pns_common.features.ring_features import RING_10
 from pns_common.models.card import CARD_KEY, ModelCard
 from pns_common.runtimes.onnx_model import model_from_bytes
 

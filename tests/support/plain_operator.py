@@ -33,7 +33,9 @@ class PlainMesh:
         # m_v, x_v and k_v.
         self.mean_normal = [self._mean_normal(v) for v in vertices]
         self.mean_jump = [np.mean([self.jump(v, j) for j in self.ring[v]]) for v in vertices]
-        self.height = [self.umbrella(v) @ self.mean_normal[v] / self.spread(v) for v in vertices]
+        self.height = [
+            self.umbrella(v) @ self.mean_normal[v] / self.spoke_length(v) for v in vertices
+        ]
 
     def area(self, a, b, c):
         p = self.points
@@ -64,8 +66,8 @@ class PlainMesh:
         """u_v."""
         return np.mean(self.spokes(v), axis=0)
 
-    def spread(self, v):
-        """r_v."""
+    def spoke_length(self, v):
+        """h_v."""
         return np.mean([spoke @ spoke for spoke in self.spokes(v)]) ** 0.5
 
     def frame(self, a, b):
@@ -76,7 +78,7 @@ class PlainMesh:
 
     def ring_features(self, v):
         """`ring-10`, in the order of its table."""
-        m, u, r = self.mean_normal[v], self.umbrella(v), self.spread(v)
+        m, u, r = self.mean_normal[v], self.umbrella(v), self.spoke_length(v)
         ring, spokes = self.ring[v], self.spokes(v)
         bends = [self.bend(v, j) for j in ring]
         tilts = [self.mean_normal[j] - m for j in ring]
@@ -95,7 +97,7 @@ class PlainMesh:
 
     def ring_vectors(self, v):
         """e₁, e₂, e₃."""
-        r = self.spread(v)
+        r = self.spoke_length(v)
         pulls = [self.jump(v, j) / 2 * (self.points[j] - self.points[v]) for j in self.ring[v]]
         return self.mean_normal[v], self.umbrella(v) / r, np.mean(pulls, axis=0) / r
 

@@ -6,7 +6,7 @@ import numpy as np
 from onnx import helper
 
 from pns_common.features.edge_features import FEATURE_SETS
-from pns_common.geometry.rings import RING_10
+from pns_common.features.ring_features import RING_10
 from tests.support.networks import SCALE_FREE_CARD, model_bytes
 
 EDGES, VERTICES = FEATURE_SETS["signed-18"].symmetries, RING_10.symmetries

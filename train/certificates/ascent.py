@@ -16,15 +16,15 @@ from torch import Tensor
 from pns_common.connectivity.topology import Topology, build_topology, split
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.orientation import SYMMETRIC
+from pns_common.features.ring_features import RING_10
 from pns_common.formula.correction import curvature_gate
 from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.formula.vertex_operator import VertexOperator
 from pns_common.geometry.frames import face_normals
-from pns_common.geometry.rings import RING_10
 from pns_common.levels.step import LevelStep, level_step
 from pns_common.masks.limit import refined_limit_positions
 from pns_common.mesh import Mesh
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from pns_common.rules.scale_free_form import ScaleFreeForm
 from pns_common.schemes import Scheme, loop, scale_free_scheme
 from train.certificates.learned_once import largest_turn

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.features.edge_features import FEATURE_SETS
-from pns_common.geometry.rings import RING_FEATURE_SETS
+from pns_common.features.ring_features import RING_FEATURE_SETS
 from pns_common.schemes import Model, VertexModel, pns
 from train.certificates.certificate import Certificate
 from train.metrics.card import MEASURES

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from pns_common.connectivity.topology import Topology, build_topology
 from pns_common.levels.step import level_step
 from pns_common.mesh import Mesh
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from pns_common.rules.placement import Placement
 from pns_common.schemes import Scheme, loop
 

@@ -12,7 +12,7 @@ from torch import Tensor
 from pns_common.base.arrays import segment_sum
 from pns_common.connectivity.disjoint_union import disjoint_faces
 from pns_common.connectivity.topology import Topology, build_topology, split
-from pns_common.rules.level import ControlLevel, control_level
+from pns_common.rules.control_level import ControlLevel, control_level
 from train.data.references import AUTHORED, LATHE, SWEPT, Pair
 from train.fitting.limit_maps import LimitMaps, applied, limit_maps, loop_matrix
 

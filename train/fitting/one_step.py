@@ -13,8 +13,8 @@ from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.formula.vertex_operator import VertexOperator
 from pns_common.levels.step import level_step
 from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
+from pns_common.rules.control_level import control_level
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
-from pns_common.rules.level import control_level
 from pns_common.rules.loop import loop_vertex_rule
 from pns_common.schemes import Scheme
 

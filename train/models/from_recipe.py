@@ -10,10 +10,10 @@ from pns_common.errors import ParameterError
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.feature_set import FeatureSet
 from pns_common.features.orientation import ORIENTATIONS
+from pns_common.features.ring_features import RING_FEATURE_SETS, RingFeatureSet
 from pns_common.formula.correction import curvature_gate
 from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.formula.vertex_operator import VertexOperator
-from pns_common.geometry.rings import RING_FEATURE_SETS, RingFeatureSet
 from pns_common.rules.scale_free import ScaleFreeForm
 from pns_common.schemes import Scheme, scale_free_scheme
 from train.models.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_correction

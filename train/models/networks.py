@@ -11,7 +11,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from pns_common.features.edge_features import FEATURE_COUNT
-from pns_common.geometry.symmetry import Symmetries
+from pns_common.features.symmetry import Symmetries
 
 RAW_COORDINATES = "raw-12"
 """The coordinates of a, b, c, d: what the unconstrained network sees instead of features."""

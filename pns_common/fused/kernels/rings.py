@@ -1,4 +1,4 @@
-"""Sums around vertices, with the bits of geometry/rings.py and ring_fields.py.
+"""Sums around vertices, with the bits of geometry/rings.py and ring_sums.py.
 
 A sum runs over its faces or edges in ascending order: each thread owns the vertices begin … end − 1
 and reads all faces or edges.
@@ -212,7 +212,7 @@ def mean_spokes(edges, measured, network_lengths, begin, end, means, valence):
 
 @kernel(SIZE, POINTS, INDEX, SIZE, SIZE, POINTS_OUT)
 def umbrella_heights(means, sharp, begin, end, fields):
-    """u_v · m_v / r_v into ``fields``; 0 where a sharp edge ends.
+    """u_v · m_v / h_v into ``fields``; 0 where a sharp edge ends.
 
     ``sharp`` counts the sharp edges at each vertex; (0,) where there are none at all.
     """

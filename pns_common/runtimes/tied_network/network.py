@@ -10,9 +10,9 @@ from jaxtyping import Float, Float32
 
 from pns_common.errors import ModelError
 from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.features.ring_features import RING_FEATURE_SETS
+from pns_common.features.symmetry import Symmetries
 from pns_common.fused import kernels_loaded
-from pns_common.geometry.rings import RING_FEATURE_SETS
-from pns_common.geometry.symmetry import Symmetries
 from pns_common.models.card import ModelCard
 from pns_common.models.contract import answer_to
 from pns_common.models.tied_form import TiedForm, tied_form

@@ -4,9 +4,9 @@ import numpy as np
 
 from pns_common.connectivity.topology import build_topology
 from pns_common.features.feature_set import FeatureGroup, FeatureSet
+from pns_common.features.symmetry import Feature
 from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
-from pns_common.geometry.symmetry import Feature
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from tests.support.meshes import icosphere
 
 POINTS, FACES = icosphere(0)

@@ -6,7 +6,7 @@ import pytest
 from pns_common.connectivity.topology import build_topology
 from pns_common.features.edge_features import tilt_features
 from pns_common.features.signed_features import normal_fields, vertex_fields
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from tests.support.meshes import bumpy_sphere
 from tests.support.plain_operator import PlainMesh
 from tests.support.roof import ROOF, SIDES, on_roof

@@ -13,7 +13,7 @@ from pns_common.connectivity.topology import build_topology
 from pns_common.formula.boundary_prior import boundary_pushes, boundary_vertices
 from pns_common.levels.step import level_step
 from pns_common.masks.limit import limit_positions
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from pns_common.schemes import (
     edge_operator,
     scale_free_form,

@@ -7,10 +7,11 @@ import torch
 from hypothesis import given
 
 from pns_common.connectivity.topology import build_topology
+from pns_common.features.ring_features import RING_10
 from pns_common.formula.vertex_operator import VertexOperator
 from pns_common.geometry.frames import face_normals
-from pns_common.geometry.rings import RING_10, Rings
-from pns_common.rules.level import control_level
+from pns_common.geometry.rings import Rings
+from pns_common.rules.control_level import control_level
 from tests.support.meshes import bumpy_sphere, manifolds, soups
 from tests.support.plain_operator import PlainMesh, shortened
 
@@ -61,7 +62,7 @@ def test_a_correction_is_the_formula_of_all_its_parts():
     for row, v in enumerate(rows):
         z = shortened(0.2 * np.array(plain.ring_features(v)[:3]), 1)
         combined = z @ np.array(plain.ring_vectors(v))
-        gate, bound = np.tanh(2 * plain.mean_jump[v]), plain.spread(v) ** 2 / 5
+        gate, bound = np.tanh(2 * plain.mean_jump[v]), plain.spoke_length(v) ** 2 / 5
         expected = gate * bound * shortened(combined, 1)
         np.testing.assert_allclose(learned.displacement[row], expected, atol=1e-15)
         wanted = prior[row] + asked[row] * combined

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from pns_common import Mesh, ModelError, loop, pns, refine
 from pns_common.connectivity.topology import EdgeClass, build_topology, split
+from pns_common.features.ring_features import RING_10
 from pns_common.geometry.frames import face_normals
-from pns_common.geometry.rings import RING_10
 from pns_common.schemes import VertexModel
 from tests.support.meshes import (
     axis_planes,

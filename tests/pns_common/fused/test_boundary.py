@@ -8,7 +8,7 @@ from pns_common import Mesh, pns
 from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.formula.boundary_prior import on_boundary
 from pns_common.fused.boundary import NO_RULE, SharpLevel, boundary_of
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from tests.support.kernels import assert_same_bits, by_arrays, by_kernels, edges_built
 from tests.support.meshes import bent, bumpy_sphere, grid, three_pages
 from tests.support.networks import SCALE_FREE_CARD, scale_free_model

@@ -8,7 +8,7 @@ from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology
 from pns_common.fused.additions import Additions, Surroundings
 from pns_common.fused.edge_rule import add_at_edges
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from tests.support.kernels import edges_built
 from tests.support.meshes import bent, grid
 from tests.support.networks import random_model, scale_free_model, vertex_model

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from pns_common import load_model, loop, pns
 from pns_common.features.feature_set import FeatureSet
+from pns_common.features.ring_features import RingFeatureSet
 from pns_common.fused.known import kernels_know
-from pns_common.geometry.rings import RingFeatureSet
 from pns_common.runtimes.onnx_model import bundled_models
 from pns_common.schemes import Scheme
 from tests.support.networks import scale_free_model

@@ -11,7 +11,7 @@ from pns_common.connectivity.topology import build_topology
 from pns_common.fused.learned_step import learned_points
 from pns_common.fused.level import control_level
 from pns_common.levels.step import level_step
-from pns_common.rules.level import control_level as array_level
+from pns_common.rules.control_level import control_level as array_level
 from tests.support.kernels import assert_kernels_agree, by_kernels
 from tests.support.meshes import bumpy_sphere
 from tests.support.networks import SCALE_FREE_CARD, VERTEX_CARD, scale_free_model, vertex_model

@@ -8,8 +8,8 @@ import sys
 import pytest
 
 from pns_common import Mesh, loop, refine
-from pns_common.base.progress import level_costs
 from pns_common.fused import COST_TO_COMPILE, COST_TO_LOAD, _Work, kernels_pay, storage
+from pns_common.levels.progress import level_costs
 from tests.support.kernels import by_arrays
 from tests.support.meshes import bumpy_sphere
 

@@ -1,4 +1,4 @@
-"""What vertices see of their rings: as defined, within its ranges, with gradients everywhere."""
+"""What is measured of rings: as defined, within its ranges, with gradients everywhere."""
 
 import numpy as np
 import torch
@@ -6,8 +6,8 @@ from hypothesis import given
 
 from pns_common.connectivity.topology import build_topology
 from pns_common.geometry.frames import face_normals
-from pns_common.geometry.rings import RING_10, Rings, ring_vectors
-from pns_common.rules.level import control_level
+from pns_common.geometry.rings import Rings, ring_vectors
+from pns_common.rules.control_level import control_level
 from tests.support.meshes import bumpy_sphere, grid, manifolds, soups
 from tests.support.plain_operator import PlainMesh
 
@@ -15,12 +15,9 @@ ROUNDING = 1 + 1e-12
 
 
 @given(soups() | manifolds())
-def test_features_keep_their_ranges_and_vectors_their_length(mesh):
+def test_vectors_keep_their_length(mesh):
     topology = build_topology(mesh.faces, len(mesh.vertices))
     rings = Rings(topology, mesh.vertices, face_normals(mesh.vertices, mesh.faces))
-    rows = RING_10(rings)
-    limits = np.array([feature.limit for feature in RING_10.features])
-    assert (np.abs(rows) <= limits * ROUNDING).all()
     assert np.linalg.norm(ring_vectors(rings), axis=2).max() <= ROUNDING
 
 
@@ -29,7 +26,7 @@ def test_gradients_are_finite_on_degenerate_meshes(mesh):
     topology = build_topology(mesh.faces, len(mesh.vertices))
     points = torch.tensor(mesh.vertices / np.abs(mesh.vertices).max(), requires_grad=True)
     rings = Rings(topology, points, face_normals(points, topology.faces))
-    (RING_10(rings).sum() + ring_vectors(rings).sum()).backward()
+    ring_vectors(rings).sum().backward()
     assert torch.isfinite(points.grad).all()
 
 
@@ -40,8 +37,8 @@ def test_each_quantity_is_as_it_is_defined():
     by_definition = {
         "normal": plain.mean_normal,
         "umbrella": [plain.umbrella(v) for v in vertices],
-        "spoke_length": [[plain.spread(v)] for v in vertices],
-        "square": [[plain.spread(v) ** 2] for v in vertices],
+        "spoke_length": [[plain.spoke_length(v)] for v in vertices],
+        "square": [[plain.spoke_length(v) ** 2] for v in vertices],
         "mean_jump": [[x] for x in plain.mean_jump],
         "height": [[k] for k in plain.height],
         "edge_squares": [plain.length(a, b, None) ** 2 for a, b in rings.topology.edges.tolist()],
@@ -50,8 +47,6 @@ def test_each_quantity_is_as_it_is_defined():
     }
     for name, expected in by_definition.items():
         np.testing.assert_allclose(getattr(rings, name), expected, atol=1e-13, err_msg=name)
-    features = [plain.ring_features(v) for v in vertices]
-    np.testing.assert_allclose(RING_10(rings), features, atol=1e-13)
     vectors = [plain.ring_vectors(v) for v in vertices]
     np.testing.assert_allclose(ring_vectors(rings), vectors, atol=1e-13)
 

@@ -9,7 +9,7 @@ from pns_common.base.blocks import WHOLE
 from pns_common.connectivity.topology import build_topology
 from pns_common.formula.fold_guard import FoldGuard
 from pns_common.levels.step import level_step
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from pns_common.rules.loop import loop_edge_rule, loop_vertex_rule
 from pns_common.schemes import Scheme, loop
 from tests.support.meshes import icosphere

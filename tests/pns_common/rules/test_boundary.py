@@ -5,7 +5,7 @@ import pytest
 
 from pns_common.connectivity.topology import build_topology
 from pns_common.rules.boundary import BoundaryRule
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from pns_common.rules.placement import Placement
 from pns_common.rules.scale_free_form import ScaleFreeForm
 

@@ -8,12 +8,12 @@ import pytest
 from pns_common.connectivity.topology import build_topology
 from pns_common.features.edge_features import paper_features
 from pns_common.features.orientation import FIRST_FACE
+from pns_common.features.ring_features import RING_10
 from pns_common.formula.correction import curvature_gate
 from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.formula.vertex_operator import VertexOperator
-from pns_common.geometry.rings import RING_10
+from pns_common.rules.control_level import control_level
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
-from pns_common.rules.level import control_level
 from tests.support.meshes import bumpy_sphere, grid
 from tests.support.plain_operator import PlainMesh, shortened
 
@@ -49,7 +49,7 @@ def test_a_vertex_moves_along_its_rings_vectors(weights):
     placed = vertex_rule(weights)(control_level(POINTS, TOPOLOGY, R))
     for v, position in enumerate(placed.positions):
         combined = shortened(np.array(weights), 1) @ np.array(PLAIN.ring_vectors(v))
-        size = BUDGET / R * PLAIN.spread(v) ** 2 * tanh(SHARPNESS * PLAIN.mean_jump[v])
+        size = BUDGET / R * PLAIN.spoke_length(v) ** 2 * tanh(SHARPNESS * PLAIN.mean_jump[v])
         expected = PLAIN.loop_vertex(v, POINTS) + size * shortened(combined, 1)
         np.testing.assert_allclose(position, expected, atol=1e-14)
     assert placed.corrected.all()

@@ -4,7 +4,7 @@ import numpy as np
 
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology
-from pns_common.rules.level import ControlLevel, control_level
+from pns_common.rules.control_level import ControlLevel, control_level
 from pns_common.rules.loop import loop_edge_rule, loop_vertex_rule
 from tests.support.meshes import TETRAHEDRON, bent, grid
 

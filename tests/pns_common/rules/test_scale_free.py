@@ -12,7 +12,7 @@ from pns_common import Mesh, loop, pns, refine
 from pns_common.connectivity.topology import build_topology, split
 from pns_common.geometry.frames import face_normals
 from pns_common.levels.step import level_step
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from pns_common.schemes import (
     edge_operator,
     scale_free_form,

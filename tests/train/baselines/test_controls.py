@@ -6,7 +6,7 @@ import pytest
 from pns_common.connectivity.topology import build_topology
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
-from pns_common.rules.level import control_level
+from pns_common.rules.control_level import control_level
 from pns_common.schemes import loop
 from train.baselines.controls import flat, nc
 from train.data.primitives import box, globe, icosphere, torus

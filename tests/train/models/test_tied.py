@@ -10,7 +10,7 @@ from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, check_parity
 from pns_common import Mesh, pns, refine
 from pns_common.features.edge_features import FEATURE_SETS
-from pns_common.geometry.rings import RING_10
+from pns_common.features.ring_features import RING_10
 from pns_common.models.card import ModelCard
 from pns_common.runtimes.onnx_model import model_from_bytes
 from pns_common.runtimes.tied_network import TiedNetwork

@@ -48,7 +48,7 @@ def test_the_correction_of_format_2(way):
     WAYS[way](correct)(Z, GATE, *AROUND, PER_LENGTH, CHOSEN, 0, *out)
     for i, v in enumerate(CHOSEN):
         vector = shortened(shortened(Z[i], 1) @ np.array(PLAIN.ring_vectors(v)), 1)
-        bound = PER_LENGTH[i] * PLAIN.spread(v) ** 2
+        bound = PER_LENGTH[i] * PLAIN.spoke_length(v) ** 2
         np.testing.assert_allclose(delta[v], GATE[i] * bound * vector, atol=1e-15)
         assert (gate[v], envelope[v]) == (GATE[i], pytest.approx(bound))
         assert ratio[v] == pytest.approx(np.linalg.norm(delta[v]) / bound)
@@ -66,6 +66,6 @@ def test_the_scale_free_correction(way, boundary):
     for i, v in enumerate(CHOSEN):
         combined = shortened(Z[i], 1) @ np.array(PLAIN.ring_vectors(v))
         wanted = 0.9 * pushes[v] + boundary * rim[v] + 0.5 * PLAIN.length_at(v, 0.8) * combined
-        bound = PER_LENGTH[i] * PLAIN.spread(v) ** 2
+        bound = PER_LENGTH[i] * PLAIN.spoke_length(v) ** 2
         np.testing.assert_allclose(delta[v], GATE[i] * shortened(wanted, bound), atol=1e-15)
         assert envelope[v] == pytest.approx(bound)

@@ -145,7 +145,7 @@ def test_an_old_file_whose_weights_are_inputs_is_taken():
 
 @pytest.mark.parametrize("name", ["paper"])
 def test_bundled_models_stay_far_below_the_limit(name, monkeypatch):
-    monkeypatch.setattr("pns_common.models.shapes.LARGEST_CALL", LARGEST_CALL // 4)
+    monkeypatch.setattr("pns_common.runtimes.call_shapes.LARGEST_CALL", LARGEST_CALL // 4)
     load_model(name)
 
 

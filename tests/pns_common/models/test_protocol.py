@@ -1,7 +1,7 @@
 """What counts as a model, and as one with a network for old vertices."""
 
 from pns_common import load_model
-from pns_common.models.model import Model, VertexModel
+from pns_common.models.protocol import Model, VertexModel
 from tests.support.networks import CARD, Float64Model, random_layers
 
 

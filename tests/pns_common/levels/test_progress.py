@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, load_model, loop, pns, refine
-from pns_common.base.progress import LEARNED_COST, LIMIT_COST
+from pns_common.levels.progress import LEARNED_COST, LIMIT_COST
 from tests.support.meshes import grid
 from tests.support.networks import random_model
 

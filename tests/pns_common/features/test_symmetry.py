@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common.features.edge_features import FEATURE_SETS
-from pns_common.geometry.symmetry import HALF_TURN, MIRROR, TURN_OVER, Feature, symmetries
+from pns_common.features.symmetry import HALF_TURN, MIRROR, TURN_OVER, Feature, symmetries
 
 
 @pytest.mark.parametrize("name", FEATURE_SETS)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pns_common.connectivity.topology import build_topology
-from pns_common.geometry.ring_fields import divided, mean_normals, neighbour_mean, spokes
+from pns_common.geometry.ring_sums import divided, mean_normals, neighbour_mean, spokes
 from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid
 from tests.support.plain_operator import PlainMesh
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from pns_common.connectivity.topology import build_topology
 from pns_common.formula.prior import normal_pushes
-from pns_common.rules.level import ControlLevel, control_level
+from pns_common.rules.control_level import ControlLevel, control_level
 from tests.support.meshes import TETRAHEDRON, bumpy_sphere
 
 POINTS = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]])
