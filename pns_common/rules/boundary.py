@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from pns_common.base.arrays import Array, dot, gather, namespace, scatter
 from pns_common.connectivity.topology import EdgeClass
-from pns_common.formula.boundary_prior import boundary_pushes, boundary_square, boundary_vertices
+from pns_common.formula.boundary_prior import boundary_square, boundary_vertices
 from pns_common.formula.correction import Correction, proximity_ratio, shortened
 from pns_common.masks.stencils import MIDPOINT, loop_vertex_vertices
 from pns_common.rules.control_level import ControlLevel
@@ -26,8 +26,7 @@ class BoundaryRule:
 
     def pushes(self, level: ControlLevel) -> Float[Array, "V 3"]:
         """d of the boundary's vertices, 0 elsewhere."""
-        strength, topology = self.form.boundary_strength, level.topology
-        return strength * boundary_pushes(level.points, topology, self.gate_sharpness)
+        return self.form.boundary_strength * level.boundary_pushes(self.gate_sharpness)
 
     def move_vertices(self, level: ControlLevel, placed: Placement) -> Placement:
         """Boundary vertices moved too: Loop's curve mask of the pushes, within ρ."""

@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 from pns_common.base.arrays import Array
 from pns_common.base.blocks import WHOLE, Blocks
 from pns_common.connectivity.topology import Topology
+from pns_common.formula.boundary_prior import boundary_pushes
 from pns_common.formula.correction import BudgetPerLength
 from pns_common.formula.prior import normal_pushes
 from pns_common.geometry.frames import face_normals
@@ -62,6 +63,11 @@ class ControlLevel:
     def network_lengths(self) -> Callable[[float | None], NetworkLengths]:
         """ℓ of the scale-free rules as a function of α: computed once, since both have the same."""
         return cache(partial(network_lengths, self.rings))
+
+    @cached_property
+    def boundary_pushes(self) -> Callable[[float], Float[Array, "V 3"]]:
+        """d of the boundary's prior at b = 1 as a function of c_v, likewise: four readers share it."""
+        return cache(partial(boundary_pushes, self.points, self.topology))
 
 
 def control_level(
