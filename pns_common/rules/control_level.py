@@ -66,7 +66,7 @@ class ControlLevel:
 
     @cached_property
     def boundary_pushes(self) -> Callable[[float], Float[Array, "V 3"]]:
-        """d of the boundary's prior at b = 1 as a function of c_v, likewise: four readers share it."""
+        """d of the boundary's prior at b = 1, a function of c_v: computed once, read four times."""
         return cache(partial(boundary_pushes, self.points, self.topology))
 
 
