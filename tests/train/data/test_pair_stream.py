@@ -16,7 +16,8 @@ from train.data.authored_pairs import authored_pair
 from train.data.faceted_pairs import faceted_pair
 from train.data.grid_pairs import grid_pair
 from train.data.lathe_pairs import lathe_pair, turned
-from train.data.pair_stream import pair_stream, patch_pair
+from train.data.pair_stream import pair_stream
+from train.data.patch_pairs import patch_pair
 from train.data.references import Pair, Reference, moved
 from train.data.solid_pairs import solid_pairs
 from train.data.sphere_pairs import sphere_pair
