@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Int
@@ -15,10 +14,8 @@ from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
 from ...meshes.weld import Weld, weld
 from ...meshes.weld_tolerance import WHOLE, weld_within
 from ..read.primitives import TrianglePrimitive
+from .parts import Parts
 from .skin_and_morph import SkinAndMorph, read_skin_and_morph
-
-if TYPE_CHECKING:
-    from .union import Parts
 
 
 @dataclass(frozen=True, eq=False)

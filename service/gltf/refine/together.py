@@ -30,11 +30,12 @@ from ..read.primitives import TrianglePrimitive
 from ..stage_shares import StageShares
 from .control_mesh import ControlMesh, control_mesh, slices, vertex_rows
 from .local_joints import local_joints
+from .parts import Parts
 from .refined_primitives import RefinedMesh, RefinedPrimitive, refined_primitives
 from .refinement import GATE, RATIO, changes_of_primitive, changes_of_vertices, creases_of
 from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
 from .smooth_normals import with_normal_accessor, with_smooth_normals
-from .union import Parts, divided, joined
+from .union import divided, joined
 
 # More faces than this, refined, and a mesh's own work is more than what surrounds it.
 MOST_FACES = 2048

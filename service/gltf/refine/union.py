@@ -7,48 +7,17 @@ meshes. So a mesh's own rows and faces keep the order among themselves that they
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Int, Shaped
+from jaxtyping import Int, Shaped
 
 from pns_common.connectivity.disjoint_union import disjoint_faces
 
-from ...meshes.weld import distinct_rows
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
+from .parts import Parts
 from .refined_primitives import RefinedPrimitive
 from .skins import COLUMNS, skin_sets
-
-
-@dataclass(frozen=True, eq=False)
-class Parts:
-    """Which of P meshes the rows and the faces of joined primitives are of, primitive by primitive.
-
-    Attributes:
-        of_row: (N,) the part of each row.
-        of_face: (F,) the part of each face.
-        count: P.
-    """
-
-    of_row: Int[np.ndarray, " N"]
-    of_face: Int[np.ndarray, " F"]
-    count: int
-
-    @property
-    def order(self) -> Int[np.ndarray, " F"]:
-        """The faces part by part, each part's in the order of its primitives."""
-        return np.argsort(self.of_face, kind="stable")
-
-    def count_faces(self, chosen: Bool[np.ndarray, " F"]) -> Int[np.ndarray, " P"]:
-        """How many of the chosen faces each part has."""
-        return np.bincount(self.of_face[chosen], minlength=self.count)
-
-    def apart(self, labels: Int[np.ndarray, " N"] | None) -> Int[np.ndarray, " N"]:
-        """Labels of rows that no two parts share."""
-        if labels is None:
-            return self.of_row
-        return distinct_rows(np.column_stack([labels, self.of_row]))
 
 
 def kind_of(primitives: Sequence[TrianglePrimitive]) -> Hashable | None:
