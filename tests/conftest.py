@@ -17,13 +17,14 @@ import tests.support.typecheck  # noqa: F401  (the hook finds it by name)
 TESTS = Path(__file__).resolve().parent
 PACKAGE = TESTS.parent / "pns_common"
 # These check their own input and raise errors of their own: the edge where values come in.
-FRONT_DOORS = {"mesh", "refine", "parameters"}
+FRONT_DOORS = {"mesh.py", "refine.py", "base/parameters.py"}
 CHECKED = [
-    f"pns_common.{path.stem}" for path in PACKAGE.glob("*.py") if path.stem not in FRONT_DOORS
+    ".".join(["pns_common", *path.relative_to(PACKAGE).with_suffix("").parts])
+    for path in sorted(PACKAGE.rglob("*.py"))
+    if path.relative_to(PACKAGE).as_posix() not in FRONT_DOORS
+    # Kernels are compiled from their source, and have their types from that.
+    and not path.is_relative_to(PACKAGE / "fused" / "kernels")
 ]
-# Kernels are compiled from their source, and have their types from that.
-for room in ("edge", "vertex", "fused", "limit", "pieces"):
-    CHECKED += [f"pns_common.{room}.{path.stem}" for path in (PACKAGE / room).glob("*.py")]
 
 # Derandomised: the same examples on every machine. Timings are never asserted.
 settings.register_profile(
@@ -42,6 +43,7 @@ FIRST_ALONE = pytest.StashKey[bool]()
 KINDS = {
     "spawning": (
         "addons",
+        "deploy",
         "docs/test_site.py",
         "fuzz",
         "service/http",
@@ -52,6 +54,7 @@ KINDS = {
         "service/workers",
         "soak",
         "test_architecture.py",
+        "test_benchmarks.py",
         "test_wheel.py",
         "web",
     ),

@@ -53,7 +53,7 @@ class TiedForm:
     first: Float32[np.ndarray, "K M"]
     hidden: Float32[np.ndarray, " H"]
     biases: Float32[np.ndarray, " B"]
-    last: Float32[np.ndarray, "3 M"]
+    last: Float32[np.ndarray, "3 N"]
     last_characters: Int32[np.ndarray, " 3"]
     last_bias: Float32[np.ndarray, " 3"]
     copies: int

@@ -61,7 +61,9 @@ def test_creases_name_vertices_of_the_mesh_that_was_given():
 
 def test_a_face_that_joining_makes_degenerate_is_refined_like_others():
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -0.0]])
-    refined, _ = refine_carried(CarriedMesh(vertices, [[0, 1, 2], [0, 3, 1]]), loop(), 2, {})
+    refined, _ = refine_carried(
+        CarriedMesh(vertices, np.array([[0, 1, 2], [0, 3, 1]])), loop(), 2, {}
+    )
     assert refined.faces.shape == (32, 3)
     assert np.isfinite(refined.vertices).all()
 

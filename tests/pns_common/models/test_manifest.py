@@ -15,7 +15,8 @@ from pns_common.runtimes.onnx_model import BUNDLED, bundled_models
 def package(tmp_path, monkeypatch):
     """A copy of the bundled files, in their place."""
     for entry in BUNDLED.iterdir():
-        (tmp_path / entry.name).write_bytes(entry.read_bytes())
+        if entry.is_file():
+            (tmp_path / entry.name).write_bytes(entry.read_bytes())
     monkeypatch.setattr(onnx_model, "BUNDLED", tmp_path)
     return tmp_path
 
