@@ -282,6 +282,7 @@ def test_what_the_course_raises_ends_the_work(stage):
         )
 
 
+@pytest.mark.spawning
 def test_validator_accepts_every_kind_of_attribute(tmp_path):
     rng = np.random.default_rng(0)
     shape = box(

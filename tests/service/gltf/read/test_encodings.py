@@ -194,6 +194,7 @@ def plain(mesh):
     return files.glb(shapes)
 
 
+@pytest.mark.spawning
 def test_every_storage_is_refined_as_its_plain_twin_and_is_valid(tmp_path):
     written = []
 

@@ -137,6 +137,7 @@ def test_primitives_of_one_mesh_morph_together_across_their_common_edge():
     assert len(position_at) == 66
 
 
+@pytest.mark.spawning
 def test_weights_names_and_bounds_stay_valid(tmp_path):
     names = ("POSITION", "NORMAL", "TANGENT")
     tree, binary = files.document([box(targets=[box_deltas(n, names) for n in (0, 3)])])

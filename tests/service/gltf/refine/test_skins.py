@@ -162,6 +162,7 @@ def test_vertices_without_weight_keep_none():
     assert not attributes["JOINTS_0"].any()
 
 
+@pytest.mark.spawning
 def test_a_mesh_shown_with_and_without_its_skin_is_refined_once(tmp_path):
     tree, binary = files.document([bound(*random_binding(3))])
     tree["nodes"] += [{"mesh": 0, "skin": 0}, {}, {}, {}]

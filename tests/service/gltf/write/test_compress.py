@@ -126,6 +126,7 @@ def test_morph_targets_stay_uncompressed_under_draco_and_are_named():
     } in result.report["changes"]
 
 
+@pytest.mark.spawning
 def test_validator_finds_no_error_in_compressed_output(tmp_path):
     paths = [tmp_path / f"{compress}.glb" for compress in KINDS]
     for path, compress in zip(paths, KINDS, strict=True):
