@@ -72,6 +72,9 @@ class Mesh:
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
 
+    def __repr__(self) -> str:
+        return f"Mesh(vertices={len(self.vertices)}, faces={len(self.faces)})"
+
     @classmethod
     def of_refined(cls, vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Mesh:
         """A mesh from arrays that a refinement step made and checked: neither copied nor read."""

@@ -7,7 +7,7 @@ new scheme is two functions and no change here.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pns_common.base.arrays import Array
 from pns_common.base.parameters import is_number
@@ -64,15 +64,15 @@ class Scheme:
     """
 
     name: str
-    vertex_rule: Rule
-    edge_rule: Rule
+    vertex_rule: Rule = field(repr=False)
+    edge_rule: Rule = field(repr=False)
     budget: float | None = None
     model: str | None = None
-    model_hash: str | None = None
+    model_hash: str | None = field(default=None, repr=False)
     learned_levels: int | None = None
-    guard: FoldGuard | None = None
-    moves_boundaries: bool = False
-    wide_bound: bool = False
+    guard: FoldGuard | None = field(default=None, repr=False)
+    moves_boundaries: bool = field(default=False, repr=False)
+    wide_bound: bool = field(default=False, repr=False)
 
 
 def loop() -> Scheme:

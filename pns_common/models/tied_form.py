@@ -58,6 +58,9 @@ class TiedForm:
     last_bias: Float32[np.ndarray, " 3"]
     copies: int
 
+    def __repr__(self) -> str:
+        return f"TiedForm(widths={self.widths.tolist()}, copies={self.copies})"
+
 
 def tied_form(layers: Sequence[Layer], group: Symmetries) -> TiedForm | None:
     """What remains of a perceptron; None where it is not tied by the group, or there is none."""

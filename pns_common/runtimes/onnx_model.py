@@ -98,9 +98,9 @@ class OnnxModel:
     """
 
     name: str
-    card: ModelCard
+    card: ModelCard = field(repr=False)
     hash: str
-    size: int
+    size: int = field(repr=False)
     _data: bytes = field(repr=False)
     _network: Network | RowNetwork = field(repr=False)
 

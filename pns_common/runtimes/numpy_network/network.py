@@ -58,6 +58,9 @@ class NumpyNetwork:
     nodes: Sequence[Node]
     weights: Mapping[str, np.ndarray]
 
+    def __repr__(self) -> str:
+        return f"NumpyNetwork(nodes={len(self.nodes)}, weights={len(self.weights)})"
+
     def run(self, output: str, inputs: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return one output in single precision; ``inputs`` are arrays by name.
 
