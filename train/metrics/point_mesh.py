@@ -78,6 +78,12 @@ def nearest(tree: FaceTree, points: Float[np.ndarray, "P 3"]) -> Nearest:
     return Nearest(np.sqrt(square), point, lowest)
 
 
+def distances(tree: FaceTree, points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, " P"]:
+    """Return how far each point is from the mesh, in its unit: `nearest` without the rest."""
+    square = tree.tree.squared_distance(tree.vertices, tree.faces, points)[0]
+    return np.sqrt(np.asarray(square))
+
+
 def _barycentric(
     corners: Float[np.ndarray, "P 3 3"], points: Float[np.ndarray, "P 3"]
 ) -> Float[np.ndarray, "P 3"]:

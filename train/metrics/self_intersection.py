@@ -3,14 +3,14 @@
 import math
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool
 from numba import njit
 from numba.extending import register_jitable
 
 from pns_common.fused.kernels.rings import between, cross, dot
 from pns_common.mesh import Mesh
 
-CELL = 1.5
+CELL = 2.0
 """Side of a cell, in mean side lengths of the faces' boxes."""
 
 MOST_CELLS = 1 << 20
@@ -19,7 +19,8 @@ MOST_CELLS = 1 << 20
 SLACK = 1e-12
 """Crossings this close to a border, as a share of a triangle, are no crossings."""
 
-Corners = Float[np.ndarray, "N 3 3"]
+SPREAD = 0x9E3779B97F4A7C15 >> 1
+"""Times this, keys of neighbouring cells fall into bins far apart (Knuth's multiplicative hash)."""
 
 for helper in (between, cross, dot):
     register_jitable(helper)
@@ -37,95 +38,148 @@ def self_intersecting(mesh: Mesh) -> Bool[np.ndarray, " F"]:
     lower, upper = corners.min(axis=1), corners.max(axis=1)
     origin = lower.min(axis=0)
     side = max(CELL * float((upper - lower).mean()), float(np.ptp(upper)) / MOST_CELLS, 1e-300)
-    keys, face = _entries(lower, upper, origin, side)
-    _mark(mesh.vertices, mesh.faces, lower, upper, origin, side, keys, face, crossing)
+    first = np.floor((lower - origin) / side).astype(np.int64)
+    last = np.floor((upper - origin) / side).astype(np.int64)
+    begin, keys, face = _binned(first, last)
+    boxes, normals = np.hstack([lower, upper]), _normals(mesh.vertices, mesh.faces)
+    _mark(mesh.vertices, mesh.faces, boxes, normals, first, begin, keys, face, crossing)
     return crossing
 
 
-def _entries(
-    lower: Float[np.ndarray, "F 3"],
-    upper: Float[np.ndarray, "F 3"],
-    origin: Float[np.ndarray, " 3"],
-    side: float,
-) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " N"]]:
-    """Return for each cell that a face's box touches the cell's key and the face, by key."""
-    first = np.floor((lower - origin) / side).astype(np.int64)
-    span = np.floor((upper - origin) / side).astype(np.int64) - first + 1
-    copies = span.prod(axis=1)
-    face = np.repeat(np.arange(len(lower)), copies)
-    place = np.arange(len(face)) - np.repeat(np.cumsum(copies) - copies, copies)
-    rows = span[face]
-    steps = np.stack(
-        [place % rows[:, 0], place // rows[:, 0] % rows[:, 1], place // (rows[:, 0] * rows[:, 1])],
-        axis=1,
-    )
-    cell = first[face] + steps
-    keys = (cell[:, 0] * MOST_CELLS + cell[:, 1]) * MOST_CELLS + cell[:, 2]
-    order = np.argsort(keys, kind="stable")
-    return keys[order], face[order]
+@njit(cache=True)
+def _binned(first, last):
+    """Return for each cell that a face's box touches the cell's key and the face, bin by bin.
+
+    Entries begin[n] … begin[n + 1] − 1 are those of bin n, of several cells perhaps.
+    """
+    count = 0
+    for f in range(len(first)):
+        touched = 1
+        for axis in range(3):
+            touched *= last[f, axis] - first[f, axis] + 1
+        count += touched
+    bins = 1
+    while bins < count:
+        bins *= 2
+    begin = np.zeros(bins + 1, np.int64)
+    keys, face = np.empty(count, np.int64), np.empty(count, np.int32)
+    # First counted, then filled in from the back of each bin.
+    for filling in range(2):
+        for f in range(len(first)):
+            for x in range(first[f, 0], last[f, 0] + 1):
+                for y in range(first[f, 1], last[f, 1] + 1):
+                    for z in range(first[f, 2], last[f, 2] + 1):
+                        key = _key(x, y, z)
+                        place = ((key * SPREAD) >> 40) & (bins - 1)
+                        if filling:
+                            begin[place] -= 1
+                            keys[begin[place]], face[begin[place]] = key, f
+                        else:
+                            begin[place] += 1
+        if not filling:
+            for n in range(bins):
+                begin[n + 1] += begin[n]
+    return begin, keys, face
 
 
 @njit(cache=True)
-def _mark(vertices, faces, lower, upper, origin, side, keys, face, crossing):
+def _key(x, y, z):
+    return (x * MOST_CELLS + y) * MOST_CELLS + z
+
+
+@njit(cache=True)
+def _normals(vertices, faces):
+    """Return twice the area vector of each face."""
+    normals = np.empty((len(faces), 3))
+    for f in range(len(faces)):
+        a, b, c = faces[f]
+        normals[f] = cross(between(vertices, a, b), between(vertices, a, c))
+    return normals
+
+
+@njit(cache=True)
+def _mark(vertices, faces, boxes, normals, first, begin, keys, face, crossing):
     """Mark the faces that cross another one of a cell."""
-    for entry in range(len(keys)):
-        later = entry + 1
-        while later < len(keys) and keys[later] == keys[entry]:
-            i, j = face[entry], face[later]
-            later += 1
-            if crossing[i] and crossing[j]:
-                continue
-            if _boxes_meet_here(lower, upper, origin, side, i, j, keys[entry]) and _cross(
-                vertices, faces[i], faces[j]
-            ):
-                crossing[i] = crossing[j] = True
+    for n in range(len(begin) - 1):
+        for entry in range(begin[n], begin[n + 1]):
+            i = face[entry]
+            for later in range(entry + 1, begin[n + 1]):
+                j = face[later]
+                if (
+                    keys[later] == keys[entry]
+                    and not (crossing[i] and crossing[j])
+                    and _boxes_meet(boxes, i, j)
+                    and _common_corner(first, i, j) == keys[entry]
+                    and _cross(vertices, normals, faces, i, j)
+                ):
+                    crossing[i] = crossing[j] = True
 
 
 @njit(cache=True)
-def _boxes_meet_here(lower, upper, origin, side, i, j, key):
-    """Whether two boxes overlap and their common corner lies in this cell, as in one alone."""
-    here = 0
+def _boxes_meet(boxes, i, j):
     for axis in range(3):
-        low = max(lower[i, axis], lower[j, axis])
-        if low > min(upper[i, axis], upper[j, axis]):
+        if boxes[i, axis] > boxes[j, axis + 3] or boxes[j, axis] > boxes[i, axis + 3]:
             return False
-        here = here * MOST_CELLS + math.floor((low - origin[axis]) / side)
-    return here == key
+    return True
 
 
 @njit(cache=True)
-def _cross(vertices, first, second):
+def _common_corner(first, i, j):
+    """Return the key of the cell where the common part of two boxes begins: one cell alone."""
+    return _key(
+        max(first[i, 0], first[j, 0]), max(first[i, 1], first[j, 1]), max(first[i, 2], first[j, 2])
+    )
+
+
+@njit(cache=True)
+def _cross(vertices, normals, faces, i, j):
     """Whether an edge of either triangle passes through the other; never where they share two."""
     shared = 0
-    for corner in first:
-        shared += _is_of(corner, second)
-    if shared > 1:
-        return False
-    return _edge_pierces(vertices, first, second) or _edge_pierces(vertices, second, first)
-
-
-@njit(cache=True)
-def _is_of(vertex, triangle):
-    return vertex == triangle[0] or vertex == triangle[1] or vertex == triangle[2]
-
-
-@njit(cache=True)
-def _edge_pierces(vertices, edges, triangle):
     for corner in range(3):
-        start, end = edges[corner], edges[(corner + 1) % 3]
+        shared += _is_of(faces[i, corner], faces, j)
+    return (
+        shared < 2
+        and not _on_one_side(vertices, normals, faces, i, j)
+        and not _on_one_side(vertices, normals, faces, j, i)
+        and (_edge_pierces(vertices, faces, i, j) or _edge_pierces(vertices, faces, j, i))
+    )
+
+
+@njit(cache=True)
+def _is_of(vertex, faces, i):
+    return vertex == faces[i, 0] or vertex == faces[i, 1] or vertex == faces[i, 2]
+
+
+@njit(cache=True)
+def _on_one_side(vertices, normals, faces, plane, other):
+    """Whether the corners that a face has alone lie strictly on one side of the other's plane."""
+    above, below = False, False
+    for corner in range(3):
+        vertex = faces[other, corner]
+        if not _is_of(vertex, faces, plane):
+            height = dot(normals[plane], between(vertices, faces[plane, 0], vertex))
+            above |= not height < 0
+            below |= not height > 0
+    return not (above and below)
+
+
+@njit(cache=True)
+def _edge_pierces(vertices, faces, i, j):
+    """Whether an edge of face i passes through face j."""
+    for corner in range(3):
+        start, end = faces[i, corner], faces[i, (corner + 1) % 3]
         if (
-            not _is_of(start, triangle)
-            and not _is_of(end, triangle)
-            and _pierces(vertices, start, end, triangle)
+            not _is_of(start, faces, j)
+            and not _is_of(end, faces, j)
+            and _pierces(vertices, start, end, faces[j, 0], faces[j, 1], faces[j, 2])
         ):
             return True
     return False
 
 
 @njit(cache=True)
-def _pierces(vertices, start, end, triangle):
+def _pierces(vertices, start, end, a, b, c):
     """Whether a segment passes through a triangle (Möller and Trumbore 1997)."""
-    a, b, c = triangle
     u, v = between(vertices, a, b), between(vertices, a, c)
     along, offset = between(vertices, start, end), between(vertices, a, start)
     side = cross(along, v)

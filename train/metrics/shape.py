@@ -17,6 +17,11 @@ from train.surfaces.implicit import Surface, signed_distance, unit_normal
 
 PROJECTIONS = 4
 FOOT_POINT_STEPS = 40
+CONVERGED = 1e-12
+"""A foot point that a step moves by less than this, in the surface's unit, is found."""
+
+SWINGS = -1 / 3
+"""Where a step turns back by more than this share of the one before, half of it gets nearer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,18 +124,25 @@ def nearest_points(surface: Surface, points: Float[np.ndarray, "P 3"]) -> Float[
     """Return the point of a surface nearest to each point, for points close to it.
 
     Foot-point iteration: onto the tangent plane at the last estimate, then back to the surface.
-    It converges where distance times curvature is below 1; the nearest estimate seen is kept.
+    It converges where distance times curvature is below 1; the nearest estimate seen is kept. The
+    surface's parameters are floats.
     """
-    estimate = _projected(surface, points)
-    nearest, least = estimate, norm(points - estimate)
+    nearest = _projected(surface, points)
+    left = np.arange(len(points))
+    estimate, before, share = nearest, np.zeros_like(points), np.ones(len(points))
     for _ in range(FOOT_POINT_STEPS):
-        normal = unit_normal(surface, estimate)
-        foot = points - dot(points - estimate, normal)[:, None] * normal
-        # Half-way: where the surface bends towards the point, whole steps swing.
-        estimate = _projected(surface, (estimate + foot) / 2)
-        away = norm(points - estimate)
-        nearest = np.where((away < least)[:, None], estimate, nearest)
-        least = np.minimum(away, least)
+        sought = points[left]
+        normal, away = unit_normal(surface, estimate), sought - estimate
+        step = away - dot(away, normal)[:, None] * normal
+        # Where the surface bends towards the point, whole steps swing.
+        share = np.where(dot(step, before) < SWINGS * dot(before, before), 0.5, share)
+        estimate = _projected(surface, estimate + share[:, None] * step)
+        nearer = norm(sought - estimate) < norm(sought - nearest[left])
+        nearest[left[nearer]] = estimate[nearer]
+        moves = norm(step) > CONVERGED
+        if not moves.any():
+            break
+        left, estimate, before, share = left[moves], estimate[moves], step[moves], share[moves]
     return nearest
 
 
@@ -140,4 +152,7 @@ def _projected(surface: Surface, points: Float[np.ndarray, "P 3"]) -> Float[np.n
         gradient = surface.gradient(points)
         step = surface.value(points) / dot(gradient, gradient)
         points = points - step[:, None] * gradient
+        # Newton's method squares what is left.
+        if np.abs(step * norm(gradient)).max(initial=0) < CONVERGED:
+            break
     return points

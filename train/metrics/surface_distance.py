@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from pns_common.base.arrays import cross, dot, norm
 from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
-from train.metrics.point_mesh import FaceTree, face_tree, nearest
+from train.metrics.point_mesh import FaceTree, distances, face_tree, nearest
 
 SAMPLES = 10_000
 """Sample points on each of the two surfaces."""
@@ -100,7 +100,7 @@ def _one_way(source: Surface, target: Surface) -> SurfaceErrors:
     closest = nearest(target.tree, source.points)
     here, there = source.normals[source.faces], target.normals[closest.face]
     angle = np.arctan2(norm(cross(here, there)), dot(here, there))
-    at_vertices = nearest(target.tree, source.tree.vertices).distance
+    at_vertices = distances(target.tree, source.tree.vertices)
     return SurfaceErrors(
         mean=float(closest.distance.mean()),
         p95=float(np.percentile(closest.distance, 95)),

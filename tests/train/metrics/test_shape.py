@@ -11,7 +11,7 @@ from train.metrics.shape import (
     nearest_points,
     shape_errors,
 )
-from train.surfaces.implicit import Saddle, SphereRidge
+from train.surfaces.implicit import Ridge, Saddle, SphereRidge, unit_normal
 
 SPHERE = SphereRidge(1.0, 0.0, 1.0, 0.0)
 
@@ -34,6 +34,20 @@ def test_nearest_points_of_a_ridge_are_as_near_as_a_dense_search_finds():
     across = ridge.across(points)
     dense = [np.hypot(y - a, z - h).min() for a, h in zip(across, points[:, 2], strict=True)]
     np.testing.assert_allclose(distances, dense, atol=1e-5)
+
+
+@pytest.mark.parametrize("share", [-0.7, -0.5, 0.3, 0.6])
+def test_nearest_points_are_found_up_to_where_they_meet(share):
+    """On the normal at a crest, at a share of the radius of curvature there, inside or outside."""
+    ridge = Ridge(0.5, 8.0, 0.0, 0.0, 0.0)
+    radius = 1 / (2 * ridge.sharpness * ridge.amplitude)
+    points = np.array([[x, 1e-4, ridge.amplitude + share * radius] for x in (-0.3, 0.4)])
+    found = nearest_points(ridge, points)
+    normal = unit_normal(ridge, found)
+    away = points - found
+    aside = away - (away * normal).sum(axis=1)[:, None] * normal
+    np.testing.assert_allclose(aside, 0, atol=1e-9)
+    assert np.linalg.norm(away, axis=1) == pytest.approx(abs(share) * radius, rel=1e-4)
 
 
 def test_a_plane_of_the_wrong_tilt_has_its_tilt_as_normal_error():

@@ -246,6 +246,6 @@ EXPERIMENT = Experiment(
     title="Simplified meshes",
     source="Beyond the paper: the test of Neural Subdivision (Liu et al. 2020).",
     run=run,
-    seconds=120,
+    seconds=60,
     reads=read_files,
 )

@@ -88,6 +88,6 @@ EXPERIMENT = Experiment(
     title="Fairness",
     source="Beyond the paper.",
     run=run,
-    seconds=120,
+    seconds=30,
     reads=read_files,
 )

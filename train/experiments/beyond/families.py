@@ -82,6 +82,6 @@ EXPERIMENT = Experiment(
     title="Families of surfaces",
     source="Beyond the paper.",
     run=run,
-    seconds=240,
+    seconds=60,
     reads=model_files,
 )

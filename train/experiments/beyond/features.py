@@ -112,5 +112,5 @@ EXPERIMENT = Experiment(
     title="Signed features",
     source="Beyond the paper.",
     run=run,
-    seconds=600,
+    seconds=140,
 )

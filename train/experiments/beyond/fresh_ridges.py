@@ -76,6 +76,6 @@ EXPERIMENT = Experiment(
     title="Fresh ridges and families",
     source="Beyond the paper.",
     run=run,
-    seconds=240,
+    seconds=70,
     reads=model_files,
 )

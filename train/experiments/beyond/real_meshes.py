@@ -249,7 +249,7 @@ TEST = Experiment(
     title="Real meshes, simplified",
     source="Beyond the paper. The test set: run once, when everything was chosen.",
     run=run_test,
-    seconds=900,
+    seconds=700,
     reads=read_files,
 )
 VALIDATION = Experiment(
@@ -257,7 +257,7 @@ VALIDATION = Experiment(
     title="Real meshes, simplified: validation",
     source="Beyond the paper. The validation set, on which the default model was chosen.",
     run=run_validation,
-    seconds=900,
+    seconds=400,
     needs_assets=True,
     reads=read_files,
 )

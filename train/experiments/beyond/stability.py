@@ -87,6 +87,6 @@ EXPERIMENT = Experiment(
     title="Stars of the bundled models",
     source="Beyond the paper.",
     run=run,
-    seconds=300,
+    seconds=90,
     reads=model_files,
 )

@@ -103,6 +103,6 @@ EXPERIMENT = Experiment(
     title="Primitives and assets, level by level",
     source="Beyond the paper.",
     run=run,
-    seconds=400,
+    seconds=80,
     reads=read_files,
 )

@@ -201,6 +201,6 @@ EXPERIMENT = Experiment(
     title="Primitives and assets stay whole",
     source="Beyond the paper.",
     run=run,
-    seconds=300,
+    seconds=60,
     reads=read_files,
 )
