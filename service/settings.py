@@ -164,7 +164,7 @@ class Settings(BaseSettings):
     )
 
     @property
-    def places(self) -> int:
+    def slots(self) -> int:
         """Requests that run or wait."""
         return self.workers + self.queue
 

@@ -1,9 +1,9 @@
-"""Content types: which bodies are taken, and what a file is by its first bytes."""
+"""The kinds of files that are taken, their media types, and what a file is by its first bytes."""
 
 from __future__ import annotations
 
 import re
-from typing import Literal
+from typing import Literal, get_args
 
 from ..errors import MediaTypeError
 
@@ -13,7 +13,10 @@ JSON = "application/json"
 MULTIPART = "multipart/form-data"
 ZIP = "application/zip"
 
+# As their names end.
 Kind = Literal["glb", "gltf", "obj", "ply", "stl", "off"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+GLTF_KINDS = ("glb", "gltf")
 FORMATS: dict[str, Kind] = {
     GLB: "glb",
     GLTF: "gltf",
@@ -24,8 +27,6 @@ FORMATS: dict[str, Kind] = {
 }
 """The pipeline's name of each file type. Only OBJ's and STL's beside glTF's are registered."""
 ACCEPTED = (*FORMATS, ZIP, MULTIPART)
-
-_MESH_KINDS: tuple[Kind, ...] = ("obj", "ply", "stl", "off")
 
 _WEIGHT = re.compile(r"q\s*=\s*(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)")
 
@@ -74,4 +75,4 @@ def sniff(data: bytes) -> str:
 def mesh_kind_of(name: str) -> Kind | None:
     """What the extension of a file name says, where the first bytes would not tell: no glTF."""
     extension = name.rpartition(".")[2].lower()
-    return next((kind for kind in _MESH_KINDS if kind == extension), None)
+    return next((kind for kind in KINDS if kind == extension and kind not in GLTF_KINDS), None)

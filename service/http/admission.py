@@ -40,22 +40,22 @@ class Admission:
 
     @asynccontextmanager
     async def upload(self) -> AsyncIterator[None]:
-        """Hold a place while a body arrives.
+        """Hold a slot while a body arrives.
 
         Raises:
-            BusyError: no place is free.
+            BusyError: no slot is free.
             DrainingError: the service shuts down, now or while the body arrives.
         """
         if self.draining:
             raise DrainingError("no new request is taken", retry_after=5)
-        with self._uploads.place():
+        with self._uploads.slot():
             async with self._uploads.until_ended():
                 yield
 
     @asynccontextmanager
     async def working(self) -> AsyncIterator[None]:
         """Be under way, until `end` says otherwise. Raises DrainingError."""
-        with self._jobs.place():
+        with self._jobs.slot():
             async with self._jobs.until_ended():
                 yield
 
@@ -137,7 +137,7 @@ class _Answers:
 
 
 class _Places:
-    """Places, a bounded number or (None) any, and those who would leave theirs when told to."""
+    """Slots, a bounded number or (None) any, and those who would leave theirs when told to."""
 
     def __init__(self, name: str, count: int | None) -> None:
         self._name = name
@@ -150,7 +150,7 @@ class _Places:
             raise BusyError(f"{self.taken} {self._name} are under way; no more fit")
 
     @contextmanager
-    def place(self) -> Iterator[None]:
+    def slot(self) -> Iterator[None]:
         self.check()
         self.taken += 1
         try:

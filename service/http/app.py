@@ -76,7 +76,7 @@ def create_app(
     admission = Admission(
         uploads=settings.uploads,
         # Two at least: of which one client may hold one and a half.
-        body_bytes=max(settings.places, 2) * int(settings.body),
+        body_bytes=max(settings.slots, 2) * int(settings.body),
         answer_bytes=int(settings.answer_bytes),
     )
 

@@ -17,6 +17,7 @@ from pns_common.base.whole_file import replace_file
 from pns_common.schemes import Model
 
 from ..bodies.folder import folder_of
+from ..bodies.media import GLTF_KINDS, KINDS
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..course import Course
 from ..errors import InvalidParameter
@@ -28,7 +29,6 @@ from ..report import Change
 from . import formats
 from .flatten import flatten
 from .indexed_triangles import IndexedTriangles
-from .kinds import GLTF_KINDS, KINDS
 from .refine_triangles import check_cost, refine_triangles
 from .single_precision import rounding_changes
 from .triangles_glb import as_gltf_json, triangles_glb

@@ -14,10 +14,10 @@ from jaxtyping import Float
 
 from pns_common.connectivity.disjoint_union import disjoint_faces
 
+from ..bodies.media import GLTF_KINDS
 from ..errors import UnreadableError
 from . import unsupported
 from .indexed_triangles import NUMBER, IndexedTriangles
-from .kinds import GLTF_KINDS
 from .off import read_off, write_off
 
 if TYPE_CHECKING:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..bodies.media import GLTF_KINDS
 from ..bodies.uploads import Sent
 from ..errors import InvalidParameter, UnrefinableError
 from ..gltf.read.plan import check_memory
@@ -11,7 +12,6 @@ from ..options import Limits, Options
 from ..report import Change
 from . import formats
 from .indexed_triangles import IndexedTriangles
-from .kinds import GLTF_KINDS
 from .single_precision import LARGEST, rounding_changes
 from .triangles_glb import triangles_glb
 

@@ -25,8 +25,8 @@ from rich.progress import Task as RichTask
 from rich.table import Table
 from rich.text import Text
 
+from ..bodies.media import KINDS
 from ..errors import InvalidParameter, NoModelError, ServiceError
-from ..meshfiles.kinds import KINDS
 from ..options import Limits, Options
 from .engines.work import Engine, Work
 from .job import DONE, FAILED, PLANNED, SKIPPED, Row, Task, failed, read_libraries, run, target_of

@@ -3,7 +3,7 @@
 Weighted fair queueing (Demers, Keshav and Shenker 1989), with a job's predicted seconds for a
 packet's length: each client advances by what its jobs cost, and who has advanced least is next. So
 a client with one small job passes one with many or large ones, and nobody waits for ever. Jobs that
-are predicted to be short have a worker and places to themselves besides: no large job is ever in
+are predicted to be short have a worker and slots to themselves besides: no large job is ever in
 front of them.
 """
 
@@ -46,16 +46,16 @@ class Turns:
 
     Args:
         workers: how many jobs of any size run at the same time.
-        places: how many short ones may wait beside them, and how many others. One client may take
+        slots: how many short ones may wait beside them, and how many others. One client may take
             three quarters of them, so that it alone never locks out the others.
         short_seconds: a job that is predicted to take no longer is short.
     """
 
-    def __init__(self, workers: int, places: int, short_seconds: float) -> None:
+    def __init__(self, workers: int, slots: int, short_seconds: float) -> None:
         self.short_seconds = short_seconds
         self.running: Counter[Lane] = Counter()
         self._workers = {Lane.ANY: workers, Lane.SHORT: 1}
-        self._places = places
+        self._slots = slots
         self._waiting: list[Waiting] = []
         self._now = 0.0
         self._numbers = count()
@@ -64,7 +64,7 @@ class Turns:
 
     @property
     def waiting(self) -> int:
-        """How many wait and take a place."""
+        """How many wait and take a slot."""
         return sum(job.counted for job in self._waiting)
 
     def backlog(self, before: Waiting | None = None, *, short: bool = False) -> float:
@@ -109,10 +109,10 @@ class Turns:
 
         `come` or `leave` must follow.
 
-        One that is not `counted` takes no place: whoever sends it must be bounded otherwise.
+        One that is not `counted` takes no slot: whoever sends it must be bounded otherwise.
 
         Raises:
-            BusyError: no place is free, or none for this client; `retry_after` is the backlog.
+            BusyError: no slot is free, or none for this client; `retry_after` is the backlog.
         """
         reached = max(self._now, self._reached.get(client, 0.0)) + seconds
         # Who came first of two that have advanced as far.
@@ -128,17 +128,17 @@ class Turns:
         return waiting
 
     def check_room(self, client: str, seconds: float = 0.0) -> None:
-        """Raise BusyError where a job of this client would have to wait and finds no place."""
+        """Raise BusyError where a job of this client would have to wait and finds no slot."""
         short = self._is_short(seconds)
         if self._is_free(Lane.ANY) or (short and self._is_free(Lane.SHORT)):
             return
         rivals = [
             job for job in self._waiting if job.counted and self._is_short(job.seconds) == short
         ]
-        if len(rivals) >= self._places:
+        if len(rivals) >= self._slots:
             raise self.busy(f"{len(rivals)} jobs wait; no more fit", short=short)
         mine = sum(job.client == client for job in rivals)
-        if mine >= max(1, self._places * 3 // 4):
+        if mine >= max(1, self._slots * 3 // 4):
             text = f"{mine} jobs of this client wait; no more of one client fit"
             raise self.busy(text, short=short)
 

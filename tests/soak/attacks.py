@@ -41,7 +41,7 @@ def slow_heads(target: Target, ended: Event) -> None:
 
 
 def idle(target: Target, ended: Event) -> None:
-    """More connections than there are places for, that say nothing."""
+    """More connections than there are slots for, that say nothing."""
     hold_anew(target, ended, 700, b"", b"")
 
 

@@ -143,7 +143,7 @@ def leaving(
 def probe(address: Address, ended: Event, answers: Connection) -> None:
     """GET /healthz, ten times a second, each on a new connection; tells status and seconds.
 
-    Who has connected and said nothing while as many others came as there are places gives way to
+    Who has connected and said nothing while as many others came as there are slots gives way to
     them. A process that waits for its processor between the two may be that one: it asks again, as
     clients do where a connection ends before the answer begins. Three times in a row is no chance.
     """

@@ -14,9 +14,9 @@ from tests.soak.target import PATIENCE, Target, head, hold, side_by_side
 
 
 def followers(target: Target, ended: Event) -> None:
-    """More streams of one job's events than there are places, of which nothing is read.
+    """More streams of one job's events than there are slots, of which nothing is read.
 
-    From fewer addresses than there are places: who has one connection is then never refused.
+    From fewer addresses than there are slots: who has one connection is then never refused.
     """
     body = large_body()
     while not ended.is_set():

@@ -150,7 +150,7 @@ def _attack_in_turn(target: Target, over: Event, orders: Connection) -> None:
 def _probing(address: Address, tally: Tally, excused: int) -> Iterator[None]:
     """The probe, in a process of its own: what it measures is the service, not its clients.
 
-    An `excused` status is no mistake: of one source, attackers have the probe's own places.
+    An `excused` status is no mistake: of one source, attackers have the probe's own slots.
     """
     context = multiprocessing.get_context("spawn")
     over, (receiver, sender) = context.Event(), context.Pipe(duplex=False)

@@ -42,7 +42,7 @@ class Guest(Protocol):
 class Crowd:
     """The open connections, by address.
 
-    Proxies are exempt from the share of an address: many clients come through one. Where all places
+    Proxies are exempt from the share of an address: many clients come through one. Where all slots
     are taken, one gives way to a new connection, so that no client locks others out. It is, of
     those that there are, the first of:
 
@@ -75,7 +75,7 @@ class Crowd:
         return len(self._names)
 
     def enter(self, guest: Guest, address: str) -> str | None:
-        """Take a place for a connection; where there is none, say why and take none."""
+        """Take a slot for a connection; where there is none, say why and take none."""
         name = None if is_named(address, self.proxies) else site(address)
         if (
             name is not None
@@ -93,7 +93,7 @@ class Crowd:
         return None
 
     def leave(self, guest: Guest) -> None:
-        """Give the place of a connection back, where it has one."""
+        """Give the slot of a connection back, where it has one."""
         if guest in self._names:
             self._forget(guest)
             name = self._names.pop(guest)

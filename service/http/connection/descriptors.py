@@ -29,8 +29,8 @@ def fitting(settings: Settings) -> int:
         import resource
     except ImportError:  # Windows has no such limit.
         return settings.connections
-    # Short jobs have a worker and places of their own.
-    requests = settings.places + settings.queue + 1 + settings.uploads
+    # Short jobs have a worker and slots of their own.
+    requests = settings.slots + settings.queue + 1 + settings.uploads
     reserved = OF_PROCESS + OF_WORKER * (settings.workers + 1) + OF_REQUEST * requests
     reserved += OF_RESULT * settings.results
     wanted = reserved + settings.connections

@@ -47,7 +47,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
 
     What uvicorn does stays; on top of it:
 
-    - a connection has a place in the crowd or is refused with 503;
+    - a connection has a slot in the crowd or is refused with 503;
     - a head must arrive within its time, and an answer be taken at a least rate;
     - a body is parsed in short turns and may not come in countless pieces;
     - an answer given before the body is whole ends the connection, after it has been heard.
@@ -77,7 +77,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
     # The connection's life
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a place, or refuse."""
+        """Take a slot, or refuse."""
         outlet = self._outlet = Outlet(transport, self._end)
         self._taking = Taking(outlet, self._shared.bounds.answer, self._abort)
         super().connection_made(outlet)  # type: ignore[arg-type]
@@ -293,7 +293,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
                 real.resume_reading()
 
     def _is_heard(self) -> bool:
-        """Whether nothing more is expected of the client; of those without a place, nothing is."""
+        """Whether nothing more is expected of the client; of those without a slot, nothing is."""
         if not self._has_place:
             return True
         if self.conn.their_state is h11.IDLE:

@@ -1,4 +1,4 @@
-"""The admission by itself: places, bytes, and how those inside are told to leave."""
+"""The admission by itself: slots, bytes, and how those inside are told to leave."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whose turn it is: short jobs, fair shares, places, and who leaves the line."""
+"""Whose turn it is: short jobs, fair shares, slots, and who leaves the line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def granted(*waiting: Waiting) -> list[bool]:
 
 def test_a_short_job_has_a_worker_to_itself() -> None:
     async def scenario() -> None:
-        turns = Turns(workers=1, places=9, short_seconds=0.5)
+        turns = Turns(workers=1, slots=9, short_seconds=0.5)
         large, next_large = turns.join("a", 30), turns.join("b", 30)
         short = turns.join("c", 0.1)
         assert granted(large, next_large, short) == [True, False, True]
@@ -38,7 +38,7 @@ def test_a_short_job_has_a_worker_to_itself() -> None:
 
 def test_clients_take_turns_by_what_their_jobs_cost() -> None:
     async def scenario() -> None:
-        turns = Turns(workers=1, places=9, short_seconds=0)
+        turns = Turns(workers=1, slots=9, short_seconds=0)
         running = turns.join("a", 1)
         many = [turns.join("a", 10) for _ in range(3)]
         lone = turns.join("b", 10)
@@ -55,7 +55,7 @@ def test_clients_take_turns_by_what_their_jobs_cost() -> None:
 
 def test_who_takes_more_than_was_predicted_stands_behind_the_others() -> None:
     async def scenario() -> None:
-        turns = Turns(workers=1, places=9, short_seconds=0)
+        turns = Turns(workers=1, slots=9, short_seconds=0)
         running = turns.join("a", 0.01)
         many = [turns.join("a", 0.01) for _ in range(3)]
         lone = turns.join("b", 5)
@@ -73,7 +73,7 @@ def test_who_takes_more_than_was_predicted_stands_behind_the_others() -> None:
 
 def test_places_are_bounded_and_one_client_never_takes_all() -> None:
     async def scenario() -> None:
-        turns = Turns(workers=1, places=4, short_seconds=0)
+        turns = Turns(workers=1, slots=4, short_seconds=0)
         turns.join("a", 10)
         for _ in range(3):
             turns.join("a", 10)
@@ -90,7 +90,7 @@ def test_places_are_bounded_and_one_client_never_takes_all() -> None:
 
 def test_what_is_not_counted_takes_no_place() -> None:
     async def scenario() -> None:
-        turns = Turns(workers=1, places=0, short_seconds=0)
+        turns = Turns(workers=1, slots=0, short_seconds=0)
         turns.join("a", 10)
         glance = turns.join("a", 0, counted=False)
         assert glance.lane is Lane.SHORT
@@ -102,7 +102,7 @@ def test_what_is_not_counted_takes_no_place() -> None:
 
 def test_who_leaves_makes_room_and_who_leaves_late_gives_the_turn_back() -> None:
     async def scenario() -> None:
-        turns = Turns(workers=1, places=2, short_seconds=0)
+        turns = Turns(workers=1, slots=2, short_seconds=0)
         first, second, third = (turns.join(name, 10) for name in "abc")
         assert [turns.place_of(job) for job in (second, third)] == [0, 1]
         coming = asyncio.create_task(turns.come(second))
@@ -125,7 +125,7 @@ def test_who_leaves_makes_room_and_who_leaves_late_gives_the_turn_back() -> None
 
 def test_the_backlog_is_what_is_in_front() -> None:
     async def scenario() -> None:
-        turns = Turns(workers=2, places=9, short_seconds=0)
+        turns = Turns(workers=2, slots=9, short_seconds=0)
         first = turns.join("a", 10)
         turns.join("b", 20)
         waiting = turns.join("c", 30)
@@ -140,7 +140,7 @@ def test_no_large_job_counts_as_in_front_of_a_short_one() -> None:
     """Else a short one is refused, or told to come back in minutes, though it is next."""
 
     async def scenario() -> None:
-        turns = Turns(workers=1, places=4, short_seconds=0.5)
+        turns = Turns(workers=1, slots=4, short_seconds=0.5)
         # Its turn by cost is behind those of the large ones.
         turns.end(turns.join("a", 0.25), 500)
         for client in "bcd":
