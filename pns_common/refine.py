@@ -16,7 +16,13 @@ from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
 from pns_common.base.deferred import Deferred
 from pns_common.base.parameters import is_number, is_whole
 from pns_common.errors import ParameterError
-from pns_common.fused import KERNEL_ROWS, fits, kernels_available, kernels_loaded, kernels_pay
+from pns_common.fused import (
+    fits,
+    kernel_blocks,
+    kernels_available,
+    kernels_loaded,
+    kernels_pay,
+)
 from pns_common.fused.known import kernels_know
 from pns_common.levels.array_steps import array_steps
 from pns_common.levels.diagnostics import LevelReport, level_report, limit_distances
@@ -132,7 +138,7 @@ def refine(
         # Loads the compiler's runtime, which whoever only imports the package does not need.
         from pns_common.fused.refine import refine_fused
 
-        made = refine_fused(*arguments, Blocks(workers, KERNEL_ROWS, work.rows), work.level_ends)
+        made = refine_fused(*arguments, kernel_blocks(workers, work.rows), work.level_ends)
     else:
         made = refine_arrays(*arguments, Blocks(workers, BLOCK_ROWS, work.rows), work.level_ends)
     points, normals = made.points, None

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.errors import ParameterError
-from pns_common.fused import KERNEL_ROWS
+from pns_common.fused import kernel_blocks
 from pns_common.masks.limit import refined_limit_normals, refined_limit_positions
 from pns_common.mesh import Mesh
 from pns_common.refine import (
@@ -78,7 +78,7 @@ def refine_parts(
     from pns_common.fused.refine_parts import refine_parts_fused
 
     workers = available_threads() if threads is None else threads
-    blocks = Blocks(workers, KERNEL_ROWS)
+    blocks = kernel_blocks(workers)
     made = refine_parts_fused(mesh, part_faces, scheme, levels, lengths, creases, blocks)
     points, normals = made.points, None
     if limit:

@@ -29,16 +29,24 @@ class Blocks:
     """How to run row-wise work: ``threads`` workers over blocks of ``rows`` rows.
 
     ``before`` is called with the number of rows of each block before it is begun, from whichever
-    thread that is; what it raises ends the work.
+    thread that is; what it raises ends the work. Where there is less to do than two blocks for each
+    thread, blocks are smaller, but of ``least`` rows; None: they never are.
     """
 
     threads: int
     rows: int = BLOCK_ROWS
     before: Callable[[int], None] = _nobody_listens
+    least: int | None = None
 
     def of_rows(self, rows: int) -> Blocks:
-        """The same with blocks of another size."""
-        return replace(self, rows=rows)
+        """The same with blocks of another size, whatever there is to do."""
+        return replace(self, rows=rows, least=None)
+
+    def rows_of(self, count: int) -> int:
+        """Rows of a block where there are so many in all."""
+        if self.least is None:
+            return self.rows
+        return min(self.rows, max(self.least, -(-count // (2 * self.threads))))
 
     def unheard(self) -> Blocks:
         """The same for work after the end, of which nobody is told."""
@@ -91,22 +99,23 @@ class Blocks:
         parts: list[tuple[Array, ...]] = [()] * self.count(count)
 
         def keep(rows: slice) -> None:
-            parts[self.number(rows)] = work(rows)
+            parts[self.number(rows, count)] = work(rows)
 
         self.run(count, keep)
         return tuple(namespace(*pieces).concat(pieces) for pieces in zip(*parts, strict=True))
 
     def count(self, rows: int) -> int:
         """How many blocks ``run`` makes of so many rows."""
-        return -(-rows // self.rows)
+        return -(-rows // self.rows_of(rows))
 
-    def number(self, rows: slice) -> int:
-        """Which block it is."""
-        return rows.start // self.rows
+    def number(self, rows: slice, count: int) -> int:
+        """Which block of ``count`` rows it is."""
+        return rows.start // self.rows_of(count)
 
     def _slices(self, count: int) -> Iterator[slice]:
-        for start in range(0, count, self.rows):
-            yield slice(start, min(start + self.rows, count))
+        rows = self.rows_of(count)
+        for start in range(0, count, rows):
+            yield slice(start, min(start + rows, count))
 
 
 @cache

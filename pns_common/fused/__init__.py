@@ -8,16 +8,19 @@ keep code in. ``python -m pns_common.fused`` compiles all kernels.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 
+from pns_common.base.blocks import Blocks
 from pns_common.fused.storage import cache_folder, kernels_are_kept
 
 # Rows a block: a kernel has no temporaries that must stay in a cache, and each call costs a little.
 KERNEL_ROWS = 32768
+# Fewer where each thread is to have some, but no fewer: a call's cost is then a tenth of its work.
+LEAST_KERNEL_ROWS = 2048
 LARGEST_INDEX = 2**31 - 1
 # What the array kernels do in the time that loading these takes, in faces that Loop makes; and what
 # a level costs them before its first face. Measured on meshes of 24 to 80,000 faces. Compiling
@@ -25,6 +28,10 @@ LARGEST_INDEX = 2**31 - 1
 COST_TO_LOAD, COST_TO_COMPILE = 250_000, 2_000_000
 COST_OF_LEVEL = 2_000
 LIBRARY = "pns_common.fused.library"
+
+
+def _nobody_listens(rows: int) -> None:
+    pass
 
 
 @dataclass
@@ -64,6 +71,11 @@ def kernels_pay(costs: Sequence[int]) -> bool:
         return True
     _work.cost += sum(costs) + len(costs) * COST_OF_LEVEL
     return _work.cost >= (COST_TO_LOAD if kernels_are_kept() else COST_TO_COMPILE)
+
+
+def kernel_blocks(threads: int, before: Callable[[int], None] = _nobody_listens) -> Blocks:
+    """How kernels' rows are divided; ``before`` as ``Blocks`` has it."""
+    return Blocks(threads, KERNEL_ROWS, before, LEAST_KERNEL_ROWS)
 
 
 def fits(vertex_count: int, face_count: int, levels: int) -> bool:

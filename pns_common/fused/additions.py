@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.blocks import BLOCK_ROWS, Blocks
+from pns_common.base.blocks import Blocks
 from pns_common.fused.boundary import NO_RULE, Boundary
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.fused.rings import (
@@ -20,6 +20,11 @@ from pns_common.fused.rings import (
     measure_pushes,
     measure_rings,
 )
+from pns_common.models.contract import CALL_ROWS
+
+# What a block of so many rows reads and writes stays in the second-level cache; and a model file's
+# runtime is called with the rows that the array kernels call it with.
+NETWORK_ROWS = 2 * CALL_ROWS
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +75,8 @@ class Surroundings:
 
     @property
     def network_blocks(self) -> Blocks:
-        """How rows are divided that a network sees: as the array kernels divide them."""
-        return self.blocks.of_rows(min(BLOCK_ROWS, self.blocks.rows))
+        """How rows are divided that a network sees: alike whatever the threads."""
+        return self.blocks.of_rows(min(NETWORK_ROWS, self.blocks.rows))
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,14 +29,14 @@ def look_at_children(
     edges = parent.half_edges, parent.edge_class
 
     def look_inside(rows: slice) -> None:
-        block, bounds = blocks.number(rows), (vertices, rows.start, rows.stop)
+        block, bounds = blocks.number(rows, count), (vertices, rows.start, rows.stop)
         inside[block] = largest_jump_inside(points, *faces, *bounds, largest_yet)
         if loop_points is not None:
             flipped[block] = flipped_children(points, loop_points, *faces, *bounds)
 
     def look_across(rows: slice) -> None:
         bounds = vertices, rows.start, rows.stop
-        across[blocks.number(rows)] = largest_jump_across(
+        across[blocks.number(rows, edge_count)] = largest_jump_across(
             points, *faces, *edges, *bounds, largest_yet
         )
 

@@ -44,7 +44,7 @@ def loop_points(
 
 def owners(blocks: Blocks, count: int) -> Blocks:
     """Blocks for sums around vertices: each reads all edges, so no more of them than threads."""
-    return blocks.of_rows(max(blocks.rows, -(-count // blocks.threads)))
+    return blocks.of_rows(max(blocks.least or blocks.rows, -(-count // blocks.threads)))
 
 
 def largest_size(points: Float[np.ndarray, "V 3"], blocks: Blocks) -> float:
@@ -52,7 +52,7 @@ def largest_size(points: Float[np.ndarray, "V 3"], blocks: Blocks) -> float:
     sizes = np.zeros(blocks.count(len(points)))
 
     def measure(rows: slice) -> None:
-        sizes[blocks.number(rows)] = largest_coordinate(points, rows.start, rows.stop)
+        sizes[blocks.number(rows, len(points))] = largest_coordinate(points, rows.start, rows.stop)
 
     blocks.run(len(points), measure)
     return float(sizes.max(initial=0))

@@ -61,7 +61,7 @@ def child_faces(
             normals[rows, child] = normal
             has_area[rows, child] = dot(normal, normal) > 0
         defined = has_area[rows]
-        inside[blocks.number(rows)] = max(
+        inside[blocks.number(rows, len(topology.faces))] = max(
             _largest_chord(four[3], four[i], defined[:, 3] & defined[:, i]) for i in range(3)
         )
         if loop_points is not None:
@@ -76,7 +76,7 @@ def child_faces(
 
     def look_across(rows: slice) -> None:
         pairs = children_across(topology, topology.interior[rows])
-        across[blocks.number(rows)] = max(
+        across[blocks.number(rows, len(topology.interior))] = max(
             _largest_chord(
                 gather(normals, left), gather(normals, right), defined[left] & defined[right]
             )

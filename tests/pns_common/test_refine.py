@@ -128,7 +128,8 @@ def test_bits_do_not_depend_on_threads_or_block_size(monkeypatch):
     expected = refine(mesh, pns(MODEL), 2, threads=1)
     module = sys.modules["pns_common.refine"]
     for threads, rows in [(2, 8192), (3, 300), (1, 77)]:
-        monkeypatch.setattr(module, "Blocks", lambda threads, *_, rows=rows: Blocks(threads, rows))
+        for name in ("Blocks", "kernel_blocks"):
+            monkeypatch.setattr(module, name, lambda threads, *_, rows=rows: Blocks(threads, rows))
         refined = refine(mesh, pns(MODEL), 2, threads=threads)
         np.testing.assert_array_equal(refined.mesh.vertices, expected.mesh.vertices)
         np.testing.assert_array_equal(refined.ratio, expected.ratio)

@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.base.blocks import Blocks
 from pns_common.base.whole_file import replace_file, replacing
 from pns_common.errors import PnsError
-from pns_common.fused import KERNEL_ROWS, load_kernels
+from pns_common.fused import kernel_blocks, load_kernels
 from pns_common.mesh import Mesh
 from pns_common.pieces import Piece, RefinedPiece, ThinHaloError, halo_rings, refine_piece
 from pns_common.schemes import Scheme
@@ -154,7 +153,7 @@ def _surely_refined(
         cut = cutout(mesh, adjacency, own, rings)
         _check_memory(task, cut, adjacency)
         piece = with_angle_creases(cut.piece, task.options.crease_angle)
-        blocks = Blocks(task.threads, KERNEL_ROWS)
+        blocks = kernel_blocks(task.threads)
         try:
             return rings, cut, refine_piece(piece, scheme, levels, task.length, blocks)
         except ThinHaloError:

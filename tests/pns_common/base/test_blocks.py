@@ -25,13 +25,27 @@ def test_threads_in_haste_take_each_block_once(hasty):
 
 
 @pytest.mark.parametrize(("count", "rows"), [(0, 5), (3, 5), (5, 5), (11, 5)])
-def test_blocks_cover_all_rows_and_are_counted(count, rows):
+@pytest.mark.parametrize("least", [None, 2])
+def test_blocks_cover_all_rows_and_are_counted(count, rows, least):
     taken = []
-    blocks = Blocks(threads=1, rows=rows)
+    blocks = Blocks(threads=1, rows=rows, least=least)
     blocks.run(count, taken.append)
     assert [row for part in taken for row in range(part.start, part.stop)] == list(range(count))
     assert len(taken) == blocks.count(count)
-    assert [blocks.number(part) for part in taken] == list(range(len(taken)))
+    assert [blocks.number(part, count) for part in taken] == list(range(len(taken)))
+
+
+def test_little_work_is_divided_among_all_threads_but_not_into_crumbs():
+    blocks = Blocks(threads=3, rows=100, least=4)
+    assert [blocks.rows_of(count) for count in (0, 10, 60, 61, 599, 10_000)] == [
+        4,
+        4,
+        10,
+        11,
+        100,
+        100,
+    ]
+    assert blocks.of_rows(7).rows_of(1) == 7
 
 
 class StopRefiningError(Exception):

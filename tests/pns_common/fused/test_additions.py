@@ -5,6 +5,7 @@ import numpy as np
 from pns_common import Mesh
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.fused.additions import Additions, Surroundings
+from pns_common.models.contract import CALL_ROWS
 from tests.support.kernels import edges_built
 from tests.support.meshes import bumpy_sphere
 
@@ -49,6 +50,8 @@ def test_what_is_asked_for_twice_is_measured_once():
     assert seen.faces is seen.faces
 
 
-def test_networks_see_rows_in_the_array_kernels_blocks():
-    assert surroundings(blocks=Blocks(1, rows=10**6)).network_blocks.rows == BLOCK_ROWS
+def test_a_model_file_is_called_with_the_array_kernels_rows_whatever_the_threads():
+    rows = surroundings(blocks=Blocks(4, rows=10**6, least=5)).network_blocks.rows_of(9000)
+    assert rows % CALL_ROWS == BLOCK_ROWS % CALL_ROWS == 0
+    assert surroundings(blocks=Blocks(1, rows=10**6)).network_blocks.rows_of(9000) == rows
     assert surroundings(blocks=Blocks(1, rows=7)).network_blocks.rows == 7

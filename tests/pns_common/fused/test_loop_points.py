@@ -31,6 +31,7 @@ def test_points_have_the_bits_of_the_masks(shape):
 def test_sums_around_vertices_are_divided_among_threads_and_no_finer():
     assert owners(Blocks(3, rows=10), 1000).rows == 334
     assert owners(Blocks(3, rows=500), 1000).rows == 500
+    assert owners(Blocks(3, rows=500, least=20), 1000).rows_of(1000) == 334
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -1.1e75])
