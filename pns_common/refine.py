@@ -127,13 +127,16 @@ def refine(
     """
     _check_kinds(mesh, scheme)
     _check_levels(levels)
-    length = _reference_length(mesh, reference_length)
+    _check_reference_length(reference_length)
+    length = Deferred(lambda: _length_of(mesh, reference_length))
     workers = _threads(threads)
     work = RefinementProgress(
         len(mesh.faces), levels, scheme.learned_levels, limit, progress or _nobody_listens
     )
     costs = level_costs(len(mesh.faces), levels, scheme.learned_levels)
-    arguments = (mesh, scheme, levels, length, creases)
+    # Loop has no use for a unit of length; its report names one when it is read.
+    unit = 1.0 if scheme.learned_levels == 0 else length()
+    arguments = (mesh, scheme, levels, unit, creases)
     if kernels_can_serve(*arguments) and kernels_pay(costs):
         # Loads the compiler's runtime, which whoever only imports the package does not need.
         from pns_common.fused.refine import refine_fused
@@ -149,7 +152,7 @@ def refine(
         work.level_ends()
     return Refinement(
         mesh=Mesh.of_refined(points, made.faces),
-        make_report=Deferred(lambda: report_of(scheme, length, made.several_fans, made.reports)),
+        make_report=Deferred(lambda: report_of(scheme, length(), made.several_fans, made.reports)),
         ratio=made.ratio,
         gate=made.gate,
         normals=normals,
@@ -256,13 +259,16 @@ def _check_levels(levels: int) -> None:
         raise ParameterError("levels", levels, expected=f"a whole number, 1 … {HIGHEST_LEVELS}")
 
 
-def _reference_length(mesh: Mesh, given: float | str) -> float:
-    if given == "auto":
-        if kernels_available() and kernels_loaded():
-            from pns_common.fused.extent import reference_length
-
-            return reference_length(mesh.vertices, mesh.faces)
-        return measure_reference_length(mesh.vertices, mesh.faces)
-    if not (is_number(given) and float(given) > 0):
+def _check_reference_length(given: float | str) -> None:
+    if given != "auto" and not (is_number(given) and float(given) > 0):
         raise ParameterError("reference_length", given, expected='"auto" or a number > 0')
-    return float(given)
+
+
+def _length_of(mesh: Mesh, given: float | str) -> float:
+    if given != "auto":
+        return float(given)
+    if kernels_available() and kernels_loaded():
+        from pns_common.fused.extent import reference_length
+
+        return reference_length(mesh.vertices, mesh.faces)
+    return measure_reference_length(mesh.vertices, mesh.faces)

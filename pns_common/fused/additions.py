@@ -1,109 +1,45 @@
-"""What a learned level adds to Loop's vertices, and what it reads of the level for that."""
+"""What a learned level adds to Loop's vertices."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.blocks import Blocks
-from pns_common.fused.boundary import NO_RULE, Boundary
-from pns_common.fused.mesh_edges import MeshEdges
-from pns_common.fused.rings import (
-    FaceMeasures,
-    RingMeasures,
-    measure_bends,
-    measure_normals,
-    measure_pushes,
-    measure_rings,
-)
-from pns_common.models.contract import CALL_ROWS
-
-# What a block of so many rows reads and writes stays in the second-level cache; and a model file's
-# runtime is called with the rows that the array kernels call it with.
-NETWORK_ROWS = 2 * CALL_ROWS
-
-
-@dataclass(frozen=True, eq=False)
-class Surroundings:
-    """A level's mesh with what the rules ask of it: each part computed once, if it is asked for.
-
-    ``reference_length`` is R > 0, the unit of length of the budget: of the whole mesh, or of each
-    vertex, where parts that share no vertex have their own. ``altitudes`` is α of the network's
-    lengths, infinite where these are h whatever the faces.
-    """
-
-    points: Float[np.ndarray, "V 3"]
-    mesh: MeshEdges
-    several_fans: Bool[np.ndarray, " V"]
-    reference_length: float | Float[np.ndarray, " V"]
-    blocks: Blocks
-    boundary: Boundary = NO_RULE
-    altitudes: float = math.inf
-
-    def budget_per_length(
-        self, vertices: Int[np.ndarray, " N"], budget: float
-    ) -> Float[np.ndarray, " N"]:
-        """C / R at each of some vertices."""
-        if isinstance(self.reference_length, np.ndarray):
-            return budget / self.reference_length[vertices]
-        return np.full(len(vertices), budget / self.reference_length)
-
-    @cached_property
-    def faces(self) -> FaceMeasures:
-        """Normals and areas."""
-        return measure_normals(self.points, self.mesh, self.blocks)
-
-    @cached_property
-    def rings(self) -> RingMeasures:
-        """The rings of all vertices."""
-        mesh, fans = self.mesh, self.several_fans
-        return measure_rings(self.points, mesh, self.faces, fans, self.altitudes, self.blocks)
-
-    @cached_property
-    def pushes(self) -> Float[np.ndarray, "V 3"]:
-        """The prior's d_v at s = 1."""
-        return measure_pushes(self.rings, self.blocks)
-
-    @cached_property
-    def bends(self) -> Float[np.ndarray, " F"]:
-        """b of the gates that read sides."""
-        return measure_bends(self.faces, self.mesh, self.blocks)
-
-    @property
-    def network_blocks(self) -> Blocks:
-        """How rows are divided that a network sees: alike whatever the threads."""
-        return self.blocks.of_rows(min(NETWORK_ROWS, self.blocks.rows))
-
 
 @dataclass(frozen=True, eq=False)
 class Additions:
-    """What is added to N of Loop's vertices; see ``placement.Placement``."""
+    """What is added to N of Loop's vertices, as ``placement.Added`` has it."""
 
     displacement: Float[np.ndarray, "N 3"]
     ratio: Float[np.ndarray, " N"]
     gate: Float[np.ndarray, " N"]
     envelope: Float[np.ndarray, " N"]
     degenerate: Bool[np.ndarray, " N"]
+    corrected: Bool[np.ndarray, " N"] | None = None
 
     @classmethod
-    def nothing(cls, count: int) -> Additions:
-        """Zeros, to be written into."""
-        ratio, gate, envelope = (np.zeros(count) for _ in range(3))
-        return cls(np.zeros((count, 3)), ratio, gate, envelope, np.zeros(count, dtype=bool))
+    def unwritten(cls, count: int) -> Additions:
+        """Numbers to be written, or cleared, in every row."""
+        ratio, gate, envelope = (np.empty(count) for _ in range(3))
+        return cls(np.empty((count, 3)), ratio, gate, envelope, np.zeros(count, dtype=bool))
 
-    def part(self, rows: slice) -> Additions:
-        """Some of the rows, as views."""
+    def rows(self, rows: slice | Int[np.ndarray, " N"]) -> Additions:
+        """Some of the rows: views for a slice, copies for indices."""
         return Additions(
             self.displacement[rows],
             self.ratio[rows],
             self.gate[rows],
             self.envelope[rows],
             self.degenerate[rows],
+            None if self.corrected is None else self.corrected[rows],
         )
+
+    def clear(self, rows: slice | Int[np.ndarray, " N"]) -> None:
+        """Add nothing to some of the rows."""
+        for values in (self.displacement, self.ratio, self.gate, self.envelope):
+            values[rows] = 0
 
     def scale(self, by: Float[np.ndarray, " N"]) -> None:
         """Take s δ in place of δ."""

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.connectivity.topology import Topology
 from pns_common.formula.boundary_prior import on_boundary
+from pns_common.fused.additions import Additions
 from pns_common.fused.mesh_edges import MeshEdges, has_boundary
 from pns_common.rules.boundary import BoundaryRule
 from pns_common.rules.control_level import ControlLevel
@@ -78,19 +79,15 @@ class Boundary:
     pushes: Float[np.ndarray, "P 3"]
     nothing: float
 
-    def move_vertices(self, placed: Placement) -> None:
-        """Move boundary vertices, in a placement's own arrays."""
+    def move_vertices(self, loop: Float[np.ndarray, "V 3"], added: Additions) -> None:
+        """Add to boundary vertices, which Loop puts at ``loop``."""
         if self.rule is not None and self.sharp is not None:
-            _move(self.rule.move_vertices, self.sharp.level, self.sharp.vertices, placed)
-        elif self.rule is not None:
-            _drop_minus_zero(placed)
+            _move(self.rule.move_vertices, self.sharp.level, self.sharp.vertices, loop, added)
 
-    def move_edges(self, placed: Placement) -> None:
-        """Move boundary edges likewise."""
+    def move_edges(self, loop: Float[np.ndarray, "E 3"], added: Additions) -> None:
+        """Add to boundary edges likewise."""
         if self.rule is not None and self.sharp is not None:
-            _move(self.rule.move_edges, self.sharp.level, self.sharp.edges, placed)
-        elif self.rule is not None:
-            _drop_minus_zero(placed)
+            _move(self.rule.move_edges, self.sharp.level, self.sharp.edges, loop, added)
 
     def first(self, vertex_count: int, edge_count: int) -> Bool[np.ndarray, " W"] | None:
         """What the fold guard settles first; None where that is nothing."""
@@ -123,21 +120,21 @@ def boundary_of(
     return Boundary(rule, sharp, pushes, 0.0)
 
 
-def _move(move: Move, level: ControlLevel, rows: Int[np.ndarray, " N"], placed: Placement) -> None:
-    """Write what ``move`` makes of some rows into a placement of arrays."""
-    _drop_minus_zero(placed)
-    moved = move(level, placed.rows(rows))
+def _move(
+    move: Move,
+    level: ControlLevel,
+    rows: Int[np.ndarray, " N"],
+    loop: Float[np.ndarray, "M 3"],
+    added: Additions,
+) -> None:
+    """Write what ``move`` makes of some rows."""
+    of_rows = added.rows(rows)
+    moved = move(level, Placement(loop[rows], **vars(of_rows)))
     for into, values in (
-        (placed.displacement, moved.displacement),
-        (placed.ratio, moved.ratio),
-        (placed.envelope, moved.envelope),
-        (placed.corrected, moved.corrected),
+        (added.displacement, moved.displacement),
+        (added.ratio, moved.ratio),
+        (added.envelope, moved.envelope),
+        (added.corrected, moved.corrected),
     ):
         if into is not None and values is not None:
             into[rows] = values
-
-
-def _drop_minus_zero(placed: Placement) -> None:
-    """Leave no −0, as adding nothing but zeros does."""
-    assert placed.displacement is not None
-    np.add(placed.displacement, 0.0, out=placed.displacement)

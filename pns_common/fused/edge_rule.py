@@ -7,7 +7,7 @@ import numpy as np
 from pns_common.features.orientation import SYMMETRIC
 from pns_common.formula.correction import where_open
 from pns_common.formula.side_gate import gentle_bend, opened
-from pns_common.fused.additions import Additions, Surroundings
+from pns_common.fused.additions import Additions
 from pns_common.fused.kernels.edge_correction import (
     DIHEDRAL,
     LENGTHS,
@@ -16,11 +16,12 @@ from pns_common.fused.kernels.edge_correction import (
     fill_log_ratios,
     look,
 )
+from pns_common.fused.surroundings import Surroundings
 from pns_common.geometry.frames import EdgeFrames
 from pns_common.rules.learned import LearnedEdgeRule
 from pns_common.rules.scale_free import ScaleFreeEdgeRule
 
-NO_FIELDS = np.zeros((0, 4))
+NO_FIELDS, NO_BENDS = np.zeros((0, 4)), np.zeros(0)
 
 
 def add_at_edges(
@@ -28,10 +29,13 @@ def add_at_edges(
 ) -> None:
     """What a rule adds at the interior edges; ``to`` has a row for each edge.
 
+    At the others it adds nothing.
+
     Raises:
         ModelError: the network returned something that is not finite, or of another shape.
     """
     mesh = level.mesh
+    to.clear(mesh.sharp_edges)
     args = mesh.faces, mesh.edges, mesh.half_edges, mesh.interior
     out = to.displacement, to.ratio, to.gate, to.envelope
     # Before the blocks: what several threads ask for is computed once.
@@ -40,37 +44,35 @@ def add_at_edges(
     bounds = level.boundary
     pushes = level.pushes if isinstance(rule, ScaleFreeEdgeRule) else NO_FIELDS
     reads_sides = isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates
-    bends = level.bends if reads_sides else None
+    bends = level.bends if reads_sides else NO_BENDS
+    symmetric = int(rule.operator.orientation is SYMMETRIC)
 
     def add(rows: slice) -> None:
         count = rows.stop - rows.start
         frame, features = np.empty((count, 9)), np.empty((count, rule.operator.features.count))
         length, longest, curvature = np.empty(count), np.empty(count), np.empty(count)
-        lengths = np.empty((LENGTHS, count))
+        lengths, gentlest = np.empty((LENGTHS, count)), np.empty(count if reads_sides else 0)
         degenerate = np.empty(count, dtype=bool)
-        symmetric = int(rule.operator.orientation is SYMMETRIC)
-        looked = frame, length, longest, curvature, degenerate, lengths, features
-        look(level.points, normals, fields, *args, rows.start, rows.stop, symmetric, *looked)
+        looked = frame, length, longest, curvature, degenerate, lengths, features, gentlest
+        of_faces = normals, fields, bends
+        look(level.points, *of_faces, *args, rows.start, rows.stop, symmetric, *looked)
         # numpy's logarithm and hyperbolic tangent run on vectors, and have the array kernels' bits.
-        fill_log_ratios(np.log(lengths), features)
+        fill_log_ratios(np.log(lengths, out=lengths), features)
         axes = frame[:, :3], frame[:, 3:6], frame[:, 6:]
-        frames = EdgeFrames(*axes, length, curvature, degenerate)
-        ends = mesh.edges[mesh.interior[rows]]
-        gate = rule.operator.gate(frames)
-        if bends is not None and isinstance(rule, ScaleFreeEdgeRule):
-            beside = mesh.half_edges[mesh.interior[rows]] // 3
-            of_both = bends[beside[:, 0]], bends[beside[:, 1]]
-            gate = opened(gate, gentle_bend(*of_both, rule.vertex_gate_sharpness))
+        gate = rule.operator.gate(EdgeFrames(*axes, length, curvature, degenerate))
+        if isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates:
+            gate = opened(gate, gentle_bend(gentlest, gentlest, rule.vertex_gate_sharpness))
+        if degenerate.any():
+            to.degenerate[mesh.interior[rows]] = degenerate
         answers = where_open(rule.operator.network, features, gate, like=axes[0])
-        eta = np.ascontiguousarray(answers)
-        to.degenerate[mesh.interior[rows]] = degenerate
+        eta, lower_ends = np.ascontiguousarray(answers), mesh.edges[mesh.interior[rows], 0]
         if isinstance(rule, LearnedEdgeRule):
-            budget_per_length = level.budget_per_length(ends[:, 0], rule.budget)
+            budget_per_length = level.budget_per_length(lower_ends, rule.budget)
             correct(eta, frame, length, gate, budget_per_length, mesh.interior, rows.start, *out)
         else:
             form = rule.form
             bounded = longest if form.wide_bound else length
-            budget_per_length = level.budget_per_length(ends[:, 0], form.budget)
+            budget_per_length = level.budget_per_length(lower_ends, form.budget)
             answer = eta, frame, level.rings.network_lengths, bounded, gate, budget_per_length
             prior = (
                 pushes,
@@ -82,4 +84,5 @@ def add_at_edges(
             )
             correct_scale_free(*answer, mesh.interior, rows.start, *prior, *out)
 
-    level.network_blocks.run(len(mesh.interior), add)
+    count = len(mesh.interior)
+    level.network_blocks(count).run(count, add)

@@ -13,8 +13,8 @@ from pns_common.formula.fold_guard import ROUNDS, FoldGuard
 from pns_common.fused.kernels.guard import find_folds
 from pns_common.fused.mesh_edges import MeshEdges
 
-# For the kernel: all faces are looked at.
-EVERYWHERE = np.zeros(0, dtype=bool)
+# For the kernel: all faces are looked at, and s is 1 everywhere.
+EVERYWHERE, UNSCALED = np.zeros(0, dtype=bool), np.zeros(0)
 
 
 def guard_scale(
@@ -24,15 +24,20 @@ def guard_scale(
     displacement: Float[np.ndarray, "W 3"],
     blocks: Blocks,
     first: Bool[np.ndarray, " W"] | None = None,
-) -> Float[np.ndarray, " W"]:
-    """s for each new vertex of the split of ``mesh``; ``first`` as the guard has it."""
+) -> Float[np.ndarray, " W"] | None:
+    """s for each new vertex of the split of ``mesh``; ``first`` as the guard has it.
+
+    None where it is 1 everywhere.
+    """
     settings = guard, mesh, loop, displacement
-    everywhere = np.ones(len(loop), dtype=bool)
-    if first is None:
-        return _settled(*settings, np.ones(len(loop)), everywhere, blocks)
-    # Faces with none of these corners are Loop's while the others' s is 0.
-    alone = _settled(*settings, first.astype(float), first, blocks, watched=first)
-    return _settled(*settings, np.where(first, alone, 1.0), ~first, blocks)
+    scale, free = UNSCALED, None
+    if first is not None:
+        # Faces with none of these corners are Loop's while the others' s is 0.
+        alone = _settled(*settings, first.astype(float), first, blocks, watched=first)
+        scale = np.where(first, alone, 1.0)
+        scale, free = (scale if scale.min() < 1 else UNSCALED), ~first
+    scale = _settled(*settings, scale, free, blocks)
+    return scale if len(scale) else None
 
 
 def _settled(
@@ -40,17 +45,21 @@ def _settled(
     mesh: MeshEdges,
     loop: Float[np.ndarray, "W 3"],
     displacement: Float[np.ndarray, "W 3"],
-    scale: Float[np.ndarray, " W"],
-    free: Bool[np.ndarray, " W"],
+    scale: Float[np.ndarray, " S"],
+    free: Bool[np.ndarray, " W"] | None,
     blocks: Blocks,
     watched: Bool[np.ndarray, " C"] = EVERYWHERE,
-) -> Float[np.ndarray, " W"]:
+) -> Float[np.ndarray, " N"]:
     """Lower s of free vertices until no child is folded; of those with a ``watched`` corner."""
     changed = watched
     for rounds in count():
-        changed = _touched(guard, mesh, loop, displacement, scale, changed, blocks) & free
+        changed = _touched(guard, mesh, loop, displacement, scale, changed, blocks)
+        if free is not None:
+            changed &= free
         if not changed.any():
             break
+        if not len(scale):
+            scale = np.ones(len(loop))
         scale[changed] = scale[changed] / 2 if rounds < ROUNDS else 0.0
     return scale
 
@@ -60,7 +69,7 @@ def _touched(
     mesh: MeshEdges,
     loop: Float[np.ndarray, "W 3"],
     displacement: Float[np.ndarray, "W 3"],
-    scale: Float[np.ndarray, " W"],
+    scale: Float[np.ndarray, " S"],
     changed: Bool[np.ndarray, " C"],
     blocks: Blocks,
 ) -> Bool[np.ndarray, " W"]:

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from pns_common.base.blocks import Blocks
-from pns_common.fused.additions import Additions, Surroundings
+from pns_common.fused.additions import Additions
 from pns_common.fused.boundary import boundary_of
 from pns_common.fused.child_faces import look_at_children
 from pns_common.fused.edge_rule import add_at_edges
 from pns_common.fused.guard import guard_scale
 from pns_common.fused.level import FusedLevel, FusedStep
-from pns_common.fused.loop_points import largest_size, loop_points
+from pns_common.fused.loop_points import add_to, loop_points
+from pns_common.fused.surroundings import Surroundings
 from pns_common.fused.vertex_rule import add_at_vertices
 from pns_common.levels.diagnostics import LevelReport, level_report
-from pns_common.levels.step import LevelStep
+from pns_common.levels.step import AddedStep
 from pns_common.rules.boundary import BoundaryRule
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
-from pns_common.rules.placement import Placement
 from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
 from pns_common.schemes import Scheme
 
@@ -33,12 +33,14 @@ CLEAR_COSINE = 1e-9
 class LearnedPoints:
     """What a learned level made, before anybody looks at its children.
 
-    ``counterpart`` is where Loop would have put the points; None where no child can be flipped.
+    ``largest`` is the largest absolute coordinate, NaN where one is. ``counterpart`` is where Loop
+    would have put the points; None where no child can be flipped.
     """
 
     points: Float[np.ndarray, "W 3"]
+    largest: float
     counterpart: Float[np.ndarray, "W 3"] | None
-    step: LevelStep
+    step: AddedStep
     added: Additions
 
 
@@ -57,7 +59,7 @@ def learned_step(level: FusedLevel, scheme: Scheme, length: float, blocks: Block
         children = look_at_children(mesh, made.points, made.counterpart, blocks.unheard())
         return level_report(mesh, made.step, children)
 
-    return FusedStep(made.points, largest_size(made.points, blocks), report, made.added)
+    return FusedStep(made.points, made.largest, report, made.added)
 
 
 def learned_points(
@@ -73,35 +75,35 @@ def learned_points(
     of_level = level.points, mesh, level.several_fans
     seen = Surroundings(*of_level, length, blocks, boundary, _altitudes(scheme))
     loop = loop_points(level.points, mesh, blocks)
-    added = Additions.nothing(len(loop))
-    at_vertices, at_edges = added.part(slice(0, count)), added.part(slice(count, None))
     edge_rule, vertex_rule = scheme.edge_rule, scheme.vertex_rule
     moves = isinstance(vertex_rule, LearnedVertexRule | ScaleFreeVertexRule)
     assert isinstance(edge_rule, LearnedEdgeRule | ScaleFreeEdgeRule)
+    added = Additions.unwritten(len(loop))
+    vertices, edges = added.rows(slice(0, count)), added.rows(slice(count, None))
     if moves:
-        add_at_vertices(vertex_rule, seen, at_vertices)
-    add_at_edges(edge_rule, seen, at_edges)
-    # A placement's arrays are those of ``added``: what changes the one changes the other.
-    smooth = seen.rings.smooth.copy() if moves else None
-    vertices = _placement(loop[:count], at_vertices, smooth)
-    edges = _placement(loop[count:], at_edges, None)
-    boundary.move_vertices(vertices)
-    boundary.move_edges(edges)
+        # A copy: the boundary's rule moves more vertices.
+        vertices = replace(vertices, corrected=seen.rings.smooth.copy())
+        add_at_vertices(vertex_rule, seen, vertices)
+    else:
+        vertices.clear(slice(None))
+    add_at_edges(edge_rule, seen, edges)
+    boundary.move_vertices(loop[:count], vertices)
+    boundary.move_edges(loop[count:], edges)
     scale = None
     if scheme.guard is not None:
-        first = boundary.first(count, len(at_edges.ratio))
+        first = boundary.first(count, len(edges.ratio))
         scale = guard_scale(scheme.guard, mesh, loop, added.displacement, blocks, first)
-        if scale.min() < 1:
+        if scale is None:
+            scale = np.broadcast_to(1.0, len(loop))
+        else:
             added.scale(scale)
 
-    points = loop.copy()
-    # Where Loop's rule stands nothing is added: not even 0, which would make 0 of −0.
-    moved = slice(None) if moves else slice(count, None)
-    points[moved] += added.displacement[moved]
     # What the guard lets stand is at clearly less than a right angle to Loop's: none is flipped.
     guarded = scheme.guard is not None and math.cos(scheme.guard.angle) > CLEAR_COSINE
-    step = LevelStep(vertices, edges, learned=True, guard=scale)
-    return LearnedPoints(points, None if guarded else loop, step, added)
+    points = loop if guarded else loop.copy()
+    largest = add_to(points, added.displacement, 0 if moves else count, blocks)
+    step = AddedStep(vertices, edges, learned=True, guard=scale)
+    return LearnedPoints(points, largest, None if guarded else loop, step, added)
 
 
 def _boundary_rule(scheme: Scheme) -> BoundaryRule | None:
@@ -114,17 +116,3 @@ def _altitudes(scheme: Scheme) -> float:
     rule = scheme.edge_rule
     altitudes = rule.form.network_altitudes if isinstance(rule, ScaleFreeEdgeRule) else None
     return math.inf if altitudes is None else altitudes
-
-
-def _placement(
-    loop: Float[np.ndarray, "N 3"], added: Additions, corrected: np.ndarray | None
-) -> Placement:
-    return Placement(
-        loop,
-        added.displacement,
-        added.ratio,
-        added.gate,
-        added.degenerate,
-        corrected,
-        added.envelope,
-    )

@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from pns_common.base.blocks import Blocks
 from pns_common.fused.kernels.masks import (
+    add_displacement,
     blend_vertices,
     largest_coordinate,
     place_edges,
@@ -55,6 +56,23 @@ def largest_size(points: Float[np.ndarray, "V 3"], blocks: Blocks) -> float:
         sizes[blocks.number(rows, len(points))] = largest_coordinate(points, rows.start, rows.stop)
 
     blocks.run(len(points), measure)
+    return float(sizes.max(initial=0))
+
+
+def add_to(
+    points: Float[np.ndarray, "W 3"],
+    displacement: Float[np.ndarray, "W 3"],
+    first: int,
+    blocks: Blocks,
+) -> float:
+    """Add to points from ``first`` on, in their place; ``largest_size`` of them all."""
+    sizes = np.zeros(blocks.count(len(points)))
+
+    def add(rows: slice) -> None:
+        block = blocks.number(rows, len(points))
+        sizes[block] = add_displacement(displacement, first, rows.start, rows.stop, points)
+
+    blocks.run(len(points), add)
     return float(sizes.max(initial=0))
 
 

@@ -26,7 +26,7 @@ from pns_common.fused.mesh_edges import MeshEdges, split_mesh_faces
 from pns_common.geometry.child_faces import ChildAngles, angle_between
 from pns_common.levels.diagnostics import LevelReport, level_report
 from pns_common.levels.refined_levels import check_coordinates
-from pns_common.levels.step import LevelStep
+from pns_common.levels.step import AddedStep
 from pns_common.mesh import Mesh
 from pns_common.rules.placement import without_correction
 from pns_common.schemes import Scheme
@@ -139,7 +139,7 @@ def _placed(
     lengths: Float[np.ndarray, " P"],
     depth: int,
     blocks: Blocks,
-) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 3"] | None, LevelStep]:
+) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 3"] | None, AddedStep]:
     """The next level's points, where Loop would have put them (None: no child can be flipped)."""
     if scheme.learned_levels is None or depth < scheme.learned_levels:
         # What overflows under an absurd budget is caught by the caller.
@@ -147,7 +147,7 @@ def _placed(
             made = learned_points(level, scheme, lengths[parts.of_vertex], blocks)
         return made.points, made.counterpart, made.step
     points, count = loop_points(level.points, level.mesh, blocks), level.mesh.vertex_count
-    step = LevelStep(
+    step = AddedStep(
         without_correction(points[:count]), without_correction(points[count:]), False, None
     )
     return points, None, step
@@ -158,7 +158,7 @@ def _reports(
     parts: _Parts,
     points: Float[np.ndarray, "W 3"],
     counterpart: Float[np.ndarray, "W 3"] | None,
-    step: LevelStep,
+    step: AddedStep,
 ) -> list[LevelReport]:
     """What ``level_report`` says of each part."""
     children = _children(mesh, parts, points, counterpart)
@@ -182,7 +182,7 @@ def _reports(
         scales = None
         if guard is not None:
             scales = np.concatenate([guard[0][own_vertices], guard[1][own_edges]])
-        its = LevelStep(vertices.rows(own_vertices), edges.rows(own_edges), step.learned, scales)
+        its = AddedStep(vertices.rows(own_vertices), edges.rows(own_edges), step.learned, scales)
         reports.append(level_report(own, its, children[part]))
     return reports
 

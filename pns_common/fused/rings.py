@@ -41,12 +41,14 @@ class RingMeasures:
     Attributes:
         fields: mean normal and umbrella height.
         means: over the spokes of each vertex.
+        jumps: x of each edge, 0 where it is not interior.
         network_lengths: ℓ of each edge.
         smooth: vertices with one closed ring of interior edges.
     """
 
     fields: Float[np.ndarray, "V 4"]
     means: Float[np.ndarray, "V M"]
+    jumps: Float[np.ndarray, " E"]
     network_lengths: Float[np.ndarray, " E"]
     valence: Int[np.ndarray, " V"]
     smooth: Bool[np.ndarray, " V"]
@@ -67,14 +69,13 @@ def measure_normals(
 
 
 def measure_bends(
-    at_faces: FaceMeasures, mesh: MeshEdges, blocks: Blocks
+    jumps: Float[np.ndarray, " E"], mesh: MeshEdges, blocks: Blocks
 ) -> Float[np.ndarray, " F"]:
     """b of all faces, as ``side_gate.face_bends`` has it."""
     bends, (gentle, sharp) = np.empty(len(mesh.faces)), GENTLE_TO_SHARP
-    args = at_faces.normals, mesh.face_edges, mesh.half_edges, mesh.edge_class
 
     def measure(rows: slice) -> None:
-        face_bends(*args, gentle, sharp, rows.start, rows.stop, bends)
+        face_bends(mesh.face_edges, jumps, gentle, sharp, rows.start, rows.stop, bends)
 
     blocks.run(len(bends), measure)
     return bends
@@ -94,7 +95,7 @@ def measure_rings(
     means, valence = np.zeros((count, VERTEX_COLUMNS)), np.zeros(count, dtype=np.int32)
     args = mesh.faces, mesh.edges, mesh.half_edges, mesh.edge_class
     of_faces = at_faces.normals, at_faces.areas
-    to = measured, np.empty(len(mesh.edges))
+    to = measured, np.empty(len(mesh.edges)), np.empty(len(mesh.edges))
 
     def edges(rows: slice) -> None:
         measure_edges(points, *of_faces, *args, altitudes, rows.start, rows.stop, *to)
@@ -113,7 +114,7 @@ def measure_rings(
     smooth = (valence > 0) & ~several_fans
     if len(mesh.sharp):
         smooth &= mesh.sharp == 0
-    return RingMeasures(fields, means, to[1], valence, smooth)
+    return RingMeasures(fields, means, *to[1:], valence, smooth)
 
 
 def measure_pushes(rings: RingMeasures, blocks: Blocks) -> Float[np.ndarray, "V 3"]:

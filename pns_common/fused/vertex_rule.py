@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pns_common.formula.correction import where_open
-from pns_common.fused.additions import Additions, Surroundings
+from pns_common.fused.additions import Additions
 from pns_common.fused.kernels.vertex_correction import correct, correct_scale_free, look_around
 from pns_common.fused.loop_points import place_vertices
+from pns_common.fused.surroundings import Surroundings
 from pns_common.rules.learned import LearnedVertexRule
 from pns_common.rules.scale_free import ScaleFreeVertexRule
 
@@ -17,11 +18,14 @@ def add_at_vertices(
 ) -> None:
     """What a rule adds at vertices with one closed ring; ``to`` has a row for each old vertex.
 
+    At the others it adds nothing.
+
     Raises:
         ModelError: the network returned something that is not finite, or of another shape.
     """
     rings, operator = level.rings, rule.operator
     vertices = np.flatnonzero(rings.smooth).astype(np.int32)
+    to.clear(np.flatnonzero(~rings.smooth))
     out = to.displacement, to.ratio, to.gate, to.envelope
     pushes = np.empty((0, 3))
     of_boundary = level.boundary.pushes, level.boundary.nothing
@@ -52,4 +56,4 @@ def add_at_vertices(
                 *answer, pushes, *of_boundary, form.prior_strength, form.network_scale, *out
             )
 
-    level.network_blocks.run(len(vertices), add)
+    level.network_blocks(len(vertices)).run(len(vertices), add)

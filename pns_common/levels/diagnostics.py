@@ -12,8 +12,8 @@ from jaxtyping import Float, Int
 from pns_common.base.arrays import dot
 from pns_common.connectivity.topology import Connectivity, EdgeClass
 from pns_common.geometry.child_faces import ChildAngles
-from pns_common.levels.step import LevelStep
-from pns_common.rules.placement import Placement
+from pns_common.levels.step import AddedStep
+from pns_common.rules.placement import Added
 
 # A gate above this counts as active.
 GATE_ACTIVE = 0.01
@@ -86,7 +86,7 @@ class LimitDistances(TypedDict):
     limit_distance_bound: float | None
 
 
-def level_report(topology: Connectivity, step: LevelStep, children: ChildAngles) -> LevelReport:
+def level_report(topology: Connectivity, step: AddedStep, children: ChildAngles) -> LevelReport:
     """Summarise the step that refined ``topology``."""
     vertices, edges = step.vertices, step.edges
     interior = topology.interior
@@ -141,14 +141,14 @@ def _longest(displacement: Float[np.ndarray, "N 3"] | None) -> float:
     return math.sqrt(dot(displacement, displacement).max(initial=0))
 
 
-def _largest(rule: Placement) -> float | None:
+def _largest(rule: Added) -> float | None:
     """The largest displacement that a rule may make; None where it may make any."""
     if rule.displacement is None:
         return 0.0
     return None if rule.envelope is None else float(rule.envelope.max(initial=0))
 
 
-def _shut(rule: Placement, rows: np.ndarray | None) -> int:
+def _shut(rule: Added, rows: np.ndarray | None) -> int:
     """Of some vertices, how many have a gate of 0."""
     return 0 if rows is None else int(np.count_nonzero(rule.gate[rows] == 0))
 

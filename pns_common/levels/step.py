@@ -15,25 +15,33 @@ from pns_common.connectivity.topology import split
 from pns_common.formula.boundary_prior import on_boundary
 from pns_common.rules.control_level import ControlLevel
 from pns_common.rules.loop import loop_edge_rule, loop_vertex_rule
-from pns_common.rules.placement import Placement
+from pns_common.rules.placement import Added, Placement
 from pns_common.schemes import Scheme
 
 
 @dataclass(frozen=True, eq=False)
-class LevelStep:
-    """What one level's rules placed.
+class AddedStep:
+    """What one level's rules added to Loop's vertices.
 
     Attributes:
-        vertices: the moved old vertices.
-        edges: the edge vertices, numbered on from them.
+        vertices: of the moved old vertices.
+        edges: of the edge vertices, numbered on from them.
         learned: whether the scheme's own rules made them; else Loop did.
         guard: s of the fold guard for all new vertices; None where there was nothing to guard.
     """
 
-    vertices: Placement
-    edges: Placement
+    vertices: Added
+    edges: Added
     learned: bool
     guard: Float[np.ndarray, " N"] | None
+
+
+@dataclass(frozen=True, eq=False)
+class LevelStep(AddedStep):
+    """What one level's rules placed."""
+
+    vertices: Placement
+    edges: Placement
 
     @property
     def points(self) -> Float[Array, "N 3"]:

@@ -18,7 +18,7 @@ from pns_common.base.blocks import Blocks
 from pns_common.fused import fits, kernels_available
 from pns_common.fused.known import kernels_know
 from pns_common.levels.refined_levels import check_coordinates
-from pns_common.levels.step import LevelStep
+from pns_common.levels.step import AddedStep
 from pns_common.pieces.exact import guarded_exact, shrunk
 from pns_common.pieces.halo import ThinHaloError, is_learned, reach
 from pns_common.pieces.steps import Links, Step, steps_by_arrays, steps_by_kernels
@@ -153,12 +153,12 @@ def _check_own(
         raise ThinHaloError(level, int(lacking.sum()))
 
 
-def _asked(placed: LevelStep | None) -> Float[np.ndarray, "W 3"] | None:
+def _asked(placed: AddedStep | None) -> Float[np.ndarray, "W 3"] | None:
     """What was to be added before the guard scaled it; not finite where it took all."""
     if placed is None or placed.guard is None:
         return None
     added = [
-        np.zeros_like(rule.loop) if rule.displacement is None else rule.displacement
+        np.zeros((len(rule.ratio), 3)) if rule.displacement is None else rule.displacement
         for rule in (placed.vertices, placed.edges)
     ]
     scale = placed.guard[:, None]

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import Topology
 from pns_common.levels.array_steps import array_steps
-from pns_common.levels.step import LevelStep
+from pns_common.levels.step import AddedStep
 from pns_common.schemes import Scheme
 
 
@@ -47,7 +47,7 @@ class Step:
     links: Links
     points: Float[np.ndarray, "W 3"]
     children: Int[np.ndarray, "C 3"]
-    placed: LevelStep | None
+    placed: AddedStep | None
     loop: Float[np.ndarray, "W 3"] | None
     may_flip: bool
 
@@ -91,8 +91,11 @@ def steps_by_kernels(
             with np.errstate(over="ignore", invalid="ignore"):
                 learned = learned_points(level, scheme, length, blocks)
             made, placed = learned.points, learned.step
-            loop = np.concatenate([placed.vertices.loop, placed.edges.loop])
             may_flip = learned.counterpart is not None
+            loop = learned.counterpart
+            if loop is None:
+                # The step has added to them in their place.
+                loop = loop_points(level.points, mesh, blocks)
         links = Links(
             mesh.vertex_count,
             mesh.faces,

@@ -10,10 +10,10 @@ from jaxtyping import Bool, Int
 from pns_common.base.arrays import dot, norm
 from pns_common.connectivity.topology import EdgeClass, next_corner
 from pns_common.geometry.frames import face_normals
-from pns_common.levels.step import LevelStep
+from pns_common.levels.step import AddedStep
 from pns_common.pieces.steps import Links, Step
 from pns_common.pieces.tally import LevelTally, Summed
-from pns_common.rules.placement import Placement
+from pns_common.rules.placement import Added
 
 
 def tally_of(
@@ -40,7 +40,7 @@ def tally_of(
 
 def _with_rules(
     tally: LevelTally,
-    placed: LevelStep,
+    placed: AddedStep,
     links: Links,
     own_vertices: Bool[np.ndarray, " W"],
     own_edges: Bool[np.ndarray, " E"],
@@ -78,11 +78,11 @@ def _with_rules(
     )
 
 
-def _longest(rule: Placement, rows: Bool[np.ndarray, " N"]) -> float:
+def _longest(rule: Added, rows: Bool[np.ndarray, " N"]) -> float:
     return 0.0 if rule.displacement is None else float(norm(rule.displacement[rows]).max(initial=0))
 
 
-def _largest(rule: Placement, rows: Bool[np.ndarray, " N"]) -> float | None:
+def _largest(rule: Added, rows: Bool[np.ndarray, " N"]) -> float | None:
     """The largest displacement that the rule may make; None where it may make any."""
     if rule.displacement is None:
         return 0.0

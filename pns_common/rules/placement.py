@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -11,6 +12,45 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.arrays import Array, namespace, scatter
 from pns_common.base.blocks import Blocks
 from pns_common.formula.correction import Correction, proximity_ratio
+
+
+@runtime_checkable
+class Added(Protocol):
+    """What a rule added to Loop's N vertices, as far as reports ask; see ``Placement``."""
+
+    @property
+    def displacement(self) -> Float[Array, "N 3"] | None:
+        """δ; None where the rule is Loop's."""
+        ...
+
+    @property
+    def ratio(self) -> Float[Array, " N"]:
+        """Proximity ratio."""
+        ...
+
+    @property
+    def gate(self) -> Float[Array, " N"]:
+        """γ."""
+        ...
+
+    @property
+    def degenerate(self) -> Bool[Array, " N"]:
+        """Vertices whose frame was the fallback."""
+        ...
+
+    @property
+    def corrected(self) -> Bool[Array, " N"] | None:
+        """Vertices that a rule may move which is not Loop's."""
+        ...
+
+    @property
+    def envelope(self) -> Float[Array, " N"] | None:
+        """ρ; None where the rule names no bound."""
+        ...
+
+    def rows(self, rows: slice | Int[np.ndarray, " N"]) -> Added:
+        """Some of the vertices."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

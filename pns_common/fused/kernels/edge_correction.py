@@ -40,13 +40,15 @@ def _no_shorter(length):
 
 @kernel(
     SIZE,
-    *(POINTS, POINTS, POINTS, INDICES, INDICES, INDICES, INDEX, SIZE, SIZE, SIZE),
+    *(POINTS, POINTS, POINTS, NUMBERS, INDICES, INDICES, INDICES, INDEX, SIZE, SIZE, SIZE),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT, FLAGS_OUT, POINTS_OUT, POINTS_OUT),
+    NUMBERS_OUT,
 )
 def look(
     points,
     normals,
     fields,
+    bends,
     faces,
     edges,
     half_edges,
@@ -61,17 +63,20 @@ def look(
     degenerate,
     lengths,
     features,
+    gentlest,
 ):
     """Frames and features of the interior edges begin … end − 1; row 0 is for edge ``begin``.
 
     Args:
         fields: (V, 4) mean normal and umbrella height; read where ``features`` has signed columns.
+        bends: (F,) b of each face; empty where gates do not read it.
         symmetric: 1 where c lies to the left of a → b and degenerate edges have x = 0, else 0.
         frame: (N, 9) out: T, N, B.
         length, longest: out: h and h̄, the longest edge of both faces.
         curvature, degenerate: out: x, and whether the frame is the fallback.
         lengths: (5, N) out: of which the logarithms are to be taken.
         features: (N, K) out: all columns but those of the log ratios.
+        gentlest: out: the smaller b of both faces; empty where ``bends`` is.
     """
     wide = features.shape[1]
     for i in range(end - begin):
@@ -106,6 +111,8 @@ def look(
         for k in range(3):
             frame[i, k], frame[i, 3 + k], frame[i, 6 + k] = tangent[k], normal[k], binormal[k]
         length[i], curvature[i], degenerate[i] = h, x, fallback
+        if len(bends):
+            gentlest[i] = min(bends[h1 // 3], bends[h2 // 3])
 
         features[i, 0] = x
         ac, bc = norm(between(points, a, c)), norm(between(points, b, c))
@@ -146,10 +153,14 @@ def fill_log_ratios(logs, features):
 def in_ball(z):
     """A vector shortened to length 1, as ``correction.project_to_ball`` does."""
     largest = max(max(abs(z[0]), abs(z[1])), abs(z[2]))
-    scale = largest if largest > 1 else 1.0
-    length = norm((z[0] / scale, z[1] / scale, z[2] / scale)) * scale
-    factor = 1.0 / (length if length > 1 else 1.0)
-    return z[0] * factor, z[1] * factor, z[2] * factor
+    if largest > 1:
+        length = norm((z[0] / largest, z[1] / largest, z[2] / largest)) * largest
+    else:
+        length = norm(z)
+    if length > 1:
+        factor = 1.0 / length
+        return z[0] * factor, z[1] * factor, z[2] * factor
+    return z
 
 
 def _rotated(frame, i, z):
@@ -163,8 +174,10 @@ def _rotated(frame, i, z):
 def shortened(v, longest):
     """A vector shortened to ``longest``, as ``correction.shortened`` does."""
     length = norm(v)
-    factor = longest / length if length > longest else 1.0
-    return v[0] * factor, v[1] * factor, v[2] * factor
+    if length > longest:
+        factor = longest / length
+        return v[0] * factor, v[1] * factor, v[2] * factor
+    return v
 
 
 def write(index, delta, gate, envelope, displacement, ratio, gates, envelopes):
@@ -263,6 +276,11 @@ def correct_scale_free(
             _prior(pushes, of_boundary, nothing, a, b, c, d, 2, strength) + asked * turned[2],
         )
         allowed = shortened(wanted, envelope)
-        delta = gate[i] * allowed[0], gate[i] * allowed[1], gate[i] * allowed[2]
+        # A rule for boundaries adds its nothing here too.
+        delta = (
+            gate[i] * allowed[0] + nothing,
+            gate[i] * allowed[1] + nothing,
+            gate[i] * allowed[2] + nothing,
+        )
         write(e, delta, gate[i], envelope, displacement, ratio, gates, envelopes)
     return 0

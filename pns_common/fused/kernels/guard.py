@@ -21,7 +21,7 @@ from pns_common.geometry.frames import NO_AREA
 
 
 def _moved(p, displacement, scale, v):
-    s = scale[v]
+    s = scale[v] if len(scale) else 1.0
     return (
         p[0] + s * displacement[v, 0],
         p[1] + s * displacement[v, 1],
@@ -55,7 +55,7 @@ def _turned(a, b, c, moved_a, moved_b, moved_c, cosine, clear):
 
 
 def _touch(scale, touched, v):
-    if scale[v] > 0:
+    if len(scale) == 0 or scale[v] > 0:
         touched[v] = True
 
 
@@ -79,6 +79,7 @@ def find_folds(
     """Mark the corners of folded children of faces begin … end − 1 whose s is not 0 yet.
 
     Args:
+        scale: s of each vertex; empty where it is 1 everywhere.
         changed: vertices whose s changed in the last round: other faces are as they were. Empty in
             the first round.
         touched: out, False on entry; threads may write the same True at once.

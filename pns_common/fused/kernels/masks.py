@@ -114,9 +114,7 @@ def blend_vertices(points, valence, sharp, beta, begin, end, sums):
     return 0
 
 
-@kernel(REAL, POINTS, SIZE, SIZE)
-def largest_coordinate(points, begin, end):
-    """The largest absolute coordinate of rows begin … end − 1; NaN where one is."""
+def _largest(points, begin, end):
     largest = 0.0
     for v in range(begin, end):
         for k in range(3):
@@ -126,3 +124,21 @@ def largest_coordinate(points, begin, end):
                 if size != size:
                     return size
     return largest
+
+
+@kernel(REAL, POINTS, SIZE, SIZE)
+def largest_coordinate(points, begin, end):
+    """The largest absolute coordinate of rows begin … end − 1; NaN where one is."""
+    return _largest(points, begin, end)
+
+
+@kernel(REAL, POINTS, SIZE, SIZE, SIZE, POINTS_OUT)
+def add_displacement(displacement, first, begin, end, points):
+    """δ added to rows begin … end − 1 from ``first`` on; the largest coordinate of all of them.
+
+    Before ``first`` Loop's rule stands, and nothing is added: not even 0, which makes 0 of −0.
+    """
+    for v in range(max(first, begin), end):
+        for k in range(3):
+            points[v, k] += displacement[v, k]
+    return _largest(points, begin, end)

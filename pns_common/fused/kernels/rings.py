@@ -23,11 +23,11 @@ from pns_common.fused.kernels.compiled import (
     kernel,
 )
 from pns_common.fused.kernels.edges import INTERIOR
-from pns_common.fused.kernels.normals import squared_chord, unit_normal
+from pns_common.fused.kernels.normals import unit_normal
 
 # Columns of an edge's row.
-SPOKE, SQUARE, JUMP, BEND = 0, 3, 4, 5
-EDGE_COLUMNS = 6
+SPOKE, SQUARE, BEND = 0, 3, 4
+EDGE_COLUMNS = 5
 # Columns of a vertex's sums, which become means.
 UMBRELLA, RING_SQUARE, MEAN_JUMP, MEAN_BEND, BEND_SQUARE, LENGTH, PULL = 0, 3, 4, 5, 6, 7, 8
 MEAN_NETWORK_SQUARE = 11
@@ -103,7 +103,7 @@ def mean_normals(faces, areas, begin, end, fields):
 @kernel(
     SIZE,
     *(POINTS, POINTS, POINTS, INDICES, INDICES, INDICES, CLASSES, REAL, SIZE, SIZE),
-    *(POINTS_OUT, NUMBERS_OUT),
+    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT),
 )
 def measure_edges(
     points,
@@ -117,9 +117,10 @@ def measure_edges(
     begin,
     end,
     measured,
+    jumps,
     network_lengths,
 ):
-    """Spoke b − a, its square, x and s (``measured``, (E, 6)) and ℓ of edges begin … end − 1.
+    """Spoke b − a, its square and s (``measured``, (E, 5)), x and ℓ of edges begin … end − 1.
 
     ``altitudes`` is α, infinite where the network speaks in units of h whatever the faces.
     """
@@ -131,7 +132,7 @@ def measure_edges(
         measured[e, SQUARE] = square
         length = math.sqrt(square) if square > 0 else math.inf
         network_lengths[e] = math.sqrt(square)
-        measured[e, JUMP] = measured[e, BEND] = 0.0
+        jumps[e] = measured[e, BEND] = 0.0
         if edge_class[e] != INTERIOR:
             continue
         f, g = half_edges[e, 0] // 3, half_edges[e, 1] // 3
@@ -140,7 +141,7 @@ def measure_edges(
         n, m = row(normals, f), row(normals, g)
         if dot(n, n) > 0 and dot(m, m) > 0:
             chord = n[0] - m[0], n[1] - m[1], n[2] - m[2]
-            measured[e, JUMP] = dot(chord, chord) / 2 + 0.0
+            jumps[e] = dot(chord, chord) / 2 + 0.0
         direction = spoke[0] / length, spoke[1] / length, spoke[2] / length
         wide = altitudes * min(areas[f, AREA], areas[g, AREA]) / length
         if wide < network_lengths[e]:
@@ -150,59 +151,52 @@ def measure_edges(
     return 0
 
 
-@kernel(
-    SIZE,
-    *(POINTS, INDICES, INDICES, CLASSES, REAL, REAL, SIZE, SIZE, NUMBERS_OUT),
-)
-def face_bends(normals, face_edges, half_edges, edge_class, gentle, sharp, begin, end, bends):
+@kernel(SIZE, INDICES, NUMBERS, REAL, REAL, SIZE, SIZE, NUMBERS_OUT)
+def face_bends(face_edges, jumps, gentle, sharp, begin, end, bends):
     """b of faces begin … end − 1 (``side_gate.face_bends``); x counts between gentle and sharp."""
     for f in range(begin, end):
         total = 0.0
         for i in range(3):
-            e = face_edges[f, i]
-            if edge_class[e] == INTERIOR:
-                x = (
-                    squared_chord(
-                        row(normals, half_edges[e, 0] // 3), row(normals, half_edges[e, 1] // 3)
-                    )
-                    / 2
-                )
-                total += x * min(max((sharp - x) / (sharp - gentle), 0.0), 1.0)
+            x = jumps[face_edges[f, i]]
+            total += x * min(max((sharp - x) / (sharp - gentle), 0.0), 1.0)
         bends[f] = total / 3
     return 0
 
 
-def _add_spoke(sums, v, sign, measured, e, length, network_square):
-    for k in range(3):
-        spoke = sign * measured[e, SPOKE + k]
-        sums[v, UMBRELLA + k] += spoke
-        sums[v, PULL + k] += measured[e, JUMP] / 2 * spoke
-    bend = measured[e, BEND]
-    sums[v, RING_SQUARE] += measured[e, SQUARE]
-    sums[v, MEAN_JUMP] += measured[e, JUMP]
+def _add_spoke(sums, v, spoke, square, jump, bend, length, network_square):
+    sums[v, UMBRELLA] += spoke[0]
+    sums[v, UMBRELLA + 1] += spoke[1]
+    sums[v, UMBRELLA + 2] += spoke[2]
+    sums[v, RING_SQUARE] += square
+    sums[v, MEAN_JUMP] += jump
     sums[v, MEAN_BEND] += bend
     sums[v, BEND_SQUARE] += bend * bend
     sums[v, LENGTH] += length
+    sums[v, PULL] += jump / 2 * spoke[0]
+    sums[v, PULL + 1] += jump / 2 * spoke[1]
+    sums[v, PULL + 2] += jump / 2 * spoke[2]
     sums[v, MEAN_NETWORK_SQUARE] += network_square
 
 
-@kernel(SIZE, INDICES, POINTS, NUMBERS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
-def mean_spokes(edges, measured, network_lengths, begin, end, means, valence):
+@kernel(SIZE, INDICES, POINTS, NUMBERS, NUMBERS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
+def mean_spokes(edges, measured, jumps, network_lengths, begin, end, means, valence):
     """Means over the spokes of vertices begin … end − 1; ``means`` (V, 15), 0 on entry."""
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
         mine, theirs = begin <= a < end, begin <= b < end
         if mine or theirs:
-            square = measured[e, SQUARE]
+            # All is read before anything is written.
+            spoke, square, bend = row(measured, e), measured[e, SQUARE], measured[e, BEND]
+            jump, ell = jumps[e], network_lengths[e]
             length = math.sqrt(square if square > 0 else 1e-300)
-            ell = network_lengths[e]
             network_square = ell * ell if ell < length else square
             if mine:
                 valence[a] += 1
-                _add_spoke(means, a, 1.0, measured, e, length, network_square)
+                _add_spoke(means, a, spoke, square, jump, bend, length, network_square)
             if theirs:
                 valence[b] += 1
-                _add_spoke(means, b, -1.0, measured, e, length, network_square)
+                back = -spoke[0], -spoke[1], -spoke[2]
+                _add_spoke(means, b, back, square, jump, bend, length, network_square)
     for v in range(begin, end):
         count = float(max(valence[v], 1))
         for k in range(OPENING):

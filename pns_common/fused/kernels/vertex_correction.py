@@ -151,6 +151,11 @@ def correct_scale_free(
             _prior(pushes, of_boundary, nothing, v, 2, strength) + asked * learned[2],
         )
         allowed = shortened(wanted, envelope)
-        delta = gate[i] * allowed[0], gate[i] * allowed[1], gate[i] * allowed[2]
+        # A rule for boundaries adds its nothing here too.
+        delta = (
+            gate[i] * allowed[0] + nothing,
+            gate[i] * allowed[1] + nothing,
+            gate[i] * allowed[2] + nothing,
+        )
         write(v, delta, gate[i], envelope, displacement, ratio, gates, envelopes)
     return 0

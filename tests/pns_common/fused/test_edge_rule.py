@@ -6,8 +6,9 @@ import pytest
 from pns_common import Mesh, pns
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology
-from pns_common.fused.additions import Additions, Surroundings
+from pns_common.fused.additions import Additions
 from pns_common.fused.edge_rule import add_at_edges
+from pns_common.fused.surroundings import Surroundings
 from pns_common.rules.control_level import control_level
 from tests.support.kernels import edges_built
 from tests.support.meshes import bent, grid
@@ -28,7 +29,7 @@ MODELS = {
 def test_kernels_add_what_the_rule_adds(name, rows):
     rule, edges = pns(MODELS[name]).edge_rule, edges_built(MESH)
     fans = np.zeros(25, dtype=bool)
-    added = Additions.nothing(len(edges.edges))
+    added = Additions.unwritten(len(edges.edges))
     add_at_edges(rule, Surroundings(MESH.vertices, edges, fans, 0.8, Blocks(2, rows)), added)
     placed = rule(LEVEL)
     for part in ("displacement", "ratio", "gate", "envelope", "degenerate"):

@@ -6,7 +6,13 @@ import pytest
 from pns_common import Mesh, MeshError
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology
-from pns_common.fused.loop_points import largest_size, loop_points, owners, place_vertices
+from pns_common.fused.loop_points import (
+    add_to,
+    largest_size,
+    loop_points,
+    owners,
+    place_vertices,
+)
 from pns_common.levels.refined_levels import check_coordinates
 from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 from tests.support.kernels import edges_built
@@ -39,6 +45,8 @@ def test_a_coordinate_out_of_range_is_found_in_any_block(bad):
     points = np.ones((100, 3))
     points[57, 2] = bad
     largest = largest_size(points, Blocks(2, rows=10))
+    added = add_to(points.copy(), np.zeros((100, 3)), 30, Blocks(2, rows=10))
+    np.testing.assert_equal(added, largest)
     assert largest == abs(bad) or np.isnan(bad) == np.isnan(largest)
     with pytest.raises(MeshError, match="too large"):
         check_coordinates(largest)

@@ -36,6 +36,8 @@ def test_rings(blocks, altitudes):
     named = None if altitudes == np.inf else altitudes
     lengths = [PLAIN.length(a, b, named) for a, b in EDGES.edges.tolist()]
     np.testing.assert_allclose(rings.network_lengths, lengths, atol=1e-14)
+    jumps = [PLAIN.jump(a, b) for a, b in EDGES.edges.tolist()]
+    np.testing.assert_allclose(rings.jumps, jumps, atol=1e-14)
     for v in range(len(POINTS)):
         np.testing.assert_allclose(
             rings.fields[v], [*PLAIN.mean_normal[v], PLAIN.height[v]], atol=1e-14
@@ -64,7 +66,7 @@ def test_pushes_and_bends(blocks):
     rings = measure_rings(POINTS, EDGES, at_faces, FANS, np.inf, blocks)
     pushes = [PLAIN.push(v) for v in range(len(POINTS))]
     np.testing.assert_allclose(measure_pushes(rings, blocks), pushes, atol=1e-14)
-    bends = measure_bends(at_faces, EDGES, blocks)
+    bends = measure_bends(rings.jumps, EDGES, blocks)
     for (a, b, c), bend in zip(FACES, bends, strict=True):
         jumps = [PLAIN.jump(*edge) for edge in ((a, b), (b, c), (c, a))]
         counted = [x * np.clip((0.6 - x) / 0.3, 0, 1) for x in jumps]

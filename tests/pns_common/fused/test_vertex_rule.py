@@ -6,7 +6,8 @@ import pytest
 from pns_common import Mesh, pns
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology
-from pns_common.fused.additions import Additions, Surroundings
+from pns_common.fused.additions import Additions
+from pns_common.fused.surroundings import Surroundings
 from pns_common.fused.vertex_rule import add_at_vertices
 from pns_common.rules.control_level import control_level
 from tests.support.kernels import edges_built
@@ -31,7 +32,7 @@ def test_kernels_add_what_the_rule_adds(model, altitudes, rows):
     seen = Surroundings(
         MESH.vertices, edges_built(MESH), fans, 0.8, Blocks(2, rows), altitudes=altitudes
     )
-    added = Additions.nothing(25)
+    added = Additions.unwritten(25)
     add_at_vertices(rule, seen, added)
     placed = rule(LEVEL)
     for part in ("displacement", "ratio", "gate", "envelope"):
@@ -41,7 +42,7 @@ def test_kernels_add_what_the_rule_adds(model, altitudes, rows):
 
 def test_vertices_of_several_fans_are_left_alone():
     rule, fans = pns(vertex_model(0)).vertex_rule, np.arange(25) == 12
-    added = Additions.nothing(25)
+    added = Additions.unwritten(25)
     add_at_vertices(
         rule, Surroundings(MESH.vertices, edges_built(MESH), fans, 0.8, Blocks(1)), added
     )

@@ -22,6 +22,7 @@ COUNT, RNG = 30, np.random.default_rng(0)
 PAIRS = MESH.edges.tolist()
 NORMALS = np.array([plain_operator.unit(PLAIN.area(*face)) for face in FACES])
 FIELDS = np.column_stack([PLAIN.mean_normal, PLAIN.height])
+BENDS = np.linspace(0, 1, len(FACES))
 FRAMES = np.array([np.concatenate(PLAIN.frame(a, b)) for a, b in PAIRS])
 LENGTH = np.array([PLAIN.length(a, b, None) for a, b in PAIRS])
 Z, GATE = RNG.standard_normal((COUNT, 3)), RNG.random(COUNT)
@@ -34,8 +35,10 @@ def looked(way, width, begin=0, end=COUNT):
     h, longest, x = np.empty(n), np.empty(n), np.empty(n)
     degenerate = np.ones(n, dtype=bool)
     mesh = MESH.faces, MESH.edges, MESH.half_edges, MESH.interior
-    out = frame, h, longest, x, degenerate, lengths, features
-    WAYS[way](look)(POINTS, NORMALS, FIELDS, *mesh, begin, end, 1, *out)
+    gentlest = np.empty(n)
+    out = frame, h, longest, x, degenerate, lengths, features, gentlest
+    WAYS[way](look)(POINTS, NORMALS, FIELDS, BENDS, *mesh, begin, end, 1, *out)
+    np.testing.assert_array_equal(gentlest, BENDS[MESH.half_edges[begin:end] // 3].min(axis=1))
     WAYS[way](fill_log_ratios)(np.log(lengths), features)
     assert not degenerate.any()
     return frame, h, longest, x, features
@@ -64,8 +67,9 @@ def test_antiparallel_faces_have_the_worlds_axes_and_shut_only_where_reading_is_
         frame, features, lengths = np.empty((1, 9)), np.zeros((1, 5)), np.empty((5, 1))
         h, longest, x = np.empty(1), np.empty(1), np.empty(1)
         degenerate = np.zeros(1, dtype=bool)
-        out = frame, h, longest, x, degenerate, lengths, features
-        WAYS[way](look)(points, normals, np.zeros((0, 4)), *mesh, 0, 1, symmetric, *out)
+        of_faces = normals, np.zeros((0, 4)), np.zeros(0)
+        out = frame, h, longest, x, degenerate, lengths, features, np.zeros(0)
+        WAYS[way](look)(points, *of_faces, *mesh, 0, 1, symmetric, *out)
         np.testing.assert_array_equal(frame.reshape(3, 3), np.eye(3))
         assert (bool(degenerate[0]), x[0], features[0, 0]) == (True, curvature, curvature)
 

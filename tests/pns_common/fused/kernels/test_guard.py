@@ -65,3 +65,4 @@ def test_a_child_that_all_but_vanishes_is_folded(way):
     displacement[CHILDREN[3]] = 0.99 * (centre - LOOP[CHILDREN[3]])
     marks = touched(way, displacement, np.ones(len(LOOP)), np.zeros(0, dtype=bool))
     assert marks[CHILDREN[3]].all()
+    np.testing.assert_array_equal(touched(way, displacement, np.zeros(0), np.zeros(0, bool)), marks)

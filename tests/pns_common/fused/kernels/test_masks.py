@@ -6,6 +6,7 @@ import pytest
 from pns_common import Mesh
 from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.fused.kernels.masks import (
+    add_displacement,
     blend_vertices,
     largest_coordinate,
     opposite,
@@ -85,3 +86,14 @@ def test_the_largest_coordinate_is_told_with_its_faults(way):
     assert largest(points, 0, 3) == np.inf
     assert np.isnan(largest(points, 0, 4))
     assert largest(points, 0, 0) == 0
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_what_is_added_leaves_loops_rows_alone_and_is_measured_with_them(way):
+    points = np.array([[-0.0, -9, 0], [1, 2, 3], [-0.0, 4, 0], [7, 7, 7]])
+    delta = np.array([[0.0, 0, 0], [0, 0, 0], [0, -20, 1], [1, 1, 1]])
+    assert WAYS[way](add_displacement)(delta, 1, 0, 3, points) == 16
+    np.testing.assert_array_equal(points, [[0, -9, 0], [1, 2, 3], [0, -16, 1], [7, 7, 7]])
+    assert np.signbit(points[0, 0])
+    assert not np.signbit(points[2, 0])
+    assert WAYS[way](add_displacement)(delta, 4, 3, 4, points) == 7

@@ -39,15 +39,16 @@ def test_vectors():
 def measured(way, altitudes=np.inf):
     normals, areas = np.empty((4, 3)), np.empty((4, 4))
     WAYS[way](measure_faces)(POINTS, MESH.faces, 0, 4, normals, areas)
-    at_edges, lengths = np.empty((8, 6)), np.empty(8)
+    at_edges, (jumps, lengths) = np.empty((8, 5)), np.empty((2, 8))
     mesh = MESH.faces, MESH.edges, MESH.half_edges, MESH.edge_class
-    WAYS[way](measure_edges)(POINTS, normals, areas, *mesh, altitudes, 0, 8, at_edges, lengths)
-    return normals, areas, at_edges, lengths
+    out = at_edges, jumps, lengths
+    WAYS[way](measure_edges)(POINTS, normals, areas, *mesh, altitudes, 0, 8, *out)
+    return normals, areas, *out
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_faces_and_edges_of_a_tent(way):
-    normals, areas, at_edges, lengths = measured(way)
+    normals, areas, at_edges, jumps, lengths = measured(way)
     np.testing.assert_allclose(areas[:, 3], np.sqrt(3))
     np.testing.assert_allclose(
         normals, THIRD * np.array([[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]])
@@ -55,22 +56,23 @@ def test_faces_and_edges_of_a_tent(way):
     np.testing.assert_allclose(lengths, np.sqrt(2))
     inner = (MESH.edges == 4).any(axis=1)
     # Normals of neighbours have the inner product 1/3: x is 2/3, and the crest's sine √8 / 3.
-    np.testing.assert_allclose(at_edges[inner, 4], 2 / 3)
-    np.testing.assert_allclose(at_edges[inner, 5], np.sqrt(8) / 3)
-    assert not at_edges[~inner, 4:].any()
+    np.testing.assert_allclose(jumps[inner], 2 / 3)
+    np.testing.assert_allclose(at_edges[inner, 4], np.sqrt(8) / 3)
+    assert not at_edges[~inner, 4].any()
+    assert not jumps[~inner].any()
     # The altitude of √3 over √2, half of it.
-    np.testing.assert_allclose(measured(way, 0.5)[3][inner], 0.5 * np.sqrt(3 / 2))
+    np.testing.assert_allclose(measured(way, 0.5)[4][inner], 0.5 * np.sqrt(3 / 2))
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_the_tip_of_a_tent(way):
-    _, areas, at_edges, lengths = measured(way)
+    _, areas, *of_edges = measured(way)
     fields, means = np.zeros((5, 4)), np.zeros((5, 15))
     valence = np.zeros(5, dtype=np.int32)
     WAYS[way](mean_normals)(MESH.faces, areas, 4, 5, fields)
     np.testing.assert_allclose(fields[4, :3], [0, 0, THIRD], atol=1e-16)
     assert not fields[:4].any()
-    WAYS[way](mean_spokes)(MESH.edges, at_edges, lengths, 4, 5, means, valence)
+    WAYS[way](mean_spokes)(MESH.edges, *of_edges, 4, 5, means, valence)
     assert valence.tolist() == [0, 0, 0, 0, 4]
     np.testing.assert_allclose(means[4, :5], [0, 0, -1, 2, 2 / 3], atol=1e-15)
     assert not means[:4].any()
@@ -85,10 +87,8 @@ def test_the_tip_of_a_tent(way):
 
 @pytest.mark.parametrize("way", WAYS)
 def test_bends_count_while_they_are_gentle(way):
-    normals = measured(way)[0]
-    bends = np.empty(4)
-    edges = MESH.face_edges, MESH.half_edges, MESH.edge_class
+    jumps, bends = measured(way)[3], np.empty(4)
     # x is 2/3 at two edges of each face: whole below `gentle`, nothing above `sharp`.
     for gentle, sharp, share in ((0.7, 0.9, 1.0), (1 / 3, 1.0, 0.5), (0.3, 0.6, 0.0)):
-        WAYS[way](face_bends)(normals, *edges, gentle, sharp, 0, 4, bends)
+        WAYS[way](face_bends)(MESH.face_edges, jumps, gentle, sharp, 0, 4, bends)
         np.testing.assert_allclose(bends, share * 4 / 9)

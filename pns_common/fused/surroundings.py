@@ -1,0 +1,82 @@
+"""What a learned level reads of its mesh."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.base.blocks import BLOCK_ROWS, Blocks
+from pns_common.fused.boundary import NO_RULE, Boundary
+from pns_common.fused.mesh_edges import MeshEdges
+from pns_common.fused.rings import (
+    FaceMeasures,
+    RingMeasures,
+    measure_bends,
+    measure_normals,
+    measure_pushes,
+    measure_rings,
+)
+from pns_common.models.contract import CALL_ROWS
+
+# Blocks that a network sees, where there are enough rows: so many that all threads have some.
+NETWORK_BLOCKS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """A level's mesh with what the rules ask of it: each part computed once, if it is asked for.
+
+    ``reference_length`` is R > 0, the unit of length of the budget: of the whole mesh, or of each
+    vertex, where parts that share no vertex have their own. ``altitudes`` is α of the network's
+    lengths, infinite where these are h whatever the faces.
+    """
+
+    points: Float[np.ndarray, "V 3"]
+    mesh: MeshEdges
+    several_fans: Bool[np.ndarray, " V"]
+    reference_length: float | Float[np.ndarray, " V"]
+    blocks: Blocks
+    boundary: Boundary = NO_RULE
+    altitudes: float = math.inf
+
+    def budget_per_length(
+        self, vertices: Int[np.ndarray, " N"], budget: float
+    ) -> Float[np.ndarray, " N"]:
+        """C / R at each of some vertices."""
+        if isinstance(self.reference_length, np.ndarray):
+            return budget / self.reference_length[vertices]
+        return np.full(len(vertices), budget / self.reference_length)
+
+    @cached_property
+    def faces(self) -> FaceMeasures:
+        """Normals and areas."""
+        return measure_normals(self.points, self.mesh, self.blocks)
+
+    @cached_property
+    def rings(self) -> RingMeasures:
+        """The rings of all vertices."""
+        mesh, fans = self.mesh, self.several_fans
+        return measure_rings(self.points, mesh, self.faces, fans, self.altitudes, self.blocks)
+
+    @cached_property
+    def pushes(self) -> Float[np.ndarray, "V 3"]:
+        """The prior's d_v at s = 1."""
+        return measure_pushes(self.rings, self.blocks)
+
+    @cached_property
+    def bends(self) -> Float[np.ndarray, " F"]:
+        """b of the gates that read sides."""
+        return measure_bends(self.rings.jumps, self.mesh, self.blocks)
+
+    def network_blocks(self, count: int) -> Blocks:
+        """How ``count`` rows are divided that a network sees: alike whatever the threads.
+
+        A model file's runtime is called with the rows that the array kernels call it with.
+        """
+        calls = -(-count // (NETWORK_BLOCKS * CALL_ROWS))
+        rows = min(max(calls, 1) * CALL_ROWS, BLOCK_ROWS)
+        return self.blocks.of_rows(min(rows, self.blocks.rows))

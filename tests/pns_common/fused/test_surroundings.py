@@ -1,0 +1,44 @@
+"""What a learned level reads of its mesh: each part once, networks' rows alike for all threads."""
+
+import numpy as np
+
+from pns_common import Mesh
+from pns_common.base.blocks import BLOCK_ROWS, Blocks
+from pns_common.fused.surroundings import Surroundings
+from pns_common.models.contract import CALL_ROWS
+from tests.support.kernels import edges_built
+from tests.support.meshes import bumpy_sphere
+
+MESH = Mesh(*bumpy_sphere(0, subdivisions=0))
+
+
+def surroundings(length=2.0, blocks=None):
+    nothing = np.zeros(12, dtype=bool)
+    given = blocks or Blocks(1)
+    return Surroundings(MESH.vertices, edges_built(MESH), nothing, length, given)
+
+
+def test_a_budget_is_shared_out_by_one_length_or_by_each_vertexs():
+    rows = np.array([0, 2])
+    assert surroundings().budget_per_length(rows, 3.0).tolist() == [1.5, 1.5]
+    lengths = np.arange(1.0, 13)
+    assert surroundings(lengths).budget_per_length(rows, 3.0).tolist() == [3, 1]
+
+
+def test_what_is_asked_for_twice_is_measured_once():
+    seen = surroundings()
+    assert seen.rings is seen.rings
+    assert seen.pushes is seen.pushes
+    assert seen.faces is seen.faces
+
+
+def test_a_model_file_is_called_with_the_array_kernels_rows_whatever_the_threads():
+    for count in (0, 9000, 100_000, 10**6):
+        one, four = (
+            surroundings(blocks=Blocks(threads, rows=10**6, least=5)).network_blocks(count)
+            for threads in (1, 4)
+        )
+        assert one.rows_of(count) == four.rows_of(count)
+        assert one.rows_of(count) % CALL_ROWS == BLOCK_ROWS % CALL_ROWS == 0
+    assert one.rows == BLOCK_ROWS
+    assert surroundings(blocks=Blocks(1, rows=7)).network_blocks(100).rows == 7
