@@ -21,7 +21,7 @@ from pns_common.runtimes.onnx_model import model_from_bytes
 from pns_common.schemes import vertex_operator
 from tests.support.meshes import bent, bumpy_sphere, grid
 from tests.support.networks import perceptron_bytes, random_layers
-from train.certificates.certify import certify_scheme
+from train.certificates.certify import run_steps, scheme_steps
 from train.certificates.double_precision import double_model
 from train.certificates.model_file import keeps_its_word
 from train.certificates.subject import in_double, subject_of_model, subject_of_network
@@ -200,10 +200,10 @@ def test_the_file_in_double_precision_is_the_network_in_double_precision():
 def test_every_certificate_passes_with_the_vertex_rule_on():
     model = two_networks(1e3)  # loud: both rules use their whole envelope
     subject = subject_of_network(model)
-    verdict = certify_scheme(subject, (), 0, lambda *_: None, valences=(3, 6, 9))
+    certificates = run_steps(scheme_steps(subject, (), 0, (3, 6, 9)), lambda *_: None)
     failed = [
         (certificate.theorem, certificate.name, certificate.value, certificate.where)
-        for certificate in verdict.certificates
+        for certificate in certificates
         if certificate.counts and not certificate.passed
     ]
     assert not failed

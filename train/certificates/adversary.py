@@ -14,7 +14,6 @@ from jaxtyping import Float
 from torch import Tensor
 
 from pns_common.connectivity.topology import Topology, build_topology
-from pns_common.geometry.frames import edge_stencil, face_normals
 from pns_common.mesh import Mesh
 from train.certificates.affine import TURNED
 from train.certificates.bodies import bumpy_sphere, random_motion
@@ -190,15 +189,6 @@ def affine_attack(
     values = ascend([slide, *operator.weights], look, steps, on_step)
     plane_mesh = Mesh(lay().detach().numpy(), grid_faces())
     return _attack("affine reproduction", cap, values, operator, plane_mesh)
-
-
-def folding(mesh: Mesh) -> float:
-    """Return the largest x = 1 − n1 · n2 of a mesh: how far a search has bent it."""
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    normals = face_normals(mesh.vertices, mesh.faces)
-    faces = topology.edge_faces[topology.interior]
-    stencil = edge_stencil(mesh.vertices, normals, topology.stencil[topology.interior], faces)
-    return float((1 - (stencil.n1 * stencil.n2).sum(axis=1)).max())
 
 
 def _ratios(step: Step) -> Float[Tensor, " N"]:

@@ -94,18 +94,6 @@ def certify_model_file(
     return Verdict(model.name, facts, certificates)
 
 
-def certify_scheme(
-    subject: Subject,
-    real: Sequence[Body],
-    seed: int,
-    on_progress: OnProgress,
-    valences: Sequence[int] = VALENCES,
-) -> Verdict:
-    """Certify any scheme against T1–T8 and what its kind promises beside them."""
-    certificates = run_steps(scheme_steps(subject, real, seed, valences), on_progress)
-    return Verdict(subject.name, {"budget": subject.budget}, certificates)
-
-
 def scheme_steps(
     subject: Subject, real: Sequence[Body], seed: int, valences: Sequence[int]
 ) -> list[Step]:

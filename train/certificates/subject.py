@@ -32,11 +32,6 @@ class Subject:
         return self.exact is not self.scheme
 
 
-def subject_of_scheme(scheme: Scheme, budget: float) -> Subject:
-    """A scheme that is double precision throughout, held to a budget of the caller's."""
-    return Subject(scheme.name, scheme, scheme, budget)
-
-
 def subject_of_model(model: Model, exact: Model, budget: float | None = None) -> Subject:
     """The learned operator with a model, and with the same model in double precision."""
     scheme = pns(model, budget)

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from pns_common.connectivity.topology import build_topology
+from pns_common.geometry.frames import face_normals
 from tests.support.meshes import rotation
 from tests.support.recipes import both_rules
 from train.certificates.adversary import (
     affine_attack,
     equivariance_attack,
-    folding,
     proximity_attack,
 )
 from train.certificates.affine import TURNED
@@ -23,6 +24,14 @@ from train.models.torch_model import recipe_model
 
 def quiet(done, value):
     pass
+
+
+def folding(mesh):
+    """The largest x = 1 − n1 · n2 of a mesh: how far a search has bent it."""
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    normals = face_normals(mesh.vertices, mesh.faces)
+    n1, n2 = normals[topology.edge_faces[topology.interior]].transpose(1, 0, 2)
+    return (1 - (n1 * n2).sum(axis=1)).max()
 
 
 def test_the_proximity_adversary_finds_the_cap_and_never_passes_it():

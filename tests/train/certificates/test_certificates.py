@@ -27,7 +27,7 @@ from train.certificates.planar_spectrum import planar_spectrum
 from train.certificates.regular import regular_smoothness
 from train.certificates.scaling import normal_variation_slope, proximity_slope
 from train.certificates.stability import lipschitz_slope
-from train.certificates.subject import subject_of_model, subject_of_network, subject_of_scheme
+from train.certificates.subject import Subject, subject_of_model, subject_of_network
 from train.models.networks import BoundedNet
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
@@ -47,7 +47,7 @@ CERTIFICATES = {
 
 
 def held(scheme):
-    return subject_of_scheme(scheme, schemes.BUDGET)
+    return Subject(scheme.name, scheme, scheme, schemes.BUDGET)
 
 
 def random_network(seed, scale):

@@ -24,14 +24,16 @@ from tests.support.networks import (
 from train.certificates.affine import affine_reproduction
 from train.certificates.bodies import flat_bodies, synthetic_bodies
 from train.certificates.certify import (
+    Verdict,
     certify_model_file,
-    certify_scheme,
+    run_steps,
+    scheme_steps,
     verdict_json,
 )
 from train.certificates.displacement import bounded_displacement
 from train.certificates.double_precision import double_model, read_bytes
 from train.certificates.model_file import keeps_its_word, sample_features
-from train.certificates.subject import subject_of_model, subject_of_scheme
+from train.certificates.subject import Subject, subject_of_model
 
 
 def quiet(title, done, total):
@@ -189,8 +191,9 @@ def test_constants_and_casts_are_widened_too():
 
 
 def test_any_scheme_can_be_certified():
-    subject = subject_of_scheme(pns(Float64Model(random_layers(2))), 0.5)
-    verdict = certify_scheme(subject, (), 0, quiet, valences=(4,))
+    scheme = pns(Float64Model(random_layers(2)))
+    steps = scheme_steps(Subject("any", scheme, scheme, 0.5), (), 0, valences=(4,))
+    verdict = Verdict("any", {}, run_steps(steps, quiet))
     assert verdict.passed, failures(verdict)
 
 

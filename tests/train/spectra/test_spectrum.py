@@ -15,13 +15,12 @@ from train.certificates.operator_jacobian import operator_jacobian
 from train.models.networks import BoundedNet
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
-from train.spectra.margin_gradient import margin_gradient, separation
+from train.spectra.margin_gradient import margin_gradient
 from train.spectra.spectrum import (
     FIRST_LIFT,
     GROWTH,
     SPOKE,
     VALENCES,
-    Spectrum,
     closed_star,
     continued_spectrum,
     flat_spectrum,
@@ -176,36 +175,6 @@ def test_strides_grow_from_small_lifts_and_end_where_asked():
     assert ratios.max() <= GROWTH * (1 + 1e-12)
     assert strides(0.3, 0.35) == [0.35]
     assert strides(0.0, FIRST_LIFT / 2) == [FIRST_LIFT / 2]
-
-
-def test_a_pair_that_left_the_real_line_is_led_back():
-    """A tangent and another eigenvalue have met: their sizes are one, whatever one does to them."""
-    rng = np.random.default_rng(0)
-    base = np.diag([0.9, 0.8, 0.7, 0.6, 0.55, 0.5, 0.5, 0.2])
-    base[5, 6], base[6, 5] = 0.1, -0.1
-    mixed = rng.standard_normal((8, 8))
-    matrix, change = mixed @ base @ np.linalg.inv(mixed), rng.standard_normal((8, 8))
-
-    def spectrum(moved):
-        values, right = np.linalg.eig(moved)
-        tangent = (np.abs(values) > 0.52) | (values.imag > 0)
-        whole = (np.eye(8),), np.zeros(8, dtype=int)
-        return Spectrum(values, right, np.linalg.inv(right), tangent, *whole)
-
-    split_pair = spectrum(matrix)
-    assert split_pair.margin == pytest.approx(0, abs=1e-9)
-    value, slope = separation(split_pair)
-    assert value == pytest.approx(-0.2)
-    up, down = (separation(spectrum(matrix + s * 1e-6 * change))[0] for s in (1, -1))
-    assert (up - down) / 2e-6 == pytest.approx((slope * change).sum(), rel=1e-4)
-
-
-def test_apart_from_such_pairs_the_separation_is_the_margin():
-    scheme = pns(recipe_model(paper(), steep_network(scale=2.0)))
-    followed = follow_lift(scheme, 6, np.linspace(0, 0.4, 9))[-1]
-    value, slope = separation(followed)
-    assert value == followed.margin
-    np.testing.assert_array_equal(slope, margin_gradient(followed))
 
 
 def test_tangents_of_a_flat_star_are_those_nearest_loops():
