@@ -72,7 +72,7 @@ def loop_vertex_vertices(points: Float[Array, "V K"], topology: Topology) -> Flo
     xp = namespace(points)
     sharp_edges = topology.edges[topology.edge_class != EdgeClass.INTERIOR]
     sharp = sharp_edge_count(topology)
-    valence = np.bincount(topology.edges.reshape(-1), minlength=topology.vertex_count)
+    valence = topology.valence
     ring_sum = _neighbour_sum(points, topology.edges)
 
     smooth = sharp < 2

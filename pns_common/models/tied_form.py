@@ -121,8 +121,7 @@ def feature_basis(
             partner = int(np.flatnonzero(moved[k])[0])
             if partner > k:
                 pairs.append((k, partner))
-                one, other = basis[k], basis[partner]
-                basis[k], basis[partner] = one + other, one - other
+                basis[[k, partner]] = basis[k] + basis[partner], basis[k] - basis[partner]
     signs = np.array([np.diag(_in_basis(act, basis)) for act in acts])
     return pairs, _characters(signs), basis
 

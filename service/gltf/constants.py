@@ -21,5 +21,6 @@ COLUMNS = {"MAT2": 2, "MAT3": 3, "MAT4": 4}
 
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 
-GLB_MAGIC, GLB_VERSION = b"glTF", 2
+# Its first word, which tells a GLB from other bodies, is bodies.media.GLB_MAGIC.
+GLB_VERSION = 2
 JSON_CHUNK, BIN_CHUNK = b"JSON", b"BIN\0"

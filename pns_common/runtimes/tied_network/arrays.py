@@ -33,8 +33,8 @@ def answers_of(
 def _z(form: TiedForm, features: Float[np.ndarray, "N K"]) -> Float32[np.ndarray, "3 N"]:
     """What the last layer says, before it is projected onto the ball."""
     seen = np.ascontiguousarray(features.T, dtype=np.float32)
-    for one, other in form.pairs:
-        seen[one], seen[other] = seen[one] + seen[other], seen[one] - seen[other]
+    for i, j in form.pairs:
+        seen[i], seen[j] = seen[i] + seen[j], seen[i] - seen[j]
     size, rows = form.copies, seen.shape[1]
     units, at, bias_at = _biased(form.biases[: form.widths[0]], size, rows), 0, form.widths[0]
     for k, character in enumerate(form.characters):
@@ -65,8 +65,8 @@ def _transformed(units: Float32[np.ndarray, "G m N"]) -> Float32[np.ndarray, "G 
     step = 1
     while step < len(units):
         halves = units.reshape(-1, 2, step, *units.shape[1:])
-        one, other = halves[:, 0], halves[:, 1]
-        units = np.stack([one + other, one - other], axis=1).reshape(units.shape)
+        even, odd = halves[:, 0], halves[:, 1]
+        units = np.stack([even + odd, even - odd], axis=1).reshape(units.shape)
         step *= 2
     return units
 

@@ -6,8 +6,9 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ...bodies.media import GLB_MAGIC
 from ...errors import UnreadableError, check_limit
-from ..constants import BIN_CHUNK, GLB_MAGIC, GLB_VERSION, JSON_CHUNK
+from ..constants import BIN_CHUNK, GLB_VERSION, JSON_CHUNK
 
 _HEADER = struct.Struct("<4sII")
 _CHUNK = struct.Struct("<I4s")

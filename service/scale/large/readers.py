@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from ...bodies.media import GLB_MAGIC
 from ...errors import UnreadableError
 from ...gltf.constants import (
     COMPONENT_TYPES,
     FLOAT,
-    GLB_MAGIC,
     GLB_VERSION,
     JSON_CHUNK,
     UNSIGNED_INTEGERS,
