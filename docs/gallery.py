@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from picture import STEEL, draw
 
 from pns_common import Mesh, load_model, loop, pns, refine, subdivide
+from pns_common.base.whole_file import replacing
 
 FOLDER = Path(__file__).with_name("gallery")
 
@@ -24,9 +25,8 @@ def main() -> None:
     FOLDER.mkdir(exist_ok=True)
     for name, figure in (("cube", cube()), ("texture", texture())):
         path = FOLDER / f"{name}.png"
-        temporary = path.with_suffix(".tmp.png")
-        figure.savefig(temporary)
-        temporary.replace(path)
+        with replacing(path) as temporary:
+            figure.savefig(temporary, format="png")
         print(path)
 
 

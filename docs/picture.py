@@ -17,6 +17,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from pns_common import Mesh, Refinement, load_model, pns, refine
+from pns_common.base.whole_file import replacing
 from service.meshes.weld import weld
 from service.meshfiles.example import part
 
@@ -49,9 +50,8 @@ def main() -> None:
     draw(right, refined.mesh.vertices, faces, palette.to_rgba(ratio)[:, :3], 0)
     right.set_title("Where the budget is spent")
     figure.colorbar(palette, ax=right, label="proximity ratio  ‖q − q0‖ R / (C h²)", shrink=0.8)
-    temporary = OUTPUT.with_suffix(".tmp.png")
-    figure.savefig(temporary)
-    temporary.replace(OUTPUT)
+    with replacing(OUTPUT) as temporary:
+        figure.savefig(temporary, format="png")
     print(f"{OUTPUT}: largest ratio {ratio.max():.3f}")
 
 

@@ -12,6 +12,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from pns_common.base.whole_file import replace_file
+
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = Path(__file__).with_name("pns_refine")
 CORE = Path(__file__).with_name("core.toml")
@@ -37,10 +39,7 @@ def main(python: str) -> None:
         (built,) = packed.glob("*.zip")
         print(said(python, tool, "validate", built))
         DIST.mkdir(exist_ok=True)
-        # Written beside, then renamed: nobody sees half a file.
-        temporary = DIST / f"{built.name}.tmp"
-        shutil.copyfile(built, temporary)
-        temporary.rename(DIST / built.name)
+        replace_file(DIST / built.name, built.read_bytes())
     print(f"{DIST / built.name}: {(DIST / built.name).stat().st_size:,} bytes")
 
 
