@@ -56,6 +56,7 @@ def write_model(
     return Exported(model.hash, parity)
 
 
+# What stands on a card about training, and in what order.
 ORDER = (
     "recipe",
     "hidden",
@@ -75,10 +76,9 @@ ORDER = (
     "vertex",
     "machine",
 )
-"""What stands on a card about training, and in what order."""
 
+# What cards call a recipe that had another name when its bundled file was made: the bytes stay.
 RECORDED: Mapping[str, str] = MappingProxyType({"paper": "ridge"})
-"""What cards call a recipe that had another name when its bundled file was made: the bytes stay."""
 
 
 def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:

@@ -10,11 +10,11 @@ from torch import Tensor
 from pns_common.models.card import CARD_KEY, ModelCard
 from train.models.networks import BoundedNet, SymmetricNet
 
+# New enough for every operator here; runtimes of the last years all read it.
 OPSET = 17
-"""New enough for every operator here; runtimes of the last years all read it."""
 
+# The file format that came with this operator set.
 IR_VERSION = 8
-"""The file format that came with this operator set."""
 
 
 def model_bytes(

@@ -15,13 +15,13 @@ from pns_common.features.symmetry import Feature
 from pns_common.runtimes.onnx_model import OnnxModel
 from train.models.networks import BoundedNet
 
+# Largest difference allowed, as a fraction of the budget and of the row's largest feature.
+#
+# Single precision rounds what the layers add up: a sliver whose features are 30 in size rounds 30
+# times as much as a triangle, in torch as in the file. Features below 1 count as 1. Of the
+# bundled networks the default's rounds most, by 1.4e-6: it was trained longest, and its weights
+# are largest.
 TOLERANCE = 3e-6
-"""Largest difference allowed, as a fraction of the budget and of the row's largest feature.
-
-Single precision rounds what the layers add up: a sliver whose features are 30 in size rounds 30
-times as much as a triangle, in torch as in the file. Features below 1 count as 1. Of the bundled
-networks the default's rounds most, by 1.4e-6: it was trained longest, and its weights are largest.
-"""
 
 ROWS = 10_000
 BUDGETS = (1e-6, 0.1, 0.5, 1.0, 1e3)

@@ -17,12 +17,12 @@ from train.models.checkpoint import load_checkpoint
 from train.models.recipes import RECIPES, Recipe
 
 MODELS = Path(__file__).resolve().parents[1] / "pns_common" / "models"
+# The bundled file of a recipe with its own seed.
 FILE_OF_RECIPE = {
     "paper": MODELS / "paper.onnx",
     "signed": MODELS / "signed.onnx",
     "general": MODELS / "general.onnx",
 }
-"""The bundled file of a recipe with its own seed."""
 
 
 def bundled_file(recipe: Recipe) -> Path | None:

@@ -87,8 +87,8 @@ class Options:
         return None if self.reference_length == "auto" else self.reference_length
 
 
+# What a parameter is where it is not given.
 DEFAULTS = Options()
-"""What a parameter is where it is not given."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ HEADER = b"x-request-id"
 # What may stand in a log, a header and a file name without a thought.
 _SANE = re.compile(rb"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
+# The id of the request that is being served; a task that is started for it keeps it.
 REQUEST_ID: ContextVar[str | None] = ContextVar("request_id", default=None)
-"""The id of the request that is being served; a task that is started for it keeps it."""
 
 
 def id_of(headers: list[tuple[bytes, bytes]]) -> str:

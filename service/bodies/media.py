@@ -17,6 +17,7 @@ ZIP = "application/zip"
 Kind = Literal["glb", "gltf", "obj", "ply", "stl", "off"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 GLTF_KINDS = ("glb", "gltf")
+# The pipeline's name of each file type. Only OBJ's and STL's beside glTF's are registered.
 FORMATS: dict[str, Kind] = {
     GLB: "glb",
     GLTF: "gltf",
@@ -25,7 +26,6 @@ FORMATS: dict[str, Kind] = {
     "model/stl": "stl",
     "model/off": "off",
 }
-"""The pipeline's name of each file type. Only OBJ's and STL's beside glTF's are registered."""
 ACCEPTED = (*FORMATS, ZIP, MULTIPART)
 
 _WEIGHT = re.compile(r"q\s*=\s*(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)")

@@ -31,8 +31,8 @@ class SiblingFiles:
     names: frozenset[str] = frozenset()
 
 
+# A document that came without any other file.
 ALONE = SiblingFiles(lambda name: None)
-"""A document that came without any other file."""
 
 
 @dataclass

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+# Exit code for a parameter out of its range, as the command line's own parser uses it.
 USAGE_ERROR = 2
-"""Exit code for a parameter out of its range, as the command line's own parser uses it."""
+# Exit code for a file or a model that cannot be used.
 FAILURE = 1
-"""Exit code for a file or a model that cannot be used."""
 
 _SETTING_OF_LIMIT = {
     "faces": "PNS_FACES",

@@ -198,12 +198,12 @@ JOB_REPORT: dict[str, Any] = {
     | {200: {"description": "The report", "content": {media.JSON: {"schema": _named("Report")}}}},
 }
 
+# The schemas that the routes above name.
 SCHEMAS: dict[str, dict[str, Any]] = {
     "Problem": Problem.model_json_schema(),
     "Job": _JOB,
     "Report": _REPORT,
 }
-"""The schemas that the routes above name."""
 
 DELETE_JOB: dict[str, Any] = {
     "summary": "Cancel a job, or forget one that has ended",

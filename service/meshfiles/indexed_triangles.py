@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float, Int
 
+# How text formats write a coordinate: micrometres are kept in coordinates of kilometres.
 NUMBER = "%.12g"
-"""How text formats write a coordinate: micrometres are kept in coordinates of kilometres."""
 
 
 @dataclass(frozen=True, eq=False)

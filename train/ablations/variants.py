@@ -31,12 +31,11 @@ from train.fitting.trainer import Fit, OnStep, optimise, step_loss, with_quiet
 from train.models.networks import RAW_COORDINATES, BoundedNet, unit_correction
 from train.models.recipes import Recipe, one_step
 
+# Interior edges, the network, its recipe and C / R to what is added to Loop's edge vertices.
+#
+# The envelope C h² of the answer is the operator's own, also where the variant knows none: it is
+# what the proximity ratio is measured against.
 EdgeCorrection = Callable[[EdgeStencil, BoundedNet, Recipe, float], Correction]
-"""Interior edges, the network, its recipe and C / R to what is added to Loop's edge vertices.
-
-The envelope C h² of the answer is the operator's own, also where the variant knows none: it is
-what the proximity ratio is measured against.
-"""
 
 
 @dataclass(frozen=True, slots=True)

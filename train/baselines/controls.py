@@ -26,8 +26,8 @@ from train.baselines.placement import kept_vertices, midpoints, placed_edges
 from train.surfaces.quasi_interpolation import added_to, normal_push
 
 CLIPPED_STRENGTH = 0.6
+# C of NC, in units of R.
 CLIPPED_BUDGET = 0.8
-"""C of NC, in units of R."""
 
 GATE = 1e5
 

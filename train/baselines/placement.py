@@ -12,8 +12,8 @@ from pns_common.schemes import (
     loop_vertex_rule,
 )
 
+# The C of the envelope that methods without a budget are measured against.
 COMPARED_BUDGET = 0.5
-"""The C of the envelope that methods without a budget are measured against."""
 
 
 def placed_edges(level: ControlLevel, positions: Float[np.ndarray, "E 3"]) -> Placement:

@@ -31,11 +31,11 @@ from train.models.from_recipe import (
 from train.models.networks import BoundedNet
 from train.models.recipes import Recipe
 
+# Called after each step with the number of steps done and the value found.
 OnStep = Callable[[int, float], None]
-"""Called after each step with the number of steps done and the value found."""
 
+# Adam's step: weights and vertices are both of size one.
 RATE = 0.02
-"""Adam's step: weights and vertices are both of size one."""
 
 
 @dataclass(frozen=True, eq=False)

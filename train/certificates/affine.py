@@ -16,11 +16,11 @@ from train.certificates.subject import Subject
 
 LEVELS = 2
 
+# Of h²: on a turned plane 1 − n1 · n2 is rounding, about 1e-16, and the gate squares it.
 TURNED = 1e-28
-"""Of h²: on a turned plane 1 − n1 · n2 is rounding, about 1e-16, and the gate squares it."""
 
+# Of h: the same where a gate as sharp as 1e6 stands before a displacement in units of h.
 TURNED_IN_EDGE_LENGTHS = 1e-20
-"""Of h: the same where a gate as sharp as 1e6 stands before a displacement in units of h."""
 
 
 def affine_reproduction(subject: Subject, flat: Sequence[Body], seed: int) -> list[Certificate]:

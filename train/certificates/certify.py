@@ -32,8 +32,8 @@ from train.certificates.stability import lipschitz_slope
 from train.certificates.subject import Subject, subject_of_model
 from train.spectra.spectrum import VALENCES
 
+# Called with what comes next, how many steps are done, and of how many.
 OnProgress = Callable[[str, int, int], None]
-"""Called with what comes next, how many steps are done, and of how many."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,8 @@ from train.certificates.plain_loop import plain_loop
 from train.certificates.step import rounding
 from train.certificates.subject import Subject
 
+# Faces up to which a mesh is refined further.
 LARGEST = 20_000
-"""Faces up to which a mesh is refined further."""
 
 AT_MOST = 1 + 1e-12
 

@@ -16,14 +16,13 @@ from train.certificates.step import step
 from train.certificates.subject import Subject
 
 EXACT = 1e-12
+# Of the envelope C h² / R: a feature's last single precision bit may turn with the mesh.
 SINGLE = 1e-6
-"""Of the envelope C h² / R: a feature's last single precision bit may turn with the mesh."""
 
+# A face's smallest sine, and the length of n1 + n2, above which frames are well conditioned.
+#
+# Antiparallel faces, where the fallback begins, are at a length of 1.4e-3.
 WELL_SHAPED = 1e-2
-"""A face's smallest sine, and the length of n1 + n2, above which frames are well conditioned.
-
-Antiparallel faces, where the fallback begins, are at a length of 1.4e-3.
-"""
 
 
 def equivariance(subject: Subject, bodies: Sequence[Body], seed: int) -> list[Certificate]:

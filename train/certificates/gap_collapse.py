@@ -31,15 +31,14 @@ from train.spectra.spectrum import (
 )
 from train.spectra.stars import Star
 
+# How far the adversary may move a vertex of the star, in spokes and each coordinate.
 SWAY = 0.1
-"""How far the adversary may move a vertex of the star, in spokes and each coordinate."""
 
+# Stars between the flat one and the final one along which eigenvalues are followed.
+#
+# With a quarter of them a crossing is taken for another and the margin changes sign; half give
+# the same.
 FOLLOWED = 65
-"""Stars between the flat one and the final one along which eigenvalues are followed.
-
-With a quarter of them a crossing is taken for another and the margin changes sign; half give the
-same.
-"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,13 +24,13 @@ from train.certificates.subject import Subject
 
 # Child faces that Loop makes flatter than this, in squared edge lengths, have no direction.
 FLAT = 1e-9
+# In degrees: what positions rounded to doubles may turn a face by.
 ROUNDING_ANGLE = 1e-5
-"""In degrees: what positions rounded to doubles may turn a face by."""
 
 SAME = 1e-12
 SCALES = (2.0**-12, 2.0**-3, 2.0**5)
+# A budget that no correction reaches.
 UNBOUNDED = 1e15
-"""A budget that no correction reaches."""
 
 
 def fold_free(subject: Subject, bodies: Sequence[Body]) -> Certificate:

@@ -8,8 +8,8 @@ from train.certificates.certificate import Certificate, Kind
 from train.certificates.subject import Subject
 from train.spectra.spectrum import VALENCES, follow_lift
 
+# Lift, in spokes.
 HIGHEST = 0.4
-"""Lift, in spokes."""
 
 LIFTS = tuple(np.linspace(0, HIGHEST, 9).tolist())
 

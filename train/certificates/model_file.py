@@ -21,9 +21,9 @@ BUDGETS = (1e-6, 0.1, 0.5, 1.0, 1e3)
 SINGLE_PRECISION = 1 + 1e-6
 SAMPLES = 4096
 
+# Percentage points between a card's improvement and the measured one: rounding on another
+# machine, no more.
 POINTS = 0.05
-"""Percentage points between a card's improvement and the measured one: rounding on another
-machine, no more."""
 
 
 def keeps_its_word(model: Model) -> list[Certificate]:

@@ -21,18 +21,18 @@ from train.spectra.spectrum import (
     without_translations,
 )
 
+# In spokes: what is of second order in the lift is then below rounding.
 TINY = 1e-8
-"""In spokes: what is of second order in the lift is then below rounding."""
 
+# In spokes, for eigenvalues: central differences err by its square times the third derivative,
+# which a gate of order two does not keep small, and by the rounding of positions over it.
 FINE = 5e-7
-"""In spokes, for eigenvalues: central differences err by its square times the third derivative,
-which a gate of order two does not keep small, and by the rounding of positions over it."""
 
 FLAT = 1e-6
 EIGENVALUE = 1e-9
+# The same for scale-free rules: their gates are some hundred times as sharp, and the second and
+# third derivatives that finite differences see with them. A gate with a kink shows as 1e-2.
 SHARPER_FLAT, SHARPER_EIGENVALUE = 1e-4, 1e-6
-"""The same for scale-free rules: their gates are some hundred times as sharp, and the second and
-third derivatives that finite differences see with them. A gate with a kink shows as 1e-2."""
 
 
 def planar_spectrum(subject: Subject, valences: Sequence[int] = VALENCES) -> list[Certificate]:

@@ -14,8 +14,8 @@ from train.experiments.harness.laboratory import Laboratory, silent
 from train.experiments.harness.reproduce import reproduce
 from train.experiments.registry import EXPERIMENTS
 
+# Called with an experiment's name, what it is doing, how many steps are done, and of how many.
 OnNews = Callable[[str, str, int, int], None]
-"""Called with an experiment's name, what it is doing, how many steps are done, and of how many."""
 
 NEWS_SECONDS = 0.2
 

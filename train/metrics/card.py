@@ -26,6 +26,7 @@ def _without_near(improvements: Mapping[str, Improvement]) -> dict[str, Improvem
     return {name: row for name, row in improvements.items() if not math.isnan(row.percent)}
 
 
+# One step by the published metrics where nothing else is said.
 MEASURES: Mapping[str, Callable[[Scheme], Mapping[str, Improvement]]] = MappingProxyType(
     {
         "ridge-held-out": lambda scheme: compare_with_loop(scheme, ridge_held_out()),
@@ -42,13 +43,12 @@ MEASURES: Mapping[str, Callable[[Scheme], Mapping[str, Improvement]]] = MappingP
         ),
     }
 )
-"""One step by the published metrics where nothing else is said."""
 
+# All that there is to say of a model that was trained on ridges for one step.
 ONE_STEP = ("ridge-held-out",)
-"""All that there is to say of a model that was trained on ridges for one step."""
 
+# What there is to say of one that aims at the limit: where it is after one step says nothing.
 TO_LIMIT = tuple(name for name in MEASURES if name.endswith("levels"))
-"""What there is to say of one that aims at the limit: where it is after one step says nothing."""
 
 
 def card_metrics(recipe: Recipe, scheme: Scheme) -> dict[str, Mapping[str, Improvement]]:

@@ -22,23 +22,23 @@ from train.metrics.surface_distance import (
     surface_errors,
 )
 
+# About 400 vertices on a closed mesh, as in the source.
 COARSE_FACES = 800
-"""About 400 vertices on a closed mesh, as in the source."""
 
+# The dense mesh has at least so many times the faces of the coarse one.
 LEAST_REDUCTION = 5
-"""The dense mesh has at least so many times the faces of the coarse one."""
 
+# How fast the simplification raises its threshold: below the library's 7, for better triangles.
 AGGRESSIVENESS = 5.0
-"""How fast the simplification raises its threshold: below the library's 7, for better triangles."""
 
+# Largest share of the coarse faces that may be cut off as pinched.
 LARGEST_CUT = 1 / 20
-"""Largest share of the coarse faces that may be cut off as pinched."""
 
+# From how many per cent on a method counts as worse.
 WORSE = 1.0
-"""From how many per cent on a method counts as worse."""
 
+# How many counts of faces near the target are tried for a manifold.
 SEARCH = 9
-"""How many counts of faces near the target are tried for a manifold."""
 
 
 @dataclass(frozen=True, slots=True)

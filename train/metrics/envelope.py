@@ -16,8 +16,8 @@ from train.metrics.evaluation import compare_with_loop
 from train.metrics.one_step import Improvement
 from train.surfaces.implicit import Surface, signed_distance
 
+# What the limit is known for; a normal error has no such bound.
 DISTANCE_METRICS = ("distance_near", "distance", "hausdorff_near", "hausdorff")
-"""What the limit is known for; a normal error has no such bound."""
 
 DIRECTIONS = 96
 HALVINGS = 40

@@ -11,12 +11,12 @@ from pns_common.schemes import Scheme, loop
 from train.data.datasets import Dataset, Instance
 from train.metrics.one_step import METRICS, Errors, Improvement, improvement, one_step_errors
 
+# For each metric its value on every instance of a data set.
 ErrorTable = Mapping[str, Float[np.ndarray, " N"]]
-"""For each metric its value on every instance of a data set."""
 
 
+# A scheme for each instance: for what may look at the surface, as the envelope's limit does.
 SchemeOf = Callable[[Instance], Scheme]
-"""A scheme for each instance: for what may look at the surface, as the envelope's limit does."""
 
 
 def one_step_table(scheme: Scheme | SchemeOf, dataset: Dataset) -> ErrorTable:

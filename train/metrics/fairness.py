@@ -6,8 +6,8 @@ from jaxtyping import Float
 from pns_common.base.arrays import cross, dot, norm, unit
 from pns_common.mesh import Mesh
 
+# Faces with twice their area below this share of their squared sides are left out.
 NO_AREA = 1e-12
-"""Faces with twice their area below this share of their squared sides are left out."""
 
 
 def bending(mesh: Mesh, normals: Float[np.ndarray, "V 3"] | None = None) -> float:

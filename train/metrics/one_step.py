@@ -15,8 +15,8 @@ from pns_common.connectivity.topology import Topology
 from pns_common.geometry.frames import edge_stencil, face_normals
 from train.surfaces.implicit import Surface, signed_distance
 
+# Vertices whose distance from the feature (|y'| on a ridge) is below this are near it.
 NEAR_FEATURE = 0.3
-"""Vertices whose distance from the feature (|y'| on a ridge) is below this are near it."""
 
 RESAMPLES = 2000
 

@@ -14,8 +14,8 @@ from pns_common.base.arrays import cross, dot
 from pns_common.connectivity.topology import build_topology
 from pns_common.mesh import Mesh
 
+# Barycentric coordinates up to here are none.
 ON_BORDER = 1e-9
-"""Barycentric coordinates up to here are none."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -10,17 +10,17 @@ from numba.extending import register_jitable
 from pns_common.fused.kernels.rings import between, cross, dot
 from pns_common.mesh import Mesh
 
+# Side of a cell, in mean side lengths of the faces' boxes.
 CELL = 2.0
-"""Side of a cell, in mean side lengths of the faces' boxes."""
 
+# Cells along one side of the grid, at most: three of them fit into an int64 key.
 MOST_CELLS = 1 << 20
-"""Cells along one side of the grid, at most: three of them fit into an int64 key."""
 
+# Crossings this close to a border, as a share of a triangle, are no crossings.
 SLACK = 1e-12
-"""Crossings this close to a border, as a share of a triangle, are no crossings."""
 
+# Times this, keys of neighbouring cells fall into bins far apart (Knuth's multiplicative hash).
 SPREAD = 0x9E3779B97F4A7C15 >> 1
-"""Times this, keys of neighbouring cells fall into bins far apart (Knuth's multiplicative hash)."""
 
 for helper in (between, cross, dot):
     register_jitable(helper)

@@ -17,11 +17,11 @@ from train.surfaces.implicit import Surface, signed_distance, unit_normal
 
 PROJECTIONS = 4
 FOOT_POINT_STEPS = 40
+# A foot point that a step moves by less than this, in the surface's unit, is found.
 CONVERGED = 1e-12
-"""A foot point that a step moves by less than this, in the surface's unit, is found."""
 
+# Where a step turns back by more than this share of the one before, half of it gets nearer.
 SWINGS = -1 / 3
-"""Where a step turns back by more than this share of the one before, half of it gets nearer."""
 
 
 @dataclass(frozen=True, slots=True)

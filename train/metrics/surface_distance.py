@@ -10,8 +10,8 @@ from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
 from train.metrics.point_mesh import FaceTree, distances, face_tree, nearest
 
+# Sample points on each of the two surfaces.
 SAMPLES = 10_000
-"""Sample points on each of the two surfaces."""
 
 SEED = 0
 

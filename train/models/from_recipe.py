@@ -20,6 +20,8 @@ from train.models.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_co
 from train.models.recipes import Recipe, ToLimit, VertexRule
 from train.models.tied import TiedNet
 
+# Usual sizes of features, by kind, on simplified meshes; others are about 1. Tied networks read
+# features in these units, so that training sees all of them from the start.
 FEATURE_SIZES: Mapping[str, float] = MappingProxyType(
     {
         "x": 0.1,
@@ -38,8 +40,6 @@ FEATURE_SIZES: Mapping[str, float] = MappingProxyType(
         "neighbours' mean jump": 0.05,
     }
 )
-"""Usual sizes of features, by kind, on simplified meshes; others are about 1. Tied networks read
-features in these units, so that training sees all of them from the start."""
 
 # The vertex network's draw is not the edge network's.
 VERTEX_SEED = 1 << 20

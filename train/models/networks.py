@@ -13,8 +13,8 @@ from torch import Tensor, nn
 from pns_common.features.edge_features import FEATURE_COUNT
 from pns_common.features.symmetry import Symmetries
 
+# The coordinates of a, b, c, d: what the unconstrained network sees instead of features.
 RAW_COORDINATES = "raw-12"
-"""The coordinates of a, b, c, d: what the unconstrained network sees instead of features."""
 
 INPUT_COUNT: Mapping[str, int] = MappingProxyType({**FEATURE_COUNT, RAW_COORDINATES: 12})
 

@@ -19,21 +19,21 @@ from train.spectra import stars
 from train.spectra.star_symmetry import Subspace, keeps_blocks, symmetry_blocks
 from train.spectra.stars import Star
 
+# Spoke of every star, in reference lengths.
 SPOKE = 0.25
-"""Spoke of every star, in reference lengths."""
 
+# Step of the central differences, in spokes: their error is then about 1e-10.
 STEP = 1e-5
-"""Step of the central differences, in spokes: their error is then about 1e-10."""
 
+# Rings of a star and how many of them are inner, tried in this order.
 RINGS = ((2, 2), (3, 2), (4, 3), (6, 4))
-"""Rings of a star and how many of them are inner, tried in this order."""
 
 VALENCES = tuple(range(3, 13))
+# Loop's tangent eigenvalue is double, once for each of three coordinates.
 TANGENT_COUNT = 6
-"""Loop's tangent eigenvalue is double, once for each of three coordinates."""
 
+# Eigenvalues are followed in growing strides: gates open at small lifts, where most moves.
 FIRST_LIFT, GROWTH = 0.006, 1.3
-"""Eigenvalues are followed in growing strides: gates open at small lifts, where most moves."""
 
 
 def loop_eigenvalue(valence: int, frequency: int = 1) -> float:

@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from train.spectra.stars import Star
 
+# An orthonormal basis of an invariant subspace.
 Subspace = Float[np.ndarray, "M D"]
-"""An orthonormal basis of an invariant subspace."""
 
 
 def symmetry_blocks(star: Star, valence: int) -> tuple[Subspace, ...]:
@@ -51,8 +51,8 @@ def keeps_blocks(
     return bool(np.abs(matrix - kept).max() <= tolerance * np.abs(matrix).max())
 
 
+# The first spoke lies on the x axis.
 _MIRROR = np.diag([1.0, -1.0, 1.0])
-"""The first spoke lies on the x axis."""
 
 
 def _turn(valence: int) -> Float[np.ndarray, "3 3"]:

@@ -12,18 +12,18 @@ from jaxtyping import Float, Int
 from pns_common.mesh import Mesh
 from train.surfaces.solids import Field, Points
 
+# Values nearer to 0 are pushed away from it: no grid point lies on the surface.
 NUDGE = 1e-9
-"""Values nearer to 0 are pushed away from it: no grid point lies on the surface."""
 
+# A vertex stays so far, as a share of its edge, from the edge's ends: no face has no area.
 SPAN = 0.05
-"""A vertex stays so far, as a share of its edge, from the edge's ends: no face has no area."""
 
 DIFFERENCE = 1e-4
+# Of Newton's method towards the surface.
 STEPS, LONGEST = 3, 0.03
-"""Of Newton's method towards the surface."""
 
+# Below this squared slope of the field Newton's step is no longer lengthened.
 FLATTEST = 0.05
-"""Below this squared slope of the field Newton's step is no longer lengthened."""
 
 
 def _tetrahedra() -> Int[np.ndarray, "6 4 3"]:
@@ -48,10 +48,10 @@ CASES = {
 }
 
 
+# The corners of a tetrahedron in order, by which of them (bits 0 … 3) are inside.
 INSIDE_FIRST = np.array(
     [sorted(range(4), key=lambda corner: not code >> corner & 1) for code in range(16)]
 )
-"""The corners of a tetrahedron in order, by which of them (bits 0 … 3) are inside."""
 
 
 def marched(field: Field, side: int, extent: float) -> Mesh:

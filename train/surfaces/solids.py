@@ -14,17 +14,17 @@ Points = Float[np.ndarray, "P 3"]
 Scalars = Float[np.ndarray, " P"]
 Field = Callable[[Points], Scalars]
 
+# How many parts a solid has, and how often.
 COUNTS = {1: 0.25, 2: 0.2, 3: 0.25, 4: 0.2, 6: 0.1}
-"""How many parts a solid has, and how often."""
 
+# Radii of the seams.
 BLENDS = (0.02, 0.08, 0.2, 0.35)
-"""Radii of the seams."""
 
+# How often a part is cut away; how often there are a few long waves; and waves of all lengths.
 CUT, WAVES, DETAIL = 0.15, 0.45, 0.5
-"""How often a part is cut away; how often there are a few long waves; and waves of all lengths."""
 
+# Waves of all lengths: how many, the lowest frequency, and the ratio from one to the next.
 OCTAVES, LOWEST, STEP = 10, 4.0, 1.28
-"""Waves of all lengths: how many, the lowest frequency, and the ratio from one to the next."""
 
 
 def random_solid(rng: np.random.Generator) -> Field:
@@ -120,8 +120,8 @@ def _cylinder(rng: np.random.Generator) -> Field:
     return field
 
 
+# Kinds of parts, and how often.
 PARTS = {_ellipsoid: 0.3, _box: 0.2, _capsule: 0.25, _ring: 0.1, _cylinder: 0.15}
-"""Kinds of parts, and how often."""
 
 
 def _placed_part(rng: np.random.Generator, *, alone: bool) -> Field:

@@ -10,9 +10,9 @@ from typing import Protocol
 
 from ..addresses import Network, is_named, site
 
+# Name of the ASGI extension by which an application says that its answer is a stream that the
+# client may ask for again: a function to call before it begins.
 LISTENS = "pns.listens"
-"""Name of the ASGI extension by which an application says that its answer is a stream that the
-client may ask for again: a function to call before it begins."""
 
 # How many of those that have waited longest are asked whether they are idle, a call of the system
 # each: the others, where these are not, came in one burst, and are read at the next turn.

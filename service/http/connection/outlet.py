@@ -8,8 +8,8 @@ import socket
 from collections.abc import Callable
 from typing import Any
 
+# Whether the system tells that a client has ended before all it said is read (Linux does).
 TELLS_END = hasattr(select, "POLLRDHUP")
-"""Whether the system tells that a client has ended before all it said is read (Linux does)."""
 
 
 class Outlet:

@@ -13,8 +13,8 @@ from .target import origin_form
 # the event loop as much as a kilobyte does, however small it is.
 FREE_PIECES = 256
 BYTES_A_PIECE = 512
+# Name of the ASGI extension that tells whether a request's body has passed them: a function.
 FLOODED = "pns.flooded"
-"""Name of the ASGI extension that tells whether a request's body has passed them: a function."""
 
 
 class Parser(h11.Connection):

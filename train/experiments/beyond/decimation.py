@@ -38,11 +38,11 @@ from train.metrics.decimation import (
 from train.metrics.surface_distance import SurfaceErrors
 
 LEVELS = (2, 3)
+# Sample points on a surface for each draw of the scale.
 SAMPLES_A_DRAW = 10
-"""Sample points on a surface for each draw of the scale."""
 
+# Lengths in tables are thousandths of the dense mesh's diagonal.
 MILLI = 1000.0
-"""Lengths in tables are thousandths of the dense mesh's diagonal."""
 
 NOTES = (
     "The test of Neural Subdivision (Liu et al. 2020). A dense mesh is simplified by quadric edge "

@@ -21,23 +21,23 @@ from train.metrics.decimation import Pair, Summary
 from train.metrics.point_mesh import face_tree, nearest
 
 ELEVATION = 25.0
+# How much of the view a mesh fills, across or upright.
 FILLED = 0.95
-"""How much of the view a mesh fills, across or upright."""
 
+# End of the colour scale, in thousandths of the diagonal.
 LARGEST = 6.0
-"""End of the colour scale, in thousandths of the diagonal."""
 
 AZIMUTH = -60.0
+# The meshes of the figure, and from which side each shows most.
 PICTURED = MappingProxyType(
     {"fuze": AZIMUTH, "penguin": AZIMUTH, "spot": 50.0, "pipe": AZIMUTH, "pulley": AZIMUTH}
 )
-"""The meshes of the figure, and from which side each shows most."""
 
+# How many pictures there are where none of those is in the test.
 FALLBACK = 2
-"""How many pictures there are where none of those is in the test."""
 
+# Files have y upwards, as glTF says; the camera has z.
 UPRIGHT = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-"""Files have y upwards, as glTF says; the camera has z."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

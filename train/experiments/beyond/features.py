@@ -14,8 +14,8 @@ from train.metrics.envelope import envelope_limit
 from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import Recipe, one_step, paper
 
+# C and c: the paper's, and an envelope in which there is more to gain.
 SETTINGS = ((0.5, 10.0), (1.0, 100.0))
-"""C and c: the paper's, and an envelope in which there is more to gain."""
 
 NOTES = (
     "Improvements over Loop on the held-out ridges, all trained by the recipe `paper` with the "

@@ -17,6 +17,7 @@ from train.experiments.harness.rows import column, table
 from train.metrics.decimation import gain
 from train.metrics.surface_distance import prepared, surface_errors
 
+# Symbol, field of the card, values.
 SWEPT: tuple[tuple[str, str, tuple[float, ...]], ...] = (
     ("C", "budget", (1, 2, 5, 10, 20, 50)),
     ("s", "prior_strength", (0, 0.5, 0.75, 1, 1.25)),
@@ -25,7 +26,6 @@ SWEPT: tuple[tuple[str, str, tuple[float, ...]], ...] = (
     ("θ", "fold_angle", (30, 45, 60, 75, 85)),
     ("K", "learned_levels", (1, 2, 3)),
 )
-"""Symbol, field of the card, values."""
 
 AS_ON_CARD = ("", 0.0)
 

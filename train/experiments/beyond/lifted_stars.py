@@ -18,6 +18,7 @@ from train.models.torch_model import recipe_model
 from train.spectra.spectrum import VALENCES, Spectrum, follow_lift, loop_eigenvalue, loop_gap
 
 BUDGETS = (0.1, 0.25, 0.5, 1.0)
+# Valences in the figure, with colour and marker.
 SHOWN: Mapping[int, tuple[str, str]] = MappingProxyType(
     {
         3: (COLOURS["unconstrained"], "o"),
@@ -27,7 +28,6 @@ SHOWN: Mapping[int, tuple[str, str]] = MappingProxyType(
         12: (COLOURS["normal-displacement"], "v"),
     }
 )
-"""Valences in the figure, with colour and marker."""
 
 NOTES = (
     "The star is embedded in regular rings so that every footprint is complete; spoke 0.25 R, the "

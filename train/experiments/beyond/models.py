@@ -18,8 +18,8 @@ from train.experiments.paper.methods import unconstrained_scheme
 from train.metrics.evaluation import compare_with_loop
 from train.metrics.whole_surface import WholeSurface, gain, surface_jump, whole_surface
 
+# Times Loop's: the jump that is asked for where the surface itself has no larger one.
 JUMP_LIMIT = 1.5
-"""Times Loop's: the jump that is asked for where the surface itself has no larger one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,18 +23,18 @@ from train.metrics.self_intersection import self_intersecting
 from train.metrics.surface_distance import SurfaceErrors, prepared, surface_errors
 from train.metrics.whole_surface import normal_jump
 
+# Faces of the coarse mesh, and the levels after which it is measured.
 SIZES: Mapping[int, int] = {500: 3, 2000: 3, 5000: 2, 20000: 1}
-"""Faces of the coarse mesh, and the levels after which it is measured."""
 
 LARGEST = max(SIZES)
+# Of the CAD-like parts that are simplified to the largest size: no file is dense enough.
 FINENESS = 2
-"""Of the CAD-like parts that are simplified to the largest size: no file is dense enough."""
 
+# The dense mesh has at least so many times the coarse one's faces.
 LEAST_REDUCTION = 2
-"""The dense mesh has at least so many times the coarse one's faces."""
 
+# No method: how far vertices alone can take a mesh of so many faces.
 ON_SURFACE = "On the surface"
-"""No method: how far vertices alone can take a mesh of so many faces."""
 
 SAMPLES_A_DRAW = 10
 WORSE = 0.0

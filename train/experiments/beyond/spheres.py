@@ -18,8 +18,8 @@ from train.surfaces.implicit import SphereRidge
 
 LEVELS = 3
 SPLITS = 6
+# Of a result: the finest spheres are refined less often.
 MOST_FACES = 350_000
-"""Of a result: the finest spheres are refined less often."""
 NOTE = (
     f"Vertices on the unit sphere; {LEVELS} levels, fewer where there would be more than "
     f"{MOST_FACES:,} faces. h is the mean edge; the distance is the root "

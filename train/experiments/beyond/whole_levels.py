@@ -19,8 +19,8 @@ from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 
 LEVELS = 4
+# Of a refined mesh: deeper levels of larger meshes are left out.
 MOST_FACES = 150_000
-"""Of a refined mesh: deeper levels of larger meshes are left out."""
 
 NOTE = (
     f"Meshes of up to {MOST_FACES:,} faces after refinement; words as above. *Of these crossing "

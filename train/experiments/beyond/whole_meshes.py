@@ -23,14 +23,14 @@ from train.metrics.fairness import volume
 from train.metrics.self_intersection import self_intersecting
 
 LEVELS = 3
+# Self-intersecting faces that are allowed, over Loop's.
 MORE = 1.02
-"""Self-intersecting faces that are allowed, over Loop's."""
 
+# Per cent of the diagonal by which a result may leave the joint box.
 OVERSHOOT = 1.0
-"""Per cent of the diagonal by which a result may leave the joint box."""
 
+# Times N1's volume: the most that is allowed; the least is Loop's.
 VOLUME = 1.1
-"""Times N1's volume: the most that is allowed; the least is Loop's."""
 
 REFERENCE = "N1"
 

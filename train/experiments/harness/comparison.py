@@ -9,8 +9,8 @@ from train.experiments.harness.rows import column
 from train.metrics.one_step import METRICS, Improvement
 from train.metrics.tables import METRIC_TITLES
 
+# Per cent of improvement below which no share of the limit is given.
 SMALLEST_LIMIT = 0.1
-"""Per cent of improvement below which no share of the limit is given."""
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 

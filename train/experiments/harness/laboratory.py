@@ -17,8 +17,8 @@ from train.models.networks import BoundedNet
 from train.models.recipes import Recipe
 from train.models.torch_model import recipe_model
 
+# Called with what is being done, how many steps of it are done, and of how many.
 OnProgress = Callable[[str, int, int], None]
-"""Called with what is being done, how many steps of it are done, and of how many."""
 
 
 def silent(_text: str, _done: int, _of: int) -> None:
@@ -48,8 +48,8 @@ class Scale:
 
 
 FULL = Scale("full", instances=1000, training_steps=100_000, levels=4, deepest=7, samples=1000)
+# A few seconds each, for the tests: every line runs, no number means anything.
 SMALL = Scale("small", instances=1, training_steps=2, levels=2, deepest=2, samples=10)
-"""A few seconds each, for the tests: every line runs, no number means anything."""
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,8 @@ Every table is a CSV file with all digits beside this page, every figure a PNG a
 """
 
 
+# Rows of the longest table that the page shows; of longer ones it names the file.
 LONGEST = 90
-"""Rows of the longest table that the page shows; of longer ones it names the file."""
 
 
 def markdown_page(experiments: Mapping[str, Experiment], records: Mapping[str, Record]) -> str:

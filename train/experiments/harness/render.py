@@ -21,8 +21,8 @@ WIDTH, HEIGHT = 1000, 680
 ASPECT = HEIGHT / WIDTH
 LIGHT = np.array([-0.35, -0.5, 0.8])
 AMBIENT = 0.35
+# Half the width of the view, in the patch's units.
 HALF_WIDTH = 1.38
-"""Half the width of the view, in the patch's units."""
 
 CENTRE = np.array([0.0, 0.0, 0.05])
 

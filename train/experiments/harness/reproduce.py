@@ -16,10 +16,10 @@ from train.experiments.harness.sources import code_of, sources_of
 from train.experiments.harness.style import shared_style
 from train.fitting.determinism import deterministic
 
+# What each figure is written as, without what would be another in each run.
 FORMATS: Mapping[str, Mapping[str, None]] = MappingProxyType(
     {"png": {"Software": None}, "pdf": {"CreationDate": None}}
 )
-"""What each figure is written as, without what would be another in each run."""
 
 
 @dataclass(frozen=True, slots=True)

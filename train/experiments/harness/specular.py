@@ -11,18 +11,18 @@ from jaxtyping import Float
 from pns_common.mesh import Mesh
 from train.metrics.fairness import vertex_normals
 
+# Width and height of a picture, pixels.
 SIDE = 420
-"""Width and height of a picture, pixels."""
 
 MARGIN = 1.08
 LIGHTS = ((-0.5, 0.6, 0.8), (0.9, 0.1, 0.45))
 AMBIENT, DIFFUSE, SPECULAR, SHININESS = 0.22, 0.5, 0.55, 60.0
 COLOUR = np.array([0.62, 0.68, 0.76])
+# The background alone is white.
 BRIGHTEST = 0.99
-"""The background alone is white."""
 
+# Points stand so far apart, in pixels.
 SPACING = 0.6
-"""Points stand so far apart, in pixels."""
 
 MOST_STEPS = 64
 

@@ -11,8 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
+# Width of a full-width figure, inches.
 TEXT_WIDTH = 6.6
-"""Width of a full-width figure, inches."""
 
 STYLE: Mapping[Any, Any] = MappingProxyType(
     {

@@ -14,8 +14,8 @@ from train.experiments.harness.style import TITLES, method_style, panels
 from train.experiments.paper.methods import eight_methods, hard_instance, level_by_level, ridge_of
 from train.metrics.shape import DistanceLevel, distance_level
 
+# Vertices along one side of the reduced patch: 32 faces, half a million at level 7.
 SIDE = 5
-"""Vertices along one side of the reduced patch: 32 faces, half a million at level 7."""
 
 METHODS = ("loop", "butterfly", "pn-triangles", "curvature-adaptive", "pns", "unconstrained")
 NOTES = (

@@ -19,8 +19,8 @@ from train.experiments.paper.methods import hard_instance, learned_methods, leve
 from train.metrics.shape import LevelErrors, level_errors
 from train.surfaces.implicit import signed_distance
 
+# End of the shared colour scale, in the patch's units.
 LARGEST_ERROR = 0.1
-"""End of the shared colour scale, in the patch's units."""
 
 CAMERA = Camera(azimuth=-62.0, elevation=42.0)
 NOTES = (

@@ -19,8 +19,8 @@ from train.experiments.paper.paper_values import PAPER_INSTANCE
 from train.models.recipes import one_step, paper
 from train.surfaces.implicit import Ridge
 
+# Reference length of all experiments: the paper's C is absolute.
 PAPER_UNITS = 1.0
-"""Reference length of all experiments: the paper's C is absolute."""
 
 
 def eight_methods(laboratory: Laboratory) -> dict[str, Scheme]:

@@ -31,8 +31,8 @@ from train.spectra.spectrum import (
 from train.spectra.stars import star
 
 BUDGETS = (0.1, 0.25, 0.5, 1.0)
+# Valence: at higher ones Loop's tangents cross other eigenvalues before the gap has closed.
 ATTACKED = 6
-"""Valence: at higher ones Loop's tangents cross other eigenvalues before the gap has closed."""
 
 ATTACK_STEPS = 40
 NOTES = (

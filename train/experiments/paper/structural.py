@@ -31,8 +31,8 @@ from train.models.torch_model import recipe_model
 from train.spectra.spectrum import VALENCES
 
 SEED = 0
+# Random weights this much larger: steeper than any that training gives.
 SCALED = 5.0
-"""Random weights this much larger: steeper than any that training gives."""
 
 ATTACK_STEPS = 200
 
