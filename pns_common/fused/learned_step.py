@@ -84,6 +84,7 @@ def learned_points(
         # A copy: the boundary's rule moves more vertices.
         vertices = replace(vertices, corrected=seen.rings.smooth.copy())
         add_at_vertices(vertex_rule, seen, vertices)
+        seen.forget_rings()
     else:
         vertices.clear(slice(None))
     add_at_edges(edge_rule, seen, edges)

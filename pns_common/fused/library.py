@@ -22,6 +22,7 @@ import llvmlite.binding  # pyright: ignore[reportMissingTypeStubs]
 
 from pns_common.base.whole_file import replace_file
 from pns_common.fused import kernels
+from pns_common.fused.freed_memory import keep_freed_memory
 from pns_common.fused.kernels.compiled import Kernel
 from pns_common.fused.storage import kernel_file
 
@@ -51,6 +52,7 @@ def library() -> Library:
 
 @cache
 def _library() -> Library:
+    keep_freed_memory()
     modules = kernel_modules()
     file = kernel_file(key_of(modules))
     assert file is not None  # ``kernels_available`` says so

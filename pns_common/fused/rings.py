@@ -28,10 +28,10 @@ from pns_common.masks.stencils import limit_ring_weight
 
 @dataclass(frozen=True, eq=False)
 class FaceMeasures:
-    """Unit normals of the faces, and area vectors with their lengths."""
+    """Unit normals of the faces, and area vectors with their lengths; none once forgotten."""
 
     normals: Float[np.ndarray, "F 3"]
-    areas: Float[np.ndarray, "F 4"]
+    areas: Float[np.ndarray, "A 4"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +40,14 @@ class RingMeasures:
 
     Attributes:
         fields: mean normal and umbrella height.
-        means: over the spokes of each vertex.
+        means: over the spokes of each vertex; none once forgotten.
         jumps: x of each edge, 0 where it is not interior.
         network_lengths: ℓ of each edge.
         smooth: vertices with one closed ring of interior edges.
     """
 
     fields: Float[np.ndarray, "V 4"]
-    means: Float[np.ndarray, "V M"]
+    means: Float[np.ndarray, "N M"]
     jumps: Float[np.ndarray, " E"]
     network_lengths: Float[np.ndarray, " E"]
     valence: Int[np.ndarray, " V"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -61,6 +61,14 @@ class Surroundings:
         """The rings of all vertices."""
         mesh, fans = self.mesh, self.several_fans
         return measure_rings(self.points, mesh, self.faces, fans, self.altitudes, self.blocks)
+
+    def forget_rings(self) -> None:
+        """Let go of the largest tables, which nothing at edges reads: a fifth of all memory."""
+        if "rings" in vars(self):
+            # Made of them, and read at edges.
+            _ = self.pushes
+            vars(self)["rings"] = replace(self.rings, means=self.rings.means[:0].copy())
+            vars(self)["faces"] = replace(self.faces, areas=self.faces.areas[:0].copy())
 
     @cached_property
     def pushes(self) -> Float[np.ndarray, "V 3"]:

@@ -32,6 +32,20 @@ def test_what_is_asked_for_twice_is_measured_once():
     assert seen.faces is seen.faces
 
 
+def test_what_edges_read_outlives_the_rings():
+    whole, seen = surroundings(), surroundings()
+    seen.forget_rings()
+    assert vars(seen).keys().isdisjoint({"rings", "faces"})
+    assert seen.rings.means.any()
+    seen.forget_rings()
+    assert len(seen.rings.means) == len(seen.faces.areas) == 0
+    for part in ("fields", "network_lengths", "jumps", "smooth"):
+        np.testing.assert_array_equal(getattr(seen.rings, part), getattr(whole.rings, part))
+    np.testing.assert_array_equal(seen.pushes, whole.pushes)
+    np.testing.assert_array_equal(seen.bends, whole.bends)
+    np.testing.assert_array_equal(seen.faces.normals, whole.faces.normals)
+
+
 def test_a_model_file_is_called_with_the_array_kernels_rows_whatever_the_threads():
     for count in (0, 9000, 100_000, 10**6):
         one, four = (
