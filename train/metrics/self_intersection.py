@@ -19,6 +19,9 @@ MOST_CELLS = 1 << 20
 # Crossings this close to a border, as a share of a triangle, are no crossings.
 SLACK = 1e-12
 
+# Heights over a face's plane below this share of the face's size decide nothing.
+NEARLY = 1e-9
+
 # Times this, keys of neighbouring cells fall into bins far apart (Knuth's multiplicative hash).
 SPREAD = 0x9E3779B97F4A7C15 >> 1
 
@@ -41,8 +44,8 @@ def self_intersecting(mesh: Mesh) -> Bool[np.ndarray, " F"]:
     first = np.floor((lower - origin) / side).astype(np.int64)
     last = np.floor((upper - origin) / side).astype(np.int64)
     begin, keys, face = _binned(first, last)
-    boxes, normals = np.hstack([lower, upper]), _normals(mesh.vertices, mesh.faces)
-    _mark(mesh.vertices, mesh.faces, boxes, normals, first, begin, keys, face, crossing)
+    boxes, planes = np.hstack([lower, upper]), _planes(mesh.vertices, mesh.faces)
+    _mark(mesh.vertices, mesh.faces, boxes, planes, first, begin, keys, face, crossing)
     return crossing
 
 
@@ -88,17 +91,20 @@ def _key(x, y, z):
 
 
 @njit(cache=True)
-def _normals(vertices, faces):
-    """Return twice the area vector of each face."""
-    normals = np.empty((len(faces), 3))
+def _planes(vertices, faces):
+    """Return twice the area vector of each face, and which heights along it decide nothing."""
+    planes = np.empty((len(faces), 4))
     for f in range(len(faces)):
         a, b, c = faces[f]
-        normals[f] = cross(between(vertices, a, b), between(vertices, a, c))
-    return normals
+        u, v = between(vertices, a, b), between(vertices, a, c)
+        normal = cross(u, v)
+        planes[f, 0], planes[f, 1], planes[f, 2] = normal
+        planes[f, 3] = NEARLY * math.sqrt(dot(normal, normal) * max(dot(u, u), dot(v, v)))
+    return planes
 
 
 @njit(cache=True)
-def _mark(vertices, faces, boxes, normals, first, begin, keys, face, crossing):
+def _mark(vertices, faces, boxes, planes, first, begin, keys, face, crossing):
     """Mark the faces that cross another one of a cell."""
     for n in range(len(begin) - 1):
         for entry in range(begin[n], begin[n + 1]):
@@ -110,7 +116,7 @@ def _mark(vertices, faces, boxes, normals, first, begin, keys, face, crossing):
                     and not (crossing[i] and crossing[j])
                     and _boxes_meet(boxes, i, j)
                     and _common_corner(first, i, j) == keys[entry]
-                    and _cross(vertices, normals, faces, i, j)
+                    and _cross(vertices, planes, faces, i, j)
                 ):
                     crossing[i] = crossing[j] = True
 
@@ -132,15 +138,15 @@ def _common_corner(first, i, j):
 
 
 @njit(cache=True)
-def _cross(vertices, normals, faces, i, j):
+def _cross(vertices, planes, faces, i, j):
     """Whether an edge of either triangle passes through the other; never where they share two."""
     shared = 0
     for corner in range(3):
         shared += _is_of(faces[i, corner], faces, j)
     return (
         shared < 2
-        and not _on_one_side(vertices, normals, faces, i, j)
-        and not _on_one_side(vertices, normals, faces, j, i)
+        and not _on_one_side(vertices, planes, faces, i, j)
+        and not _on_one_side(vertices, planes, faces, j, i)
         and (_edge_pierces(vertices, faces, i, j) or _edge_pierces(vertices, faces, j, i))
     )
 
@@ -151,15 +157,15 @@ def _is_of(vertex, faces, i):
 
 
 @njit(cache=True)
-def _on_one_side(vertices, normals, faces, plane, other):
-    """Whether the corners that a face has alone lie strictly on one side of the other's plane."""
+def _on_one_side(vertices, planes, faces, plane, other):
+    """Whether the corners that a face has alone lie clearly on one side of the other's plane."""
     above, below = False, False
     for corner in range(3):
         vertex = faces[other, corner]
         if not _is_of(vertex, faces, plane):
-            height = dot(normals[plane], between(vertices, faces[plane, 0], vertex))
-            above |= not height < 0
-            below |= not height > 0
+            height = dot(planes[plane], between(vertices, faces[plane, 0], vertex))
+            above |= not height < -planes[plane, 3]
+            below |= not height > planes[plane, 3]
     return not (above and below)
 
 
