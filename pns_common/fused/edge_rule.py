@@ -84,5 +84,4 @@ def add_at_edges(
             )
             correct_scale_free(*answer, mesh.interior, rows.start, *prior, *out)
 
-    count = len(mesh.interior)
-    level.network_blocks(count).run(count, add)
+    level.network_blocks.run(len(mesh.interior), add)

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-# Less than 32 MiB: at 1.3 million faces the peak is no higher for it.
+# More would save the system's help in calls of more than 100,000 faces too, and costs memory: at
+# 1.3 million faces in random order the peak is 440 MiB, 480 with blocks of 31 MiB, 370 with none.
 KEPT_BLOCK = 24 * 2**20
 
 

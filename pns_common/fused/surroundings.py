@@ -20,10 +20,6 @@ from pns_common.fused.rings import (
     measure_pushes,
     measure_rings,
 )
-from pns_common.models.contract import CALL_ROWS
-
-# Blocks that a network sees, where there are enough rows: so many that all threads have some.
-NETWORK_BLOCKS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +76,7 @@ class Surroundings:
         """b of the gates that read sides."""
         return measure_bends(self.rings.jumps, self.mesh, self.blocks)
 
-    def network_blocks(self, count: int) -> Blocks:
-        """How ``count`` rows are divided that a network sees: alike whatever the threads.
-
-        A model file's runtime is called with the rows that the array kernels call it with.
-        """
-        calls = -(-count // (NETWORK_BLOCKS * CALL_ROWS))
-        rows = min(max(calls, 1) * CALL_ROWS, BLOCK_ROWS)
-        return self.blocks.of_rows(min(rows, self.blocks.rows))
+    @property
+    def network_blocks(self) -> Blocks:
+        """How rows are divided that a network sees: as the array kernels divide them."""
+        return self.blocks.of_rows(min(BLOCK_ROWS, self.blocks.rows))

@@ -56,4 +56,4 @@ def add_at_vertices(
                 *answer, pushes, *of_boundary, form.prior_strength, form.network_scale, *out
             )
 
-    level.network_blocks(len(vertices)).run(len(vertices), add)
+    level.network_blocks.run(len(vertices), add)

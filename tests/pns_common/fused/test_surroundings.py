@@ -5,7 +5,6 @@ import numpy as np
 from pns_common import Mesh
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.fused.surroundings import Surroundings
-from pns_common.models.contract import CALL_ROWS
 from tests.support.kernels import edges_built
 from tests.support.meshes import bumpy_sphere
 
@@ -46,13 +45,8 @@ def test_what_edges_read_outlives_the_rings():
     np.testing.assert_array_equal(seen.faces.normals, whole.faces.normals)
 
 
-def test_a_model_file_is_called_with_the_array_kernels_rows_whatever_the_threads():
-    for count in (0, 9000, 100_000, 10**6):
-        one, four = (
-            surroundings(blocks=Blocks(threads, rows=10**6, least=5)).network_blocks(count)
-            for threads in (1, 4)
-        )
-        assert one.rows_of(count) == four.rows_of(count)
-        assert one.rows_of(count) % CALL_ROWS == BLOCK_ROWS % CALL_ROWS == 0
-    assert one.rows == BLOCK_ROWS
-    assert surroundings(blocks=Blocks(1, rows=7)).network_blocks(100).rows == 7
+def test_networks_see_rows_in_the_array_kernels_blocks_whatever_the_threads():
+    for threads in (1, 4):
+        blocks = surroundings(blocks=Blocks(threads, rows=10**6, least=5)).network_blocks
+        assert blocks.rows_of(9000) == BLOCK_ROWS
+    assert surroundings(blocks=Blocks(1, rows=7)).network_blocks.rows == 7
