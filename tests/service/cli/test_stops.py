@@ -9,10 +9,18 @@ from rich.console import Console
 from service.cli.stops import stoppable
 
 
+@pytest.fixture
+def ctrl_c_interrupts():
+    """As at a terminal: what a shell starts in the background ignores SIGINT from its birth."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.parametrize(
     ("number", "kind"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)]
 )
-def test_a_signal_ends_what_is_inside_and_tells_how_to_go_on(number, kind):
+def test_a_signal_ends_what_is_inside_and_tells_how_to_go_on(number, kind, ctrl_c_interrupts):
     said = io.StringIO()
     with pytest.raises(kind) as stopped, stoppable(Console(file=said)):
         signal.raise_signal(number)

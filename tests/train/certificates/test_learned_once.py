@@ -22,10 +22,15 @@ from train.certificates.learned_once import (
     smoothness_class,
 )
 from train.certificates.planar_spectrum import planar_spectrum
-from train.certificates.subject import subject_of_scheme
+from train.certificates.subject import Subject
 
 BODIES = (*synthetic_bodies(0), Body("rough", Mesh(*bumpy_sphere(0, bump=0.4))))
 CERTIFICATES = (fold_free, limit_distance, smoothness_class, resolution_independence)
+
+
+def subject_of_scheme(scheme, budget):
+    """A scheme that is double precision throughout."""
+    return Subject(scheme.name, scheme, scheme, budget)
 
 
 def subject(scale=2.0, seed=0, **changes):
