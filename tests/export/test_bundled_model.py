@@ -24,11 +24,11 @@ from train.models.torch_model import recipe_model
 
 PERCENT_POINTS = 0.01
 BY_MODEL = {path.stem: recipe for recipe, path in FILE_OF_RECIPE.items()}
+# Models that are trained within seconds: tests train them again.
 QUICK = ("paper", "signed")
-"""Models that are trained within seconds: tests train them again."""
 
+# Models that stay readable and exact; what trained them is gone.
 OLDER = ("full",)
-"""Models that stay readable and exact; what trained them is gone."""
 
 each_model = pytest.mark.parametrize("name", sorted(BY_MODEL))
 

@@ -18,8 +18,8 @@ Quads = Int[np.ndarray, "Q 4"]
 Points = Float[np.ndarray, "V 3"]
 
 FEWEST, MOST = 24, 1600
+# Of edges' mean length, at most.
 ROUGHNESS = 0.04
-"""Of edges' mean length, at most."""
 
 CUTS = {"one way": 0.5, "shorter": 0.3, "at random": 0.2}
 SURFACE_LEVELS = 2

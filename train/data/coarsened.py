@@ -8,15 +8,14 @@ from pns_common.mesh import Mesh
 from train.data.dense_meshes import is_manifold
 from train.data.simplifiers import SIMPLIFIERS, fast_quadric
 
+# How often each of `train.data.simplifiers`.
+#
+# The cheapest collapses first leave faces that are longer and thinner, along what bends one way
+# only, than sweeps with a threshold do.
 WAYS = {"fast-quadric": 0.5, "quadric": 0.3, "shortest-edges": 0.12, "clustered": 0.08}
-"""How often each of `train.data.simplifiers`.
 
-The cheapest collapses first leave faces that are longer and thinner, along what bends one way only,
-than sweeps with a threshold do.
-"""
-
+# How fast the sweeps' threshold may rise.
 AGGRESSIVENESS = (3.0, 5.0, 7.0)
-"""How fast the sweeps' threshold may rise."""
 
 FEWEST = 8
 

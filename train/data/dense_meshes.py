@@ -16,10 +16,10 @@ from pns_common.refine import refine
 from pns_common.schemes import loop
 from train.data.parts import CAD_PARTS
 
+# .npz: arrays `vertices` and `faces`.
 FORMATS = (".glb", ".gltf", ".npz", ".obj", ".off", ".ply", ".stl")
-""".npz: arrays `vertices` and `faces`."""
+# A file whose stem ends so holds a control mesh, to be subdivided.
 CONTROL_ENDING = "_control_mesh"
-"""A file whose stem ends so holds a control mesh, to be subdivided."""
 
 CONTROL_LEVELS = 3
 FEWEST_FACES = 900

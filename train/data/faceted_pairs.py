@@ -14,22 +14,22 @@ from train.data.coarsened import coarsened
 from train.data.dense_meshes import is_manifold, largest_part
 from train.data.references import Pair, Reference
 
+# Of the split polyhedron that is then simplified.
 FEWEST_FACES, MOST_FACES = 1500, 8000
-"""Of the split polyhedron that is then simplified."""
 
 SAMPLES = 12_000
 FEWEST, MOST = 20, 1500
+# How often it is a block; else a convex polyhedron.
 BLOCKS = 0.6
-"""How often it is a block; else a convex polyhedron."""
 
+# How often a convex one is a box, or a prism; else the hull of random points.
 BOXES, PRISMS = 0.2, 0.4
-"""How often a convex one is a box, or a prism; else the hull of random points."""
 
+# Cells along each side of a block's grid.
 CELLS = 5
-"""Cells along each side of a block's grid."""
 
+# Widths of its cells, even by logarithm.
 THINNEST, WIDEST = 0.08, 1.0
-"""Widths of its cells, even by logarithm."""
 
 
 def faceted_pair(rng: np.random.Generator) -> Pair | None:

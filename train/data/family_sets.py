@@ -9,11 +9,11 @@ from train.data.patches import JITTER, rounded_boxes, tori
 from train.data.stream import FAMILIES, Family, crossing
 
 COUNT = 10
+# No stream starts from it: streams are seeded by recipes, from 0.
 TEST_SEED = 9999
-"""No stream starts from it: streams are seeded by recipes, from 0."""
 
+# Families of the paper, which have test sets of their own.
 DRAWN_ELSEWHERE = ("ridge", "saddle")
-"""Families of the paper, which have test sets of their own."""
 
 
 def trained_families() -> list[Dataset]:

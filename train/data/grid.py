@@ -4,8 +4,8 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 
+# Vertices along one side of the patch.
 SIDE = 9
-"""Vertices along one side of the patch."""
 
 
 def grid_faces() -> Int[np.ndarray, "F 3"]:

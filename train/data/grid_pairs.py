@@ -13,16 +13,16 @@ from pns_common.mesh import Mesh
 from train.data.references import Pair, Reference
 from train.surfaces.solids import random_rotation
 
+# u, v in [0, 1] to points; v goes round.
 Parametrised = Callable[[Float[np.ndarray, " N"], Float[np.ndarray, " N"]], np.ndarray]
-"""u, v in [0, 1] to points; v goes round."""
 
 KINDS = {"globe": 0.4, "ring": 0.35, "tube": 0.25}
 CUTS = {"one way": 0.75, "in turn": 0.1, "at random": 0.15}
+# How often one of rows and columns is many, and the other few.
 THIN = 0.25
-"""How often one of rows and columns is many, and the other few."""
 
+# Rows and columns, at least, of the mesh that stands for the surface itself.
 FINE = 200
-"""Rows and columns, at least, of the mesh that stands for the surface itself."""
 
 
 def grid_pair(rng: np.random.Generator) -> Pair:

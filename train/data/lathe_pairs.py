@@ -17,22 +17,22 @@ from train.surfaces.quasi_interpolation import n1
 from train.surfaces.solids import random_rotation
 
 FEWEST_SIDES, MOST_SIDES = 3, 40
+# How often the sides are few; sides from which on the part stands for a round one.
 FEW, ROUND = 0.25, 7
-"""How often the sides are few; sides from which on the part stands for a round one."""
 
+# Sides, at least, of the mesh that stands for a round part.
 FINE = 180
-"""Sides, at least, of the mesh that stands for a round part."""
 
 FINE_LEVELS = 4
 
+# Straight pieces of the outline, and how often.
 PIECES = {1: 0.5, 2: 0.2, 3: 0.2, 4: 0.1}
-"""Straight pieces of the outline, and how often."""
 
+# How often a piece has more than one row, up to five.
 SEVERAL_ROWS = 0.25
-"""How often a piece has more than one row, up to five."""
 
+# How often an end is a tip; and how often a flat one has a vertex in its middle.
 TIP, CENTRE = 0.35, 0.5
-"""How often an end is a tip; and how often a flat one has a vertex in its middle."""
 
 Outline = Float[np.ndarray, "N 2"]
 

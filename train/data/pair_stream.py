@@ -20,6 +20,7 @@ from train.data.solid_pairs import solid_pairs
 from train.data.sphere_pairs import sphere_pair
 from train.data.swept_pairs import swept_pair
 
+# How often each draws a pair, in the order that a seed means; the rest are solids.
 SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingProxyType(
     {
         patch_pair: 0.14,
@@ -31,7 +32,6 @@ SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingPr
         swept_pair: 0.10,
     }
 )
-"""How often each draws a pair, in the order that a seed means; the rest are solids."""
 
 MOST_FACES = 2500
 

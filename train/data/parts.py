@@ -12,8 +12,8 @@ from jaxtyping import Float, Int
 
 from pns_common.mesh import Mesh
 
+# Points (radius, height) of a lathe's profile, from the lower end of the axis to the upper.
 Profile = Float[np.ndarray, "N 2"]
-"""Points (radius, height) of a lathe's profile, from the lower end of the axis to the upper."""
 
 
 def torus(fineness: int = 1) -> Mesh:
@@ -219,6 +219,7 @@ def _joined(*pieces: Profile) -> Profile:
     return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
 
 
+# Every part of a fineness, by its name in tables.
 CAD_PARTS: Mapping[str, Callable[[int], Mesh]] = MappingProxyType(
     {
         "torus": torus,
@@ -230,4 +231,3 @@ CAD_PARTS: Mapping[str, Callable[[int], Mesh]] = MappingProxyType(
         "knob": knob,
     }
 )
-"""Every part of a fineness, by its name in tables."""

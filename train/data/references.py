@@ -7,14 +7,14 @@ from jaxtyping import Float
 
 from pns_common.mesh import Mesh
 
+# The kind of control meshes that were made for Loop's surface.
 AUTHORED = "authored"
-"""The kind of control meshes that were made for Loop's surface."""
 
+# The kind of few-faced parts that are to be no sharper than quasi-interpolation leaves them.
 LATHE = "lathe"
-"""The kind of few-faced parts that are to be no sharper than quasi-interpolation leaves them."""
 
+# The kind of parts of machined surfaces: smooth, most of it bent one way alone.
 SWEPT = "swept"
-"""The kind of parts of machined surfaces: smooth, most of it bent one way alone."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

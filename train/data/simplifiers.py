@@ -13,14 +13,14 @@ from pns_common.errors import MeshError
 from pns_common.mesh import Mesh, clean
 from train.data.dense_meshes import largest_part
 
+# How fast fast-simplification raises its threshold: below its own 7, for better triangles.
 AGGRESSIVENESS = 5.0
-"""How fast fast-simplification raises its threshold: below its own 7, for better triangles."""
 
+# Share of the simplification that its largest part has to hold.
 LEAST_KEPT = 0.8
-"""Share of the simplification that its largest part has to hold."""
 
+# A result is used where its faces are within this factor of the target.
 CLOSENESS = 1.6
-"""A result is used where its faces are within this factor of the target."""
 
 Simplifier = Callable[[Mesh, int], Mesh]
 

@@ -11,24 +11,24 @@ from train.data.references import Pair, Reference
 from train.surfaces.marching import laid_onto, marched, unit_gradient
 from train.surfaces.solids import Field, random_solid
 
+# Grid on which a solid is first looked for.
 FIRST_LOOK, FIRST_EXTENT = 20, 1.9
-"""Grid on which a solid is first looked for."""
 
 MARGIN = 1.12
+# Points a side of the grid that it is marched on, and how often.
 SIDES = {40: 0.3, 64: 0.7}
-"""Points a side of the grid that it is marched on, and how often."""
 
 FEWEST_DENSE = 500
 FEWEST, MOST = 24, 4000
 LEAST_REDUCTION = 4
+# Half of the coarse meshes are of usual size; the others of any, evenly by logarithm.
 USUAL, USUALLY = (300, 2000), 0.5
-"""Half of the coarse meshes are of usual size; the others of any, evenly by logarithm."""
 
+# How often the collapsed vertices are laid onto the surface; collapses leave them beside it.
 ON_SURFACE = 0.16
-"""How often the collapsed vertices are laid onto the surface; collapses leave them beside it."""
 
+# Coarse meshes made of one solid.
 EACH = 5
-"""Coarse meshes made of one solid."""
 
 
 def solid_pairs(rng: np.random.Generator) -> Iterator[Pair]:

@@ -7,8 +7,8 @@ from train.data.coarsened import coarsened
 from train.data.primitives import icosphere
 from train.data.references import Pair, Reference
 
+# How often it is an icosphere; and collapsed with its vertices laid back onto the surface.
 ICOSPHERE, ON_SURFACE = 0.4, 0.3
-"""How often it is an icosphere; and collapsed with its vertices laid back onto the surface."""
 
 DENSE_SPLITS, MOST_SPLITS = 5, 3
 FEWEST, MOST = 12, 2500

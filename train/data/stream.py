@@ -136,8 +136,8 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
         "fillet": fillet,
     }
 )
+# How often each family is drawn.
 SHARES = (0.42, 0.14, 0.10, 0.12, 0.12, 0.10)
-"""How often each family is drawn."""
 
 
 def random_instance(rng: np.random.Generator) -> Instance:

@@ -15,29 +15,29 @@ from train.data.grid_pairs import Parametrised, cut_quads, random_cut, vertex_no
 from train.data.references import SWEPT, Pair, Reference
 from train.surfaces.solids import random_rotation
 
+# Pieces of a profile, from and below; how often one is straight, but for one that never is.
 PIECES, STRAIGHT = (1, 6), 0.4
-"""Pieces of a profile, from and below; how often one is straight, but for one that never is."""
 
+# Of straight pieces and of arcs, even by logarithm; the arcs' angles in radians.
 LENGTHS, RADII, TURNS = (0.1, 1.0), (0.06, 0.8), (0.35, 2.2)
-"""Of straight pieces and of arcs, even by logarithm; the arcs' angles in radians."""
 
+# Beyond this angle from the axis's right a profile turns back, so that it does not meet itself.
 FARTHEST_TURN = np.pi / 2
-"""Beyond this angle from the axis's right a profile turns back, so that it does not meet itself."""
 
+# How often it is drawn along a line; and, where it is not, turned all the way round.
 DRAWN, WHOLE = 0.35, 0.35
-"""How often it is drawn along a line; and, where it is not, turned all the way round."""
 
+# The line's length, or the inner radius, over the profile's extent.
 SIZES = (0.15, 3.0)
-"""The line's length, or the inner radius, over the profile's extent."""
 
+# Of each axis: circles become ellipses, so that no torus and no sphere is among these surfaces.
 SQUEEZED = (0.6, 1.5)
-"""Of each axis: circles become ellipses, so that no torus and no sphere is among these surfaces."""
 
+# Rows and columns of the dense mesh, about.
 FINE = 150
-"""Rows and columns of the dense mesh, about."""
 
+# How often the coarse mesh is a grid; else it is the dense one, coarsened.
 GRIDS = 0.4
-"""How often the coarse mesh is a grid; else it is the dense one, coarsened."""
 
 FEWEST, MOST = 120, 1600
 ARC_ROWS, STRAIGHT_ROWS, COLUMNS = (1, 7), (1, 3), (4, 80)

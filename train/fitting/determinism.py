@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import torch
 
+# The matrices are small: one thread is as fast as two, and the order of sums is fixed.
 THREADS = 1
-"""The matrices are small: one thread is as fast as two, and the order of sums is fixed."""
 
 
 @contextmanager

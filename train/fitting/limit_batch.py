@@ -16,20 +16,20 @@ from pns_common.rules.control_level import ControlLevel, control_level
 from train.data.references import AUTHORED, LATHE, SWEPT, Pair
 from train.fitting.limit_maps import LimitMaps, applied, limit_maps, loop_matrix
 
+# Levels of Loop between the learned level and the vertices at which the limit is looked at.
 FINER = 1
-"""Levels of Loop between the learned level and the vertices at which the limit is looked at."""
 
+# Meshes stand so far apart that the nearest point of all surfaces is one of a mesh's own.
 APART = 16.0
-"""Meshes stand so far apart that the nearest point of all surfaces is one of a mesh's own."""
 
+# Points of the surfaces from which the limit is looked at.
 SEEN_BACK = 6000
-"""Points of the surfaces from which the limit is looked at."""
 
+# Levels of Loop between the learned level and the vertices between which bending is measured.
 FAIR = 2
-"""Levels of Loop between the learned level and the vertices between which bending is measured."""
 
+# Kinds that are to bend no more than quasi-interpolation makes them: smooth ones, and lathes'.
 SMOOTH_KINDS = ("grid", "sphere", LATHE, SWEPT)
-"""Kinds that are to bend no more than quasi-interpolation makes them: smooth ones, and lathes'."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,19 +14,19 @@ from torch import Tensor
 from train.fitting.limit_batch import LimitBatch, LimitSurface
 from train.models.recipes import LimitWeights
 
+# Exponents of the soft maxima of distances, and of turns between neighbouring normals.
 PEAK, JUMP = 10, 16
-"""Exponents of the soft maxima of distances, and of turns between neighbouring normals."""
 
 TINY = 1e-30
+# Squared chord below which the angle between normals is rounded off.
 BLUNT = 1e-6
-"""Squared chord below which the angle between normals is rounded off."""
 
+# Errors below these (in R; chords of unit normals; no unit; chords) are as good as none.
 DISTANCE_FLOOR, NORMAL_FLOOR, BEND_FLOOR, JUMP_FLOOR = 1e-4, 4e-3, 1e-2, 1e-3
-"""Errors below these (in R; chords of unit normals; no unit; chords) are as good as none."""
 
 ACCURACY = ("mean", "spread", "peak", "normal", "normal_spread")
+# Faces with twice their area below this share of their squared sides do not count as bent.
 NO_AREA = 1e-9
-"""Faces with twice their area below this share of their squared sides do not count as bent."""
 
 
 @dataclass(frozen=True, eq=False)

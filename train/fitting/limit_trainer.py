@@ -21,8 +21,8 @@ from train.models.from_recipe import (
 from train.models.networks import BoundedNet
 from train.models.recipes import Recipe, ToLimit
 
+# Share of the steps in which the learning rate rises.
 WARM_UP = 0.1
-"""Share of the steps in which the learning rate rises."""
 
 LONGEST_GRADIENT = 1.0
 

@@ -22,8 +22,8 @@ from train.models.networks import BoundedNet
 from train.models.recipes import OneStep, Recipe, ToLimit, one_step
 from train.surfaces.implicit import signed_distance, unit_normal
 
+# Called after each step with the number of steps done and the loss.
 OnStep = Callable[[int, float], None]
-"""Called after each step with the number of steps done and the loss."""
 
 Loss = Callable[[BoundedNet, Batch], Float[Tensor, ""]]
 

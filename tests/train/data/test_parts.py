@@ -97,8 +97,8 @@ def pappus(areas_and_centroids):
 
 
 QUARTER = np.pi / 4
+# A quarter disc's centroid from its tangents' corner, in radii.
 FROM_CORNER = 1 - 4 / (3 * np.pi)
-"""A quarter disc's centroid from its tangents' corner, in radii."""
 
 
 def spandrel(radius, corner, *, inwards):
