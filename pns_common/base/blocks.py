@@ -20,8 +20,8 @@ BLOCK_ROWS = 8192
 MOST_THREADS = 8
 
 
-def _nobody_listens(rows: int) -> None:
-    pass
+def nobody_listens(rows: int) -> None:
+    """What is told of blocks where nobody asked."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Blocks:
 
     threads: int
     rows: int = BLOCK_ROWS
-    before: Callable[[int], None] = _nobody_listens
+    before: Callable[[int], None] = nobody_listens
     least: int | None = None
 
     def of_rows(self, rows: int) -> Blocks:
@@ -50,7 +50,7 @@ class Blocks:
 
     def unheard(self) -> Blocks:
         """The same for work after the end, of which nobody is told."""
-        return replace(self, before=_nobody_listens)
+        return replace(self, before=nobody_listens)
 
     def run(self, count: int, work: Callable[[slice], None]) -> None:
         """Call ``work`` once for each block of range(count); each writes its own rows."""

@@ -36,8 +36,12 @@ def gentle_bend(
     of_first: Float[Array, " N"], of_second: Float[Array, " N"], gate_sharpness: float
 ) -> Float[Array, " N"]:
     """w of edges whose faces have these b; ``gate_sharpness`` is c_v."""
-    xp = namespace(of_first)
-    return xp.tanh(gate_sharpness * xp.minimum(of_first, of_second))
+    return of_gentler(namespace(of_first).minimum(of_first, of_second), gate_sharpness)
+
+
+def of_gentler(bends: Float[Array, " N"], gate_sharpness: float) -> Float[Array, " N"]:
+    """The same from the smaller b of both faces."""
+    return namespace(bends).tanh(gate_sharpness * bends)
 
 
 def opened(gate: Float[Array, " N"], by: Float[Array, " N"]) -> Float[Array, " N"]:

@@ -14,7 +14,7 @@ from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 
-from pns_common.base.blocks import Blocks
+from pns_common.base.blocks import Blocks, nobody_listens
 from pns_common.fused.storage import cache_folder, kernels_are_kept
 
 # Rows a block: a kernel has no temporaries that must stay in a cache, and each call costs a little.
@@ -29,10 +29,6 @@ LARGEST_INDEX = 2**31 - 1
 COST_TO_LOAD, COST_TO_COMPILE = 250_000, 2_000_000
 COST_OF_LEVEL = 2_000
 LIBRARY = "pns_common.fused.library"
-
-
-def _nobody_listens(rows: int) -> None:
-    pass
 
 
 @dataclass
@@ -74,7 +70,7 @@ def kernels_pay(costs: Sequence[int]) -> bool:
     return _work.cost >= (COST_TO_LOAD if kernels_are_kept() else COST_TO_COMPILE)
 
 
-def kernel_blocks(threads: int, before: Callable[[int], None] = _nobody_listens) -> Blocks:
+def kernel_blocks(threads: int, before: Callable[[int], None] = nobody_listens) -> Blocks:
     """How kernels' rows are divided; ``before`` as ``Blocks`` has it."""
     return Blocks(threads, KERNEL_ROWS, before, LEAST_KERNEL_ROWS)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from pns_common.features.orientation import SYMMETRIC
 from pns_common.formula.correction import where_open
-from pns_common.formula.side_gate import gentle_bend, opened
+from pns_common.formula.side_gate import of_gentler, opened
 from pns_common.fused.additions import Additions
 from pns_common.fused.kernels.edge_correction import (
     DIHEDRAL,
@@ -61,7 +61,7 @@ def add_at_edges(
         axes = frame[:, :3], frame[:, 3:6], frame[:, 6:]
         gate = rule.operator.gate(EdgeFrames(*axes, length, curvature, degenerate))
         if isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates:
-            gate = opened(gate, gentle_bend(gentlest, gentlest, rule.vertex_gate_sharpness))
+            gate = opened(gate, of_gentler(gentlest, rule.vertex_gate_sharpness))
         if degenerate.any():
             to.degenerate[mesh.interior[rows]] = degenerate
         answers = where_open(rule.operator.network, features, gate, like=axes[0])
