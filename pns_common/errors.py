@@ -45,7 +45,7 @@ class ParameterError(PnsError, ValueError):
 
 
 def _restored(kind: type[PnsError], args: tuple[Any, ...], values: dict[str, Any]) -> PnsError:
-    """The error that crossed from another process."""
+    """Restore an error that crossed from another process."""
     error = kind.__new__(kind)
     error.args = args
     error.__dict__.update(values)

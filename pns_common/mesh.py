@@ -79,7 +79,7 @@ class Mesh:
 
     @classmethod
     def of_refined(cls, vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Mesh:
-        """A mesh from arrays that a refinement step made and checked: neither copied nor read."""
+        """Make a mesh of arrays that a refinement step made and checked: not copied, not read."""
         mesh = object.__new__(cls)
         for name, array in (("vertices", vertices), ("faces", faces)):
             array.flags.writeable = False
@@ -142,13 +142,13 @@ def clean(mesh: Mesh) -> Cleaned:
 
 
 def repeated_vertex(faces: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
-    """Whether a face names a vertex twice."""
+    """Return whether a face names a vertex twice."""
     a, b, c = faces.T
     return (a == b) | (b == c) | (c == a)
 
 
 def _array(values: object, element: str) -> np.ndarray:
-    """What numpy makes of the input, refused where its rows differ in length."""
+    """Return what numpy makes of the input, refused where its rows differ in length."""
     try:
         return np.asarray(values)
     except ValueError as error:
@@ -158,7 +158,7 @@ def _array(values: object, element: str) -> np.ndarray:
 
 
 def _frozen(values: np.ndarray, dtype: np.typing.DTypeLike) -> np.ndarray:
-    """A read-only C-contiguous copy that no caller can change behind the mesh's back."""
+    """Return a read-only C-contiguous copy that no caller can change behind the mesh's back."""
     copy = np.array(values, dtype=np.dtype(dtype), order="C")
     copy.flags.writeable = False
     return copy

@@ -162,7 +162,7 @@ def refine(
 def report_of(
     scheme: Scheme, reference_length: float, several_fans: int, levels: list[LevelReport]
 ) -> Report:
-    """The report of a refinement, from those of its levels."""
+    """Make the report of a refinement from those of its levels."""
     return {
         "scheme": scheme.name,
         "budget": scheme.budget,
@@ -215,7 +215,7 @@ def kernels_can_serve(
     reference_length: float,
     creases: Int[np.ndarray, "N 2"] | None,
 ) -> bool:
-    """Whether the compiled kernels can take the place of the array kernels, with the same bits."""
+    """Return whether compiled kernels can take the array kernels' place, with the same bits."""
     if not (kernels_available() and fits(len(mesh.vertices), len(mesh.faces), levels)):
         return False
     return scheme.learned_levels == 0 or (reference_length > 0 and kernels_know(scheme))
@@ -224,7 +224,7 @@ def kernels_can_serve(
 def measure_reference_length(
     vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
 ) -> float:
-    """R = largest distance of a referenced vertex from the referenced vertices' centroid, over √2.
+    """Return R, the largest distance of a referenced vertex from their centroid, over √2.
 
     About 1 on the paper's patches over [−1, 1]²; unchanged by rotation, proportional to scale.
     """

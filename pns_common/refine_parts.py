@@ -100,7 +100,7 @@ def refine_parts(
 
 
 def _first_vertices(mesh: Mesh, part_faces: Int[np.ndarray, " Q"]) -> Int[np.ndarray, " Q"]:
-    """Where the vertices of each part begin, and where the last one's end."""
+    """Return where the vertices of each part begin, and where the last one's end."""
     whole = len(part_faces) > 1 and part_faces[0] == 0 and part_faces[-1] == len(mesh.faces)
     if not (whole and (np.diff(part_faces) > 0).all()):
         raise ParameterError("part_faces", part_faces, expected="ascending, from 0 to all faces")

@@ -76,12 +76,12 @@ class Scheme:
 
 
 def loop() -> Scheme:
-    """Loop subdivision (Loop 1987)."""
+    """Return the scheme of Loop subdivision (Loop 1987)."""
     return Scheme("loop", loop_vertex_rule, loop_edge_rule, learned_levels=0)
 
 
 def pns(model: Model, budget: float | None = None) -> Scheme:
-    """Proximity-Preserving Neural Subdivision with a model.
+    """Return the scheme of Proximity-Preserving Neural Subdivision with a model.
 
     Args:
         model: from ``load_model``, or anything that keeps the protocol.
@@ -119,7 +119,7 @@ def scale_free_scheme(
     model: str | None = None,
     model_hash: str | None = None,
 ) -> Scheme:
-    """The default scheme: scale-free rules at K levels, each guarded, then Loop."""
+    """Return the default scheme: scale-free rules at K levels, each guarded, then Loop."""
     boundary = BoundaryRule(form, vertices.gate_sharpness) if form.boundary_strength > 0 else None
     return Scheme(
         "pns",
@@ -136,7 +136,7 @@ def scale_free_scheme(
 
 
 def scale_free_form(card: ModelCard, budget: float) -> ScaleFreeForm | None:
-    """The numbers of a card of format 3 with another budget; None for older cards."""
+    """Return the numbers of a card of format 3 with another budget; None for older cards."""
     strength, scale = card.prior_strength, card.network_scale
     angle, levels = card.fold_angle, card.learned_levels
     if strength is None or scale is None or angle is None or levels is None:
@@ -155,7 +155,7 @@ def scale_free_form(card: ModelCard, budget: float) -> ScaleFreeForm | None:
 
 
 def edge_operator(model: Model) -> EdgeOperator:
-    """What a model's card and network make of interior edges."""
+    """Return what a model's card and network make of interior edges."""
 
     def network(rows: Array) -> Array:
         # The unit budget, scaled in float64 afterwards: one file serves every C / R exactly.
@@ -170,7 +170,7 @@ def edge_operator(model: Model) -> EdgeOperator:
 
 
 def vertex_operator(model: Model) -> VertexOperator | None:
-    """What a model makes of old vertices; None where it leaves them to Loop.
+    """Return what a model makes of old vertices; None where it leaves them to Loop.
 
     Raises:
         ModelError: the card names vertex features, and the model has no network for them.

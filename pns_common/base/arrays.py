@@ -18,7 +18,7 @@ Array: TypeAlias = Any
 
 
 def namespace(*arrays: Array) -> Any:
-    """The array-API namespace that the arrays share."""
+    """Return the array-API namespace that the arrays share."""
     # Looking the namespace up costs as much as arithmetic on a hundred rows.
     if all(type(array) is np.ndarray for array in arrays):
         return _of_numpy()
@@ -36,7 +36,7 @@ def _of_numpy() -> Any:
 
 
 def beside(values: Array, constant: np.ndarray, dtype: Any = None) -> Array:
-    """A numpy array as one of the kind of ``values``, and on its device."""
+    """Return a numpy array as one of the kind of ``values``, and on its device."""
     if type(values) is np.ndarray:
         return constant if dtype is None else constant.astype(dtype, copy=False)
     # torch refuses to look at memory that is read-only or runs backwards: only that is copied.
@@ -45,7 +45,7 @@ def beside(values: Array, constant: np.ndarray, dtype: Any = None) -> Array:
 
 
 def gather(values: Array, indices: Int[np.ndarray, "..."]) -> Array:
-    """Rows of ``values`` at ``indices``: shape ``indices.shape + values.shape[1:]``."""
+    """Return the rows of ``values`` at ``indices``: shape ``indices.shape + values.shape[1:]``."""
     xp = namespace(values)
     if is_torch_array(values):
         flat = beside(values, indices.reshape(-1))
@@ -70,7 +70,7 @@ def segment_sum(
 def scatter(
     values: Shaped[Array, " N *K"], rows: Int[np.ndarray, " N"], count: int
 ) -> Shaped[Array, " S *K"]:
-    """An array of ``count`` rows: ``values`` at ``rows``, each named once, and 0 elsewhere."""
+    """Return ``count`` rows: ``values`` at ``rows``, each named once, and 0 elsewhere."""
     shape = (count, *values.shape[1:])
     if is_torch_array(values):
         zeros = values.new_zeros(shape)
@@ -81,22 +81,22 @@ def scatter(
 
 
 def detached(values: Array) -> Array:
-    """The same numbers, through which no gradient passes."""
+    """Return the same numbers, through which no gradient passes."""
     return values.detach() if is_torch_array(values) else values
 
 
 def as_numpy(values: Array) -> np.ndarray:
-    """The same numbers as a numpy array, without a gradient."""
+    """Return the same numbers as a numpy array, without a gradient."""
     return values.detach().cpu().numpy() if is_torch_array(values) else values
 
 
 def dot(u: Float[Array, "N 3"], v: Float[Array, "N 3"]) -> Float[Array, " N"]:
-    """Row-wise inner product, summed in a fixed order."""
+    """Return the row-wise inner product, summed in a fixed order."""
     return u[:, 0] * v[:, 0] + u[:, 1] * v[:, 1] + u[:, 2] * v[:, 2]
 
 
 def cross(u: Float[Array, "N 3"], v: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
-    """Row-wise cross product (written out: np.cross spends most of its time on axes)."""
+    """Return the row-wise cross product (written out: np.cross spends most time on axes)."""
     xp = namespace(u, v)
     return xp.stack(
         [
@@ -109,7 +109,7 @@ def cross(u: Float[Array, "N 3"], v: Float[Array, "N 3"]) -> Float[Array, "N 3"]
 
 
 def norm(v: Float[Array, "N 3"]) -> Float[Array, " N"]:
-    """Row-wise Euclidean length, with gradient 0 (not NaN) at zero vectors."""
+    """Return the row-wise Euclidean length, with gradient 0 (not NaN) at zero vectors."""
     xp = namespace(v)
     square = dot(v, v)
     positive = square > 0
@@ -117,14 +117,14 @@ def norm(v: Float[Array, "N 3"]) -> Float[Array, " N"]:
 
 
 def unit(v: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
-    """Rows scaled to length 1; zero rows stay zero."""
+    """Scale rows to length 1; zero rows stay zero."""
     return unit_longer_than(v, 0.0)
 
 
 def unit_longer_than(
     v: Float[Array, "N 3"], shortest: Float[Array, " N"] | float
 ) -> Float[Array, "N 3"]:
-    """Rows longer than ``shortest`` scaled to length 1; all others become zero."""
+    """Scale rows longer than ``shortest`` to length 1; all others become zero."""
     xp = namespace(v)
     square = dot(v, v)
     long = square > shortest * shortest

@@ -21,7 +21,7 @@ MOST_THREADS = 8
 
 
 def nobody_listens(rows: int) -> None:
-    """What is told of blocks where nobody asked."""
+    """Do nothing with what is told of blocks."""
 
 
 @dataclass(frozen=True)
@@ -39,17 +39,17 @@ class Blocks:
     least: int | None = None
 
     def of_rows(self, rows: int) -> Blocks:
-        """The same with blocks of another size, whatever there is to do."""
+        """Return the same with blocks of another size, whatever there is to do."""
         return replace(self, rows=rows, least=None)
 
     def rows_of(self, count: int) -> int:
-        """Rows of a block where there are so many in all."""
+        """Return how many rows a block has where there are so many in all."""
         if self.least is None:
             return self.rows
         return min(self.rows, max(self.least, -(-count // (2 * self.threads))))
 
     def unheard(self) -> Blocks:
-        """The same for work after the end, of which nobody is told."""
+        """Return the same for work after the end, of which nobody is told."""
         return replace(self, before=nobody_listens)
 
     def run(self, count: int, work: Callable[[slice], None]) -> None:
@@ -90,7 +90,7 @@ class Blocks:
         return work(rows)
 
     def gather(self, count: int, work: Callable[[slice], tuple[Array, ...]]) -> tuple[Array, ...]:
-        """Arrays whose rows ``work`` makes block by block, joined in order.
+        """Return the arrays whose rows ``work`` makes block by block, joined in order.
 
         It is called for no rows where there are none.
         """
@@ -105,11 +105,11 @@ class Blocks:
         return tuple(namespace(*pieces).concat(pieces) for pieces in zip(*parts, strict=True))
 
     def count(self, rows: int) -> int:
-        """How many blocks ``run`` makes of so many rows."""
+        """Return how many blocks ``run`` makes of so many rows."""
         return -(-rows // self.rows_of(rows))
 
     def number(self, rows: slice, count: int) -> int:
-        """Which block of ``count`` rows it is."""
+        """Return which block of ``count`` rows it is."""
         return rows.start // self.rows_of(count)
 
     def _slices(self, count: int) -> Iterator[slice]:
@@ -120,7 +120,7 @@ class Blocks:
 
 @cache
 def _pool(helpers: int) -> ThreadPoolExecutor:
-    """Threads that wait for work beside the caller: starting them takes as long as a block."""
+    """Start threads that wait for work beside the caller: starting takes as long as a block."""
     return ThreadPoolExecutor(helpers, thread_name_prefix="pns")
 
 

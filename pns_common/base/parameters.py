@@ -7,10 +7,10 @@ from numbers import Integral, Real
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a finite real number, numpy's too (a bool is none)."""
+    """Return whether a value is a finite real number, numpy's too (a bool is none)."""
     return not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
 
 
 def is_whole(value: object) -> bool:
-    """Whether a value is a whole number of an integer type (a bool is none)."""
+    """Return whether a value is a whole number of an integer type (a bool is none)."""
     return not isinstance(value, bool) and isinstance(value, Integral)

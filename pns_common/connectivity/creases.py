@@ -12,7 +12,7 @@ from pns_common.errors import ParameterError
 
 
 def with_creases(topology: Topology, creases: Int[np.ndarray, "N 2"]) -> Topology:
-    """The topology with those of its interior edges as creases that the vertex pairs name.
+    """Return the topology with those interior edges as creases that the vertex pairs name.
 
     Raises:
         ParameterError: a pair is no edge of the mesh.
@@ -28,7 +28,7 @@ def crease_classes(
     vertex_count: int,
     creases: Int[np.ndarray, "N 2"],
 ) -> Int[np.ndarray, " E"]:
-    """The classes of the edges, with those interior ones as creases that the vertex pairs name.
+    """Return the classes of the edges; interior ones that the vertex pairs name are creases.
 
     Raises:
         ParameterError: a pair is no edge.
@@ -45,21 +45,21 @@ def crease_classes(
 
 
 def crease_children(topology: Topology) -> Int[np.ndarray, "N 2"]:
-    """The halves of the crease edges, as vertex pairs of the split mesh."""
+    """Return the halves of the crease edges, as vertex pairs of the split mesh."""
     return crease_halves(topology.edges, topology.edge_class, topology.vertex_count)
 
 
 def crease_halves(
     edges: Int[np.ndarray, "E 2"], edge_class: Int[np.ndarray, " E"], vertex_count: int
 ) -> Int[np.ndarray, "N 2"]:
-    """The same from the arrays."""
+    """Return the same from the arrays."""
     creases = np.flatnonzero(edge_class == EdgeClass.CREASE)
     middle = vertex_count + creases
     return np.stack([edges[creases], np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
 
 
 def _checked(creases: Int[np.ndarray, "N 2"], vertex_count: int) -> Int[np.ndarray, "N 2"]:
-    """The pairs, refused unless they are pairs of vertices."""
+    """Return the pairs, refused unless they are pairs of vertices."""
     pairs = np.asarray(creases)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
         raise ParameterError("creases", pairs.shape, expected="an integer array of shape (N, 2)")

@@ -9,7 +9,7 @@ from jaxtyping import Int
 
 
 def disjoint_faces(parts: Iterable[tuple[np.ndarray, int]]) -> Int[np.ndarray, "F 3"]:
-    """The faces of all parts, where each part's vertices follow those of the parts before it.
+    """Return the faces of all parts; a part's vertices follow those of the parts before it.
 
     Args:
         parts: of each its (F, 3) faces and the count of its vertices; at least one.

@@ -19,12 +19,12 @@ class OrderedEdges:
 
 
 def first_face_order(topology: Topology, edges: Int[np.ndarray, " N"]) -> OrderedEdges:
-    """c in the face of lower index, d in the other."""
+    """Take for c the vertex in the face of lower index, for d that in the other."""
     return OrderedEdges(topology.stencil[edges], topology.half_edges[edges] // 3)
 
 
 def left_face_order(topology: Topology, edges: Int[np.ndarray, " N"]) -> OrderedEdges:
-    """c in the face to the left of a → b, seen from outside: the one that runs from a to b."""
+    """Take for c the vertex left of a → b, seen from outside: in the face that runs from a to b."""
     first = first_face_order(topology, edges)
     start = np.take(topology.faces, topology.half_edges[edges, 0])
     right = (start != first.stencil[:, 0])[:, None]

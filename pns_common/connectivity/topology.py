@@ -165,7 +165,7 @@ def split(topology: Topology) -> Int[np.ndarray, "C 3"]:
 
 
 def children_across(topology: Topology, edges: Int[np.ndarray, " N"]) -> Int[np.ndarray, "2 N 2"]:
-    """The faces of the split mesh that meet across interior edges: pairs at one end, at the other.
+    """Pair the faces of the split mesh across interior edges: those at one end, at the other.
 
     Corner i of face f keeps child 4f + i, and one face's half-edge starts where the other's ends.
     """
@@ -176,13 +176,13 @@ def children_across(topology: Topology, edges: Int[np.ndarray, " N"]) -> Int[np.
 
 
 def sharp_edge_count(topology: Topology) -> Int[np.ndarray, " V"]:
-    """For each vertex the number of edges at it that are not interior."""
+    """Return for each vertex the number of edges at it that are not interior."""
     sharp = topology.edges[topology.edge_class != EdgeClass.INTERIOR]
     return np.bincount(sharp.reshape(-1), minlength=topology.vertex_count)
 
 
 def multi_fan_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
-    """Vertices whose faces form more than one fan (bow-ties among them).
+    """Return the vertices whose faces form more than one fan (bow-ties among them).
 
     A fan is a run of corners joined across interior edges: an open fan has one join fewer than
     corners, a closed one as many. Closed fans are told apart by pointer doubling.
@@ -203,7 +203,7 @@ def multi_fan_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
 def stable_sort(
     key: Int[np.ndarray, " N"],
 ) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " N"]]:
-    """Non-negative keys in order, and the positions they come from; equal keys keep theirs.
+    """Return non-negative keys in order, and the positions they come from; equal keys keep theirs.
 
     Packing (key, position) into one integer and sorting values is several times faster than
     argsort; where the pack would overflow, argsort serves.
@@ -219,13 +219,13 @@ def stable_sort(
 
 
 def next_corner(corner: Int[np.ndarray, "..."]) -> Int[np.ndarray, "..."]:
-    """The corner 3 f + (i + 1) mod 3 after corner 3 f + i of the same face."""
+    """Return the corner 3 f + (i + 1) mod 3 after corner 3 f + i of the same face."""
     place = corner - 3 * (corner // 3)  # numpy divides much faster than it takes remainders
     return corner + 1 - 3 * (place == 2)
 
 
 def _next_around_vertex(topology: Topology) -> Int[np.ndarray, " K"]:
-    """For each corner the next one around its vertex, across the half-edge that leaves it."""
+    """Return for each corner the next around its vertex, across the half-edge that leaves it."""
     start = topology.half_edges[topology.half_edges[:, 0] >= 0]
     end = next_corner(start)
     following = np.full(topology.faces.size, -1, dtype=np.int64)

@@ -37,12 +37,12 @@ SHORTEST = 1e-150
 
 
 def curvature(stencil: EdgeStencil, frames: EdgeFrames) -> list[Float[Array, " N"]]:
-    """x = 1 − n1 · n2."""
+    """Return x = 1 − n1 · n2."""
     return [frames.curvature]
 
 
 def log_ratios(stencil: EdgeStencil, frames: EdgeFrames) -> list[Float[Array, " N"]]:
-    """Logarithms of the other four sides over h."""
+    """Return the logarithms of the other four sides over h."""
     xp = namespace(stencil.a)
 
     def log(length: Float[Array, " N"]) -> Float[Array, " N"]:

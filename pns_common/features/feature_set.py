@@ -38,7 +38,7 @@ class FeatureSet:
     vertex_fields: VertexFields | None = None
 
     def __call__(self, stencil: EdgeStencil, frames: EdgeFrames) -> Float[Array, "N K"]:
-        """φ, one row for each edge."""
+        """Return φ, one row for each edge."""
         columns = [column for group in self.groups for column in group.columns(stencil, frames)]
         return namespace(stencil.a).stack(columns, axis=-1)
 
@@ -58,5 +58,5 @@ class FeatureSet:
         return edge_symmetries(self.features)
 
     def fields(self, rings: Rings) -> Array | None:
-        """The vertex data of a level, (V, M), or None where none is asked for."""
+        """Return the vertex data of a level, (V, M), or None where none is asked for."""
         return None if self.vertex_fields is None else self.vertex_fields(rings)

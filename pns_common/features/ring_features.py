@@ -24,7 +24,7 @@ RING_TURN_OVER = Generator("turn_over", "", "", (-1, 1, 1))
 
 
 def ring_features(rings: Rings) -> Float[Array, "V 10"]:
-    """The features of ``ring-10``, in the order of RING_10."""
+    """Return the features of ``ring-10``, in the order of RING_10."""
     xp = namespace(rings.normal)
     spoke_length, height = rings.spoke_length, rings.height
     square = squared(rings.spokes)
@@ -55,7 +55,7 @@ class RingFeatureSet:
     columns: Callable[[Rings], Array]
 
     def __call__(self, rings: Rings) -> Float[Array, "V K"]:
-        """φ, one row for each vertex."""
+        """Return φ, one row for each vertex."""
         return self.columns(rings)
 
     @property

@@ -24,32 +24,32 @@ from pns_common.geometry.rings import Rings
 
 
 def normal_fields(rings: Rings) -> Float[Array, "V 3"]:
-    """m_v alone, for sets without the umbrella."""
+    """Return m_v alone, for sets without the umbrella."""
     return rings.normal
 
 
 def vertex_fields(rings: Rings) -> Float[Array, "V 4"]:
-    """m_v and u_v · m_v / h_v; the latter 0 on boundary, irregular and crease edges."""
+    """Return m_v and u_v · m_v / h_v; the latter 0 on boundary, irregular and crease edges."""
     return namespace(rings.normal).concat([rings.normal, rings.height], axis=1)
 
 
 def signed_dihedral(stencil: EdgeStencil, frames: EdgeFrames) -> list[Float[Array, " N"]]:
-    """(n1 × n2) · T: the sine of the angle between the faces, positive on a crest."""
+    """Return (n1 × n2) · T: the sine of the angle between the faces, positive on a crest."""
     return [dot(cross(stencil.n1, stencil.n2), frames.tangent)]
 
 
 def end_normals(stencil: EdgeStencil, frames: EdgeFrames) -> list[Float[Array, " N"]]:
-    """How the surface tilts at the two ends, along the edge and across it."""
+    """Return how the surface tilts at the two ends, along the edge and across it."""
     return _tilts(stencil, frames, (0, 1))
 
 
 def wing_normals(stencil: EdgeStencil, frames: EdgeFrames) -> list[Float[Array, " N"]]:
-    """How the surface tilts at the two opposite vertices."""
+    """Return how the surface tilts at the two opposite vertices."""
     return _tilts(stencil, frames, (2, 3))
 
 
 def umbrella_heights(stencil: EdgeStencil, frames: EdgeFrames) -> list[Float[Array, " N"]]:
-    """How far each vertex stands below its neighbours' mean."""
+    """Return how far each vertex stands below its neighbours' mean."""
     fields = _fields(stencil)
     return [fields[:, vertex, 3] for vertex in range(4)]
 

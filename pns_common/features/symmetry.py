@@ -70,7 +70,7 @@ class Symmetries:
 
 
 def symmetries(features: Sequence[Feature], generators: Sequence[Generator]) -> Symmetries:
-    """All products of commuting generators, each of order two."""
+    """Return all products of commuting generators, each of order two."""
     count = len(features)
     elements = [(np.arange(count), np.ones(count), np.ones(3))]
     for generator in generators:
@@ -82,7 +82,7 @@ def symmetries(features: Sequence[Feature], generators: Sequence[Generator]) -> 
 
 
 def edge_symmetries(features: Sequence[Feature]) -> Symmetries:
-    """The group of an edge stencil: 8 elements for signed features, else 4."""
+    """Return the group of an edge stencil: 8 elements for signed features, else 4."""
     signed = any(feature.turn_over < 0 for feature in features)
     return symmetries(features, [HALF_TURN, MIRROR, *([TURN_OVER] if signed else [])])
 

@@ -26,20 +26,20 @@ BEND, CORNER = 1 / 2, 1.0
 
 
 def boundary_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
-    """Vertices on exactly two boundary edges, and on no other edge that is sharp."""
+    """Return the vertices on exactly two boundary edges, and on no other edge that is sharp."""
     boundary = topology.edges[topology.edge_class == EdgeClass.BOUNDARY]
     count = np.bincount(boundary.reshape(-1), minlength=topology.vertex_count)
     return (count == 2) & (sharp_edge_count(topology) == 2)
 
 
 def on_boundary(topology: Topology) -> Bool[np.ndarray, " N"]:
-    """Of the vertices that a mesh is split into those that its boundaries alone place."""
+    """Return which vertices of the split of a mesh its boundaries alone place."""
     is_boundary = topology.edge_class == EdgeClass.BOUNDARY
     return np.concatenate([boundary_vertices(topology), is_boundary])
 
 
 def along_boundary(topology: Topology, vertices: Int[np.ndarray, " N"]) -> Int[np.ndarray, "N 2"]:
-    """The two neighbours of boundary vertices along the boundary."""
+    """Return the two neighbours of boundary vertices along the boundary."""
     boundary = topology.edges[topology.edge_class == EdgeClass.BOUNDARY]
     ends, others = boundary.reshape(-1), boundary[:, ::-1].reshape(-1)
     wanted = np.zeros(topology.vertex_count, dtype=bool)
@@ -52,7 +52,7 @@ def along_boundary(topology: Topology, vertices: Int[np.ndarray, " N"]) -> Int[n
 def boundary_pushes(
     points: Float[Array, "V 3"], topology: Topology, gate_sharpness: float
 ) -> Float[Array, "V 3"]:
-    """d of all vertices at b = 1; ``gate_sharpness`` is c_v."""
+    """Return d of all vertices at b = 1; ``gate_sharpness`` is c_v."""
     xp = namespace(points)
     vertices = np.flatnonzero(boundary_vertices(topology))
     sides = along_boundary(topology, vertices)
@@ -70,7 +70,7 @@ def boundary_pushes(
 def boundary_square(
     points: Float[Array, "V 3"], topology: Topology, vertices: Int[np.ndarray, " N"]
 ) -> Float[Array, " N"]:
-    """h² of boundary vertices: the mean square of their two boundary edges."""
+    """Return h² of boundary vertices: the mean square of their two boundary edges."""
     sides, middle = along_boundary(topology, vertices), gather(points, vertices)
     a, b = (gather(points, sides[:, side]) - middle for side in (0, 1))
     return (dot(a, a) + dot(b, b)) / 2

@@ -62,7 +62,7 @@ class Correction:
 
 
 def curvature_gate(gate_sharpness: float) -> Gate:
-    """γ = tanh(c x²): 0, with derivative 0, where the two faces are coplanar (equation 4)."""
+    """Return γ = tanh(c x²): 0, with derivative 0, where both faces are coplanar (equation 4)."""
 
     def gate(frames: EdgeFrames) -> Array:
         return namespace(frames.curvature).tanh(gate_sharpness * frames.curvature**2)
@@ -71,7 +71,7 @@ def curvature_gate(gate_sharpness: float) -> Gate:
 
 
 def project_to_ball(vectors: Float[Array, "N 3"], radius: float = 1.0) -> Float[Array, "N 3"]:
-    """Vectors longer than ``radius`` are shortened to it, also huge ones; none is lengthened."""
+    """Shorten vectors longer than ``radius`` to it, also huge ones; none is lengthened."""
     xp = namespace(vectors)
     # Dividing by the largest component first keeps the square of a huge vector finite.
     size = xp.abs(vectors)
@@ -89,7 +89,7 @@ def correct(
     budget_per_length: BudgetPerLength,
     frames_of: Callable[[EdgeStencil], EdgeFrames] = edge_frames,
 ) -> Correction:
-    """δ = h² γ F η(φ) for interior edges (equation 1); ``budget_per_length`` is C / R.
+    """Return δ = h² γ F η(φ) at interior edges (equation 1); ``budget_per_length`` is C / R.
 
     Raises:
         ModelError: the network returned something that is not finite, or of another shape.
@@ -104,7 +104,7 @@ def correct(
 
 
 def shortened(vectors: Float[Array, "N 3"], longest: Float[Array, " N"]) -> Float[Array, "N 3"]:
-    """Π_ρ: vectors longer than ρ = ``longest`` shortened to it; none is lengthened."""
+    """Return Π_ρ of vectors: those longer than ρ = ``longest`` shortened to it, none lengthened."""
     xp = namespace(vectors)
     length = norm(vectors)
     long = length > longest
@@ -122,7 +122,7 @@ def correct_scale_free(
     prior: Float[Array, "N 3"],
     wide_bound: bool,
 ) -> Correction:
-    """δ = γ Π_ρ(D + τ ℓ F z(φ)), ρ = h² C / R, for interior edges.
+    """Return δ = γ Π_ρ(D + τ ℓ F z(φ)), ρ = h² C / R, at interior edges.
 
     It is equation 1 with η = Π_C(R (Fᵀ D + τ ℓ z) / h²) / R: the bound is the same, and the network
     speaks in units of h, so what it says holds at every resolution. ``budget_per_length`` is C / R,
@@ -145,7 +145,7 @@ def correct_scale_free(
 def where_open(
     network: NetworkFunction, features: Array, gate: Float[Array, " N"], like: Float[Array, "N 3"]
 ) -> Array:
-    """The network's answers, checked; 0 in rows whose gate is shut, for which it is not run.
+    """Return the network's answers, checked; 0 in rows whose gate is shut, for which it is not run.
 
     Nothing is added there whatever it says, and no other row is changed by their absence. Tensors,
     which may keep a gradient, are all run. ``like`` has the type and precision of the geometry.
@@ -163,7 +163,7 @@ def where_open(
 
 
 def checked_answer(eta: Array, like: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
-    """The network's answer in the geometry's precision, refused unless (N, 3) and finite.
+    """Return the network's answer in the geometry's precision, refused unless (N, 3) and finite.
 
     Raises:
         ModelError: it is not.
@@ -179,7 +179,7 @@ def checked_answer(eta: Array, like: Float[Array, "N 3"]) -> Float[Array, "N 3"]
 
 
 def proximity_ratio(correction: Correction) -> Float[Array, " N"]:
-    """‖δ‖ R / (C h²) ∈ [0, 1]; 0 where the envelope is empty."""
+    """Return ‖δ‖ R / (C h²) ∈ [0, 1]; 0 where the envelope is empty."""
     xp = namespace(correction.envelope)
     open_ = correction.envelope > 0
     return xp.where(

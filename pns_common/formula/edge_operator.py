@@ -39,12 +39,12 @@ class EdgeOperator:
         topology: Topology,
         edges: Int[np.ndarray, " N"],
     ) -> EdgeStencil:
-        """What some interior edges see; ``fields`` is the feature set's of the whole level."""
+        """Gather what some interior edges see; ``fields`` is the feature set's of a whole level."""
         ordered = self.orientation.order(topology, edges)
         return edge_stencil(points, normals, ordered.stencil, ordered.faces, fields)
 
     def correct(self, stencil: EdgeStencil, budget_per_length: BudgetPerLength) -> Correction:
-        """δ = h² γ F η(φ); ``budget_per_length`` is C / R.
+        """Return δ = h² γ F η(φ); ``budget_per_length`` is C / R.
 
         Raises:
             ModelError: the network returned something that is not finite, or of another shape.
@@ -67,7 +67,7 @@ class EdgeOperator:
         gate: Gate,
         wide_bound: bool,
     ) -> Correction:
-        """δ = γ Π_ρ(D + τ ℓ F z(φ)); likewise, with τ ℓ and D, and ``gate`` in place of its own."""
+        """Return δ = γ Π_ρ(D + τ ℓ F z(φ)); likewise, with τ ℓ, D, and ``gate`` for its own."""
         return correct_scale_free(
             stencil,
             self.features,

@@ -43,7 +43,7 @@ class FoldGuard:
         blocks: Blocks = WHOLE,
         first: Bool[np.ndarray, " V"] | None = None,
     ) -> Float[np.ndarray, " V"]:
-        """s for each new vertex.
+        """Return s for each new vertex.
 
         Args:
             faces: those of the split mesh.
@@ -108,7 +108,7 @@ def turned(
     after: Float[Array, "V 3"],
     cosine: float,
 ) -> Bool[Array, " N"]:
-    """Whether a face turned by more than arccos(cosine), or shrank below a thousandth of its area.
+    """Return whether a face turned by more than arccos(cosine), or lost all but 1/1000 of its area.
 
     False where it had no area before.
     """
@@ -124,7 +124,7 @@ def turned(
 def _area_vectors(
     faces: Int[np.ndarray, "N 3"], points: Float[Array, "V 3"]
 ) -> tuple[Float[Array, "N 3"], Bool[Array, " N"]]:
-    """Twice the area vectors, and whether they are more than rounding."""
+    """Return twice the area vectors, and whether they are more than rounding."""
     a, b, c = (gather(points, faces[:, corner]) for corner in range(3))
     u, v = b - a, c - a
     area = cross(u, v)

@@ -25,7 +25,7 @@ CLEAR_NORMAL = 1 / 4
 
 
 def normal_pushes(rings: Rings) -> Float[Array, "V 3"]:
-    """d_v of all vertices for s = 1; everything after it is linear in s."""
+    """Return d_v of all vertices for s = 1; everything after it is linear in s."""
     xp = namespace(rings.points)
     agreement = norm(rings.normal)[:, None]
     normal = rings.normal / xp.where(agreement > CLEAR_NORMAL, agreement, CLEAR_NORMAL)

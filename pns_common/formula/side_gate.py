@@ -25,7 +25,7 @@ GENTLE_TO_SHARP = (0.3, 0.6)
 
 
 def face_bends(jumps: Float[Array, " E"], topology: Topology) -> Float[Array, " F"]:
-    """b of all faces; ``jumps`` is x of each edge, 0 where it is not interior."""
+    """Return b of all faces; ``jumps`` is x of each edge, 0 where it is not interior."""
     xp, (gentle, sharp) = namespace(jumps), GENTLE_TO_SHARP
     counted = jumps * xp.clip((sharp - jumps) / (sharp - gentle), 0.0, 1.0)
     first, second, third = (gather(counted, topology.face_edges[:, k]) for k in range(3))
@@ -35,22 +35,22 @@ def face_bends(jumps: Float[Array, " E"], topology: Topology) -> Float[Array, " 
 def gentle_bend(
     of_first: Float[Array, " N"], of_second: Float[Array, " N"], gate_sharpness: float
 ) -> Float[Array, " N"]:
-    """w of edges whose faces have these b; ``gate_sharpness`` is c_v."""
+    """Return w of edges whose faces have these b; ``gate_sharpness`` is c_v."""
     return of_gentler(namespace(of_first).minimum(of_first, of_second), gate_sharpness)
 
 
 def of_gentler(bends: Float[Array, " N"], gate_sharpness: float) -> Float[Array, " N"]:
-    """The same from the smaller b of both faces."""
+    """Return the same from the smaller b of both faces."""
     return namespace(bends).tanh(gate_sharpness * bends)
 
 
 def opened(gate: Float[Array, " N"], by: Float[Array, " N"]) -> Float[Array, " N"]:
-    """γ₂ + (1 − γ₂) w."""
+    """Return γ₂ + (1 − γ₂) w."""
     return gate + (1 - gate) * by
 
 
 def opened_gate(gate: Gate, by: Float[Array, " N"]) -> Gate:
-    """The gate of the two faces, opened by w."""
+    """Return the gate of the two faces, opened by w."""
 
     def both(frames: EdgeFrames) -> Array:
         return opened(gate(frames), by)

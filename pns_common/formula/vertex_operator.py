@@ -50,7 +50,7 @@ class VertexOperator:
     def correct(
         self, rings: Rings, vertices: Int[np.ndarray, " N"], budget_per_length: BudgetPerLength
     ) -> Correction:
-        """What is added at some vertices; ``budget_per_length`` is C / R.
+        """Return what is added at some vertices; ``budget_per_length`` is C / R.
 
         Raises:
             ModelError: the network returned something that is not finite, or of another shape.
@@ -72,7 +72,7 @@ class VertexOperator:
         asked: Float[Array, "N 1"],
         prior: Float[Array, "N 3"],
     ) -> Correction:
-        """δ = γ_v Π_ρ(D + τ ℓ_v Σ z_i e_i), ρ = h_v² C / R; likewise, with τ ℓ_v and D.
+        """Return δ = γ_v Π_ρ(D + τ ℓ_v Σ z_i e_i), ρ = h_v² C / R; likewise, with τ ℓ_v and D.
 
         Raises:
             ModelError: the network returned something that is not finite, or of another shape.
@@ -87,7 +87,7 @@ class VertexOperator:
     def _evaluated(
         self, rings: Rings, vertices: Int[np.ndarray, " N"], budget_per_length: BudgetPerLength
     ) -> tuple[Float[Array, " N"], Float[Array, " N"], Float[Array, "N 3"]]:
-        """γ_v, ρ = h_v² C / R, and Σ z_i e_i."""
+        """Return γ_v, ρ = h_v² C / R, and Σ z_i e_i."""
         xp = namespace(rings.normal)
         gamma = xp.tanh(self.gate_sharpness * gather(rings.mean_jump, vertices)[:, 0])
         envelope = budget_per_length * gather(rings.square, vertices)[:, 0]

@@ -43,7 +43,7 @@ _work = _Work()
 
 @cache
 def kernels_available() -> bool:
-    """Whether kernels can be compiled here, and kept."""
+    """Return whether kernels can be compiled here, and kept."""
     return find_spec("numba") is not None and cache_folder() is not None
 
 
@@ -58,12 +58,12 @@ def load_kernels() -> bool:
 
 
 def kernels_loaded() -> bool:
-    """Whether they are loaded."""
+    """Return whether they are loaded."""
     return LIBRARY in sys.modules
 
 
 def kernels_pay(costs: Sequence[int]) -> bool:
-    """Whether to use the kernels for levels of such costs: they are loaded, or pay for that now."""
+    """Return whether kernels are to be used for levels of such costs: loaded, or paid for now."""
     if kernels_loaded():
         return True
     _work.cost += sum(costs) + len(costs) * COST_OF_LEVEL
@@ -71,12 +71,12 @@ def kernels_pay(costs: Sequence[int]) -> bool:
 
 
 def kernel_blocks(threads: int, before: Callable[[int], None] = nobody_listens) -> Blocks:
-    """How kernels' rows are divided; ``before`` as ``Blocks`` has it."""
+    """Return how kernels' rows are divided; ``before`` as ``Blocks`` has it."""
     return Blocks(threads, KERNEL_ROWS, before, LEAST_KERNEL_ROWS)
 
 
 def fits(vertex_count: int, face_count: int, levels: int) -> bool:
-    """Whether so many levels can be numbered in int32.
+    """Return whether so many levels can be numbered in int32.
 
     The largest numbers are the half-edges that the last level makes, 12 a face that it splits; no
     more vertices than that are added on the way.

@@ -21,12 +21,12 @@ class Additions:
 
     @classmethod
     def unwritten(cls, count: int) -> Additions:
-        """Numbers to be written, or cleared, in every row."""
+        """Make room for numbers that are to be written, or cleared, in every row."""
         ratio, gate, envelope = (np.empty(count) for _ in range(3))
         return cls(np.empty((count, 3)), ratio, gate, envelope, np.zeros(count, dtype=bool))
 
     def rows(self, rows: slice | Int[np.ndarray, " N"]) -> Additions:
-        """Some of the rows: views for a slice, copies for indices."""
+        """Return some of the rows: views for a slice, copies for indices."""
         return Additions(
             self.displacement[rows],
             self.ratio[rows],

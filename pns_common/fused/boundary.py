@@ -43,7 +43,7 @@ class SharpLevel:
         mesh: MeshEdges,
         length: float | Float[np.ndarray, " V"],
     ) -> SharpLevel:
-        """Those of a mesh; ``length`` is R, or each vertex's own."""
+        """Take the boundaries of a mesh; ``length`` is R, or each vertex's own."""
         edges = mesh.sharp_edges
         ends = mesh.edges[edges].astype(np.int64)
         vertices = np.unique(ends)
@@ -90,7 +90,7 @@ class Boundary:
             _move(self.rule.move_edges, self.sharp.level, self.sharp.edges, loop, added)
 
     def first(self, vertex_count: int, edge_count: int) -> Bool[np.ndarray, " W"] | None:
-        """What the fold guard settles first; None where that is nothing."""
+        """Return what the fold guard settles first; None where that is nothing."""
         if self.sharp is None:
             return None
         alone = on_boundary(self.sharp.level.topology)
@@ -109,7 +109,7 @@ def boundary_of(
     mesh: MeshEdges,
     length: float | Float[np.ndarray, " V"],
 ) -> Boundary:
-    """What ``rule`` makes of a level; ``length`` is R, or each vertex's own."""
+    """Make what ``rule`` adds at a level's boundary; ``length`` is R, or each vertex's own."""
     if rule is None:
         return NO_RULE
     if not has_boundary(mesh):

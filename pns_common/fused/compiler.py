@@ -29,7 +29,7 @@ DATA, SHAPE, STRIDES = (object.__basicsize__ + offset for offset in (0, 16, 24))
 
 
 def compile_kernels(modules: Sequence[ModuleType]) -> bytes:
-    """The object file of all kernels of some modules."""
+    """Compile all kernels of some modules into one object file."""
     # numba optimises for the processor that the code is made for.
     _numba.config.CPU_NAME, _numba.config.CPU_FEATURES = processor()
     for helper in _helpers(modules):
@@ -42,7 +42,7 @@ def compile_kernels(modules: Sequence[ModuleType]) -> bytes:
 
 
 def _helpers(modules: Sequence[ModuleType]) -> list[Any]:
-    """The functions that kernels call."""
+    """Return the functions that kernels call."""
     return [
         value
         for module in modules
@@ -52,7 +52,7 @@ def _helpers(modules: Sequence[ModuleType]) -> list[Any]:
 
 
 def _compiled(kernel: Kernel) -> Any:
-    """A kernel's code, under its name, as a module of LLVM."""
+    """Compile a kernel, under its name, to a module of LLVM."""
     types = tuple(_type(each) for each in kernel.arguments)
     # Nothing is to be called from Python in numba's way, which needs numba.
     alone = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
@@ -74,7 +74,7 @@ def _type(of: Array | str) -> Any:
 
 
 def _entry(kernel: Kernel, main: str) -> str:
-    """The function that takes arrays as they are, as LLVM's text.
+    """Return the function that takes arrays as they are, as LLVM's text.
 
     In numba's convention an array is: two pointers to owners, which borrowed arrays have not, its
     number of elements and their size, which nothing reads, its data, its shape and its strides.

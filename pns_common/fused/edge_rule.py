@@ -27,7 +27,7 @@ NO_FIELDS, NO_BENDS = np.zeros((0, 4)), np.zeros(0)
 def add_at_edges(
     rule: LearnedEdgeRule | ScaleFreeEdgeRule, level: Surroundings, to: Additions
 ) -> None:
-    """What a rule adds at the interior edges; ``to`` has a row for each edge.
+    """Add what a rule wants at the interior edges; ``to`` has a row for each edge.
 
     At the others it adds nothing.
 

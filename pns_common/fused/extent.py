@@ -11,7 +11,7 @@ from pns_common.fused.kernels.extent import farthest, sum_referenced
 
 
 def reference_length(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> float:
-    """R: the largest distance of a referenced vertex from their centroid, over √2."""
+    """Return R: the largest distance of a referenced vertex from their centroid, over √2."""
     used, total = np.zeros(len(vertices), dtype=bool), np.zeros(3)
     count = sum_referenced(vertices, faces, used, total)
     return farthest(vertices, used, total / count) / math.sqrt(2)

@@ -11,7 +11,7 @@ from pns_common.fused.mesh_edges import MeshEdges
 
 
 def multi_fan_vertices(mesh: MeshEdges, blocks: Blocks) -> Bool[np.ndarray, " V"]:
-    """Whether the faces of each vertex form more than one fan."""
+    """Return for each vertex whether its faces form more than one fan."""
     corner, count = (np.zeros(mesh.vertex_count, dtype=np.int32) for _ in range(2))
     count_corners(mesh.faces, corner, count)
     several = np.empty(mesh.vertex_count, dtype=bool)

@@ -25,7 +25,7 @@ def guard_scale(
     blocks: Blocks,
     first: Bool[np.ndarray, " W"] | None = None,
 ) -> Float[np.ndarray, " W"] | None:
-    """s for each new vertex of the split of ``mesh``; ``first`` as the guard has it.
+    """Return s for each new vertex of the split of ``mesh``; ``first`` as the guard has it.
 
     None where it is 1 everywhere.
     """
@@ -73,7 +73,7 @@ def _touched(
     changed: Bool[np.ndarray, " C"],
     blocks: Blocks,
 ) -> Bool[np.ndarray, " W"]:
-    """The corners of folded children; after the first round only those that ``changed`` count."""
+    """Return folded children's corners; after the first round only those that ``changed`` count."""
     touched = np.zeros(len(loop), dtype=bool)
     around = loop, displacement, scale, math.cos(guard.angle)
     args = mesh.faces, mesh.face_edges, mesh.vertex_count, changed

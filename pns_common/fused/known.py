@@ -13,7 +13,7 @@ from pns_common.schemes import Rule, Scheme
 
 
 def kernels_know(scheme: Scheme) -> bool:
-    """Whether the kernels have the features and the form of a scheme's own rules."""
+    """Return whether the kernels have the features and the form of a scheme's own rules."""
     edges, vertices = scheme.edge_rule, scheme.vertex_rule
     if not isinstance(edges, LearnedEdgeRule | ScaleFreeEdgeRule):
         return False

@@ -65,7 +65,7 @@ def learned_step(level: FusedLevel, scheme: Scheme, length: float, blocks: Block
 def learned_points(
     level: FusedLevel, scheme: Scheme, length: float | Float[np.ndarray, " V"], blocks: Blocks
 ) -> LearnedPoints:
-    """The same, without a look at the children; ``length`` may be each vertex's own.
+    """Return the same, without a look at the children; ``length`` may be each vertex's own.
 
     Raises:
         ModelError: a network returned something that is not finite, or of another shape.
@@ -113,7 +113,7 @@ def _boundary_rule(scheme: Scheme) -> BoundaryRule | None:
 
 
 def _altitudes(scheme: Scheme) -> float:
-    """α of the network's lengths; infinite where they are h."""
+    """Return α of the network's lengths; infinite where they are h."""
     rule = scheme.edge_rule
     altitudes = rule.form.network_altitudes if isinstance(rule, ScaleFreeEdgeRule) else None
     return math.inf if altitudes is None else altitudes

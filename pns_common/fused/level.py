@@ -34,7 +34,7 @@ class FusedLevel:
         return multi_fan_vertices(self.mesh, self.blocks.unheard())
 
     def topology(self) -> Topology:
-        """The same connectivity as the array kernels keep it."""
+        """Return the same connectivity as the array kernels keep it."""
         mesh = self.mesh
         faces, edges = mesh.faces.astype(np.int64), mesh.edges.astype(np.int64)
         opposed = (mesh.edge_class == EdgeClass.INTERIOR) | (mesh.edge_class == EdgeClass.CREASE)
@@ -77,7 +77,7 @@ def control_level(
     creases: Int[np.ndarray, "N 2"] | None,
     blocks: Blocks,
 ) -> FusedLevel:
-    """The level of a control mesh.
+    """Return the level of a control mesh.
 
     Raises:
         ParameterError: a crease is no edge of the mesh.
@@ -87,7 +87,7 @@ def control_level(
 
 
 def next_level(level: FusedLevel, points: Float[np.ndarray, "W 3"], blocks: Blocks) -> FusedLevel:
-    """The level whose points a step has placed; the children of creases are creases."""
+    """Return the level whose points a step has placed; the children of creases are creases."""
     mesh, made = level.mesh, split_mesh_edges(level.mesh, blocks)
     # Where the edges were split by arithmetic their classes were too.
     creases = None if mesh.plain else crease_halves(mesh.edges, mesh.edge_class, mesh.vertex_count)

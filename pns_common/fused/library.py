@@ -40,12 +40,12 @@ class Library:
     loaded: Any
 
     def __getitem__(self, name: str) -> int:
-        """The address of a kernel."""
+        """Return the address of a kernel."""
         return self.loaded[name]
 
 
 def library() -> Library:
-    """All kernels, loaded once. Compiles them where that was not done before: some 15 s."""
+    """Load all kernels, once. Compiles them where that was not done before: some 15 s."""
     with _opening:
         return _library()
 
@@ -70,13 +70,13 @@ def _library() -> Library:
 
 
 def kernel_modules() -> list[ModuleType]:
-    """The modules that define kernels."""
+    """Return the modules that define kernels."""
     names = sorted(found.name for found in pkgutil.iter_modules(kernels.__path__))
     return [import_module(f"{kernels.__name__}.{name}") for name in names]
 
 
 def kernels_of(modules: Sequence[ModuleType]) -> list[Kernel]:
-    """The kernels that the modules define."""
+    """Return the kernels that the modules define."""
     return [
         value
         for module in modules
@@ -86,7 +86,7 @@ def kernels_of(modules: Sequence[ModuleType]) -> list[Kernel]:
 
 
 def target_machine() -> Any:
-    """The processor that code is made for: this one, or that of NUMBA_CPU_NAME."""
+    """Return the processor that code is made for: this one, or that of NUMBA_CPU_NAME."""
     _llvm.initialize_native_target()
     _llvm.initialize_native_asmprinter()
     name, features = processor()
@@ -96,7 +96,7 @@ def target_machine() -> Any:
 
 
 def processor() -> tuple[str, str]:
-    """Its name and its features, as LLVM calls them."""
+    """Return the processor's name and its features, as LLVM calls them."""
     name, features = (os.environ.get(f"NUMBA_CPU_{what}") for what in ("NAME", "FEATURES"))
     if features is None:
         features = "" if name else _llvm.get_host_cpu_features().flatten()
@@ -107,7 +107,7 @@ def processor() -> tuple[str, str]:
 
 
 def key_of(modules: Sequence[ModuleType]) -> str:
-    """What tells the code of these modules from any other."""
+    """Return what tells the code of these modules from any other."""
     parts = [_llvm.get_default_triple(), *processor(), object.__basicsize__]
     parts += [metadata.version("numba"), metadata.version("llvmlite")]
     parts += [COMPILER.read_bytes()]

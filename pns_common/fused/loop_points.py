@@ -21,7 +21,7 @@ from pns_common.masks.stencils import loop_beta
 def loop_points(
     points: Float[np.ndarray, "V 3"], mesh: MeshEdges, blocks: Blocks
 ) -> Float[np.ndarray, "W 3"]:
-    """Old vertices, then edge vertices, where Loop puts them."""
+    """Place old vertices, then edge vertices, where Loop puts them."""
     count, edge_count = mesh.vertex_count, len(mesh.edges)
     placed = np.empty((count + edge_count, 3))
     edge_points = placed[count:]
@@ -44,12 +44,15 @@ def loop_points(
 
 
 def owners(blocks: Blocks, count: int) -> Blocks:
-    """Blocks for sums around vertices: each reads all edges, so no more of them than threads."""
+    """Return blocks for sums around vertices.
+
+    Each reads all edges, so there are no more of them than threads.
+    """
     return blocks.of_rows(max(blocks.least or blocks.rows, -(-count // blocks.threads)))
 
 
 def largest_size(points: Float[np.ndarray, "V 3"], blocks: Blocks) -> float:
-    """The largest absolute coordinate; NaN where one is."""
+    """Return the largest absolute coordinate; NaN where one is."""
     sizes = np.zeros(blocks.count(len(points)))
 
     def measure(rows: slice) -> None:
@@ -82,7 +85,7 @@ def place_vertices(
     blocks: Blocks,
     placed: Float[np.ndarray, "V 3"],
 ) -> None:
-    """Loop's old vertices, into ``placed``."""
+    """Write Loop's old vertices into ``placed``."""
     count = mesh.vertex_count
     placed[:] = 0
     valence = np.zeros(count, dtype=np.int32)

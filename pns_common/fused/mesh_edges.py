@@ -72,7 +72,7 @@ class MeshEdges:
 
 
 def build_edges(faces: Int[np.ndarray, "F 3"], vertex_count: int, blocks: Blocks) -> MeshEdges:
-    """Edges of int32 faces."""
+    """Build the edges of int32 faces."""
     count = len(faces)
     # As many as there could be: what is not written is not in memory.
     head = np.full(vertex_count, -1, dtype=np.int32)
@@ -94,7 +94,7 @@ def build_edges(faces: Int[np.ndarray, "F 3"], vertex_count: int, blocks: Blocks
 
 
 def split_mesh_edges(parent: MeshEdges, blocks: Blocks) -> MeshEdges:
-    """Edges of the split mesh; creases stay creases only where the parent is plain."""
+    """Return the split mesh's edges; creases stay creases only where the parent is plain."""
     count, vertices = len(parent.faces), parent.vertex_count + len(parent.edges)
     faces = split_mesh_faces(parent, np.int32, blocks)
     if not parent.plain:
@@ -138,14 +138,14 @@ def split_mesh_edges(parent: MeshEdges, blocks: Blocks) -> MeshEdges:
 
 
 def has_boundary(mesh: MeshEdges) -> bool:
-    """Whether an edge has a single face."""
+    """Return whether an edge has a single face."""
     return bool((mesh.edge_class == EdgeClass.BOUNDARY).any())
 
 
 def split_mesh_faces(
     parent: MeshEdges, dtype: type[np.int32] | type[np.int64], blocks: Blocks
 ) -> Int[np.ndarray, "C 3"]:
-    """The children of the faces, as ``topology.split`` orders them."""
+    """Return the children of the faces, as ``topology.split`` orders them."""
     faces = np.empty((4 * len(parent.faces), 3), dtype=dtype)
     split = split_faces if dtype is np.int32 else split_faces_long
 
@@ -157,7 +157,7 @@ def split_mesh_faces(
 
 
 def _sorted_edges(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> MeshEdges:
-    """The same by sorting, for meshes whose hubs make chains long."""
+    """Build the same by sorting, for meshes whose hubs make chains long."""
     topology = build_topology(faces.astype(np.int64), vertex_count)
     edge_of = topology.face_edges.reshape(-1)
     half_edges = topology.half_edges.astype(np.int32)

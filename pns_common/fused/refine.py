@@ -31,7 +31,7 @@ def refine_fused(
     blocks: Blocks,
     after_level: AfterLevel,
 ) -> RefinedLevels:
-    """What ``refine.refine_arrays`` makes, bit for bit.
+    """Return what ``refine.refine_arrays`` makes, bit for bit.
 
     Raises:
         ParameterError: a crease is no edge.
@@ -68,7 +68,7 @@ def _look(control: FusedLevel, reports: Sequence[Callable[[], LevelReport]]) -> 
 def _checked_step(
     level: FusedLevel, scheme: Scheme, length: float, depth: int, blocks: Blocks
 ) -> FusedStep:
-    """The step of one level, as ``step.level_step`` chooses it."""
+    """Make the step of one level, as ``step.level_step`` chooses it."""
     if scheme.learned_levels is not None and depth >= scheme.learned_levels:
         step = loop_step(level, blocks)
     else:

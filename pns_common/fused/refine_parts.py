@@ -77,12 +77,12 @@ class _Parts:
         return len(self.faces) - 1
 
     def next(self) -> _Parts:
-        """The same of the next level, but for its edges."""
+        """Return the same of the next level, but for its edges."""
         of_edge = np.repeat(np.arange(self.count), np.diff(self.edges))
         return replace(self, faces=4 * self.faces, of_vertex=np.r_[self.of_vertex, of_edge])
 
     def with_edges_of(self, mesh: MeshEdges) -> _Parts:
-        """Edges are numbered as they first appear over faces, so they lie as the faces do."""
+        """Find the parts' edges: numbered as they first appear over faces, they lie as those do."""
         edges = np.searchsorted(mesh.half_edges[:, 0] // 3, self.faces)
         return replace(self, edges=edges)
 
@@ -140,7 +140,7 @@ def _placed(
     depth: int,
     blocks: Blocks,
 ) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 3"] | None, AddedStep]:
-    """The next level's points, where Loop would have put them (None: no child can be flipped)."""
+    """Return the next level's points, Loop's (None: no child can be flipped), and the step."""
     if scheme.learned_levels is None or depth < scheme.learned_levels:
         # What overflows under an absurd budget is caught by the caller.
         with np.errstate(over="ignore", invalid="ignore"):
@@ -160,7 +160,7 @@ def _reports(
     counterpart: Float[np.ndarray, "W 3"] | None,
     step: AddedStep,
 ) -> list[LevelReport]:
-    """What ``level_report`` says of each part."""
+    """Return what ``level_report`` says of each part."""
     children = _children(mesh, parts, points, counterpart)
     order = np.argsort(parts.of_vertex, kind="stable")
     starts = np.searchsorted(parts.of_vertex[order], np.arange(parts.count + 1))
@@ -193,7 +193,7 @@ def _children(
     points: Float[np.ndarray, "W 3"],
     counterpart: Float[np.ndarray, "W 3"] | None,
 ) -> list[ChildAngles]:
-    """What ``look_at_children`` sees of each part."""
+    """Return what ``look_at_children`` sees of each part."""
     faces, edges = (mesh.faces, mesh.face_edges), (mesh.half_edges, mesh.edge_class)
     count, seen = mesh.vertex_count, list[ChildAngles]()
     for part in range(parts.count):

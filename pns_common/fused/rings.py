@@ -71,7 +71,7 @@ def measure_normals(
 def measure_bends(
     jumps: Float[np.ndarray, " E"], mesh: MeshEdges, blocks: Blocks
 ) -> Float[np.ndarray, " F"]:
-    """b of all faces, as ``side_gate.face_bends`` has it."""
+    """Return b of all faces, as ``side_gate.face_bends`` has it."""
     bends, (gentle, sharp) = np.empty(len(mesh.faces)), GENTLE_TO_SHARP
 
     def measure(rows: slice) -> None:
@@ -118,7 +118,7 @@ def measure_rings(
 
 
 def measure_pushes(rings: RingMeasures, blocks: Blocks) -> Float[np.ndarray, "V 3"]:
-    """d_v of the prior at s = 1."""
+    """Return d_v of the prior at s = 1."""
     pushes = np.empty((len(rings.valence), 3))
     weight = limit_ring_weight(np.arange(int(rings.valence.max(initial=0)) + 1))
     smooth = rings.smooth.astype(np.int32)

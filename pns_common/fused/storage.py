@@ -19,7 +19,7 @@ STEM = "kernels-"
 
 @cache
 def cache_folder() -> Path | None:
-    """The folder that new kernels are written to; None where there is none."""
+    """Return the folder that new kernels are written to; None where there is none."""
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given:
         return Path(given)
@@ -29,7 +29,7 @@ def cache_folder() -> Path | None:
 
 
 def kernel_file(key: str) -> Path | None:
-    """The file of that key: with the package, if it came with it; else in ``cache_folder``."""
+    """Return the file of a key: with the package, if it came so; else in ``cache_folder``."""
     name, folder = f"{STEM}{key}.o", cache_folder()
     if (BUILT / name).exists():
         return BUILT / name
@@ -37,13 +37,16 @@ def kernel_file(key: str) -> Path | None:
 
 
 def kernels_are_kept() -> bool:
-    """Whether kernels were compiled here before; for another processor or version, perhaps."""
+    """Return whether kernels were compiled here before.
+
+    Perhaps that was for another processor or version.
+    """
     folder = cache_folder()
     return any(any(each.glob(f"{STEM}*.o")) for each in (BUILT, folder) if each is not None)
 
 
 def private_folder(parent: Path) -> Path | None:
-    """A folder of this user's alone, made if need be; None where there cannot be one."""
+    """Return a folder of this user's alone, made if need be; None where there cannot be one."""
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = parent / f"pns-kernels-{user}"
     try:

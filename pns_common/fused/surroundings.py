@@ -42,7 +42,7 @@ class Surroundings:
     def budget_per_length(
         self, vertices: Int[np.ndarray, " N"], budget: float
     ) -> Float[np.ndarray, " N"]:
-        """C / R at each of some vertices."""
+        """Return C / R at each of some vertices."""
         if isinstance(self.reference_length, np.ndarray):
             return budget / self.reference_length[vertices]
         return np.full(len(vertices), budget / self.reference_length)

@@ -16,7 +16,7 @@ CACHE_LINE = 64
 def answers_of(
     form: TiedForm, features: Float[np.ndarray, "N K"], budget: float
 ) -> Float32[np.ndarray, "N 3"]:
-    """What ``tied_network.arrays.answers_of`` gives, bit for bit."""
+    """Return what ``tied_network.arrays.answers_of`` gives, bit for bit."""
     answers = np.empty((len(features), 3), dtype=np.float32)
     widest = int(form.widths.max())
     units = _on_cache_lines(form.copies, widest, LANES)
@@ -41,7 +41,7 @@ def answers_of(
 
 
 def _on_cache_lines(*shape: int) -> Float32[np.ndarray, "G M L"]:
-    """Space that begins with a cache line, so that no vector lies on two: a quarter sooner."""
+    """Make space that begins with a cache line, so no vector lies on two: a quarter sooner."""
     size = np.dtype(np.float32).itemsize
     space = np.empty(math.prod(shape) + CACHE_LINE // size, dtype=np.float32)
     start = -space.ctypes.data % CACHE_LINE // size

@@ -16,7 +16,7 @@ from pns_common.rules.scale_free import ScaleFreeVertexRule
 def add_at_vertices(
     rule: LearnedVertexRule | ScaleFreeVertexRule, level: Surroundings, to: Additions
 ) -> None:
-    """What a rule adds at vertices with one closed ring; ``to`` has a row for each old vertex.
+    """Add what a rule wants at vertices with one closed ring; ``to`` has rows for old vertices.
 
     At the others it adds nothing.
 

@@ -89,7 +89,7 @@ def child_faces(
 
 
 def angle_between(chord: float) -> float:
-    """The angle between two unit normals, 0 … π radians, from their squared distance.
+    """Return the angle between two unit normals, 0 … π radians, from their squared distance.
 
     That keeps small angles, which 1 − cos would round away.
     """
@@ -99,6 +99,6 @@ def angle_between(chord: float) -> float:
 def _largest_chord(
     n1: Float[np.ndarray, "N 3"], n2: Float[np.ndarray, "N 3"], defined: Bool[np.ndarray, " N"]
 ) -> float:
-    """The largest squared distance between the normals of a pair that both have one."""
+    """Return the largest squared distance between the normals of a pair that both have one."""
     chord = n1 - n2
     return float(np.max(dot(chord, chord), initial=0, where=defined))

@@ -65,14 +65,14 @@ class EdgeFrames:
 
 
 def face_normals(points: Float[Array, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Float[Array, "F 3"]:
-    """Unit normals (b − a) × (c − a), anticlockwise faces seen from outside; 0 without area."""
+    """Return unit normals (b − a) × (c − a), faces anticlockwise from outside; 0 without area."""
     return triangle_normals(*(gather(points, faces[:, corner]) for corner in range(3)))
 
 
 def triangle_normals(
     a: Float[Array, "N 3"], b: Float[Array, "N 3"], c: Float[Array, "N 3"]
 ) -> Float[Array, "N 3"]:
-    """Unit normals of triangles; 0 where they have no area."""
+    """Return the unit normals of triangles; 0 where they have no area."""
     u, v = b - a, c - a
     return unit_longer_than(cross(u, v), NO_AREA * (dot(u, u) + dot(v, v)))
 
@@ -94,7 +94,7 @@ def edge_stencil(
 
 
 def edge_frames(stencil: EdgeStencil) -> EdgeFrames:
-    """F = [T, N, B]: T along the edge, N the mean face normal across it, B = T × N (section 3.2).
+    """Return F = [T, N, B]: T along the edge, N its mean face normal, B = T × N (section 3.2).
 
     Degenerate edges take a fixed world triad, so that F is a rotation for every input; there, and
     only there, F does not turn with the mesh.
@@ -124,7 +124,7 @@ def edge_frames(stencil: EdgeStencil) -> EdgeFrames:
 
 
 def shut_where_degenerate(stencil: EdgeStencil) -> EdgeFrames:
-    """Edge frames with x = 0 on all degenerate edges: no gate opens where F would not turn along.
+    """Return edge frames with x = 0 where degenerate: no gate opens where F would not turn along.
 
     Antiparallel faces are among them, where x would be 2.
     """
@@ -134,7 +134,7 @@ def shut_where_degenerate(stencil: EdgeStencil) -> EdgeFrames:
 
 
 def rotate(frames: EdgeFrames, local: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
-    """F η: local coordinates (along T, N, B) to world coordinates."""
+    """Return F η: local coordinates (along T, N, B) turned to world coordinates."""
     return (
         local[:, :1] * frames.tangent
         + local[:, 1:2] * frames.normal

@@ -13,7 +13,7 @@ from pns_common.connectivity.topology import Topology
 
 
 def mean_normals(points: Float[Array, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Float[Array, "V 3"]:
-    """m_v = Σ (b − a) × (c − a) / Σ ‖(b − a) × (c − a)‖ over the faces at v; 0 without area.
+    """Return m_v = Σ (b − a) × (c − a) / Σ ‖(b − a) × (c − a)‖ over v's faces; 0 without area.
 
     The mean of their normals, weighted by area: ‖m_v‖ ≤ 1, and 1 where they agree.
     """
@@ -27,21 +27,21 @@ def mean_normals(points: Float[Array, "V 3"], faces: Int[np.ndarray, "F 3"]) -> 
 
 
 def spokes(points: Float[Array, "V 3"], topology: Topology) -> Float[Array, "S 3"]:
-    """p_j − p_v of both directions of every edge: rows 2 e and 2 e + 1 start at its two ends."""
+    """Return p_j − p_v along every edge both ways: rows 2 e and 2 e + 1 start at its two ends."""
     ends = topology.edges.reshape(-1)
     others = topology.edges[:, ::-1].reshape(-1)
     return gather(points, others) - gather(points, ends)
 
 
 def neighbour_mean(values: Float[Array, "S K"], topology: Topology) -> Float[Array, "V K"]:
-    """The mean of the spokes' values at each vertex; 0 where there are none."""
+    """Return the mean of the spokes' values at each vertex; 0 where there are none."""
     valence = np.maximum(topology.valence, 1)
     total = segment_sum(values, topology.edges.reshape(-1), topology.vertex_count)
     return total / beside(values, valence, values.dtype)[:, None]
 
 
 def divided(values: Float[Array, "N K"], by: Float[Array, "N 1"]) -> Float[Array, "N K"]:
-    """``values`` / ``by``, and 0 where ``by`` is 0."""
+    """Return ``values`` / ``by``, and 0 where ``by`` is 0."""
     xp = namespace(values)
     positive = by > 0
     return xp.where(positive, values / xp.where(positive, by, 1.0), 0.0)

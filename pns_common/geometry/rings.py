@@ -111,20 +111,20 @@ class Rings:
         return namespace(lean).where(closed, divided(lean, self.spoke_length), 0.0)
 
     def mean(self, values: Float[Array, "S K"]) -> Float[Array, "V K"]:
-        """The mean over each vertex's spokes."""
+        """Return the mean over each vertex's spokes."""
         return neighbour_mean(values, self.topology)
 
     def mean_of_edges(self, values: Float[Array, " E"]) -> Float[Array, "V 1"]:
-        """The same of what both directions of an edge have in common."""
+        """Return the same of what both directions of an edge have in common."""
         both = np.repeat(np.arange(len(self.topology.edges)), 2)
         return self.mean(gather(values[:, None], both))
 
     def of_neighbour(self, values: Float[Array, "V K"]) -> Float[Array, "S K"]:
-        """For each spoke the value at its far end."""
+        """Return for each spoke the value at its far end."""
         return gather(values, self.topology.edges[:, ::-1].reshape(-1))
 
     def of_centre(self, values: Float[Array, "V K"]) -> Float[Array, "S K"]:
-        """For each spoke the value at its near end."""
+        """Return for each spoke the value at its near end."""
         return gather(values, self.topology.edges.reshape(-1))
 
     @cached_property
@@ -133,19 +133,19 @@ class Rings:
 
 
 def squared(vectors: Float[Array, "N 3"]) -> Float[Array, "N 1"]:
-    """Their squared lengths."""
+    """Return the squared lengths of vectors."""
     return dot(vectors, vectors)[:, None]
 
 
 def root(square: Float[Array, "N 1"]) -> Float[Array, "N 1"]:
-    """Its square root, with gradient 0 at 0."""
+    """Return the square root, with gradient 0 at 0."""
     xp = namespace(square)
     positive = square > 0
     return xp.where(positive, xp.sqrt(xp.where(positive, square, 1.0)), 0.0)
 
 
 def ring_vectors(rings: Rings) -> Float[Array, "V 3 3"]:
-    """Rows e1, e2, e3 of each vertex, polar vectors that turn with the mesh, none longer than 1.
+    """Return e1, e2, e3 of each vertex, polar vectors that turn with the mesh, at most 1 long.
 
     e1 = m_v, e2 = u_v / h_v, e3 = mean of (x / 2) (p_j − p_v) / h_v. None is normalised: each is
     Lipschitz also where a symmetric ring makes it vanish.
@@ -159,7 +159,7 @@ def ring_vectors(rings: Rings) -> Float[Array, "V 3 3"]:
 def _across_edges(
     points: Float[Array, "V 3"], normals: Float[Array, "F 3"], topology: Topology
 ) -> tuple[Float[Array, "S 1"], Float[Array, "S 1"]]:
-    """x and s of each spoke: both directions of an edge have the same."""
+    """Return x and s of each spoke: both directions of an edge have the same."""
     xp = namespace(points)
     left = left_face_order(topology, topology.interior)
     first, second = (gather(normals, left.faces[:, side]) for side in (0, 1))
@@ -172,6 +172,6 @@ def _across_edges(
 
 
 def _on_spokes(values: Float[Array, "I 1"], topology: Topology) -> Float[Array, "S 1"]:
-    """Values of interior edges at both spokes of each edge; 0 at other edges."""
+    """Return values of interior edges at both spokes of each edge; 0 at other edges."""
     edges: Int[np.ndarray, " S"] = np.repeat(np.arange(len(topology.edges)), 2)
     return gather(segment_sum(values, topology.interior, len(topology.edges)), edges)

@@ -38,7 +38,7 @@ class NetworkLengths:
 
 
 def network_lengths(rings: Rings, altitudes: float | None) -> NetworkLengths:
-    """ℓ of a level; ``altitudes`` is α > 0, or None for h and h_v whatever the faces."""
+    """Return ℓ of a level; ``altitudes`` is α > 0, or None for h and h_v whatever the faces."""
     length = norm(rings.spokes[::2])
     if altitudes is None:
         return NetworkLengths(length, rings.spoke_length)
@@ -57,7 +57,7 @@ def network_lengths(rings: Rings, altitudes: float | None) -> NetworkLengths:
 
 
 def longest_side(stencil: EdgeStencil, frames: EdgeFrames) -> Float[Array, " N"]:
-    """h̄ of interior edges."""
+    """Return h̄ of interior edges."""
     xp, longest = namespace(frames.length), frames.length
     for wing in (stencil.c, stencil.d):
         for end in (stencil.a, stencil.b):

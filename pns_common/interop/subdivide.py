@@ -75,7 +75,7 @@ def subdivide(
 
 
 def _adapter(mesh: object) -> Adapter:
-    """The adapter of a mesh's class, or of one that it is derived from."""
+    """Return the adapter of a mesh's class, or of one that it is derived from."""
     for base in type(mesh).__mro__:
         known = ADAPTERS.get((base.__module__.partition(".")[0], base.__name__))
         if known is not None:

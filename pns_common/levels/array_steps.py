@@ -54,7 +54,7 @@ def array_steps(
     reference_length: float,
     blocks: Blocks,
 ) -> Iterator[ArrayStep]:
-    """The steps from a control mesh on, without end; coordinates that overflow are not finite.
+    """Yield the steps from a control mesh on, without end; overflowing coordinates are not finite.
 
     Raises:
         ParameterError: a crease is no edge.

@@ -135,26 +135,26 @@ def limit_distances(levels: Sequence[LevelReport]) -> LimitDistances:
 
 
 def _longest(displacement: Float[np.ndarray, "N 3"] | None) -> float:
-    """The largest length; of the squares, since a root keeps their order."""
+    """Return the largest length; of the squares, since a root keeps their order."""
     if displacement is None:
         return 0.0
     return math.sqrt(dot(displacement, displacement).max(initial=0))
 
 
 def _largest(rule: Added) -> float | None:
-    """The largest displacement that a rule may make; None where it may make any."""
+    """Return the largest displacement that a rule may make; None where it may make any."""
     if rule.displacement is None:
         return 0.0
     return None if rule.envelope is None else float(rule.envelope.max(initial=0))
 
 
 def _shut(rule: Added, rows: np.ndarray | None) -> int:
-    """Of some vertices, how many have a gate of 0."""
+    """Count those of some vertices that have a gate of 0."""
     return 0 if rows is None else int(np.count_nonzero(rule.gate[rows] == 0))
 
 
 def edge_counts(edge_class: Int[np.ndarray, " E"]) -> EdgeCounts:
-    """How many edges there are of each class."""
+    """Count the edges of each class."""
     count = np.bincount(edge_class, minlength=len(EdgeClass)).tolist()
     counts: EdgeCounts = {
         "interior": count[EdgeClass.INTERIOR],
@@ -177,12 +177,12 @@ def _ratio_summary(ratio: Float[np.ndarray, " N"]) -> RatioSummary:
 
 
 def _mean(values: Float[np.ndarray, " N"]) -> float:
-    """``values.mean()``, without what surrounds its sum."""
+    """Return ``values.mean()``, without what surrounds its sum."""
     return float(np.add.reduce(values)) / len(values)
 
 
 def _p99(values: Float[np.ndarray, " N"]) -> float:
-    """``np.percentile(values, 99)``, whose checks would take longest of all in a small mesh."""
+    """Return ``np.percentile(values, 99)``, whose checks take longest of all in a small mesh."""
     position = (len(values) - 1) * 0.99
     below = int(position)
     above = min(below + 1, len(values) - 1)

@@ -13,7 +13,7 @@ ROWS_PER_FACE, LEARNED_ROWS_PER_FACE = 2.0, 4.0
 
 
 def level_costs(faces: int, levels: int, learned_levels: int | None) -> list[int]:
-    """What each level of a refinement costs, in faces that Loop makes.
+    """Return what each level of a refinement costs, in faces that Loop makes.
 
     Arguments as of ``RefinementProgress``.
     """
@@ -60,14 +60,14 @@ class RefinementProgress:
         self._lock = Lock()
 
     def rows(self, count: int) -> None:
-        """So many more rows of the level are looked at; from any thread."""
+        """Take note of so many more rows of the level that are looked at; from any thread."""
         with self._lock:
             self._seen += count
             within = min(self._seen / self._rows[0], 1.0) if self._rows else 0.0
             self._report(within * self._costs[0] if self._costs else 0.0)
 
     def level_ends(self) -> None:
-        """A level is done, or the limit surface."""
+        """Take note that a level is done, or the limit surface."""
         with self._lock:
             self._spent += self._costs.pop(0)
             self._rows.pop(0)

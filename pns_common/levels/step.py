@@ -82,7 +82,7 @@ def level_step(level: ControlLevel, scheme: Scheme) -> LevelStep:
 
 
 def _scaled(placement: Placement, scale: Float[np.ndarray, " N"]) -> Placement:
-    """The placement with s δ instead of δ."""
+    """Return the placement with s δ instead of δ."""
     if placement.displacement is None:
         return placement
     s = beside(placement.loop, scale, placement.loop.dtype)

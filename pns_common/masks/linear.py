@@ -24,7 +24,7 @@ def level_topologies(
     levels: int,
     creases: Int[np.ndarray, "N 2"] | None = None,
 ) -> list[Topology]:
-    """The topologies that ``levels`` steps of ``refine`` go through, control mesh first."""
+    """Return the topologies that ``levels`` steps of ``refine`` go through, control mesh first."""
     topologies: list[Topology] = []
     for _ in range(levels):
         topology = build_topology(faces, vertex_count)
@@ -39,7 +39,7 @@ def level_topologies(
 def refine_linear(
     columns: Float[np.ndarray, "V K"], topologies: Sequence[Topology]
 ) -> Float[np.ndarray, "W K"]:
-    """Columns at the refined vertices: Loop's masks, level by level."""
+    """Refine columns by Loop's masks, level by level."""
     for topology in topologies:
         vertices = loop_vertex_vertices(columns, topology)
         columns = np.concatenate([vertices, loop_edge_vertices(columns, topology)])
@@ -65,6 +65,6 @@ class LinearRefinement:
         return last.vertex_count + len(last.edges)
 
     def __call__(self, columns: Float[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
-        """Columns at the refined vertices."""
+        """Refine columns."""
         refined = refine_linear(columns, self.topologies)
         return refined_limit_positions(refined, self.topologies[-1]) if self.limit else refined

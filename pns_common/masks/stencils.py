@@ -18,7 +18,7 @@ ALL = slice(None)
 
 
 def loop_beta(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-    """β_k = (5/8 − (3/8 + ¼ cos 2π/k)²) / k, the weight of one neighbour; 0 for valence 0.
+    """Return β_k = (5/8 − (3/8 + ¼ cos 2π/k)²) / k, the weight of one neighbour; 0 for valence 0.
 
     This is Loop's own cosine formula. Warren's 3/(8k) agrees only at k = 3 and k = 6.
     """
@@ -28,7 +28,7 @@ def loop_beta(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
 
 
 def limit_ring_weight(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-    """w_k = 1 / (1 + 3 / (8 k β_k)): all neighbours' weight in Loop's limit mask; 0 for valence 0.
+    """Return w_k = 1 / (1 + 3 / (8 k β_k)), the ring's weight in Loop's limit mask; 0 for k = 0.
 
     The limit of a vertex is (1 − w_k) p + w_k (mean of its neighbours).
     """
@@ -39,14 +39,14 @@ def limit_ring_weight(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]
 def loop_edge_point(
     a: Float[Array, "N K"], b: Float[Array, "N K"], c: Float[Array, "N K"], d: Float[Array, "N K"]
 ) -> Float[Array, "N K"]:
-    """q0 = 3/8 (a + b) + 1/8 (c + d), the edge vertex of interior edges (equation 2)."""
+    """Return q0 = 3/8 (a + b) + 1/8 (c + d), the edge vertex of interior edges (equation 2)."""
     return EDGE_ENDPOINT * (a + b) + EDGE_OPPOSITE * (c + d)
 
 
 def loop_edge_vertices(
     points: Float[Array, "V K"], topology: Topology, rows: slice = ALL
 ) -> Float[Array, "E K"]:
-    """A vertex for each edge (of ``rows``): Loop's on interior edges, the midpoint on others."""
+    """Return a vertex for each edge (of ``rows``): Loop's if interior, else the midpoint."""
     xp = namespace(points)
     stencil = topology.stencil[rows]
     a, b, c, d = (stencil[:, column] for column in range(4))
@@ -62,7 +62,7 @@ def loop_edge_vertices(
 
 
 def loop_vertex_vertices(points: Float[Array, "V K"], topology: Topology) -> Float[Array, "V K"]:
-    """The moved old vertices.
+    """Return the moved old vertices.
 
     Counting boundary, irregular and crease edges at a vertex: none or one (a dart), Loop's rule
     (equation 3); two, the cubic curve rule 1/8, 3/4, 1/8 along them; more, it stays. An isolated
@@ -89,6 +89,6 @@ def loop_vertex_vertices(points: Float[Array, "V K"], topology: Topology) -> Flo
 def _neighbour_sum(
     points: Float[Array, "V K"], edges: Int[np.ndarray, "E 2"]
 ) -> Float[Array, "V K"]:
-    """For each vertex the sum of its neighbours along ``edges``."""
+    """Return for each vertex the sum of its neighbours along ``edges``."""
     neighbours = gather(points, edges[:, ::-1].reshape(-1))
     return segment_sum(neighbours, edges.reshape(-1), points.shape[0])

@@ -73,7 +73,7 @@ class ModelCard:
     wide_bound: bool | None = None
 
     def to_json(self) -> str:
-        """The card as JSON, keys in the order of the attributes; without those that are None."""
+        """Return the card as JSON, keys in the order of the attributes; none that is None."""
         import msgspec  # to write a card; reading one needs the standard library alone
 
         values = {field.name: getattr(self, field.name) for field in fields(self)}
@@ -96,7 +96,7 @@ class ModelCard:
 
 
 def _json_object(text: str) -> dict[str, Any]:
-    """The object that a text of JSON holds. Raises ValueError."""
+    """Read the object that a text of JSON holds. Raises ValueError."""
 
     def no_number(word: str) -> None:
         raise ValueError(f"{word}, which is no number of JSON")
@@ -113,7 +113,7 @@ def _json_object(text: str) -> dict[str, Any]:
 
 
 def _typed_fields(values: dict[str, Any]) -> dict[str, Any]:
-    """The fields of a card, each of its type; a whole number will do for a float."""
+    """Return a card's fields, each of its type; a whole number will do for a float."""
     known = {field.name: field for field in fields(ModelCard)}
     unknown = sorted(set(values) - set(known))
     if unknown:
@@ -129,7 +129,7 @@ def _typed_fields(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _kinds(hint: Any) -> tuple[Any, ...]:
-    """The types that a hint allows: those of a union, else one; containers without their items."""
+    """Return the types that a hint allows: a union's, else one; containers without items."""
     kinds = get_args(hint) if isinstance(hint, UnionType) else (hint,)
     return tuple(get_origin(kind) or kind for kind in kinds)
 
@@ -141,7 +141,7 @@ def _is_one(value: Any, kind: type) -> bool:
 
 
 def _problem(card: ModelCard) -> str | None:
-    """What is wrong with the card's values, or None."""
+    """Return what is wrong with the card's values, or None."""
     if card.format not in FORMATS:
         return f"format {card.format}, not {' or '.join(map(str, FORMATS))}"
     if card.features not in FEATURE_SETS:
@@ -156,7 +156,7 @@ def _problem(card: ModelCard) -> str | None:
 
 
 def _vertex_problem(card: ModelCard) -> str | None:
-    """What is wrong with the fields of the vertex network, or None."""
+    """Return what is wrong with the fields of the vertex network, or None."""
     name, gate_sharpness = card.vertex_features, card.vertex_gate_sharpness
     if name is None and gate_sharpness is None:
         return None
@@ -172,7 +172,7 @@ def _vertex_problem(card: ModelCard) -> str | None:
 
 
 def _scale_free_problem(card: ModelCard) -> str | None:
-    """What is wrong with the fields of the scale-free rule, or None."""
+    """Return what is wrong with the fields of the scale-free rule, or None."""
     values = {name: getattr(card, name) for name in SCALE_FREE_FIELDS}
     boundary = card.boundary_strength
     optional = [name for name in OPTIONAL_FIELDS if getattr(card, name) is not None]

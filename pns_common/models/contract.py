@@ -39,7 +39,7 @@ Signature = tuple[str, str, list[str | int]]
 
 
 def feature_inputs(card: ModelCard) -> list[tuple[str, int]]:
-    """The inputs that are features, and how many columns each has."""
+    """Return the inputs that are features, and how many columns each has."""
     widths = [("features", FEATURE_COUNT[card.features])]
     if card.vertex_features is not None:
         widths.append(("vertex_features", RING_FEATURE_SETS[card.vertex_features].count))
@@ -47,12 +47,12 @@ def feature_inputs(card: ModelCard) -> list[tuple[str, int]]:
 
 
 def answer_to(given: str) -> str:
-    """The output that an input of features is read for."""
+    """Return the output that an input of features is read for."""
     return given.replace("features", "correction")
 
 
 def read_card(texts: Sequence[str], name: str) -> ModelCard:
-    """The card among a file's metadata entries of that key; ``name`` is what errors call the file.
+    """Read the card among the metadata entries of its key; ``name`` is what errors call the file.
 
     Raises:
         ModelError: there is not one, or it is wrong.

@@ -28,7 +28,7 @@ class Model(Protocol):
         ...
 
     def __call__(self, features: Array, budget: float) -> Array:
-        """η of equation 1, or z in format 3: (N, 3) in the edge frame for features (N, K)."""
+        """Return η of equation 1, or z in format 3: (N, 3) in edge frames, for features (N, K)."""
         ...
 
 
@@ -37,5 +37,5 @@ class VertexModel(Model, Protocol):
     """A model with a second network, for old vertices."""
 
     def vertex_correction(self, features: Array, budget: float) -> Array:
-        """Weights (N, 3) of the ring's three vectors for features (N, L); norm ≤ budget."""
+        """Return weights (N, 3) of the ring's three vectors for features (N, L); norm ≤ budget."""
         ...

@@ -63,7 +63,7 @@ class TiedForm:
 
 
 def tied_form(layers: Sequence[Layer], group: Symmetries) -> TiedForm | None:
-    """What remains of a perceptron; None where it is not tied by the group, or there is none."""
+    """Return what remains of a perceptron; None for none, and where the group does not tie it."""
     size = len(group.order)
     if size == 1 or len(layers) < 2:
         return None
@@ -97,7 +97,7 @@ def tied_form(layers: Sequence[Layer], group: Symmetries) -> TiedForm | None:
 
 
 def character_table(size: int) -> Float[np.ndarray, "G G"]:
-    """χ_s(g), by s and g."""
+    """Return χ_s(g), by s and g."""
     table = np.ones((1, 1))
     while len(table) < size:
         table = np.block([[table, table], [table, -table]])
@@ -107,7 +107,7 @@ def character_table(size: int) -> Float[np.ndarray, "G G"]:
 def feature_basis(
     group: Symmetries,
 ) -> tuple[list[tuple[int, int]], Int[np.ndarray, " K"], Float[np.ndarray, "K K"]]:
-    """Sums and differences of features that each know one character.
+    """Return sums and differences of features that each know one character.
 
     Returns the pairs that are replaced by their sum and their difference, in order; the character
     of each in the end; and what they are of the features.
@@ -129,7 +129,7 @@ def feature_basis(
 def _in_basis(
     act: Float[np.ndarray, "K K"], basis: Float[np.ndarray, "K K"]
 ) -> Float[np.ndarray, "K K"]:
-    """What a symmetry does to sums and differences: a permutation of them, with signs."""
+    """Return what a symmetry does to sums and differences: a permutation of them, with signs."""
     # The rows are orthogonal, and their entries 0, 1 and −1: all of this is exact.
     return basis @ act @ (basis / np.sum(basis**2, axis=1)[:, None]).T
 
@@ -160,7 +160,7 @@ def _is_tied(layers: Sequence[Layer], widths: Sequence[int], group: Symmetries) 
 
 
 def _generators(size: int) -> list[int]:
-    """Which elements make all others: the group's numbering has one bit for each."""
+    """Return which elements make all others: the group's numbering has one bit for each."""
     return [1 << bit for bit in range(size.bit_length() - 1)]
 
 
@@ -169,7 +169,7 @@ def _generators_of(group: Symmetries) -> list[int]:
 
 
 def _characters(signs: Float[np.ndarray, "B N"]) -> Int32[np.ndarray, " N"]:
-    """s of what each generator multiplies by such signs."""
+    """Return s of what each generator multiplies by such signs."""
     bits = (1 << np.arange(len(signs)))[:, None]
     return np.sum(np.where(signs < 0, bits, 0), axis=0).astype(np.int32)
 

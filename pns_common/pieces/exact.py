@@ -27,7 +27,10 @@ def shrunk(
     faces: Int[np.ndarray, "F 3"],
     rim: Bool[np.ndarray, " V"],
 ) -> Bool[np.ndarray, " F"]:
-    """The faces that only touch exact ones, and no vertex of ``rim``, whose faces lack some."""
+    """Return the faces that only touch exact ones, and no vertex of ``rim``.
+
+    Of the faces around a vertex of ``rim`` some are lacking.
+    """
     beside = rim.copy()
     beside[faces[~exact].reshape(-1)] = True
     return exact & ~beside[faces].any(axis=1)
@@ -40,7 +43,7 @@ def guarded_exact(
     asked: Float[np.ndarray, "W 3"],
     angle: float,
 ) -> Bool[np.ndarray, " C"]:
-    """The children that are still exact once the guard has scaled their corners.
+    """Return the children that are still exact once the guard has scaled their corners.
 
     Args:
         exact: those that were before.
@@ -67,7 +70,7 @@ def may_fold(
     asked: Float[np.ndarray, "W 3"],
     angle: float,
 ) -> Bool[np.ndarray, " N"]:
-    """Whether some scales in [0, 1] of the corners could make the guard act; True if in doubt.
+    """Return whether scales in [0, 1] of the corners could make the guard act; True if in doubt.
 
     With sides u, v that change by Δu, Δv, the area vector changes by at most ‖Δu‖ ‖v‖ + ‖u‖ ‖Δv‖ +
     ‖Δu‖ ‖Δv‖. If that is less than sin θ times its length, it turns by less than θ and keeps more
@@ -89,11 +92,11 @@ def may_fold(
 def _largest_change(
     first: Float[np.ndarray, "N 3"], second: Float[np.ndarray, "N 3"]
 ) -> Float[np.ndarray, " N"]:
-    """The largest ‖s δ − s' δ'‖ for s, s' in [0, 1]; not below ∞ where a number is not finite."""
+    """Return the largest ‖s δ − s' δ'‖ for s, s' in [0, 1]; ∞ where a number is not finite."""
     sizes = np.stack([_size(first), _size(second), _size(first - second)])
     return sizes.max(axis=0)
 
 
 def _size(vectors: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
-    """Lengths; NaN and ∞ stay that."""
+    """Return lengths; NaN and ∞ stay what they are."""
     return np.sqrt(dot(vectors, vectors))

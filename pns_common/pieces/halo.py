@@ -45,7 +45,7 @@ class ThinHaloError(PnsError):
 
 
 def halo_rings(scheme: Scheme, levels: int, guard_rings: int = GUARD_RINGS) -> int:
-    """Rings of control faces that a piece needs for so many levels.
+    """Return the rings of control faces that a piece needs for so many levels.
 
     The guard may go further than ``guard_rings``; refining the piece then says so (ThinHaloError).
     """
@@ -58,7 +58,7 @@ def halo_rings(scheme: Scheme, levels: int, guard_rings: int = GUARD_RINGS) -> i
 
 
 def reach(scheme: Scheme, level: int) -> int:
-    """w: rings that the rules of a level read, without the guard.
+    """Return w: rings that the rules of a level read, without the guard.
 
     Raises:
         ParameterError: a scheme of other rules than Loop's and a model's.
@@ -78,5 +78,5 @@ def reach(scheme: Scheme, level: int) -> int:
 
 
 def is_learned(scheme: Scheme, level: int) -> bool:
-    """Whether the scheme's own rules act at a level."""
+    """Return whether the scheme's own rules act at a level."""
     return scheme.learned_levels is None or level < scheme.learned_levels

@@ -117,7 +117,7 @@ def refine_piece(
 def steps_of(
     piece: Piece, scheme: Scheme, levels: int, length: float, blocks: Blocks
 ) -> Iterator[Step]:
-    """The steps of a piece, one after the other as they are asked for."""
+    """Return the steps of a piece, one after the other as they are asked for."""
     known = scheme.learned_levels == 0 or (length > 0 and kernels_know(scheme))
     fused = known and kernels_available() and fits(len(piece.points), len(piece.faces), levels)
     steps = steps_by_kernels if fused else steps_by_arrays
@@ -125,7 +125,10 @@ def steps_of(
 
 
 def first_at_own(links: Links, own: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " V"]:
-    """The vertices that first appear in an own face; of those around own faces alone it is sure."""
+    """Return the vertices that first appear in an own face.
+
+    Of vertices around own faces alone that is sure.
+    """
     first = np.full(links.vertex_count, -1, dtype=np.int64)
     corners = links.faces.reshape(-1)
     # Written backwards, so that the earliest corner is the one that remains.
@@ -140,7 +143,7 @@ def _check_own(
     own_edges: Bool[np.ndarray, " E"],
     exact: Bool[np.ndarray, " C"],
 ) -> None:
-    """Own faces' children must be exact, and those that they meet across own edges.
+    """Check that own faces' children are exact, and those that they meet across own edges.
 
     Raises:
         ThinHaloError: some are not.
@@ -154,7 +157,7 @@ def _check_own(
 
 
 def _asked(placed: AddedStep | None) -> Float[np.ndarray, "W 3"] | None:
-    """What was to be added before the guard scaled it; not finite where it took all."""
+    """Return what was to be added before the guard scaled it; not finite where it took all."""
     if placed is None or placed.guard is None:
         return None
     added = [

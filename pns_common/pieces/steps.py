@@ -60,7 +60,7 @@ def steps_by_arrays(
     length: float,
     blocks: Blocks,
 ) -> Iterator[Step]:
-    """The steps of ``array_steps``, with what is asked of them here."""
+    """Yield the steps of ``array_steps``, with what is asked of them here."""
     for step in array_steps(points, faces, creases, scheme, length, blocks):
         links, loop = _links(step.topology, step.several_fans), step.placed.loop_points
         kept = step.placed if step.placed.learned else None
@@ -75,7 +75,7 @@ def steps_by_kernels(
     length: float,
     blocks: Blocks,
 ) -> Iterator[Step]:
-    """The same with compiled kernels, which must know the scheme (``fused.known``)."""
+    """Yield the same from compiled kernels, which must know the scheme (``fused.known``)."""
     from pns_common.fused.learned_step import learned_points
     from pns_common.fused.level import control_level, next_level
     from pns_common.fused.loop_points import loop_points

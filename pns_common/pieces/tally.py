@@ -35,7 +35,7 @@ class Summed:
 
     @classmethod
     def of(cls, values: Float[np.ndarray, " N"]) -> Summed:
-        """Of an array."""
+        """Sum an array."""
         steps = np.rint(values * STEPS).astype(np.int64)
         total = (int((steps >> HALF).sum()) << HALF) + int((steps & ((1 << HALF) - 1)).sum())
         active = int((values > GATE_ACTIVE).sum())
@@ -104,12 +104,12 @@ class LevelTally:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """For a file; ``of_dict`` reads it."""
+        """Return the tally for a file; ``of_dict`` reads it."""
         return asdict(self)
 
     @classmethod
     def of_dict(cls, values: dict[str, Any]) -> LevelTally:
-        """What ``as_dict`` wrote."""
+        """Read what ``as_dict`` wrote."""
         summed = {
             name: None if values[name] is None else Summed(**values[name])
             for name in ("ratio", "gate", "vertex_ratio", "vertex_gate")
@@ -162,7 +162,7 @@ class ReducedReport(TypedDict):
 
 
 def reduced_report(pieces: Iterable[list[LevelTally]]) -> ReducedReport:
-    """The report of the whole mesh from the tallies of all its pieces, in any order."""
+    """Make the report of the whole mesh from the tallies of all its pieces, in any order."""
     levels = [reduce(operator.add, level) for level in zip(*pieces, strict=True)]
     learned = [level for level in levels if level.learned]
     bounds = [level.envelope for level in learned if level.envelope is not None]

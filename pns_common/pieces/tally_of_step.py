@@ -22,7 +22,7 @@ def tally_of(
     own_vertices: Bool[np.ndarray, " W"],
     own_edges: Bool[np.ndarray, " E"],
 ) -> LevelTally:
-    """What a step did to the faces, new vertices and edges that are a piece's own."""
+    """Tally what a step did to the faces, new vertices and edges that are a piece's own."""
     links, placed = step.links, step.placed
     classes = np.bincount(links.edge_class[own_edges], minlength=len(EdgeClass))
     interior, boundary, irregular, crease = (int(count) for count in classes)
@@ -45,7 +45,7 @@ def _with_rules(
     own_vertices: Bool[np.ndarray, " W"],
     own_edges: Bool[np.ndarray, " E"],
 ) -> LevelTally:
-    """The same with what the scheme's own rules did."""
+    """Add to a tally what the scheme's own rules did."""
     vertices, edges = placed.vertices, placed.edges
     own_old = own_vertices[: links.vertex_count]
     rows = links.interior[own_edges[links.interior]]
@@ -83,14 +83,14 @@ def _longest(rule: Added, rows: Bool[np.ndarray, " N"]) -> float:
 
 
 def _largest(rule: Added, rows: Bool[np.ndarray, " N"]) -> float | None:
-    """The largest displacement that the rule may make; None where it may make any."""
+    """Return the largest displacement that the rule may make; None where it may make any."""
     if rule.displacement is None:
         return 0.0
     return None if rule.envelope is None else float(rule.envelope[rows].max(initial=0))
 
 
 def _flipped(step: Step, own: Bool[np.ndarray, " F"]) -> int:
-    """How many own children oppose Loop's."""
+    """Count own children that oppose Loop's."""
     assert step.loop is not None
     if step.children.dtype == np.int32:
         from pns_common.fused.kernels.chords import flipped_among
@@ -104,7 +104,7 @@ def _flipped(step: Step, own: Bool[np.ndarray, " F"]) -> int:
 def _largest_chord(
     step: Step, own: Bool[np.ndarray, " F"], own_edges: Bool[np.ndarray, " E"]
 ) -> float:
-    """The largest squared distance between normals inside own faces and across own edges."""
+    """Return the largest squared distance between normals inside own faces and across own edges."""
     links, faces = step.links, np.flatnonzero(own)
     edges = links.interior[own_edges[links.interior]]
     halves = [np.asarray(half[edges], dtype=np.int64) for half in (links.first, links.second)]
@@ -123,7 +123,7 @@ def _largest_chord(
 
 
 def _corner_child(corner: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    """The child that keeps corner i of face f: 4 f + i, of 3 f + i."""
+    """Return the child that keeps corner i of face f: 4 f + i, of 3 f + i."""
     return corner + corner // 3
 
 

@@ -25,11 +25,11 @@ class BoundaryRule:
     gate_sharpness: float
 
     def pushes(self, level: ControlLevel) -> Float[Array, "V 3"]:
-        """d of the boundary's vertices, 0 elsewhere."""
+        """Return d of the boundary's vertices, 0 elsewhere."""
         return self.form.boundary_strength * level.boundary_pushes(self.gate_sharpness)
 
     def move_vertices(self, level: ControlLevel, placed: Placement) -> Placement:
-        """Boundary vertices moved too: Loop's curve mask of the pushes, within ρ."""
+        """Move boundary vertices too: Loop's curve mask of the pushes, within ρ."""
         topology = level.topology
         movable = boundary_vertices(topology)
         rows = np.flatnonzero(movable)
@@ -41,7 +41,7 @@ class BoundaryRule:
         return replace(moved, corrected=corrected)
 
     def move_edges(self, level: ControlLevel, placed: Placement) -> Placement:
-        """Boundary edges moved too: the mean of the pushes at their ends, within ρ."""
+        """Move boundary edges too: the mean of the pushes at their ends, within ρ."""
         rows = np.flatnonzero(level.topology.edge_class == EdgeClass.BOUNDARY)
         ends, pushes = level.topology.edges[rows], self.pushes(level)
         wanted = MIDPOINT * (gather(pushes, ends[:, 0]) + gather(pushes, ends[:, 1]))
@@ -56,7 +56,7 @@ class BoundaryRule:
         wanted: Float[Array, "N 3"],
         envelope: Float[Array, " N"],
     ) -> Placement:
-        """The placement with Π_ρ of what is wanted at rows where it had nothing; ρ is given."""
+        """Add Π_ρ of what is wanted at rows where the placement had nothing; ρ is given."""
         xp, count = namespace(wanted), placed.loop.shape[0]
         moved = shortened(wanted, envelope)
         nothing = xp.zeros_like(envelope)

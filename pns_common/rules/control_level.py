@@ -44,7 +44,7 @@ class ControlLevel:
     depth: int = 0
 
     def budget_per_length(self, vertices: Int[np.ndarray, " N"], budget: float) -> BudgetPerLength:
-        """C / R at some vertices: one number where the whole mesh has one R."""
+        """Return C / R at some vertices: one number where the whole mesh has one R."""
         if isinstance(self.reference_length, np.ndarray):
             return budget / self.reference_length[vertices]
         return budget / self.reference_length
@@ -76,7 +76,7 @@ def control_level(
     reference_length: float = 1.0,
     depth: int = 0,
 ) -> ControlLevel:
-    """A level from its points alone, on any backend: what training starts a step with."""
+    """Make a level of its points alone, on any backend: what training starts a step with."""
     normals = face_normals(points, topology.faces)
     return ControlLevel(points, topology, normals, reference_length, depth=depth)
 

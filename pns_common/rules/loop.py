@@ -8,12 +8,12 @@ from pns_common.rules.placement import Placement, without_correction
 
 
 def loop_vertex_rule(level: ControlLevel) -> Placement:
-    """Loop's rule for old vertices."""
+    """Place old vertices by Loop's rule."""
     return without_correction(loop_vertex_vertices(level.points, level.topology))
 
 
 def loop_edge_rule(level: ControlLevel) -> Placement:
-    """Loop's rule for edge vertices."""
+    """Place edge vertices by Loop's rule."""
     points, topology = level.points, level.topology
     (positions,) = level.blocks.gather(
         len(topology.edges), lambda rows: (loop_edge_vertices(points, topology, rows),)

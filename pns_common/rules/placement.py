@@ -49,7 +49,7 @@ class Added(Protocol):
         ...
 
     def rows(self, rows: slice | Int[np.ndarray, " N"]) -> Added:
-        """Some of the vertices."""
+        """Return some of the vertices."""
         ...
 
 
@@ -81,13 +81,13 @@ class Placement:
         return self.loop if self.displacement is None else self.loop + self.displacement
 
     def rows(self, rows: slice | Int[np.ndarray, " N"]) -> Placement:
-        """Some of the vertices; of arrays, views for a slice and copies for indices."""
+        """Return some of the vertices; of arrays, views for a slice and copies for indices."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return Placement(**{n: None if v is None else v[rows] for n, v in values.items()})
 
 
 def without_correction(positions: Float[Array, "N 3"]) -> Placement:
-    """A placement that is Loop's."""
+    """Make a placement that is Loop's."""
     xp = namespace(positions)
     nothing = xp.zeros_like(positions[:, 0])
     return Placement(positions, None, nothing, nothing, xp.zeros_like(nothing, dtype=xp.bool))
@@ -96,7 +96,7 @@ def without_correction(positions: Float[Array, "N 3"]) -> Placement:
 def with_correction(
     base: Placement, rows: Int[np.ndarray, " N"], correction: Correction
 ) -> Placement:
-    """Loop's placement with a correction added at some of its vertices."""
+    """Add a correction to Loop's placement at some of its vertices."""
     count = base.loop.shape[0]
     return Placement(
         loop=base.loop,
@@ -111,7 +111,7 @@ def with_correction(
 def correct_in_blocks(
     blocks: Blocks, count: int, correct: Callable[[slice], Correction]
 ) -> Correction:
-    """The correction of ``count`` rows, made block by block."""
+    """Make the correction of ``count`` rows block by block."""
     names = [field.name for field in fields(Correction)]
 
     def columns(rows: slice) -> tuple[Array, ...]:

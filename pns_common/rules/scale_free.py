@@ -76,7 +76,7 @@ class ScaleFreeEdgeRule:
     def _gate(
         self, bends: Float[Array, " F"] | None, topology: Topology, edges: Int[np.ndarray, " N"]
     ) -> Gate:
-        """The gate of the two faces, opened by b of all faces where the form has them."""
+        """Return the gate of the two faces, opened by b of all faces where the form has them."""
         if bends is None:
             return self.operator.gate
         faces = topology.edge_faces[edges]
@@ -115,5 +115,5 @@ class ScaleFreeVertexRule:
 def _at_edges(
     pushes: Float[Array, "V 3"], topology: Topology, edges: Int[np.ndarray, " N"]
 ) -> Float[Array, "N 3"]:
-    """What Loop's mask makes of pushes on interior edges."""
+    """Return what Loop's mask makes of pushes on interior edges."""
     return loop_edge_point(*(gather(pushes, topology.stencil[edges, k]) for k in range(4)))

@@ -18,7 +18,7 @@ from pns_common.models.contract import CALL_ROWS, LARGEST_CALL, Signature
 
 
 def signature(value: onnx.ValueInfoProto) -> Signature:
-    """What a graph says of one of its tensors."""
+    """Return what a graph says of one of its tensors."""
     tensor = value.type.tensor_type
     shape: list[str | int] = [
         dim.dim_value if dim.HasField("dim_value") else "*" for dim in tensor.shape.dim
@@ -88,7 +88,7 @@ def _inferred(proto: onnx.ModelProto, name: str) -> Iterator[onnx.ValueInfoProto
 
 
 def _bytes(value: onnx.ValueInfoProto) -> int | None:
-    """What a tensor of numbers takes; None where its shape is open, or it holds other things."""
+    """Return a tensor's size in bytes; None if its shape is open, or it holds no numbers."""
     tensor = value.type.tensor_type
     if not tensor.HasField("shape") or tensor.elem_type in (0, onnx.TensorProto.STRING):
         return None

@@ -24,7 +24,7 @@ from pns_common.runtimes.call_shapes import check_calls, signature
 
 
 def check_file(data: bytes, name: str) -> ModelCard:
-    """The card of a file that keeps the contract; ``name`` is what errors call it.
+    """Return the card of a file that keeps the contract; ``name`` is what errors call it.
 
     Raises:
         ModelError: the file breaks the contract; says which part.

@@ -109,7 +109,7 @@ class OnnxModel:
         return model_from_bytes, (self._data, self.name)
 
     def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
-        """Corrections (N, 3) float32, for features (N, K) and a dimensionless budget.
+        """Return corrections (N, 3) float32, for features (N, K) and a dimensionless budget.
 
         Raises:
             ModelError: the graph does not run to its end, or answers in another shape.
@@ -117,7 +117,7 @@ class OnnxModel:
         return self._answers("features", features, budget)
 
     def vertex_correction(self, features: Float[np.ndarray, "N L"], budget: float) -> np.ndarray:
-        """Weights (N, 3) float32 for the rings of old vertices, where the card has features.
+        """Return weights (N, 3) float32 for the rings of old vertices, where the card has features.
 
         Raises:
             ModelError: the model has no vertex rule; and as for edges.
@@ -172,7 +172,7 @@ def _broken_off(name: str, reason: str) -> ModelError:
 
 
 def bundled_models() -> list[str]:
-    """Names of the model files that come with the package."""
+    """Return the names of the model files that come with the package."""
     return sorted(
         entry.name.removesuffix(".onnx")
         for entry in BUNDLED.iterdir()
@@ -181,7 +181,7 @@ def bundled_models() -> list[str]:
 
 
 def model_name(source: str | Path) -> str:
-    """What the model of a bundled name or a file is called: the name, or the file's stem."""
+    """Return what the model of a bundled name or a file is called: the name, or the file's stem."""
     return source if _is_bundled(source) else Path(source).stem
 
 
@@ -213,7 +213,7 @@ def load_model(source: str | Path | None = None) -> OnnxModel:
 
 
 def _is_bundled(source: str | Path) -> TypeGuard[str]:
-    """Whether it is a bundled name; a Path never is."""
+    """Return whether it is a bundled name; a Path never is."""
     return isinstance(source, str) and source in bundled_models()
 
 

@@ -26,7 +26,7 @@ from pns_common.fused.kernels.edges import INTERIOR
 
 
 def _opened_before(half_edges, face):
-    """How many edges first appear in an earlier face (they ascend by their first half-edge)."""
+    """Count the edges that first appear in an earlier face (they ascend by first half-edge)."""
     least, most = 0, half_edges.shape[0]
     while least < most:
         middle = (least + most) // 2
@@ -47,7 +47,7 @@ def _before(i):
 
 @kernel(SIZE, INDICES, INDICES, INDICES, INDICES, SIZE, SIZE, INDICES_OUT)
 def number_halves(faces, face_edges, edges, half_edges, begin, end, halves):
-    """The two children of the edges that first appear in faces begin … end − 1.
+    """Give numbers to both children of the edges that first appear in faces begin … end − 1.
 
     Args:
         halves: (E, 2) out: the child at the lower endpoint, and at the higher.
@@ -68,7 +68,7 @@ def number_halves(faces, face_edges, edges, half_edges, begin, end, halves):
 
 
 def _at_vertex(half_edge, faces, vertex):
-    """The child at ``vertex`` of a parent's half-edge."""
+    """Return the child at ``vertex`` of a parent's half-edge."""
     f = half_edge // 3
     i = half_edge - 3 * f
     if faces[f, i] == vertex:
@@ -79,7 +79,7 @@ def _at_vertex(half_edge, faces, vertex):
 def _fill_half(
     e, vertex, child, faces, vertex_count, half_edges, kind, to_edges, to_halves, to_kind
 ):
-    """A child of a parent edge e: as many half-edges as e, of the same class."""
+    """Write a child of a parent edge e: as many half-edges as e, of the same class."""
     to_edges[child, 0], to_edges[child, 1] = vertex, vertex_count + e
     first, second = half_edges[e, 0], half_edges[e, 1]
     to_halves[child, 0] = _at_vertex(first, faces, vertex)
@@ -106,7 +106,7 @@ def split_edges(
     to_half_edges,
     to_class,
 ):
-    """Edges of the children of faces begin … end − 1, in the layout of ``edges.classify``."""
+    """Write the edges of children of faces begin … end − 1, in the layout of ``edges.classify``."""
     following = 3 * begin + 2 * _opened_before(half_edges, begin)
     for f in range(begin, end):
         for i in range(3):
@@ -170,13 +170,13 @@ def _split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
 
 @kernel(SIZE, INDICES, INDICES, SIZE, SIZE, SIZE, INDICES_OUT)
 def split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
-    """The children 4 f … 4 f + 3 of faces begin … end − 1."""
+    """Write the children 4 f … 4 f + 3 of faces begin … end − 1."""
     _split_faces(faces, face_edges, vertex_count, begin, end, to_faces)
     return 0
 
 
 @kernel(SIZE, INDICES, INDICES, SIZE, SIZE, SIZE, LONG_INDICES_OUT)
 def split_faces_long(faces, face_edges, vertex_count, begin, end, to_faces):
-    """The same in int64."""
+    """Write the same in int64."""
     _split_faces(faces, face_edges, vertex_count, begin, end, to_faces)
     return 0

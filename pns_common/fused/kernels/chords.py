@@ -12,7 +12,7 @@ def _normal(points, children, f):
 
 @kernel(REAL, POINTS, INDICES, LONG_INDEX)
 def chords_inside(points, children, faces):
-    """The largest squared chord between the middle child and the others of some faces."""
+    """Return the largest squared chord between the middle child and the others of some faces."""
     largest = 0.0
     for f in faces:
         middle = _normal(points, children, 4 * f + 3)
@@ -24,7 +24,7 @@ def chords_inside(points, children, faces):
 
 @kernel(REAL, POINTS, INDICES, LONG_INDEX, LONG_INDEX)
 def chords_between(points, children, first, second):
-    """The same between pairs of children."""
+    """Return the same between pairs of children."""
     largest = 0.0
     for e in range(first.shape[0]):
         n = _normal(points, children, first[e])
@@ -34,7 +34,7 @@ def chords_between(points, children, first, second):
 
 @kernel(SIZE, POINTS, POINTS, INDICES, LONG_INDEX)
 def flipped_among(points, loop_points, children, faces):
-    """How many children of some faces have a normal that opposes Loop's."""
+    """Count the children of some faces whose normal opposes Loop's."""
     flipped = 0
     for f in faces:
         for i in range(4):

@@ -25,7 +25,7 @@ class Array:
     written: bool = False
 
     def checked(self, value: np.ndarray) -> np.ndarray:
-        """The value. Raises TypeError where a kernel would read it wrongly."""
+        """Return the value. Raises TypeError where a kernel would read it wrongly."""
         flags = value.flags
         suits = flags.carray if self.written else flags.c_contiguous and flags.aligned
         if not suits or value.ndim != self.ndim or value.dtype != self.dtype:

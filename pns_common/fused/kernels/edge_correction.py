@@ -65,7 +65,7 @@ def look(
     features,
     gentlest,
 ):
-    """Frames and features of the interior edges begin … end − 1; row 0 is for edge ``begin``.
+    """Write frames and features of the interior edges begin … end − 1; row 0 is edge ``begin``'s.
 
     Args:
         fields: (V, 4) mean normal and umbrella height; read where ``features`` has signed columns.
@@ -143,7 +143,7 @@ def look(
 
 @kernel(SIZE, POINTS, POINTS_OUT)
 def fill_log_ratios(logs, features):
-    """The log ratios of the sides, from the logarithms of ``lengths``."""
+    """Write the log ratios of the sides, from the logarithms of ``lengths``."""
     for i in range(features.shape[0]):
         for k in range(LENGTHS - 1):
             features[i, LOGS + k] = logs[k, i] - logs[LENGTHS - 1, i]
@@ -151,7 +151,7 @@ def fill_log_ratios(logs, features):
 
 
 def in_ball(z):
-    """A vector shortened to length 1, as ``correction.project_to_ball`` does."""
+    """Shorten a vector to length 1, as ``correction.project_to_ball`` does."""
     largest = max(max(abs(z[0]), abs(z[1])), abs(z[2]))
     if largest > 1:
         length = norm((z[0] / largest, z[1] / largest, z[2] / largest)) * largest
@@ -172,7 +172,7 @@ def _rotated(frame, i, z):
 
 
 def shortened(v, longest):
-    """A vector shortened to ``longest``, as ``correction.shortened`` does."""
+    """Shorten a vector to ``longest``, as ``correction.shortened`` does."""
     length = norm(v)
     if length > longest:
         factor = longest / length
@@ -181,7 +181,7 @@ def shortened(v, longest):
 
 
 def write(index, delta, gate, envelope, displacement, ratio, gates, envelopes):
-    """δ, ‖δ‖ / ρ (0 where the envelope is empty), γ and ρ into their arrays."""
+    """Write δ, ‖δ‖ / ρ (0 where the envelope is empty), γ and ρ into their arrays."""
     for k in range(3):
         displacement[index, k] = delta[k]
     ratio[index] = norm(delta) / envelope if envelope > 0 else 0.0
@@ -206,7 +206,7 @@ def correct(
     gates,
     envelopes,
 ):
-    """δ = h² γ F η into the rows of the edges (``correction.correct``)."""
+    """Write δ = h² γ F η into the rows of the edges (``correction.correct``)."""
     for i in range(eta.shape[0]):
         e = interior[begin + i]
         envelope = budget_per_length[i] * (length[i] * length[i])
@@ -218,13 +218,13 @@ def correct(
 
 
 def _at_edge(pushes, a, b, c, d, k):
-    """A coordinate of what Loop's edge mask makes of pushes."""
+    """Return a coordinate of what Loop's edge mask makes of pushes."""
     ends, sides = pushes[a, k] + pushes[b, k], pushes[c, k] + pushes[d, k]
     return EDGE_ENDPOINT * ends + EDGE_OPPOSITE * sides
 
 
 def _prior(pushes, of_boundary, nothing, a, b, c, d, k, strength):
-    """A coordinate of D_e, with the boundary's part."""
+    """Return a coordinate of D_e, with the boundary's part."""
     part = _at_edge(of_boundary, a, b, c, d, k) if len(of_boundary) else nothing
     return strength * _at_edge(pushes, a, b, c, d, k) + part
 
@@ -257,7 +257,7 @@ def correct_scale_free(
     gates,
     envelopes,
 ):
-    """δ = γ Π_ρ(D + τ ℓ F z) into the rows of the edges (``correction.correct_scale_free``).
+    """Write δ = γ Π_ρ(D + τ ℓ F z) into the edges' rows (``correction.correct_scale_free``).
 
     ``network_lengths`` are ℓ of all edges, ``bound_length`` is h of the bound.
     ``of_boundary`` are the boundary's pushes; (0, 3) where there are none. Then ``nothing`` is

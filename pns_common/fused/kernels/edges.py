@@ -31,7 +31,7 @@ TOO_LONG = -1
 
 
 def _may_repeat(f, links, face_edges):
-    """Whether an earlier face may have the three edges of face f; yes where that is not known."""
+    """Return whether an earlier face may have the three edges of face f; yes if not known."""
     for i in range(3):
         e = face_edges[f, i]
         if links[e, SECOND] >= 0:
@@ -50,7 +50,7 @@ def _repeats(faces, f):
 
 @kernel(SIZE, INDICES, SIZE, INDEX_OUT, INDEX_OUT, INDICES_OUT, INDICES_OUT, INDEX_OUT)
 def chain_edges(faces, most_steps, head, low, links, face_edges, plain):
-    """Number the edges; returns how many there are, or TOO_LONG.
+    """Give each edge its number; returns how many there are, or TOO_LONG.
 
     A vertex of valence k that is the lower end of its edges takes k² / 2 steps: ``most_steps``
     bounds them, so that no mesh takes much longer than a sort would.
@@ -104,7 +104,7 @@ def chain_edges(faces, most_steps, head, low, links, face_edges, plain):
 
 @kernel(SIZE, INDICES, INDEX, INDICES, SIZE, SIZE, INDICES_OUT, INDICES_OUT, CLASSES_OUT)
 def classify(faces, low, links, begin, end, edges, half_edges, edge_class):
-    """Ends, half-edges and classes of edges begin … end − 1; returns how many are not interior.
+    """Write ends, half-edges, classes of edges begin … end − 1; returns how many are not interior.
 
     Args:
         edges: (E, 2) out: endpoints a < b.

@@ -34,7 +34,7 @@ def sum_referenced(points, faces, used, total):
 
 @kernel(REAL, POINTS, FLAGS, NUMBERS)
 def farthest(points, used, centre):
-    """The largest distance of a used vertex from ``centre``."""
+    """Return the largest distance of a used vertex from ``centre``."""
     largest = 0.0
     for v in range(points.shape[0]):
         if used[v]:

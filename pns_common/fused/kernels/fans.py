@@ -18,7 +18,7 @@ SMALLEST_RING = 3
 
 
 def _across(face_edges, half_edges, edge_class, half_edge):
-    """The other half-edge of an interior or crease edge, else −1: a crease parts no fan."""
+    """Return an interior or crease edge's other half-edge, else −1: a crease parts no fan."""
     f = half_edge // 3
     e = face_edges[f, half_edge - 3 * f]
     if edge_class[e] != INTERIOR and edge_class[e] != CREASE:
@@ -29,7 +29,7 @@ def _across(face_edges, half_edges, edge_class, half_edge):
 
 @kernel(SIZE, INDICES, INDEX_OUT, INDEX_OUT)
 def count_corners(faces, corner, count):
-    """One corner of each vertex, and how many it has; ``count`` is 0 on entry."""
+    """Write one corner of each vertex, and how many it has; ``count`` is 0 on entry."""
     for f in range(faces.shape[0]):
         for i in range(3):
             corner[faces[f, i]] = 3 * f + i
@@ -41,7 +41,7 @@ def count_corners(faces, corner, count):
 def several_fans(
     face_edges, half_edges, edge_class, corner, count, sharp, plain, begin, end, several
 ):
-    """Whether the vertices begin … end − 1 have corners outside the fan of their ``corner``.
+    """Mark the vertices begin … end − 1 that have corners outside the fan of their ``corner``.
 
     Args:
         sharp: how many edges at each vertex are not interior; (0,) where there are none at all.

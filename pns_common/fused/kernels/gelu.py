@@ -22,7 +22,7 @@ Q3, Q4 = np.float32(1620.8885), np.float32(63.63315)
 
 
 def gelu_within(x: Any, limited: Any) -> Any:
-    """x Φ(x), where ``limited`` is x, or ± LIMIT beyond it."""
+    """Return x Φ(x), where ``limited`` is x, or ± LIMIT beyond it."""
     y = limited * limited
     p = ((((P5 * y + P4) * y + P3) * y + P2) * y + P1) * y + P0
     q = ((((y + Q4) * y + Q3) * y + Q2) * y + Q1) * y + Q0
@@ -31,6 +31,6 @@ def gelu_within(x: Any, limited: Any) -> Any:
 
 
 def gelu(x):
-    """x Φ(x) of a number; NaN of −∞, as x/2 (1 + erf(x/√2)) is."""
+    """Return x Φ(x) of a number; NaN of −∞, as x/2 (1 + erf(x/√2)) is."""
     above = x if x > -LIMIT else -LIMIT
     return gelu_within(x, above if above < LIMIT else LIMIT)

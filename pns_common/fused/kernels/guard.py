@@ -34,7 +34,7 @@ def _difference(p, q):
 
 
 def _turned(a, b, c, moved_a, moved_b, moved_c, cosine, clear):
-    """Whether a face turned or shrank too much; False where it had no area (``turned``).
+    """Return whether a face turned or shrank too much; False if it had no area (``turned``).
 
     ``clear`` is a bound for ``clearly_less``: no root need be taken where the angle is clear.
     """

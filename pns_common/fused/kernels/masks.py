@@ -29,7 +29,7 @@ from pns_common.masks.stencils import (
 
 
 def opposite(faces, half_edge):
-    """The vertex of a half-edge's face that is not on it."""
+    """Return the vertex of a half-edge's face that is not on it."""
     f = half_edge // 3
     i = half_edge - 3 * f
     return faces[f, i - 1 if i > 0 else 2]
@@ -37,7 +37,7 @@ def opposite(faces, half_edge):
 
 @kernel(SIZE, POINTS, INDICES, INDICES, INDICES, CLASSES, SIZE, SIZE, POINTS_OUT)
 def place_edges(points, faces, edges, half_edges, edge_class, begin, end, placed):
-    """Loop's vertices of edges begin … end − 1 (equation 2); midpoints where not interior."""
+    """Write Loop's vertices of edges begin … end − 1 (equation 2); else midpoints."""
     for e in range(begin, end):
         a, b = edges[e, 0], edges[e, 1]
         if edge_class[e] == INTERIOR:
@@ -53,7 +53,7 @@ def place_edges(points, faces, edges, half_edges, edge_class, begin, end, placed
 
 @kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
 def sum_rings(points, edges, begin, end, sums, valence):
-    """Sums of neighbours and valences of vertices begin … end − 1; both 0 on entry."""
+    """Sum neighbours and valences of vertices begin … end − 1; both are 0 on entry."""
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
         if begin <= a < end:
@@ -69,7 +69,7 @@ def sum_rings(points, edges, begin, end, sums, valence):
 
 @kernel(SIZE, POINTS, INDICES, INDEX, INDEX, POINTS_OUT)
 def sum_along_curves(points, edges, sharp_edges, sharp, sums):
-    """Where a vertex has two or more sharp edges, sum over these alone.
+    """Sum over two or more sharp edges alone where a vertex has them.
 
     Args:
         sharp_edges: (S,) the edges that are not interior, ascending.
@@ -94,7 +94,7 @@ def sum_along_curves(points, edges, sharp_edges, sharp, sums):
 
 @kernel(SIZE, POINTS, INDEX, INDEX, NUMBERS, SIZE, SIZE, POINTS_OUT)
 def blend_vertices(points, valence, sharp, beta, begin, end, sums):
-    """Sums of neighbours become the moved old vertices begin … end − 1 (equation 3).
+    """Turn sums of neighbours into the moved old vertices begin … end − 1 (equation 3).
 
     Args:
         sharp: (V,) sharp edges at each vertex, or (0,) where there are none at all.
@@ -128,13 +128,13 @@ def _largest(points, begin, end):
 
 @kernel(REAL, POINTS, SIZE, SIZE)
 def largest_coordinate(points, begin, end):
-    """The largest absolute coordinate of rows begin … end − 1; NaN where one is."""
+    """Return the largest absolute coordinate of rows begin … end − 1; NaN where one is."""
     return _largest(points, begin, end)
 
 
 @kernel(REAL, POINTS, SIZE, SIZE, SIZE, POINTS_OUT)
 def add_displacement(displacement, first, begin, end, points):
-    """δ added to rows begin … end − 1 from ``first`` on; the largest coordinate of all of them.
+    """Add δ to rows begin … end − 1 from ``first`` on; return the largest coordinate of all.
 
     Before ``first`` Loop's rule stands, and nothing is added: not even 0, which makes 0 of −0.
     """

@@ -29,7 +29,7 @@ NORMAL_NUMBERS = 1e-300
 
 
 def unit_normal(points, a, b, c):
-    """The unit normal of a triangle; zeros where it has no area (``frames.triangle_normals``)."""
+    """Return a triangle's unit normal; zeros where it has no area (``frames.triangle_normals``)."""
     u0, u1, u2 = (
         points[b, 0] - points[a, 0],
         points[b, 1] - points[a, 1],
@@ -50,7 +50,7 @@ def unit_normal(points, a, b, c):
 
 
 def squared_chord(n, m):
-    """The squared distance between two unit normals; 0 where one is undefined."""
+    """Return the squared distance between two unit normals; 0 where one is undefined."""
     if n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0 and m[0] * m[0] + m[1] * m[1] + m[2] * m[2] > 0:
         x, y, z = n[0] - m[0], n[1] - m[1], n[2] - m[2]
         return x * x + y * y + z * z
@@ -71,7 +71,7 @@ def _row(points, i):
 
 @called_seldom
 def _child_normal(points, vertex_count, faces, face_edges, f, i):
-    """The normal of the child at corner i; of the one in the middle for i = 3."""
+    """Return the normal of the child at corner i; of the one in the middle for i = 3."""
     if i == 3:
         return unit_normal(
             points,
@@ -88,7 +88,7 @@ def _child_normal(points, vertex_count, faces, face_edges, f, i):
 
 
 def area(p, q, r):
-    """Twice the area vector of a triangle, and its square."""
+    """Return twice the area vector of a triangle, and its square."""
     u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     v0, v1, v2 = r[0] - p[0], r[1] - p[1], r[2] - p[2]
     x, y, z = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
@@ -96,20 +96,20 @@ def area(p, q, r):
 
 
 def clearly_less(n, m, bound):
-    """Whether the angle of two area vectors has a cosine above √bound; False where in doubt."""
+    """Return whether the angle of area vectors has a cosine above √bound; False if in doubt."""
     inner, squares = n[0] * m[0] + n[1] * m[1] + n[2] * m[2], n[3] * m[3]
     return inner > 0 and squares > NORMAL_NUMBERS and inner * inner > bound * squares
 
 
 def _bound(chord):
-    """What ``clearly_less`` takes for angles below that of a squared chord."""
+    """Return what ``clearly_less`` takes for angles below that of a squared chord."""
     cosine = max(1 - chord / 2 + COSINE_MARGIN, 0.0)
     return cosine * cosine
 
 
 @called_seldom
 def _chord_inside(points, vertex_count, faces, face_edges, f):
-    """The largest squared chord between the child in the middle of face f and the others."""
+    """Return the largest squared chord between face f's middle child and its others."""
     centre, largest = _child_normal(points, vertex_count, faces, face_edges, f, 3), 0.0
     for i in range(3):
         corner = _child_normal(points, vertex_count, faces, face_edges, f, i)
@@ -119,7 +119,7 @@ def _chord_inside(points, vertex_count, faces, face_edges, f):
 
 @kernel(REAL, POINTS, INDICES, INDICES, SIZE, SIZE, SIZE, NUMBERS_OUT)
 def largest_jump_inside(points, faces, face_edges, vertex_count, begin, end, largest_yet):
-    """The largest squared chord between normals of children of one face, in faces begin … end − 1.
+    """Return the largest squared chord between normals inside one of faces begin … end − 1.
 
     Args:
         largest_yet: (1,) in and out: the largest found anywhere. It only spares work: threads may
@@ -146,7 +146,7 @@ def largest_jump_inside(points, faces, face_edges, vertex_count, begin, end, lar
 
 @called_seldom
 def _chord_across(points, vertex_count, faces, face_edges, f, i, g, j):
-    """The larger squared chord across corner i's edge of face f, which is corner j's of face g."""
+    """Return the larger squared chord across an edge: face f's at corner i, g's at corner j."""
     return max(
         squared_chord(
             _child_normal(points, vertex_count, faces, face_edges, f, i),
@@ -163,7 +163,7 @@ def _chord_across(points, vertex_count, faces, face_edges, f, i, g, j):
 def largest_jump_across(
     points, faces, face_edges, half_edges, edge_class, vertex_count, begin, end, largest_yet
 ):
-    """The same between children across interior edges begin … end − 1."""
+    """Return the same between children across interior edges begin … end − 1."""
     largest, bound = 0.0, _bound(largest_yet[0])
     for e in range(begin, end):
         if edge_class[e] != INTERIOR:
@@ -190,7 +190,7 @@ def largest_jump_across(
 
 @kernel(SIZE, POINTS, POINTS, INDICES, INDICES, SIZE, SIZE, SIZE)
 def flipped_children(points, loop_points, faces, face_edges, vertex_count, begin, end):
-    """How many children of faces begin … end − 1 have a normal that opposes Loop's."""
+    """Count the children of faces begin … end − 1 whose normal opposes Loop's."""
     flipped = 0
     for f in range(begin, end):
         for i in range(4):

@@ -40,12 +40,12 @@ HEIGHT = 3
 
 
 def dot(u, v):
-    """The inner product, summed in the order of ``arrays.dot``."""
+    """Return the inner product, summed in the order of ``arrays.dot``."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
 def cross(u, v):
-    """The cross product, as ``arrays.cross`` has it."""
+    """Return the cross product, as ``arrays.cross`` has it."""
     return (
         u[1] * v[2] - u[2] * v[1],
         u[2] * v[0] - u[0] * v[2],
@@ -54,24 +54,24 @@ def cross(u, v):
 
 
 def between(points, a, b):
-    """The vector from row a to row b."""
+    """Return the vector from row a to row b."""
     return points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
 
 
 def norm(v):
-    """The length of a vector, 0 for zero vectors and NaN, as in ``arrays.norm``."""
+    """Return the length of a vector, 0 for zero vectors and NaN, as in ``arrays.norm``."""
     square = dot(v, v)
     return math.sqrt(square) if square > 0 else 0.0
 
 
 def row(values, i):
-    """The first three columns of a row."""
+    """Return the first three columns of a row."""
     return values[i, 0], values[i, 1], values[i, 2]
 
 
 @kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, POINTS_OUT)
 def measure_faces(points, faces, begin, end, normals, areas):
-    """Unit normals (F, 3) and area vectors with their lengths (F, 4) of faces begin … end − 1."""
+    """Write normals (F, 3), area vectors and their lengths (F, 4) of faces begin … end − 1."""
     for f in range(begin, end):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         normal = unit_normal(points, a, b, c)
@@ -85,7 +85,7 @@ def measure_faces(points, faces, begin, end, normals, areas):
 
 @kernel(SIZE, INDICES, POINTS, SIZE, SIZE, POINTS_OUT)
 def mean_normals(faces, areas, begin, end, fields):
-    """m_v in the first three columns of ``fields`` (V, 4), all 0 on entry."""
+    """Write m_v into the first three columns of ``fields`` (V, 4), all 0 on entry."""
     for f in range(faces.shape[0]):
         for i in range(3):
             v = faces[f, i]
@@ -120,7 +120,7 @@ def measure_edges(
     jumps,
     network_lengths,
 ):
-    """Spoke b − a, its square and s (``measured``, (E, 5)), x and ℓ of edges begin … end − 1.
+    """Write b − a, its square and s (``measured``, (E, 5)), x and ℓ of edges begin … end − 1.
 
     ``altitudes`` is α, infinite where the network speaks in units of h whatever the faces.
     """
@@ -153,7 +153,10 @@ def measure_edges(
 
 @kernel(SIZE, INDICES, NUMBERS, REAL, REAL, SIZE, SIZE, NUMBERS_OUT)
 def face_bends(face_edges, jumps, gentle, sharp, begin, end, bends):
-    """b of faces begin … end − 1 (``side_gate.face_bends``); x counts between gentle and sharp."""
+    """Write b of faces begin … end − 1 (``side_gate.face_bends``).
+
+    x counts between gentle and sharp.
+    """
     for f in range(begin, end):
         total = 0.0
         for i in range(3):
@@ -180,7 +183,7 @@ def _add_spoke(sums, v, spoke, square, jump, bend, length, network_square):
 
 @kernel(SIZE, INDICES, POINTS, NUMBERS, NUMBERS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
 def mean_spokes(edges, measured, jumps, network_lengths, begin, end, means, valence):
-    """Means over the spokes of vertices begin … end − 1; ``means`` (V, 15), 0 on entry."""
+    """Write means over the spokes of vertices begin … end − 1; ``means`` (V, 15), 0 on entry."""
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
         mine, theirs = begin <= a < end, begin <= b < end
@@ -206,7 +209,7 @@ def mean_spokes(edges, measured, jumps, network_lengths, begin, end, means, vale
 
 @kernel(SIZE, POINTS, INDEX, SIZE, SIZE, POINTS_OUT)
 def umbrella_heights(means, sharp, begin, end, fields):
-    """u_v · m_v / h_v into ``fields``; 0 where a sharp edge ends.
+    """Write u_v · m_v / h_v into ``fields``; 0 where a sharp edge ends.
 
     ``sharp`` counts the sharp edges at each vertex; (0,) where there are none at all.
     """
@@ -223,7 +226,7 @@ def umbrella_heights(means, sharp, begin, end, fields):
 
 @kernel(SIZE, POINTS, POINTS, INDEX, INDEX, NUMBERS, SIZE, SIZE, POINTS_OUT)
 def prior_pushes(means, fields, valence, smooth, ring_weight, begin, end, pushes):
-    """d_v of the prior at s = 1 (``prior.normal_pushes``).
+    """Write d_v of the prior at s = 1 (``prior.normal_pushes``).
 
     Args:
         smooth: 1 where the vertex may move, else 0.
@@ -243,7 +246,7 @@ def prior_pushes(means, fields, valence, smooth, ring_weight, begin, end, pushes
 
 @kernel(SIZE, INDICES, POINTS, POINTS, INDEX, SIZE, SIZE, POINTS_OUT)
 def mean_neighbours(edges, measured, fields, valence, begin, end, means):
-    """Means of what lies at the far ends of spokes: opening, umbrella heights, mean jump.
+    """Write means of what lies at the far ends of spokes: opening, umbrella heights, mean jump.
 
     Reads MEAN_JUMP of all vertices, and writes the last three columns of its own.
     """

@@ -28,7 +28,7 @@ NOTHING = np.float32(0)
 
 
 def _read(features, begin, held):
-    """Rows from ``begin`` on, one beside the other; 0 past the last."""
+    """Read rows from ``begin`` on, one beside the other; 0 past the last."""
     present = min(LANES, features.shape[0] - begin)
     for k in range(features.shape[1]):
         for lane in range(present):
@@ -38,7 +38,7 @@ def _read(features, begin, held):
 
 
 def _add_and_subtract(x, g, i, h, j):
-    """The sum and the difference of two rows in their place."""
+    """Put the sum and the difference of two rows in their place."""
     for lane in range(LANES):
         a, b = x[g, i, lane], x[h, j, lane]
         x[g, i, lane] = a + b
@@ -56,7 +56,7 @@ def _add_product(x, g, i, weight, y, h, j):
 
 
 def _transform(units, width):
-    """Σ_g χ_s(g) x_g in place of x_s."""
+    """Put Σ_g χ_s(g) x_g in place of x_s."""
     step = 1
     while step < units.shape[0]:
         for g in range(units.shape[0]):
@@ -67,7 +67,7 @@ def _transform(units, width):
 
 
 def _activate(units, width):
-    """GELU of all copies, between two transforms."""
+    """Apply GELU to all copies, between two transforms."""
     _transform(units, width)
     for g in range(units.shape[0]):
         for i in range(width):
@@ -86,7 +86,7 @@ def _first(units, held, width, characters, first, biases):
 
 
 def _next(units, held, before, width, hidden, at, biases, bias_at):
-    """A layer in place of the one before it: a block of products for each character."""
+    """Put a layer in place of the one before it: a block of products for each character."""
     for s in range(units.shape[0]):
         for j in range(before):
             for lane in range(LANES):
@@ -100,7 +100,7 @@ def _next(units, held, before, width, hidden, at, biases, bias_at):
 
 
 def _write(held, begin, budget, answers):
-    """budget · z / max(1, ‖z‖), in double precision, where no square of a single overflows."""
+    """Write budget · z / max(1, ‖z‖) in double precision, where no square of a single overflows."""
     for lane in range(min(LANES, len(answers) - begin)):
         x = np.float64(held[SEEN, 0, lane])
         y = np.float64(held[SEEN, 1, lane])
@@ -133,7 +133,7 @@ def answer(
     held,
     answers,
 ):
-    """The answers to all rows of features; the weights are those of ``form.TiedForm``.
+    """Answer all rows of features; the weights are those of ``form.TiedForm``.
 
     Args:
         units: (n, M, LANES) for the widest M layer, overwritten.

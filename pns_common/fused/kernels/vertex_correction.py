@@ -47,7 +47,7 @@ def _reach(means, v):
 
 @kernel(SIZE, POINTS, POINTS, INDEX, SIZE, SIZE, POINTS_OUT, NUMBERS_OUT)
 def look_around(means, fields, vertices, begin, end, features, mean_jump):
-    """The features of ``ring-10`` and x_v of vertices[begin:end]."""
+    """Write the features of ``ring-10`` and x_v of vertices[begin:end]."""
     for i in range(end - begin):
         v = vertices[begin + i]
         normal, umbrella, reach = row(fields, v), row(means, v), _reach(means, v)
@@ -71,7 +71,7 @@ def _component(z, means, fields, v, reach, k):
 
 
 def _combined(z, means, fields, v):
-    """Σ z_i e_i over the ring's three vectors."""
+    """Return Σ z_i e_i over the ring's three vectors."""
     reach = _reach(means, v)
     x = _component(z, means, fields, v, reach, 0)
     y = _component(z, means, fields, v, reach, 1)
@@ -96,7 +96,7 @@ def correct(
     gates,
     envelopes,
 ):
-    """δ = h_v² γ_v (C / R) v into the rows of the vertices (``VertexOperator.correct``)."""
+    """Write δ = h_v² γ_v (C / R) v into the vertices' rows (``VertexOperator.correct``)."""
     for i in range(z.shape[0]):
         v = vertices[begin + i]
         envelope = budget_per_length[i] * means[v, RING_SQUARE]
@@ -108,7 +108,7 @@ def correct(
 
 
 def _prior(pushes, of_boundary, nothing, v, k, strength):
-    """A coordinate of D_v, with the boundary's part."""
+    """Return a coordinate of D_v, with the boundary's part."""
     part = of_boundary[v, k] if len(of_boundary) else nothing
     return strength * pushes[v, k] + part
 
@@ -136,7 +136,7 @@ def correct_scale_free(
     gates,
     envelopes,
 ):
-    """δ = γ_v Π_ρ(D + τ ℓ_v Σ z_i e_i) likewise.
+    """Write δ = γ_v Π_ρ(D + τ ℓ_v Σ z_i e_i) likewise.
 
     ``pushes`` are Loop's vertex mask of d, ``of_boundary`` and ``nothing`` as at edges.
     """

@@ -27,7 +27,7 @@ class DartMasks:
 
 
 def dart_masks(topology: Topology) -> list[DartMasks]:
-    """The masks of all darts, by valence.
+    """Return the masks of all darts, by valence.
 
     A dart's matrix is built from the edges around it, whatever faces there are; its stationary
     distribution is the mask, so no weight is below 0 and they sum to 1.
@@ -53,7 +53,7 @@ def dart_masks(topology: Topology) -> list[DartMasks]:
 
 
 def _matrices(topology: Topology, spokes: Int[np.ndarray, "D N"]) -> Float[np.ndarray, "D M M"]:
-    """How darts and their neighbours move; the dart comes first."""
+    """Return how darts and their neighbours move; the dart comes first."""
     count, valence = spokes.shape
     edges, ring = spokes // 2, topology.edges[:, ::-1].reshape(-1)[spokes]
     beta = float(loop_beta(np.array([valence]))[0])

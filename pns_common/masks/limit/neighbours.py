@@ -32,7 +32,7 @@ class Neighbours:
 
 
 def own_neighbours(topology: Topology) -> Neighbours:
-    """The neighbours in the mesh itself."""
+    """Return the neighbours in the mesh itself."""
     return Neighbours(
         topology=topology,
         of_spokes=topology.edges[:, ::-1].reshape(-1),
@@ -42,7 +42,7 @@ def own_neighbours(topology: Topology) -> Neighbours:
 
 
 def split_neighbours(topology: Topology) -> Neighbours:
-    """The neighbours of the same vertices once the mesh is split: the vertices of their edges."""
+    """Return the same vertices' neighbours in the split mesh: the vertices of their edges."""
     middles = topology.vertex_count + topology.face_edges
     return Neighbours(
         topology=topology,

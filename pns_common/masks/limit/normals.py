@@ -43,12 +43,15 @@ class LimitNormals:
 
 
 def limit_normals(points: Float[Array, "V 3"], topology: Topology) -> LimitNormals:
-    """The normals of the limit surface at the limits of the vertices."""
+    """Return the normals of the limit surface at the limits of the vertices."""
     return normals_of_vertices(points, own_neighbours(topology))
 
 
 def normals_of_vertices(points: Float[Array, "W 3"], neighbours: Neighbours) -> LimitNormals:
-    """The normals at the first of ``points``, a mesh's vertices, with neighbours among them all."""
+    """Return the normals at the first of ``points``, a mesh's vertices.
+
+    Their neighbours are among all of ``points``.
+    """
     topology = neighbours.topology
     around = sectors(topology)
     masks = tangent_masks(topology, around)
@@ -81,7 +84,7 @@ def plane_normals(
     area: Float[Array, "S 3"],
     corners: np.ndarray | None = None,
 ) -> Float[Array, "S 3"]:
-    """Unit normals of the planes of two tangents; the way ``area`` points where they span none.
+    """Return unit normals of the planes of two tangents; along ``area`` where they span none.
 
     The tangents of a corner wider than half a turn stand the other way round: there ``area`` says
     which way is out.

@@ -24,12 +24,15 @@ from pns_common.masks.stencils import CURVE_LIMIT_CENTRE, CURVE_LIMIT_NEIGHBOUR,
 
 
 def limit_positions(points: Float[Array, "V K"], topology: Topology) -> Float[Array, "V K"]:
-    """The limit of each vertex; of any columns that Loop's masks refine, not positions alone."""
+    """Return the limit of each vertex, or of any columns that Loop's masks refine."""
     return limits_of_vertices(points, own_neighbours(topology))
 
 
 def limits_of_vertices(points: Float[Array, "W K"], around: Neighbours) -> Float[Array, "V K"]:
-    """The limits of the first of ``points``, a mesh's vertices, with neighbours among them all."""
+    """Return the limits of the first of ``points``, a mesh's vertices.
+
+    Their neighbours are among all of ``points``.
+    """
     xp, topology = namespace(points), around.topology
     sharp, valence = sharp_edge_count(topology), topology.valence
     ring = limit_ring_weight(valence)

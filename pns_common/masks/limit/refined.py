@@ -34,7 +34,7 @@ ROOT_3 = 3**0.5
 def refined_limit_positions(
     points: Float[Array, "W K"], topology: Topology, blocks: Blocks = WHOLE
 ) -> Float[Array, "W K"]:
-    """Limits of the vertices that ``topology`` was split into: old vertices, then edge vertices."""
+    """Return the limits of ``topology``'s split: of old vertices, then of edge vertices."""
     xp = namespace(points)
     count, edges = topology.vertex_count, topology.edges
 
@@ -59,7 +59,7 @@ def refined_limit_positions(
 def refined_limit_normals(
     points: Float[Array, "W 3"], topology: Topology, blocks: Blocks = WHOLE
 ) -> Float[Array, "W 3"]:
-    """Unit normals of the limit surface there; on creases the unit mean of both sides'."""
+    """Return unit normals of the limit surface there; on creases the unit mean of both sides'."""
     xp = namespace(points)
     count = topology.vertex_count
 
@@ -85,7 +85,7 @@ def refined_limit_normals(
 def _one_sided(
     points: Float[Array, "W 3"], topology: Topology, half_edges: Int[np.ndarray, " H"]
 ) -> Float[Array, "H 3"]:
-    """Normals at the middles of half-edges that are not interior, on their faces' side."""
+    """Return normals at the middles of half-edges that are not interior, on their faces' side."""
     middle = gather(points, topology.vertex_count + topology.face_edges.reshape(-1)[half_edges])
     rows = _half_ring(topology, half_edges)
     b, bc, ca = (gather(points, row) - middle for row in rows)
@@ -96,7 +96,7 @@ def _one_sided(
 
 
 def _rings(topology: Topology, edges: Int[np.ndarray, " N"]) -> list[Int[np.ndarray, " N"]]:
-    """The six neighbours of the middle of interior edges, anticlockwise."""
+    """Return the six neighbours of the middle of interior edges, anticlockwise."""
     sides = topology.half_edges[edges]
     return [row for side in (0, 1) for row in _half_ring(topology, sides[:, side])]
 
@@ -104,7 +104,7 @@ def _rings(topology: Topology, edges: Int[np.ndarray, " N"]) -> list[Int[np.ndar
 def _half_ring(
     topology: Topology, half_edges: Int[np.ndarray, " H"]
 ) -> list[Int[np.ndarray, " H"]]:
-    """Around the middle of half-edge a → b of face a, b, c: b, and the middles of bc and ca."""
+    """Return b and the middles of bc and ca, around the middle of half-edge a → b of abc."""
     following = next_corner(half_edges)
     middles = topology.vertex_count + topology.face_edges.reshape(-1)
     after = topology.faces.reshape(-1)[following]

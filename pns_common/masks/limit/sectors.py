@@ -70,7 +70,7 @@ def sectors(topology: Topology) -> Sectors:
 
 
 def _previous_around_vertex(topology: Topology) -> Int[np.ndarray, " C"]:
-    """For each corner the one before it, clockwise across the interior half-edge that leaves it."""
+    """Return each corner's predecessor, clockwise across the interior half-edge that leaves it."""
     leaving = topology.half_edges[topology.interior]
     before = np.full(topology.faces.size, -1, dtype=np.int64)
     before[leaving] = next_corner(leaving)[:, ::-1]

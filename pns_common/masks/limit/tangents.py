@@ -45,7 +45,7 @@ class TangentMasks:
 
 
 def tangent_masks(topology: Topology, around: Sectors) -> TangentMasks:
-    """The masks of all sectors."""
+    """Return the masks of all sectors."""
     sharp = sharp_edge_count(topology)[around.vertex]
     size = around.size
     rank, k = around.rank, size[around.of_corner]
@@ -87,7 +87,7 @@ def tangent_masks(topology: Topology, around: Sectors) -> TangentMasks:
 def _curve_weights(
     size: np.ndarray,
 ) -> tuple[Float[np.ndarray, " S"], Float[np.ndarray, " S"]]:
-    """a and c of the mask across a curve."""
+    """Return a and c of the mask across a curve."""
     k = size.astype(float)
     step = np.pi / k
     total = np.where(size > 1, 1 / np.tan(step / 2), 0.0)
@@ -98,7 +98,7 @@ def _curve_weights(
 
 @lru_cache(maxsize=256)
 def dart_tangents(valence: int) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " K"]]:
-    """The even mask (centre first) and the odd one (neighbours alone), the crease at q_0."""
+    """Return the even mask (centre first) and the odd one (neighbours alone), the crease at q_0."""
     k = valence
     angle = 2 * np.pi * np.arange(k) / k
     beta = float(loop_beta(np.array([k]))[0])

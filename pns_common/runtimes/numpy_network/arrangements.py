@@ -61,7 +61,7 @@ def _reshape_outline(inputs: Inputs, attributes: Attributes) -> list[np.ndarray]
 
 
 def _new_shape(inputs: Inputs, attributes: Attributes) -> list[int]:
-    """The sizes that Reshape names: 0 copies one, −1 is what is left."""
+    """Return the sizes that Reshape names: 0 copies one, −1 is what is left."""
     data, sizes = inputs[0], whole_numbers(inputs, 1, attributes, "shape")
     if not attributes.get("allowzero", 0):
         sizes = [data.shape[axis] if size == 0 else size for axis, size in enumerate(sizes)]
@@ -114,7 +114,7 @@ def _transpose(inputs: Inputs, attributes: Attributes) -> list[np.ndarray]:
 
 
 def _view(function: Function, attributes: tuple[str, ...], shaping: tuple[int, ...]) -> Operator:
-    """An operator that only looks at its input in another way: its outline is made by itself."""
+    """Make an operator that looks at its input another way: its outline is made by itself."""
     return Operator(function, function, attributes, shaping)
 
 

@@ -80,7 +80,7 @@ class NumpyNetwork:
             raise ValueError(str(error)) from error
 
     def leading_to(self, output: str) -> list[Node]:
-        """The nodes that an output depends on, in order."""
+        """Return the nodes that an output depends on, in order."""
         wanted = {output}
         steps: list[Node] = []
         for step in reversed(self.nodes):
@@ -166,7 +166,7 @@ def _network(message: Message) -> NumpyNetwork:
 def _signatures(
     graph: Message, weights: Mapping[str, np.ndarray]
 ) -> tuple[list[Signature], list[Signature]]:
-    """Inputs (old files list weights there too) and outputs."""
+    """Return the inputs (old files list weights there too) and the outputs."""
     inputs = [_signature(value) for value in graph["input"]]
     outputs = [_signature(value) for value in graph["output"]]
     return [each for each in inputs if each[0] not in weights], outputs
@@ -180,7 +180,7 @@ def _signature(value: Message) -> Signature:
 
 
 def _check_names(network: NumpyNetwork, inputs: Sequence[str]) -> None:
-    """Each tensor is made once and before it is read, and sizes are constants."""
+    """Check that each tensor is made once, before it is read, and that sizes are constants."""
     known, constant = {*inputs, *network.weights}, set(network.weights)
     for step in network.nodes:
         operator = OPERATORS[step.operator]
@@ -197,7 +197,7 @@ def _check_names(network: NumpyNetwork, inputs: Sequence[str]) -> None:
 
 
 def _shaped_by(step: Node, operator: Operator) -> set[str]:
-    """The inputs of a node that its shape follows from by their values."""
+    """Return the inputs of a node that its shape follows from by their values."""
     return {step.inputs[i] for i in operator.shaping if i < len(step.inputs)} - {""}
 
 
@@ -214,7 +214,7 @@ def _check_calls(network: NumpyNetwork, card: ModelCard) -> None:
 
 
 def _outlines(network: NumpyNetwork, inputs: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The outlines of all tensors of a call; constants as they are."""
+    """Return the outlines of all tensors of a call; constants as they are."""
     outlines, held = {**network.weights, **inputs}, 0
     for step in network.nodes:
         try:

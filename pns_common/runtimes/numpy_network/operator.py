@@ -101,7 +101,7 @@ def reduction(function: Callable[..., np.ndarray]) -> Operator:
 
 
 def _reduced(inputs: Inputs, attributes: Attributes) -> tuple[int, ...]:
-    """The axes that a reduction is over; each value by itself where there are none."""
+    """Return the axes that a reduction is over; none where each value stays by itself."""
     every, axes = range(inputs[0].ndim), whole_numbers(inputs, 1, attributes, "axes")
     if not axes:
         return () if attributes.get("noop_with_empty_axes", 0) else tuple(every)

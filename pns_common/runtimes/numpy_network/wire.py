@@ -59,7 +59,7 @@ def read_message(data: memoryview, schema: Schema) -> Message:
 
 
 def _records(data: memoryview) -> Iterator[tuple[int, int, int | memoryview]]:
-    """The records of a message: number, wire type, and the number or the bytes that they hold."""
+    """Yield a message's records: number, wire type, and the number or the bytes they hold."""
     position = 0
     while position < len(data):
         key, position = _varint(data, position)
@@ -79,7 +79,7 @@ def _records(data: memoryview) -> Iterator[tuple[int, int, int | memoryview]]:
 
 
 def _varint(data: memoryview, position: int) -> tuple[int, int]:
-    """The number that starts at a byte, and where the next record starts."""
+    """Read the number that starts at a byte; return it, and where the next record starts."""
     value = 0
     for shift in range(0, 70, 7):
         if position >= len(data):
@@ -93,7 +93,7 @@ def _varint(data: memoryview, position: int) -> tuple[int, int]:
 
 
 def _values(field: Field, wire_type: int, value: int | memoryview) -> list[Any]:
-    """What a record adds to its field."""
+    """Return what a record adds to its field."""
     if isinstance(field.kind, str) and field.kind in _NUMBER:
         expected = _NUMBER[field.kind]
         if field.repeated and isinstance(value, memoryview) and wire_type == LENGTH:

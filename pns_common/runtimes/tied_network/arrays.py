@@ -21,7 +21,10 @@ ROWS = 1024
 def answers_of(
     form: TiedForm, features: Float[np.ndarray, "N K"], budget: float
 ) -> Float32[np.ndarray, "N 3"]:
-    """The network's answers to rows of features; one that is not finite is for the caller."""
+    """Return the network's answers to rows of features.
+
+    An answer that is not finite is for the caller.
+    """
     answers = np.empty((len(features), 3), dtype=np.float32)
     with np.errstate(all="ignore"):
         for start in range(0, len(features), ROWS):
@@ -31,7 +34,7 @@ def answers_of(
 
 
 def _z(form: TiedForm, features: Float[np.ndarray, "N K"]) -> Float32[np.ndarray, "3 N"]:
-    """What the last layer says, before it is projected onto the ball."""
+    """Return what the last layer says, before it is projected onto the ball."""
     seen = np.ascontiguousarray(features.T, dtype=np.float32)
     for i, j in form.pairs:
         seen[i], seen[j] = seen[i] + seen[j], seen[i] - seen[j]
@@ -54,14 +57,14 @@ def _z(form: TiedForm, features: Float[np.ndarray, "N K"]) -> Float32[np.ndarray
 
 
 def _biased(bias: Float32[np.ndarray, " m"], size: int, rows: int) -> Float32[np.ndarray, "G m N"]:
-    """Units by their characters, before any product: a bias is the same for all g."""
+    """Return units by their characters, before any product: a bias is the same for all g."""
     units = np.zeros((size, len(bias), rows), dtype=np.float32)
     units[0] = bias[:, None]
     return units
 
 
 def _transformed(units: Float32[np.ndarray, "G m N"]) -> Float32[np.ndarray, "G m N"]:
-    """Σ_g χ_s(g) x_g for all s, as sums and differences; the same leads back, but for n."""
+    """Return Σ_g χ_s(g) x_g for all s, as sums and differences; the same leads back, but for n."""
     step = 1
     while step < len(units):
         halves = units.reshape(-1, 2, step, *units.shape[1:])
@@ -72,12 +75,12 @@ def _transformed(units: Float32[np.ndarray, "G m N"]) -> Float32[np.ndarray, "G 
 
 
 def gelu(x: Float32[np.ndarray, "G m N"]) -> Float32[np.ndarray, "G m N"]:
-    """x Φ(x)."""
+    """Return x Φ(x)."""
     return gelu_within(x, np.clip(x, -LIMIT, LIMIT))
 
 
 def _in_ball(z: Float32[np.ndarray, "3 N"], budget: float) -> Float32[np.ndarray, "N 3"]:
-    """budget · z / max(1, ‖z‖), in double precision, where no square of a single overflows."""
+    """Return budget · z / max(1, ‖z‖), in double precision: no square of a single overflows."""
     x, y, w = wide = z.astype(np.float64)
     length = np.sqrt(x * x + y * y + w * w)
     return (wide / np.where(length > 1, length, 1.0) * budget).astype(np.float32).T

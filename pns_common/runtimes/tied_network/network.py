@@ -33,7 +33,7 @@ class TiedNetwork:
     def answers(
         self, given: str, features: Float[np.ndarray, "N K"], budget: float
     ) -> Float32[np.ndarray, "N 3"]:
-        """What the network that reads ``given`` answers.
+        """Return what the network that reads ``given`` answers.
 
         Raises:
             ValueError: it reads rows of another length.
@@ -64,7 +64,7 @@ def open_tied_network(data: bytes, name: str) -> tuple[ModelCard, TiedNetwork] |
 
 
 def _groups(card: ModelCard) -> dict[str, Symmetries]:
-    """The symmetries of what each input reads."""
+    """Return the symmetries of what each input reads."""
     groups = {"features": FEATURE_SETS[card.features].symmetries}
     if card.vertex_features is not None:
         groups["vertex_features"] = RING_FEATURE_SETS[card.vertex_features].symmetries

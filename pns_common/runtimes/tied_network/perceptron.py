@@ -20,7 +20,7 @@ ROOT_TWO = float(np.float32(np.sqrt(2)))
 
 
 def read_perceptron(network: NumpyNetwork, given: str, output: str) -> list[Layer] | None:
-    """The layers between a checked graph's input and output; None where it is of another form."""
+    """Read the layers between a checked graph's input and output; None for another form."""
     reader = _Reader(iter(network.leading_to(output)), network.weights)
     try:
         return reader.perceptron(given, output)
@@ -60,7 +60,7 @@ class _Reader:
         return Layer(weight, bias)
 
     def _gelu(self, divided: Node, z: str) -> str:
-        """x/2 (1 + erf(x/√2)) from its first node on; returns its name."""
+        """Follow x/2 (1 + erf(x/√2)) from its first node on; returns its name."""
         _check(divided, "Div", z, None)
         erf = self._next("Erf", *divided.outputs)
         half = self._next("Mul", z, None)
@@ -95,7 +95,7 @@ class _Reader:
 
 
 def _check(step: Node, operator: str, *inputs: str | None, **attributes: Any) -> None:
-    """Whether it is this operator of these inputs (None: any) and says just that."""
+    """Check that it is this operator of these inputs (None: any) and says just that."""
     fits = step.operator == operator and len(step.inputs) == len(inputs)
     fits = fits and len(step.outputs) == 1 and step.attributes == attributes
     if not fits or any(
