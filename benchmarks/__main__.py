@@ -73,7 +73,7 @@ def main(
 
 
 def case_table(contested: dict[str, Any]) -> Table:
-    """One case: seconds of every method, and ours beside the fastest peer."""
+    """Return one case as a table: seconds of every method, and ours beside the fastest peer."""
     peers = {n: m for n, m in contested["methods"].items() if not n.startswith(OURS)}
     title = f"{contested['order']}, {contested['faces']:,} faces × {contested['levels']}"
     table = Table(title=f"{title} (load {contested['load']})")
@@ -95,7 +95,7 @@ def case_table(contested: dict[str, Any]) -> Table:
 
 
 def machine() -> dict[str, Any]:
-    """What the numbers were measured on."""
+    """Return what the numbers were measured on."""
     import os
     import platform
 

@@ -79,7 +79,7 @@ def main(
 
 
 def upload(size: int) -> bytes:
-    """The largest torus whose file is no larger than ``size`` bytes."""
+    """Return the largest torus whose file is no larger than ``size`` bytes."""
     data, faces = b"", 8
     while len(larger := _glb(faces)) <= size:
         data, faces = larger, faces + max(4, faces // 20)
@@ -93,7 +93,7 @@ def _glb(faces: int) -> bytes:
 
 @contextmanager
 def served(python: str, core: int) -> Iterator[int]:
-    """`pns serve` with one worker, on one core; its port."""
+    """Run `pns serve` with one worker, on one core; yields its port."""
     command = [python, "-m", "service", "serve", "--port", "0"]
     server = subprocess.Popen(
         ["taskset", "--cpu-list", str(core), *command],
@@ -120,7 +120,7 @@ def served(python: str, core: int) -> Iterator[int]:
 
 
 def asked(port: int, path: str, body: bytes, seconds: float) -> float:
-    """Answers a second of a server that is asked without a pause."""
+    """Return the answers a second of a server that is asked without a pause."""
     with ThreadPoolExecutor(CLIENTS) as clients:
         list(clients.map(lambda _: _ask(port, path, body, 0.5), range(CLIENTS)))
         start = time.perf_counter()
@@ -143,7 +143,7 @@ def _ask(port: int, path: str, body: bytes, seconds: float) -> int:
 
 
 def program_rate(command: list[str], upload_path: Path, seconds: float, core: int) -> float:
-    """Answers a second of a program that prints it."""
+    """Return the answers a second of a program that prints it."""
     done = subprocess.run(
         ["taskset", "--cpu-list", str(core), *command, str(upload_path), str(seconds)],
         capture_output=True,

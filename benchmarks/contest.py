@@ -124,7 +124,7 @@ def contest(
 
 
 def summary(contestant: Contestant) -> dict[str, Any]:
-    """First call, and of the warm ones (or the only one) the median and the extremes.
+    """Return the first call, and of the warm ones (or the only one) the median and the extremes.
 
     ``cold`` counts from the start of the process, imports and the reading of the mesh included.
     """
@@ -148,5 +148,5 @@ def summary(contestant: Contestant) -> dict[str, Any]:
 
 
 def ours(name: str, python: str) -> list[str]:
-    """How one of our methods is started, with the Python of an environment that has the library."""
+    """Return how our method is started, by the Python of an environment that has the library."""
     return [python, "-m", "benchmarks.ours", name]

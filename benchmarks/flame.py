@@ -42,7 +42,7 @@ def main(
 
 
 def read_stacks(text: str) -> Counter[tuple[str, ...]]:
-    """Samples of each stack, outermost frame first, of the repeated work alone."""
+    """Read how many samples each stack has, outermost frame first, of the repeated work alone."""
     counted: Counter[tuple[str, ...]] = Counter()
     for line in text.splitlines():
         stack, _, samples = line.rpartition(" ")
@@ -55,7 +55,7 @@ def read_stacks(text: str) -> Counter[tuple[str, ...]]:
 
 
 def draw(counted: Counter[tuple[str, ...]], title: str, path: Path) -> None:
-    """Boxes as wide as the share of samples that pass through a frame, callers below."""
+    """Draw boxes as wide as the share of samples that pass through a frame, callers below."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -89,13 +89,13 @@ def draw(counted: Counter[tuple[str, ...]], title: str, path: Path) -> None:
 
 
 def short(frame: str) -> str:
-    """A frame's function, and its file without folders."""
+    """Return a frame's function, and its file without folders."""
     function, _, place = frame.partition(" (")
     return f"{function} ({Path(place.rstrip(')')).name})"
 
 
 def hash_of(frame: str) -> int:
-    """The same number for a frame in every run."""
+    """Return the same number for a frame in every run."""
     return sum(map(ord, frame))
 
 

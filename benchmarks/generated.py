@@ -8,7 +8,7 @@ from pns_common import Mesh
 
 
 def torus(faces: int) -> Mesh:
-    """A torus with ridges along its tube, of about so many faces."""
+    """Make a torus with ridges along its tube, of about so many faces."""
     columns = round((faces / 2) ** 0.5 * 2**0.5)
     rows = max(3, round(faces / 2 / columns))
     u, v = np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
@@ -25,7 +25,7 @@ def torus(faces: int) -> Mesh:
 
 
 def patch(faces: int) -> Mesh:
-    """An open patch over [−1, 1]² with ridges, of about so many faces."""
+    """Make an open patch over [−1, 1]² with ridges, of about so many faces."""
     n = round((faces / 2) ** 0.5) + 1
     x, y = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
     z = 0.2 * np.exp(-30 * (x + 0.3 * np.sin(2 * y)) ** 2) + 0.05 * np.sin(5 * y)
@@ -37,7 +37,7 @@ def patch(faces: int) -> Mesh:
 
 
 def shuffled(mesh: Mesh, seed: int = 0) -> Mesh:
-    """The same mesh with its vertices and faces in random order: the worst case for caches."""
+    """Return the same mesh, vertices and faces in random order: the worst case for caches."""
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(mesh.vertices))
     vertices = np.empty_like(mesh.vertices)

@@ -44,7 +44,7 @@ def main(
 
 
 def _share(file: MeasuredFile, stages: tuple[str, ...]) -> float:
-    """Seconds of stages, over those of the refinement."""
+    """Return the seconds of stages over those of the refinement."""
     return sum(file.seconds.get(stage, 0.0) for stage in stages) / file.seconds["refine"]
 
 

@@ -21,7 +21,7 @@ def reset_peak() -> None:
 
 
 def peak_mib() -> float:
-    """The peak resident memory since the last reset, in MiB."""
+    """Return the peak resident memory since the last reset, in MiB."""
     status = Path("/proc/self/status")
     if status.exists():
         for line in status.read_text().splitlines():

@@ -12,7 +12,7 @@ MARKERS = "osD^vP*"
 
 
 def plot_results(result: dict[str, Any], path: Path) -> None:
-    """One line a method: warm seconds for a level of the closed mesh."""
+    """Draw one line a method: warm seconds for a level of the closed mesh."""
     import matplotlib as mpl
 
     mpl.use("Agg")

@@ -60,14 +60,14 @@ def main(
 
 
 def tetrahedra(rng: np.random.Generator) -> list[Primitive]:
-    """Four faces and nothing but positions."""
+    """Make four faces and nothing but positions."""
     points = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]) * rng.uniform(0.2, 3, 3)
     faces = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
     return [{"POSITION": points.astype(np.float32), "indices": faces.astype(np.uint16)}]
 
 
 def boxes(rng: np.random.Generator) -> list[Primitive]:
-    """Six sides of four vertices each, with normals and texture coordinates."""
+    """Make six sides of four vertices each, with normals and texture coordinates."""
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     points, normals, faces = [], [], []
     for axis in range(3):
@@ -89,13 +89,13 @@ def boxes(rng: np.random.Generator) -> list[Primitive]:
 
 
 def parted_boxes(rng: np.random.Generator) -> list[Primitive]:
-    """The same in two primitives."""
+    """Make the same in two primitives."""
     (whole,) = boxes(rng)
     return [whole | {"indices": part} for part in np.split(whole["indices"], 2)]
 
 
 def skinned_boxes(rng: np.random.Generator) -> list[Primitive]:
-    """The same, hanging on two joints."""
+    """Make the same, hanging on two joints."""
     (whole,) = boxes(rng)
     upper = whole["POSITION"][:, 2] > 0
     weights = np.where(upper[:, None], (0.25, 0.75, 0, 0), (1, 0, 0, 0))
@@ -112,7 +112,7 @@ SCENES: dict[str, Callable[[np.random.Generator], list[Primitive]]] = {
 
 
 def scene(primitives: Callable[[np.random.Generator], list[Primitive]], count: int) -> bytes:
-    """A GLB of so many meshes, none with the positions of another."""
+    """Make a GLB of so many meshes, none with the positions of another."""
     rng = np.random.default_rng(0)
     tree: dict[str, Any] = {"asset": {"version": "2.0"}, "scene": 0}
     tree |= {"meshes": [], "accessors": [], "bufferViews": []}
@@ -162,7 +162,7 @@ def _accessor(tree: dict[str, Any], pieces: list[bytes], rows: np.ndarray) -> in
 
 
 def _shortest(run: Callable[[], None], clock: Callable[[], float], runs: int) -> float:
-    """The seconds of the shortest, after one that is not counted."""
+    """Return the seconds of the shortest, after one that is not counted."""
     run()
     seconds = []
     for _ in range(runs):

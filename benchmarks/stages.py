@@ -54,7 +54,7 @@ def main(
 
 
 def operator_table(sizes: list[int], runs: int, model: str) -> Table:
-    """One level on generated meshes: seconds, MiB, and trimesh's Loop over ours."""
+    """Measure one level on generated meshes: seconds, MiB, and trimesh's Loop over ours."""
     table = Table(title=f"One level in memory, median of {runs} runs")
     table.add_column("faces", justify="right")
     for method in METHODS:
@@ -70,7 +70,7 @@ def operator_table(sizes: list[int], runs: int, model: str) -> Table:
 
 
 def file_table(measured: dict[str, MeasuredFile], levels: int) -> Table:
-    """Files by stage: milliseconds, MiB, and what reading and writing cost beside refining."""
+    """Measure files by stage: milliseconds, MiB, and what all but refining costs beside it."""
     table = Table(title=f"Files, levels = {levels}: milliseconds, and peak MiB, by stage")
     table.add_column("file", no_wrap=True)
     table.add_column("faces out", justify="right")

@@ -12,25 +12,25 @@ from pns_common.fused import load_kernels
 
 
 def plain_loop() -> Callable[[], object]:
-    """One level of Loop from 320,000 faces."""
+    """Refine 320,000 faces by one level of Loop."""
     mesh = torus(320_000)
     return lambda: refine(mesh, loop())
 
 
 def learned_level() -> Callable[[], object]:
-    """One level of the default model from 320,000 faces, with its report."""
+    """Refine 320,000 faces by one level of the default model, with its report."""
     mesh, scheme = torus(320_000), pns(load_model())
     return lambda: refine(mesh, scheme).report
 
 
 def three_levels() -> Callable[[], object]:
-    """Three levels of the default model from 20,000 faces, with the report."""
+    """Refine 20,000 faces by three levels of the default model, with the report."""
     mesh, scheme = torus(20_000), pns(load_model())
     return lambda: refine(mesh, scheme, 3).report
 
 
 def file() -> Callable[[], object]:
-    """A GLB of 60,000 faces refined twice, from bytes to bytes."""
+    """Refine a GLB of 60,000 faces twice, from bytes to bytes."""
     from service.gltf.subdivide import subdivide_gltf
     from service.meshfiles.indexed_triangles import IndexedTriangles
     from service.meshfiles.triangles_glb import triangles_glb

@@ -10,7 +10,7 @@ MIB = 2**20
 
 
 def copy_bandwidth(mib: int = 128) -> float:
-    """Bytes a second that one thread copies, counted once (read and written: twice as much)."""
+    """Return the bytes a second that one thread copies, counted once (though read and written)."""
     source = np.ones(mib * MIB // 8)
     target = np.empty_like(source)
     np.copyto(target, source)  # first touch
@@ -20,7 +20,7 @@ def copy_bandwidth(mib: int = 128) -> float:
 
 
 def sgemm_rate(size: int = 1024) -> float:
-    """Floating-point operations a second of numpy's single-precision product, all its threads."""
+    """Return the operations a second of numpy's single-precision product, all its threads."""
     a = np.ones((size, size), dtype=np.float32)
     a @ a
     start = time.perf_counter()
@@ -29,7 +29,7 @@ def sgemm_rate(size: int = 1024) -> float:
 
 
 def numpy_second(faces: int = 80_000) -> float:
-    """Seconds of a sort and some gathers of numpy, for as many rows as a mesh has faces."""
+    """Return the seconds of a sort and some gathers of numpy, of as many rows as faces."""
     rng = np.random.default_rng(0)
     keys, rows = rng.integers(0, 2**40, 3 * faces), rng.standard_normal((faces, 3))
     index = rng.integers(0, faces, 3 * faces)

@@ -12,7 +12,7 @@ LIBRARIES = {"libigl": "igl", "trimesh": "trimesh", "PyVista": "pyvista", "Open3
 
 
 def available_peers() -> tuple[dict[str, list[str]], dict[str, str]]:
-    """How each peer is started, and why the others are missing."""
+    """Return how each peer is started, and why the others are missing."""
     peers: dict[str, list[str]] = {}
     missing: dict[str, str] = {}
     for name, driver in DRIVERS.items():

@@ -15,7 +15,7 @@ import numpy as np
 
 
 def write_mesh(path: Path, points: np.ndarray, faces: np.ndarray) -> None:
-    """A mesh as every peer reads it: counts, float64 coordinates, int32 faces."""
+    """Write a mesh as every peer reads it: counts, float64 coordinates, int32 faces."""
     with path.open("wb") as file:
         np.array([len(points), len(faces)], dtype=np.int64).tofile(file)
         np.ascontiguousarray(points, dtype=np.float64).tofile(file)
@@ -23,7 +23,7 @@ def write_mesh(path: Path, points: np.ndarray, faces: np.ndarray) -> None:
 
 
 def read_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
-    """Points (V, 3) float64 and faces (F, 3) int32."""
+    """Read points (V, 3) float64 and faces (F, 3) int32."""
     with Path(path).open("rb") as file:
         vertices, faces = np.fromfile(file, dtype=np.int64, count=2)
         points = np.fromfile(file, dtype=np.float64, count=3 * vertices)
@@ -31,7 +31,7 @@ def read_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def status_kib(name: str) -> int:
-    """A line of the process's status, in KiB (Linux)."""
+    """Return a line of the process's status, in KiB (Linux)."""
     for line in Path("/proc/self/status").read_text().splitlines():
         if line.startswith(name):
             return int(line.split()[1])

@@ -12,7 +12,7 @@ Arrays = tuple[np.ndarray, np.ndarray]
 
 
 def libigl(points: np.ndarray, faces: np.ndarray, levels: int) -> Callable[[], Arrays]:
-    """igl.loop."""
+    """Refine by igl.loop."""
     import igl
 
     wide = faces.astype(np.int64)
@@ -20,7 +20,7 @@ def libigl(points: np.ndarray, faces: np.ndarray, levels: int) -> Callable[[], A
 
 
 def trimesh(points: np.ndarray, faces: np.ndarray, levels: int) -> Callable[[], Arrays]:
-    """trimesh.remesh.subdivide_loop."""
+    """Refine by trimesh.remesh.subdivide_loop."""
     from trimesh.remesh import subdivide_loop
 
     wide = faces.astype(np.int64)
@@ -28,7 +28,7 @@ def trimesh(points: np.ndarray, faces: np.ndarray, levels: int) -> Callable[[], 
 
 
 def pyvista(points: np.ndarray, faces: np.ndarray, levels: int) -> Callable[[], Arrays]:
-    """PolyData.subdivide(subfilter="loop"), which is VTK's."""
+    """Refine by PolyData.subdivide(subfilter="loop"), which is VTK's."""
     import pyvista
 
     def refine() -> Arrays:
@@ -40,7 +40,7 @@ def pyvista(points: np.ndarray, faces: np.ndarray, levels: int) -> Callable[[], 
 
 
 def open3d(points: np.ndarray, faces: np.ndarray, levels: int) -> Callable[[], Arrays]:
-    """TriangleMesh.subdivide_loop."""
+    """Refine by TriangleMesh.subdivide_loop."""
     import open3d
 
     def refine() -> Arrays:

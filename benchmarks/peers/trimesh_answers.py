@@ -9,7 +9,7 @@ import trimesh
 
 
 def answer(data: bytes) -> bytes:
-    """A GLB with every mesh of another refined by Loop's rules."""
+    """Refine every mesh of a GLB by Loop's rules, to another GLB."""
     scene = trimesh.load(io.BytesIO(data), file_type="glb", force="scene")
     for name, mesh in scene.geometry.items():
         points, faces = trimesh.remesh.subdivide_loop(mesh.vertices, mesh.faces)

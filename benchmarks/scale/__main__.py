@@ -38,7 +38,7 @@ ROWS = [50_000, 100_000]
 
 
 def everything(share: float, python: str, results: Path) -> None:
-    """All that docs/scale.md tells, at a share of its sizes."""
+    """Measure all that docs/scale.md tells, at a share of its sizes."""
 
     def of(size: int) -> str:
         return str(max(1, round(size * share)))
@@ -64,7 +64,7 @@ def everything(share: float, python: str, results: Path) -> None:
 
 
 def kept(results: Path) -> dict[str, Any]:
-    """What was measured before."""
+    """Read what was measured before."""
     return json.loads(results.read_text()) if results.exists() else {}
 
 
@@ -74,7 +74,7 @@ def keep(results: Path, name: str, made: dict[str, Any]) -> None:
 
 
 def main() -> None:
-    """The command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -24,7 +24,7 @@ main()
 
 
 def library(workers: int, files: int) -> dict[str, Any]:
-    """`pns batch` of so many small files with some workers, beside as many loops at once.
+    """Run `pns batch` of so many small files with some workers, beside as many loops at once.
 
     The loops share the files, and go before and after the batch. All of them start Python, import
     what they need and load the kernels.
@@ -54,7 +54,7 @@ def library(workers: int, files: int) -> dict[str, Any]:
 
 
 def _loops(source: Path, output: Path, count: int) -> tuple[float, float]:
-    """Wall and processor seconds of so many bare loops at once."""
+    """Measure the wall and processor seconds of so many bare loops at once."""
     output.mkdir()
     command = [sys.executable, "-m", "benchmarks.scale.loop", str(source), str(output)]
     spent, _ = _run([[*command, str(first), str(count)] for first in range(count)])
@@ -62,7 +62,7 @@ def _loops(source: Path, output: Path, count: int) -> tuple[float, float]:
 
 
 def _batch(source: Path, output: Path, workers: int) -> tuple[tuple[float, float], float]:
-    """Wall and processor seconds of a batch, and the latter of its driver alone."""
+    """Measure the wall and processor seconds of a batch, and the latter of its driver alone."""
     options = ["--scheme", SCHEME, "--levels", str(LEVELS), "--workers", str(workers)]
     report = output.with_suffix(".jsonl")
     command = [sys.executable, "-c", COMMAND, "batch", str(source), str(output), *options]
@@ -71,7 +71,7 @@ def _batch(source: Path, output: Path, workers: int) -> tuple[tuple[float, float
 
 
 def _run(commands: list[list[str]]) -> tuple[tuple[float, float], list[str]]:
-    """Wall and processor seconds of commands at once, and what they say."""
+    """Run commands at once; return wall and processor seconds, and what they say."""
     began, used = time.perf_counter(), _children()
     running = [subprocess.Popen(each, stdout=subprocess.PIPE, text=True) for each in commands]
     said = [process.communicate()[0] for process in running]
@@ -81,6 +81,6 @@ def _run(commands: list[list[str]]) -> tuple[tuple[float, float], list[str]]:
 
 
 def _children() -> float:
-    """Processor seconds of the processes that this one started and that have ended."""
+    """Return the processor seconds of the processes that this one started and that have ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime

@@ -41,11 +41,11 @@ def torus(folder: Path, faces: int) -> None:
 
 
 def side_of(faces: int) -> int:
-    """Vertices around a torus of about so many faces, either way."""
+    """Return how many vertices a torus of about so many faces has around, either way."""
     return max(3, round(math.sqrt(faces / 2)))
 
 
 def bytes_of(faces: int) -> int:
-    """What the arrays of such a torus take."""
+    """Return what the arrays of such a torus take."""
     vertices = side_of(faces) ** 2
     return 24 * vertices + 12 * 2 * vertices

@@ -7,7 +7,7 @@ from typing import Any
 
 
 def plot(known: dict[str, Any], picture: Path) -> None:
-    """Growth with faces and with parts, as docs/scale.md shows it."""
+    """Draw the growth with faces and with parts, as docs/scale.md shows it."""
     import matplotlib as mpl
 
     mpl.use("agg")

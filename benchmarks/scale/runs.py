@@ -21,7 +21,7 @@ from .watch import Watch
 def large(
     faces: int, levels: int, parts: int | None, workers: int, memory: int, place: Path
 ) -> dict[str, Any]:
-    """`pns large`: a torus refined to so many faces outside memory; all files are removed again."""
+    """Measure `pns large`: a torus refined to so many faces outside memory; files are removed."""
     from rich.console import Console
 
     from service.options import Options
@@ -60,7 +60,7 @@ def large(
 
 
 def in_memory(threads: int, faces: int, levels: int) -> dict[str, Any]:
-    """`refine` of a torus in memory, the better of two."""
+    """Measure `refine` of a torus in memory, the better of two."""
     from pns_common import Mesh, load_model, pns, refine
     from pns_common.fused import load_kernels
 
@@ -79,7 +79,10 @@ def in_memory(threads: int, faces: int, levels: int) -> dict[str, Any]:
 
 
 def manifest(rows: int) -> dict[str, Any]:
-    """The driver's memory over a dry run of a manifest; each second row names a missing file."""
+    """Measure the driver's memory over a dry run of a manifest.
+
+    Each second row names a missing file.
+    """
     from rich.console import Console
 
     from service.options import Limits, Options
@@ -103,6 +106,6 @@ def manifest(rows: int) -> dict[str, Any]:
 
 
 def processor_seconds() -> float:
-    """Of this process so far, and of its workers that have ended."""
+    """Return the seconds of this process so far, and of its workers that have ended."""
     used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return sum(each.ru_utime + each.ru_stime for each in used)

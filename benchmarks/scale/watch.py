@@ -45,7 +45,7 @@ class Watch:
             self.disk = max(self.disk, shutil.disk_usage(self.folder).used - self._used)
 
     def as_dict(self) -> dict[str, int]:
-        """All values, by process and kind."""
+        """Return all values, by process and kind."""
         named = {f"driver_{kind}_bytes": value for kind, value in self.driver.items()}
         named |= {f"worker_{kind}_bytes": value for kind, value in self.worker.items()}
         return named | {"disk_bytes": self.disk}

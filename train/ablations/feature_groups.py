@@ -34,7 +34,7 @@ class Choice:
 
 
 def choices(whole: FeatureSet, base: FeatureSet) -> tuple[Choice, ...]:
-    """The whole set, the whole less each group beyond the base, the base, and base plus each."""
+    """List the whole set, it less each group beyond the base, the base, and base plus each."""
     groups = [group for group in whole.groups if group not in base.groups]
     less = [
         Choice(f"less {group.name}", _subset(whole, [g for g in whole.groups if g is not group]))
@@ -72,7 +72,7 @@ def features_scheme(recipe: Recipe, features: FeatureSet, network: BoundedNet) -
 
 
 def named(table: Mapping[str, FeatureSet] = FEATURE_SETS) -> tuple[Choice, ...]:
-    """The choices between the bundled sets."""
+    """Return the choices between the bundled sets."""
     return choices(table["signed-18"], table["paper-5"])
 
 

@@ -79,13 +79,13 @@ def _edge_rule(level: ControlLevel) -> Placement:
 
 
 def _extraordinary(topology: Topology, valence: Int[np.ndarray, " V"]) -> Bool[np.ndarray, " V"]:
-    """Whether a vertex has one closed fan of a valence other than 6 (a star needs three)."""
+    """Return whether a vertex has one closed fan of a valence other than 6 (a star needs three)."""
     closed = (sharp_edge_count(topology) == 0) & ~multi_fan_vertices(topology)
     return closed & (valence >= 3) & (valence != REGULAR_VALENCE)
 
 
 def _twins(topology: Topology) -> Int[np.ndarray, " H"]:
-    """For each half-edge the other one of its interior edge; −1 where there is none."""
+    """Return for each half-edge the other one of its interior edge; −1 where there is none."""
     twin = np.full(topology.faces.size, -1)
     first, second = topology.half_edges[topology.interior].T
     twin[first], twin[second] = second, first

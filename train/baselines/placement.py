@@ -40,5 +40,5 @@ def midpoints(level: ControlLevel) -> Float[np.ndarray, "E 3"]:
 
 
 def is_interior(topology: Topology) -> np.ndarray:
-    """Whether each edge is an interior one, as a column."""
+    """Return whether each edge is an interior one, as a column."""
     return (topology.edge_class == EdgeClass.INTERIOR)[:, None]

@@ -45,7 +45,7 @@ def _aligned(subject: Subject, flat: Sequence[Body], seed: int) -> Certificate:
 
 
 def _off_loop(scheme: Scheme, mesh: Mesh, axis: int) -> float:
-    """How far a planar mesh's refinement is from Loop's; but for boundaries where these move.
+    """Return how far planar refinements are from Loop's; but for boundaries where these move.
 
     These stay in the plane: there the coordinate across it is compared, everything else at the
     first level.

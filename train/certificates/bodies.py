@@ -28,7 +28,7 @@ class Body:
 
 
 def synthetic_bodies(seed: int) -> tuple[Body, ...]:
-    """The paper's battery, shape-regular: a paraboloid, a bumpy sphere and a ridge."""
+    """Return the paper's battery, shape-regular: a paraboloid, a bumpy sphere and a ridge."""
     (ridge,) = draw_ridges(seed=999, count=1)
     return (
         Body("paraboloid", paraboloid(seed)),
@@ -38,14 +38,14 @@ def synthetic_bodies(seed: int) -> tuple[Body, ...]:
 
 
 def paraboloid(seed: int) -> Mesh:
-    """z = 0.6 x² + 0.4 y² over the jittered patch: every vertex curved, boundaries."""
+    """Return z = 0.6 x² + 0.4 y² over the jittered patch: every vertex curved, boundaries."""
     plane = jittered_grid(seed, jitter=0.4).numpy().astype(np.float64)
     height = 0.6 * plane[:, 0] ** 2 + 0.4 * plane[:, 1] ** 2
     return Mesh(np.column_stack([plane, height]), grid_faces())
 
 
 def bumpy_sphere(seed: int) -> Mesh:
-    """A sphere of 320 faces with bumps of 15 %: closed, valences 5 and 6."""
+    """Return a sphere of 320 faces with bumps of 15 %: closed, valences 5 and 6."""
     sphere = trimesh.creation.icosphere(subdivisions=2)
     directions = np.asarray(sphere.vertices, dtype=np.float64)
     waves = 3 * np.random.default_rng(seed).standard_normal((3, 3))
@@ -54,7 +54,7 @@ def bumpy_sphere(seed: int) -> Mesh:
 
 
 def bumpy_torus(seed: int, around: int = 12, across: int = 6) -> Mesh:
-    """A torus of 12 × 6 quads, halved: closed and every vertex regular."""
+    """Return a torus of 12 × 6 quads, halved: closed and every vertex regular."""
     u, v = (axis.ravel() for axis in np.mgrid[:around, :across])
     phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, 2)
     alpha, beta = 2 * np.pi * u / around, 2 * np.pi * v / across
@@ -71,7 +71,7 @@ def bumpy_torus(seed: int, around: int = 12, across: int = 6) -> Mesh:
 
 
 def flat_bodies(seed: int) -> tuple[Body, ...]:
-    """Planar meshes in z = 0, none folded: a grid, a triangulation of any valences, stars."""
+    """Return planar meshes in z = 0, none folded: a grid, one of any valences, stars."""
     plane = jittered_grid(seed, jitter=0.4).numpy().astype(np.float64)
     # Triangles too thin would fold over in the plane once Loop has moved them.
     scattered = jittered_grid(seed + 1, jitter=1.2).numpy().astype(np.float64)
@@ -83,7 +83,7 @@ def flat_bodies(seed: int) -> tuple[Body, ...]:
 
 
 def real_bodies(folder: Path) -> tuple[Body, ...]:
-    """The mesh files of a folder, cleaned, centred and scaled to the reference length 1.
+    """Read the mesh files of a folder, cleaned, centred and scaled to the reference length 1.
 
     Raises:
         MeshError: the folder has no mesh file.
@@ -95,7 +95,7 @@ def real_bodies(folder: Path) -> tuple[Body, ...]:
 
 
 def random_motion(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """A rotation, uniform over all, and a translation of about the meshes' size."""
+    """Draw a rotation, uniform over all, and a translation of about the meshes' size."""
     # A normalised Gaussian quaternion is uniform.
     return Rotation.from_quat(rng.standard_normal(4)).as_matrix(), rng.standard_normal(3)
 

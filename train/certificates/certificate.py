@@ -56,12 +56,12 @@ class Certificate:
 
 
 def worst(measured: list[tuple[float, str]]) -> tuple[float, str]:
-    """The largest value with its place; a NaN is worse than any number."""
+    """Return the largest value with its place; a NaN is worse than any number."""
     return max(measured, key=lambda entry: math.inf if math.isnan(entry[0]) else entry[0])
 
 
 def farthest(measured: list[tuple[float, str]], expected: float) -> tuple[float, str]:
-    """The value farthest from the expected one, with its place; a NaN is farther than any."""
+    """Return the value farthest from the expected one, and its place; a NaN is farthest."""
     return max(
         measured, key=lambda entry: math.inf if math.isnan(entry[0]) else abs(entry[0] - expected)
     )

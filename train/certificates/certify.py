@@ -97,7 +97,7 @@ def certify_model_file(
 def scheme_steps(
     subject: Subject, real: Sequence[Body], seed: int, valences: Sequence[int]
 ) -> list[Step]:
-    """The certificates of a scheme, ready to run."""
+    """Return the certificates of a scheme, ready to run."""
     shaped, flat = synthetic_bodies(seed), flat_bodies(seed)
     every = (*shaped, *real)
     return [
@@ -114,7 +114,10 @@ def scheme_steps(
 
 
 def _steps_of_kind(subject: Subject, bodies: Sequence[Body], valences: Sequence[int]) -> list[Step]:
-    """Schemes that turn into Loop have its spectra; of others lifted stars say more."""
+    """Return the certificates that a kind of scheme has.
+
+    Schemes that turn into Loop have its spectra; of others lifted stars say more.
+    """
     if subject.scheme.guard is None:
         return [Step("stars", "lifted stars", lambda: lifted_stars(subject, valences))]
     return [
@@ -140,12 +143,12 @@ def run_steps(steps: Sequence[Step], on_progress: OnProgress) -> tuple[Certifica
 
 
 def refused(theorem: str, title: str, error: PnsError) -> Certificate:
-    """A certificate that could not be measured, and so has failed."""
+    """Return a certificate that could not be measured, and so has failed."""
     return Certificate(theorem, title, math.nan, where=str(error))
 
 
 def verdict_json(verdict: Verdict) -> bytes:
-    """A verdict as JSON; numbers that JSON does not know (NaN, ∞) are null."""
+    """Return a verdict as JSON; numbers that JSON does not know (NaN, ∞) are null."""
     rows = [
         {
             "theorem": certificate.theorem,
@@ -164,7 +167,7 @@ def verdict_json(verdict: Verdict) -> bytes:
 
 
 def verdict_table(verdict: Verdict) -> Table:
-    """One row a certificate."""
+    """Return the verdict as a table, one row a certificate."""
     table = Table(title=f"Certificates of {verdict.name}", title_justify="left")
     for heading in ("", "Property"):
         table.add_column(heading, no_wrap=heading == "")

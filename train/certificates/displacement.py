@@ -59,7 +59,7 @@ def worst_ratio(
     moves_boundaries: bool = False,
     wide_bound: bool = False,
 ) -> tuple[float, str]:
-    """The largest ratio ‖p − p_Loop‖ / (C h² / R) of one step, and at which vertex.
+    """Return the largest ratio ‖p − p_Loop‖ / (C h² / R) of one step, and at which vertex.
 
     ``curvature`` is C / R; what the rule moves and what its bound counts: as in ``Scheme``.
     """

@@ -80,7 +80,7 @@ class DoubleModel:
 
 
 def double_model(model: OnnxModel, data: bytes) -> DoubleModel:
-    """The network of a checked model file (`data` are its bytes) in double precision."""
+    """Open the network of a checked model file (`data` are its bytes) in double precision."""
     proto = onnx.load_from_string(data)
     for tensor in proto.graph.initializer:
         tensor.CopyFrom(_widened(tensor))
@@ -93,7 +93,7 @@ def double_model(model: OnnxModel, data: bytes) -> DoubleModel:
 
 
 def read_bytes(source: str | Path) -> bytes:
-    """The bytes of a bundled model or of a file that `load_model` has accepted."""
+    """Read the bytes of a bundled model or of a file that `load_model` has accepted."""
     if isinstance(source, str) and source in bundled_models():
         return (BUNDLED / f"{source}.onnx").read_bytes()
     return Path(source).read_bytes()

@@ -57,7 +57,7 @@ def _certify(
 def discrepancy(
     scheme: Scheme, mesh: Mesh, turn: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, "3"]
 ) -> tuple[Float[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
-    """‖S(gM) − g S(M)‖ at each new vertex, and which vertices the theorem speaks of."""
+    """Return ‖S(gM) − g S(M)‖ at each new vertex, and which vertices the theorem speaks of."""
     still = step(scheme, mesh)
     moved = step(scheme, Mesh(mesh.vertices @ turn.T + shift, mesh.faces))
     apart = np.linalg.norm(moved.positions - (still.positions @ turn.T + shift), axis=1)
@@ -67,7 +67,7 @@ def discrepancy(
 
 
 def well_conditioned(mesh: Mesh) -> Bool[np.ndarray, " E"]:
-    """Edges between well-shaped faces that are not nearly folded; others than interior too."""
+    """Mark edges between well-shaped faces, not nearly folded; also others than interior."""
     topology = build_topology(mesh.faces, len(mesh.vertices))
     interior = topology.interior
     good = np.ones(len(topology.edges), dtype=bool)
@@ -85,7 +85,7 @@ def _open(mesh: Mesh, topology: Topology) -> Bool[np.ndarray, " I"]:
 
 
 def _smallest_sine(mesh: Mesh) -> Float[np.ndarray, " F"]:
-    """Of a face's angles: twice its area over the product of its two longest sides."""
+    """Return a face's smallest sine: twice its area over the product of its two longest sides."""
     corners = mesh.vertices[mesh.faces]
     sides = corners[:, [1, 2, 0]] - corners
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)

@@ -49,7 +49,7 @@ def fold_free(subject: Subject, bodies: Sequence[Body]) -> Certificate:
 def largest_turn(
     faces: Int[np.ndarray, "F 3"], before: Float[np.ndarray, "V 3"], after: Float[np.ndarray, "V 3"]
 ) -> float:
-    """The largest angle between a face's normal before and after, in degrees; 180 for NaN."""
+    """Return the largest angle of a face's normals before and after, in degrees; 180 for NaN."""
     vectors, longest = [], []
     for points in (before, after):
         a, b, c = points[faces].transpose(1, 0, 2)
@@ -130,7 +130,7 @@ def resolution_independence(subject: Subject, bodies: Sequence[Body]) -> Certifi
 
 
 def unbounded(scheme: Scheme) -> Scheme:
-    """The scheme with a budget that nothing reaches, where its rules say how to."""
+    """Return the scheme with a budget that nothing reaches, where its rules say how to."""
     vertices, edges = scheme.vertex_rule, scheme.edge_rule
     if not (isinstance(vertices, ScaleFreeVertexRule) and isinstance(edges, ScaleFreeEdgeRule)):
         return scheme

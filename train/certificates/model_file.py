@@ -36,7 +36,7 @@ def keeps_its_word(model: Model) -> list[Certificate]:
 
 
 def sample_features(count: int, seed: int = 0) -> Float[np.ndarray, "N K"]:
-    """Rows as meshes give them, then wide ones, then slivers (e^±30), flat and folded edges."""
+    """Draw rows as meshes give them, then wide ones, slivers (e^±30), flat and folded edges."""
     rng = np.random.default_rng(seed)
     width = 10.0 ** rng.uniform(-1, 1.5, size=(SAMPLES, 1))
     rows = width * rng.uniform(-1, 1, size=(SAMPLES, count))
@@ -94,7 +94,7 @@ def _metrics(model: Model) -> Certificate:
 
 
 def _claimed_percent(claimed: Any, metric: str) -> float:
-    """What a card says of a metric; NaN, which fails, where it says nothing readable."""
+    """Return what a card says of a metric; NaN, which fails, where it says nothing readable."""
     row = claimed.get(metric) if isinstance(claimed, Mapping) else None
     value = row.get("percent") if isinstance(row, Mapping) else None
     return float(value) if isinstance(value, int | float) else math.nan

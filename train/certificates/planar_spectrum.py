@@ -61,13 +61,13 @@ def planar_spectrum(subject: Subject, valences: Sequence[int] = VALENCES) -> lis
 
 
 def spectrum(scheme: Scheme, valence: int) -> np.ndarray:
-    """|λ| of the linearisation at a flat star, largest first, translations left out."""
+    """Return |λ| of the linearisation at a flat star, largest first, translations left out."""
     matrix = without_translations(jacobian(scheme, closed_star(scheme, valence)(0.0), FINE))
     return np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
 
 
 def derivative_of_departure(scheme: Scheme, valence: int) -> float:
-    """The largest ‖S − S_Loop‖ / ε of a flat star moved by a tiny ε in any inner coordinate.
+    """Return the largest ‖S − S_Loop‖ / ε of a flat star moved by a tiny ε in any inner coordinate.
 
     One-sided: a gate with a kink at flat faces cancels in central differences, and automatic
     differentiation calls its slope 0 too.

@@ -38,13 +38,13 @@ def normal_variation_slope(subject: Subject, bodies: Sequence[Body]) -> Certific
 
 
 def distance_from_loop(scheme: Scheme, mesh: Mesh) -> float:
-    """‖S(M) − S_Loop(M)‖ over all new vertices."""
+    """Return ‖S(M) − S_Loop(M)‖ over all new vertices."""
     apart = step(scheme, mesh).positions - step(loop(), mesh).positions
     return float(np.linalg.norm(apart, axis=1).max())
 
 
 def normals_from_loop(scheme: Scheme, mesh: Mesh) -> float:
-    """‖n − n_Loop‖ over all faces of the refined mesh."""
+    """Return ‖n − n_Loop‖ over all faces of the refined mesh."""
     ours, base = step(scheme, mesh), step(loop(), mesh)
     faces = split(ours.topology)
     apart = face_normals(ours.positions, faces) - face_normals(base.positions, faces)
@@ -52,7 +52,7 @@ def normals_from_loop(scheme: Scheme, mesh: Mesh) -> float:
 
 
 def fitted_slope(x: Float[np.ndarray, " N"], y: Float[np.ndarray, " N"]) -> float:
-    """The slope of log y over log x, by least squares."""
+    """Return the slope of log y over log x, by least squares."""
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
 

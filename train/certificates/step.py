@@ -43,7 +43,7 @@ def step(scheme: Scheme, mesh: Mesh, reference_length: float = 1.0) -> Step:
 
 
 def departure(scheme: Scheme, mesh: Mesh, reference_length: float = 1.0) -> Step:
-    """A step whose displacement is recomputed from the positions and Loop's.
+    """Return a step whose displacement is recomputed from the positions and Loop's.
 
     The difference of positions sees everything; where it is below their rounding, what the scheme
     says it has added is finer.
@@ -56,7 +56,7 @@ def departure(scheme: Scheme, mesh: Mesh, reference_length: float = 1.0) -> Step
 
 
 def rounding(mesh: Mesh) -> float:
-    """How far two ways of computing one position may differ."""
+    """Return how far two ways of computing one position may differ."""
     return 16 * float(np.finfo(float).eps) * float(np.abs(mesh.vertices).max())
 
 

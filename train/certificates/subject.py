@@ -33,18 +33,18 @@ class Subject:
 
 
 def subject_of_model(model: Model, exact: Model, budget: float | None = None) -> Subject:
-    """The learned operator with a model, and with the same model in double precision."""
+    """Return the learned operator with a model, and with the same model in double precision."""
     scheme = pns(model, budget)
     return Subject(model.name, scheme, pns(exact, budget), float(scheme.budget or 0.0))
 
 
 def subject_of_network(model: TorchModel, budget: float | None = None) -> Subject:
-    """The learned operator with a torch network."""
+    """Return the learned operator with a torch network."""
     vertices = None if model.vertex_network is None else in_double(model.vertex_network)
     exact = TorchModel(model.name, model.card, in_double(model.network), vertices)
     return subject_of_model(model, exact, budget)
 
 
 def in_double(network: BoundedNet) -> BoundedNet:
-    """A copy of a network in double precision."""
+    """Return a copy of a network in double precision."""
     return copy.deepcopy(network).double()

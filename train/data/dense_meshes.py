@@ -117,7 +117,7 @@ def largest_part(mesh: Mesh) -> Mesh:
 
 
 def is_manifold(mesh: Mesh) -> bool:
-    """Whether all edges are interior or boundary and every vertex has one fan, and is used."""
+    """Return whether all edges are interior or boundary, and all vertices used, with one fan."""
     topology = build_topology(mesh.faces, len(mesh.vertices))
     regular = bool((topology.edge_class != EdgeClass.IRREGULAR).all())
     used = len(np.unique(mesh.faces)) == len(mesh.vertices)

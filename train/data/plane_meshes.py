@@ -20,18 +20,18 @@ class PlaneMesh:
 
 
 def regular_grid(rng: np.random.Generator, side: int, jitter: float) -> PlaneMesh:
-    """All diagonals run one way, as in the paper's patch."""
+    """Make a grid whose diagonals all run one way, as in the paper's patch."""
     return _grid(_jittered(rng, side, jitter), np.zeros((side - 1, side - 1), dtype=bool))
 
 
 def turned_grid(rng: np.random.Generator, side: int, jitter: float) -> PlaneMesh:
-    """Each diagonal runs either way, at random."""
+    """Make a grid each of whose diagonals runs either way, at random."""
     points = _jittered(rng, side, jitter)
     return _grid(points, rng.random((side - 1, side - 1)) < 0.5)
 
 
 def scattered(rng: np.random.Generator, side: int, jitter: float) -> PlaneMesh:
-    """Delaunay's triangulation of a jittered grid whose rows are shifted by half a spacing."""
+    """Triangulate (Delaunay) a jittered grid whose rows are shifted by half a spacing."""
     points = _jittered(rng, side, jitter)
     odd = (np.arange(side * side) % side) % 2 == 1
     inside = np.abs(points[:, 0]) < 1

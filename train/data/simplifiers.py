@@ -26,7 +26,7 @@ Simplifier = Callable[[Mesh, int], Mesh]
 
 
 def fast_quadric(mesh: Mesh, faces: int, aggressiveness: float = AGGRESSIVENESS) -> Mesh:
-    """Quadric edge collapses in sweeps with a rising threshold (fast-simplification)."""
+    """Collapse edges by quadrics in sweeps with a rising threshold (fast-simplification)."""
     vertices, triangles = fast_simplification.simplify(
         mesh.vertices.copy(), mesh.faces.copy(), target_count=faces, agg=aggressiveness
     )[:2]
@@ -34,19 +34,19 @@ def fast_quadric(mesh: Mesh, faces: int, aggressiveness: float = AGGRESSIVENESS)
 
 
 def quadric(mesh: Mesh, faces: int) -> Mesh:
-    """Quadric edge collapses, the cheapest first (Garland and Heckbert 1997; libigl)."""
+    """Collapse edges by quadrics, the cheapest first (Garland and Heckbert 1997; libigl)."""
     vertices, triangles, *_ = igl.qslim(mesh.vertices, mesh.faces, faces)
     return _mesh(vertices, triangles)
 
 
 def shortest_edges(mesh: Mesh, faces: int) -> Mesh:
-    """Collapses of the shortest edge to its midpoint: even triangles that ignore shape (libigl)."""
+    """Collapse the shortest edge to its midpoint: even triangles, whatever the shape (libigl)."""
     vertices, triangles, *_ = igl.decimate(mesh.vertices, mesh.faces, faces)
     return _mesh(vertices, triangles)
 
 
 def clustered(mesh: Mesh, faces: int) -> Mesh:
-    """Vertices of one cell of a grid become their mean (Rossignac and Borrel 1993).
+    """Merge the vertices in one cell of a grid at their mean (Rossignac and Borrel 1993).
 
     The grid's fineness is found by bisection.
     """

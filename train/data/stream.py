@@ -31,7 +31,7 @@ class Drawn:
 
 
 def ridge(rng: np.random.Generator) -> Drawn:
-    """The paper's family."""
+    """Draw a ridge of the paper's family."""
     surface = Ridge(
         amplitude=rng.uniform(0.2, 0.85),
         sharpness=rng.uniform(2.5, 11),
@@ -43,7 +43,7 @@ def ridge(rng: np.random.Generator) -> Drawn:
 
 
 def curved_ridge(rng: np.random.Generator) -> Drawn:
-    """Ridges along an arc or a whole circle, its centre in the patch.
+    """Draw a ridge along an arc or a whole circle, its centre in the patch.
 
     Where the circle is small, the surface comes to a faint tip at its centre.
     """
@@ -58,7 +58,7 @@ def curved_ridge(rng: np.random.Generator) -> Drawn:
 
 
 def bump(rng: np.random.Generator) -> Drawn:
-    """Bumps from round to twice as long as wide."""
+    """Draw a bump, from round to twice as long as wide."""
     surface = Bump(
         amplitude=rng.uniform(0.2, 0.7),
         sharpness=rng.uniform(1.5, 7),
@@ -71,13 +71,13 @@ def bump(rng: np.random.Generator) -> Drawn:
 
 
 def saddle(rng: np.random.Generator) -> Drawn:
-    """The paper's saddles, on which Loop is hard to beat."""
+    """Draw one of the paper's saddles, on which Loop is hard to beat."""
     surface = Saddle(rng.uniform(0.2, 0.7), rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2))
     return _graph(surface)
 
 
 def lumpy_sphere(rng: np.random.Generator) -> Drawn:
-    """A part of a sphere with waves; the patch is laid on it by central projection."""
+    """Draw a part of a sphere with waves; the patch is laid on it by central projection."""
     radius = rng.uniform(1.2, 2.5)
     surface = LumpySphere(
         radius,
@@ -97,7 +97,7 @@ def lumpy_sphere(rng: np.random.Generator) -> Drawn:
 
 
 def fillet(rng: np.random.Generator) -> Drawn:
-    """Two walls at a right angle with a fillet, sharp to wide."""
+    """Draw two walls at a right angle with a fillet, sharp to wide."""
     surface = Fillet(rng.uniform(0.1, 0.9))
     shift = rng.uniform(-0.25, 0.25)
     turn = rng.uniform(0, np.pi)
@@ -111,7 +111,7 @@ def fillet(rng: np.random.Generator) -> Drawn:
 
 
 def crossing(rng: np.random.Generator) -> Drawn:
-    """Two crossing ridges: held out of every stream."""
+    """Draw two crossing ridges: held out of every stream."""
     angle = rng.uniform(0, np.pi)
     surface = Crossing(
         amplitude=rng.uniform(0.3, 0.6),
@@ -154,7 +154,7 @@ def random_instance(rng: np.random.Generator) -> Instance:
 
 
 def decimated(rng: np.random.Generator, lift: Lift) -> Mesh:
-    """A dense mesh of the surface, simplified: vertices of all valences, near the surface."""
+    """Simplify a dense mesh of the surface: vertices of all valences, near the surface."""
     dense = _mesh(regular_grid(rng, 41, 0.3), lift)
     count = int(rng.integers(100, 260))
     points, faces = fast_simplification.simplify(
@@ -164,7 +164,7 @@ def decimated(rng: np.random.Generator, lift: Lift) -> Mesh:
 
 
 def stream(seed: int) -> Iterator[Instance]:
-    """All instances of a seed, without end."""
+    """Yield all instances of a seed, without end."""
     rng = np.random.default_rng(seed)
     while True:
         yield random_instance(rng)

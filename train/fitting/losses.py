@@ -12,27 +12,27 @@ from train.models.recipes import LossWeights
 
 
 def distance_loss(distance: Float[Tensor, " I"]) -> Float[Tensor, ""]:
-    """L_sdf: mean squared signed distance of inserted vertices to the surface."""
+    """Return L_sdf: mean squared signed distance of inserted vertices to the surface."""
     return (distance**2).mean()
 
 
 def normal_loss(
     normals: Float[Tensor, "I 3"], surface_normals: Float[Tensor, "I 3"]
 ) -> Float[Tensor, ""]:
-    """L_n: mean of 1 − n·n*, between the refined mesh's normals and the surface's."""
+    """Return L_n: mean of 1 − n·n*, between the refined mesh's normals and the surface's."""
     return (1 - dot(normals, surface_normals)).mean()
 
 
 def fairness_loss(
     normals: Float[Tensor, "I 3"], pairs: Int[np.ndarray, "P 2"]
 ) -> Float[Tensor, ""]:
-    """L_fair: mean squared difference of normals over pairs of inserted vertices on one face."""
+    """Return L_fair: mean squared difference of normals over pairs of new vertices on one face."""
     first, second = (gather(normals, side) for side in pairs.T)
     return ((first - second) ** 2).sum(dim=-1).mean()
 
 
 def proximity_loss(ratio: Float[Tensor, " I"]) -> Float[Tensor, ""]:
-    """L_prox: mean squared proximity ratio.
+    """Return L_prox: mean squared proximity ratio.
 
     The bound itself is architectural; this term only discourages spending without gain.
     """

@@ -37,14 +37,14 @@ class Support:
 
 
 def support_of(meshes: list[Mesh], features: FeatureSet) -> Support:
-    """The features at the interior edges of the training meshes."""
+    """Return the features at the interior edges of the training meshes."""
     rows = torch.from_numpy(np.concatenate([_edge_features(mesh, features) for mesh in meshes]))
     rows = rows.to(torch.float32)
     return Support(rows, rows.amin(dim=0), rows.amax(dim=0))
 
 
 def draw_features(support: Support, generator: torch.Generator) -> Float[Tensor, "D K"]:
-    """Features of edges that the training set may not have; the first is the curvature."""
+    """Draw features of edges that the training set may not have; the first is the curvature."""
     half, width = DRAWS // 2, support.rows.shape[1] - 1
     chosen = torch.randint(len(support.rows), (half,), generator=generator)
     noise = SHAPE_NOISE * torch.randn(half, width, generator=generator)
@@ -66,7 +66,7 @@ def quiet_loss(
 def quiet_term(
     meshes: list[Mesh], features: FeatureSet, seed: int
 ) -> Callable[[BoundedNet], Float[Tensor, ""]]:
-    """The quiet loss of a network, on features drawn anew at every call."""
+    """Return the quiet loss of a network, on features drawn anew at every call."""
     support = support_of(meshes, features)
     generator = torch.Generator().manual_seed(seed)
     return lambda network: quiet_loss(network, support, draw_features(support, generator))

@@ -127,7 +127,7 @@ def collapsed(mesh: Mesh, faces: int) -> Mesh:
 
 
 def euler_characteristic(mesh: Mesh) -> int:
-    """V − E + F, over the vertices in use."""
+    """Return V − E + F, over the vertices in use."""
     ends = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     used = len(np.unique(mesh.faces))
     return used - len(np.unique(ends, axis=0)) + len(mesh.faces)

@@ -139,7 +139,7 @@ def _common_corner(first, i, j):
 
 @njit(cache=True)
 def _cross(vertices, planes, faces, i, j):
-    """Whether an edge of either triangle passes through the other; never where they share two."""
+    """Return whether an edge of either passes through the other; never where they share two."""
     shared = 0
     for corner in range(3):
         shared += _is_of(faces[i, corner], faces, j)
@@ -158,7 +158,7 @@ def _is_of(vertex, faces, i):
 
 @njit(cache=True)
 def _on_one_side(vertices, planes, faces, plane, other):
-    """Whether the corners that a face has alone lie clearly on one side of the other's plane."""
+    """Return whether the corners a face has alone lie clearly on one side of the other's plane."""
     above, below = False, False
     for corner in range(3):
         vertex = faces[other, corner]
@@ -171,7 +171,7 @@ def _on_one_side(vertices, planes, faces, plane, other):
 
 @njit(cache=True)
 def _edge_pierces(vertices, faces, i, j):
-    """Whether an edge of face i passes through face j."""
+    """Return whether an edge of face i passes through face j."""
     for corner in range(3):
         start, end = faces[i, corner], faces[i, (corner + 1) % 3]
         if (
@@ -185,7 +185,7 @@ def _edge_pierces(vertices, faces, i, j):
 
 @njit(cache=True)
 def _pierces(vertices, start, end, a, b, c):
-    """Whether a segment passes through a triangle (Möller and Trumbore 1997)."""
+    """Return whether a segment passes through a triangle (Möller and Trumbore 1997)."""
     u, v = between(vertices, a, b), between(vertices, a, c)
     along, offset = between(vertices, start, end), between(vertices, a, start)
     side = cross(along, v)

@@ -26,7 +26,7 @@ State = Mapping[str, Tensor]
 
 
 def is_operator(checkpoint: str) -> bool:
-    """Whether a checkpoint's network is PNS itself, not an ablated or unconstrained variant."""
+    """Return whether a checkpoint's network is PNS itself, not ablated, not unconstrained."""
     return checkpoint.startswith("pns_") or checkpoint == "ablation_PNS_full_trained"
 
 

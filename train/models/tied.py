@@ -164,7 +164,7 @@ class _Invariant(nn.Module):
 
 
 def product(size: int) -> Int[np.ndarray, "G G"]:
-    """The place of g h among the elements of a group made of commuting generators of order two.
+    """Return where g h stands in a group made of commuting generators of order two.
 
     `symmetries` numbers them by which generators they are made of, one bit each.
     """

@@ -16,11 +16,11 @@ def margin_gradient(spectrum: Spectrum) -> Float[np.ndarray, "L L"]:
 
 
 def _size_gradient(spectrum: Spectrum, index: int) -> Float[np.ndarray, "L L"]:
-    """d|λ|."""
+    """Return d|λ|."""
     value = spectrum.values[index]
     return np.real(np.conj(value) / max(abs(value), 1e-300) * _gradient(spectrum, index))
 
 
 def _gradient(spectrum: Spectrum, index: int) -> np.ndarray:
-    """dλ, complex."""
+    """Return dλ, complex."""
     return np.outer(spectrum.left[index], spectrum.right[:, index])

@@ -46,7 +46,7 @@ def symmetry_blocks(star: Star, valence: int) -> tuple[Subspace, ...]:
 def keeps_blocks(
     matrix: Float[np.ndarray, "M M"], blocks: tuple[Subspace, ...], tolerance: float = 1e-7
 ) -> bool:
-    """Whether a matrix maps every block to itself."""
+    """Return whether a matrix maps every block to itself."""
     kept = sum(block @ (block.T @ matrix @ block) @ block.T for block in blocks)
     return bool(np.abs(matrix - kept).max() <= tolerance * np.abs(matrix).max())
 

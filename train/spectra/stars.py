@@ -62,7 +62,7 @@ def star(
 
 
 def _places(valence: int, rings: int) -> list[Place]:
-    """All places, ring by ring; a spoke belongs to the sector that it begins."""
+    """Return all places, ring by ring; a spoke belongs to the sector that it begins."""
     places: list[Place] = [(0, 0, 0)]
     for ring, sector in product(range(1, rings + 1), range(valence)):
         places += [(sector, ring - j, j) for j in range(ring)]

@@ -34,7 +34,7 @@ def code_of(path: Path) -> bytes:
 
 
 def _says_only(node: ast.AST) -> bool:
-    """Whether a statement is nothing but a text."""
+    """Return whether a statement is nothing but a text."""
     return (
         isinstance(node, ast.Expr)
         and isinstance(node.value, ast.Constant)
