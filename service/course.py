@@ -36,7 +36,7 @@ class Course:
 
     @contextmanager
     def stage(self, name: str, start: float = 0.0, end: float = 1.0) -> Iterator[None]:
-        """A stage, which goes from one share of the part around it to another."""
+        """Go through a stage, from one share of the part around it to another."""
         self.begins(name)
         began = time.perf_counter()
         with self.part(start, end):
@@ -45,7 +45,7 @@ class Course:
 
     @contextmanager
     def part(self, start: float, end: float) -> Iterator[None]:
-        """What goes from one share of the part around it to another, and tells its own shares."""
+        """Go from one share of the part around it to another; shares inside are the part's own."""
         outer = self._start, self._length
         self._start, self._length = outer[0] + outer[1] * start, outer[1] * (end - start)
         try:
@@ -56,13 +56,13 @@ class Course:
             self._start, self._length = outer
 
     def reach(self, share: float) -> None:
-        """So much of the part is done."""
+        """Take note that so much of the part is done."""
         with self._lock:
             self._done = max(self._done, self._start + self._length * share)
             self.moves(min(self._done, 1.0))
 
     def count(self, total: int) -> Callable[[int], None]:
-        """What counts the part's rows, as they are begun."""
+        """Return what counts the part's rows, as they are begun."""
         done = 0
 
         def more(rows: int) -> None:
@@ -73,5 +73,5 @@ class Course:
         return more
 
     def book(self, stage: str, seconds: float) -> None:
-        """A part of a stage took so long."""
+        """Take note that a part of a stage took so long."""
         self.seconds[stage] = self.seconds.get(stage, 0.0) + seconds

@@ -21,7 +21,7 @@ class JsonLines(logging.Formatter):
     """
 
     def format(self, record: logging.LogRecord) -> str:
-        """The line."""
+        """Return the line."""
         fields: dict[str, Any] = {
             "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
             "level": record.levelname.lower(),
@@ -56,7 +56,7 @@ def configure(level: int = logging.INFO) -> None:
 
 
 def _bounded(text: str) -> str:
-    """The beginning and the end of a text that is too long: a traceback's cause stands last."""
+    """Return the beginning and the end of a text too long: a traceback's cause stands last."""
     if len(text) <= LONGEST:
         return text
     half = LONGEST // 2

@@ -67,7 +67,7 @@ def print_model(model: OnnxModel) -> None:
 
 
 def _further_rows(card: ModelCard) -> dict[str, Any]:
-    """What the card says of what not every model has."""
+    """Return what the card says of what not every model has."""
     rows = {
         "vertex features": card.vertex_features,
         "vertex gate sharpness c": card.vertex_gate_sharpness,
@@ -84,7 +84,7 @@ def _further_rows(card: ModelCard) -> dict[str, Any]:
 
 
 def _headline(card: ModelCard) -> list[str]:
-    """The improvements by which models are compared; a dash for what the card does not hold."""
+    """Return the improvements that models are compared by; a dash for what a card does not hold."""
     shown: list[str] = []
     for dataset, metric in HEADLINE_COLUMNS.values():
         measured = card.metrics.get(dataset, {})
@@ -94,7 +94,7 @@ def _headline(card: ModelCard) -> list[str]:
 
 
 def _tables(title: str, data: Mapping[str, Any]) -> Iterator[Table]:
-    """Nested data as tables: single values in a list, what has rows and columns in a grid."""
+    """Yield nested data as tables: single values in a list, rows and columns in a grid."""
     if _is_measured(data):
         yield _metrics_table(title, data)
     elif _is_grid(data):
@@ -109,14 +109,14 @@ def _tables(title: str, data: Mapping[str, Any]) -> Iterator[Table]:
 
 
 def _is_measured(value: Any) -> bool:
-    """Whether a card's metric is a table of rows as this project's export writes them."""
+    """Return whether a card's metric is a table of rows as this project's export writes them."""
     return _is_grid(value, most=None) and all(
         set(METRIC_COLUMNS) <= set(row) for row in value.values()
     )
 
 
 def _is_grid(value: Any, most: int | None = WIDEST_GRID) -> bool:
-    """Whether it is rows by name, with the same columns of single values in each."""
+    """Return whether it is rows by name, with the same columns of single values in each."""
     if not isinstance(value, Mapping) or not value:
         return False
     rows = list(value.values())

@@ -50,7 +50,7 @@ def build_report(
     unused_vertices: int,
     changes: Sequence[Change],
 ) -> dict[str, Any]:
-    """The report as JSON data; `unused_vertices` of the file were dropped."""
+    """Build the report as JSON data; `unused_vertices` of the file were dropped."""
     refined = [result.report for result in results if result.report is not None]
     return {
         "scheme": scheme.name,
@@ -76,12 +76,12 @@ def build_report(
 
 
 def dropped(degenerate_faces: int, vertices: int) -> dict[str, int]:
-    """What a file loses. Duplicate faces never are: refined once, they come back as copies."""
+    """Return what a file loses. Duplicate faces stay: refined once, they come back as copies."""
     return {"degenerate_faces": degenerate_faces, "duplicate_faces": 0, "vertices": vertices}
 
 
 def total_level(levels: Sequence[LevelReport]) -> LevelReport:
-    """One level over several meshes: counts add, means weigh by what is meant, largest wins.
+    """Total a level over meshes: counts add, means weigh by what is meant, the largest wins.
 
     The p99 of the whole does not follow from the meshes' own; the largest of them bounds it.
     """

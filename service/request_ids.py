@@ -15,7 +15,7 @@ REQUEST_ID: ContextVar[str | None] = ContextVar("request_id", default=None)
 
 
 def id_of(headers: list[tuple[bytes, bytes]]) -> str:
-    """The id that the client sent, where it is a sane one, else a new one."""
+    """Return the id that the client sent, where it is a sane one, else a new one."""
     sent = [value for name, value in headers if name == HEADER]
     if len(sent) == 1 and _SANE.fullmatch(sent[0]):
         return sent[0].decode()

@@ -21,12 +21,12 @@ Network = IPv4Network | IPv6Network
 
 
 def _worker_default() -> int:
-    """Two refinements side by side at most: each may take `memory`."""
+    """Return how many refine side by side: two at most, since each may take `memory`."""
     return min(2, os.cpu_count() or 1)
 
 
 def _comma_separated(value: object) -> object:
-    """A list as an environment variable holds it; blanks around a name are not part of it."""
+    """Read a list as an environment variable holds it; blanks around names are no part."""
     if isinstance(value, str):
         return [name.strip() for name in value.split(",") if name.strip()]
     return value
@@ -169,7 +169,7 @@ class Settings(BaseSettings):
         return self.workers + self.queue
 
     def job_limits(self) -> Limits:
-        """What one job may cost, as the pipeline checks it."""
+        """Return what one job may cost, as the pipeline checks it."""
         return Limits(
             max_faces=self.faces,
             max_memory_bytes=int(self.memory),

@@ -39,7 +39,7 @@ class ArchiveError(ServiceError):
 
 
 def open_archive(data: bytes, max_bytes: int) -> tuple[File, SiblingFiles]:
-    """The document in a .zip, and the files beside it; unpacked, they hold `max_bytes` at most.
+    """Open the document in a .zip, and the files beside it: unpacked `max_bytes` at most.
 
     Raises:
         UnreadableError: no .zip.
@@ -70,7 +70,7 @@ def _find(unpacker: _Unpacker, folder: str, name: str) -> File | None:
 
 
 def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
-    """The files by name, each checked by what its entry says."""
+    """Return the files by name, each checked by what its entry says."""
     index_bytes = 0
     entries: dict[str, zipfile.ZipInfo] = {}
     for entry in opened.infolist():
@@ -103,7 +103,7 @@ class _Unpacker:
     unpacked: int = field(default=0)
 
     def read(self, name: str) -> File:
-        """One file, unpacked piece by piece until it ends or a limit does."""
+        """Unpack one file piece by piece, until it ends or a limit does."""
         pieces: list[bytes] = []
         allowed = min(self.max_bytes, max(RATIO_FLOOR, MAX_RATIO * self.packed))
         try:

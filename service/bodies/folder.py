@@ -9,7 +9,7 @@ from .sibling_files import File, SiblingFiles
 
 
 def folder_of(document: Path) -> SiblingFiles:
-    """What lies beside a file; links that lead out of its folder are not followed."""
+    """Return what lies beside a file; links that lead out of its folder are not followed."""
     return SiblingFiles(partial(_find, document.parent.resolve()))
 
 

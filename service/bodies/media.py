@@ -36,7 +36,7 @@ BLANK = b" \t\r\n"
 
 
 def of_request(content_type: str) -> str:
-    """The media type that a Content-Type names, without its parameters. Raises MediaTypeError."""
+    """Return the media type of a Content-Type, without its parameters. Raises MediaTypeError."""
     media = content_type.partition(";")[0].strip().lower()
     if media not in ACCEPTED:
         named = f"{media!r} is not supported" if media else "the request has no Content-Type"
@@ -45,7 +45,7 @@ def of_request(content_type: str) -> str:
 
 
 def quality(media: str, accept: str) -> float:
-    """How much an Accept header wants a media type, 0 to 1: its most specific range decides."""
+    """Return how much an Accept header wants a media type, 0 to 1: by its most specific range."""
     wanted: dict[str, float] = {}
     for entry in accept.split(","):
         pattern, *parameters = (part.strip().lower() for part in entry.split(";"))
@@ -58,7 +58,7 @@ def quality(media: str, accept: str) -> float:
 
 
 def sniff(data: bytes) -> str:
-    """GLB, glTF JSON or an archive, by the first bytes: form clients send application/octet-stream.
+    """Tell GLB, glTF JSON or an archive by the first bytes: form clients send octet streams.
 
     Raises MediaTypeError.
     """
@@ -73,6 +73,6 @@ def sniff(data: bytes) -> str:
 
 
 def mesh_kind_of(name: str) -> Kind | None:
-    """What the extension of a file name says, where the first bytes would not tell: no glTF."""
+    """Tell by a file name's extension what the first bytes would not tell: no glTF."""
     extension = name.rpartition(".")[2].lower()
     return next((kind for kind in KINDS if kind == extension and kind not in GLTF_KINDS), None)

@@ -97,7 +97,7 @@ class SentFiles:
 
 
 def sent_files(body: bytes, content_type: str) -> SentFiles:
-    """The files of a form.
+    """Return the files of a form.
 
     A neighbour is called by its part's name, or else by its file name: form clients strip folders
     from the latter.

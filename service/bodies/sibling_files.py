@@ -43,7 +43,7 @@ class Opened:
     files: dict[str, File | None] = field(default_factory=dict)
 
     def open(self, uri: str) -> File | None:
-        """The file behind a URI; None where it did not come, or the URI leads elsewhere."""
+        """Open the file behind a URI; None where it did not come, or the URI leads elsewhere."""
         name = safe_name(uri)
         if name is None:
             return None
@@ -64,12 +64,12 @@ class Opened:
 
 
 def safe_name(uri: str) -> str | None:
-    """The name of a file below the document's folder; None for any other URI."""
+    """Return the name of a file below the document's folder; None for any other URI."""
     return None if _SCHEME.match(uri) else relative_name(unquote(uri))
 
 
 def relative_name(path: str) -> str | None:
-    """A relative path in its shortest form; None for one that could lead out of its folder."""
+    """Return a relative path's shortest form; None if it could lead out of its folder."""
     if path.startswith("/") or "\\" in path or any(ord(letter) < 32 for letter in path):
         return None
     steps = [step for step in path.split("/") if step not in ("", ".")]

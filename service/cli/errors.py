@@ -15,7 +15,7 @@ _SETTING_OF_LIMIT = {
 
 
 def explained(error: Exception) -> tuple[str, int] | None:
-    """The line and the exit code of an error that is not our fault; None for one that is."""
+    """Return the line and the exit code of an error that is not our fault; None for one that is."""
     from pydantic import ValidationError
 
     from pns_common.errors import ParameterError, PnsError
@@ -43,5 +43,5 @@ def explained(error: Exception) -> tuple[str, int] | None:
 
 
 def printable(text: str) -> str:
-    """A text as a terminal may show it: a file's name or content may hold its commands."""
+    """Return a text as a terminal may show it: a file's name or content may hold its commands."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

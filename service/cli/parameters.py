@@ -11,7 +11,7 @@ from ..options import Compression, Diagnostics, NormalRule, Options, SchemeName,
 
 
 def options_of(context: typer.Context) -> Options:
-    """What a command was given of the parameters that every way of refining shares.
+    """Return what a command was given of the parameters that every way of refining shares.
 
     Raises:
         InvalidParameter: one is out of its range.

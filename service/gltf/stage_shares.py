@@ -31,7 +31,7 @@ class StageShares:
 
 
 def stage_shares(scheme: Scheme, options: Options) -> StageShares:
-    """The shares under some options."""
+    """Return the shares under some options."""
     made = [4**level for level in range(1, options.levels + 1)]
     learned = made if scheme.learned_levels is None else made[: scheme.learned_levels]
     refine = 1 + LEARNED_COST * sum(learned) / sum(made) + LIMIT * options.limit

@@ -107,7 +107,7 @@ def subdivide_gltf(
 
 
 def make_scheme(options: Options, model: Model | None) -> Scheme:
-    """The scheme that the options name.
+    """Make the scheme that the options name.
 
     Raises:
         NoModelError: the learned scheme without a model.

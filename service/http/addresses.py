@@ -10,7 +10,7 @@ IPV6_SITE = 64
 
 
 def is_named(address: str, networks: tuple[Network, ...]) -> bool:
-    """Whether an address lies in one of the networks; what is no address lies in none."""
+    """Return whether an address lies in one of the networks; what is no address lies in none."""
     try:
         parsed = ip_address(address)
     except ValueError:
@@ -21,7 +21,7 @@ def is_named(address: str, networks: tuple[Network, ...]) -> bool:
 
 
 def site(address: str) -> str:
-    """The address that counts for a client's share: an IPv6 address's network, others whole."""
+    """Return the address that counts for a client's share: of IPv6 the network, others whole."""
     try:
         parsed = ip_address(address)
     except ValueError:

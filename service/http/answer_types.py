@@ -10,7 +10,7 @@ BYTES = "application/octet-stream"
 
 
 def answer_type(request: Request, *, report: bool = False) -> str:
-    """The media type that the client wants most; `report` where the route has nothing else.
+    """Return the media type that the client wants most; `report` where the route has nothing else.
 
     Generated clients know a file by `application/octet-stream` alone, and may ask for that.
     """

@@ -45,7 +45,7 @@ def create_app(
     warm_up: Callable[[Model | str | None], None] = jobs.warm_up,
     catalogue: Callable[[], Catalogue] = jobs.catalogue,
 ) -> FastAPI:
-    """The application, with worker processes that live as long as its lifespan.
+    """Create the application, with worker processes that live as long as its lifespan.
 
     `settings` None reads the environment; `model` None loads `settings.model`. `job` is what a
     worker calls for each job, `measure` what it calls to predict its cost, `warm_up` what it calls
@@ -131,7 +131,7 @@ def create_app(
 
 
 def _show(metrics: Metrics, desk: Desk, book: JobBook) -> None:
-    """What the metrics say of jobs."""
+    """Set what the metrics say of jobs."""
     desk.watchers.append(
         lambda job: metrics.job(
             job.seconds,

@@ -32,7 +32,7 @@ class ReadOnce:
         self._reading = asyncio.Lock()
 
     async def get(self) -> Catalogue:
-        """The catalogue. Raises ServiceError where no worker can read it now."""
+        """Return the catalogue. Raises ServiceError where no worker can read it now."""
         # One reads, however many ask: it takes the worker that measures every job.
         async with self._reading:
             if self._catalogue is None:
@@ -42,6 +42,6 @@ class ReadOnce:
             return self._catalogue
 
     async def check(self, name: str | None) -> None:
-        """Raises InvalidParameter where there is no model of that name; None is always right."""
+        """Check that there is a model of that name; None always is. Raises InvalidParameter."""
         if name is not None:
             check_choice("model", name, (await self.get()).names)

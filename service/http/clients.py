@@ -26,7 +26,7 @@ class Client:
 
 
 def client_of(request: Request, settings: Settings) -> Client:
-    """The client that an authentication layer has found, else the address that asks."""
+    """Return the client that an authentication layer has found, else the address that asks."""
     identified = getattr(request.state, "client", None)
     if isinstance(identified, Client):
         return identified

@@ -33,7 +33,7 @@ POLICY = "; ".join(
 
 
 def router() -> APIRouter:
-    """The page at `/docs`, and its files under it."""
+    """Route the page at `/docs`, and its files under it."""
     routes = APIRouter(include_in_schema=False)
     # Read and compressed now: it takes longer than a probe should wait for.
     for name in FILES:

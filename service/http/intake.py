@@ -40,7 +40,7 @@ class Wanted:
 async def taken_in(
     service: Service, request: Request, parameters: Parameters, wanted: Wanted
 ) -> AsyncIterator[Job]:
-    """The job of a request, once its body is there. The body's bytes are counted until the end.
+    """Yield the job of a request, once its body is there; the body's bytes count until the end.
 
     Whoever takes the job lets go of what is wanted; where this raises, nothing is left.
 
@@ -100,12 +100,12 @@ async def taken_in(
 
 
 def owner_of(client: Client) -> str | None:
-    """Who alone may see what a client makes; None: everybody who knows its id."""
+    """Return who alone may see what a client makes; None: everybody who knows its id."""
     return client.id if client.named else None
 
 
 def _refuse_repeated(request: Request) -> None:
-    """Of a parameter that is given twice, one value would be lost without a word."""
+    """Refuse a parameter that is given twice: one value would be lost without a word."""
     given = Counter(name for name, _ in request.query_params.multi_items())
     for name, count in given.items():
         if count > 1:

@@ -68,14 +68,14 @@ class JobBook:
         return entry
 
     def find(self, job_id: str, client: str) -> Entry:
-        """The entry of a job that this client may see. Raises NoSuchJobError."""
+        """Return the entry of a job that this client may see. Raises NoSuchJobError."""
         entry = self._entries.get(job_id)
         if entry is None or entry.owner not in (None, client):
             raise NoSuchJobError("no job has this id, or its result is no longer kept")
         return entry
 
     def keep(self, job: Job) -> None:
-        """A job has ended: count its result, make room for it, and forget it in time."""
+        """Keep a job that has ended: count its result, make room for it, forget it in time."""
         entry = self._entries.get(job.id)
         if entry is None or job.state is not State.DONE:
             _release(job)

@@ -39,7 +39,7 @@ log = logging.getLogger("pns.service")
 
 
 def router(service: Service) -> APIRouter:
-    """The routes, bound to one service."""
+    """Make the routes, bound to one service."""
     routes = APIRouter(tags=["jobs"])
 
     @routes.post("/jobs", status_code=202, **documentation.JOBS)
@@ -88,7 +88,7 @@ def router(service: Service) -> APIRouter:
 
 
 def job_json(service: Service, job: Job) -> dict[str, Any]:
-    """A job as its client sees it."""
+    """Return a job as its client sees it."""
     queued = job.state is State.QUEUED
     estimate = service.desk.remaining(job)
     return {
@@ -127,7 +127,7 @@ async def _hand_in(service: Service, request: Request, parameters: Parameters) -
 
 
 async def _work(service: Service, job: Job, held: AsyncExitStack) -> None:
-    """A job that no connection waits for, to its end; while shutting down, to its fetching."""
+    """Do a job that no connection waits for, to its end; while shutting down, to its fetching."""
     async with held:
         try:
             async with service.admission.working():
@@ -147,7 +147,7 @@ async def _work(service: Service, job: Job, held: AsyncExitStack) -> None:
 
 
 async def _events(service: Service, job: Job) -> AsyncIterator[str]:
-    """The job as server-sent events, one for each change, until it has ended."""
+    """Yield the job as server-sent events, one for each change, until it has ended."""
     said, silent = "", 0.0
     while True:
         ended = job.state.ended

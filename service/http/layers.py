@@ -32,7 +32,7 @@ def around(
     keys: dict[str, Entry] | None,
     tracer: Tracer | None = None,
 ) -> ASGIApp:
-    """`app` with everything that is done for every request.
+    """Lay around `app` everything that is done for every request.
 
     `keys` None: it is open to everybody; `tracer` None: nothing is traced.
     """
@@ -55,7 +55,7 @@ def around(
 
 
 def upload_pace(settings: Settings) -> Pace:
-    """How fast a body must come."""
+    """Return how fast a body must come."""
     return Pace(
         rate=int(settings.rate),
         grace=settings.grace_seconds,

@@ -33,7 +33,7 @@ class LimitsEntry(BaseModel):
 
 
 def limits_of(settings: Settings) -> LimitsEntry:
-    """The limits that the settings set."""
+    """Return the limits that the settings set."""
     return LimitsEntry(
         body_bytes=int(settings.body),
         faces=settings.faces,

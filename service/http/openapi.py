@@ -23,7 +23,7 @@ OPEN_TAG = "probes"
 
 
 def operation_id(route: APIRoute) -> str:
-    """The name of the function: it is the clients' name of it, too."""
+    """Return the name of the function: it is the clients' name of it, too."""
     return route.name
 
 
@@ -35,7 +35,7 @@ class Description:
         self._document: dict[str, Any] | None = None
 
     def __call__(self) -> dict[str, Any]:
-        """The document."""
+        """Return the document."""
         if self._document is None:
             self._document = _described(self._make())
         return self._document

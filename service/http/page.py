@@ -34,7 +34,7 @@ POLICY = "; ".join(
 
 
 def router(prefix: str = "") -> APIRouter:
-    """The page at `/`, and its assets.
+    """Route the page at `/`, and its assets.
 
     Under a `prefix` the page names them from the root of the host: a browser that asked for the
     prefix without a slash at its end would look for them a folder too high.
@@ -57,7 +57,7 @@ def router(prefix: str = "") -> APIRouter:
 
 @cache
 def _paths() -> frozenset[str]:
-    """What may be asked for: a name is looked up here, and never joined to a path of the disk."""
+    """List what may be asked for: names are looked up here, never joined to a path of the disk."""
     return frozenset(
         str(path.relative_to(FOLDER).as_posix()) for path in FOLDER.rglob("*") if path.is_file()
     )

@@ -23,12 +23,12 @@ from ..options import (
 
 
 def _empty_is_absent(value: Any) -> Any:
-    """`budget=` in a URL means the same as no budget at all."""
+    """Take `budget=` in a URL for no budget at all."""
     return None if value == "" else value
 
 
 def _length(value: Any) -> float | Literal["auto"]:
-    """One sentence for a value that is neither, where a union would explain only one of the two."""
+    """Refuse with one sentence what is neither; a union would explain only one of the two."""
     if value == "auto":
         return "auto"
     try:
@@ -110,5 +110,5 @@ class Parameters(BaseModel):
     )
 
     def options(self) -> Options:
-        """The same as the pipeline takes them: all but the model, which is not its to find."""
+        """Return the same as the pipeline takes them: all but the model, not its to find."""
         return Options(**self.model_dump(exclude={"model"}))

@@ -52,7 +52,7 @@ def problem(
     headers: dict[str, str] | None = None,
     **members: Any,
 ) -> JSONResponse:
-    """One problem document; members that are None are left out."""
+    """Return one problem document; members that are None are left out."""
     body = {
         "type": f"urn:pns:problem:{code}",
         "title": title,
@@ -83,7 +83,7 @@ class ProblemResponse(JSONResponse):
 
 
 def of_service_error(error: ServiceError) -> JSONResponse:
-    """The document of an error that the service foresees."""
+    """Return the document of an error that the service foresees."""
     members: dict[str, Any] = {"pointer": error.pointer}
     headers: dict[str, str] = {}
     match error:
@@ -102,7 +102,7 @@ def of_service_error(error: ServiceError) -> JSONResponse:
 
 
 def of_job(error: Exception) -> JSONResponse:
-    """The document of the error that a job ended with."""
+    """Return the document of the error that a job ended with."""
     return of_service_error(error) if isinstance(error, ServiceError) else internal_error()
 
 
@@ -121,7 +121,7 @@ def _of_http_exception(error: HTTPException) -> JSONResponse:
 
 
 def internal_error() -> JSONResponse:
-    """A fault of ours: plain, because its details belong in the log."""
+    """Return the document of a fault of ours: plain, because its details belong in the log."""
     return problem(500, "internal-error", "Internal error", "The service failed; it is logged.")
 
 

@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 
 def router(service: Service) -> APIRouter:
-    """The routes, bound to one service."""
+    """Make the routes, bound to one service."""
     routes = APIRouter()
 
     @routes.post("/subdivide", response_class=Response, **documentation.SUBDIVIDE)
@@ -75,7 +75,7 @@ def router(service: Service) -> APIRouter:
 async def _subdivide(
     service: Service, request: Request, parameters: Parameters, kind: str
 ) -> Response:
-    """A job that its client waits for."""
+    """Do a job that its client waits for."""
     settings = service.settings
     report_only = kind == media.JSON
     wanted = Wanted(not report_only, report_only, folder=None, patience=settings.job_seconds)
@@ -110,7 +110,7 @@ def _server_timing(seconds: dict[str, float]) -> str:
 
 
 async def _unless_gone(receive: Receive, work: Coroutine[Any, Any, T]) -> T:
-    """The value of `work`, cancelled when the client disconnects. Raises ClientDisconnect."""
+    """Return the value of `work`, cancelled if the client disconnects. Raises ClientDisconnect."""
     job = asyncio.create_task(work)
     gone = asyncio.create_task(_disconnected(receive))
     try:

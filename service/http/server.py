@@ -83,7 +83,7 @@ def serve(settings: Settings) -> None:
 
 
 def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:
-    """uvicorn's settings, and the protocol that takes over where they end."""
+    """Return uvicorn's settings, and the protocol that takes over where they end."""
     shared = Shared(
         Bounds(
             head_seconds=settings.head_seconds,

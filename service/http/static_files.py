@@ -34,7 +34,7 @@ class StaticFile:
 
 
 def static_file(content: bytes, suffix: str) -> StaticFile:
-    """A file of these bytes, of the type that its suffix says."""
+    """Return a file of these bytes, of the type that its suffix says."""
     return StaticFile(
         content=content,
         packed=gzip.compress(content, mtime=0),
@@ -44,7 +44,7 @@ def static_file(content: bytes, suffix: str) -> StaticFile:
 
 
 def answer(request: Request, file: StaticFile, policy: str, caching: str = ASK_AGAIN) -> Response:
-    """The file, or that the browser has it; ``policy`` says what a page may load and ask for."""
+    """Answer with the file, or that the browser has it; ``policy``: what a page may load."""
     headers = {
         "Cache-Control": caching,
         "Content-Security-Policy": policy,

@@ -41,7 +41,7 @@ class BarycentricGrid:
 
 @lru_cache(maxsize=8)
 def barycentric_grid(levels: int) -> BarycentricGrid:
-    """The grid after `levels` splits."""
+    """Make the grid after `levels` splits."""
     segments = 2**levels
     points = segments * np.eye(3, dtype=np.int64)
     faces = np.array([[0, 1, 2]])

@@ -14,7 +14,7 @@ from pns_common.mesh import Mesh
 
 
 def edges_sharper_than(mesh: Mesh, angle: float) -> Int[np.ndarray, "N 2"]:
-    """The interior edges at which the normals of the two faces differ by more than `angle` radians.
+    """Return the interior edges whose two faces' normals differ by more than `angle` radians.
 
     Faces without area have no normal, and make no crease.
     """

@@ -40,7 +40,7 @@ class SplitConnectivity:
         return at_descendants(self.ids, self.grid)
 
     def linear(self, values: Shaped[np.ndarray, "C K"]) -> Float[np.ndarray, "N K"]:
-        """Values at the refined vertices, blended linearly along edges and over faces."""
+        """Blend values at the refined vertices linearly, along edges and over faces."""
         corners = values.astype(np.float64)
         t = self._edge_parameter[:, None]
         start, end = (corners[self.edges[:, side], None] for side in (0, 1))
@@ -50,14 +50,14 @@ class SplitConnectivity:
         return np.concatenate([part.reshape(-1, values.shape[1]) for part in parts])
 
     def nearest(self, values: Shaped[np.ndarray, "C K"]) -> Shaped[np.ndarray, "N K"]:
-        """Values at the refined vertices, copied from the nearest corner (a tie: the first)."""
+        """Copy values at the refined vertices from the nearest corner (a tie: the first)."""
         side = (self._edge_parameter > 1 / 2).astype(np.int64)
         corner = self.grid.points[self.grid.inner].argmax(axis=1)
         parts = [values, values[self.edges[:, side]], values[self.faces[:, corner]]]
         return np.concatenate([part.reshape(-1, values.shape[1]) for part in parts])
 
     def at_vertices(self, at_points: Int[np.ndarray, "F T"]) -> Int[np.ndarray, " N"]:
-        """Labels that agree wherever refined vertices do, moved from grid points to vertices."""
+        """Move labels that agree wherever refined vertices do from grid points to vertices."""
         labels = np.empty(self.count, dtype=np.int64)
         labels[self.ids] = at_points
         return labels
@@ -69,7 +69,7 @@ class SplitConnectivity:
 
 
 def at_descendants(ids: Int[np.ndarray, "F T"], grid: BarycentricGrid) -> Int[np.ndarray, "D 3"]:
-    """From values at grid points to values at the corners of all descendants, face by face."""
+    """Take values from grid points to the corners of all descendants, face by face."""
     # np.take, unlike indexing, gives rows that need no second copy to be reshaped.
     return np.take(ids, grid.faces.reshape(-1), axis=1).reshape(-1, 3)
 

@@ -22,21 +22,21 @@ UvBlend = Callable[
 
 
 def uv_blend(options: Options) -> UvBlend:
-    """The rule that the options name."""
+    """Return the rule that the options name."""
     return smooth_uv if options.uv == "smooth" else linear_uv
 
 
 def linear_uv(
     connectivity: SplitConnectivity, vertex: Int[np.ndarray, " C"], uv: Shaped[np.ndarray, "C 2"]
 ) -> Float[np.ndarray, "N 2"]:
-    """Linear in each face of the control mesh: textures lie as they lay."""
+    """Blend linearly in each face of the control mesh: textures lie as they lay."""
     return connectivity.linear(uv)
 
 
 def smooth_uv(
     connectivity: SplitConnectivity, vertex: Int[np.ndarray, " C"], uv: Shaped[np.ndarray, "C 2"]
 ) -> Float[np.ndarray, "N 2"]:
-    """Loop's stencil inside charts; seams and the charts' boundaries stay linear.
+    """Blend by Loop's stencil inside charts; seams and the charts' boundaries stay linear.
 
     A chart is a piece of the surface within which texture coordinates are continuous: corners are
     one where vertex and coordinates are.
@@ -59,6 +59,6 @@ def smooth_uv(
 def _chart_vertices(
     columns: Float[np.ndarray, "V 2"], topology: Topology
 ) -> Float[np.ndarray, "V 2"]:
-    """Loop's rule inside; what lies on a boundary stays where it is, as linear blending has it."""
+    """Move vertices inside by Loop's rule; on a boundary they stay, as in linear blending."""
     inside = sharp_edge_count(topology) == 0
     return np.where(inside[:, None], loop_vertex_vertices(columns, topology), columns)

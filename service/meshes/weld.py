@@ -62,12 +62,12 @@ def weld_by_label(
 
 
 def canonical_zero(values: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-    """The same numbers with −0 written as 0, so that equal numbers have equal bits."""
+    """Write −0 as 0, so that equal numbers have equal bits."""
     return values + values.dtype.type(0)
 
 
 def distinct_rows(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
-    """For each row a number that equal rows, and only they, share; rows are compared bit by bit."""
+    """Give the rows numbers: equal ones, and only they, share one; compared bit by bit."""
     words = as_words(rows)
     mixed = _hash(words)
     order = np.argsort(mixed)
@@ -99,7 +99,7 @@ def number_by_first_appearance(labels: Int[np.ndarray, " N"]) -> Int[np.ndarray,
 
 
 def as_words(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, "N W"]:
-    """The rows' bits as unsigned 32-bit words, padded with zeros."""
+    """Return the rows' bits as unsigned 32-bit words, padded with zeros."""
     narrow = np.ascontiguousarray(rows)
     width = narrow.itemsize * narrow.shape[1]
     octets = narrow.view(np.uint8).reshape(len(narrow), width)
@@ -109,7 +109,7 @@ def as_words(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, "N W"]:
 
 
 def _hash(words: Int[np.ndarray, "N W"]) -> Int[np.ndarray, " N"]:
-    """A 64-bit mix of each row."""
+    """Return a 64-bit mix of each row."""
     mixed = np.full(len(words), 0x9E3779B97F4A7C15, dtype=np.uint64)
     for word in words.T:
         mixed = (mixed ^ word) * np.uint64(0xD6E8FEB86659FD93)

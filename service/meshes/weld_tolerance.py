@@ -50,7 +50,7 @@ def weld_within(
 def _reference_lengths(
     welded: Weld, part_faces: Int[np.ndarray, " P"], first: Int[np.ndarray, " P"]
 ) -> Float[np.ndarray, " P"]:
-    """Each part's own R."""
+    """Return each part's own R."""
     ends = zip(
         pairwise([*part_faces, len(welded.faces)]),
         pairwise([*first, len(welded.points)]),
@@ -70,7 +70,7 @@ def near_labels(
     apart: Int[np.ndarray, " V"],
     first: Int[np.ndarray, " P"] = WHOLE,
 ) -> Int[np.ndarray, " V"]:
-    """Labels that points share where all three coordinates differ by less than `distance`.
+    """Return labels that points share where all three coordinates differ by less than `distance`.
 
     Points in one cell of a grid, twice as wide, are joined, and so in the grids shifted by half a
     cell along each axis: two near points straddle a wall of one of the two at most. The cost does
@@ -92,7 +92,7 @@ def near_labels(
 
 
 def _connected(partitions: list[Int[np.ndarray, " V"]], count: int) -> Int[np.ndarray, " V"]:
-    """The components of points that share a part in any partition: the lowest index of each.
+    """Label components of points that share a part in any partition: by the lowest index of each.
 
     Every root hooks on to the lowest root that it meets, and paths are cut short at once, so a
     long chain takes few rounds.

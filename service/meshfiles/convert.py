@@ -122,7 +122,7 @@ def predicted_faces(
 
 
 def _lines(report: dict[str, Any]) -> Iterator[str]:
-    """What was changed or lost, each thing once: how often, and where first."""
+    """Yield what was changed or lost, each thing once: how often, and where first."""
     said: Counter[str] = Counter()
     places: defaultdict[str, list[str]] = defaultdict(list)
     for change in report["changes"]:
@@ -197,7 +197,7 @@ def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, An
 
 @contextmanager
 def _progress(console: Console) -> Iterator[Course]:
-    """A bar that shows on a terminal while the work goes on, and leaves nothing behind."""
+    """Show a bar on a terminal while the work goes on, and leave nothing behind."""
     from rich.progress import Progress
 
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:

@@ -51,13 +51,13 @@ STEEL = {
 
 
 def part_glb() -> bytes:
-    """The part as a GLB with normals, texture coordinates and a material."""
+    """Return the part as a GLB with normals, texture coordinates and a material."""
     triangles = part()
     return triangles_glb(triangles, material=STEEL, normals=_smooth_normals(triangles))
 
 
 def part() -> IndexedTriangles:
-    """A closed surface of genus 1: the section swept around the y axis, cut at the UV seams."""
+    """Return a closed surface of genus 1: the section swept around y, cut at the UV seams."""
     columns, rows = TEETH * len(CREST), len(SECTION)
     # One column and one row more than the surface has: the seams' second sides.
     column, row = np.meshgrid(np.arange(columns + 1), np.arange(rows + 1), indexing="ij")
@@ -81,14 +81,14 @@ def _faces(columns: int, rows: int) -> Int[np.ndarray, "F 3"]:
 
 
 def _arc_length() -> Float[np.ndarray, " R"]:
-    """Length along the section at each of its points and back at the first, from 0 to 1."""
+    """Return the length along the section at its points and back at the first, 0 to 1."""
     closed = np.vstack([SECTION, SECTION[:1]])[:, :2]
     steps = np.linalg.norm(np.diff(closed, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
 
 
 def _smooth_normals(triangles: IndexedTriangles) -> Float[np.ndarray, "N 3"]:
-    """Area-weighted normals, equal on both sides of the seams."""
+    """Return area-weighted normals, equal on both sides of the seams."""
     _, welded = np.unique(triangles.vertices, axis=0, return_inverse=True)
     a, b, c = triangles.vertices[triangles.faces].transpose(1, 0, 2)
     total = np.zeros_like(triangles.vertices)

@@ -23,7 +23,7 @@ LOST = ("materials", "textures", "images", "animations", "cameras", "extensions"
 
 
 def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, list[Change]]:
-    """The default scene's triangles in world coordinates, and what a file of `kind` cannot hold.
+    """Return the default scene's triangles in the world, and what a file of `kind` cannot hold.
 
     Raises:
         ServiceError: the file cannot be read, or its scene shows no triangles.
@@ -50,7 +50,7 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, li
 
 
 def _placed_meshes(tree: dict[str, Any]) -> Iterator[tuple[int, Float[np.ndarray, "4 4"]]]:
-    """Each mesh that the default scene shows, with its node's world matrix."""
+    """Yield each mesh that the default scene shows, with its node's world matrix."""
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])
     roots = scenes[tree.get("scene", 0)].get("nodes", []) if scenes else range(len(nodes))
@@ -86,7 +86,7 @@ def _local_matrix(node: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
 def _placed(
     primitives: list[TrianglePrimitive], matrix: Float[np.ndarray, "4 4"], *, keeps_uv: bool
 ) -> IndexedTriangles:
-    """One mesh in world coordinates; closed at its seams where nothing is left to tell them by."""
+    """Place one mesh in the world; closed at its seams where nothing is left to tell them by."""
     positions = np.concatenate([p.attributes["POSITION"] for p in primitives]).astype(np.float64)
     faces = disjoint_faces((p.corners, len(p.attributes["POSITION"])) for p in primitives)
     uv = np.concatenate([_uv(p) for p in primitives]) if keeps_uv else None

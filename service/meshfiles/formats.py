@@ -73,7 +73,7 @@ def read(data: bytes, kind: str) -> IndexedTriangles:
 
 
 def write(mesh_file: IndexedTriangles, kind: str) -> bytes:
-    """The file's bytes: PLY and STL binary, OBJ and OFF text."""
+    """Write the file's bytes: PLY and STL binary, OBJ and OFF text."""
     if kind == "obj":
         return _obj(mesh_file)
     if kind == "off":
@@ -86,7 +86,7 @@ def write(mesh_file: IndexedTriangles, kind: str) -> bytes:
 
 
 def _scene(data: bytes, kind: str) -> trimesh.Scene:
-    """What trimesh makes of the file."""
+    """Return what trimesh makes of the file."""
     # Before warnings become errors: what it imports may warn.
     readers = load_readers()
     text = _as_utf8(data) if kind == "obj" or (kind == "stl" and not _is_binary_stl(data)) else data
@@ -108,7 +108,7 @@ def _scene(data: bytes, kind: str) -> trimesh.Scene:
 
 
 def _as_utf8(data: bytes) -> bytes:
-    """The same text; names in old files are Latin-1, and geometry is ASCII in either."""
+    """Return the same text; names in old files are Latin-1, and geometry is ASCII in either."""
     try:
         data.decode()
     except UnicodeDecodeError:
@@ -117,12 +117,12 @@ def _as_utf8(data: bytes) -> bytes:
 
 
 def _is_binary_stl(data: bytes) -> bool:
-    """Whether the count of faces agrees with the length: text may begin in any way."""
+    """Return whether the count of faces agrees with the length: text may begin in any way."""
     return len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
 
 
 def _uv(parts: list[trimesh.Trimesh]) -> Float[np.ndarray, "N 2"] | None:
-    """Texture coordinates of all parts, if all have them: half of a seam cannot be interpolated."""
+    """Return all parts' texture coordinates, if all have them: half a seam is not interpolated."""
     of_parts = [getattr(part.visual, "uv", None) for part in parts]
     if any(uv is None or len(uv) != len(p.vertices) for uv, p in zip(of_parts, parts, strict=True)):
         return None
@@ -132,7 +132,7 @@ def _uv(parts: list[trimesh.Trimesh]) -> Float[np.ndarray, "N 2"] | None:
 def _beside_triangles(
     data: bytes, kind: str, parts: list[trimesh.Trimesh], *, has_uv: bool
 ) -> tuple[int | None, dict[str, int]]:
-    """How many faces the file lists (None: triangles only), and what it held beside them."""
+    """Count the faces that the file lists (None: triangles only), and what is beside them."""
     match kind:
         case "obj":
             others = unsupported.of_obj(data)

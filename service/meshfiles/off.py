@@ -24,7 +24,7 @@ _NO_FACE = "the OFF file has a face that is not a count and as many vertices"
 
 
 def read_off(data: bytes) -> IndexedTriangles:
-    """Positions and faces, polygons split into fans; colours and normals are passed over.
+    """Read positions and faces, polygons split into fans; colours and normals are passed over.
 
     Raises:
         UnreadableError: not a text OFF file, or one without faces.
@@ -58,7 +58,7 @@ def read_off(data: bytes) -> IndexedTriangles:
 
 
 def write_off(mesh_file: IndexedTriangles) -> bytes:
-    """The file's bytes."""
+    """Write the file's bytes."""
     text = io.StringIO()
     text.write(f"OFF\n{len(mesh_file.vertices)} {len(mesh_file.faces)} 0\n")
     np.savetxt(text, mesh_file.vertices, fmt=f"{NUMBER} {NUMBER} {NUMBER}")

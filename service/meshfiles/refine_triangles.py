@@ -35,7 +35,7 @@ def refine_triangles(
     limits: Limits,
     course: Course | None = None,
 ) -> tuple[IndexedTriangles, dict[str, Any]]:
-    """The refined triangles and the report.
+    """Refine the triangles; return also the report.
 
     Raises:
         LimitError: over `max_faces` or `max_memory_bytes`.
@@ -100,7 +100,7 @@ def _checked(mesh_file: IndexedTriangles) -> Mesh:
 
 
 def _unused_vertices(mesh_file: IndexedTriangles, welded: Weld, cleaned: Cleaned) -> int:
-    """How many of the file's vertices no refined face uses."""
+    """Count the file's vertices that no refined face uses."""
     used = welded.vertex_of >= 0
     stay = cleaned.vertex_map[welded.vertex_of[used]] >= 0
     return mesh_file.unused + len(used) - int(stay.sum())
@@ -114,7 +114,7 @@ def _with_corners(
     refinement: Refinement,
     options: Options,
 ) -> IndexedTriangles:
-    """The refined mesh, cut open again where texture coordinates differ."""
+    """Cut the refined mesh open again where texture coordinates differ."""
     points = refinement.mesh.vertices
     grid = barycentric_grid(options.levels)
     if mesh_file.uv is None:
@@ -128,7 +128,7 @@ def _with_corners(
 def _distinct_corners(
     faces: Int[np.ndarray, "P 3"], welded: Weld, uv: Float[np.ndarray, "N 2"]
 ) -> tuple[Int[np.ndarray, "P 3"], Int[np.ndarray, " C"], Float[np.ndarray, "C 2"]]:
-    """Faces over the distinct pairs of a welded vertex and texture coordinates, and these."""
+    """Return faces over distinct pairs of welded vertex and texture coordinates, and these."""
     rows = np.column_stack([welded.vertex_of.astype(np.float64), uv])
     corners = number_by_first_appearance(distinct_rows(rows)[faces.reshape(-1)])
     row = np.empty(corners.max() + 1, dtype=np.int64)

@@ -15,7 +15,7 @@ LARGEST = float(np.finfo(np.float32).max)
 
 
 def rounding_changes(triangles: IndexedTriangles) -> list[Change]:
-    """The faces that lose their area because float32 cannot tell their corners apart.
+    """Count the faces that lose their area because float32 cannot tell their corners apart.
 
     Raises:
         UnrefinableError: a position beyond the range of float32.

@@ -29,7 +29,7 @@ BYTES_PER_BYTE = {"obj": 32, "off": 32, "ply": 60, "stl": 12}
 
 
 def as_gltf(sent: Sent, options: Options, limits: Limits) -> Sent:
-    """The same upload if it is a glTF; a converted GLB, and what that lost, if not.
+    """Return the same upload if it is a glTF; a converted GLB, and what that lost, if not.
 
     Raises:
         UnreadableError: not a file of its kind, or one without faces.

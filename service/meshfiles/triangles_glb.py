@@ -21,7 +21,7 @@ def triangles_glb(
     normals: np.ndarray | None = None,
     extras: dict[str, Any] | None = None,
 ) -> bytes:
-    """The file's bytes; `extras` goes to `asset.extras`."""
+    """Write the file's bytes; `extras` goes to `asset.extras`."""
     asset: dict[str, Any] = {"version": "2.0", "generator": "pns"}
     if extras:
         asset["extras"] = extras
@@ -57,7 +57,7 @@ def triangles_glb(
 
 
 def as_gltf_json(glb: bytes, limits: Limits) -> bytes:
-    """The same file as a .gltf whose buffer is embedded as a data: URI."""
+    """Return the same file as a .gltf whose buffer is embedded as a data: URI."""
     container = read_glb(glb)
     tree = decode_object(container.text, limits)
     if container.binary is not None:

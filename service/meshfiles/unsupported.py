@@ -32,7 +32,7 @@ _PLY_UV = frozenset({"u", "v", "s", "t", "texture_u", "texture_v"})
 
 
 def of_obj(data: bytes) -> dict[str, int]:
-    """Names and counts of the statements that are passed over."""
+    """Count, by name, the statements that are passed over."""
     counts = Counter(_OBJ_NAMES[name] for name in _OBJ_STATEMENT.findall(data))
     if colours := len(_OBJ_COLOUR.findall(data)):
         counts["vertex colours"] = colours
@@ -40,7 +40,7 @@ def of_obj(data: bytes) -> dict[str, int]:
 
 
 def unused_in_obj(data: bytes) -> int:
-    """How many vertices no face names; trimesh leaves them out without a word."""
+    """Count the vertices that no face names; trimesh leaves them out without a word."""
     text = _OBJ_CONTINUED.sub(b" ", data)
     starts = np.array([match.start() for match in _OBJ_VERTEX.finditer(text)], dtype=np.int64)
     lines = list(_OBJ_FACE.finditer(text))
@@ -54,7 +54,7 @@ def unused_in_obj(data: bytes) -> int:
 
 
 def of_ply(elements: dict[str, Any], *, has_uv: bool) -> dict[str, int]:
-    """Names and counts of the properties and elements that are passed over."""
+    """Count, by name, the properties and elements that are passed over."""
     kept = _PLY_KEPT | _PLY_UV if has_uv else _PLY_KEPT
     counts: dict[str, int] = {}
     for element, content in elements.items():

@@ -79,7 +79,7 @@ LOOK_UP = 64
 
 
 def batch_work(seconds: float, job: Callable[[Task], Row] = run) -> Work[Task, Row]:
-    """What is done with each file, which may take so many seconds."""
+    """Return what is done with each file, which may take so many seconds."""
 
     def lost(task: Task, error: ServiceError) -> Row:
         return replace(failed(task.url, task.output, error), attempts=task.attempt)
@@ -164,7 +164,7 @@ def work_hash(batch: Batch) -> str:
 
 
 def _destination(batch: Batch) -> Place:
-    """Where the results go.
+    """Return where the results go.
 
     Raises:
         InvalidParameter: nothing can be written there.
@@ -202,7 +202,7 @@ def _tasks(
 
 
 def _task(batch: Batch, item: Item, destination: Place, journal: Journal) -> Task:
-    """What is to be done with a file, with what is known of it.
+    """Return what is to be done with a file, with what is known of it.
 
     Raises:
         ServiceError: nothing can be made of it, or not there.
@@ -229,7 +229,7 @@ def _task(batch: Batch, item: Item, destination: Place, journal: Journal) -> Tas
 
 
 def _shown(url: str) -> str:
-    """A name as text: bytes of a file's name that are no UTF-8 are spelled out."""
+    """Show a name as text: bytes of a file's name that are no UTF-8 are spelled out."""
     return url.encode(errors="backslashreplace").decode()
 
 
@@ -267,7 +267,7 @@ def _count_aside(listing: Callable[[], Iterator[Item]], bar: Progress, line: Tas
 
 
 def _line(row: Row) -> str:
-    """What is said of a file at once: why it failed, or what is planned."""
+    """Return what is said of a file at once: why it failed, or what is planned."""
     if row.status == FAILED:
         return f"{row.path}: {row.detail} [{row.code}]"
     if row.status == PLANNED:

@@ -73,7 +73,7 @@ class Row:
     stages: dict[str, float] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
-        """The columns of the report; the seconds of each stage are columns of their own."""
+        """Return the columns of the report; the seconds of each stage are columns of their own."""
         values = {name: getattr(self, name) for name in COLUMNS}
         return values | {f"seconds_{name}": self.stages.get(name, 0.0) for name in STAGES}
 
@@ -102,7 +102,7 @@ def run(task: Task) -> Row:
 
 
 def failed(path: str, output: str, error: Exception) -> Row:
-    """The row of a file that could not be refined."""
+    """Return the row of a file that could not be refined."""
     code = error.code if isinstance(error, ServiceError) else "cannot-be-read-or-written"
     pointer = getattr(error, "pointer", None) or ""
     detail = error.detail if isinstance(error, ServiceError) else str(error)
@@ -164,7 +164,7 @@ def _refine(task: Task) -> Row:
 
 
 def _plan(task: Task) -> Row:
-    """What refining would cost: the faces, found without refining."""
+    """Return what refining would cost: the faces, found without refining."""
     from ..meshfiles.convert import predicted_faces
     from .places import place_of
 
@@ -186,7 +186,7 @@ def _plan(task: Task) -> Row:
 
 @cache
 def _model(name: str | None) -> Model:
-    """A model, loaded once a worker."""
+    """Load a model, once a worker."""
     from pns_common import ModelError, load_model
 
     try:

@@ -47,7 +47,7 @@ class Journal:
             self._database.executescript(SCHEMA)
 
     def known(self, path: str) -> str | None:
-        """The hash of the input whose result was written by this same work; None without one."""
+        """Return the hash of the input whose result this same work has written; None without."""
         row = self._database.execute(
             "SELECT input FROM rows WHERE path = ? AND work = ? AND status = 'done'",
             (path, self._work),
@@ -55,7 +55,7 @@ class Journal:
         return None if row is None else str(row[0])
 
     def claim(self, output: str, path: str) -> bool:
-        """Whether a result may be written at `output`: no other file that is there holds it."""
+        """Return whether a result may be written at `output`: no other file holds that place."""
         self._database.execute("INSERT OR IGNORE INTO outputs VALUES (?, ?)", (output, path))
         query = "SELECT path FROM outputs WHERE output = ?"
         holder = str(self._database.execute(query, (output,)).fetchone()[0])
@@ -153,7 +153,7 @@ class Journal:
 
 @contextmanager
 def open_journal(report: Path, work: str) -> Iterator[Journal]:
-    """A journal whose report is written at the end, also after an interruption.
+    """Open a journal whose report is written at the end, also after an interruption.
 
     Raises:
         OSError: the journal or the report cannot be read or written; it names which.
@@ -170,7 +170,7 @@ def open_journal(report: Path, work: str) -> Iterator[Journal]:
 
 
 def journal_of(report: Path) -> Path:
-    """The file beside a report that is gone on from."""
+    """Return the file beside a report that is gone on from."""
     return report.with_name(report.name + ".journal")
 
 

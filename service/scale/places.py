@@ -49,18 +49,18 @@ class Place:
         return any(name in READ_ONLY for name in named)
 
     def below(self, relative: str) -> Place:
-        """What lies at a relative path below a folder."""
+        """Return what lies at a relative path below a folder."""
         return Place(self.system, posixpath.join(self.path, relative))
 
     def read(self) -> bytes:
-        """The whole file. Raises OSError."""
+        """Read the whole file. Raises OSError."""
         if self.local:
             return Path(self.path).read_bytes()
         with self._foreign():
             return bytes(self.system.cat_file(self.path))
 
     def is_gone(self) -> bool:
-        """Whether it is certain that nothing is there."""
+        """Return whether it is certain that nothing is there."""
         try:
             with self._foreign():
                 self.system.info(self.path)
@@ -71,17 +71,17 @@ class Place:
         return False
 
     def is_file(self) -> bool:
-        """Whether there is a file. Raises OSError: nobody can say."""
+        """Return whether there is a file. Raises OSError: nobody can say."""
         with self._foreign():
             return bool(self.system.isfile(self.path))
 
     def is_folder(self) -> bool:
-        """Whether there is a folder. Raises OSError: nobody can say."""
+        """Return whether there is a folder. Raises OSError: nobody can say."""
         with self._foreign():
             return bool(self.system.isdir(self.path))
 
     def matches(self) -> list[str]:
-        """The paths that its path matches as a glob, in order. Raises OSError."""
+        """Return the paths that its path matches as a glob, in order. Raises OSError."""
         with self._foreign():
             return sorted(str(path) for path in self.system.glob(self.path))
 
@@ -112,7 +112,7 @@ class Place:
                 pass
 
     def files(self) -> Iterator[str]:
-        """The relative paths of all files below a folder, folder by folder in order of name."""
+        """Yield the relative paths of all files below a folder, each folder in order of name."""
         with self._foreign():
             for folder, folders, names in self._walk():
                 folders.sort()
@@ -128,7 +128,7 @@ class Place:
 
     @contextmanager
     def _foreign(self) -> Iterator[None]:
-        """Errors of a file system elsewhere, each library's own, as an OSError that names it."""
+        """Turn errors of a file system elsewhere, each library's own, into OSErrors naming it."""
         try:
             yield
         except FileNotFoundError:
@@ -140,7 +140,7 @@ class Place:
             raise OSError(number, f"{type(error).__name__}: {error}", self.url) from error
 
     def siblings(self) -> SiblingFiles:
-        """The files in the same folder and below it, opened when a document names them."""
+        """Return the files in the same folder and below it, opened when a document names them."""
         folder = Place(self.system, posixpath.dirname(self.path))
 
         def find(name: str) -> File | None:
@@ -155,7 +155,7 @@ class Place:
 
 
 def place_of(text: str) -> Place:
-    """The place of a path or URL.
+    """Return the place of a path or URL.
 
     Raises:
         InvalidParameter: no file system takes it, or what that needs is not installed.

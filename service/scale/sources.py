@@ -71,7 +71,7 @@ def _globbed(pattern: str, endings: tuple[str, ...]) -> Iterator[Item]:
 
 
 def _listed(path: str, manifest: Place) -> Item:
-    """A manifest's row: paths are relative to the manifest's folder, unless they say otherwise."""
+    """Return a manifest's row; relative paths start at its folder, unless it says otherwise."""
     if "://" in path or posixpath.isabs(path):
         return Item(path, path.partition("://")[2].lstrip("/") or path.lstrip("/"))
     folder = Place(manifest.system, posixpath.dirname(manifest.path))

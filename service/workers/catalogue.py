@@ -78,7 +78,7 @@ class Catalogue:
         return f'"{hashlib.sha256(self.content).hexdigest()[:32]}"'
 
     def is_known(self, if_none_match: str) -> bool:
-        """Whether a client that sends this If-None-Match has the content."""
+        """Return whether a client that sends this If-None-Match has the content."""
         tags = {tag.strip().removeprefix("W/") for tag in if_none_match.split(",")}
         return bool(tags & {self.tag, "*"})
 

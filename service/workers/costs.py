@@ -29,7 +29,7 @@ class Cost:
 def cost_of(
     faces: int, primitives: int, size: int, learned: int = 0, values: int = 0, items: int = 0
 ) -> Cost:
-    """The cost of so many refined faces and primitives, from an upload of `size` bytes.
+    """Return the cost of so many refined faces and primitives, from an upload of `size` bytes.
 
     `learned` are the faces after the last level at which a model acts; `values` what refined faces
     carry beside the usual attributes, an attribute or morph target of a face each; `items` what the

@@ -107,11 +107,11 @@ class Desk:
                 watcher(job)
 
     def place(self, job: Job) -> int:
-        """How many jobs come before one that waits."""
+        """Count the jobs that come before one that waits."""
         return self.turns.waiting if job.waiting is None else self.turns.place_of(job.waiting)
 
     def remaining(self, job: Job) -> float | None:
-        """Predicted seconds until a job ends; None where that is not known."""
+        """Predict the seconds until a job ends; None where that is not known."""
         if job.state.ended:
             return 0.0
         if job.cost is None:
@@ -145,7 +145,7 @@ class Desk:
             await self._run_in_turn(job, job.waiting)
 
     async def _run_in_turn(self, job: Job, waiting: Waiting) -> None:
-        """Raises JobStopped where a short job is overdue."""
+        """Run a job in its turn. Raises JobStopped where a short job is overdue."""
         cost = job.cost
         async with self._turn(waiting, job) as lane:
             began = job.began = time.monotonic()

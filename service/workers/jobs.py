@@ -110,7 +110,7 @@ def subdivide(work: Work) -> Done:
 
 
 def measure(work: Work) -> Cost:
-    """What a job will cost. Raises ServiceError where a body is not what its type says."""
+    """Measure what a job will cost. Raises ServiceError where a body is not what its type says."""
     from ..bodies import uploads
     from .costs import cost_of
     from .measure import cost_of_gltf, cost_of_other
@@ -132,7 +132,7 @@ def measure(work: Work) -> Cost:
 
 
 def _learned_levels(work: Work) -> int:
-    """At how many levels a model acts."""
+    """Return at how many levels a model acts."""
     if work.options.scheme != "pns":
         return 0
     try:
@@ -188,7 +188,7 @@ def hold_model(model: Model | str | None) -> None:
 
 
 def catalogue() -> Catalogue:
-    """What this worker's models say of themselves."""
+    """Return what this worker's models say of themselves."""
     from .catalogue import catalogue_of
 
     return catalogue_of(_MODELS)

@@ -54,7 +54,7 @@ class _Counts(msgspec.Struct):
 def cost_of_gltf(
     data: bytes, kind: Kind, levels: int, limits: Limits, learned_levels: int = 0
 ) -> Cost:
-    """The cost of a .glb or .gltf; a model acts at the first `learned_levels`.
+    """Return the cost of a .glb or .gltf; a model acts at the first `learned_levels`.
 
     One that cannot be read, or is over a limit, is refused as soon as a worker looks at it: it
     costs no more than its bytes.
@@ -80,7 +80,7 @@ def cost_of_gltf(
 
 
 def cost_of_other(data: bytes, levels: int, limits: Limits, learned_levels: int = 0) -> Cost:
-    """The cost of a file that does not say how many faces it has."""
+    """Return the cost of a file that does not say how many faces it has."""
     before = min(len(data) // BYTES_PER_FACE, limits.max_faces // 4**levels)
     return cost_of(before * 4**levels, 1, len(data), _learned(before, levels, learned_levels))
 
@@ -90,7 +90,7 @@ def _learned(faces: int, levels: int, learned_levels: int) -> int:
 
 
 def _unusual(primitive: _Primitive) -> int:
-    """How many attributes follow its vertices beside the usual ones, morph targets' among them."""
+    """Count the attributes beside the usual ones that follow its vertices, morph targets' too."""
     sets = sum(name.startswith("JOINTS_") for name in primitive.attributes)
     further = max(len(primitive.attributes) - USUAL_ATTRIBUTES, 0)
     further += max(sets - 1, 0) * VALUES_PER_FURTHER_SET
@@ -98,7 +98,7 @@ def _unusual(primitive: _Primitive) -> int:
 
 
 def _triangles(primitive: _Primitive, accessors: list[_Accessor]) -> int:
-    """The triangles that a primitive says it has; 0 where it makes no sense."""
+    """Return the triangles that a primitive says it has; 0 where it makes no sense."""
     index = primitive.indices
     if index is None:
         index = primitive.attributes.get("POSITION", -1)

@@ -112,7 +112,7 @@ class MemoryFile:
         return os.fstat(self._file.fileno()).st_size
 
     def pieces(self) -> Iterator[bytes]:
-        """The content in pieces of at most `PIECE` bytes."""
+        """Yield the content in pieces of at most `PIECE` bytes."""
         offset = 0
         while piece := os.pread(self._file.fileno(), PIECE, offset):
             yield piece
@@ -120,7 +120,7 @@ class MemoryFile:
 
 
 def read(name: FileName) -> bytes:
-    """All bytes of another process's file. Raises ForeignFileError."""
+    """Read all bytes of another process's file. Raises ForeignFileError."""
     with os.fdopen(opened(name, os.O_RDONLY), "rb") as file:
         return file.read()
 
@@ -154,7 +154,7 @@ def _write(descriptor: int, data: bytes) -> None:
 
 
 def opened(name: FileName, flags: int) -> int:
-    """A descriptor of another process's file. Raises ForeignFileError."""
+    """Open another process's file; return its descriptor. Raises ForeignFileError."""
     # Another file might be a pipe, whose opening waits for its other end.
     descriptor = os.open(name.path, flags | os.O_CLOEXEC | os.O_NONBLOCK)
     status = os.fstat(descriptor)

@@ -42,7 +42,7 @@ class Models:
         return {name: served} | {bundled: bundled for bundled in bundled_models()}
 
     def get(self, name: str | None = None) -> Model:
-        """The model of that name, or the served one.
+        """Return the model of that name, or the served one.
 
         Raises:
             InvalidParameter: there is none of that name.
@@ -55,7 +55,7 @@ class Models:
         return self.load(sources[name])
 
     def load(self, source: Model | str) -> Model:
-        """A model, loaded where it has not been yet. Raises NoModelError."""
+        """Load a model where it has not been yet. Raises NoModelError."""
         from pns_common import ModelError, load_model
 
         if not isinstance(source, str):

@@ -84,7 +84,7 @@ class Workers:
         must_end: float | None = None,
         stop: Callable[[], None] | None = None,
     ) -> T:
-        """The value of `function(*arguments)`, called in a worker once one is free.
+        """Return the value of `function(*arguments)`, called in a worker once one is free.
 
         `files` are those that the arguments name: they are held until the function has come back
         or its process is dead, whatever becomes of this call. It comes back before `must_end` (on
@@ -124,7 +124,7 @@ class Workers:
         return value
 
     async def _take(self, must_end: float) -> ProcessPool:
-        """A free pool; those whose idle process has died meanwhile are replaced."""
+        """Take a free pool; those whose idle process has died meanwhile are replaced."""
         try:
             async with asyncio.timeout(must_end - time.monotonic()):
                 while not (pool := await self._free.get()).active:
@@ -220,7 +220,7 @@ class Workers:
 def _scheduled(
     pool: ProcessPool, function: Callable[..., T], *arguments: object
 ) -> asyncio.Future[T]:
-    """What a process is going to answer. Nothing ever cancels it: pebble would act on that."""
+    """Schedule what a process is to answer. Nothing ever cancels it: pebble would act on that."""
     try:
         future = asyncio.wrap_future(pool.schedule(worker.call, args=(function, *arguments)))
     except RuntimeError as error:
@@ -244,7 +244,7 @@ async def _result(future: asyncio.Future[T], must_end: float) -> T:
 
 
 def _lost(future: asyncio.Future[T]) -> bool:
-    """Whether the process ended instead of answering."""
+    """Return whether the process ended instead of answering."""
     return future.cancelled() or isinstance(future.exception(), (ProcessExpired, BrokenProcessPool))
 
 

@@ -54,7 +54,7 @@ class ProgressPage:
         self.close()
 
     def close(self) -> None:
-        """The job has ended: keep what the page says, and neither file nor memory."""
+        """Keep what the page says of a job that has ended, and neither file nor memory."""
         if self._words is not None:
             self._last = self.stage, self.share
             self._words.release()
@@ -99,12 +99,12 @@ class Reporter:
             os.close(descriptor)
 
     def stage(self, name: str) -> None:
-        """A stage begins. Raises JobStopped."""
+        """Begin a stage. Raises JobStopped."""
         self._check()
         self._words[_STAGE] = 1 + STAGES.index(name)
 
     def reach(self, share: float) -> None:
-        """So much of the job is done, 0 … 1. Raises JobStopped."""
+        """Take note that so much of the job is done, 0 … 1. Raises JobStopped."""
         self._check()
         self._words[_DONE] = round(share * _SCALE)
 

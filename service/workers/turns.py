@@ -68,7 +68,7 @@ class Turns:
         return sum(job.counted for job in self._waiting)
 
     def backlog(self, before: Waiting | None = None, *, short: bool = False) -> float:
-        """Predicted seconds until one that waits will run.
+        """Predict the seconds until one that waits will run.
 
         None: until one that came last of all would, a `short` one or another.
         """
@@ -80,12 +80,12 @@ class Turns:
         return seconds if short else (seconds + self._running_seconds) / self._workers[Lane.ANY]
 
     def place_of(self, waiting: Waiting) -> int:
-        """How many come before one that waits."""
+        """Count those that come before one that waits."""
         short = self._is_short(waiting.seconds)
         return sum(job.counted for job in self._ahead(waiting, short=short))
 
     def _ahead(self, before: Waiting | None, *, short: bool) -> list[Waiting]:
-        """Those in front of one that waits, or (None) all; no large one is in front of a short."""
+        """Return those in front of one that waits, or (None) all; no large one before a short."""
         return [
             job
             for job in self._waiting
@@ -146,7 +146,7 @@ class Turns:
         return self.running[lane] < self._workers[lane]
 
     def busy(self, detail: str, *, short: bool = False) -> BusyError:
-        """The error of who finds no room, with the time until there may be some."""
+        """Return the error for who finds no room, with the time until there may be some."""
         return BusyError(detail, retry_after=max(1, round(self.backlog(short=short) + 0.5)))
 
     def _grant(self) -> None:

@@ -64,7 +64,7 @@ def call(function: Callable[..., T], *arguments: object) -> T:
 
 @contextmanager
 def rare_searches() -> Iterator[None]:
-    """Search for cycles rarely, and once at the end: what lies in them may hold large arrays."""
+    """Search for cycles rarely, and at the end: what lies in them may hold large arrays."""
     usual = gc.get_threshold()
     gc.set_threshold(OBJECTS_A_SEARCH)
     try:

@@ -14,7 +14,7 @@ from .schema import Accessor, BufferView, Document, Sparse
 
 
 def element_size(accessor: Accessor) -> int:
-    """Bytes of one element; each column of a matrix begins at a multiple of four bytes."""
+    """Return the bytes of one element; a matrix's columns begin at multiples of four bytes."""
     component = COMPONENT_TYPES[accessor.component_type].itemsize
     rows = COLUMNS.get(accessor.type)
     if rows is None:
@@ -24,14 +24,14 @@ def element_size(accessor: Accessor) -> int:
 
 
 def extent(accessor: Accessor, buffer_view: BufferView) -> int:
-    """Bytes from the view's start to the end of the accessor's last element."""
+    """Return the bytes from the view's start to the end of the accessor's last element."""
     size = element_size(accessor)
     stride = buffer_view.byte_stride or size
     return accessor.byte_offset + stride * (accessor.count - 1) + size
 
 
 def is_padded(accessor: Accessor) -> bool:
-    """Whether a matrix's columns have gaps between them."""
+    """Return whether a matrix's columns have gaps between them."""
     packed = COMPONENT_TYPES[accessor.component_type].itemsize * COMPONENT_COUNTS[accessor.type]
     return element_size(accessor) != packed
 
@@ -39,7 +39,7 @@ def is_padded(accessor: Accessor) -> bool:
 def read(
     document: Document, buffers: Sequence[memoryview], index: int
 ) -> Shaped[np.ndarray, "N K"]:
-    """All elements of an accessor; a dense one is a view of the file's bytes, so read-only.
+    """Read all elements of an accessor; a dense one is a view of the file's bytes, so read-only.
 
     Raises:
         GltfError: a sparse accessor whose indices do not ascend, or reach past its end.
@@ -55,7 +55,7 @@ def read(
 def read_rows(
     document: Document, buffers: Sequence[memoryview], index: int, rows: Int[np.ndarray, " N"]
 ) -> Shaped[np.ndarray, "N K"]:
-    """The elements `rows` of an accessor, sparse or dense; zeros where it has no bytes.
+    """Read the elements `rows` of an accessor, sparse or dense; zeros where it has no bytes.
 
     Costs in proportion to the rows, whatever the accessor's count claims. The document has been
     checked: everything lies inside its buffer view, and the rows inside the accessor.
@@ -91,7 +91,7 @@ def _stored(
     *,
     strided: bool = True,
 ) -> Shaped[np.ndarray, "N ..."]:
-    """A view of elements as they lie in the bytes: (N, K), or (N, columns, rows) of a matrix."""
+    """View elements as they lie in the bytes: (N, K), or (N, columns, rows) of a matrix."""
     view = document.buffer_views[buffer_view]
     dtype = COMPONENT_TYPES[accessor.component_type]
     rows = COLUMNS.get(accessor.type)

@@ -24,7 +24,7 @@ _COLOUR, _MESHES, _STRIDE, _ALIGNMENT, _QUANTIZED = (
 
 
 def breaches(document: Document) -> list[Change]:
-    """One change for each kind: where it is first, and how often."""
+    """Return one change for each kind: where it is first, and how often."""
     first: dict[str, str] = {}
     counts: dict[str, int] = {}
     for what, pointer in _all(document):
@@ -50,7 +50,7 @@ def _all(document: Document) -> Iterator[tuple[str, str]]:
 
 
 def _attributes(document: Document) -> Iterator[tuple[str, str]]:
-    """What is wrong with accessors where they are attributes; each is looked at once a name."""
+    """Yield what is wrong with accessors as attributes; each is looked at once a name."""
     declared = EXTENSION in document.extensions_used
     used = {
         (name, index): None

@@ -16,7 +16,7 @@ _DATA_URI = re.compile(r"data:[^,]*;base64,", re.IGNORECASE)
 def resolve_buffers(
     document: Document, binary: memoryview | None, opened: Opened
 ) -> list[memoryview]:
-    """The bytes of each buffer, exactly `byteLength` long.
+    """Return the bytes of each buffer, exactly `byteLength` long.
 
     A data URI's bytes are fewer than its characters, so the body's limit bounds them too.
 

@@ -61,7 +61,7 @@ def read_glb(data: bytes) -> Container:
 def write_glb(
     text: bytes, binary: Sequence[bytes | memoryview], others: Sequence[tuple[bytes, memoryview]]
 ) -> bytes:
-    """A GLB of the JSON `text`, the BIN chunk made of the pieces `binary`, and further chunks.
+    """Write a GLB of the JSON `text`, the BIN chunk made of the pieces `binary`, and more chunks.
 
     Raises:
         LimitError: the result would pass the 4 GiB that a GLB can hold.

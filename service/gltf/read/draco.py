@@ -80,7 +80,7 @@ def _decode(
     held: int,
     limits: Limits,
 ) -> dict[str | None, Shaped[np.ndarray, "N K"]]:
-    """The attributes by name, and the indices under None."""
+    """Decode the attributes by name, and the indices under None."""
     here = f"{pointer}/extensions/{EXTENSION}"
     wanted = checked(primitive.extensions[EXTENSION], CompressedPrimitive, here)
     if primitive.mode not in (TRIANGLES, STRIP):
@@ -146,7 +146,7 @@ def _check_claim(document: Document, primitive: Primitive, faces: int, pointer: 
 def _as_type(
     values: Shaped[np.ndarray, "N K"], dtype: np.dtype[Any], index: int
 ) -> Shaped[np.ndarray, "N K"]:
-    """The values in the accessor's component type, which must be able to hold them."""
+    """Return the values in the accessor's component type, which must be able to hold them."""
     if dtype.kind != "f":
         bounds = np.iinfo(dtype)
         # The decoder hands normalised integers back as floats that are whole.
@@ -165,7 +165,7 @@ def _store(
     primitive: dict[str, Any],
     decoded: dict[str | None, Shaped[np.ndarray, "N K"]],
 ) -> None:
-    """New accessors for one primitive: the old ones may serve another."""
+    """Make new accessors for one primitive: the old ones may serve another."""
     for name, values in decoded.items():
         accessors = tree.setdefault("accessors", [])
         if name is None:

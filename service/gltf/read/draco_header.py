@@ -86,7 +86,7 @@ class _Cursor:
             raise GltfError("the Draco data are cut off", pointer=self.pointer)
 
     def varint(self) -> int:
-        """An unsigned LEB128 number of at most 32 bits."""
+        """Read an unsigned LEB128 number of at most 32 bits."""
         value = 0
         for shift in range(0, 35, 7):
             byte = self.byte()

@@ -10,7 +10,7 @@ OLD_VALUE_KEY = "extras"
 
 
 def replaces_extras(tree: dict[str, Any]) -> bool:
-    """Whether `asset.extras` holds a value that must move for the report to have a place."""
+    """Return whether `asset.extras` holds a value that must move for the report to have a place."""
     return not isinstance(tree["asset"].get("extras", {}), dict)
 
 

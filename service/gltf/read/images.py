@@ -51,7 +51,7 @@ def embed_images(
 
 
 def mime_type(content: memoryview) -> str | None:
-    """The type of an image by its first bytes."""
+    """Tell the type of an image by its first bytes."""
     for signature, offset, kind in _SIGNATURES:
         if content[offset : offset + len(signature)] == signature:
             return kind

@@ -56,12 +56,12 @@ class Reference:
         return self.holder[self.key]
 
     def point_at(self, index: int) -> None:
-        """Change it."""
+        """Let it name another index."""
         self.holder[self.key] = index
 
 
 def unknown_extensions(tree: dict[str, Any], text: bytes) -> list[str]:
-    """The extensions in use that may hold numbers which `references` does not see.
+    """Return the extensions in use that may hold numbers which `references` does not see.
 
     `text` is the JSON that the tree came from: most files have no extension, and a search tells.
     """
@@ -82,7 +82,7 @@ def unknown_extensions(tree: dict[str, Any], text: bytes) -> list[str]:
 
 
 def accessor_references(tree: dict[str, Any]) -> Iterator[Reference]:
-    """Every place that names an accessor."""
+    """Yield every place that names an accessor."""
     for mesh in tree.get("meshes", []):
         for primitive in mesh.get("primitives", []):
             for attributes in (primitive["attributes"], *primitive.get("targets", [])):
@@ -105,7 +105,7 @@ def accessor_references(tree: dict[str, Any]) -> Iterator[Reference]:
 
 
 def view_references(tree: dict[str, Any], accessors: list[dict[str, Any]]) -> Iterator[Reference]:
-    """Every place that names a buffer view: images, and those of the given accessors."""
+    """Yield every place that names a buffer view: images, and those of the given accessors."""
     for image in tree.get("images", []):
         yield from _at(image, "bufferView")
     for accessor in accessors:

@@ -32,7 +32,7 @@ _STRING = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+(?:"|\\?\Z)', re.DOTALL)
 
 
 def decode_object(text: bytes, limits: Limits) -> dict[str, Any]:
-    """The JSON object that `text` holds.
+    """Decode the JSON object that `text` holds.
 
     Raises:
         LimitError: too many values or too deep.
@@ -73,12 +73,12 @@ def _refuse_long_integers(value: Any) -> None:
 
 
 def escaped(name: str) -> str:
-    """A key as one step of a JSON pointer (RFC 6901)."""
+    """Return a key as one step of a JSON pointer (RFC 6901)."""
     return name.replace("~", "~0").replace("/", "~1")
 
 
 def encode(value: Any) -> bytes:
-    """Compact UTF-8 JSON, keys in the order that they have."""
+    """Encode as compact UTF-8 JSON, keys in the order that they have."""
     return msgspec.json.encode(value)
 
 
@@ -94,17 +94,17 @@ def check_size(text: bytes, limits: Limits) -> None:
 
 
 def decoded_size(text: bytes) -> int:
-    """Bytes that the decoded text and the typed view of it will take, erring upwards."""
+    """Return the bytes that the decoded text and its typed view will take, erring upwards."""
     return BYTES_PER_ITEM * json_items(text)
 
 
 def json_items(text: bytes) -> int:
-    """The values that a JSON text may hold, erring upwards."""
+    """Return how many values a JSON text may hold, erring upwards."""
     return sum(text.count(mark) for mark in b'{[,:"')
 
 
 def _depth(text: bytes) -> int:
-    """How deep brackets and braces nest outside strings."""
+    """Return how deep brackets and braces nest outside strings."""
     # Without escapes, which are rare, every second quote ends a string: no pattern need be matched.
     bare = _STRING.sub(b"", text) if b"\\" in text else text
     marks = _MARKS[np.frombuffer(bare, dtype=np.uint8)]

@@ -48,7 +48,7 @@ class _Packed:
 
 
 def placeholders(document: Document) -> set[int]:
-    """Buffers that may have no bytes, since compressed views only claim to lie in them."""
+    """Return buffers that may have no bytes, since compressed views only claim to lie in them."""
     return {
         view.buffer
         for view in document.buffer_views

@@ -12,7 +12,7 @@ SURFACES = (TRIANGLES, STRIP, FAN)
 
 
 def triangle_count(corners: int, mode: int, pointer: str) -> int:
-    """The triangles that a number of corners makes.
+    """Return how many triangles a number of corners makes.
 
     Raises:
         GltfError: corners that make no whole triangles.
@@ -27,7 +27,7 @@ def triangle_count(corners: int, mode: int, pointer: str) -> int:
 
 
 def triangles(corners: Int[np.ndarray, " C"], mode: int) -> Int[np.ndarray, "F 3"]:
-    """The corners of each triangle, in the order and with the first corner that glTF gives them."""
+    """Return the corners of each triangle, in glTF's order and with its first corner."""
     if mode == TRIANGLES:
         return corners.reshape(-1, 3)
     step = np.arange(len(corners) - 2)

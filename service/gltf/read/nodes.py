@@ -44,7 +44,7 @@ def check_nodes(document: Document) -> list[Change]:
 
 
 def mesh_instances(document: Document) -> list[int]:
-    """For each mesh the number of nodes that show it."""
+    """Return for each mesh the number of nodes that show it."""
     counts = [0] * len(document.meshes)
     for node in document.nodes:
         if node.mesh is not None:
@@ -69,7 +69,7 @@ def _check_acyclic(document: Document, parents: Counter[int]) -> None:
 
 
 def _on_a_cycle(document: Document, left: list[int]) -> int:
-    """The first node of a cycle that a walk comes back to; each node left has a parent left."""
+    """Return the first node that a walk comes back to; each node left has a parent left."""
     parent = {
         child: number
         for number, node in enumerate(document.nodes)

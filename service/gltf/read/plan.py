@@ -38,7 +38,7 @@ class MeshPlan:
 
 
 def plan(document: Document) -> list[MeshPlan]:
-    """The meshes to refine; others have only points or lines and stay as they are.
+    """Return the meshes to refine; others have only points or lines and stay as they are.
 
     Raises:
         GltfError: a primitive whose corners make no whole triangles.
@@ -98,7 +98,7 @@ def check_memory(needed: int, limits: Limits) -> None:
 
 
 def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, levels: int) -> int:
-    """Bytes at the peak, erring upwards."""
+    """Predict the bytes at the peak, erring upwards."""
     total = BYTES_PER_INPUT_BYTE * size
     for mesh in plans:
         for number in mesh.primitives:

@@ -83,7 +83,7 @@ def _read_attributes(
     indices: dict[str, int],
     rows: Int[np.ndarray, " N"],
 ) -> tuple[dict[str, Shaped[np.ndarray, "N K"]], dict[str, Accessor]]:
-    """The rows of attributes, by name, and what describes them."""
+    """Read the rows of attributes, by name, and what describes them."""
     attributes: dict[str, Shaped[np.ndarray, "N K"]] = {}
     accessors: dict[str, Accessor] = {}
     for name, index in indices.items():
@@ -100,7 +100,7 @@ def _read_attributes(
 def compact(
     indices: Int[np.ndarray, " C"], count: int
 ) -> tuple[Int[np.ndarray, " U"], Int[np.ndarray, " C"]]:
-    """The used indices in ascending order, and each index's place among them.
+    """Return the used indices in ascending order, and each index's place among them.
 
     Costs in proportion to the indices, however many vertices the accessor has: many primitives may
     share one.

@@ -20,17 +20,17 @@ _ALL = {(kind, flag) for kind in range(BYTE, UNSIGNED_SHORT + 1) for flag in (Fa
 
 
 def is_dequantised(name: str) -> bool:
-    """Whether an attribute is written as float32, however it was stored."""
+    """Return whether an attribute is written as float32, however it was stored."""
     return name in ("POSITION", "NORMAL", "TANGENT") or name.startswith("TEXCOORD_")
 
 
 def allowed(name: str) -> set[tuple[int, bool]]:
-    """The integer encodings of an attribute, (component type, normalized), with the extension."""
+    """Return an attribute's integer encodings by the extension: (component type, normalized)."""
     return _SIGNED_FRACTIONS if name in ("NORMAL", "TANGENT") else _ALL
 
 
 def needs_extension(name: str, component_type: int, *, normalized: bool) -> bool:
-    """Whether an attribute of this storage is valid only under KHR_mesh_quantization."""
+    """Return whether an attribute of this storage is valid only under KHR_mesh_quantization."""
     if not is_dequantised(name) or component_type == FLOAT:
         return False
     core = _CORE_TEXCOORD if name.startswith("TEXCOORD_") else set()
@@ -40,7 +40,7 @@ def needs_extension(name: str, component_type: int, *, normalized: bool) -> bool
 def dequantised(
     name: str, values: Shaped[np.ndarray, "N K"], accessor: Accessor
 ) -> tuple[Shaped[np.ndarray, "N K"], Accessor]:
-    """The values as they are refined and written, with an accessor that describes them.
+    """Return the values as they are refined and written, with an accessor that describes them.
 
     Positions, normals, tangents and texture coordinates become float32; all else stays.
     """
@@ -51,7 +51,7 @@ def dequantised(
 
 
 def as_float(values: Shaped[np.ndarray, "N K"], *, normalized: bool) -> Shaped[np.ndarray, "N K"]:
-    """Integers as float32; normalized ones as fractions c / max, not below −1 (glTF §3.6.2.2)."""
+    """Return integers as float32; normalized: fractions c / max, not below −1 (glTF §3.6.2.2)."""
     if not normalized:
         return values.astype(np.float32)
     fractions = values.astype(np.float64) / np.iinfo(values.dtype).max
@@ -59,7 +59,7 @@ def as_float(values: Shaped[np.ndarray, "N K"], *, normalized: bool) -> Shaped[n
 
 
 def still_needed(tree: dict[str, Any]) -> bool:
-    """Whether any primitive of a document, its morph targets too, is quantised."""
+    """Return whether any primitive of a document, its morph targets too, is quantised."""
     accessors = tree.get("accessors", [])
     return any(
         needs_extension(

@@ -213,7 +213,7 @@ class Document(Part, frozen=True):
 
 
 def view(tree: dict[str, Any]) -> Document:
-    """The typed view of a glTF JSON tree.
+    """Return the typed view of a glTF JSON tree.
 
     Raises:
         GltfError: a property is missing, of another type or outside its range.
@@ -222,7 +222,7 @@ def view(tree: dict[str, Any]) -> Document:
 
 
 def checked(value: Any, kind: type[Shape], pointer: str) -> Shape:
-    """A typed view of the JSON value at `pointer`; extensions have types of their own.
+    """Return a typed view of the JSON value at `pointer`; extensions have types of their own.
 
     Raises:
         GltfError: a property is missing, of another type or outside its range.
@@ -235,6 +235,6 @@ def checked(value: Any, kind: type[Shape], pointer: str) -> Shape:
 
 
 def _pointer(path: str) -> str:
-    """`$.accessors[3].count` as a JSON pointer; it ends where the path is not known (`[...]`)."""
+    """Return `$.accessors[3].count` as a JSON pointer, to where the path is known (`[...]`)."""
     known = path.strip("`$").partition("[...]")[0]
     return "".join(f"/{step}" for step in re.findall(r"\w+", known))

@@ -34,7 +34,7 @@ def spare(
     ranges: Iterable[tuple[int, int, int]],
     unknown: Iterable[str],
 ) -> Spare:
-    """What the surfaces of a document, as it came, stand on."""
+    """Return what the surfaces of a document, as it came, stand on."""
     accessors: set[int] = set()
     for mesh in document.meshes:
         for primitive in mesh.primitives:

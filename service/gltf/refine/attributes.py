@@ -42,7 +42,7 @@ class RefinedVertices:
 def refined_attributes(
     primitive: TrianglePrimitive, refined_vertices: RefinedVertices, uv_blend: UvBlend
 ) -> dict[str, Shaped[np.ndarray, "N K"]]:
-    """The attributes in the order of the file, each in the component type that it had."""
+    """Return the attributes in the order of the file, each in the component type that it had."""
     skin: dict[str, Shaped[np.ndarray, "N 4"]] = {}
     if refined_vertices.skin_and_morph.binding is not None:
         skin = skin_attributes(primitive, refined_vertices.skin_and_morph.binding)
@@ -77,7 +77,7 @@ def blend(
     corners: Shaped[np.ndarray, "C K"],
     accessor: Accessor,
 ) -> Shaped[np.ndarray, "N K"]:
-    """Fractions, floats, colours linearly; identifiers, without average, from a nearest corner."""
+    """Blend linearly: fractions, floats, colours; identifiers, which have no mean, by nearness."""
     fraction = accessor.normalized or name.startswith("COLOR_")
     if corners.dtype.kind != "f" and not fraction:
         return connectivity.nearest(corners)
@@ -87,7 +87,7 @@ def blend(
 def tangent_directions(
     directions: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"] | None
 ) -> Float[np.ndarray, "N 3"]:
-    """Unit tangents at a right angle to the normals, where there are normals."""
+    """Return unit tangents at a right angle to the normals, where there are normals."""
     if normals is None:
         return safe_unit(directions)
     return perpendicular_tangents(directions, normals)
@@ -96,5 +96,5 @@ def tangent_directions(
 def in_type_of(
     old: Shaped[np.ndarray, "C K"], blended: Float[np.ndarray, "N K"]
 ) -> Shaped[np.ndarray, "N K"]:
-    """Blended values in the component type that they had; integers rounded."""
+    """Return blended values in the component type that they had; integers rounded."""
     return (blended if old.dtype.kind == "f" else np.rint(blended)).astype(old.dtype)

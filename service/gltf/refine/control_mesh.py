@@ -100,14 +100,14 @@ def control_mesh(
 def _vertex_counts(
     faces: Int[np.ndarray, "F 3"], starts: Int[np.ndarray, " P"]
 ) -> Int[np.ndarray, " P"]:
-    """How many vertices each part has, numbered part by part as they first appear."""
+    """Count the vertices of each part, numbered part by part as they first appear."""
     if not len(faces):
         return np.zeros(len(starts), dtype=np.int64)
     return np.diff(np.maximum.reduceat(faces.max(axis=1), starts), prepend=-1)
 
 
 def vertex_rows(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, " V"]:
-    """For each vertex of the mesh to refine the first of the primitives' rows that are it."""
+    """Return for each vertex of the mesh to refine the first of the rows that are it."""
     used = np.flatnonzero(control.weld.vertex_of >= 0)[::-1]
     row = np.empty(len(control.weld.points), dtype=np.int64)
     row[control.weld.vertex_of[used]] = used
@@ -115,6 +115,6 @@ def vertex_rows(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, " V"]
 
 
 def slices(lengths: Sequence[int]) -> list[slice]:
-    """Consecutive slices of the given lengths."""
+    """Return consecutive slices of the given lengths."""
     ends = np.cumsum([0, *lengths]).tolist()
     return [slice(start, end) for start, end in pairwise(ends)]

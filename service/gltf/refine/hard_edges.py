@@ -15,7 +15,7 @@ _NO_NORMAL = -1
 
 
 def hard_edges(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, "N 2"]:
-    """The interior edges whose two faces carry different normals at both ends.
+    """Return the interior edges whose two faces carry different normals at both ends.
 
     At both: the sides of a cone share the normals along its base and part at its tip alone, and
     they are smooth. A face without normals says nothing, and makes no crease.
@@ -34,12 +34,12 @@ def hard_edges(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, "N 2"]
 
 
 def _proper(control: ControlMesh) -> np.ndarray:
-    """Which of all faces do not name a welded vertex twice."""
+    """Mark those of all faces that do not name a welded vertex twice."""
     return np.concatenate(control.kept)
 
 
 def _corner_labels(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
-    """For each corner of each proper face a number that equal normals at one vertex share."""
+    """Label each corner of each proper face: equal normals at one vertex share a number."""
     labels = np.full(len(control.weld.vertex_of), _NO_NORMAL)
     chosen = [n for n, p in enumerate(control.primitives) if "NORMAL" in p.attributes]
     if chosen:

@@ -30,7 +30,7 @@ class LocalJoints:
     first: Int[np.ndarray, " P"]
 
     def named(self, binding: Binding, part: Int[np.ndarray, " N"]) -> Binding:
-        """The binding of vertices of some parts with joints as the file names them."""
+        """Return the binding of vertices of some parts with joints as the file names them."""
         bound = binding.weights > 0
         place = np.where(bound, self.first[part][:, None] + binding.joints, 0)
         return Binding(np.where(bound, np.append(self.joints, 0)[place], 0), binding.weights)
@@ -39,7 +39,7 @@ class LocalJoints:
 def local_joints(
     binding: Binding, part: Int[np.ndarray, " N"], count: int
 ) -> tuple[LocalJoints, Binding]:
-    """The joints of `count` parts, and the binding of vertices of some parts with their places."""
+    """Return the joints of `count` parts, and the binding of some parts' vertices to them."""
     bound = binding.weights > 0
     codes = part[:, None] * _JOINTS + binding.joints
     used = np.unique(codes[bound])

@@ -78,7 +78,7 @@ def refined_meshes(
 
 
 def _windows(plans: Sequence[MeshPlan], levels: int) -> Iterator[list[MeshPlan]]:
-    """Runs of small meshes, and each other mesh for itself."""
+    """Yield runs of small meshes, and each other mesh for itself."""
     window: list[MeshPlan] = []
     held = 0
     for plan in plans:
@@ -128,7 +128,7 @@ def _together(
     course: Course,
     shares: StageShares,
 ) -> dict[int, MeshOutcome]:
-    """By their places in the window, the meshes that could be refined with others."""
+    """Refine those meshes of a window together that can be; by their places in it."""
     groups: defaultdict[Hashable, list[int]] = defaultdict(list)
     for place, primitives in enumerate(read):
         kind = kind_of(primitives)

@@ -23,7 +23,7 @@ def angle_weighted_normals(
     count: int,
     blocks: Blocks,
 ) -> Float[np.ndarray, "G 3"]:
-    """The unit normal of each group of corners; 0 where a group's faces have no area or cancel out.
+    """Return the unit normal of each group of corners; 0 where faces have no area or cancel out.
 
     `groups` names the group, 0 … count − 1, of each face's corners.
     """
@@ -51,14 +51,14 @@ def angle_weighted_normals(
 
 
 def safe_unit(vectors: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
-    """Rows scaled to length 1; the z axis where there is no direction."""
+    """Scale rows to length 1; the z axis where there is no direction."""
     return np.where((norm(vectors) > NO_DIRECTION)[:, None], unit(vectors), [0.0, 0.0, 1.0])
 
 
 def perpendicular_tangents(
     tangents: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"]
 ) -> Float[np.ndarray, "N 3"]:
-    """The tangents' unit projections onto the planes of the unit normals.
+    """Return the tangents' unit projections onto the planes of the unit normals.
 
     Where a tangent lies along its normal, any perpendicular serves; this takes one from the axis
     that the normal is furthest from.

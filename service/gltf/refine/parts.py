@@ -30,11 +30,11 @@ class Parts:
         return np.argsort(self.of_face, kind="stable")
 
     def count_faces(self, chosen: Bool[np.ndarray, " F"]) -> Int[np.ndarray, " P"]:
-        """How many of the chosen faces each part has."""
+        """Count the chosen faces of each part."""
         return np.bincount(self.of_face[chosen], minlength=self.count)
 
     def apart(self, labels: Int[np.ndarray, " N"] | None) -> Int[np.ndarray, " N"]:
-        """Labels of rows that no two parts share."""
+        """Return labels of rows that no two parts share."""
         if labels is None:
             return self.of_row
         return distinct_rows(np.column_stack([labels, self.of_row]))

@@ -57,7 +57,7 @@ def refined_primitives(
     uv_blend: UvBlend,
     course: Course,
 ) -> list[RefinedPrimitive]:
-    """The refined primitives; one that has no face left is not among them."""
+    """Return the refined primitives; one that has no face left is not among them."""
     ids = refined_ids(control.weld, cleaned, refined.refinement, grid)
     ends = slices([int(keep.sum()) for keep in control.kept])
     points = refined.refinement.mesh.vertices
@@ -85,7 +85,7 @@ def refined_primitives(
 def refined_ids(
     welded: Weld, cleaned: Cleaned, refinement: Refinement, grid: BarycentricGrid
 ) -> Int[np.ndarray, "P T"]:
-    """The refined vertex at each grid point of each face that is not degenerate.
+    """Return the refined vertex at each grid point of each face that is not degenerate.
 
     Copies of a face (double-sided modelling, decals) take the vertices of the one that was refined,
     in their own order of corners.

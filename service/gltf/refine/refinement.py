@@ -25,7 +25,7 @@ RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 
 
 def creases_of(control: ControlMesh, options: Options) -> Int[np.ndarray, "N 2"] | None:
-    """The edges of the cleaned mesh that the options keep sharp; None where none are asked for."""
+    """Return the cleaned mesh's edges that the options keep sharp; None if none are asked for."""
     angle = options.crease_angle
     if control.cleaned is None or (angle is None and options.crease != "normals"):
         return None
@@ -77,7 +77,7 @@ def refine_control_mesh(
 def changes_of_mesh(
     control: ControlMesh, refined: RefinedMesh | None, pointer: str
 ) -> list[Change]:
-    """What was joined, dropped or cut in a mesh."""
+    """Return what was joined, dropped or cut in a mesh."""
     changes = [
         change
         for primitive, keep in zip(control.primitives, control.kept, strict=True)
@@ -89,7 +89,7 @@ def changes_of_mesh(
 
 
 def changes_of_vertices(near: int, cut: int, pointer: str) -> list[Change]:
-    """What was joined of a mesh's vertices, and how many refined ones lost a joint."""
+    """Return what was joined of a mesh's vertices, and how many refined ones lost a joint."""
     changes: list[Change] = []
     if near:
         changes.append(Change(pointer, "vertices joined within weld_tolerance", near))
@@ -99,7 +99,7 @@ def changes_of_vertices(near: int, cut: int, pointer: str) -> list[Change]:
 
 
 def changes_of_primitive(number: int, kept: Bool[np.ndarray, " F"], pointer: str) -> list[Change]:
-    """What was dropped of one primitive of the mesh at `pointer`."""
+    """Return what was dropped of one primitive of the mesh at `pointer`."""
     if kept.all():
         return []
     what = "degenerate faces dropped" if kept.any() else "left as it was: no face has an area"

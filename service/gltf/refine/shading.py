@@ -37,7 +37,7 @@ class Shading:
     def take(
         self, group: Int[np.ndarray, " N"]
     ) -> tuple[Float[np.ndarray, "N 3"], tuple[Float[np.ndarray, "N 3"] | None, ...]]:
-        """The normals at rest, and morphed, at vertices of which the groups are given."""
+        """Return the normals at rest, and morphed, at vertices of which the groups are given."""
         return self.rest[group], tuple(None if m is None else m[group] for m in self.morphed)
 
 
@@ -50,7 +50,7 @@ def shade(
     limit_normals: Float[np.ndarray, "V 3"] | None,
     course: Course,
 ) -> Shading | None:
-    """The normals over refined vertices at `points`; None where no primitive has normals.
+    """Return the normals over refined vertices at `points`; None where no primitive has normals.
 
     `ids` are, for each primitive, the refined vertices at the grid points of its faces.
     `limit_normals`, where they are wanted, take the place of the faces' own where a vertex has one

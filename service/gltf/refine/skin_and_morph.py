@@ -51,20 +51,20 @@ class SkinAndMorph:
         return distinct_rows(np.hstack(words)) if words else None
 
     def take(self, rows: Int[np.ndarray, " M"]) -> SkinAndMorph:
-        """Skin and morph of some of the vertices."""
+        """Return skin and morph of some of the vertices."""
         binding = None if self.binding is None else self.binding.take(rows)
         return SkinAndMorph(binding, tuple(delta[rows] for delta in self.deltas), _NONE)
 
 
 def read_skin_and_morph(primitives: Sequence[TrianglePrimitive]) -> SkinAndMorph:
-    """Skin and morph of all vertices of a mesh, one primitive after the other."""
+    """Read skin and morph of all vertices of a mesh, one primitive after the other."""
     count = max(len(primitive.targets) for primitive in primitives)
     deltas = [np.concatenate([_delta(p, target) for p in primitives]) for target in range(count)]
     return SkinAndMorph(read_binding(primitives), tuple(deltas), _NONE)
 
 
 def refine_skin_and_morph(control: SkinAndMorph, linear: LinearRefinement) -> SkinAndMorph:
-    """Skin and morph of the refined vertices; deltas in float32, as they will be written."""
+    """Refine skin and morph; deltas in float32, as they will be written."""
     binding, cut = None, _NONE
     if control.binding is not None:
         binding, cut = refine_binding(control.binding, linear)
@@ -73,7 +73,7 @@ def refine_skin_and_morph(control: SkinAndMorph, linear: LinearRefinement) -> Sk
 
 
 def _delta(primitive: TrianglePrimitive, target: int) -> Float[np.ndarray, "N 3"]:
-    """A target's position deltas; zeros where the primitive or the target has none."""
+    """Read a target's position deltas; zeros where the primitive or the target has none."""
     if target < len(primitive.targets) and POSITION in primitive.targets[target]:
         return primitive.targets[target][POSITION]
     return np.zeros((len(primitive.attributes[POSITION]), 3), dtype=np.float32)

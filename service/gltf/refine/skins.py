@@ -44,18 +44,18 @@ class Binding:
     weights: Float[np.ndarray, "N K"]
 
     def take(self, rows: Int[np.ndarray, " M"]) -> Binding:
-        """The binding of some of the vertices."""
+        """Return the binding of some of the vertices."""
         return Binding(self.joints[rows], self.weights[rows])
 
 
 def skin_sets(primitive: TrianglePrimitive) -> list[int]:
-    """The numbers n of its attributes WEIGHTS_n, ascending; each has its JOINTS_n."""
+    """Return the numbers n of its attributes WEIGHTS_n, ascending; each has its JOINTS_n."""
     matches = (_SET.fullmatch(name) for name in primitive.attributes)
     return sorted(int(match[1]) for match in matches if match)
 
 
 def read_binding(primitives: Sequence[TrianglePrimitive]) -> Binding | None:
-    """The binding of all vertices of a mesh, one primitive after the other; None without any."""
+    """Read the binding of a mesh's vertices, one primitive after the other; None without any."""
     width = SLOTS * max(len(skin_sets(primitive)) for primitive in primitives)
     if width == 0:
         return None
@@ -73,7 +73,7 @@ def read_binding(primitives: Sequence[TrianglePrimitive]) -> Binding | None:
 def refine_binding(
     binding: Binding, linear: LinearRefinement
 ) -> tuple[Binding, Int[np.ndarray, " V"]]:
-    """The binding at the refined vertices, and which of them lost a joint for want of slots."""
+    """Refine the binding; return also which vertices lost a joint for want of slots."""
     width = binding.weights.shape[1]
     bound = binding.weights > 0
     used = np.unique(binding.joints[bound])
@@ -100,7 +100,7 @@ def refine_binding(
 def skin_attributes(
     primitive: TrianglePrimitive, binding: Binding
 ) -> dict[str, Shaped[np.ndarray, "N 4"]]:
-    """JOINTS_n and WEIGHTS_n of refined vertices, in as many sets and the types that there were."""
+    """Return JOINTS_n and WEIGHTS_n of refined vertices, sets and types as there were."""
     sets = skin_sets(primitive)
     kept = Binding(*(part[:, : SLOTS * len(sets)] for part in (binding.joints, binding.weights)))
     attributes: dict[str, Shaped[np.ndarray, "N 4"]] = {}
@@ -122,7 +122,7 @@ def skin_attributes(
 
 
 def whole_units(weights: Float[np.ndarray, "N K"], total_units: int) -> Int[np.ndarray, "N K"]:
-    """Weights as integers that sum to `total_units` in each row: largest remainders are rounded up.
+    """Round weights to integers that sum to `total_units` a row: largest remainders go up.
 
     Rows without weight stay 0.
     """
@@ -142,7 +142,7 @@ def _fractions(weights: Shaped[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 4"]:
 def _distinct_joints(
     joints: Int[np.ndarray, "N K"], weights: Float[np.ndarray, "N K"]
 ) -> tuple[Int[np.ndarray, "N K"], Float[np.ndarray, "N K"]]:
-    """Each row by ascending joint, with the weights of a joint that is named twice added up."""
+    """Sort each row by joint, and add up the weights of a joint that is named twice."""
     joints = np.where(weights > 0, joints, _NO_JOINT)
     order = np.argsort(joints, axis=1, kind="stable")
     joints, weights = (np.take_along_axis(part, order, axis=1) for part in (joints, weights))
@@ -157,7 +157,7 @@ def _distinct_joints(
 def _heaviest(
     joints: Int[np.ndarray, "N K"], weights: Float[np.ndarray, "N K"], count: int
 ) -> tuple[Int[np.ndarray, "N k"], Float[np.ndarray, "N k"]]:
-    """The slots of most weight, heaviest first; of equals, the earlier."""
+    """Return the slots of most weight, heaviest first; of equals, the earlier."""
     order = np.argsort(-weights, axis=1, kind="stable")[:, :count]
     joints, weights = (np.take_along_axis(part, order, axis=1) for part in (joints, weights))
     return np.where(weights > 0, joints, 0), weights

@@ -22,7 +22,7 @@ from .normals import angle_weighted_normals, safe_unit
 def with_smooth_normals(
     control: ControlMesh, cleaned: Cleaned, creases: Int[np.ndarray, "N 2"] | None
 ) -> list[TrianglePrimitive]:
-    """The primitives, with a normal for each vertex and each side of the creases (N, 2) there.
+    """Give the primitives a normal for each vertex and each side of the creases (N, 2) there.
 
     A vertex is split where creases part its faces. Copies of a face take its normals, turned over
     where they are; faces that will be dropped keep what they had.
@@ -42,13 +42,13 @@ def with_smooth_normals(
 
 
 def with_normal_accessor(accessors: dict[str, Accessor], count: int) -> dict[str, Accessor]:
-    """The accessors of a primitive that has normals now, whether it had any or not."""
+    """Return the accessors of a primitive that has normals now, whether it had any or not."""
     plain = Accessor(component_type=FLOAT, count=count, type="VEC3")
     return {"NORMAL": plain} | accessors
 
 
 def _fans(cleaned: Cleaned, creases: Int[np.ndarray, "N 2"] | None) -> Int[np.ndarray, "F 3"]:
-    """A number for each corner that the corners of one smooth fan of faces share."""
+    """Return a number for each corner that the corners of one smooth fan of faces share."""
     faces = cleaned.mesh.faces
     topology = build_topology(faces, len(cleaned.mesh.vertices))
     smooth = np.ones(len(topology.interior), dtype=bool)
@@ -84,7 +84,7 @@ def _normals(cleaned: Cleaned, fans: Int[np.ndarray, "F 3"]) -> Float[np.ndarray
 def _of_all_faces(
     control: ControlMesh, cleaned: Cleaned, fans: Int[np.ndarray, "F 3"]
 ) -> tuple[Int[np.ndarray, "P 3"], Int[np.ndarray, " P"]]:
-    """The fans of all proper faces' corners, and which faces are copies turned over."""
+    """Return the fans of all proper faces' corners, and which faces are copies turned over."""
     proper = np.concatenate(control.kept)
     leader = cleaned.representative[proper]
     own = cleaned.vertex_map[control.weld.faces[proper]]
@@ -100,7 +100,7 @@ def _with_normals(
     turned: np.ndarray,
     values: Float[np.ndarray, "G 3"],
 ) -> TrianglePrimitive:
-    """Rows of their own for each vertex, fan and side that the corners name."""
+    """Return rows of their own for each vertex, fan and side that the corners name."""
     side = np.full(primitive.corners.shape, -1)
     side[keep] = 2 * fan + turned[:, None]
     pairs = np.column_stack([primitive.corners.reshape(-1), side.reshape(-1)])

@@ -51,7 +51,7 @@ class NormalGroups:
         otherwise: Float[np.ndarray, "G 3"],
         course: Course,
     ) -> Float[np.ndarray, "G 3"]:
-        """The groups' unit normals over refined vertices; `otherwise` where they have none."""
+        """Return the groups' unit normals at refined vertices; `otherwise` where they have none."""
         blocks = Blocks(available_threads(), before=course.count(len(self.vertices)))
         values = angle_weighted_normals(
             points, self.vertices, self.groups, len(self.before), blocks
@@ -63,7 +63,7 @@ class NormalGroups:
     def with_limit(
         self, values: Float[np.ndarray, "G 3"], limit: Float[np.ndarray, "V 3"]
     ) -> Float[np.ndarray, "G 3"]:
-        """The limit surface's normals for the groups that are alone at their vertex.
+        """Return the limit surface's normals for the groups that are alone at their vertex.
 
         Where several are (creases), the limit has a normal for each side, and one cannot serve.
         """
@@ -79,7 +79,7 @@ class NormalGroups:
 def normal_groups(
     control: ControlMesh, ids: Sequence[Int[np.ndarray, "F T"]], grid: BarycentricGrid
 ) -> NormalGroups | None:
-    """The groups over the primitives that have normals; None where none has.
+    """Return the groups over the primitives that have normals; None where none has.
 
     `ids` are, for each primitive, the refined vertices at the grid points of its faces.
     """
@@ -104,7 +104,7 @@ def normal_groups(
 def _split_groups(
     control: ControlMesh, chosen: Sequence[int], grid: BarycentricGrid
 ) -> tuple[SplitConnectivity, Float[np.ndarray, "C 3"]]:
-    """The split connectivity of (welded vertex, old normal) pairs, and the pairs' normals."""
+    """Split the connectivity of (welded vertex, old normal) pairs; return it and their normals."""
     old = [control.primitives[number].attributes["NORMAL"] for number in chosen]
     welded = [control.weld.vertex_of[control.rows[number]] for number in chosen]
     starts = slices([len(normals) for normals in old])
@@ -122,7 +122,7 @@ def _split_groups(
 def joined_normals(
     vertex: Int[np.ndarray, " N"], normals: Float[np.ndarray, "N 3"]
 ) -> Int[np.ndarray, " N"]:
-    """Labels that rows share where they have the same vertex and, nearly, the same normal.
+    """Return labels that rows share where they have the same vertex and, nearly, the same normal.
 
     SiblingFiles along one direction are compared: rows with equal normals are always joined, rows
     that nearly agree all but always, at the cost of one sort however many meet at a vertex.

@@ -22,7 +22,7 @@ def refined_targets(
     refined_vertices: RefinedVertices,
     base: Mapping[str, Shaped[np.ndarray, "N K"]],
 ) -> list[Deltas]:
-    """The deltas of each target, as many and in the order that there were; `base` is refined."""
+    """Refine the deltas of each target, as many and in their order; `base` is refined already."""
     return [
         _refined_target(primitive, refined_vertices, base, number)
         for number in range(len(primitive.targets))

@@ -120,7 +120,7 @@ def refine_together(
 
 
 def _able(control: ControlMesh, parts: Parts) -> Bool[np.ndarray, " P"]:
-    """Which parts have a face left, and an extent to measure by."""
+    """Return which parts have a face left, and an extent to measure by."""
     proper = np.concatenate(control.kept)
     points = control.weld.points[control.weld.faces]
     low, high = np.full((parts.count, 3), np.inf), np.full((parts.count, 3), -np.inf)
@@ -137,7 +137,7 @@ def _smoothed(
     creases: Int[np.ndarray, "N 2"] | None,
     options: Options,
 ) -> tuple[ControlMesh, Parts]:
-    """The union with new normals, for which vertices are split into more rows."""
+    """Return the union with new normals, for which vertices are split into more rows."""
     primitives = with_smooth_normals(control, cleaned, creases)
     of_row = np.concatenate(
         [
@@ -158,7 +158,7 @@ def _chosen_together(
     course: Course,
     shares: StageShares,
 ) -> list[Part | None]:
-    """The same of some of the meshes; None for the others."""
+    """Refine some of the meshes together; None for the others."""
     made: list[Part | None] = [None] * len(meshes)
     places = np.flatnonzero(chosen).tolist()
     if places:
@@ -213,7 +213,7 @@ def _skin_and_morph(
     made: PartsRefinement,
     options: Options,
 ) -> tuple[SkinAndMorph, Int[np.ndarray, " P"]]:
-    """What follows the refined vertices, and how many of each part lost a joint."""
+    """Return what follows the refined vertices, and how many of each part lost a joint."""
     if not control.skin_and_morph.any:
         return control.skin_and_morph, np.zeros(parts.count, dtype=np.int64)
     rows = vertex_rows(control, cleaned)
@@ -245,7 +245,7 @@ def _divided(
     pointers: Sequence[str],
     options: Options,
 ) -> list[Part]:
-    """The union's refined primitives, cut into those of its parts."""
+    """Return the union's refined primitives, cut into those of its parts."""
     copied = (cleaned.representative >= 0) & (cleaned.face_map < 0)
     copies = parts.count_faces(copied).tolist()
     refined: list[list[RefinedPrimitive]] = [[] for _ in meshes]
@@ -283,11 +283,11 @@ def _divided(
 def _shares(
     kept: Bool[np.ndarray, " F"], primitives: Sequence[TrianglePrimitive]
 ) -> list[Bool[np.ndarray, " f"]]:
-    """Each part's share of what says of a primitive's faces whether they were kept."""
+    """Return each part's share of what says of a primitive's faces whether they were kept."""
     return [kept[share] for share in slices([len(primitive.corners) for primitive in primitives])]
 
 
 def _with_normals(primitive: TrianglePrimitive) -> TrianglePrimitive:
-    """The primitive, described as one that has normals."""
+    """Return the primitive, described as one that has normals."""
     accessors = with_normal_accessor(primitive.accessors, len(primitive.rows))
     return replace(primitive, accessors=accessors)

@@ -21,7 +21,7 @@ from .skins import COLUMNS, skin_sets
 
 
 def kind_of(primitives: Sequence[TrianglePrimitive]) -> Hashable | None:
-    """What meshes have in common that may be joined; None for one that may not."""
+    """Return what meshes have in common that may be joined; None for one that may not."""
     joints = {
         values.dtype
         for primitive in primitives
@@ -44,7 +44,7 @@ def kind_of(primitives: Sequence[TrianglePrimitive]) -> Hashable | None:
 
 
 def joined(meshes: Sequence[Sequence[TrianglePrimitive]]) -> tuple[list[TrianglePrimitive], Parts]:
-    """The union's primitives, and which rows and faces are whose."""
+    """Join the primitives; return also which rows and faces are whose."""
     numbers = np.arange(len(meshes))
     alike = list(zip(*meshes, strict=True))
     rows = [[len(p.attributes["POSITION"]) for p in own] for own in alike]
@@ -60,7 +60,7 @@ def joined(meshes: Sequence[Sequence[TrianglePrimitive]]) -> tuple[list[Triangle
 def divided(
     refined: RefinedPrimitive, counts: Int[np.ndarray, " P"], sources: Sequence[TrianglePrimitive]
 ) -> list[RefinedPrimitive]:
-    """A refined primitive of the union cut into those of its parts, as each has them alone.
+    """Cut a refined primitive of the union into those of its parts, as each has them alone.
 
     `counts` are the refined faces of each part, `sources` its primitives before.
     """
@@ -129,7 +129,7 @@ def _signature(
 
 
 def _joint_blocks(primitives: Sequence[TrianglePrimitive]) -> int:
-    """How many blocks of joints a mesh is refined in, to a factor of two: 0 without a skin.
+    """Return how many blocks of joints a mesh is refined in, to a factor of two: 0 without a skin.
 
     Meshes of few joints do not wait for the blocks of one that has many.
     """

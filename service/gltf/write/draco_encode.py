@@ -50,7 +50,7 @@ class Encoded:
 
 
 def grid_of(positions: list[Float[np.ndarray, "N 3"]]) -> Grid:
-    """The smallest grid over all positions of a mesh."""
+    """Return the smallest grid over all positions of a mesh."""
     low = np.min([points.min(axis=0) for points in positions], axis=0)
     high = np.max([points.max(axis=0) for points in positions], axis=0)
     size = float((high.astype(np.float64) - low).max())
@@ -58,7 +58,7 @@ def grid_of(positions: list[Float[np.ndarray, "N 3"]]) -> Grid:
 
 
 def can_encode(attributes: dict[str, Shaped[np.ndarray, "N K"]]) -> bool:
-    """Whether Draco holds these types; what it reorders, it must hold as a whole."""
+    """Return whether Draco holds these types; what it reorders, it must hold as a whole."""
     return all(values.dtype in _TYPES for values in attributes.values())
 
 
@@ -108,5 +108,5 @@ def encode(
 
 
 def _double(values: Shaped[np.ndarray, "N K"] | None) -> Float[np.ndarray, "N K"] | None:
-    """DracoPy takes doubles here, and stores float32."""
+    """Return doubles, which DracoPy takes here; it stores float32."""
     return None if values is None else values.astype(np.float64)

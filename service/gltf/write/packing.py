@@ -63,7 +63,7 @@ class MeshoptWriter(Writer):
         return view
 
     def bytes_of(self, view: dict[str, Any]) -> dict[str, Any]:
-        """The object that says where a view's bytes lie in BIN."""
+        """Return the object that says where a view's bytes lie in BIN."""
         return view.get("extensions", {}).get(MESHOPT, view)
 
     def finish(self) -> list[bytes | memoryview]:
@@ -76,7 +76,7 @@ class MeshoptWriter(Writer):
         return pieces
 
     def changes(self) -> list[Change]:
-        """What was compressed."""
+        """Return what was compressed."""
         return [Change("/bufferViews", "compressed by meshopt, exactly", self.views)]
 
 
@@ -125,7 +125,7 @@ class DracoWriter(Writer):
         return super().finish()
 
     def changes(self) -> list[Change]:
-        """What was compressed, and what was not."""
+        """Return what was compressed, and what was not."""
         what = "compressed by Draco: positions, normals and texture coordinates rounded"
         return [*([Change("/meshes", what, self.encoded)] if self.encoded else []), *self.plain]
 

@@ -53,7 +53,7 @@ def remove_unused(tree: dict[str, Any], spare: Spare) -> list[tuple[int, int]]:
 def _renumbered(
     entries: list[dict[str, Any]], kept: list[bool], references: Iterable[Reference]
 ) -> list[dict[str, Any]]:
-    """The kept entries: those beyond their number move into the places of those that went."""
+    """Keep entries: those beyond their number move into the places of those that went."""
     count = sum(kept)
     holes = [index for index in range(count) if not kept[index]]
     movers = [index for index in range(count, len(entries)) if kept[index]]
@@ -72,7 +72,7 @@ def cut(
     gone: Iterable[tuple[int, int]],
     needed: Iterable[tuple[int, int]],
 ) -> tuple[list[bytes | memoryview], list[tuple[int, int]]]:
-    """The pieces without the bytes of `gone` that nothing in `needed` covers.
+    """Cut from the pieces the bytes of `gone` that nothing in `needed` covers.
 
     Whole words go, so that what follows stays aligned. Also the (position, bytes before it that
     went) of each cut, ascending, for `moved`.
@@ -105,7 +105,7 @@ def cut(
 
 
 def moved(offset: int, shifts: Sequence[tuple[int, int]]) -> int:
-    """Where a byte lies after the cuts."""
+    """Return where a byte lies after the cuts."""
     cuts = bisect_right(shifts, offset, key=itemgetter(0))
     return offset - (shifts[cuts - 1][1] if cuts else 0)
 
@@ -121,7 +121,7 @@ def _merged(ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
 
 
 def _without(ranges: list[tuple[int, int]], others: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """What is left of disjoint ascending ranges without others of the same kind."""
+    """Return what is left of disjoint ascending ranges without others of the same kind."""
     left: list[tuple[int, int]] = []
     place = 0
     for start, end in ranges:

@@ -18,7 +18,7 @@ _MODES = {STRIP: "triangle strip written as triangles", FAN: "triangle fan writt
 
 
 def storage_changes(document: Document, plans: Sequence[MeshPlan]) -> list[Change]:
-    """One change for each primitive and way of storing that refinement gives up."""
+    """Return one change for each primitive and way of storing that refinement gives up."""
     return [
         change
         for plan in plans

@@ -38,7 +38,7 @@ class VertexUse:
                 self.rows[source.attributes["POSITION"]].append(primitive.rows[used])
 
     def unused(self) -> int:
-        """How many elements no refined face uses, of accessors that nothing else uses either."""
+        """Count elements that no refined face uses, of accessors that nothing else uses either."""
         others = {
             primitive.attributes["POSITION"]
             for mesh, content in enumerate(self.document.meshes)

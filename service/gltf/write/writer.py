@@ -51,7 +51,7 @@ class Writer:
             self.replace(mesh, primitive)
 
     def changes(self) -> list[Change]:
-        """What was not written as it was made."""
+        """Return what was not written as it was made."""
         return []
 
     def replace(self, mesh: int, refined: RefinedPrimitive) -> None:
@@ -95,7 +95,7 @@ class Writer:
         self.length = sum(len(piece) for piece in self.pieces)
 
     def bytes_of(self, view: dict[str, Any]) -> dict[str, Any]:
-        """The object that says where a view's bytes lie in BIN."""
+        """Return the object that says where a view's bytes lie in BIN."""
         return view
 
     def finish(self) -> list[bytes | memoryview]:
@@ -133,13 +133,13 @@ class Writer:
         return {"buffer": 0, "byteOffset": self.append(data), "byteLength": len(data)}
 
     def add_view(self, view: dict[str, Any]) -> int:
-        """A new buffer view's index."""
+        """Add a buffer view; return its index."""
         views = self.tree.setdefault("bufferViews", [])
         views.append(view)
         return len(views) - 1
 
     def add_accessor(self, values: Shaped[np.ndarray, "N K"], kind: str, view: int | None) -> int:
-        """A new accessor's index; `view` None: its elements lie elsewhere."""
+        """Add an accessor; return its index. `view` None: its elements lie elsewhere."""
         accessors = self.tree.setdefault("accessors", [])
         place = {} if view is None else {"bufferView": view}
         accessors.append(
@@ -179,7 +179,7 @@ def describe(
 
 
 def in_words(values: Shaped[np.ndarray, "N K"], kind: str) -> Shaped[np.ndarray, "N B"]:
-    """Rows as bytes, each column of a matrix and each row padded to whole words where needed."""
+    """Return rows as bytes, a matrix's columns and all rows padded to whole words if need be."""
     narrow = np.ascontiguousarray(values)
     if narrow.itemsize == 4:
         return narrow.view(np.uint8).reshape(len(values), -1)

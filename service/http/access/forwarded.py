@@ -47,6 +47,6 @@ class Forwarded:
 
 
 def _values(scope: Scope, wanted: bytes) -> list[str]:
-    """The header's values, those of several lines in their order."""
+    """Return the header's values, those of several lines in their order."""
     text = ",".join(value.decode("latin-1") for name, value in scope["headers"] if name == wanted)
     return [value.strip() for value in text.split(",") if value.strip()]

@@ -38,20 +38,20 @@ class Entry(BaseModel):
 
 
 def new_key(name: str) -> str:
-    """A fresh key of that name. Raises KeysError where it cannot be one."""
+    """Make a fresh key of that name. Raises KeysError where it cannot be one."""
     if not re.fullmatch(NAME, name):
         raise KeysError(f"{name!r}: a name is 1 to 63 of a-z, 0-9 and -, not - first")
     return f"{PREFIX}_{name}_{secrets.token_urlsafe(32)}"
 
 
 def hash_of(key: str, *, salt: bytes | None = None) -> str:
-    """What a file keeps of a key: scrypt's parameters, the salt, and the digest."""
+    """Return what a file keeps of a key: scrypt's parameters, the salt, and the digest."""
     salt = secrets.token_bytes(16) if salt is None else salt
     return _written(LOG_N, R, P, salt, _scrypt(key, salt, LOG_N, R, P))
 
 
 def matches(key: str, hashed: str) -> bool:
-    """Whether `hashed` was made of `key`; the comparison takes as long whatever differs."""
+    """Return whether `hashed` was made of `key`; the comparison takes as long whatever differs."""
     fields = _HASH.fullmatch(hashed)
     if fields is None:
         return False
@@ -74,7 +74,7 @@ class Keyring:
         }
 
     def find(self, key: str, name: str) -> Entry | None:
-        """The entry of that name, where the key is its."""
+        """Return the entry of that name, where the key is its."""
         entry = self._entries.get(name)
         own = {} if entry is None else {_cost(entry.hash): entry.hash}
         right = [matches(key, hashed) for hashed in (self._nobody | own).values()]
@@ -82,7 +82,7 @@ class Keyring:
 
 
 def read_keys(path: Path) -> dict[str, Entry]:
-    """The entries of a file, by name. Raises KeysError."""
+    """Read the entries of a file, by name. Raises KeysError."""
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
         entries = _ENTRIES.validate_python(data.get("key", []))
@@ -108,7 +108,7 @@ def read_keys(path: Path) -> dict[str, Entry]:
 
 
 def toml_entry(entry: Entry) -> str:
-    """An entry as the file holds it."""
+    """Return an entry as the file holds it."""
     lines = ["[[key]]", f'name = "{entry.name}"', f'hash = "{entry.hash}"']
     if entry.faces_per_minute is not None:
         lines.append(f"faces_per_minute = {entry.faces_per_minute:g}")
@@ -119,13 +119,13 @@ _ENTRIES = TypeAdapter(list[Entry])
 
 
 def _cost(hashed: str) -> tuple[int, int, int]:
-    """scrypt's log n, r and p of a hash."""
+    """Read scrypt's log n, r and p from a hash."""
     log_n, r, p = map(int, hashed.split("$")[1:4])
     return log_n, r, p
 
 
 def _hash_of_nobody(hashed: str) -> str:
-    """A hash that costs as much and is no key's."""
+    """Make a hash that costs as much and is no key's."""
     return _written(*_cost(hashed), secrets.token_bytes(16), secrets.token_bytes(32))
 
 

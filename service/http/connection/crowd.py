@@ -23,15 +23,15 @@ class Guest(Protocol):
     """A connection, as the crowd sees it."""
 
     def is_idle(self) -> bool:
-        """Whether its client has really said nothing: not even what is yet unread."""
+        """Return whether its client has really said nothing: not even what is yet unread."""
         ...
 
     def has_left(self) -> bool:
-        """Whether its client will say nothing more, and what it said last is yet to be read."""
+        """Return whether its client says nothing more, and its last words are yet to be read."""
         ...
 
     def rate(self) -> float:
-        """Bytes a second that its client sends or takes; infinite while it is early to tell."""
+        """Return the bytes a second that its client sends or takes; infinite while it is early."""
         ...
 
     def give_way(self) -> None:
@@ -144,23 +144,23 @@ class Crowd:
         return True
 
     def _who_left(self, name: str) -> Guest | None:
-        """The oldest of an address whose client has left, unheard or a listener."""
+        """Return the oldest of an address whose client has left, unheard or a listener."""
         free = chain(self._waiting, self._listening)
         own = (guest for guest in free if self._names[guest] == name)
         return next((guest for guest in own if guest.has_left()), None)
 
     def _slowest(self) -> Guest | None:
-        """The slowest, where there is one whose rate can be told."""
+        """Return the slowest, where there is one whose rate can be told."""
         rates = {guest: guest.rate() for guest in self._slow}
         told = [guest for guest, rate in rates.items() if rate < inf]
         return min(told, key=lambda guest: (rates[guest], -self._held_with(guest)), default=None)
 
     def _greediest(self, guests: Iterable[Guest], more_than: int = -1) -> Guest | None:
-        """The oldest of the address with the most connections, if those are more than that."""
+        """Return the oldest of the address with most connections, if those are more than that."""
         guest = max(guests, key=self._held_with, default=None)
         return guest if guest is not None and self._held_with(guest) > more_than else None
 
     def _held_with(self, guest: Guest) -> int:
-        """How many connections its address has; none that count, where it is a proxy's."""
+        """Return how many connections its address has; none that count, where it is a proxy's."""
         name = self._names[guest]
         return 0 if name is None else self._of_address[name]

@@ -20,7 +20,7 @@ OF_RESULT = 2
 
 
 def fitting(settings: Settings) -> int:
-    """`settings.connections`, or as many as there are descriptors for; raises the limit first.
+    """Return `settings.connections`, or what descriptors are there for; raises the limit first.
 
     Raises:
         OSError: there are not descriptors enough for a single connection.

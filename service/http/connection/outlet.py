@@ -62,7 +62,7 @@ class Outlet:
             self.real.write(data)
 
     def is_closing(self) -> bool:
-        """Whether the end has begun."""
+        """Return whether the end has begun."""
         return self._closing or self.real.is_closing()
 
     def close(self) -> None:

@@ -18,7 +18,7 @@ class Pace:
     whole: float
 
     def patience(self, moved: int, waited: float) -> float:
-        """How many more seconds to wait for the next byte.
+        """Return how many more seconds to wait for the next byte.
 
         `moved` bytes have been moved so far, and the client was waited for `waited` seconds in all.
         Never more than `idle`; zero or less once the client is late.
@@ -26,7 +26,7 @@ class Pace:
         return min(self.idle, self.grace + moved / self.rate - waited, self.whole - waited)
 
     def excuse(self, moved: int, waited: float) -> str:
-        """What the client that ran out of patience has done."""
+        """Return what the client that ran out of patience has done."""
         if waited >= self.whole:
             return f"not whole within {self.whole:g} seconds"
         if waited >= self.grace + moved / self.rate:

@@ -41,7 +41,7 @@ class Parser(h11.Connection):
         self.out_of_breath = False
 
     def next_event(self) -> Any:
-        """The next event, or h11.NEED_DATA where the breath is out or the body is a flood."""
+        """Return the next event, or h11.NEED_DATA if the breath is out or the body is a flood."""
         if self.flooded:
             return h11.NEED_DATA
         if self._left <= 0:
@@ -60,7 +60,7 @@ class Parser(h11.Connection):
         return event
 
     def _checked_event(self) -> Any:
-        """The next event, if there is but one way to read the lines that it came in."""
+        """Return the next event, if there is but one way to read the lines that it came in."""
         lined = self._chunked or self.their_state is h11.IDLE
         waiting = self.trailing_data[0] if lined else b""
         event = super().next_event()

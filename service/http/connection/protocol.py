@@ -111,7 +111,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
     # Reading
 
     def get_buffer(self, sizehint: int) -> bytearray:
-        """Where the next read goes."""
+        """Return where the next read goes."""
         return self._shared.buffer
 
     def buffer_updated(self, nbytes: int) -> None:
@@ -143,7 +143,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
             self._shared.turns.add(self._more)
 
     def _more(self) -> None:
-        """A turn: parse on, and read again where all is parsed."""
+        """Take a turn: parse on, and read again where all is parsed."""
         if self.transport.is_closing():
             return
         self.flow.held = False
@@ -165,15 +165,15 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
             crowd.work(self)
 
     def is_idle(self) -> bool:
-        """Whether its client has said nothing: a head that waits in the socket is something."""
+        """Return whether its client said nothing: a head waiting in the socket is something."""
         return bool(self.conn.trailing_data[0]) or not self._outlet.has_unread
 
     def has_left(self) -> bool:
-        """Whether its client has ended what it sends."""
+        """Return whether its client has ended what it sends."""
         return self._outlet.has_left
 
     def rate(self) -> float:
-        """Bytes a second of its body or its answer."""
+        """Return the bytes a second of its body or its answer."""
         if self._taking.waits:
             return self._taking.rate(RATE_SECONDS)
         seconds = self.loop.time() - self._asked_at
@@ -228,7 +228,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
     # The answer
 
     async def _application(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """The application; an answer before the body is whole says that the connection ends."""
+        """Run the application; an answer before the body is whole says: the connection ends."""
         parser = self.conn
         self._taking.begin()
         self._asked_at = self.loop.time()
@@ -257,13 +257,13 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
             self._await_head()
 
     def pause_writing(self) -> None:
-        """The client has more to take than it takes: its clock runs."""
+        """Start the client's clock: it has more to take than it takes."""
         super().pause_writing()
         self._taking.fall_behind()
         self._say_to_crowd()
 
     def resume_writing(self) -> None:
-        """The client has caught up: its clock stands."""
+        """Stop the client's clock: it has caught up."""
         self._taking.catch_up()
         self._say_to_crowd()
         if self.transport.is_closing():
@@ -293,7 +293,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
                 real.resume_reading()
 
     def _is_heard(self) -> bool:
-        """Whether nothing more is expected of the client; of those without a slot, nothing is."""
+        """Return whether nothing more is expected of the client; without a slot, nothing is."""
         if not self._has_place:
             return True
         if self.conn.their_state is h11.IDLE:
@@ -301,7 +301,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         return self.conn.their_state in (h11.DONE, h11.MUST_CLOSE, h11.CLOSED)
 
     def eof_received(self) -> None:
-        """The client sends no more; asyncio closes, once what is written is taken."""
+        """Hear that the client sends no more; asyncio closes, once what is written is taken."""
         if not self._taking.waits:
             self._end_deadline.start(self._shared.bounds.answer.idle)
 

@@ -7,7 +7,7 @@ from http import HTTPStatus
 
 
 def refusal(status: int, code: str, detail: str, more: bytes = b"") -> bytes:
-    """A whole answer, a problem document that ends the connection; `more` are lines of its head."""
+    """Return a whole answer, a problem that ends the connection; `more` are lines of its head."""
     phrase = HTTPStatus(status).phrase
     document = {
         "type": f"urn:pns:problem:{code}",

@@ -41,5 +41,5 @@ def check_lines(lines: bytes) -> None:
 
 
 def is_chunked(request: h11.Request) -> bool:
-    """Whether its body comes in chunks: h11 takes no other transfer encoding."""
+    """Return whether its body comes in chunks: h11 takes no other transfer encoding."""
     return any(name == b"transfer-encoding" for name, _ in request.headers)

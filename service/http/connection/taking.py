@@ -39,28 +39,28 @@ class Taking:
         return self._timer is not None
 
     def rate(self, early: float) -> float:
-        """Bytes a second of those that it was waited for; infinite before `early` seconds."""
+        """Return the bytes a second of those waited for; infinite before `early` seconds."""
         moved, waited = self._progress(self._clock.time())
         return moved / waited if waited > early else inf
 
     def begin(self) -> None:
-        """Another answer begins."""
+        """Begin another answer."""
         self._waited, self._from = 0.0, self._outlet.taken
 
     def fall_behind(self) -> None:
-        """The outlet is full: the client's clock runs."""
+        """Start the client's clock: the outlet is full."""
         self._full_since = self._clock.time()
         self._moved = (self._outlet.taken, self._full_since)
         self._timer = self._clock.call_later(TICK_SECONDS, self._look)
 
     def catch_up(self) -> None:
-        """The outlet has room: the client's clock stands."""
+        """Stop the client's clock: the outlet has room."""
         if self._timer is not None:
             self.forget()
             self._waited += self._clock.time() - self._full_since
 
     def forget(self) -> None:
-        """There is nobody to watch any more."""
+        """Watch nobody any more."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -77,5 +77,5 @@ class Taking:
             self._timer = self._clock.call_later(TICK_SECONDS, self._look)
 
     def _progress(self, now: float) -> tuple[int, float]:
-        """Bytes that this client took of its answer, and the seconds that it was waited for."""
+        """Return the bytes that this client took of its answer, and the seconds of waiting."""
         return self._outlet.taken - self._from, self._waited + now - self._full_since

@@ -17,7 +17,7 @@ _AUTHORITY = re.compile(rb"(?:[\w.~!$&'()*+,;=%-]+|\[[0-9A-Fa-f:.]+\])(?::[0-9]*
 
 
 def origin_form(request: h11.Request) -> h11.Request:
-    """The request with its path alone for a target; one that has no other is handed back.
+    """Return the request with its path alone for a target; one that has no other is handed back.
 
     Raises:
         h11.RemoteProtocolError: the target names no host, or more than a host and a port.

@@ -27,7 +27,7 @@ class TracingError(Exception):
 
 
 def tracer_from_environment() -> Tracer | None:
-    """A tracer that sends to the endpoint that the environment names; None where it names none.
+    """Make a tracer that sends to the endpoint that the environment names; None if it names none.
 
     Raises:
         TracingError: the extra is not installed.

@@ -34,7 +34,7 @@ _at: ContextVar[Any] = ContextVar("at")
 
 
 def local(work: Work[T, R], workers: int) -> Engine[T, R]:
-    """An engine of `workers` processes on this machine.
+    """Return an engine of `workers` processes on this machine.
 
     Each process has a pool of its own, and one chunk at a time: in a pebble pool of several, one
     that is killed between two tasks, or while it holds their common pipe, is the end of all.
@@ -133,7 +133,7 @@ class _Worker:
             return self.replaced(work.prepare).sent(work, chunk)
 
     def replaced(self, prepare: Callable[[], None]) -> _Worker:
-        """Another one, in place of one whose pool has ended."""
+        """Return another one, in place of one whose pool has ended."""
         self.pool.stop()
         self.pool.join()
         return _Worker.new(prepare)
@@ -171,5 +171,5 @@ def _first(waiting: deque[T], size: int) -> list[T]:
 
 
 def _late(lost: BaseException) -> bool:
-    """Whether a process was ended because its task took too long."""
+    """Return whether a process was ended because its task took too long."""
     return isinstance(lost, TimeoutError) or getattr(lost, "exitcode", 0) == -signal.SIGALRM

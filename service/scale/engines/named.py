@@ -17,7 +17,7 @@ def engine_of(
     workers: int | None,
     say: Callable[[str], None],
 ) -> Engine[T, R]:
-    """The engine of a name, local or ray; an address implies Ray, and local takes all processors.
+    """Return the engine of a name, local or ray; an address means Ray, local takes all processors.
 
     ``say`` is told where Ray's dashboard is.
 

@@ -30,7 +30,7 @@ def on_ray(
     workers: int | None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Engine[T, R]:
-    """An engine on Ray: a cluster at `address`, else one started here; `workers` bounds its tasks.
+    """Return an engine on Ray: a cluster at `address`, else one started here, of `workers` tasks.
 
     Raises:
         InvalidParameter: Ray is not installed, or no cluster answers.

@@ -29,7 +29,7 @@ Engine = Callable[[Iterator[T]], Iterator[list[R]]]
 
 
 def nothing() -> None:
-    """What a worker does beforehand where there is nothing to prepare."""
+    """Do what a worker does beforehand where there is nothing to prepare."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +51,14 @@ class Work(Generic[T, R]):
     prepare: Callable[[], None] = nothing
 
     def again(self, task: T) -> T | None:
-        """A task whose worker is lost, to be tried once more; None where it was tried enough."""
+        """Return a task whose worker is lost, to be tried once more; None if tried enough."""
         if task.attempt >= self.most_attempts:
             return None
         changed: Any = task
         return replace(changed, attempt=task.attempt + 1)
 
     def given_up(self, task: T, *, late: bool) -> R:
-        """What a task gives whose last worker died, or hung, as far as is known."""
+        """Return what a task gives whose last worker died, or hung, as far as is known."""
         times = "twice" if self.most_attempts == 2 else f"{self.most_attempts} times"
         if late:
             return self.lost(

@@ -33,22 +33,22 @@ class Adjacency:
 
     @classmethod
     def open(cls, folder: Path) -> Adjacency:
-        """What ``build`` left in a folder."""
+        """Open what ``build`` left in a folder."""
         return cls(*(np.load(folder / name, mmap_mode="r") for name in (STARTS, FACES_AT)))
 
     def faces_at(self, vertices: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
-        """The faces at some vertices, ascending, each once."""
+        """Return the faces at some vertices, ascending, each once."""
         return np.unique(self.faces[self.places_at(vertices)[0]])
 
     def places_at(
         self, vertices: Int[np.ndarray, " N"]
     ) -> tuple[Int[np.ndarray, " M"], Int[np.ndarray, " N"]]:
-        """Where in ``faces`` those of some vertices are, one vertex after another; how many."""
+        """Return where in ``faces`` some vertices' lie, one vertex after another; how many."""
         begin, count = self.starts[vertices], self.valence(vertices)
         return np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count), count
 
     def valence(self, vertices: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-        """How many corners each has."""
+        """Return how many corners each has."""
         return self.starts[vertices + 1] - self.starts[vertices]
 
 
@@ -131,7 +131,7 @@ def _deal_out(mesh: ArrayMesh, files: list[Path]) -> None:
 def ring_of(
     mesh: ArrayMesh, adjacency: Adjacency, faces: Int[np.ndarray, " N"], rings: int
 ) -> Int[np.ndarray, " M"]:
-    """Some faces (ascending) with so many rings of faces around them, ascending."""
+    """Return some faces (ascending) with so many rings of faces around them, ascending."""
     for _ in range(rings):
         vertices = np.unique(mesh.faces[faces])
         grown = adjacency.faces_at(vertices)
@@ -144,6 +144,6 @@ def ring_of(
 def whole_vertices(
     adjacency: Adjacency, vertices: Int[np.ndarray, " V"], local_faces: Int[np.ndarray, "F 3"]
 ) -> Bool[np.ndarray, " V"]:
-    """The vertices all of whose corners are among the faces of a part."""
+    """Return the vertices all of whose corners are among the faces of a part."""
     here = np.bincount(local_faces.reshape(-1), minlength=len(vertices))
     return here == adjacency.valence(vertices)

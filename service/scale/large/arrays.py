@@ -56,12 +56,12 @@ def open_mesh(folder: Path) -> ArrayMesh:
 
 
 def index_type(vertices: int) -> str:
-    """The type of indices that so many vertices need."""
+    """Return the type of indices that so many vertices need."""
     return "<i4" if vertices <= LARGEST_INT32 else "<i8"
 
 
 def new_array(path: Path, shape: tuple[int, ...], dtype: str) -> np.memmap:
-    """A new .npy to write into; its room on the disk is taken at once.
+    """Create a .npy to write into; its room on the disk is taken at once.
 
     Raises:
         LimitError: the disk has no room for it.
@@ -75,7 +75,7 @@ def new_array(path: Path, shape: tuple[int, ...], dtype: str) -> np.memmap:
 def finished_array(
     path: Path, shape: tuple[int, ...], dtype: str
 ) -> Generator[np.memmap, None, None]:
-    """A new .npy to write into, which gets its name once it is written: see ``new_array``.
+    """Create a .npy to write into, which gets its name once it is written: see ``new_array``.
 
     What is left of one that was not is written over by the next.
     """
@@ -122,7 +122,7 @@ def _no_room(path: Path, size: int, free: int) -> LimitError:
 
 
 def blocks_of(count: int, rows: int = BLOCK) -> Iterator[slice]:
-    """Slices of so many rows that cover range(count)."""
+    """Yield slices of so many rows that cover range(count)."""
     for start in range(0, count, rows):
         yield slice(start, min(start + rows, count))
 

@@ -28,7 +28,7 @@ class Cutout:
 
 
 def cutout(mesh: ArrayMesh, adjacency: Adjacency, own: Int[np.ndarray, " N"], rings: int) -> Cutout:
-    """The faces ``own`` (ascending) with so many rings around them."""
+    """Cut out the faces ``own`` (ascending) with so many rings around them."""
     faces = ring_of(mesh, adjacency, own, rings)
     corners = np.asarray(mesh.faces[faces], dtype=np.int64)
     vertices, local = np.unique(corners, return_inverse=True)
@@ -44,7 +44,7 @@ def cutout(mesh: ArrayMesh, adjacency: Adjacency, own: Int[np.ndarray, " N"], ri
 def _local_creases(
     mesh: ArrayMesh, vertices: Int[np.ndarray, " V"], faces: Int[np.ndarray, "F 3"]
 ) -> Int[np.ndarray, "N 2"] | None:
-    """The creases that are edges of the piece, in its numbers."""
+    """Return the creases that are edges of the piece, in its numbers."""
     if mesh.creases is None:
         return None
     creases = np.asarray(mesh.creases, dtype=np.int64)

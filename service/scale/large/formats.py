@@ -42,7 +42,7 @@ class OutputKind:
         return self.ending != TILES
 
     def new(self, work: Path, about: Survey, vertices: int, faces: int) -> Target | Tiles:
-        """Files of their final size, to be filled.
+        """Create files of their final size, to be filled.
 
         Raises:
             LimitError: the disk has no room for them.
@@ -63,7 +63,7 @@ class OutputKind:
         report: dict[str, Any],
         boxes: list[Any],
     ) -> None:
-        """What is full takes its place."""
+        """Put what is full in its place."""
         out = work / "out"
         if not out.exists():
             return  # a run before this one ended between the last renaming and its own tidying
@@ -77,7 +77,7 @@ class OutputKind:
 
 
 def input_mesh(source: Path, work: Path) -> tuple[ArrayMesh, dict[str, Any]]:
-    """The arrays of an input, and what is not in them: of a file they are made in ``work``.
+    """Return the arrays of an input, and what is not in them: of a file they are made in ``work``.
 
     Raises:
         InvalidParameter: none of the formats that are read.
@@ -103,7 +103,7 @@ def input_mesh(source: Path, work: Path) -> tuple[ArrayMesh, dict[str, Any]]:
 
 
 def output_kind(output: Path) -> OutputKind:
-    """How an output of this name is written.
+    """Return how an output of this name is written.
 
     Raises:
         InvalidParameter: none of the formats that are written, or it would replace something else.
@@ -127,7 +127,7 @@ def output_kind(output: Path) -> OutputKind:
 
 
 def _strangers(output: Path, kind: OutputKind) -> list[str]:
-    """What is in a folder that no run wrote: it would be lost with what is replaced."""
+    """Return what is in a folder that no run wrote: it would be lost with what is replaced."""
     if not output.is_dir():
         return [output.name]
     ours = TILE_FILES if kind.ending == TILES else ARRAY_FILES

@@ -27,7 +27,7 @@ BASES = "bases.npy"
 
 
 def shown_first(piece: Piece, levels: int) -> Int[np.ndarray, "N L"]:
-    """How many edges of each level the descendants of each own face are first to show.
+    """Count the edges of each level that the descendants of each own face are first to show.
 
     The faces at own faces' vertices must be there. Where no face repeats a vertex and no two have
     the same three, a face's children show the two halves of each edge that it showed, and the three
@@ -64,7 +64,9 @@ class Numbering:
         faces: Int[np.ndarray, " F"],
         openers: Int[np.ndarray, " E"],
     ) -> Int[np.ndarray, " E"]:
-        """The vertices of a piece's edges of a level, sure where all faces of the edge are there.
+        """Return the vertices of a piece's edges of a level.
+
+        They are sure where all faces of the edge are there.
 
         ``faces`` are the control mesh's numbers of the piece's; ``openers`` the piece's face that
         is first to show each edge, which ascends.
@@ -104,7 +106,7 @@ def write_bases(
 
 
 def _openers(topology: Topology, control_faces: int) -> Int[np.ndarray, " F"]:
-    """How many edges each control face's descendants are first to show."""
+    """Count the edges that each control face's descendants are first to show."""
     half_edges = topology.face_edges.reshape(-1)
     first = np.empty(len(topology.edges), dtype=np.int64)
     # Written backwards, so that the earliest half-edge is the one that remains.
@@ -114,7 +116,7 @@ def _openers(topology: Topology, control_faces: int) -> Int[np.ndarray, " F"]:
 
 
 def _is_plain(topology: Topology) -> bool:
-    """Whether no face repeats a vertex and no two faces have the same three."""
+    """Return whether no face repeats a vertex and no two faces have the same three."""
     if repeated_vertex(topology.faces).any():
         return False
     # Two faces with two edges in common have all three.

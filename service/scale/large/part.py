@@ -78,7 +78,7 @@ class PartDone:
 
 
 def done_file(work: Path, stage: str, part: int) -> Path:
-    """What is there as soon as a part is done."""
+    """Return what is there as soon as a part is done."""
     return work / (f"count-{part:05}.npy" if stage == COUNT else f"part-{part:05}.json")
 
 
@@ -141,7 +141,7 @@ def _surely_refined(
     adjacency: Adjacency,
     own: Int[np.ndarray, " N"],
 ) -> tuple[int, Cutout, RefinedPiece]:
-    """The part refined with as many rings around it as it turns out to need; how many that were.
+    """Refine the part with as many rings around it as it turns out to need; return how many.
 
     Raises:
         PnsError: it cannot be refined.
@@ -198,7 +198,7 @@ def write_part(
 
 
 def with_angle_creases(piece: Piece, angle: float | None) -> Piece:
-    """The piece with its edges sharper than ``angle`` as creases too."""
+    """Return the piece with its edges sharper than ``angle`` as creases too."""
     if angle is None:
         return piece
     sharp = edges_sharper_than(Mesh(piece.points, piece.faces), angle)
@@ -209,7 +209,7 @@ def with_angle_creases(piece: Piece, angle: float | None) -> Piece:
 
 @cache
 def scheme_of(options: Options, model: str | None) -> Scheme:
-    """The scheme of some options, made once a worker.
+    """Make the scheme of some options, once a worker.
 
     Raises:
         NoModelError: there is no such model, or it cannot be used.

@@ -30,17 +30,17 @@ class Parts:
 
     @classmethod
     def open(cls, folder: Path, parts: int) -> Parts:
-        """What ``cut`` left in a folder."""
+        """Open what ``cut`` left in a folder."""
         order = np.load(folder / ORDER, mmap_mode="r")
         return cls(order, part_starts(len(order), parts))
 
     def own(self, part: int) -> Int[np.ndarray, " N"]:
-        """The faces of a part."""
+        """Return the faces of a part."""
         return np.array(self.order[self.starts[part] : self.starts[part + 1]])
 
 
 def part_starts(faces: int, parts: int) -> Int[np.ndarray, " N"]:
-    """Where each part begins, and the last ends."""
+    """Return where each part begins, and the last ends."""
     return np.array([faces * part // parts for part in range(parts + 1)], dtype=np.int64)
 
 
@@ -68,7 +68,7 @@ def cut(mesh: ArrayMesh, survey: Survey, parts: int, folder: Path) -> None:
 
 
 def cells_of(mesh: ArrayMesh, survey: Survey, rows: slice) -> Int[np.ndarray, " N"]:
-    """The Morton number of the cell of each face's centroid."""
+    """Return the Morton number of the cell of each face's centroid."""
     low, high = np.array(survey.low), np.array(survey.high)
     corners = np.asarray(mesh.positions[mesh.faces[rows].reshape(-1)], dtype=np.float64)
     # Coordinates may be near the largest that there are: no sum before they are scaled.
@@ -79,7 +79,7 @@ def cells_of(mesh: ArrayMesh, survey: Survey, rows: slice) -> Int[np.ndarray, " 
 
 
 def spread(values: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    """Each bit i at place 3 i."""
+    """Put each bit i at place 3 i."""
     result = np.zeros_like(values)
     for bit in range(BITS):
         result |= (values >> bit & 1) << 3 * bit
@@ -87,7 +87,7 @@ def spread(values: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
 
 
 def _ranks(cells: Int[np.ndarray, " N"], following: Int[np.ndarray, " M"]) -> Int[np.ndarray, " N"]:
-    """The place of each face of a block in the whole order; ``following`` goes on behind them."""
+    """Return a block's faces' places in the whole order; ``following`` goes on behind them."""
     by_cell = np.argsort(cells, kind="stable")
     ordered = cells[by_cell]
     opens = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])

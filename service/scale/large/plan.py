@@ -48,7 +48,7 @@ class Large:
 
 @contextmanager
 def work_folder(large: Large, model_hash: str | None) -> Iterator[Path]:
-    """The folder of a work, with what an earlier run of the same left in it; no other run's.
+    """Yield the folder of a work, with what an earlier run of the same left in it; no other run's.
 
     Each plan has a folder of its own in ``large.work``, so that a worker that outlived a killed run
     of another plan writes nothing into this one's files. All is removed once the work is done, or
@@ -105,7 +105,7 @@ def _remove(work: Path, folder: Path) -> None:
 
 
 def identity(source: Path) -> list[Any]:
-    """What tells a file, or the arrays of a folder, from others: names, sizes, times of change.
+    """Return what tells a file, or arrays of a folder, from others: name, size, time of change.
 
     Raises:
         InvalidParameter: there is no such file.
@@ -125,5 +125,5 @@ def keep(file: Path, values: Any) -> None:
 
 
 def kept(file: Path) -> Any:
-    """What ``keep`` wrote; None where it has not."""
+    """Return what ``keep`` wrote; None where it has not."""
     return json.loads(file.read_text()) if file.exists() else None

@@ -49,7 +49,7 @@ _STL_VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.
 
 
 def read_ply(path: Path, sink: Sink) -> None:
-    """A binary PLY of triangles, of either byte order.
+    """Read a binary PLY of triangles, of either byte order.
 
     Raises:
         UnreadableError: another file, or a face that is no triangle.
@@ -107,7 +107,7 @@ def _ply_header(path: Path) -> tuple[str, list[tuple[str, int, list[list[str]]]]
 
 
 def _ply_record(path: Path, order: str, element: str, properties: list[list[str]]) -> np.dtype:
-    """The record of an element, whose lists are of triangles' corners."""
+    """Return the record of an element, whose lists are of triangles' corners."""
     fields: list[Any] = []
     try:
         for words in properties:
@@ -130,7 +130,7 @@ def _ply_record(path: Path, order: str, element: str, properties: list[list[str]
 
 
 def read_stl(path: Path, sink: Sink) -> None:
-    """An STL, binary or text: three vertices of their own for each face.
+    """Read an STL, binary or text: three vertices of their own for each face.
 
     Raises:
         UnreadableError: another file.
@@ -164,7 +164,7 @@ def _add_soup(sink: Sink, points: np.ndarray) -> None:
 
 
 def read_obj(path: Path, sink: Sink) -> None:
-    """An OBJ's positions and triangles; all else is passed over.
+    """Read an OBJ's positions and triangles; all else is passed over.
 
     Raises:
         UnreadableError: a number that is none, or a face that is no triangle.
@@ -203,7 +203,7 @@ def _numbers(path: Path, rows: list[Any]) -> np.ndarray:
 
 
 def _text_blocks(path: Path) -> Iterator[bytes]:
-    """A file's text in blocks of whole lines; a line that fills a block is no mesh's."""
+    """Yield a file's text in blocks of whole lines; a line that fills a block is no mesh's."""
     with path.open("rb") as file:
         left = b""
         while block := file.read(TEXT):
@@ -216,7 +216,7 @@ def _text_blocks(path: Path) -> Iterator[bytes]:
 
 
 def read_glb(path: Path, sink: Sink) -> None:
-    """The triangles of a GLB's one mesh, in its own coordinates, uncompressed.
+    """Read the triangles of a GLB's one mesh, in its own coordinates, uncompressed.
 
     Raises:
         UnreadableError: another file, or one whose mesh is kept in another way.
@@ -265,7 +265,7 @@ def _accessor(
     types: tuple[int, ...],
     width: int,
 ) -> np.ndarray:
-    """An accessor's rows where they lie."""
+    """Return an accessor's rows where they lie."""
     accessor = tree["accessors"][number]
     if "sparse" in accessor or accessor["componentType"] not in types:
         raise UnreadableError(f"{path}: accessor {number} is kept in a way that is not read")

@@ -14,7 +14,7 @@ PASSES_BYTES_PER_FACE = 25
 
 
 def bytes_needed(about: Survey, levels: int, kind: OutputKind) -> int:
-    """What a run writes, about: vertices are those of a mesh whose edges have two faces each."""
+    """Return about what a run writes; vertices are those of a mesh with two faces an edge."""
     vertices, faces = about.vertices, about.faces
     for _ in range(levels):
         vertices, faces = vertices + faces * 3 // 2, faces * 4

@@ -40,7 +40,7 @@ MOST_ATTEMPTS = 10
 
 
 def large_work(job: Callable[[PartTask], PartDone] = run_part) -> Work[PartTask, PartDone]:
-    """What is done with each part, which may take any time."""
+    """Return what is done with each part, which may take any time."""
 
     def lost(task: PartTask, error: ServiceError) -> PartDone:
         hint = "more --parts, or less --memory, makes them smaller"
@@ -125,7 +125,7 @@ def run_large(
 
 
 def parts_for(faces: int, memory: int) -> int:
-    """How many parts a mesh needs whose workers may take so many bytes each.
+    """Return how many parts a mesh needs whose workers may take so many bytes each.
 
     Raises:
         InvalidParameter: too few for any part.
@@ -160,7 +160,7 @@ def _cut(mesh: ArrayMesh, about: Survey, parts: int, work: Path) -> None:
 
 
 def _numbered(about: Survey, parts: int, levels: int, work: Path) -> tuple[int, ...]:
-    """How many vertices each level has; their numbers lie in the folder then."""
+    """Return how many vertices each level has; their numbers lie in the folder then."""
     file = work / "numbered.json"
     if not file.exists():
         own = partition.Parts.open(work, parts).own
@@ -177,7 +177,7 @@ def _target(
     levels: int,
     work: Path,
 ) -> Target | Tiles:
-    """The files that the parts write into; vertices that no face uses are in them already."""
+    """Make the files that the parts write into, with the vertices that no face uses."""
     file = work / "target.json"
     if not file.exists():
         last = vertices[-1] if vertices else 0
@@ -224,7 +224,7 @@ def _do(
 def _report(
     scheme: Scheme, length: float, about: Survey, done: list[Any], read: dict[str, Any]
 ) -> dict[str, Any]:
-    """The report: that of ``refine`` without percentiles, and what the reader dropped."""
+    """Return the report: that of ``refine`` without percentiles, and what the reader dropped."""
     tallies = ([LevelTally.of_dict(level) for level in part["levels"]] for part in done)
     reduced = reduced_report(tallies)
     for level in reduced["levels"]:

@@ -37,7 +37,7 @@ class Sink:
         self.faces += len(faces)
 
     def rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """All positions and faces, by memory map, once the files are closed."""
+        """Return all positions and faces, by memory map, once the files are closed."""
         return (
             _mapped(self._folder / POSITIONS, "<f8", self.vertices),
             _mapped(self._folder / FACES, "<i8", self.faces),

@@ -74,7 +74,7 @@ def survey(mesh: ArrayMesh) -> Survey:
 
 
 def used_vertices(mesh: ArrayMesh) -> np.ndarray:
-    """Which vertices some face uses.
+    """Return which vertices some face uses.
 
     Raises:
         UnrefinableError: no faces, or an index out of range.

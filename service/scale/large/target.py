@@ -83,7 +83,7 @@ def _rows(
 
 
 def new_folder(folder: Path, vertex_count: int, face_count: int) -> Target:
-    """The arrays of a folder, empty.
+    """Create the arrays of a folder, empty.
 
     Raises:
         LimitError: the disk has no room for them.
@@ -99,7 +99,7 @@ def new_folder(folder: Path, vertex_count: int, face_count: int) -> Target:
 
 
 def new_ply(path: Path, vertex_count: int, face_count: int) -> Target:
-    """A binary PLY, empty but for its header: double positions, and triangles.
+    """Create a binary PLY, empty but for its header: double positions, and triangles.
 
     Raises:
         LimitError: the disk has no room for it, or there are more vertices than it can number.

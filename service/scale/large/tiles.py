@@ -36,14 +36,14 @@ class Tiles:
 
 
 def new_tiles(folder: Path, about: Survey) -> Tiles:
-    """The folder of a tileset without tiles."""
+    """Create the folder of a tileset without tiles."""
     folder.mkdir(exist_ok=True)
     x, y, z = (low / 2 + high / 2 for low, high in zip(about.low, about.high, strict=True))
     return Tiles(str(folder), (x, y, z))
 
 
 def tile_name(part: int) -> str:
-    """The file of a part."""
+    """Return the file of a part."""
     return f"part-{part:05}.glb"
 
 
@@ -93,7 +93,7 @@ def write_tileset(tiles: Tiles, boxes: list[Any], report: dict[str, Any]) -> Non
 
 
 def _box(low: np.ndarray, high: np.ndarray) -> list[float]:
-    """A box as a tileset has it: its centre, then its three half axes, with z up."""
+    """Return a box as a tileset has it: its centre, then its three half axes, with z up."""
     x, y, z = ((low + high) / 2).tolist()
     half = (high - low) / 2
     dx, dy, dz = half.tolist()

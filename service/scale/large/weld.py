@@ -85,7 +85,7 @@ class _Scratch:
         return array[:count]
 
     def dealt(self, name: str, rows: Iterator[Int[np.ndarray, "N K"]], total: int, width: int):
-        """The rows again, in groups: those with the same first ``width`` columns are together."""
+        """Yield the rows in groups: those with the same first ``width`` columns are together."""
         number = -(-total // SORTED) or 1
         files = [self._folder / f"scratch-{name}-{k}" for k in range(number)]
         self._files += files
@@ -111,7 +111,7 @@ class _Scratch:
 
 
 def _mixed(columns: Int[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
-    """A 64-bit mix of each row."""
+    """Return a 64-bit mix of each row."""
     mixed = np.full(len(columns), 0x9E3779B97F4A7C15, dtype=np.uint64)
     for column in columns.T:
         mixed = (mixed ^ column.astype(np.uint64)) * MIX
@@ -120,7 +120,7 @@ def _mixed(columns: Int[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
 
 
 def _first_alike(keys: Int[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
-    """Of each row an equal one that is not later: itself, where there is none before it.
+    """Return for each row an equal one that is not later: itself, where there is none before it.
 
     The first of them all, unless rows of one hash differ and lie between.
     """
@@ -134,7 +134,7 @@ def _first_alike(keys: Int[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
 
 
 def _first_corners(positions: np.ndarray, faces: np.ndarray, scratch: _Scratch) -> np.ndarray:
-    """The first corner 3 f + i of each of the file's vertices; −1 where no face uses it."""
+    """Return the first corner 3 f + i of each of the file's vertices; −1 where no face uses it."""
     first = scratch.array("first", len(positions), -1)
     for rows in blocks_of(len(faces)):
         corners = faces[rows].reshape(-1)
@@ -153,7 +153,7 @@ def _first_corners(positions: np.ndarray, faces: np.ndarray, scratch: _Scratch) 
 
 
 def _labels(positions: np.ndarray, first: np.ndarray, scratch: _Scratch) -> np.ndarray:
-    """Of each of the file's vertices the first corner of all that lie where it does."""
+    """Return for each of the file's vertices the first corner of all that lie where it does."""
     # First the vertex of its block that stands for it, then what is known of that one.
     label = scratch.array("label", len(positions), -1)
     known = scratch.array("known", len(positions), -1)
@@ -187,7 +187,7 @@ def _labels(positions: np.ndarray, first: np.ndarray, scratch: _Scratch) -> np.n
 def _repeated_faces(
     faces: np.ndarray, label: np.ndarray, scratch: _Scratch
 ) -> tuple[Bool[np.ndarray, " F"], int]:
-    """The faces to drop, and how many of them are like an earlier one."""
+    """Return the faces to drop, and how many of them are like an earlier one."""
     dropped = np.zeros(len(faces), dtype=bool)
     repeated = 0
 
@@ -218,7 +218,7 @@ def _repeated_faces(
 def _places(
     faces: np.ndarray, label: np.ndarray, dropped: np.ndarray, scratch: _Scratch
 ) -> tuple[np.ndarray, int]:
-    """Of each corner that is the first of a vertex that stays its number, else −1; how many."""
+    """Give vertices that stay their numbers, at each one's first corner, else −1; return how many."""
     place = scratch.array("place", 3 * len(faces), -1)
     for rows in blocks_of(len(faces)):
         place[label[faces[rows][~dropped[rows]]].reshape(-1)] = 0
@@ -235,7 +235,7 @@ def _places(
 def _sorted(
     rows: Int[np.ndarray, "N K"], width: int
 ) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, " G"]]:
-    """Rows in the order of their first columns, and where runs of equal ones begin."""
+    """Sort rows by their first columns; return also where runs of equal ones begin."""
     order = np.lexsort([rows[:, column] for column in range(width)])
     ordered = rows[order]
     if not len(ordered):
