@@ -34,5 +34,5 @@ def leave_the_site(app, doctree):
 
 
 def setup(app):
-    """Called by Sphinx."""
+    """Register what Sphinx is to call."""
     app.connect("doctree-read", leave_the_site)

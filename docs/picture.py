@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def face_ratio(refined: Refinement) -> Float[np.ndarray, " F"]:
-    """The largest proximity ratio among each face's vertices."""
+    """Return the largest proximity ratio among each face's vertices."""
     return refined.ratio[refined.mesh.faces].max(axis=1)
 
 

@@ -44,7 +44,7 @@ def main(python: str) -> None:
 
 
 def staged(stage: Path) -> None:
-    """The extension's folder as it is packed: sources, licence, wheels, and a manifest of them."""
+    """Stage the extension's folder as it is packed: sources, licence, wheels, and a manifest."""
     shutil.copytree(SOURCE, stage, ignore=shutil.ignore_patterns("__pycache__"))
     wheels = stage / "wheels"
     collect_wheels(wheels)
@@ -53,13 +53,13 @@ def staged(stage: Path) -> None:
 
 
 def with_wheels(manifest: str, names: Sequence[str]) -> str:
-    """The manifest with a list of wheels at its end."""
+    """Return the manifest with a list of wheels at its end."""
     listed = "".join(f'  "./wheels/{name}",\n' for name in names)
     return f"{manifest.rstrip()}\nwheels = [\n{listed}]\n"
 
 
 def collect_wheels(folder: Path) -> None:
-    """The wheels that the extension brings: the library alone, and what it needs as published."""
+    """Collect the extension's wheels: the library alone, and what it needs as published."""
     folder.mkdir(parents=True)
     pip = (sys.executable, "-m", "pip", "--quiet")
     said(
@@ -81,7 +81,7 @@ def collect_wheels(folder: Path) -> None:
 
 
 def clean_copy(folder: Path) -> Path:
-    """The project without what builds leave in it, which would find its way into the wheel."""
+    """Copy the project without what builds leave in it, which would get into the wheel."""
     listed = said("git", "-C", ROOT, "ls-files", "-z", "--cached", "--others", "--exclude-standard")
     for name in filter(None, listed.split("\0")):
         if (ROOT / name).is_file():
@@ -91,7 +91,7 @@ def clean_copy(folder: Path) -> Path:
 
 
 def said(*command: object) -> str:
-    """What a command prints; what it complains of is shown if it fails."""
+    """Return what a command prints; what it complains of is shown if it fails."""
     done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
     if done.returncode:
         raise SystemExit(f"{' '.join(map(str, command))}\n{done.stdout}{done.stderr}")

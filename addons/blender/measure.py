@@ -89,7 +89,7 @@ def longest_pieces(obj: bpy.types.Object, scheme: str) -> float:
 
 
 def seconds(act: Callable[[], object]) -> float:
-    """The median of some runs, after one that warms up."""
+    """Return the median of some runs, after one that warms up."""
     act()
     spent = []
     for _ in range(RUNS):
@@ -112,7 +112,7 @@ def refined(obj: bpy.types.Object, scheme: str) -> None:
 
 
 def sheet(side: int = SIDE) -> bpy.types.Object:
-    """A wavy sheet of triangles with vertex groups, shape keys and a UV map."""
+    """Make a wavy sheet of triangles with vertex groups, shape keys and a UV map."""
     across, along = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side))
     points = np.stack([across, along, 0.2 * np.sin(5 * across) * np.cos(4 * along)], -1)
     points = points.reshape(-1, 3)

@@ -42,7 +42,7 @@ Panels = dict[tuple[int, int], tuple[Shape, str]]
 
 
 def read(folder: Path, field: str) -> Panels:
-    """The shape and the note of each row and column.
+    """Read the shape and the note of each row and column.
 
     Raises:
         SystemExit: there is no panel in the folder.
@@ -90,7 +90,7 @@ def build(
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command's arguments."""
+    """Make the parser of the command's arguments."""
     made = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     made.add_argument("folder", type=Path)
     made.add_argument("-o", "--output", type=Path, required=True)

@@ -59,7 +59,7 @@ def turn(frames: int) -> None:
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command's arguments."""
+    """Make the parser of the command's arguments."""
     made = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     made.add_argument("meshes", nargs="+", type=Path, metavar="MESH")
     made.add_argument("-o", "--output", type=Path, required=True)

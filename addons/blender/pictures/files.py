@@ -19,7 +19,7 @@ READERS = {
 
 
 def read(path: Path) -> Mesh:
-    """The triangles of a file, z up; vertices at the same place are one.
+    """Read the triangles of a file, z up; vertices at the same place are one.
 
     Raises:
         SystemExit: Blender has no reader for it, or there is nothing in it.
@@ -49,7 +49,7 @@ def read(path: Path) -> Mesh:
 
 
 def welded(points: np.ndarray, faces: np.ndarray) -> Mesh:
-    """Vertices at the same place joined, and degenerate faces left out."""
+    """Join vertices at the same place, and leave degenerate faces out."""
     _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     place = np.empty_like(order)

@@ -26,7 +26,7 @@ VIRIDIS = (
 
 
 def clay() -> bpy.types.Material:
-    """Matt clay with a soft highlight, which shows where curvature jumps."""
+    """Make matt clay with a soft highlight, which shows where curvature jumps."""
     material, shader = _principled("clay")
     shader.inputs["Base Color"].default_value = CLAY
     shader.inputs["Roughness"].default_value = 0.38
@@ -34,7 +34,7 @@ def clay() -> bpy.types.Material:
 
 
 def zebra() -> bpy.types.Material:
-    """Stripes of light as a polished surface reflects them: they kink where normals do."""
+    """Make stripes of light as a polished surface reflects them: they kink where normals do."""
     material, tree, out = _empty("zebra")
     where = tree.nodes.new("ShaderNodeTexCoord")
     axes = tree.nodes.new("ShaderNodeSeparateXYZ")
@@ -57,7 +57,7 @@ def zebra() -> bpy.types.Material:
 
 
 def wire() -> bpy.types.Material:
-    """Clay with its edges drawn."""
+    """Make clay with its edges drawn."""
     material, shader = _principled("wire")
     tree = material.node_tree
     lines = tree.nodes.new("ShaderNodeWireframe")
@@ -78,7 +78,7 @@ def wire() -> bpy.types.Material:
 
 
 def heat(field: str, highest: float) -> bpy.types.Material:
-    """The colour of a field from 0 to ``highest``, shaded softly so that the form still shows."""
+    """Colour a field from 0 to ``highest``, shaded softly so that the form still shows."""
     material, shader = _principled(f"heat {field}")
     tree = material.node_tree
     value = tree.nodes.new("ShaderNodeAttribute")
@@ -94,7 +94,7 @@ def heat(field: str, highest: float) -> bpy.types.Material:
 
 
 def bar() -> bpy.types.Material:
-    """The ramp itself along a plane's first texture coordinate, for a legend."""
+    """Make the ramp itself along a plane's first texture coordinate, for a legend."""
     material, tree, out = _empty("bar")
     where = tree.nodes.new("ShaderNodeTexCoord")
     axes = tree.nodes.new("ShaderNodeSeparateXYZ")
@@ -107,7 +107,7 @@ def bar() -> bpy.types.Material:
 
 
 def ink() -> bpy.types.Material:
-    """What letters are drawn with: no light falls on them."""
+    """Make what letters are drawn with: no light falls on them."""
     material, tree, out = _empty("ink")
     glow = tree.nodes.new("ShaderNodeEmission")
     glow.inputs["Color"].default_value = (0.01, 0.01, 0.012, 1)
@@ -116,7 +116,7 @@ def ink() -> bpy.types.Material:
 
 
 def colour_ramp(tree: bpy.types.NodeTree) -> bpy.types.Node:
-    """Viridis as a node."""
+    """Make viridis as a node."""
     ramp = tree.nodes.new("ShaderNodeValToRGB")
     elements = ramp.color_ramp.elements
     while len(elements) < len(VIRIDIS):

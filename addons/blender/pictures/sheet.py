@@ -58,7 +58,7 @@ def build(rows: Sequence[Row], turns: Sequence[float] = (0.0,)) -> Layout:
 
 
 def extent(shapes: Sequence[Shape], turns: Sequence[float]) -> tuple[float, float]:
-    """How wide and high the widest and highest of these is in the picture, with its margin."""
+    """Return how wide and high the widest and highest are in the picture, with its margin."""
     sizes = [_box(shape, turns) for shape in shapes]
     wide = max(high[0] - low[0] for low, high in sizes)
     tall = max(high[1] - low[1] for low, high in sizes)
@@ -66,7 +66,7 @@ def extent(shapes: Sequence[Shape], turns: Sequence[float]) -> tuple[float, floa
 
 
 def text(words: str, across: float, along: float, size: float, align: str = "CENTER") -> None:
-    """Letters that face the eye."""
+    """Write letters that face the eye."""
     curve = bpy.data.curves.new("text", "FONT")
     curve.body, curve.size, curve.align_x, curve.align_y = words, size, align, "CENTER"
     curve.materials.append(ink())
@@ -76,7 +76,7 @@ def text(words: str, across: float, along: float, size: float, align: str = "CEN
 
 
 def legend(title: str, highest: float, across: float, along: float) -> None:
-    """The colours from 0 to ``highest``, with a title."""
+    """Draw the colours from 0 to ``highest``, with a title."""
     corners = [(-0.3, -0.03, 0), (0.3, -0.03, 0), (0.3, 0.03, 0), (-0.3, 0.03, 0)]
     mesh = bpy.data.meshes.new("bar")
     mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
@@ -110,7 +110,7 @@ def _build_row(
 def place(
     shape: Shape, material: bpy.types.Material, where: Vector, scale: float, turns: Sequence[float]
 ) -> None:
-    """A shape with the middle of its picture there; the pivot stands where its turning axis is."""
+    """Put the middle of a shape's picture there; the pivot stands where its turning axis is."""
     low, high = _box(shape, turns)
     middle = (low + high) / 2
     pivot = bpy.data.objects.new("pivot", None)
@@ -144,13 +144,13 @@ def _mesh(shape: Shape, material: bpy.types.Material) -> bpy.types.Mesh:
 
 
 def centred(shape: Shape) -> np.ndarray:
-    """The vertices around the middle of their box."""
+    """Return the vertices around the middle of their box."""
     points = shape.vertices
     return points - (points.min(axis=0) + points.max(axis=0)) / 2
 
 
 def _box(shape: Shape, turns: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Where a shape begins and ends along the picture's axes, over all these turns."""
+    """Return where a shape begins and ends along the picture's axes, over all these turns."""
     points, axes = centred(shape), np.array([RIGHT, UP, VIEW]).T
     boxes = []
     for angle in map(math.radians, turns):

@@ -31,12 +31,12 @@ def clear() -> None:
 
 
 def at(across: float, along: float, depth: float = 0.0) -> Vector:
-    """The point that lies there in the picture."""
+    """Return the point that lies there in the picture."""
     return RIGHT * across + UP * along + VIEW * depth
 
 
 def facing() -> Matrix:
-    """A turn that lets a flat thing face the eye."""
+    """Return a turn that lets a flat thing face the eye."""
     return Matrix((RIGHT, UP, VIEW)).transposed().to_4x4()
 
 
@@ -54,7 +54,7 @@ def camera(width: float, height: float, middle: Vector | None = None) -> None:
 
 
 def light() -> None:
-    """A sun over the left shoulder, a grey sky, and white paper behind."""
+    """Put up a sun over the left shoulder, a grey sky, and white paper behind."""
     sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
     sun.data.energy, sun.data.angle = SUN, math.radians(6)
     towards = at(-0.55, 0.65, 0.75)
@@ -77,7 +77,7 @@ def light() -> None:
 
 
 def prepare(width: int, height: int, quality: Quality) -> None:
-    """Settings that every picture has: as many pixels, the same seed, colours as they are."""
+    """Set what every picture has: as many pixels, the same seed, colours as they are."""
     scene = bpy.context.scene
     if quality.engine == "CYCLES":
         bpy.ops.preferences.addon_enable(module="cycles")

@@ -28,17 +28,17 @@ class Shape:
 
 
 def control(mesh: Mesh, levels: int, model: str | None) -> Shape:
-    """The control mesh, its faces flat."""
+    """Return the control mesh, its faces flat."""
     return Shape("Control mesh", mesh.vertices, mesh.faces, False, {})
 
 
 def loop_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
-    """Loop subdivision."""
+    """Refine by Loop's rules."""
     return _smooth("Loop", refine(mesh, loop(), levels), {})
 
 
 def pushed_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
-    """N1: each vertex pushed once along its normal by as much as Loop takes it in; then Loop."""
+    """Make N1: push each vertex once along its normal by what Loop takes in; then Loop."""
     topology = build_topology(mesh.faces, len(mesh.vertices))
     rings = Rings(topology, mesh.vertices, face_normals(mesh.vertices, mesh.faces))
     pushed = Mesh(mesh.vertices + normal_pushes(rings), mesh.faces)
@@ -46,7 +46,7 @@ def pushed_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
 
 
 def learned_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
-    """The learned operator, with the proximity ratio of its last learned level."""
+    """Refine by the learned operator, with the proximity ratio of its last learned level."""
     scheme = pns(load_model(model))
     made = refine(mesh, scheme, levels)
     learned = min(levels, scheme.learned_levels or levels)
@@ -59,7 +59,7 @@ def learned_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
 def spread(
     values: Float[np.ndarray, " V"], made: Refinement, levels: int
 ) -> Float[np.ndarray, " W"]:
-    """Values at vertices, and at those of later levels the mean of the edge's ends."""
+    """Spread values at vertices: those of later levels have the mean of the edge's ends."""
     faces, count = made.mesh.faces, len(made.mesh.vertices)
     mesh = made.mesh
     for _ in range(levels):

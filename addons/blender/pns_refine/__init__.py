@@ -6,14 +6,14 @@ Only what is registered knows Blender's interface; ``refining`` knows no Blender
 
 
 def register() -> None:
-    """Called when the extension is enabled."""
+    """Do what is to be done when the extension is enabled."""
     from . import registration
 
     registration.register()
 
 
 def unregister() -> None:
-    """Called when the extension is disabled."""
+    """Do what is to be done when the extension is disabled."""
     from . import registration
 
     registration.unregister()

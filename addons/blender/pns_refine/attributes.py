@@ -105,12 +105,12 @@ def write_layer(mesh: bpy.types.Mesh, layer: Layer) -> Iterator[None]:
 
 
 def is_carried(name: str) -> bool:
-    """Whether an attribute is one that goes through refinement as such."""
+    """Return whether an attribute is one that goes through refinement as such."""
     return name not in STRUCTURE and not name.startswith(PASSING)
 
 
 def _numbered(texts: list[str | bytes]) -> tuple[tuple[str | bytes, ...], np.ndarray]:
-    """Different texts, and which of them stands in each row; the first is that of new elements."""
+    """Return the different texts, and which is in each row; the first is that of new elements."""
     places: dict[str | bytes, int] = {type(texts[0])(): 0} if texts else {}
     rows = np.array([places.setdefault(text, len(places)) for text in texts], dtype=np.int64)
     return tuple(places), rows

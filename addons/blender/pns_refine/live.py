@@ -42,7 +42,7 @@ class PNS_PG_live(Settings, bpy.types.PropertyGroup):  # noqa: N801 (Blender's n
 
 
 def users_of(mesh: bpy.types.Mesh) -> list[bpy.types.Object]:
-    """The objects that show a mesh live."""
+    """Return the objects that show a mesh live."""
     return [o for o in bpy.data.objects if o.data == mesh and modifier_of(o) is not None]
 
 
@@ -117,7 +117,7 @@ def _forget(mesh: bpy.types.Mesh) -> None:
 
 
 def _borrowed(mesh: bpy.types.Mesh) -> bool:
-    """Whether another mesh has the same result, as after duplication."""
+    """Return whether another mesh has the same result, as after duplication."""
     cache = mesh.pns_live.cache
     return cache is not None and any(
         other != mesh and other.pns_live.cache == cache for other in bpy.data.meshes
@@ -130,7 +130,7 @@ def _point(mesh: bpy.types.Mesh, cache: bpy.types.Object) -> None:
 
 
 def _digest(mesh: bpy.types.Mesh) -> Generator[None, None, str]:
-    """A text that changes when the mesh changes, or what is asked for."""
+    """Return a text that changes when the mesh changes, or what is asked for."""
     reading = yield from read_mesh(mesh)
     digest = hashlib.blake2b(digest_size=16)
     snapshot, live = reading.snapshot, mesh.pns_live
@@ -161,7 +161,7 @@ class Watch:
         self.at: int | None = None
 
     def note(self, mesh: bpy.types.Mesh) -> None:
-        """A mesh has changed, now."""
+        """Note that a mesh has changed, now."""
         self.changed[mesh.session_uid] = time.monotonic()
         if not bpy.app.timers.is_registered(tick):
             bpy.app.timers.register(tick, first_interval=QUIET)
@@ -208,7 +208,7 @@ WATCH = Watch()
 
 
 def _object_of(uid: int | None) -> bpy.types.Object | None:
-    """Some object that shows the mesh of this number live; None where it is gone."""
+    """Return some object that shows the mesh of this number live; None where it is gone."""
     for mesh in bpy.data.meshes:
         if mesh.session_uid == uid and mesh.pns_live.enabled:
             return next(iter(users_of(mesh)), None)
@@ -216,7 +216,7 @@ def _object_of(uid: int | None) -> bpy.types.Object | None:
 
 
 def tick() -> float | None:
-    """What Blender's timer calls."""
+    """Advance the watch, as Blender's timer asks."""
     return WATCH.advance()
 
 

@@ -10,7 +10,7 @@ INFO = "Result"
 
 
 def modifier_of(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
-    """The live modifier of an object."""
+    """Return the live modifier of an object."""
     return obj.modifiers.get(MODIFIER)
 
 
@@ -44,12 +44,12 @@ def point_at(obj: bpy.types.Object, cache: bpy.types.Object) -> None:
 
 
 def result_of(group: bpy.types.NodeTree | None) -> bpy.types.Object | None:
-    """The result that a group of nodes gives."""
+    """Return the result that a group of nodes gives."""
     return None if group is None else group.nodes[INFO].inputs["Object"].default_value
 
 
 def _group(cache: bpy.types.Object) -> bpy.types.NodeTree:
-    """The nodes that give the geometry of an object, as it lies in its own space.
+    """Return the nodes that give the geometry of an object, as it lies in its own space.
 
     The object stands in the node and is no input of the modifier: how such inputs are set has
     changed between versions of Blender.

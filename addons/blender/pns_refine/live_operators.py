@@ -17,7 +17,7 @@ class _OfLive:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """With an active object that is shown live."""
+        """Return whether there is an active object that is shown live."""
         obj = context.object
         if obj is None or obj.type != "MESH" or live.modifier_of(obj) is None:
             cls.poll_message_set("Start live mode first")
@@ -34,7 +34,7 @@ class OBJECT_OT_pns_live_add(bpy.types.Operator):  # noqa: N801 (Blender's names
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """With an active mesh that is not live yet, and has no shape keys."""
+        """Return whether a mesh is active that is not live yet, and has no shape keys."""
         obj = context.object
         if obj is None or obj.type != "MESH":
             cls.poll_message_set("Select a mesh first")

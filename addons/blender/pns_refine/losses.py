@@ -21,7 +21,7 @@ SIMULATED = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT", "OCEAN"}
 
 
 def losses(obj: bpy.types.Object, reading: Reading, *, quads: bool) -> list[str]:
-    """Sentences on all that an object's mesh loses, or has only in part, when it is refined."""
+    """Tell in sentences all that an object's mesh loses, or has only in part, when refined."""
     mesh: bpy.types.Mesh = obj.data
     return [
         *_of_faces(reading, quads),
@@ -120,7 +120,7 @@ def _of_modifiers(obj: bpy.types.Object) -> list[str]:
 
 
 def irregularities(refined: Refined) -> list[str]:
-    """What was found of the mesh when it was refined."""
+    """Return what was found of the mesh when it was refined."""
     said = []
     edges = refined.report["levels"][0]["edges"]["irregular"]
     if edges:

@@ -28,12 +28,12 @@ PASSED_ON = {
 
 
 def triangle_count(mesh: bpy.types.Mesh) -> int:
-    """How many triangles a mesh's faces are cut into."""
+    """Return how many triangles a mesh's faces are cut into."""
     return len(mesh.loops) - 2 * len(mesh.polygons)
 
 
 def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The selected meshes with faces; the active one alone if nothing is selected."""
+    """Return the selected meshes with faces; the active one alone if nothing is selected."""
     objects = list(context.selected_objects) or [context.object]
     return [o for o in objects if o is not None and o.type == "MESH" and len(o.data.polygons)]
 
@@ -49,7 +49,7 @@ class Refining(Settings):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """In object mode, with some mesh that has faces."""
+        """Return whether it is object mode, with some mesh that has faces."""
         if context.mode != "OBJECT":
             cls.poll_message_set("Leave the present mode for Object Mode first")
             return False
@@ -59,7 +59,7 @@ class Refining(Settings):
         return True
 
     def draw(self, context: bpy.types.Context) -> None:
-        """The properties, and how many faces there will be."""
+        """Show the properties, and how many faces there will be."""
         layout = self.layout
         layout.use_property_split = True
         self.draw_settings(layout)
@@ -67,7 +67,7 @@ class Refining(Settings):
         draw_forecast(layout, chosen_objects(context), self.levels)
 
     def begin(self, context: bpy.types.Context) -> Run:
-        """A run for the selected meshes.
+        """Begin a run for the selected meshes.
 
         Raises:
             PnsError: the model cannot be used.
@@ -181,7 +181,7 @@ def place(obj: bpy.types.Object, made: Made, keep_original: bool) -> bpy.types.O
 
 
 def draw_forecast(layout: bpy.types.UILayout, objects: list[bpy.types.Object], levels: int) -> None:
-    """How many faces there will be, and whether that is wise."""
+    """Show how many faces there will be, and whether that is wise."""
     count = sum(triangle_count(o.data) for o in objects)
     layout.label(text=forecast(count, levels), icon="INFO")
     warning = too_many(count, levels)

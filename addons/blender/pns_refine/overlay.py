@@ -42,7 +42,7 @@ class OBJECT_OT_pns_overlay(bpy.types.Operator):  # noqa: N801 (Blender's names)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """With an active object that was refined."""
+        """Return whether the active object was refined."""
         if shown_mesh(context.object) is None:
             cls.poll_message_set("Refine the object first")
             return False
@@ -58,7 +58,7 @@ class OBJECT_OT_pns_overlay(bpy.types.Operator):  # noqa: N801 (Blender's names)
 
 
 def shown_mesh(obj: bpy.types.Object | None) -> bpy.types.Mesh | None:
-    """The refined mesh that an object shows: its own, or its live result; None if neither."""
+    """Return the refined mesh that an object shows: its own, or a live result; None if neither."""
     if obj is None or obj.type != "MESH":
         return None
     cache = obj.data.pns_live.cache
@@ -67,13 +67,13 @@ def shown_mesh(obj: bpy.types.Object | None) -> bpy.types.Mesh | None:
 
 
 def current(obj: bpy.types.Object) -> str | None:
-    """The diagnostic that is shown, if any."""
+    """Return the diagnostic that is shown, if any."""
     material = _material(obj)
     return None if material is None else material.node_tree.nodes[ATTRIBUTE].attribute_name
 
 
 def ramp_of(obj: bpy.types.Object) -> bpy.types.Node | None:
-    """The colour ramp of an object's overlay, to be shown as its legend."""
+    """Return the colour ramp of an object's overlay, to be shown as its legend."""
     material = _material(obj)
     return None if material is None else material.node_tree.nodes[RAMP]
 
@@ -97,7 +97,7 @@ def hide(obj: bpy.types.Object) -> None:
 
 
 def ramp_material(name: str, highest: float) -> bpy.types.Material:
-    """A material that colours by an attribute, from 0 to ``highest``."""
+    """Make a material that colours by an attribute, from 0 to ``highest``."""
     material = bpy.data.materials.new(MATERIAL)
     material.use_nodes = True
     tree = material.node_tree
@@ -122,12 +122,12 @@ def ramp_material(name: str, highest: float) -> bpy.types.Material:
 
 
 def _linear(channel: float) -> float:
-    """A channel of sRGB as light."""
+    """Return a channel of sRGB as light."""
     return channel / 12.92 if channel <= 0.04045 else ((channel + 0.055) / 1.055) ** 2.4
 
 
 def _group(material: bpy.types.Material) -> bpy.types.NodeTree:
-    """The nodes that set a material on all faces; it stands in its node."""
+    """Return the nodes that set a material on all faces; it stands in its node."""
     group = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
@@ -141,7 +141,7 @@ def _group(material: bpy.types.Material) -> bpy.types.NodeTree:
 
 
 def _material(obj: bpy.types.Object) -> bpy.types.Material | None:
-    """The material of an object's overlay."""
+    """Return the material of an object's overlay."""
     modifier = obj.modifiers.get(MODIFIER)
     if modifier is None or modifier.node_group is None:
         return None

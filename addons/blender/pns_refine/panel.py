@@ -22,7 +22,7 @@ class VIEW3D_PT_pns(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's names)
     bl_label = "PNS Refine"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """The operator with the settings it last had."""
+        """Show the operator with the settings it last had."""
         layout = self.layout
         layout.operator(OBJECT_OT_pns_refine.bl_idname, icon="MOD_SUBSURF")
         last = context.window_manager.operator_properties_last(OBJECT_OT_pns_refine.bl_idname)
@@ -39,11 +39,11 @@ class VIEW3D_PT_pns_report(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's na
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """With a refined object."""
+        """Return whether the active object was refined."""
         return shown_mesh(context.object) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Sentences."""
+        """Show sentences."""
         mesh = shown_mesh(context.object)
         column = self.layout.column(align=True)
         for line in certificate_lines(context.object, mesh, context.scene):
@@ -63,11 +63,11 @@ class VIEW3D_PT_pns_overlay(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's n
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """With a refined object."""
+        """Return whether the active object was refined."""
         return shown_mesh(context.object) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
-        """A button for each, and the ramp from 0 to the largest value."""
+        """Show a button for each, and the ramp from 0 to the largest value."""
         obj, layout = context.object, self.layout
         now = current(obj)
         column = layout.column(align=True)
@@ -100,7 +100,7 @@ class VIEW3D_PT_pns_live(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's name
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """With an active mesh."""
+        """Return whether a mesh is active."""
         return context.object is not None and context.object.type == "MESH"
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -124,6 +124,6 @@ class VIEW3D_PT_pns_live(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's name
 
 
 def draw_menu(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
-    """The entry in the Object menu."""
+    """Show the entry in the Object menu."""
     menu.layout.separator()
     menu.layout.operator(OBJECT_OT_pns_refine.bl_idname, icon="MOD_SUBSURF")

@@ -83,7 +83,7 @@ def read_mesh(mesh: bpy.types.Mesh) -> Generator[None, None, Reading]:
 
 
 def _groups(mesh: bpy.types.Mesh) -> tuple[Group, ...]:
-    """The vertex groups of a mesh, which only objects that have it can tell."""
+    """Return the vertex groups of a mesh, which only objects that have it can tell."""
     holder = next((o for o in bpy.data.objects if o.data == mesh), None)
     if holder is None:
         return ()
@@ -91,7 +91,7 @@ def _groups(mesh: bpy.types.Mesh) -> tuple[Group, ...]:
 
 
 def _weights(mesh: bpy.types.Mesh) -> Generator[None, None, tuple[np.ndarray, int]]:
-    """The weights of all vertex groups, (V, G), and the number of memberships of weight 0."""
+    """Read the weights of all vertex groups, (V, G), and the number of memberships of weight 0."""
     weights = np.zeros((len(mesh.vertices), len(_groups(mesh))))
     empty = 0
     if weights.shape[1] == 0:
@@ -119,7 +119,7 @@ def _creases(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def _freestyle(mesh: bpy.types.Mesh) -> list[Layer]:
-    """Freestyle's marks, where they are no attributes."""
+    """Read Freestyle's marks, where they are no attributes."""
     layers = []
     for rows, domain in ((mesh.edges, Domain.EDGE), (mesh.polygons, Domain.FACE)):
         name = f"freestyle_{domain.name.lower()}"

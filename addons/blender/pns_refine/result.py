@@ -33,7 +33,7 @@ def remember(mesh: bpy.types.Mesh, refined: Refined, notes: list[str]) -> None:
 def certificate_lines(
     obj: bpy.types.Object, mesh: bpy.types.Mesh, scene: bpy.types.Scene
 ) -> list[str]:
-    """The certificate of a refined mesh in the scene's units, as the object is scaled."""
+    """Return the certificate of a refined mesh in the scene's units, as the object is scaled."""
     report = json.loads(mesh.pns_result.report)
     scale = max(obj.matrix_world.to_scale(), key=abs)
     return words.certificate(
@@ -42,12 +42,12 @@ def certificate_lines(
 
 
 def note_lines(mesh: bpy.types.Mesh) -> list[str]:
-    """What does not come through unchanged."""
+    """Return what does not come through unchanged."""
     return json.loads(mesh.pns_result.notes or "[]")
 
 
 def in_units(length: float, scene: bpy.types.Scene) -> str:
-    """A length as the scene's units word it."""
+    """Return a length as the scene's units word it."""
     units = scene.unit_settings
     if units.system == "NONE":
         return f"{length:.4g}"

@@ -81,7 +81,7 @@ class Share:
 def refine_meshes(
     objects: Iterable[bpy.types.Object], choice: Choice, share: Share
 ) -> Generator[object, None, dict[str, Made]]:
-    """Refined copies of the meshes of these objects, by the name of the old mesh."""
+    """Refine the meshes of these objects; return the copies by the name of the old mesh."""
     holders = {obj.data.name: obj for obj in objects}
     made: dict[str, Made] = {}
     finished = False
@@ -100,7 +100,7 @@ def refine_meshes(
 def refine_mesh(
     obj: bpy.types.Object, choice: Choice, share: Share, number: int = 0, count: int = 1
 ) -> Generator[object, None, Made]:
-    """A refined copy of an object's mesh; the computation runs in a thread of its own."""
+    """Refine a copy of an object's mesh; the computation runs in a thread of its own."""
     mesh: bpy.types.Mesh = obj.data
     reading: Reading = yield from read_mesh(mesh)
     job = Job(partial(compute, reading.snapshot, choice)).start()

@@ -20,12 +20,12 @@ BUDGET = load_model(DEFAULT_MODEL).card.budget
 
 @lru_cache(maxsize=4)
 def _loaded(source: str, stamp: float) -> OnnxModel:
-    """A model, read once; ``stamp`` changes where its file does."""
+    """Load a model once; ``stamp`` changes where its file does."""
     return load_model(Path(source) if stamp else source)
 
 
 def model_of(name: str, file: str) -> OnnxModel:
-    """The model of a file, or the bundled one of this name.
+    """Return the model of a file, or the bundled one of this name.
 
     Raises:
         ModelError: there is no such file, or it is no model.
@@ -115,7 +115,7 @@ class Settings:
 
 
 def choice_of(settings: Settings) -> Choice:
-    """What was chosen, without Blender.
+    """Return what was chosen, without Blender.
 
     Raises:
         PnsError: the model cannot be used.

@@ -9,12 +9,12 @@ MANY = 1_000_000
 
 
 def forecast(triangles: int, levels: int) -> str:
-    """How many faces there will be."""
+    """Tell how many faces there will be."""
     return f"{triangles * 4**levels:,} triangles from {triangles:,}"
 
 
 def too_many(triangles: int, levels: int) -> str | None:
-    """A warning where there will be more faces than work well."""
+    """Return a warning where there will be more faces than work well."""
     if triangles * 4**levels <= MANY:
         return None
     return f"More than {MANY:,} triangles: this takes long, and much memory"
@@ -23,7 +23,7 @@ def too_many(triangles: int, levels: int) -> str | None:
 def certificate(
     report: dict[str, Any], farthest: float, length: Callable[[float], str]
 ) -> list[str]:
-    """What a report promises and measured; ``length`` words a length of the mesh's own units."""
+    """Tell what a report promises and measured; ``length`` words a length in the mesh's units."""
     levels = report["levels"]
     steps = f"{len(levels)} level" + ("s" if len(levels) > 1 else "")
     if report["scheme"] == "loop":
@@ -42,7 +42,7 @@ def certificate(
 
 
 def listed(names: Sequence[str], most: int = 4) -> str:
-    """Names in a row; those that are too many are counted."""
+    """List names in a row; those that are too many are counted."""
     if len(names) <= most:
         return ", ".join(names)
     return ", ".join(names[:most]) + f" and {len(names) - most} more"

@@ -23,7 +23,7 @@ FREE_NORMALS = (5, 0, 0)
 def write_mesh(
     refined: Refined, reading: Reading, source: bpy.types.Mesh
 ) -> Generator[None, None, tuple[bpy.types.Mesh, list[str]]]:
-    """A new mesh, as ``source`` in all but its geometry; yields between pieces.
+    """Write a new mesh, as ``source`` in all but its geometry; yields between pieces.
 
     Returns the mesh, and what Blender would not take, in words. Nothing is left behind if the
     generator is closed before its end.
@@ -95,7 +95,7 @@ def _write_layers(mesh: bpy.types.Mesh, refined: Refined) -> Generator[None, Non
 
 
 def _write_groups(carrier: bpy.types.Object, refined: Refined, reading: Reading) -> Iterator[None]:
-    """Vertex groups by way of attributes, which Blender turns into groups itself, and fast."""
+    """Write vertex groups as attributes, which Blender turns into groups itself, and fast."""
     mesh = carrier.data
     for group, weights in zip(reading.groups, refined.groups.T, strict=True):
         attribute = mesh.attributes.new(".pns weights", "FLOAT", "POINT")

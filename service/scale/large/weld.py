@@ -218,7 +218,7 @@ def _repeated_faces(
 def _places(
     faces: np.ndarray, label: np.ndarray, dropped: np.ndarray, scratch: _Scratch
 ) -> tuple[np.ndarray, int]:
-    """Give vertices that stay their numbers, at each one's first corner, else −1; return how many."""
+    """Give vertices that stay numbers, at each one's first corner, else −1; return how many."""
     place = scratch.array("place", 3 * len(faces), -1)
     for rows in blocks_of(len(faces)):
         place[label[faces[rows][~dropped[rows]]].reshape(-1)] = 0

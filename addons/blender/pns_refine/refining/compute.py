@@ -117,7 +117,7 @@ def compute(
 def all_creases(
     snapshot: Snapshot, angle: float | None
 ) -> tuple[Int[np.ndarray, "N 2"], Float[np.ndarray, " N"]]:
-    """Sharp edges, and for how many levels: marked ones, and those bent by more than ``angle``."""
+    """Return sharp edges, for how many levels: those marked, and those bent beyond ``angle``."""
     marked = (snapshot.crease_sharpness > 0) & snapshot.edge_used
     pairs, crease_sharpness = snapshot.edges[marked], snapshot.crease_sharpness[marked]
     if angle is not None:
@@ -130,7 +130,7 @@ def all_creases(
 
 
 def split_vertices(snapshot: Snapshot, topology: Topology) -> int:
-    """How many vertices on borders lie where another does: the surface will come apart there."""
+    """Count border vertices that lie where another does: there the surface will come apart."""
     border = topology.edges[topology.edge_class == EdgeClass.BOUNDARY]
     places = snapshot.points[np.unique(border)]
     if len(places) == 0:
@@ -141,7 +141,7 @@ def split_vertices(snapshot: Snapshot, topology: Topology) -> int:
 
 
 def bent_edges(snapshot: Snapshot, angle: float) -> Int[np.ndarray, "N 2"]:
-    """Interior edges whose faces' normals are more than ``angle`` apart."""
+    """Return interior edges whose faces' normals are more than ``angle`` apart."""
     topology = build_topology(snapshot.triangles, len(snapshot.points))
     interior = topology.edges[topology.interior]
     normals = face_normals(snapshot.points, snapshot.triangles)
@@ -155,7 +155,7 @@ def bent_edges(snapshot: Snapshot, angle: float) -> Int[np.ndarray, "N 2"]:
 def _distance_from_loop(
     mesh: Mesh, choice: Choice, steps: Steps, positions: Positions, bar: _Bar
 ) -> Float[np.ndarray, " W"]:
-    """How far each vertex lies from where Loop alone would have it."""
+    """Return how far each vertex lies from where Loop alone would have it."""
     if choice.model is None:
         return np.zeros(len(positions.points))
     plain = refine_positions(mesh, loop(), steps, limit=choice.limit, progress=bar.within("loop"))
@@ -165,7 +165,7 @@ def _distance_from_loop(
 def _where_it_acted(
     mesh: Mesh, scheme: Scheme, steps: Steps, positions: Positions, bar: _Bar
 ) -> tuple[Float[np.ndarray, " W"], Float[np.ndarray, " W"]]:
-    """Ratio and gate of the last level that is learned; at vertices made later, the ends' mean."""
+    """Return ratio and gate of the last learned level; at later vertices, the ends' mean."""
     learned = scheme.learned_levels
     if not learned or learned >= len(steps.steps):
         return positions.ratio, positions.gate
@@ -189,7 +189,7 @@ def _plan(
 
 
 def _final_crease_sharpness(steps: Steps) -> Float[np.ndarray, " E"]:
-    """What is left of each final edge's sharpness."""
+    """Return what is left of each final edge's sharpness."""
     crease_sharpness = np.zeros(len(steps.final.edges))
     numbers = edge_numbers(steps.final, steps.pairs)
     crease_sharpness[numbers] = steps.crease_sharpness
@@ -243,7 +243,7 @@ class _Carry:
 
 
 def _unit(values: Float[np.ndarray, "N K"]) -> Float[np.ndarray, "N K"]:
-    """Rows of length 1; a row without length stays."""
+    """Scale rows to length 1; a row without length stays."""
     length = np.linalg.norm(values, axis=1, keepdims=True)
     return values / np.where(length > 0, length, 1)
 

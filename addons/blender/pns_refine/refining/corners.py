@@ -19,7 +19,7 @@ def refine_corners(
     creases: Int[np.ndarray, "N 2"],
     same: Float[np.ndarray, "C J"] | None = None,
 ) -> Float[np.ndarray, "D K"]:
-    """Values at three corners a face, in faces' order, at the corners of the faces' children.
+    """Refine values at three corners a face, in faces' order, to those of the faces' children.
 
     Corners of a vertex that agree are one point of a patch, and a seam runs where they differ.
     Inside a patch Loop's masks are used, as for the vertices; on its border the values stay and
@@ -52,7 +52,7 @@ def refine_corners(
 def patch_points(
     vertices: Int[np.ndarray, " C"], values: Float[np.ndarray, "C K"]
 ) -> Int[np.ndarray, " C"]:
-    """A number for each corner; the same for corners of one vertex that have the same values."""
+    """Give each corner a number; those of one vertex that have the same values share it."""
     first = np.zeros(int(vertices.max(initial=-1)) + 1, dtype=np.int64)
     first[vertices[::-1]] = np.arange(len(vertices))[::-1]
     # Corners that agree with their vertex's first are found without sorting: on most meshes, all.

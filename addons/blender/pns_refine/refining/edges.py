@@ -12,7 +12,7 @@ from .steps import Steps, edge_numbers
 
 
 def edge_parents(steps: Steps, snapshot: Snapshot) -> Int[np.ndarray, " E"]:
-    """The mesh's own edge that each final edge is a piece of; −1 for edges new inside faces.
+    """Return the mesh's own edge that each final edge is a piece of; −1 for edges new inside faces.
 
     An edge between an old vertex and an edge vertex is half of that edge: those inside a face join
     two edge vertices.

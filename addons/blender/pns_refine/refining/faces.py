@@ -24,7 +24,7 @@ class FacePlan:
 
 
 def triangle_faces(final: Topology, parents: Int[np.ndarray, " T"]) -> FacePlan:
-    """All triangles as they are; ``parents`` are the polygons they come from."""
+    """Return all triangles as they are; ``parents`` are the polygons they come from."""
     count = len(final.faces)
     faces = Faces(
         starts=3 * np.arange(count + 1),
@@ -38,7 +38,7 @@ def triangle_faces(final: Topology, parents: Int[np.ndarray, " T"]) -> FacePlan:
 def quad_faces(
     final: Topology, parents: Int[np.ndarray, " T"], diagonal: Int[np.ndarray, " T"]
 ) -> FacePlan:
-    """Triangles joined across ``diagonal``, the side that they share with another of their quad.
+    """Join triangles across ``diagonal``, the side that they share with another of their quad.
 
     A quad was cut along a diagonal, and each piece has one side parallel to it at every level: so
     the pieces pair up without a rest. −1 is a triangle that stays one. A quad stands where its
@@ -81,7 +81,7 @@ def quad_faces(
 
 
 def quad_diagonals(snapshot: Snapshot) -> Int[np.ndarray, " T"]:
-    """Of each triangle the side that its quad was cut along; −1 where it is no half of a quad."""
+    """Return each triangle's side that its quad was cut along; −1 where it is no half of one."""
     start = snapshot.polygon_corners[snapshot.polygons]
     size = snapshot.polygon_corners[snapshot.polygons + 1] - start
     place = snapshot.corners - start[:, None]
@@ -91,7 +91,7 @@ def quad_diagonals(snapshot: Snapshot) -> Int[np.ndarray, " T"]:
 
 
 def diagonal_children(diagonal: Int[np.ndarray, " T"], levels: int) -> Int[np.ndarray, " C"]:
-    """The sides of the triangles' children that are parallel to these."""
+    """Return the sides of the triangles' children that are parallel to these."""
     for _ in range(levels):
         turned = (diagonal[:, None] + SIDE_TURN) % 3
         diagonal = np.where(diagonal[:, None] < 0, -1, turned).reshape(-1)
@@ -99,7 +99,7 @@ def diagonal_children(diagonal: Int[np.ndarray, " T"], levels: int) -> Int[np.nd
 
 
 def used_edges(faces: Faces, edge_count: int) -> np.ndarray:
-    """Whether a face has the edge: diagonals of joined quads are in none."""
+    """Return whether a face has the edge: diagonals of joined quads are in none."""
     used = np.zeros(edge_count, dtype=bool)
     used[faces.edges] = True
     return used

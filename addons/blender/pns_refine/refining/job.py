@@ -46,7 +46,7 @@ class Job(Generic[Answer]):
         self._thread.join(seconds)
 
     def answer(self) -> Answer:
-        """What it came to.
+        """Return what it came to.
 
         Raises:
             StoppedError: it was told to stop. Whatever the work raised, it raises too.

@@ -49,7 +49,7 @@ def refine_positions(
 def _level_by_level(
     mesh: Mesh, scheme: Scheme, steps: Steps, *, limit: bool, progress: Progress
 ) -> Positions:
-    """Each level with the creases it has; where some are half sharp, two readings are mixed.
+    """Refine level by level with the creases of each; half sharp ones mix two readings.
 
     Both readings lie within the budget of Loop's, so their mixture lies within the budget of the
     mixture of Loop's. Such a level's report is the sharper reading's.
@@ -74,7 +74,7 @@ def _level_by_level(
 
 
 def _one_report(reports: list[Any]) -> dict[str, Any]:
-    """The report of all levels, from those of each; what is a sum over levels is added up."""
+    """Return the report of all levels, from those of each; sums over levels are added up."""
     report = dict(reports[0]) | {"levels": [level for part in reports for level in part["levels"]]}
     for name in ("learned_levels", "limit_distance", "limit_distance_bound"):
         values = [part[name] for part in reports if part["learned_levels"]]

@@ -48,7 +48,7 @@ class Layer:
     unit: bool = False
 
     def of(self, values: np.ndarray) -> Layer:
-        """The same attribute with other rows."""
+        """Return the same attribute with other rows."""
         return replace(self, values=values)
 
 
@@ -126,6 +126,6 @@ class Refined:
 
 
 def edge_keys(pairs: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, " N"]:
-    """One number for each pair of vertices, whichever comes first."""
+    """Return one number for each pair of vertices, whichever comes first."""
     pairs = np.asarray(pairs, dtype=np.int64)
     return pairs.min(axis=1, initial=2**31) << np.int64(32) | pairs.max(axis=1, initial=0)

@@ -70,12 +70,12 @@ class Steps:
 
 
 def crease_sharpness_of(crease: Float[np.ndarray, " E"]) -> Float[np.ndarray, " E"]:
-    """Blender's crease, 0 … 1, as a number of levels."""
+    """Return Blender's crease, 0 … 1, as a number of levels."""
     return np.where(crease >= 1, np.inf, SHARPEST * np.clip(crease, 0, 1) ** 2)
 
 
 def crease_of(crease_sharpness: Float[np.ndarray, " E"]) -> Float[np.ndarray, " E"]:
-    """The crease that is sharp for so many levels."""
+    """Return the crease that is sharp for so many levels."""
     return np.sqrt(np.clip(crease_sharpness / SHARPEST, 0, 1))
 
 
@@ -86,7 +86,7 @@ def level_steps(
     pairs: Int[np.ndarray, "N 2"],
     crease_sharpness: Float[np.ndarray, " N"],
 ) -> Steps:
-    """The topologies of ``levels`` levels; ``pairs`` of vertices name edges of this sharpness."""
+    """Return ``levels`` levels' topologies; ``pairs`` of vertices name edges of this sharpness."""
     steps = []
     kept = crease_sharpness > 0
     pairs, crease_sharpness = pairs[kept], crease_sharpness[kept]
@@ -101,7 +101,7 @@ def level_steps(
 
 
 def refine_columns(columns: Float[np.ndarray, "V K"], steps: Steps) -> Float[np.ndarray, "W K"]:
-    """Columns at the refined vertices: Loop's masks, level by level."""
+    """Refine columns by Loop's masks, level by level."""
     if columns.shape[1] == 0:
         return np.zeros((steps.final.vertex_count, 0))
     for step in steps.steps:
@@ -114,7 +114,7 @@ def refine_columns(columns: Float[np.ndarray, "V K"], steps: Steps) -> Float[np.
 
 
 def edge_numbers(topology: Topology, pairs: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, " N"]:
-    """Which edge of the topology each pair is; −1 where it is none."""
+    """Return which edge of the topology each pair is; −1 where it is none."""
     if len(topology.edges) == 0 or len(pairs) == 0:
         return np.full(len(pairs), -1, dtype=np.int64)
     keys = edge_keys(topology.edges)
@@ -126,7 +126,7 @@ def edge_numbers(topology: Topology, pairs: Int[np.ndarray, "N 2"]) -> Int[np.nd
 
 
 def one_level(columns: Float[np.ndarray, "V K"], topology: Topology) -> np.ndarray:
-    """Columns at the vertices of the next level, in pieces that stay in the processor's cache."""
+    """Refine columns by a level, in pieces that stay in the processor's cache."""
     old, width = columns.shape
     made = np.empty((old + len(topology.edges), width))
     for start in range(0, width, COLUMNS):
@@ -141,7 +141,7 @@ def one_level(columns: Float[np.ndarray, "V K"], topology: Topology) -> np.ndarr
 def _mixture(
     plain: Topology, pairs: Int[np.ndarray, "N 2"], crease_sharpness: Float[np.ndarray, " N"]
 ) -> Mixture | None:
-    """Edges of less than a level left: sharp by that share, and their ends by their mean."""
+    """Mix edges of less than a level left: sharp by that share, and their ends by their mean."""
     ending = crease_sharpness < 1
     if not ending.any():
         return None
@@ -160,7 +160,7 @@ def _mixture(
 def _worn(
     plain: Topology, pairs: Int[np.ndarray, "N 2"], crease_sharpness: Float[np.ndarray, " N"]
 ) -> tuple[Int[np.ndarray, "M 2"], Float[np.ndarray, " M"]]:
-    """The halves of sharp edges, a level less sharp; without those that are smooth now."""
+    """Return the halves of sharp edges, a level less sharp; without those that are smooth now."""
     lasting = crease_sharpness > 1
     edges = edge_numbers(plain, pairs[lasting])
     middle = plain.vertex_count + edges

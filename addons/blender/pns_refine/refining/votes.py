@@ -12,7 +12,7 @@ from .steps import Steps
 
 
 def vote_at_points(values: Shaped[np.ndarray, "V K"], steps: Steps) -> Shaped[np.ndarray, "W K"]:
-    """Old vertices keep their value; an edge vertex has that of most of its parents.
+    """Let old vertices keep their value; an edge vertex has that of most of its parents.
 
     Parents vote with the weight that Loop's edge mask gives them; of two equals, the endpoint of
     lower number wins.
@@ -23,7 +23,7 @@ def vote_at_points(values: Shaped[np.ndarray, "V K"], steps: Steps) -> Shaped[np
 
 
 def vote_at_corners(values: Shaped[np.ndarray, "C K"], levels: int) -> Shaped[np.ndarray, "D K"]:
-    """Values at three corners a face, in faces' order, at the corners of the faces' children.
+    """Vote on values at three corners a face, in faces' order, for those of the children.
 
     A child at a corner has that corner's value; the one in the middle has at each of its corners
     that of the corner before.
@@ -37,7 +37,7 @@ def vote_at_corners(values: Shaped[np.ndarray, "C K"], levels: int) -> Shaped[np
 
 
 def _elected(values: Shaped[np.ndarray, "V K"], topology: Topology) -> Int[np.ndarray, " E"]:
-    """For each edge the parent whose value is taken."""
+    """Return for each edge the parent whose value is taken."""
     a, b, c, d = (topology.stencil[:, column] for column in range(4))
     weight = np.array([EDGE_ENDPOINT, EDGE_ENDPOINT, EDGE_OPPOSITE, EDGE_OPPOSITE])
     parents = [a, b, np.where(c < 0, a, c), np.where(d < 0, b, d)]

@@ -35,11 +35,11 @@ class WatchedModel:
         return self.model.hash
 
     def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
-        """Corrections of a block of edges."""
+        """Return corrections of a block of edges."""
         self.look_up()
         return self.model(features, budget)
 
     def vertex_correction(self, features: Float[np.ndarray, "N L"], budget: float) -> np.ndarray:
-        """Corrections of a block of vertices."""
+        """Return corrections of a block of vertices."""
         self.look_up()
         return self.model.vertex_correction(features, budget)
