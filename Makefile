@@ -6,6 +6,7 @@ DEV    := .venv
 BLENDER := .venv-blender
 CLIENTS := .venv-clients
 PEERS := .venv-bench
+INTEROP := .venv-interop
 # Tests start hundreds of processes: each would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 # Pins what is installed, and what builds it.
@@ -18,7 +19,7 @@ HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.
 PROCESSES ?= 2
 PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
-.PHONY: bench bench-answers scale image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures paper-hero web
+.PHONY: bench bench-answers scale image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
 
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
@@ -53,6 +54,12 @@ unit: kernels $(CLIENTS)/.ready
 # What neither trains, nor starts programs, nor reads the whole collection of assets.
 quick: kernels
 	$(PYTEST) -m 'not (spawning or training or conformance or retrain or exhaustive)' tests
+
+# Meshes of other libraries with the real ones, Open3D too, which is too large for the tests' environment: none is
+# skipped. What they bring for pytest is left alone.
+interop-test: $(INTEROP)/.ready
+	$(INTEROP)/bin/python -c 'import meshio, open3d, pyvista, trimesh'
+	PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 OMP_NUM_THREADS=1 $(INTEROP)/bin/python -m pytest tests/pns_common/interop tests/pns_common/test_pyvista.py
 
 # What `make test` shows on one of each kind, on all there are.
 exhaustive: kernels
@@ -181,6 +188,11 @@ $(CLIENTS)/.ready: requirements/clients.txt
 	PIP_CONSTRAINT= $(CLIENTS)/bin/python -m pip install --quiet --requirement requirements/clients.txt
 	touch $@
 
+$(INTEROP)/.ready: pyproject.toml setup.py constraints.txt requirements/interop.txt
+	$(PYTHON) -m venv $(INTEROP)
+	$(INTEROP)/bin/python -m pip install --quiet --editable '.[fast]' --requirement requirements/interop.txt
+	touch $@
+
 $(DEV)/.ready: pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv $(DEV)
 	$(DEV)/bin/python -m pip install $(HASHED)
@@ -245,4 +257,4 @@ build/bench/.ready: $(wildcard benchmarks/peers/*.cpp benchmarks/peers/*.hpp)
 	touch $@
 
 clean:
-	rm -rf $(SERVE) $(DEV) $(CLIENTS) $(PEERS) $(BLENDER)-* build dist *.egg-info .pytest_cache .ruff_cache .hypothesis tests/node/node_modules web/node_modules results/cache
+	rm -rf $(SERVE) $(DEV) $(CLIENTS) $(PEERS) $(INTEROP) $(BLENDER)-* build dist *.egg-info .pytest_cache .ruff_cache .hypothesis tests/node/node_modules web/node_modules results/cache

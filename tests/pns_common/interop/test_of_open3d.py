@@ -1,4 +1,4 @@
-"""A open3d TriangleMesh comes back as one, with all that it carries."""
+"""An Open3D TriangleMesh comes back as one, with all that it carries."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from tests.support.split_data import EXPECTED, FACES, SCHEME, UV, VERTICES, same
 
 
 class TestOpen3d:
-    """open3d is large: where it is absent, these are left out."""
+    """Open3D is large: these are left out where it is absent. `make interop-test` has it."""
 
     @pytest.fixture
     def mesh(self):
