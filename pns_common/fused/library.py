@@ -71,7 +71,7 @@ def _library() -> Library:
 
 def kernel_modules() -> list[ModuleType]:
     """Return the modules that define kernels."""
-    names = sorted(found.name for found in pkgutil.iter_modules(kernels.__path__))
+    names = sorted(module.name for module in pkgutil.iter_modules(kernels.__path__))
     return [import_module(f"{kernels.__name__}.{name}") for name in names]
 
 

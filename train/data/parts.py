@@ -119,15 +119,15 @@ def rounded_box(fineness: int = 1) -> Mesh:
     inner box; in the rounded zones the grid's lines stand at equal angles.
     """
     radius, flat, bent = 0.2, 20 * fineness, 7 * fineness
-    lattice, faces = cube_faces(flat + 2 * bent)
+    grid, faces = cube_faces(flat + 2 * bent)
     inner = np.array([1.0, 0.7, 0.4]) - radius
     rim = radius * np.tan(np.linspace(0, np.pi / 4, bent + 1))
-    points = np.empty(lattice.shape)
+    points = np.empty(grid.shape)
     for axis, half in enumerate(inner):
         lines = np.concatenate(
             [-half - rim[:0:-1], np.linspace(-half, half, flat + 1), half + rim[1:]]
         )
-        points[:, axis] = lines[lattice[:, axis]]
+        points[:, axis] = lines[grid[:, axis]]
     core = np.clip(points, -inner, inner)
     outward = points - core
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
@@ -179,7 +179,7 @@ def closed_grid_faces(
 
 
 def cube_faces(cells: int) -> tuple[Int[np.ndarray, "V 3"], Int[np.ndarray, "F 3"]]:
-    """Return the surface of a cube of cells³ lattice cells: points in 0 … cells, and triangles."""
+    """Return the surface of a cube of cells³ cells: points in 0 … cells, and triangles."""
     i, j = (axis.ravel() for axis in np.mgrid[:cells, :cells])
     corners = np.stack([i, j, i + 1, j, i + 1, j + 1, i, j + 1], axis=1).reshape(-1, 4, 2)
     even = ((i + j) % 2 == 0)[:, None, None]
@@ -194,8 +194,8 @@ def cube_faces(cells: int) -> tuple[Int[np.ndarray, "V 3"], Int[np.ndarray, "F 3
             side = np.full((len(flat), 3, 3), end)
             side[..., u], side[..., v] = triangles[..., 0], triangles[..., 1]
             sides.append(side)
-    lattice, number = np.unique(np.concatenate(sides).reshape(-1, 3), axis=0, return_inverse=True)
-    return lattice, number.reshape(-1, 3)
+    grid, number = np.unique(np.concatenate(sides).reshape(-1, 3), axis=0, return_inverse=True)
+    return grid, number.reshape(-1, 3)
 
 
 def _angles(count: int) -> Float[np.ndarray, " N"]:

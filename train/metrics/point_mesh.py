@@ -67,8 +67,8 @@ def face_tree(mesh: Mesh) -> FaceTree:
 
 def nearest(tree: FaceTree, points: Float[np.ndarray, "P 3"]) -> Nearest:
     """Return the nearest point of the mesh to each point, in the mesh's unit."""
-    found = tree.tree.squared_distance(tree.vertices, tree.faces, points)
-    square, face, point = (np.asarray(part) for part in found)
+    answer = tree.tree.squared_distance(tree.vertices, tree.faces, points)
+    square, face, point = (np.asarray(part) for part in answer)
     border = _barycentric(tree.vertices[tree.faces[face]], point) <= ON_BORDER
     sides = border.sum(axis=1)
     on_edge = tree.across[face, border.argmax(axis=1)]

@@ -29,8 +29,8 @@ class Array:
         flags = value.flags
         suits = flags.carray if self.written else flags.c_contiguous and flags.aligned
         if not suits or value.ndim != self.ndim or value.dtype != self.dtype:
-            found = f"{value.dtype}, {value.ndim} dimensions"
-            raise TypeError(f"a kernel takes {self}, not {found}, {flags}")
+            kind = f"{value.dtype}, {value.ndim} dimensions"
+            raise TypeError(f"a kernel takes {self}, not {kind}, {flags}")
         return value
 
 

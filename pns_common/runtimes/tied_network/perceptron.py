@@ -89,8 +89,8 @@ class _Reader:
         return step
 
     def _check_number(self, name: str, number: float) -> None:
-        found = self.weights.get(name)
-        if found is None or found.shape != () or found != number:
+        weight = self.weights.get(name)
+        if weight is None or weight.shape != () or weight != number:
             raise _OtherFormError
 
 

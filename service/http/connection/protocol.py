@@ -66,7 +66,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         self.conn: Parser = Parser(config.h11_max_incomplete_event_size or HEAD_BYTES)
         self.app = self._application
         self._shared = shared
-        self._has_place = False
+        self._has_slot = False
         self._head_deadline = Deadline(self.loop, self._head_is_late)
         self._end_deadline = Deadline(self.loop, self._abort)
         self._listens = False
@@ -87,7 +87,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
             log.warning("a connection is refused: %s", refusal)
             self._say(503, "too-many-connections", refusal, b"retry-after: 5\r\n")
             return
-        self._has_place = True
+        self._has_slot = True
         self._await_head()
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -294,7 +294,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
 
     def _is_heard(self) -> bool:
         """Return whether nothing more is expected of the client; without a slot, nothing is."""
-        if not self._has_place:
+        if not self._has_slot:
             return True
         if self.conn.their_state is h11.IDLE:
             return not self.conn.trailing_data[0]

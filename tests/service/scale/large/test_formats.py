@@ -39,7 +39,7 @@ def refined(source, output, parts=3, options=LOOP):
     return report
 
 
-def soup():
+def loose_triangles():
     """Triangles with seams: each corner of a surface, some repeated, one without area."""
     points, faces = grid(8, bent)
     faces = np.concatenate([faces, faces[:2, ::-1], [[3, 3, 4]]])
@@ -67,9 +67,9 @@ def assert_same(folder, mesh):
 
 @pytest.mark.parametrize("ending", ["ply", "stl", "obj", "glb"])
 def test_files_are_refined_as_in_memory(tmp_path, ending):
-    source = written(tmp_path / f"in.{ending}", soup())
+    source = written(tmp_path / f"in.{ending}", loose_triangles())
     report = refined(source, tmp_path / "out")
-    as_stl = formats.read(formats.write(soup(), "stl"), "stl")
+    as_stl = formats.read(formats.write(loose_triangles(), "stl"), "stl")
     read = formats.read(source.read_bytes(), ending) if ending != "glb" else as_stl
     assert_same(tmp_path / "out", refine(control_of(read.vertices, read.faces), loop()).mesh)
     assert (report["dropped"]["degenerate_faces"], report["dropped"]["duplicate_faces"]) == (1, 2)
@@ -166,7 +166,7 @@ def test_a_ply_may_be_of_either_byte_order_with_other_properties(tmp_path):
 
 
 def test_a_ply_that_is_written_holds_what_the_arrays_hold(tmp_path):
-    source = written(tmp_path / "in.obj", soup())
+    source = written(tmp_path / "in.obj", loose_triangles())
     refined(source, tmp_path / "out.ply")
     refined(source, tmp_path / "out")
     read = formats.read((tmp_path / "out.ply").read_bytes(), "ply")
@@ -175,7 +175,7 @@ def test_a_ply_that_is_written_holds_what_the_arrays_hold(tmp_path):
 
 
 def test_parts_of_a_tileset_meet_in_bits(tmp_path):
-    source = written(tmp_path / "in.obj", soup())
+    source = written(tmp_path / "in.obj", loose_triangles())
     report = refined(source, tmp_path / "out.3dtiles", 5)
     refined(source, tmp_path / "out")
     tree = json.loads((tmp_path / "out.3dtiles" / "tileset.json").read_text())
@@ -202,7 +202,7 @@ def test_a_tileset_is_valid(tmp_path):
     validator = shutil.which("3d-tiles-validator")
     if validator is None:
         pytest.skip("3d-tiles-validator is not installed (npm)")
-    refined(written(tmp_path / "in.stl", soup()), tmp_path / "out.3dtiles", 4)
+    refined(written(tmp_path / "in.stl", loose_triangles()), tmp_path / "out.3dtiles", 4)
     arguments = [validator, "--tilesetFile", str(tmp_path / "out.3dtiles" / "tileset.json")]
     told = subprocess.run(arguments, capture_output=True, text=True, check=True).stdout
     report = json.loads(told[told.index("{") :])
