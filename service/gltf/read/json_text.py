@@ -106,8 +106,8 @@ def json_items(text: bytes) -> int:
 def _depth(text: bytes) -> int:
     """Return how deep brackets and braces nest outside strings.
 
-    The decoder's own limit will not do: it is what the caller's stack leaves of Python's (997 with
-    an empty stack, 495 above 500 frames), and a file would pass here, and fail there or when written.
+    The decoder's own limit will not do: it is what the caller's stack leaves of Python's (997 of
+    1,000, or 495 above 500 frames). A file would pass here, and fail there or when written.
     """
     # Without escapes, which are rare, every second quote ends a string: no pattern need be matched.
     bare = _STRING.sub(b"", text) if b"\\" in text else text
