@@ -68,7 +68,8 @@ def _compiled(kernel: Kernel) -> Any:
 def _type(of: Array | str) -> Any:
     if isinstance(of, Array):
         # numba takes writable arrays where it expects read-only ones.
-        dtype = getattr(_numba.types, "boolean" if of.dtype == "bool" else of.dtype)
+        name = "uint32" if of.natural else "boolean" if of.dtype == "bool" else of.dtype
+        dtype = getattr(_numba.types, name)
         return _numba.types.Array(dtype, of.ndim, "C", readonly=not of.written)
     return getattr(_numba, of)
 

@@ -18,6 +18,7 @@ from pns_common.fused.kernels.compiled import (
     CLASSES_OUT,
     INDICES,
     INDICES_OUT,
+    INTEGERS_2,
     LONG_INDICES_OUT,
     SIZE,
     kernel,
@@ -89,7 +90,7 @@ def _fill_half(
 
 @kernel(
     SIZE,
-    *(INDICES, INDICES, INDICES, CLASSES, INDICES, SIZE, SIZE, SIZE),
+    *(INDICES, INDICES, INTEGERS_2, CLASSES, INDICES, SIZE, SIZE, SIZE),
     *(INDICES_OUT, INDICES_OUT, INDICES_OUT, CLASSES_OUT),
 )
 def split_edges(

@@ -18,11 +18,18 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Array:
-    """An array in C's order; ``written``: by the kernel."""
+    """An array in C's order.
+
+    Attributes:
+        written: by the kernel.
+        natural: int32 of which none is negative. Machine code then need not ask of an index whether
+            it counts from the end, as one below 0 does: a fifth of what gathers rows.
+    """
 
     dtype: str
     ndim: int
     written: bool = False
+    natural: bool = False
 
     def checked(self, value: np.ndarray) -> np.ndarray:
         """Return the value. Raises TypeError where a kernel would read it wrongly."""
@@ -36,8 +43,10 @@ class Array:
 
 POINTS, POINTS_OUT = Array("float64", 2), Array("float64", 2, written=True)
 NUMBERS, NUMBERS_OUT = Array("float64", 1), Array("float64", 1, written=True)
-INDICES, INDICES_OUT = Array("int32", 2), Array("int32", 2, written=True)
-INDEX, INDEX_OUT = Array("int32", 1), Array("int32", 1, written=True)
+INDICES, INDICES_OUT = Array("int32", 2, natural=True), Array("int32", 2, written=True)
+INDEX, INDEX_OUT = Array("int32", 1, natural=True), Array("int32", 1, written=True)
+# Of which some may be negative, or are counted with.
+INTEGERS, INTEGERS_2 = Array("int32", 1), Array("int32", 2)
 LONG_INDICES, LONG_INDICES_OUT = Array("int64", 2), Array("int64", 2, written=True)
 LONG_INDEX = Array("int64", 1)
 CLASSES, CLASSES_OUT = Array("int8", 1), Array("int8", 1, written=True)

@@ -13,6 +13,7 @@ from pns_common.fused.kernels.compiled import (
     INDEX_OUT,
     INDICES,
     INDICES_OUT,
+    INTEGERS_2,
     SIZE,
     kernel,
 )
@@ -102,7 +103,7 @@ def chain_edges(faces, most_steps, head, low, links, face_edges, plain):
     return count
 
 
-@kernel(SIZE, INDICES, INDEX, INDICES, SIZE, SIZE, INDICES_OUT, INDICES_OUT, CLASSES_OUT)
+@kernel(SIZE, INDICES, INDEX, INTEGERS_2, SIZE, SIZE, INDICES_OUT, INDICES_OUT, CLASSES_OUT)
 def classify(faces, low, links, begin, end, edges, half_edges, edge_class):
     """Write ends, half-edges, classes of edges begin … end − 1; returns how many are not interior.
 

@@ -8,6 +8,7 @@ from pns_common.fused.kernels.compiled import (
     INDEX,
     INDEX_OUT,
     INDICES,
+    INTEGERS_2,
     SIZE,
     kernel,
 )
@@ -37,7 +38,7 @@ def count_corners(faces, corner, count):
     return 0
 
 
-@kernel(SIZE, INDICES, INDICES, CLASSES, INDEX, INDEX, INDEX, SIZE, SIZE, SIZE, FLAGS_OUT)
+@kernel(SIZE, INDICES, INTEGERS_2, CLASSES, INDEX, INDEX, INDEX, SIZE, SIZE, SIZE, FLAGS_OUT)
 def several_fans(
     face_edges, half_edges, edge_class, corner, count, sharp, plain, begin, end, several
 ):

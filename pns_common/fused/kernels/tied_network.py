@@ -9,6 +9,7 @@ import numpy as np
 from pns_common.fused.kernels.compiled import (
     INDEX,
     INDICES,
+    INTEGERS,
     POINTS,
     REAL,
     SINGLES,
@@ -114,7 +115,7 @@ def _write(held, begin, budget, answers):
 
 @kernel(
     SIZE,
-    *(POINTS, INDICES, INDEX, INDEX, SINGLES_2, SINGLES, SINGLES),
+    *(POINTS, INDICES, INDEX, INTEGERS, SINGLES_2, SINGLES, SINGLES),
     *(SINGLES_2, INDEX, SINGLES, REAL, SINGLES_3_OUT, SINGLES_3_OUT, SINGLES_2_OUT),
 )
 def answer(

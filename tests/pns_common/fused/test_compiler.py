@@ -9,7 +9,7 @@ pytest.importorskip("numba")
 
 from pns_common.fused.compiler import DATA, SHAPE, STRIDES, _entry, _helpers, _type
 from pns_common.fused.kernels import edges, masks
-from pns_common.fused.kernels.compiled import POINTS, POINTS_OUT, SIZE
+from pns_common.fused.kernels.compiled import INDICES, INTEGERS_2, POINTS, POINTS_OUT, SIZE
 from pns_common.fused.kernels.masks import largest_coordinate, sum_rings
 
 
@@ -45,3 +45,7 @@ def test_helpers_are_the_plain_functions_of_a_module_and_no_kernel_or_import():
     assert {"opposite", "_repeats", "_may_repeat"} <= names
     assert not names & {"sum_rings", "kernel"}
     assert sum_rings.function not in _helpers([masks])
+
+
+def test_what_is_never_negative_is_read_without_a_sign():
+    assert [str(_type(each).dtype) for each in (INDICES, INTEGERS_2)] == ["uint32", "int32"]
