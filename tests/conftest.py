@@ -79,7 +79,7 @@ LONGEST = (
     "docs/test_site.py",
     "train/certificates/test_ascent.py",
     "train/certificates/test_adversary.py",
-    "train/data/test_pair_stream.py",
+    "train/data/pairs/test_pair_stream.py",
     "train/test_train_command.py",
     "train/fitting/test_limit_training.py",
 )

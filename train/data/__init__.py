@@ -1,1 +1,1 @@
-"""Data sets, grids, patches, parts and the stream: seeded coarse meshes on known surfaces."""
+"""Data sets, grids, patches, parts, simplifiers; in pairs/ the stream for training to limits."""

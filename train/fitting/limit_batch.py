@@ -13,7 +13,7 @@ from pns_common.base.arrays import segment_sum
 from pns_common.connectivity.disjoint_union import disjoint_faces
 from pns_common.connectivity.topology import Topology, build_topology, split
 from pns_common.rules.control_level import ControlLevel, control_level
-from train.data.references import AUTHORED, LATHE, SWEPT, Pair
+from train.data.pairs.references import AUTHORED, LATHE, SWEPT, Pair
 from train.fitting.limit_maps import LimitMaps, applied, limit_maps, loop_matrix
 
 # Levels of Loop between the learned level and the vertices at which the limit is looked at.

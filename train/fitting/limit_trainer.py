@@ -7,8 +7,8 @@ import torch
 
 from pns_common.levels.step import level_step
 from pns_common.schemes import Scheme
-from train.data.pair_stream import pair_stream
-from train.data.references import Pair
+from train.data.pairs.pair_stream import pair_stream
+from train.data.pairs.references import Pair
 from train.fitting.determinism import deterministic
 from train.fitting.limit_batch import LimitBatch, limit_batch
 from train.fitting.limit_loss import LimitMeasures, Standards, limit_loss, measure

@@ -11,10 +11,10 @@ import torch
 from pns_common.connectivity.topology import build_topology
 from pns_common.refine import refine
 from pns_common.schemes import loop
-from train.data import pair_stream as stream
-from train.data.grid_pairs import grid_pair
+from train.data.pairs import pair_stream as stream
+from train.data.pairs.grid import grid_pair
+from train.data.pairs.references import AUTHORED, Pair, Reference
 from train.data.primitives import box, globe, torus
-from train.data.references import AUTHORED, Pair, Reference
 from train.fitting.limit_batch import SMOOTH_KINDS, limit_batch
 from train.fitting.limit_loss import Standards, limit_loss, measure
 from train.fitting.limit_maps import applied, limit_maps, loop_matrix

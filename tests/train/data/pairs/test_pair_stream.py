@@ -12,16 +12,16 @@ from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
 from pns_common.refine import measure_reference_length, refine
 from pns_common.schemes import loop
-from train.data.authored_pairs import authored_pair
-from train.data.faceted_pairs import faceted_pair
-from train.data.grid_pairs import grid_pair
-from train.data.lathe_pairs import lathe_pair, turned
-from train.data.pair_stream import pair_stream
-from train.data.patch_pairs import patch_pair
-from train.data.references import Pair, Reference, moved
-from train.data.solid_pairs import solid_pairs
-from train.data.sphere_pairs import sphere_pair
-from train.data.swept_pairs import swept_pair
+from train.data.pairs.authored import authored_pair
+from train.data.pairs.faceted import faceted_pair
+from train.data.pairs.grid import grid_pair
+from train.data.pairs.lathe import lathe_pair, turned
+from train.data.pairs.pair_stream import pair_stream
+from train.data.pairs.patch import patch_pair
+from train.data.pairs.references import Pair, Reference, moved
+from train.data.pairs.solid import solid_pairs
+from train.data.pairs.sphere import sphere_pair
+from train.data.pairs.swept import swept_pair
 from train.metrics.fairness import volume
 
 KINDS = [

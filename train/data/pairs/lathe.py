@@ -11,8 +11,8 @@ from jaxtyping import Float
 
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
-from train.data.faceted_pairs import sampled
-from train.data.references import LATHE, Pair
+from train.data.pairs.faceted import sampled
+from train.data.pairs.references import LATHE, Pair
 from train.surfaces.quasi_interpolation import n1
 from train.surfaces.solids import random_rotation
 

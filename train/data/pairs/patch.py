@@ -4,7 +4,7 @@ import numpy as np
 
 from pns_common.refine import refine
 from pns_common.schemes import loop
-from train.data.references import Pair, Reference
+from train.data.pairs.references import Pair, Reference
 from train.data.stream import random_instance
 from train.surfaces.implicit import unit_normal
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from pns_common.mesh import Mesh
-from train.data.coarsened import coarsened
+from train.data.pairs.coarsened import coarsened
+from train.data.pairs.references import Pair, Reference
 from train.data.primitives import icosphere
-from train.data.references import Pair, Reference
 
 # How often it is an icosphere; and collapsed with its vertices laid back onto the surface.
 ICOSPHERE, ON_SURFACE = 0.4, 0.3

@@ -10,9 +10,9 @@ from scipy.spatial import ConvexHull
 
 from pns_common.connectivity.topology import build_topology, split
 from pns_common.mesh import Mesh
-from train.data.coarsened import coarsened
 from train.data.dense_meshes import is_manifold, largest_part
-from train.data.references import Pair, Reference
+from train.data.pairs.coarsened import coarsened
+from train.data.pairs.references import Pair, Reference
 
 # Of the split polyhedron that is then simplified.
 FEWEST_FACES, MOST_FACES = 1500, 8000

@@ -10,9 +10,9 @@ from jaxtyping import Float, Int
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
 from pns_common.schemes import loop
-from train.data.faceted_pairs import block
-from train.data.grid_pairs import vertex_normals
-from train.data.references import AUTHORED, Pair, Reference
+from train.data.pairs.faceted import block
+from train.data.pairs.grid import vertex_normals
+from train.data.pairs.references import AUTHORED, Pair, Reference
 
 Quads = Int[np.ndarray, "Q 4"]
 Points = Float[np.ndarray, "V 3"]

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.mesh import Mesh
-from train.data.references import Pair, Reference
+from train.data.pairs.references import Pair, Reference
 from train.surfaces.solids import random_rotation
 
 # u, v in [0, 1] to points; v goes round.

@@ -6,8 +6,8 @@ import numpy as np
 
 from pns_common.errors import MeshError
 from pns_common.mesh import Mesh
-from train.data.coarsened import coarsened
-from train.data.references import Pair, Reference
+from train.data.pairs.coarsened import coarsened
+from train.data.pairs.references import Pair, Reference
 from train.surfaces.marching import laid_onto, marched, unit_gradient
 from train.surfaces.solids import Field, random_solid
 

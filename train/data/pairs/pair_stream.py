@@ -10,15 +10,15 @@ from types import MappingProxyType
 import numpy as np
 
 from pns_common.refine import measure_reference_length
-from train.data.authored_pairs import authored_pair
-from train.data.faceted_pairs import faceted_pair
-from train.data.grid_pairs import grid_pair
-from train.data.lathe_pairs import lathe_pair
-from train.data.patch_pairs import patch_pair
-from train.data.references import Pair, moved
-from train.data.solid_pairs import solid_pairs
-from train.data.sphere_pairs import sphere_pair
-from train.data.swept_pairs import swept_pair
+from train.data.pairs.authored import authored_pair
+from train.data.pairs.faceted import faceted_pair
+from train.data.pairs.grid import grid_pair
+from train.data.pairs.lathe import lathe_pair
+from train.data.pairs.patch import patch_pair
+from train.data.pairs.references import Pair, moved
+from train.data.pairs.solid import solid_pairs
+from train.data.pairs.sphere import sphere_pair
+from train.data.pairs.swept import swept_pair
 
 # How often each draws a pair, in the order that a seed means; the rest are solids.
 SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingProxyType(

@@ -5,8 +5,8 @@ from collections import Counter
 import numpy as np
 
 from pns_common.mesh import Mesh
-from train.data import coarsened as subject
-from train.data.coarsened import WAYS, coarsened
+from train.data.pairs import coarsened as subject
+from train.data.pairs.coarsened import WAYS, coarsened
 from train.data.primitives import icosphere
 from train.data.simplifiers import SIMPLIFIERS
 

@@ -1,0 +1,1 @@
+"""Coarse meshes of many kinds beside the surfaces that they stand for, and the stream of all."""
