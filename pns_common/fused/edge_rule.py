@@ -52,8 +52,18 @@ def add_at_edges(
         frame, features = np.empty((count, 9)), np.empty((count, rule.operator.features.count))
         length, longest, curvature = np.empty(count), np.empty(count), np.empty(count)
         lengths, gentlest = np.empty((LENGTHS, count)), np.empty(count if reads_sides else 0)
-        degenerate = np.empty(count, dtype=bool)
-        looked = frame, length, longest, curvature, degenerate, lengths, features, gentlest
+        stencils, degenerate = np.empty((count, 4), dtype=np.int32), np.empty(count, dtype=bool)
+        looked = (
+            stencils,
+            frame,
+            length,
+            longest,
+            curvature,
+            degenerate,
+            lengths,
+            features,
+            gentlest,
+        )
         of_faces = normals, fields, bends
         look(level.points, *of_faces, *args, rows.start, rows.stop, symmetric, *looked)
         # numpy's logarithm and hyperbolic tangent run on vectors, and have the array kernels' bits.
@@ -65,20 +75,20 @@ def add_at_edges(
         if degenerate.any():
             to.degenerate[mesh.interior[rows]] = degenerate
         answers = where_open(rule.operator.network, features, gate, like=axes[0])
-        eta, lower_ends = np.ascontiguousarray(answers), mesh.edges[mesh.interior[rows], 0]
+        eta = np.ascontiguousarray(answers)
         if isinstance(rule, LearnedEdgeRule):
-            budget_per_length = level.budget_per_length(lower_ends, rule.budget)
+            budget_per_length = level.budget_per_length(stencils[:, 0], rule.budget)
             correct(eta, frame, length, gate, budget_per_length, mesh.interior, rows.start, *out)
         else:
             form = rule.form
             bounded = longest if form.wide_bound else length
-            budget_per_length = level.budget_per_length(lower_ends, form.budget)
+            budget_per_length = level.budget_per_length(stencils[:, 0], form.budget)
             answer = eta, frame, level.rings.network_lengths, bounded, gate, budget_per_length
             prior = (
                 pushes,
                 bounds.pushes,
                 bounds.nothing,
-                *args[:3],
+                stencils,
                 form.prior_strength,
                 form.network_scale,
             )

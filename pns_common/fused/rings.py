@@ -10,7 +10,6 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.blocks import Blocks
 from pns_common.formula.side_gate import GENTLE_TO_SHARP
 from pns_common.fused.kernels.rings import (
-    EDGE_COLUMNS,
     VERTEX_COLUMNS,
     face_bends,
     mean_neighbours,
@@ -91,22 +90,23 @@ def measure_rings(
 ) -> RingMeasures:
     """Look around every vertex of a level; ``altitudes`` is α of the network's lengths."""
     count, by_owner = mesh.vertex_count, owners(blocks, mesh.vertex_count)
-    fields, measured = np.zeros((count, 4)), np.empty((len(mesh.edges), EDGE_COLUMNS))
-    means, valence = np.zeros((count, VERTEX_COLUMNS)), np.zeros(count, dtype=np.int32)
+    fields, means = np.zeros((count, 4)), np.zeros((count, VERTEX_COLUMNS))
+    valence = np.zeros(count, dtype=np.int32)
     args = mesh.faces, mesh.edges, mesh.half_edges, mesh.edge_class
     of_faces = at_faces.normals, at_faces.areas
-    to = measured, np.empty(len(mesh.edges)), np.empty(len(mesh.edges))
+    bends, jumps, network_lengths = (np.empty(len(mesh.edges)) for _ in range(3))
+    to = bends, jumps, network_lengths
 
     def edges(rows: slice) -> None:
         measure_edges(points, *of_faces, *args, altitudes, rows.start, rows.stop, *to)
 
     def around(rows: slice) -> None:
         mean_normals(mesh.faces, at_faces.areas, rows.start, rows.stop, fields)
-        mean_spokes(mesh.edges, *to, rows.start, rows.stop, means, valence)
+        mean_spokes(points, mesh.edges, *to, rows.start, rows.stop, means, valence)
         umbrella_heights(means, mesh.sharp, rows.start, rows.stop, fields)
 
     def beyond(rows: slice) -> None:
-        mean_neighbours(mesh.edges, measured, fields, valence, rows.start, rows.stop, means)
+        mean_neighbours(points, mesh.edges, fields, valence, rows.start, rows.stop, means)
 
     blocks.run(len(mesh.edges), edges)
     by_owner.run(count, around)
@@ -114,7 +114,7 @@ def measure_rings(
     smooth = (valence > 0) & ~several_fans
     if len(mesh.sharp):
         smooth &= mesh.sharp == 0
-    return RingMeasures(fields, means, *to[1:], valence, smooth)
+    return RingMeasures(fields, means, jumps, network_lengths, valence, smooth)
 
 
 def measure_pushes(rings: RingMeasures, blocks: Blocks) -> Float[np.ndarray, "V 3"]:

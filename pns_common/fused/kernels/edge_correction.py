@@ -9,6 +9,7 @@ from pns_common.fused.kernels.compiled import (
     FLAGS_OUT,
     INDEX,
     INDICES,
+    INDICES_OUT,
     NUMBERS,
     NUMBERS_OUT,
     POINTS,
@@ -41,8 +42,8 @@ def _no_shorter(length):
 @kernel(
     SIZE,
     *(POINTS, POINTS, POINTS, NUMBERS, INDICES, INDICES, INDICES, INDEX, SIZE, SIZE, SIZE),
-    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT, FLAGS_OUT, POINTS_OUT, POINTS_OUT),
-    NUMBERS_OUT,
+    *(INDICES_OUT, POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT, FLAGS_OUT, POINTS_OUT),
+    *(POINTS_OUT, NUMBERS_OUT),
 )
 def look(
     points,
@@ -56,6 +57,7 @@ def look(
     begin,
     end,
     symmetric,
+    stencils,
     frame,
     length,
     longest,
@@ -71,6 +73,7 @@ def look(
         fields: (V, 4) mean normal and umbrella height; read where ``features`` has signed columns.
         bends: (F,) b of each face; empty where gates do not read it.
         symmetric: 1 where c lies to the left of a → b and degenerate edges have x = 0, else 0.
+        stencils: (N, 4) out: a, b, c, d.
         frame: (N, 9) out: T, N, B.
         length, longest: out: h and h̄, the longest edge of both faces.
         curvature, degenerate: out: x, and whether the frame is the fallback.
@@ -87,6 +90,7 @@ def look(
             h1, h2 = h2, h1
         c, d = opposite(faces, h1), opposite(faces, h2)
         n1, n2 = row(normals, h1 // 3), row(normals, h2 // 3)
+        stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3] = a, b, c, d
 
         edge = between(points, a, b)
         h = norm(edge)
@@ -232,7 +236,7 @@ def _prior(pushes, of_boundary, nothing, a, b, c, d, k, strength):
 @kernel(
     SIZE,
     *(POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, INDEX, SIZE),
-    *(POINTS, POINTS, REAL, INDICES, INDICES, INDICES, REAL, REAL),
+    *(POINTS, POINTS, REAL, INDICES, REAL, REAL),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
 )
 def correct_scale_free(
@@ -247,9 +251,7 @@ def correct_scale_free(
     pushes,
     of_boundary,
     nothing,
-    faces,
-    edges,
-    half_edges,
+    stencils,
     strength,
     scale,
     displacement,
@@ -265,8 +267,7 @@ def correct_scale_free(
     """
     for i in range(z.shape[0]):
         e = interior[begin + i]
-        a, b = edges[e, 0], edges[e, 1]
-        c, d = opposite(faces, half_edges[e, 0]), opposite(faces, half_edges[e, 1])
+        a, b, c, d = stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3]
         envelope = budget_per_length[i] * (bound_length[i] * bound_length[i])
         turned = _rotated(frame, i, in_ball(row(z, i)))
         asked = scale * network_lengths[e]

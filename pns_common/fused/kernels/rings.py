@@ -25,9 +25,6 @@ from pns_common.fused.kernels.compiled import (
 from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.normals import unit_normal
 
-# Columns of an edge's row.
-SPOKE, SQUARE, BEND = 0, 3, 4
-EDGE_COLUMNS = 5
 # Columns of a vertex's sums, which become means.
 UMBRELLA, RING_SQUARE, MEAN_JUMP, MEAN_BEND, BEND_SQUARE, LENGTH, PULL = 0, 3, 4, 5, 6, 7, 8
 MEAN_NETWORK_SQUARE = 11
@@ -103,7 +100,7 @@ def mean_normals(faces, areas, begin, end, fields):
 @kernel(
     SIZE,
     *(POINTS, POINTS, POINTS, INDICES, INDICES, INDICES, CLASSES, REAL, SIZE, SIZE),
-    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+    *(NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
 )
 def measure_edges(
     points,
@@ -116,23 +113,20 @@ def measure_edges(
     altitudes,
     begin,
     end,
-    measured,
+    bends,
     jumps,
     network_lengths,
 ):
-    """Write b − a, its square and s (``measured``, (E, 5)), x and ℓ of edges begin … end − 1.
+    """Write s, x and ℓ of edges begin … end − 1.
 
     ``altitudes`` is α, infinite where the network speaks in units of h whatever the faces.
     """
     for e in range(begin, end):
         spoke = between(points, edges[e, 0], edges[e, 1])
         square = dot(spoke, spoke)
-        for k in range(3):
-            measured[e, SPOKE + k] = spoke[k]
-        measured[e, SQUARE] = square
         length = math.sqrt(square) if square > 0 else math.inf
         network_lengths[e] = math.sqrt(square)
-        jumps[e] = measured[e, BEND] = 0.0
+        jumps[e] = bends[e] = 0.0
         if edge_class[e] != INTERIOR:
             continue
         f, g = half_edges[e, 0] // 3, half_edges[e, 1] // 3
@@ -147,7 +141,7 @@ def measure_edges(
         if wide < network_lengths[e]:
             network_lengths[e] = wide
         # Beside 0 there is no −0 in the array kernels' sums either.
-        measured[e, BEND] = dot(cross(n, m), direction) + 0.0
+        bends[e] = dot(cross(n, m), direction) + 0.0
     return 0
 
 
@@ -181,16 +175,16 @@ def _add_spoke(sums, v, spoke, square, jump, bend, length, network_square):
     sums[v, MEAN_NETWORK_SQUARE] += network_square
 
 
-@kernel(SIZE, INDICES, POINTS, NUMBERS, NUMBERS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
-def mean_spokes(edges, measured, jumps, network_lengths, begin, end, means, valence):
+@kernel(SIZE, POINTS, INDICES, NUMBERS, NUMBERS, NUMBERS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
+def mean_spokes(points, edges, bends, jumps, network_lengths, begin, end, means, valence):
     """Write means over the spokes of vertices begin … end − 1; ``means`` (V, 15), 0 on entry."""
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
         mine, theirs = begin <= a < end, begin <= b < end
         if mine or theirs:
             # All is read before anything is written.
-            spoke, square, bend = row(measured, e), measured[e, SQUARE], measured[e, BEND]
-            jump, ell = jumps[e], network_lengths[e]
+            spoke = between(points, a, b)
+            square, bend, jump, ell = dot(spoke, spoke), bends[e], jumps[e], network_lengths[e]
             length = math.sqrt(square if square > 0 else 1e-300)
             network_square = ell * ell if ell < length else square
             if mine:
@@ -244,8 +238,8 @@ def prior_pushes(means, fields, valence, smooth, ring_weight, begin, end, pushes
     return 0
 
 
-@kernel(SIZE, INDICES, POINTS, POINTS, INDEX, SIZE, SIZE, POINTS_OUT)
-def mean_neighbours(edges, measured, fields, valence, begin, end, means):
+@kernel(SIZE, POINTS, INDICES, POINTS, INDEX, SIZE, SIZE, POINTS_OUT)
+def mean_neighbours(points, edges, fields, valence, begin, end, means):
     """Write means of what lies at the far ends of spokes: opening, umbrella heights, mean jump.
 
     Reads MEAN_JUMP of all vertices, and writes the last three columns of its own.
@@ -254,8 +248,7 @@ def mean_neighbours(edges, measured, fields, valence, begin, end, means):
         a, b = edges[e, 0], edges[e, 1]
         mine, theirs = begin <= a < end, begin <= b < end
         if mine or theirs:
-            tilt = between(fields, a, b)
-            opening = dot(tilt, row(measured, e))
+            opening = dot(between(fields, a, b), between(points, a, b))
             if mine:
                 means[a, OPENING] += opening
                 means[a, NEAR_HEIGHT] += fields[b, HEIGHT]

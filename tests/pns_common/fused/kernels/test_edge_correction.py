@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
+from pns_common.connectivity.topology import build_topology
 from pns_common.fused.kernels.edge_correction import (
     correct,
     correct_scale_free,
@@ -25,6 +26,7 @@ FIELDS = np.column_stack([PLAIN.mean_normal, PLAIN.height])
 BENDS = np.linspace(0, 1, len(FACES))
 FRAMES = np.array([np.concatenate(PLAIN.frame(a, b)) for a, b in PAIRS])
 LENGTH = np.array([PLAIN.length(a, b, None) for a, b in PAIRS])
+STENCILS = build_topology(FACES, len(POINTS)).stencil.astype(np.int32)
 Z, GATE = RNG.standard_normal((COUNT, 3)), RNG.random(COUNT)
 PER_LENGTH = RNG.uniform(0.1, 0.5, COUNT)
 
@@ -36,9 +38,12 @@ def looked(way, width, begin=0, end=COUNT):
     degenerate = np.ones(n, dtype=bool)
     mesh = MESH.faces, MESH.edges, MESH.half_edges, MESH.interior
     gentlest = np.empty(n)
-    out = frame, h, longest, x, degenerate, lengths, features, gentlest
+    stencils = np.empty((n, 4), dtype=np.int32)
+    out = stencils, frame, h, longest, x, degenerate, lengths, features, gentlest
     WAYS[way](look)(POINTS, NORMALS, FIELDS, BENDS, *mesh, begin, end, 1, *out)
     np.testing.assert_array_equal(gentlest, BENDS[MESH.half_edges[begin:end] // 3].min(axis=1))
+    np.testing.assert_array_equal(stencils[:, :2], STENCILS[begin:end, :2])
+    np.testing.assert_array_equal(np.sort(stencils), np.sort(STENCILS[begin:end]))
     WAYS[way](fill_log_ratios)(np.log(lengths), features)
     assert not degenerate.any()
     return frame, h, longest, x, features
@@ -68,7 +73,8 @@ def test_antiparallel_faces_have_the_worlds_axes_and_shut_only_where_reading_is_
         h, longest, x = np.empty(1), np.empty(1), np.empty(1)
         degenerate = np.zeros(1, dtype=bool)
         of_faces = normals, np.zeros((0, 4)), np.zeros(0)
-        out = frame, h, longest, x, degenerate, lengths, features, np.zeros(0)
+        stencils = np.empty((1, 4), dtype=np.int32)
+        out = stencils, frame, h, longest, x, degenerate, lengths, features, np.zeros(0)
         WAYS[way](look)(points, *of_faces, *mesh, 0, 1, symmetric, *out)
         np.testing.assert_array_equal(frame.reshape(3, 3), np.eye(3))
         assert (bool(degenerate[0]), x[0], features[0, 0]) == (True, curvature, curvature)
@@ -99,8 +105,7 @@ def test_the_scale_free_correction(way, boundary):
     of_boundary = rim if boundary else np.zeros((0, 3))
     delta, ratio, _, envelope = out = outputs()
     answer = Z, FRAMES, 0.9 * LENGTH, 1.1 * LENGTH, GATE, PER_LENGTH, MESH.interior, 0
-    mesh = MESH.faces, MESH.edges, MESH.half_edges
-    WAYS[way](correct_scale_free)(*answer, pushes, of_boundary, 0.0, *mesh, 0.8, 0.4, *out)
+    WAYS[way](correct_scale_free)(*answer, pushes, of_boundary, 0.0, STENCILS, 0.8, 0.4, *out)
     for e, (a, b) in enumerate(PAIRS):
         local = plain_operator.shortened(Z[e], 1)
         asked = 0.4 * 0.9 * LENGTH[e] * FRAMES[e].reshape(3, 3).T @ local

@@ -39,16 +39,16 @@ def test_vectors():
 def measured(way, altitudes=np.inf):
     normals, areas = np.empty((4, 3)), np.empty((4, 4))
     WAYS[way](measure_faces)(POINTS, MESH.faces, 0, 4, normals, areas)
-    at_edges, (jumps, lengths) = np.empty((8, 5)), np.empty((2, 8))
+    bends, jumps, lengths = np.empty((3, 8))
     mesh = MESH.faces, MESH.edges, MESH.half_edges, MESH.edge_class
-    out = at_edges, jumps, lengths
+    out = bends, jumps, lengths
     WAYS[way](measure_edges)(POINTS, normals, areas, *mesh, altitudes, 0, 8, *out)
     return normals, areas, *out
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_faces_and_edges_of_a_tent(way):
-    normals, areas, at_edges, jumps, lengths = measured(way)
+    normals, areas, bends, jumps, lengths = measured(way)
     np.testing.assert_allclose(areas[:, 3], np.sqrt(3))
     np.testing.assert_allclose(
         normals, THIRD * np.array([[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]])
@@ -57,8 +57,8 @@ def test_faces_and_edges_of_a_tent(way):
     inner = (MESH.edges == 4).any(axis=1)
     # Normals of neighbours have the inner product 1/3: x is 2/3, and the crest's sine √8 / 3.
     np.testing.assert_allclose(jumps[inner], 2 / 3)
-    np.testing.assert_allclose(at_edges[inner, 4], np.sqrt(8) / 3)
-    assert not at_edges[~inner, 4].any()
+    np.testing.assert_allclose(bends[inner], np.sqrt(8) / 3)
+    assert not bends[~inner].any()
     assert not jumps[~inner].any()
     # The altitude of √3 over √2, half of it.
     np.testing.assert_allclose(measured(way, 0.5)[4][inner], 0.5 * np.sqrt(3 / 2))
@@ -72,7 +72,7 @@ def test_the_tip_of_a_tent(way):
     WAYS[way](mean_normals)(MESH.faces, areas, 4, 5, fields)
     np.testing.assert_allclose(fields[4, :3], [0, 0, THIRD], atol=1e-16)
     assert not fields[:4].any()
-    WAYS[way](mean_spokes)(MESH.edges, *of_edges, 4, 5, means, valence)
+    WAYS[way](mean_spokes)(POINTS, MESH.edges, *of_edges, 4, 5, means, valence)
     assert valence.tolist() == [0, 0, 0, 0, 4]
     np.testing.assert_allclose(means[4, :5], [0, 0, -1, 2, 2 / 3], atol=1e-15)
     assert not means[:4].any()
