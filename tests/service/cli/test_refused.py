@@ -46,6 +46,8 @@ NAMES = ", ".join(bundled_models())
         ("example part.obj", 2, "part.obj"),
         ("serve --port 70000", 2, "port"),
         ("subdivide part.glb", 2, "--output"),
+        ("large part.glb out.ply --report nowhere/report.json", 2, "nowhere"),
+        ("large part.glb out.ply --memory much", 2, "as 4GiB"),
     ],
 )
 def test_errors_are_one_line_and_leave_no_file(

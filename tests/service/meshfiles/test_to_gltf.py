@@ -1,11 +1,11 @@
-"""A mesh file on its way to glTF: what it may cost."""
+"""A mesh file on its way to glTF: what it may cost, and what it cannot be."""
 
 from __future__ import annotations
 
 import pytest
 
 from service.bodies.uploads import Sent
-from service.errors import LimitError
+from service.errors import InvalidParameter, LimitError, UnrefinableError
 from service.meshfiles.example import part_glb
 from service.meshfiles.to_gltf import BYTES_PER_BYTE, as_gltf
 from service.options import Limits, Options
@@ -23,3 +23,18 @@ def test_a_file_too_large_to_be_read_is_refused_before_it_is_read(kind: str) -> 
     with pytest.raises(LimitError) as refusal:
         as_gltf(sent, Options(), Limits(max_memory_bytes=1000 * BYTES_PER_BYTE[kind] - 1))
     assert refusal.value.limit == "memory"
+
+
+@pytest.mark.parametrize("far", ["3.5e38", "-1e300", "inf", "nan"])
+def test_a_position_that_float32_cannot_hold_is_refused(far: str) -> None:
+    sent = Sent(f"v 0 0 {far}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".encode(), "obj")
+    with pytest.raises(UnrefinableError, match="float32"):
+        as_gltf(sent, Options(), Limits())
+
+
+def test_creases_by_normals_are_refused_where_there_are_none_to_hand_on() -> None:
+    sent = Sent(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "obj")
+    with pytest.raises(InvalidParameter, match="angle:DEGREES") as refusal:
+        as_gltf(sent, Options(crease="normals"), Limits())
+    assert refusal.value.name == "crease"
+    assert as_gltf(sent, Options(crease="angle:30"), Limits()).kind == "glb"
