@@ -172,9 +172,8 @@ def _result(service: Service, job: Job, kind: str) -> Response:
         return problems.of_job(job.error)
     if job.state is not State.DONE:
         raise NotDoneError(f"the job is {job.state}")
-    file = job.report if kind == media.JSON else job.answer
-    if file is None:
-        raise NotDoneError("the job was not to make this")
+    answer, report = job.results
+    file = report if kind == media.JSON else answer
     file.hold()
     held = ExitStack()
     held.callback(file.release)
