@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.connectivity.topology import build_topology
+from pns_common.fused.face_edges import number_edges
 
 from .barycentric_grid import BarycentricGrid
 
@@ -78,9 +78,9 @@ def split_connectivity(
     faces: Int[np.ndarray, "F 3"], corner_count: int, grid: BarycentricGrid
 ) -> SplitConnectivity:
     """Split `faces` over `corner_count` distinct corners; no face names a corner twice."""
-    topology = build_topology(faces, corner_count)
+    edges, face_edges = number_edges(faces, corner_count)
     per_edge, per_face = grid.segments - 1, len(grid.inner)
-    first_inner = corner_count + per_edge * len(topology.edges)
+    first_inner = corner_count + per_edge * len(edges)
 
     ids = np.empty((len(faces), len(grid.points)), dtype=np.int64)
     ids[:, :3] = faces
@@ -88,8 +88,8 @@ def split_connectivity(
     for side in range(3):
         forward = faces[:, side] < faces[:, (side + 1) % 3]
         along = np.where(forward[:, None], step, per_edge - 1 - step)
-        base = corner_count + per_edge * topology.face_edges[:, side]
+        base = corner_count + per_edge * face_edges[:, side]
         ids[:, grid.sides[side]] = base[:, None] + along
     inner = first_inner + np.arange(len(faces) * per_face).reshape(len(faces), per_face)
     ids[:, grid.inner] = inner
-    return SplitConnectivity(faces, topology.edges, grid, ids, first_inner + inner.size)
+    return SplitConnectivity(faces, edges, grid, ids, first_inner + inner.size)

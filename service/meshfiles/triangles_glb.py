@@ -10,6 +10,7 @@ import numpy as np
 from ..gltf.constants import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, FLOAT, UNSIGNED_INT
 from ..gltf.read.container import read_glb, write_glb
 from ..gltf.read.json_text import decode_object, encode
+from ..meshes.extent import extent
 from ..options import Limits
 from .indexed_triangles import IndexedTriangles
 
@@ -48,7 +49,7 @@ def triangles_glb(
         "bufferViews": _views(arrays),
         "buffers": [{"byteLength": sum(values.nbytes for values in arrays)}],
     }
-    low, high = arrays[0].min(axis=0), arrays[0].max(axis=0)
+    low, high = extent(arrays[0])
     tree["accessors"][0] |= {"min": low.tolist(), "max": high.tolist()}
     if material is not None:
         primitive["material"] = 0

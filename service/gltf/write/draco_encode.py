@@ -13,6 +13,8 @@ import DracoPy
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from ...meshes.extent import extent
+
 POSITION_BITS, NORMAL_BITS, TEXCOORD_BITS = 16, 10, 14
 # 0 is the fastest, 10 the smallest; 7 is where Draco's own tools stand.
 EFFORT = 7
@@ -51,8 +53,8 @@ class Encoded:
 
 def grid_of(positions: list[Float[np.ndarray, "N 3"]]) -> Grid:
     """Return the smallest grid over all positions of a mesh."""
-    low = np.min([points.min(axis=0) for points in positions], axis=0)
-    high = np.max([points.max(axis=0) for points in positions], axis=0)
+    lows, highs = zip(*(extent(points) for points in positions), strict=True)
+    low, high = np.min(lows, axis=0), np.max(highs, axis=0)
     size = float((high.astype(np.float64) - low).max())
     return Grid(low, size if size > 0 else 1.0)
 

@@ -34,7 +34,8 @@ class VertexUse:
             if keep.any():
                 source = self.document.meshes[mesh].primitives[primitive.number]
                 self.refined.add((mesh, primitive.number))
-                used = np.unique(primitive.corners[keep])
+                used = np.zeros(len(primitive.rows), dtype=bool)
+                used[primitive.corners[keep]] = True
                 self.rows[source.attributes["POSITION"]].append(primitive.rows[used])
 
     def unused(self) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Shaped
 
 from ...course import Course
+from ...meshes.extent import extent
 from ...report import Change
 from ..constants import ARRAY_BUFFER, COLUMNS, COMPONENT_TYPES, ELEMENT_ARRAY_BUFFER
 from ..read.modes import TRIANGLES
@@ -174,8 +175,7 @@ def describe(
         given = {"name": before.name, "extras": before.extras}
         accessor.update({key: value for key, value in given.items() if value is not None})
     if name == "POSITION":
-        accessor["min"] = values.min(axis=0).tolist()
-        accessor["max"] = values.max(axis=0).tolist()
+        accessor["min"], accessor["max"] = (bound.tolist() for bound in extent(values))
 
 
 def in_words(values: Shaped[np.ndarray, "N K"], kind: str) -> Shaped[np.ndarray, "N B"]:

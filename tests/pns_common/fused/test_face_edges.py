@@ -1,0 +1,28 @@
+"""Edges are numbered as the array kernels number them, whoever does it."""
+
+import numpy as np
+import pytest
+
+from pns_common.connectivity.topology import build_topology
+from pns_common.fused import face_edges, load_kernels
+from tests.support.meshes import bumpy_sphere, grid
+
+FACES = {
+    "closed": bumpy_sphere(0, subdivisions=2)[1],
+    "open": grid(4)[1],
+    "irregular": np.random.default_rng(0).integers(0, 9, (40, 3)),
+}
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+@pytest.mark.parametrize("name", FACES)
+def test_edges_have_the_numbers_of_the_topology(name, loaded, monkeypatch):
+    if loaded:
+        load_kernels()
+    monkeypatch.setattr(face_edges, "kernels_loaded", lambda: loaded)
+    faces = FACES[name]
+    topology = build_topology(faces, int(faces.max()) + 1)
+    numbered = face_edges.number_edges(faces, int(faces.max()) + 1)
+    for found, expected in zip(numbered, (topology.edges, topology.face_edges), strict=True):
+        assert found.dtype == expected.dtype
+        np.testing.assert_array_equal(found, expected)
