@@ -57,7 +57,7 @@ def draw_features(support: Support, generator: torch.Generator) -> Float[Tensor,
 def quiet_loss(
     network: BoundedNet, support: Support, features: Float[Tensor, "D K"]
 ) -> Float[Tensor, ""]:
-    """Mean ‖η‖² at budget 1, weighed from 0 inside the box to 1 at the margin outside it."""
+    """Return mean ‖η‖² at budget 1, weighed from 0 inside the box to 1 at the margin outside it."""
     outside = torch.maximum(support.low - features, features - support.high).amax(dim=1)
     weight = (outside / MARGIN).clamp(0, 1)
     return (weight * (network(features, 1.0) ** 2).sum(dim=1)).mean()

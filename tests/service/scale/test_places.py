@@ -3,6 +3,7 @@
 import errno
 
 import pytest
+from fsspec.implementations.local import LocalFileSystem
 
 from service.scale.places import Place, place_of
 
@@ -47,6 +48,15 @@ def test_an_error_of_this_machine_is_its_own(tmp_path):
     with pytest.raises(IsADirectoryError) as refusal:
         place_of(str(tmp_path)).read()
     assert refusal.value.errno == errno.EISDIR
+
+
+def test_a_fault_on_this_machine_is_not_taken_for_a_far_one():
+    class BrokenHere(LocalFileSystem):
+        isfile = isdir = Broken().isfile
+
+    for ask in (Place.is_file, Place.is_folder):
+        with pytest.raises(ForeignError):
+            ask(Place(BrokenHere(), "a/b.obj"))
 
 
 def test_what_nobody_can_reach_is_not_taken_to_be_gone():
