@@ -124,7 +124,7 @@ def _mixed_tetrahedra(inside: np.ndarray, side: int) -> Int[np.ndarray, "T 4"]:
     mixed = np.argwhere((count > 0) & (count < len(corners)))
     number = np.arange(side**3).reshape(side, side, side)
     kinds = [
-        np.stack([number[tuple((mixed + at).T)] for at in tetrahedron], axis=1)
+        np.stack([number[tuple((mixed + corner).T)] for corner in tetrahedron], axis=1)
         for tetrahedron in TETRAHEDRA
     ]
     return np.concatenate(kinds)

@@ -50,9 +50,9 @@ def learned_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
     scheme = pns(load_model(model))
     made = refine(mesh, scheme, levels)
     learned = min(levels, scheme.learned_levels or levels)
-    at = made if learned == levels else refine(mesh, scheme, learned)
+    to_learned = made if learned == levels else refine(mesh, scheme, learned)
     # Later levels are Loop's: a ratio stays with the vertices that it was measured at.
-    ratio = spread(at.ratio, at, levels - learned)
+    ratio = spread(to_learned.ratio, to_learned, levels - learned)
     return _beside_loop("PNS", made, mesh, levels, {"ratio": ratio})
 
 

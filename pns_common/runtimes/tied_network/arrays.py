@@ -39,16 +39,17 @@ def _z(form: TiedForm, features: Float[np.ndarray, "N K"]) -> Float32[np.ndarray
     for i, j in form.pairs:
         seen[i], seen[j] = seen[i] + seen[j], seen[i] - seen[j]
     size, rows = form.copies, seen.shape[1]
-    units, at, bias_at = _biased(form.biases[: form.widths[0]], size, rows), 0, form.widths[0]
+    begin, bias_begin = 0, form.widths[0]
+    units = _biased(form.biases[:bias_begin], size, rows)
     for k, character in enumerate(form.characters):
         units[character] += form.first[k][:, None] * seen[k]
     for before, width in zip(form.widths, form.widths[1:], strict=False):
         said = _transformed(gelu(_transformed(units)))
-        units = _biased(form.biases[bias_at : bias_at + width], size, rows)
-        blocks = form.hidden[at : at + size * width * before].reshape(size, width, before)
+        units = _biased(form.biases[bias_begin : bias_begin + width], size, rows)
+        blocks = form.hidden[begin : begin + size * width * before].reshape(size, width, before)
         for j in range(before):
             units += blocks[:, :, j, None] * said[:, None, j]
-        at, bias_at = at + blocks.size, bias_at + width
+        begin, bias_begin = begin + blocks.size, bias_begin + width
     said = _transformed(gelu(_transformed(units)))
     z = np.repeat(form.last_bias[:, None], rows, axis=1)
     for i in range(form.widths[-1]):

@@ -30,7 +30,7 @@ GRACE_SECONDS = 5.0
 NO_TASK = -1
 
 # In a worker: memory that its driver sees too, with the number of the task it is at.
-_at: ContextVar[Any] = ContextVar("at")
+_current: ContextVar[Any] = ContextVar("current")
 
 
 def local(work: Work[T, R], workers: int) -> Engine[T, R]:
@@ -70,7 +70,7 @@ def local(work: Work[T, R], workers: int) -> Engine[T, R]:
                     try:
                         done = future.result()
                     except (TimeoutError, ProcessExpired) as error:
-                        lost, number = error, worker.at.value
+                        lost, number = error, worker.current.value
                     except BrokenProcessPool as error:
                         idle[-1] = worker.replaced(work.prepare)
                         lost, number = error, NO_TASK
@@ -106,23 +106,23 @@ def local(work: Work[T, R], workers: int) -> Engine[T, R]:
 
 @dataclass(frozen=True)
 class _Worker:
-    """A process, in a pool of its own that starts it anew, and what it says that it is at."""
+    """A process, in a pool of its own that starts it anew, and the task that it says it is at."""
 
     pool: ProcessPool
-    at: Any
+    current: Any
 
     @classmethod
     def new(cls, prepare: Callable[[], None]) -> _Worker:
         from pebble import ProcessPool
 
         context = multiprocessing.get_context("spawn")
-        at = context.RawValue("l", NO_TASK)
-        pool = ProcessPool(1, initializer=_begin, initargs=(at, prepare), context=context)
-        return cls(pool, at)
+        current = context.RawValue("l", NO_TASK)
+        pool = ProcessPool(1, initializer=_begin, initargs=(current, prepare), context=context)
+        return cls(pool, current)
 
     def sent(self, work: Work[T, R], chunk: list[T]) -> tuple[_Worker, Future[Done[R]]]:
         """Send a chunk; the worker is another where this one's process died while idle."""
-        self.at.value = NO_TASK
+        self.current.value = NO_TASK
         longest = None if work.seconds is None else work.seconds + chunks.SECONDS + GRACE_SECONDS
         arguments = work.job, chunk, work.seconds
         try:
@@ -150,18 +150,18 @@ def _no_interrupt() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin(at: Any, prepare: Callable[[], None]) -> None:
+def _begin(current: Any, prepare: Callable[[], None]) -> None:
     """Set up a process: one thread, since the files are the parallelism."""
     os.environ["OMP_NUM_THREADS"] = "1"
-    _at.set(at)
+    _current.set(current)
     prepare()
 
 
 def _do(job: Callable[[T], R], tasks: list[T], seconds: float | None) -> Done[R]:
-    at = _at.get()
+    current = _current.get()
 
     def begins(number: int | None) -> None:
-        at.value = NO_TASK if number is None else number
+        current.value = NO_TASK if number is None else number
 
     return chunks.do(job, tasks, seconds, begins)
 

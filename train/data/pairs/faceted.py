@@ -125,5 +125,5 @@ def sampled(
     area = np.linalg.norm(across, axis=1)
     face = rng.choice(len(faces), SAMPLES, p=area / area.sum())
     u, v = np.sort(rng.random((2, SAMPLES, 1)), axis=0)
-    at = a[face] * u + b[face] * (v - u) + c[face] * (1 - v)
-    return Reference(at, across[face] / area[face, None])
+    on_faces = a[face] * u + b[face] * (v - u) + c[face] * (1 - v)
+    return Reference(on_faces, across[face] / area[face, None])

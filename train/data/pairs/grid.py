@@ -31,10 +31,10 @@ def grid_pair(rng: np.random.Generator) -> Pair:
     rows, columns = int(rng.integers(4, 30)), int(rng.integers(5, 30))
     if rng.random() < THIN:
         rows, columns = rng.permutation([rng.integers(4, 12), rng.integers(50, 110)]).tolist()
-    at = {"globe": _globe, "ring": _ring, "tube": _tube}[kind](rng)
-    coarse = grid_mesh(at, kind, rows, columns, random_cut(rows, columns, rng))
+    point_at = {"globe": _globe, "ring": _ring, "tube": _tube}[kind](rng)
+    coarse = grid_mesh(point_at, kind, rows, columns, random_cut(rows, columns, rng))
     down, along = (-(-FINE // count) * count for count in (rows, columns))
-    fine = grid_mesh(at, kind, down, along, np.zeros(down * along, dtype=bool))
+    fine = grid_mesh(point_at, kind, down, along, np.zeros(down * along, dtype=bool))
     turn = random_rotation(rng)
     surface = Reference(fine.vertices @ turn, vertex_normals(fine) @ turn)
     return Pair("grid", Mesh(coarse.vertices @ turn, coarse.faces), surface)
@@ -51,12 +51,12 @@ def random_cut(rows: int, columns: int, rng: np.random.Generator) -> Bool[np.nda
 
 
 def grid_mesh(
-    at: Parametrised, kind: str, rows: int, columns: int, other_way: Bool[np.ndarray, " Q"]
+    point_at: Parametrised, kind: str, rows: int, columns: int, other_way: Bool[np.ndarray, " Q"]
 ) -> Mesh:
     """Return the mesh of a parametrised surface; a globe's ends are poles, a tube's are open."""
     lines = rows if kind == "ring" else rows + 1
     u, v = (axis.ravel() for axis in np.mgrid[:lines, :columns])
-    points = at(u / rows, v / columns)
+    points = point_at(u / rows, v / columns)
     number = np.arange(len(points)).reshape(lines, columns)
     if kind == "globe":
         number[0], number[-1] = number[0, 0], number[-1, 0]
@@ -81,37 +81,37 @@ def cut_quads(
 def _globe(rng: np.random.Generator) -> Parametrised:
     lumps, phase, axes = rng.uniform(-0.3, 0.3, 2), rng.uniform(0, 6.3, 2), rng.uniform(0.4, 1.6, 3)
 
-    def at(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def point_at(u: np.ndarray, v: np.ndarray) -> np.ndarray:
         t = np.pi * u
         first, second = (np.sin(turns * t + p) ** 2 for turns, p in zip((1, 2), phase, strict=True))
         bulge = lumps[0] * first + lumps[1] * second
         return _turned(np.sin(t) * (1 + bulge), -np.cos(t), v) * axes
 
-    return at
+    return point_at
 
 
 def _ring(rng: np.random.Generator) -> Parametrised:
     radius, tube, lump = rng.uniform(0.6, 1.0), rng.uniform(0.1, 0.5), rng.uniform(-0.15, 0.15)
     phase, axes = rng.uniform(0, 6.3), np.append(rng.uniform(0.4, 1.6, 2), 1.0)
 
-    def at(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def point_at(u: np.ndarray, v: np.ndarray) -> np.ndarray:
         t = 2 * np.pi * u
         thick = tube * (1 + lump * np.cos(2 * t + phase))
         return _turned(radius + thick * np.cos(t), thick * np.sin(t), v) * axes
 
-    return at
+    return point_at
 
 
 def _tube(rng: np.random.Generator) -> Parametrised:
     lump = rng.uniform(-0.3, 0.3) * (rng.random() < 0.5)
     phase, axes, length = rng.uniform(0, 6.3), rng.uniform(0.4, 1.6, 2), rng.uniform(0.8, 3.2)
 
-    def at(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def point_at(u: np.ndarray, v: np.ndarray) -> np.ndarray:
         return _turned(0.5 * (1 + lump * np.sin(3 * u + phase)), length * (u - 0.5), v) * np.append(
             axes, 1.0
         )
 
-    return at
+    return point_at
 
 
 def _turned(radius: np.ndarray, height: np.ndarray, v: np.ndarray) -> Float[np.ndarray, "N 3"]:

@@ -93,13 +93,13 @@ def random_profile(rng: np.random.Generator) -> Profile:
 def swept_pair(rng: np.random.Generator) -> Pair | None:
     """Return a coarse mesh on a random swept profile; None where collapses spoilt it."""
     profile = random_profile(rng)
-    at, closes = _random_sweep(profile, rng)
-    fine = _grid(at, np.linspace(0, profile.starts[-1], FINE), FINE, closes, rng)
+    point_at, closes = _random_sweep(profile, rng)
+    fine = _grid(point_at, np.linspace(0, profile.starts[-1], FINE), FINE, closes, rng)
     turn = random_rotation(rng)
     if rng.random() < GRIDS:
         rows = _rows(profile, rng)
         most = min(COLUMNS[1], MOST // (2 * len(rows)))
-        coarse = _grid(at, rows, int(rng.integers(COLUMNS[0], most)), closes, rng)
+        coarse = _grid(point_at, rows, int(rng.integers(COLUMNS[0], most)), closes, rng)
     else:
         count = int(_log_uniform(rng, (FEWEST, MOST), 1)[0])
         coarse = coarsened(fine.vertices, fine.faces, count, rng)
@@ -138,7 +138,7 @@ def _random_sweep(profile: Profile, rng: np.random.Generator) -> tuple[Parametri
 
 
 def _grid(
-    at: Parametrised,
+    point_at: Parametrised,
     rows: Float[np.ndarray, " R"],
     columns: int,
     closes: bool,
@@ -148,7 +148,7 @@ def _grid(
     u, v = (axis.ravel() for axis in np.meshgrid(rows, across, indexing="ij"))
     number = np.arange(len(u)).reshape(len(rows), -1)
     number = np.c_[number, number[:, :1]] if closes else number
-    return Mesh(at(u, v), cut_quads(number, random_cut(len(rows) - 1, columns, rng)))
+    return Mesh(point_at(u, v), cut_quads(number, random_cut(len(rows) - 1, columns, rng)))
 
 
 def _rows(profile: Profile, rng: np.random.Generator) -> Float[np.ndarray, " R"]:

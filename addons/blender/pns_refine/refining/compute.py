@@ -170,8 +170,8 @@ def _where_it_acted(
     if not learned or learned >= len(steps.steps):
         return positions.ratio, positions.gate
     first = replace(steps, steps=steps.steps[:learned])
-    at = refine_positions(mesh, scheme, first, limit=False, progress=bar.within("loop"))
-    ratio, gate = at.ratio, at.gate
+    acted = refine_positions(mesh, scheme, first, limit=False, progress=bar.within("loop"))
+    ratio, gate = acted.ratio, acted.gate
     for step in steps.steps[learned:]:
         ends = step.topology.edges
         ratio = np.concatenate([ratio, ratio[ends].mean(axis=1)])
