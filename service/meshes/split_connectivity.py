@@ -41,13 +41,18 @@ class SplitConnectivity:
 
     def linear(self, values: Shaped[np.ndarray, "C K"]) -> Float[np.ndarray, "N K"]:
         """Blend values at the refined vertices linearly, along edges and over faces."""
-        corners = values.astype(np.float64)
-        t = self._edge_parameter[:, None]
-        start, end = (corners[self.edges[:, side], None] for side in (0, 1))
+        corners, width = values.astype(np.float64), values.shape[1]
         weights = self.grid.points[self.grid.inner] / self.grid.segments
-        inner = sum(weights[:, k, None] * corners[self.faces[:, k], None] for k in range(3))
-        parts = [corners, (1 - t) * start + t * end, inner]
-        return np.concatenate([part.reshape(-1, values.shape[1]) for part in parts])
+        along = np.empty((len(self.edges), self.grid.segments - 1, width))
+        inner = np.empty((len(self.faces), len(weights), width))
+        # One point of all edges, of all faces, after the other: numpy is slow along short rows.
+        start, end = (np.take(corners, self.edges[:, side], axis=0) for side in (0, 1))
+        for place, t in enumerate(self._edge_parameter):
+            along[:, place] = (1 - t) * start + t * end
+        of_face = [np.take(corners, self.faces[:, k], axis=0) for k in range(3)]
+        for place, shares in enumerate(weights):
+            inner[:, place] = sum(map(np.multiply, shares, of_face))
+        return np.concatenate([part.reshape(-1, width) for part in (corners, along, inner)])
 
     def nearest(self, values: Shaped[np.ndarray, "C K"]) -> Shaped[np.ndarray, "N K"]:
         """Copy values at the refined vertices from the nearest corner (a tie: the first)."""

@@ -35,10 +35,15 @@ class Array:
         """Return the value. Raises TypeError where a kernel would read it wrongly."""
         flags = value.flags
         suits = flags.carray if self.written else flags.c_contiguous and flags.aligned
-        if not suits or value.ndim != self.ndim or value.dtype != self.dtype:
+        if not suits or value.ndim != self.ndim or value.dtype != self._type:
             kind = f"{value.dtype}, {value.ndim} dimensions"
             raise TypeError(f"a kernel takes {self}, not {kind}, {flags}")
         return value
+
+    @cached_property
+    def _type(self) -> np.dtype[Any]:
+        """What ``dtype`` names: a name takes as long to compare as all else together."""
+        return np.dtype(self.dtype)
 
 
 POINTS, POINTS_OUT = Array("float64", 2), Array("float64", 2, written=True)

@@ -125,7 +125,7 @@ def _refined_primitive(
         row=row,
         welded=welded[row],
         connectivity=own,
-        positions=refined.refinement.mesh.vertices[vertex],
+        positions=np.take(refined.refinement.mesh.vertices, vertex, axis=0),
         normals=normals,
         skin_and_morph=refined.skin_and_morph.take(vertex),
         morphed_normals=morphed,
