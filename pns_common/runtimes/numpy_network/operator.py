@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-Inputs = Sequence[Any]  # an array, or None where an input is left out
+# An array each, or None where an input is left out.
+Inputs = Sequence[Any]
 Attributes = Mapping[str, Any]
 Function = Callable[[Inputs, Attributes], list[np.ndarray]]
 
