@@ -13,10 +13,10 @@ from ..course import Course
 from ..errors import NoModelError
 from ..options import Limits, Options
 from ..report import Change, MeshResult, build_report
+from .read.checks.nodes import mesh_instances
 from .read.container import write_glb
 from .read.extras import put_report, replaces_extras
 from .read.json_text import encode
-from .read.nodes import mesh_instances
 from .read.plan import BYTES_FOR_LIMIT, BYTES_FOR_NORMALS
 from .read.upload import Media, Upload, read_upload
 from .refine.meshes import refined_meshes

@@ -7,7 +7,7 @@ import re
 
 from ...bodies.sibling_files import Opened, safe_name
 from ...errors import GltfError
-from .meshopt import placeholders
+from .compressed.meshopt import placeholders
 from .schema import Buffer, Document
 
 _DATA_URI = re.compile(r"data:[^,]*;base64,", re.IGNORECASE)

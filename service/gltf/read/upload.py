@@ -8,18 +8,18 @@ from typing import Any, Literal
 from ...bodies.sibling_files import ALONE, Opened, SiblingFiles
 from ...options import BYTES_PER_INPUT_BYTE, Limits
 from ...report import Change
-from .breaches import breaches
 from .buffers import resolve_buffers
+from .checks.breaches import breaches
+from .checks.nodes import check_nodes
+from .checks.references import check_references
+from .checks.refusals import refuse_features, refuse_version
+from .compressed.draco import decode_primitives
+from .compressed.meshopt import decode_views
 from .container import Container, read_glb
-from .draco import decode_primitives
 from .images import embed_images
 from .index_references import unknown_extensions
 from .json_text import decode_object, decoded_size
-from .meshopt import decode_views
-from .nodes import check_nodes
 from .plan import MeshPlan, check_cost, plan
-from .references import check_references
-from .refusals import refuse_features, refuse_version
 from .schema import Document, view
 from .spare import Spare, spare
 

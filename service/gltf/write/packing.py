@@ -12,7 +12,7 @@ from jaxtyping import Shaped
 
 from ...course import Course
 from ...report import Change
-from ..read import draco
+from ..read.compressed import draco
 from ..read.extensions import declare
 from ..read.schema import Accessor
 from ..refine.refined_primitives import RefinedPrimitive

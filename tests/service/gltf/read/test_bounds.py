@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.memory import peak_mib, reset_peak
 from service.errors import GltfError, LimitError, ServiceError, UnsupportedFeature
-from service.gltf.read.draco_header import read_header
+from service.gltf.read.compressed.draco_header import read_header
 from service.gltf.read.memory_cap import memory_cap
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options

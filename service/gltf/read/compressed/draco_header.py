@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from ...errors import GltfError, UnsupportedFeature
+from ....errors import GltfError, UnsupportedFeature
 
 _HEADER = struct.Struct("<5sBBBBH")
 _MESH = 1

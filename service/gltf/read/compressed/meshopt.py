@@ -13,11 +13,11 @@ from typing import Any, Literal
 import meshopt
 import numpy as np
 
-from ...errors import GltfError
-from ...options import Limits
-from .extensions import withdraw
-from .plan import check_decoded
-from .schema import Document, Index, Part, Size, checked
+from ....errors import GltfError
+from ....options import Limits
+from ..extensions import withdraw
+from ..plan import check_decoded
+from ..schema import Document, Index, Part, Size, checked
 
 EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 

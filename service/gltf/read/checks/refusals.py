@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 
-from ...errors import GltfError, UnsupportedFeature
-from ..constants import FLOAT, UNSIGNED_BYTE, UNSIGNED_SHORT
-from .json_text import escaped
-from .modes import SURFACES
-from .quantization import allowed, is_dequantised
-from .schema import Accessor, Document, Primitive
+from ....errors import GltfError, UnsupportedFeature
+from ...constants import FLOAT, UNSIGNED_BYTE, UNSIGNED_SHORT
+from ..json_text import escaped
+from ..modes import SURFACES
+from ..quantization import allowed, is_dequantised
+from ..schema import Accessor, Document, Primitive
 
 # Extensions of primitives that name vertices by number: refined vertices have other numbers.
 _BY_VERTEX = ("CESIUM_primitive_outline",)

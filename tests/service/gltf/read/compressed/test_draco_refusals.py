@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from service.errors import GltfError, LimitError
-from service.gltf.read.draco import SLACK
-from service.gltf.read.draco_header import read_header
+from service.gltf.read.compressed.draco import SLACK
+from service.gltf.read.compressed.draco_header import read_header
 from tests.fuzz.seeds import draco
 from tests.service.gltf.read.refused import refine
 from tests.support.gltf import files

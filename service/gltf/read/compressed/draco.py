@@ -12,14 +12,14 @@ import DracoPy
 import numpy as np
 from jaxtyping import Shaped
 
-from ...errors import GltfError, LimitError
-from ...options import Limits
-from ..constants import COMPONENT_COUNTS, COMPONENT_TYPES, UNSIGNED_INT
+from ....errors import GltfError, LimitError
+from ....options import Limits
+from ...constants import COMPONENT_COUNTS, COMPONENT_TYPES, UNSIGNED_INT
+from ..extensions import withdraw
+from ..memory_cap import memory_cap
+from ..plan import check_decoded
+from ..schema import Document, Index, Part, Primitive, checked
 from .draco_header import read_header
-from .extensions import withdraw
-from .memory_cap import memory_cap
-from .plan import check_decoded
-from .schema import Document, Index, Part, Primitive, checked
 
 EXTENSION = "KHR_draco_mesh_compression"
 

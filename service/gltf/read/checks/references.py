@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ...errors import GltfError
-from ..constants import COMPONENT_TYPES, UNSIGNED_INTEGERS
-from .accessors import element_size, extent
-from .json_text import escaped
-from .schema import Accessor, Document, Material, Primitive, TextureInfo
+from ....errors import GltfError
+from ...constants import COMPONENT_TYPES, UNSIGNED_INTEGERS
+from ..accessors import element_size, extent
+from ..json_text import escaped
+from ..schema import Accessor, Document, Material, Primitive, TextureInfo
 
 
 def check_references(document: Document, buffers: Sequence[memoryview]) -> None:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections import Counter
 
-from ...errors import GltfError
-from ...report import Change
+from ....errors import GltfError
+from ....report import Change
+from ..schema import Document
 from .references import refer
-from .schema import Document
 
 
 def check_nodes(document: Document) -> list[Change]:

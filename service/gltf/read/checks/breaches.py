@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...report import Change
-from ..constants import COMPONENT_TYPES, FLOAT
-from .quantization import EXTENSION, needs_extension
-from .schema import Document
+from ....report import Change
+from ...constants import COMPONENT_TYPES, FLOAT
+from ..quantization import EXTENSION, needs_extension
+from ..schema import Document
 
 LEAST_STRIDE, MOST_STRIDE = 4, 252
 _COLOUR, _MESHES, _STRIDE, _ALIGNMENT, _QUANTIZED = (

@@ -1,0 +1,1 @@
+"""Compressed geometry, decoded as if it had come plain: Draco, and meshopt."""
