@@ -56,6 +56,13 @@ def _add_product(x, g, i, weight, y, h, j):
         x[g, i, lane] += weight * y[h, j, lane]
 
 
+def _add_two_products(x, g, i, weight, next_weight, y, h, j):
+    """Add those of two rows, one after the other: what they are added to is read and kept once."""
+    for lane in range(LANES):
+        sum_so_far = x[g, i, lane] + weight * y[h, j, lane]
+        x[g, i, lane] = sum_so_far + next_weight * y[h, j + 1, lane]
+
+
 def _transform(units, width):
     """Put Σ_g χ_s(g) x_g in place of x_s."""
     step = 1
@@ -94,8 +101,11 @@ def _next(units, held, before, width, hidden, at, biases, bias_at):
                 held[SAID, j, lane] = units[s, j, lane]
         for i in range(width):
             _fill(units, s, i, biases[bias_at + i] if s == 0 else NOTHING)
-            for j in range(before):
-                _add_product(units, s, i, hidden[at], held, SAID, j)
+            for j in range(0, before - 1, 2):
+                _add_two_products(units, s, i, hidden[at], hidden[at + 1], held, SAID, j)
+                at += 2
+            if before % 2 == 1:
+                _add_product(units, s, i, hidden[at], held, SAID, before - 1)
                 at += 1
     return at
 
