@@ -19,6 +19,9 @@ AGGRESSIVENESS = 5.0
 # Share of the simplification that its largest part has to hold.
 LEAST_KEPT = 0.8
 
+# Cells of the grid along the longest side of what is clustered, at most.
+MOST_CELLS = 512
+
 # A result is used where its faces are within this factor of the target.
 CLOSENESS = 1.6
 
@@ -51,7 +54,7 @@ def clustered(mesh: Mesh, faces: int) -> Mesh:
     The grid's fineness is found by bisection.
     """
     corner, extent = mesh.vertices.min(axis=0), float(np.ptp(mesh.vertices, axis=0).max())
-    low, high, best, least = 2, 512, None, np.inf
+    low, high, best, least = 2, MOST_CELLS, None, np.inf
     while low <= high:
         cells = (low + high) // 2
         merged = _merged(mesh, np.floor((mesh.vertices - corner) / extent * cells).astype(np.int64))
@@ -90,21 +93,20 @@ def simplified(mesh: Mesh, simplifier: Simplifier, faces: int) -> Mesh | None:
 
 
 def _merged(mesh: Mesh, cell: Int[np.ndarray, "V 3"]) -> Mesh | None:
-    _, number = np.unique(cell, axis=0, return_inverse=True)
-    number = number.reshape(-1)
+    # Cells in the order of their coordinates, 0 … MOST_CELLS.
+    _, number = np.unique(cell @ (MOST_CELLS + 1) ** np.arange(2, -1, -1), return_inverse=True)
     members = np.bincount(number)
     sums = [np.bincount(number, column) for column in mesh.vertices.T]
     faces = number[mesh.faces]
-    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     # Two sheets that fall together, whichever way they face, are left out both.
     _, first, count = np.unique(
         np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
     )
-    single = np.zeros(len(faces), dtype=bool)
-    single[first[count == 1]] = True
-    if not (whole & single).any():
+    single = np.sort(first[count == 1])
+    if len(single) == 0:
         return None
-    return _mesh(np.stack(sums, axis=1) / members[:, None], faces[whole & single])
+    return _mesh(np.stack(sums, axis=1) / members[:, None], faces[single])
 
 
 def _mesh(vertices: ArrayLike, faces: ArrayLike) -> Mesh:
