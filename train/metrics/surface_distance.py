@@ -8,7 +8,8 @@ from jaxtyping import Float, Int
 from pns_common.base.arrays import cross, dot, norm
 from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
-from train.metrics.point_mesh import FaceTree, distances, face_tree, nearest
+from train.metrics.faces import point_mesh
+from train.metrics.faces.point_mesh import FaceTree, distances, face_tree, nearest
 
 # Sample points on each of the two surfaces.
 SAMPLES = 10_000
@@ -60,13 +61,21 @@ class Surface:
 
 def prepared(mesh: Mesh, samples: int = SAMPLES) -> Surface:
     """Return a mesh with its tree and so many sample points; the same mesh gives the same ones."""
-    points, faces = surface_samples(mesh, samples, np.random.default_rng(SEED))
-    normals = face_normals(mesh.vertices, mesh.faces)
-    return Surface(face_tree(mesh), normals, points, faces)
+    return _sampled(face_tree(mesh), samples)
+
+
+def moved(surface: Surface, vertices: Float[np.ndarray, "V 3"]) -> Surface:
+    """Return what `prepared` does, of the same faces with vertices elsewhere, but not far."""
+    return _sampled(point_mesh.moved(surface.tree, vertices), len(surface.points))
+
+
+def _sampled(tree: FaceTree, samples: int) -> Surface:
+    points, faces = surface_samples(tree, samples, np.random.default_rng(SEED))
+    return Surface(tree, face_normals(tree.vertices, tree.faces), points, faces)
 
 
 def surface_samples(
-    mesh: Mesh, count: int, rng: np.random.Generator
+    mesh: Mesh | FaceTree, count: int, rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, "N 3"], Int[np.ndarray, " N"]]:
     """Return points spread evenly by area, and their faces.
 

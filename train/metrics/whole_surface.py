@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.connectivity.topology import build_topology
+from pns_common.base.blocks import Blocks
+from pns_common.fused.mesh_edges import build_edges
 from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
 from pns_common.refine import Refinement, refine
@@ -97,9 +98,9 @@ def normal_jump(mesh: Mesh) -> float:
 
     Faces without area have no normal, and turn from none.
     """
-    topology = build_topology(mesh.faces, len(mesh.vertices))
+    edges = build_edges(mesh.faces.astype(np.int32), len(mesh.vertices), Blocks(threads=1))
     normals = face_normals(mesh.vertices, mesh.faces)
-    left, right = (normals[side] for side in topology.edge_faces[topology.interior].T)
+    left, right = (normals[side] for side in edges.half_edges[edges.interior].T // 3)
     both = left.any(axis=1) & right.any(axis=1)
     chord = np.linalg.norm(left - right, axis=1).max(initial=0, where=both)
     return float(2 * np.arcsin(min(1.0, chord / 2)))

@@ -18,7 +18,7 @@ from train.experiments.harness.experiment import Figure
 from train.experiments.harness.render import ASPECT, CENTRE, HALF_WIDTH, Camera, shaded_image
 from train.experiments.harness.style import COLOURS, MARKERS, SEQUENTIAL, TITLES, panels
 from train.metrics.decimation import Pair, Summary
-from train.metrics.point_mesh import face_tree, nearest
+from train.metrics.faces.point_mesh import face_tree, nearest
 
 ELEVATION = 25.0
 # How much of the view a mesh fills, across or upright.

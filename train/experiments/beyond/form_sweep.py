@@ -15,7 +15,7 @@ from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.metrics.decimation import gain
-from train.metrics.surface_distance import prepared, surface_errors
+from train.metrics.surface_distance import moved, prepared, surface_errors
 
 # Symbol, field of the card, values.
 SWEPT: tuple[tuple[str, str, tuple[float, ...]], ...] = (
@@ -101,10 +101,11 @@ def run(laboratory: Laboratory) -> Outcome:
             if coarse is None:
                 continue
             plain = refine(coarse, loop(), levels, threads=1)
-            reference = surface_errors(true, prepared(plain.mesh, samples))
+            loops = prepared(plain.mesh, samples)
+            reference = surface_errors(true, loops)
             for key, scheme in schemes.items():
                 refined = refine(coarse, scheme, levels, threads=1)
-                errors = surface_errors(true, prepared(refined.mesh, samples))
+                errors = surface_errors(true, moved(loops, refined.mesh.vertices))
                 results[key].append(_result(gain(reference, errors), refined, plain))
     rows = [
         _row(symbol, value, results[keys[field, value]], on_card=on_card(field, value))

@@ -18,9 +18,9 @@ from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.metrics.decimation import gain
-from train.metrics.point_mesh import face_tree, nearest
-from train.metrics.self_intersection import self_intersecting
-from train.metrics.surface_distance import SurfaceErrors, prepared, surface_errors
+from train.metrics.faces.point_mesh import FaceTree, nearest
+from train.metrics.faces.self_intersection import self_intersecting
+from train.metrics.surface_distance import SurfaceErrors, moved, prepared, surface_errors
 from train.metrics.whole_surface import normal_jump
 
 # Faces of the coarse mesh, and the levels after which it is measured.
@@ -135,22 +135,21 @@ def compared(
         name: refine(coarse.mesh, scheme, level, threads=1) for name, scheme in schemes.items()
     }
     meshes = {name: refinement.mesh for name, refinement in refined.items()}
-    meshes[ON_SURFACE] = on_surface(meshes[LOOP], coarse.dense.mesh)
-    return [
-        Measured(
-            coarse,
-            method,
-            surface_errors(true, prepared(mesh, samples)),
-            normal_jump(mesh),
-            int(self_intersecting(mesh).sum()),
-        )
-        for method, mesh in meshes.items()
-    ]
+    loops = prepared(meshes[LOOP], samples)
+    meshes[ON_SURFACE] = on_surface(meshes[LOOP], true.tree)
+    rows = []
+    for method, mesh in meshes.items():
+        # All have Loop's faces.
+        surface = moved(loops, mesh.vertices)
+        crossing = self_intersecting(surface.tree.boxes)
+        errors = surface_errors(true, surface)
+        rows.append(Measured(coarse, method, errors, normal_jump(mesh), int(crossing.sum())))
+    return rows
 
 
-def on_surface(mesh: Mesh, surface: Mesh) -> Mesh:
+def on_surface(mesh: Mesh, surface: FaceTree) -> Mesh:
     """Return a mesh with each vertex at the nearest point of a surface."""
-    return Mesh(nearest(face_tree(surface), mesh.vertices).point, mesh.faces)
+    return Mesh(nearest(surface, mesh.vertices).point, mesh.faces)
 
 
 def summary(measured: list[Measured]) -> list[Summary]:

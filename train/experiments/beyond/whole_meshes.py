@@ -19,8 +19,9 @@ from train.experiments.harness.contenders import LOOP, OURS, contenders
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
+from train.metrics.faces.face_boxes import face_boxes
+from train.metrics.faces.self_intersection import self_intersecting
 from train.metrics.fairness import volume
-from train.metrics.self_intersection import self_intersecting
 
 LEVELS = 3
 # Self-intersecting faces that are allowed, over Loop's.
@@ -108,7 +109,7 @@ def measured(refined: Refinement) -> Measured:
 
 def crossing(mesh: Mesh) -> int:
     """Return how many faces cross others."""
-    return int(self_intersecting(mesh).sum())
+    return int(self_intersecting(face_boxes(mesh)).sum())
 
 
 def rows_of(

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, refine
 from tests.support.meshes import bent, bumpy_sphere, grid, manifolds
-from train.metrics.point_mesh import face_tree, nearest
+from train.metrics.faces.point_mesh import face_tree, moved, nearest
 
 
 def squared_distance(points, corners):
@@ -98,6 +98,33 @@ def test_of_equally_near_faces_the_lowest_is_named(turn):
         belongs = np.array([[np.isin(own, face).all() for face in faces] for own in corners])
         closest = nearest(face_tree(Mesh(points, faces)), above)
         np.testing.assert_array_equal(closest.face, belongs.argmax(axis=1))
+
+
+@pytest.mark.parametrize("turn", range(4))
+def test_between_two_sheets_the_lowest_face_is_named_whatever_came_before(turn):
+    rng = np.random.default_rng(turn)
+    low, faces = grid(8)
+    high = low + np.array([0, 0, 0.5])
+    turned = rng.permutation(2 * len(faces))
+    mesh = Mesh(np.concatenate([low, high]), np.concatenate([faces, faces + len(low)])[turned])
+    # Each foot lies well inside a face.
+    inside = low[faces].mean(axis=1) + np.array([0, 0, 0.25])
+    points = inside[rng.integers(0, len(inside), 300)]
+    closest = nearest(face_tree(mesh), points)
+    every = distances_to_all(points, mesh)
+    np.testing.assert_array_equal(closest.face, np.isclose(every, 0.25, rtol=1e-12).argmax(axis=1))
+
+
+def test_a_moved_tree_answers_as_a_new_one():
+    mesh = refine(Mesh(*bumpy_sphere()), loop(), 1, threads=1).mesh
+    rng = np.random.default_rng(0)
+    other = Mesh(mesh.vertices * [1, 2, 0.5] + 0.01 * rng.normal(size=(1, 3)), mesh.faces)
+    points = points_near(other, 300, rng)
+    new, old = (
+        nearest(tree, points) for tree in (face_tree(other), moved(face_tree(mesh), other.vertices))
+    )
+    np.testing.assert_array_equal(new.distance, old.distance)
+    np.testing.assert_array_equal(new.face, old.face)
 
 
 def test_points_alone_give_what_they_give_together():

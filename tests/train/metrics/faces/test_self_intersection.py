@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from pns_common.mesh import Mesh
 from train.data.primitives import icosphere, torus
-from train.metrics.self_intersection import self_intersecting
+from train.metrics.faces.face_boxes import face_boxes
+from train.metrics.faces.self_intersection import self_intersecting
 
 
 def by_every_pair(mesh):
@@ -35,12 +36,23 @@ def test_agrees_with_every_pair(seed, noise):
     rng = np.random.default_rng(seed)
     sphere = icosphere(1)
     mesh = Mesh(sphere.vertices + noise * rng.normal(size=sphere.vertices.shape), sphere.faces)
-    np.testing.assert_array_equal(self_intersecting(mesh), by_every_pair(mesh))
+    np.testing.assert_array_equal(self_intersecting(face_boxes(mesh)), by_every_pair(mesh))
+
+
+def test_the_order_of_the_faces_decides_nothing():
+    rng = np.random.default_rng(0)
+    sphere = icosphere(3)
+    vertices = sphere.vertices + 0.05 * rng.normal(size=sphere.vertices.shape)
+    crossing = self_intersecting(face_boxes(Mesh(vertices, sphere.faces)))
+    turned = rng.permutation(len(sphere.faces))
+    again = self_intersecting(face_boxes(Mesh(vertices, sphere.faces[turned])))
+    assert 0 < crossing.sum() < len(crossing)
+    np.testing.assert_array_equal(again, crossing[turned])
 
 
 @pytest.mark.parametrize("mesh", [icosphere(2), torus(12, 8)])
 def test_embedded_meshes_have_none(mesh):
-    assert not self_intersecting(mesh).any()
+    assert not self_intersecting(face_boxes(mesh)).any()
 
 
 def test_two_spheres_cut_each_other_in_a_ring():
@@ -50,7 +62,7 @@ def test_two_spheres_cut_each_other_in_a_ring():
         np.concatenate([sphere.vertices, moved]),
         np.concatenate([sphere.faces, sphere.faces + len(sphere.vertices)]),
     )
-    crossing = self_intersecting(both)
+    crossing = self_intersecting(face_boxes(both))
     middle = both.vertices[both.faces[crossing]].mean(axis=1)
     distance = np.linalg.norm(middle - [0.5, 0.05, 0.1], axis=1)
     radius = np.sqrt(1 - (1 + 0.01 + 0.04) / 4)
@@ -65,7 +77,7 @@ def test_faces_far_larger_than_the_rest_are_found():
         np.concatenate([small.vertices, sheet]),
         np.concatenate([small.faces, [[len(small.vertices) + k for k in range(3)]]]),
     )
-    crossing = self_intersecting(both)
+    crossing = self_intersecting(face_boxes(both))
     heights = small.vertices[small.faces][:, :, 2] > 0.013
     np.testing.assert_array_equal(crossing[:-1], heights.any(axis=1) & ~heights.all(axis=1))
     assert crossing[-1]
@@ -87,4 +99,4 @@ def test_a_wall_of_rulings_does_not_cross_itself_by_rounding(seed):
     )
     turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     noise = 1e-11 * np.random.default_rng(seed).normal(size=points.shape)
-    assert not self_intersecting(Mesh(points @ turn + noise, faces)).any()
+    assert not self_intersecting(face_boxes(Mesh(points @ turn + noise, faces))).any()
