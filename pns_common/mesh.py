@@ -115,12 +115,9 @@ def clean(mesh: Mesh) -> Cleaned:
     if degenerate.all():
         raise MeshError("every face is degenerate", element="faces")
     proper = np.flatnonzero(~degenerate)
-    a, b, c = np.sort(mesh.faces[proper], axis=1).T
-    # Numbers are sorted several times as fast as rows.
-    count = len(mesh.vertices)
-    _, pair = np.unique(a * count + b, return_inverse=True)
-    _, first, group = np.unique(pair * count + c, return_index=True, return_inverse=True)
-    leader = first[group]
+    corners = np.sort(mesh.faces[proper], axis=1)
+    _, first, group = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+    leader = first[group.reshape(-1)]
     is_leader = leader == np.arange(len(proper))
     number = np.cumsum(is_leader) - 1
 

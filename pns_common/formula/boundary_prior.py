@@ -9,8 +9,8 @@ is quasi-interpolation of the curve. γ_p = tanh(c_v x_p) f(x_p), x_p = 1 − co
 at p: 0 where the boundary is straight, and 0 at corners of a right angle or more, which are meant.
 
 Nothing here knows the surface: two pieces with the same boundary push it alike and meet again, if
-they share R. (The fold guard settles boundaries first, without the rest; only where a boundary's
-own displacement would fold a face of one piece do they differ.)
+they share R. (The fold guard leaves boundaries alone; only where a boundary's own displacement
+would fold a face of one piece, and what lies inside does not go along, do they differ.)
 """
 
 from __future__ import annotations

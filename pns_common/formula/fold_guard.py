@@ -7,6 +7,10 @@ has less than a thousandth of its area, s of its three corners is halved, for al
 once. After ROUNDS rounds s of such corners becomes 0: then a face is Loop's own at the latest when
 all three have, so it ends. Faces of q0 without area have no direction to turn from: left out.
 
+A boundary that pieces share goes where they meet again, whatever lies inside. So s of its vertices
+is halved only by faces that it would fold by itself: where the inside goes along with it, and
+nothing is folded, it stays as well.
+
 So no face turns by more than θ from Loop's, for any displacements. The rounds know no order of
 faces or vertices, and a face is looked at alone: the guard is local and numbering-free, and
 commutes with motions, reflections and scaling. s is a number to the gradient: that passes through
@@ -41,7 +45,7 @@ class FoldGuard:
         loop: Float[Array, "V 3"],
         displacement: Float[Array, "V 3"],
         blocks: Blocks = WHOLE,
-        first: Bool[np.ndarray, " V"] | None = None,
+        shared: Bool[np.ndarray, " V"] | None = None,
     ) -> Float[np.ndarray, " V"]:
         """Return s for each new vertex.
 
@@ -50,34 +54,22 @@ class FoldGuard:
             loop: where Loop puts its vertices.
             displacement: what is added to them.
             blocks: how rows are divided.
-            first: vertices whose displacements are settled as if there were no others, and stay;
-                None where all are settled together.
+            shared: vertices of boundaries, which stay but for what they would fold by themselves;
+                None where all vertices are alike.
         """
         loop, displacement = detached(loop), detached(displacement)
-        mesh = (faces, loop, displacement)
-        everywhere = np.ones(len(loop), dtype=bool)
-        if first is None:
-            return self._settled(*mesh, np.ones(len(loop)), everywhere, blocks)
-        alone = self._settled(*mesh, first.astype(float), first, blocks)
-        return self._settled(*mesh, np.where(first, alone, 1.0), ~first, blocks)
-
-    def _settled(
-        self,
-        faces: Int[np.ndarray, "F 3"],
-        loop: Float[Array, "V 3"],
-        displacement: Float[Array, "V 3"],
-        scale: Float[np.ndarray, " V"],
-        free: Bool[np.ndarray, " V"],
-        blocks: Blocks,
-    ) -> Float[np.ndarray, " V"]:
-        """Lower s of free vertices until no face is folded; with theirs at 0 none may be."""
-        watched, rounds = faces, 0
+        shared = np.zeros(len(loop), dtype=bool) if shared is None else shared
+        scale, watched, rounds = np.ones(len(loop)), faces, 0
         while len(watched):
-            corners = watched[self._folded(watched, loop, displacement, scale, blocks)].reshape(-1)
+            folded = watched[self._folded(watched, loop, displacement, scale, blocks)]
+            corners = folded.reshape(-1)
+            if shared.any():
+                by_itself = np.where(shared, scale, 0.0)
+                alone = self._folded(folded, loop, displacement, by_itself, blocks)
+                corners = folded[alone[:, None] | ~shared[folded]]
             touched = np.zeros(len(scale), dtype=bool)
             # A face that is Loop's own already has nothing left to give (only NaN comes here).
             touched[corners[scale[corners] > 0]] = True
-            touched &= free
             scale[touched] = scale[touched] / 2 if rounds < ROUNDS else 0.0
             # A face none of whose corners changed stays as it was.
             watched = faces[touched[faces].any(axis=1)] if touched.any() else faces[:0]

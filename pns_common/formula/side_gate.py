@@ -9,14 +9,18 @@ where both its faces bend gently across some edge: x is 1 − n · n' there, and
 over GENTLE_TO_SHARP. A right angle has x = 1 and does not count: on a box all sides stay shut, on a
 prism of many sides the walls are open, however few rows they have, and its lids are not. On planes
 both b are 0, and so is γ; a bump of height ε gives O(ε²).
+
+A face at a boundary knows one side less: in the last row of a sheet that bends one way, every other
+face has no bent side at all. Such a face takes the largest b of itself and its neighbours.
 """
 
 from __future__ import annotations
 
-from jaxtyping import Float
+import numpy as np
+from jaxtyping import Float, Int
 
-from pns_common.base.arrays import Array, gather, namespace
-from pns_common.connectivity.topology import Topology
+from pns_common.base.arrays import Array, beside, gather, namespace, scatter
+from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.formula.correction import Gate
 from pns_common.geometry.frames import EdgeFrames
 
@@ -29,7 +33,33 @@ def face_bends(jumps: Float[Array, " E"], topology: Topology) -> Float[Array, " 
     xp, (gentle, sharp) = namespace(jumps), GENTLE_TO_SHARP
     counted = jumps * xp.clip((sharp - jumps) / (sharp - gentle), 0.0, 1.0)
     first, second, third = (gather(counted, topology.face_edges[:, k]) for k in range(3))
-    return (first + second + third) / 3
+    own = (first + second + third) / 3
+    at_boundary = (topology.edge_class[topology.face_edges] == EdgeClass.BOUNDARY).any(axis=1)
+    rows = np.flatnonzero(at_boundary)
+    faces = with_neighbours(rows, topology.face_edges, topology.half_edges, topology.edge_class)
+    widened = scatter(widest(own, faces), rows, len(topology.faces))
+    return xp.where(beside(own, at_boundary), widened, own)
+
+
+def with_neighbours(
+    rows: Int[np.ndarray, " N"],
+    face_edges: Int[np.ndarray, "F 3"],
+    half_edges: Int[np.ndarray, "E 2"],
+    edge_class: Int[np.ndarray, " E"],
+) -> Int[np.ndarray, "N 4"]:
+    """Return some faces, each with its three neighbours; itself where it has none."""
+    sides = face_edges[rows]
+    both = half_edges[sides] // 3
+    other = np.where(both[:, :, 0] == rows[:, None], both[:, :, 1], both[:, :, 0])
+    across = np.where(edge_class[sides] == EdgeClass.INTERIOR, other, rows[:, None])
+    return np.concatenate([rows[:, None], across], axis=1)
+
+
+def widest(bends: Float[Array, " F"], faces: Int[np.ndarray, "N 4"]) -> Float[Array, " N"]:
+    """Return the largest b of each row's faces."""
+    xp = namespace(bends)
+    first, second, third, fourth = (gather(bends, faces[:, k]) for k in range(4))
+    return xp.maximum(xp.maximum(first, second), xp.maximum(third, fourth))
 
 
 def gentle_bend(

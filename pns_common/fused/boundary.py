@@ -89,15 +89,15 @@ class Boundary:
         if self.rule is not None and self.sharp is not None:
             _move(self.rule.move_edges, self.sharp.level, self.sharp.edges, loop, added)
 
-    def first(self, vertex_count: int, edge_count: int) -> Bool[np.ndarray, " W"] | None:
-        """Return what the fold guard settles first; None where that is nothing."""
+    def shared(self, vertex_count: int, edge_count: int) -> Bool[np.ndarray, " W"] | None:
+        """Return what the fold guard takes for shared with other pieces; None where nothing is."""
         if self.sharp is None:
             return None
         alone = on_boundary(self.sharp.level.topology)
-        first = np.zeros(vertex_count + edge_count, dtype=bool)
-        first[self.sharp.vertices] = alone[: len(self.sharp.vertices)]
-        first[vertex_count + self.sharp.edges] = alone[len(self.sharp.vertices) :]
-        return first
+        shared = np.zeros(vertex_count + edge_count, dtype=bool)
+        shared[self.sharp.vertices] = alone[: len(self.sharp.vertices)]
+        shared[vertex_count + self.sharp.edges] = alone[len(self.sharp.vertices) :]
+        return shared
 
 
 NO_RULE = Boundary(None, None, np.zeros((0, 3)), -0.0)

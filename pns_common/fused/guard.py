@@ -13,8 +13,8 @@ from pns_common.formula.fold_guard import ROUNDS, FoldGuard
 from pns_common.fused.kernels.guard import find_folds
 from pns_common.fused.mesh_edges import MeshEdges
 
-# For the kernel: all faces are looked at, and s is 1 everywhere.
-EVERYWHERE, UNSCALED = np.zeros(0, dtype=bool), np.zeros(0)
+# For the kernel: no vertex is shared, all faces are looked at, and s is 1 everywhere.
+NONE_SHARED, EVERYWHERE, UNSCALED = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool), np.zeros(0)
 
 
 def guard_scale(
@@ -23,59 +23,33 @@ def guard_scale(
     loop: Float[np.ndarray, "W 3"],
     displacement: Float[np.ndarray, "W 3"],
     blocks: Blocks,
-    first: Bool[np.ndarray, " W"] | None = None,
+    shared: Bool[np.ndarray, " W"] | None = None,
 ) -> Float[np.ndarray, " W"] | None:
-    """Return s for each new vertex of the split of ``mesh``; ``first`` as the guard has it.
+    """Return s for each new vertex of the split of ``mesh``; ``shared`` as the guard has it.
 
     None where it is 1 everywhere.
     """
-    settings = guard, mesh, loop, displacement
-    scale, free = UNSCALED, None
-    if first is not None:
-        # Faces with none of these corners are Loop's while the others' s is 0.
-        alone = _settled(*settings, first.astype(float), first, blocks, watched=first)
-        scale = np.where(first, alone, 1.0)
-        scale, free = (scale if scale.min() < 1 else UNSCALED), ~first
-    scale = _settled(*settings, scale, free, blocks)
-    return scale if len(scale) else None
-
-
-def _settled(
-    guard: FoldGuard,
-    mesh: MeshEdges,
-    loop: Float[np.ndarray, "W 3"],
-    displacement: Float[np.ndarray, "W 3"],
-    scale: Float[np.ndarray, " S"],
-    free: Bool[np.ndarray, " W"] | None,
-    blocks: Blocks,
-    watched: Bool[np.ndarray, " C"] = EVERYWHERE,
-) -> Float[np.ndarray, " N"]:
-    """Lower s of free vertices until no child is folded; of those with a ``watched`` corner."""
-    changed = watched
+    scale, changed = UNSCALED, EVERYWHERE
+    is_shared = NONE_SHARED if shared is None else shared
     for rounds in count():
-        changed = _touched(guard, mesh, loop, displacement, scale, changed, blocks)
-        if free is not None:
-            changed &= free
+        around = loop, displacement, scale, is_shared, math.cos(guard.angle)
+        changed = _touched(around, mesh, changed, blocks)
         if not changed.any():
             break
         if not len(scale):
             scale = np.ones(len(loop))
         scale[changed] = scale[changed] / 2 if rounds < ROUNDS else 0.0
-    return scale
+    return scale if len(scale) else None
 
 
 def _touched(
-    guard: FoldGuard,
+    around: tuple[np.ndarray | float, ...],
     mesh: MeshEdges,
-    loop: Float[np.ndarray, "W 3"],
-    displacement: Float[np.ndarray, "W 3"],
-    scale: Float[np.ndarray, " S"],
     changed: Bool[np.ndarray, " C"],
     blocks: Blocks,
 ) -> Bool[np.ndarray, " W"]:
     """Return folded children's corners; after the first round only those that ``changed`` count."""
-    touched = np.zeros(len(loop), dtype=bool)
-    around = loop, displacement, scale, math.cos(guard.angle)
+    touched = np.zeros(mesh.vertex_count + len(mesh.edges), dtype=bool)
     args = mesh.faces, mesh.face_edges, mesh.vertex_count, changed
 
     def look(rows: slice) -> None:

@@ -92,8 +92,8 @@ def learned_points(
     boundary.move_edges(loop[count:], edges)
     scale = None
     if scheme.guard is not None:
-        first = boundary.first(count, len(edges.ratio))
-        scale = guard_scale(scheme.guard, mesh, loop, added.displacement, blocks, first)
+        shared = boundary.shared(count, len(edges.ratio))
+        scale = guard_scale(scheme.guard, mesh, loop, added.displacement, blocks, shared)
         if scale is None:
             scale = np.broadcast_to(1.0, len(loop))
         else:

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
-from pns_common.formula.side_gate import GENTLE_TO_SHARP
+from pns_common.connectivity.topology import EdgeClass
+from pns_common.formula.side_gate import GENTLE_TO_SHARP, widest, with_neighbours
 from pns_common.fused.kernels.rings import (
     VERTEX_COLUMNS,
     face_bends,
@@ -77,6 +78,10 @@ def measure_bends(
         face_bends(mesh.face_edges, jumps, gentle, sharp, rows.start, rows.stop, bends)
 
     blocks.run(len(bends), measure)
+    boundary = mesh.sharp_edges[mesh.edge_class[mesh.sharp_edges] == EdgeClass.BOUNDARY]
+    rows = np.unique(mesh.half_edges[boundary, 0] // 3)
+    faces = with_neighbours(rows, mesh.face_edges, mesh.half_edges, mesh.edge_class)
+    bends[rows] = widest(bends, faces)
     return bends
 
 

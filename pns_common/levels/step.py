@@ -69,9 +69,8 @@ def level_step(level: ControlLevel, scheme: Scheme) -> LevelStep:
     if scheme.guard is None or loop_points is None:
         return step
     displacement = _joined(*(_displacement(rule) for rule in (step.vertices, step.edges)))
-    # Boundaries first, so that what lies inside has no part in where they go.
-    first = on_boundary(level.topology) if scheme.moves_boundaries else None
-    scale = scheme.guard(split(level.topology), loop_points, displacement, level.blocks, first)
+    shared = on_boundary(level.topology) if scheme.moves_boundaries else None
+    scale = scheme.guard(split(level.topology), loop_points, displacement, level.blocks, shared)
     count = level.topology.vertex_count
     return replace(
         step,

@@ -54,19 +54,26 @@ def _turned(a, b, c, moved_a, moved_b, moved_c, cosine, clear):
     return not dot(old, new) >= cosine * size
 
 
-def _touch(scale, touched, v):
-    if len(scale) == 0 or scale[v] > 0:
-        touched[v] = True
+def _by_itself(p, displacement, scale, shared, v):
+    """Return where a vertex is while none moves but the shared ones."""
+    if shared[v]:
+        return _moved(p, displacement, scale, v)
+    return (
+        p[0] + 0.0 * displacement[v, 0],
+        p[1] + 0.0 * displacement[v, 1],
+        p[2] + 0.0 * displacement[v, 2],
+    )
 
 
 @kernel(
     SIZE,
-    *(POINTS, POINTS, NUMBERS, REAL, INDICES, INDICES, SIZE, FLAGS, SIZE, SIZE, FLAGS_OUT),
+    *(POINTS, POINTS, NUMBERS, FLAGS, REAL, INDICES, INDICES, SIZE, FLAGS, SIZE, SIZE, FLAGS_OUT),
 )
 def find_folds(
     loop,
     displacement,
     scale,
+    shared,
     cosine,
     faces,
     face_edges,
@@ -80,6 +87,7 @@ def find_folds(
 
     Args:
         scale: s of each vertex; empty where it is 1 everywhere.
+        shared: vertices that are marked only if they fold the child by themselves; empty for none.
         changed: vertices whose s changed in the last round: other faces are as they were. Empty in
             the first round.
         touched: out, False on entry; threads may write the same True at once.
@@ -112,7 +120,13 @@ def find_folds(
             if len(changed) and not (changed[v] or changed[s] or changed[t]):
                 continue
             if _turned(a, b, c, moved_a, moved_b, moved_c, cosine, clear):
-                _touch(scale, touched, v)
-                _touch(scale, touched, s)
-                _touch(scale, touched, t)
+                by_itself = True
+                if len(shared):
+                    alone_a = _by_itself(a, displacement, scale, shared, v)
+                    alone_b = _by_itself(b, displacement, scale, shared, s)
+                    alone_c = _by_itself(c, displacement, scale, shared, t)
+                    by_itself = _turned(a, b, c, alone_a, alone_b, alone_c, cosine, clear)
+                for w in (v, s, t):
+                    if (by_itself or not shared[w]) and (len(scale) == 0 or scale[w] > 0):
+                        touched[w] = True
     return 0

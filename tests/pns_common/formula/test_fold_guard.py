@@ -100,3 +100,43 @@ def test_faces_without_area_are_left_out_and_shrinking_ones_are_not():
 def test_displacements_that_are_no_numbers_do_not_keep_it_busy():
     delta = np.full_like(FLAT, np.nan)
     assert len(FoldGuard(1.0)(FACES, FLAT, delta)) == len(FLAT)
+
+
+def rim(width: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a flat band of narrow faces, and those of one row as shared."""
+    x = np.arange(5.0)
+    points = np.concatenate([np.c_[x, 0 * x, 0 * x], np.c_[x, 0 * x + width, 0 * x]])
+    quads = np.arange(4)
+    faces = np.concatenate([np.c_[quads, quads + 1, quads + 6], np.c_[quads, quads + 6, quads + 5]])
+    return points, faces, np.arange(10) < 5
+
+
+def test_a_shared_boundary_stays_where_the_inside_goes_along_with_it():
+    """A narrow rim that is lifted as a whole folds nowhere: neither side of it is held back."""
+    points, faces, shared = rim(0.01)
+    lifted = np.tile([0.0, 0.0, 0.1], (len(points), 1))
+    assert (FoldGuard(np.radians(75))(faces, points, lifted, shared=shared) == 1).all()
+
+
+def test_a_shared_boundary_gives_way_only_to_what_it_folds_by_itself():
+    points, faces, shared = rim(0.01)
+    guard = FoldGuard(np.radians(75))
+    lifted = np.where(shared[:, None], [0.0, 0.0, 0.1], 0.0)
+    alone = guard(faces, points, lifted, shared=shared)
+    assert alone.max() < 1  # nobody goes along: all corners give way together
+    inside = np.where(shared[:, None], 0.0, [0.0, 0.0, 0.1])
+    held = guard(faces, points, inside + np.array([0.0, 0.0, 0.001]), shared=shared)
+    assert (held[shared] == 1).all()
+    assert held[~shared].max() < 1
+
+
+@given(st.integers(0, 2**31), st.floats(0.01, 1e3))
+def test_what_lies_inside_lowers_no_shared_vertex_that_folds_nothing_by_itself(seed, size):
+    rng = np.random.default_rng(seed)
+    shared = rng.random(len(FLAT)) < 0.3
+    delta = size * rng.standard_normal(FLAT.shape)
+    delta[shared] *= 0.01 / size
+    scale = FoldGuard(np.radians(75))(FACES, FLAT, delta, shared=shared)
+    assert (scale[shared] == 1).all()
+    moved = FLAT + scale[:, None] * delta
+    assert angles(FACES, FLAT, moved).max() <= np.radians(75) + 1e-7

@@ -5,7 +5,8 @@ import numpy as np
 from pns_common import Mesh, pns, refine
 from pns_common.connectivity.topology import build_topology
 from pns_common.formula.side_gate import face_bends, gentle_bend, opened
-from tests.support.meshes import torus_of_quads
+from pns_common.rules.control_level import control_level
+from tests.support.meshes import grid, torus_of_quads
 from tests.support.networks import scale_free_model
 from tests.support.quasi_interpolation import OPEN_GATES, quasi_interpolated, with_card
 
@@ -51,6 +52,31 @@ def test_a_side_gate_opens_where_both_faces_bend():
     first, second = np.array([0, 1e-3, 0.1, 0.1]), np.array([0.1, 0.1, 0.2, 0.0])
     np.testing.assert_allclose(gentle_bend(first, second, 1e4), [0, 1, 1, 0], atol=1e-8)
     np.testing.assert_allclose(opened(np.array([0.0, 0.5, 1.0]), np.full(3, 0.5)), [0.5, 0.75, 1])
+
+
+def test_the_last_row_of_a_sheet_moves_with_the_others():
+    """Next to a boundary every other face of a sheet that bends one way has no bent side."""
+    points, faces = sheet(rows=4, columns=6)
+    level = control_level(points, build_topology(faces, len(points)))
+    bends = face_bends(level.rings.edge_jumps, level.topology)
+    expected = (1 - np.cos(0.3)) / 3  # one side of three, as inside
+    np.testing.assert_allclose(bends, expected, rtol=1e-9)
+
+
+def test_a_flat_sheet_stays_shut_up_to_its_boundary():
+    points, faces = grid(6)
+    level = control_level(points, build_topology(faces, len(points)))
+    assert not face_bends(level.rings.edge_jumps, level.topology).any()
+
+
+def sheet(rows, columns):
+    """An arc drawn along a line, as plane quads, each cut in two."""
+    number = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, -1)
+    u, v = np.divmod(number.ravel(), columns + 1)
+    corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    a, b, c, d = (corner.ravel() for corner in corners)
+    points = np.stack([np.cos(0.3 * u), v.astype(float), np.sin(0.3 * u)], axis=1)
+    return points, np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
 
 
 def both_gates(points, faces):

@@ -44,19 +44,19 @@ def test_a_level_of_sharp_edges_alone_has_their_vertices_and_classes():
     assert lengths.reference_length.tolist() == [1, 2, 3, 4, 5]
 
 
-def test_its_pushes_and_what_comes_first_are_the_whole_meshs():
+def test_its_pushes_and_what_is_shared_are_the_whole_meshs():
     whole = control_level(OPEN.vertices, build_topology(OPEN.faces, 25))
     boundary = boundary_of(RULE, OPEN.vertices, edges_built(OPEN), 1.0)
     np.testing.assert_array_equal(boundary.pushes, RULE.pushes(whole))
     edge_count = len(whole.topology.edges)
-    np.testing.assert_array_equal(boundary.first(25, edge_count), on_boundary(whole.topology))
+    np.testing.assert_array_equal(boundary.shared(25, edge_count), on_boundary(whole.topology))
     sharp = whole.topology.edge_class == EdgeClass.BOUNDARY
     np.testing.assert_array_equal(boundary.sharp.edges, np.flatnonzero(sharp))
 
 
-def test_where_there_is_no_rule_or_no_boundary_nothing_comes_first():
+def test_where_there_is_no_rule_or_no_boundary_nothing_is_shared():
     closed = Mesh(*bumpy_sphere(0, subdivisions=0))
     without = boundary_of(RULE, closed.vertices, edges_built(closed), 1.0)
-    assert (without.sharp, without.first(12, 30), str(without.nothing)) == (None, None, "0.0")
+    assert (without.sharp, without.shared(12, 30), str(without.nothing)) == (None, None, "0.0")
     assert boundary_of(None, OPEN.vertices, edges_built(OPEN), 1.0) is NO_RULE
     assert str(NO_RULE.nothing) == "-0.0"  # which leaves a -0 as it is

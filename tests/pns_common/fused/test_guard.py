@@ -18,16 +18,16 @@ MESHES = [Mesh(*bumpy_sphere(1, subdivisions=0)), Mesh(*grid(4, bent))]
 
 
 @given(st.sampled_from(MESHES), st.integers(0, 2**31), st.floats(0.01, 1e6), st.booleans())
-def test_scales_are_the_array_kernels(mesh, seed, size, in_turn):
+def test_scales_are_the_array_kernels(mesh, seed, size, some_shared):
     rng, edges = np.random.default_rng(seed), edges_built(mesh)
     loop = loop_points(mesh.vertices, edges, Blocks(1))
     delta = size * rng.standard_normal(loop.shape)
-    first = rng.random(len(loop)) < 0.3 if in_turn else None
+    shared = rng.random(len(loop)) < 0.3 if some_shared else None
     guard = FoldGuard(rng.uniform(0.05, 1.5))
     faces = split(build_topology(mesh.faces, len(mesh.vertices)))
-    scale = guard_scale(guard, edges, loop, delta, Blocks(2, rows=5), first)
+    scale = guard_scale(guard, edges, loop, delta, Blocks(2, rows=5), shared)
     scale = np.ones(len(loop)) if scale is None else scale
-    np.testing.assert_array_equal(scale, guard(faces, loop, delta, first=first))
+    np.testing.assert_array_equal(scale, guard(faces, loop, delta, shared=shared))
 
 
 @pytest.mark.parametrize(("size", "acts"), [(1e-6, False), (3.0, True)])

@@ -16,6 +16,7 @@ MESH = edges_built(Mesh(POINTS, FACES))
 LOOP = loop_points(POINTS, MESH, Blocks(1))
 CHILDREN = split(build_topology(FACES, 16))
 COSINE = np.cos(1.0)
+NONE = np.zeros(0, dtype=bool)
 
 
 def areas(points):
@@ -30,9 +31,9 @@ def folded(moved):
     return turned | (sizes[1] < 1e-3 * sizes[0])
 
 
-def touched(way, displacement, scale, changed):
+def touched(way, displacement, scale, changed, shared=NONE):
     marks = np.zeros(len(LOOP), dtype=bool)
-    around = LOOP, displacement, scale, COSINE
+    around = LOOP, displacement, scale, shared, COSINE
     mesh = MESH.faces, MESH.face_edges, MESH.vertex_count
     WAYS[way](find_folds)(*around, *mesh, changed, 0, len(FACES), marks)
     return marks
@@ -66,3 +67,21 @@ def test_a_child_that_all_but_vanishes_is_folded(way):
     marks = touched(way, displacement, np.ones(len(LOOP)), np.zeros(0, dtype=bool))
     assert marks[CHILDREN[3]].all()
     np.testing.assert_array_equal(touched(way, displacement, np.zeros(0), np.zeros(0, bool)), marks)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_shared_corners_are_marked_where_they_fold_a_child_by_themselves(way):
+    rng = np.random.default_rng(3)
+    displacement, shared = 0.12 * rng.standard_normal(LOOP.shape), rng.random(len(LOOP)) < 0.5
+    everywhere, unscaled = np.zeros(0, dtype=bool), np.zeros(0)
+    bad = folded(LOOP + displacement)
+    by_itself = bad & folded(LOOP + np.where(shared[:, None], displacement, 0.0))
+    expected = np.zeros(len(LOOP), dtype=bool)
+    expected[CHILDREN[bad]] = True
+    expected &= ~shared
+    expected[CHILDREN[by_itself]] = True
+    corners = shared & np.isin(np.arange(len(LOOP)), CHILDREN[bad])
+    assert (expected & corners).any()
+    assert (~expected & corners).any()
+    marks = touched(way, displacement, unscaled, everywhere, shared)
+    np.testing.assert_array_equal(marks, expected)
