@@ -145,7 +145,7 @@ EXPERIMENT = Experiment(
     title="The numbers of the default model's form",
     source="Beyond the paper. On the validation set.",
     run=run,
-    seconds=150,
+    seconds=45,
     needs_assets=True,
     reads=read_files,
 )

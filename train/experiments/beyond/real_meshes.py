@@ -248,7 +248,7 @@ TEST = Experiment(
     title="Real meshes, simplified",
     source="Beyond the paper. The test set: run once, when everything was chosen.",
     run=run_test,
-    seconds=700,
+    seconds=300,
     reads=read_files,
 )
 VALIDATION = Experiment(
@@ -256,7 +256,7 @@ VALIDATION = Experiment(
     title="Real meshes, simplified: validation",
     source="Beyond the paper. The validation set, on which the default model was chosen.",
     run=run_validation,
-    seconds=400,
+    seconds=150,
     needs_assets=True,
     reads=read_files,
 )
