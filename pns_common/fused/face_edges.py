@@ -22,5 +22,6 @@ def number_edges(
         return topology.edges, topology.face_edges
     from pns_common.fused.mesh_edges import build_edges
 
-    mesh = build_edges(faces.astype(np.int32), vertex_count, kernel_blocks(available_threads()))
+    in_order = np.ascontiguousarray(faces, dtype=np.int32)
+    mesh = build_edges(in_order, vertex_count, kernel_blocks(available_threads()))
     return mesh.edges.astype(np.int64), mesh.face_edges.astype(np.int64)

@@ -10,6 +10,7 @@ from tests.support.meshes import bumpy_sphere, grid
 FACES = {
     "closed": bumpy_sphere(0, subdivisions=2)[1],
     "open": grid(4)[1],
+    "column by column": np.asfortranarray(grid(4)[1]),
     "irregular": np.random.default_rng(0).integers(0, 9, (40, 3)),
 }
 
@@ -23,6 +24,6 @@ def test_edges_have_the_numbers_of_the_topology(name, loaded, monkeypatch):
     faces = FACES[name]
     topology = build_topology(faces, int(faces.max()) + 1)
     numbered = face_edges.number_edges(faces, int(faces.max()) + 1)
-    for found, expected in zip(numbered, (topology.edges, topology.face_edges), strict=True):
-        assert found.dtype == expected.dtype
-        np.testing.assert_array_equal(found, expected)
+    for made, expected in zip(numbered, (topology.edges, topology.face_edges), strict=True):
+        assert made.dtype == expected.dtype
+        np.testing.assert_array_equal(made, expected)

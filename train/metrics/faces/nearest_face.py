@@ -29,7 +29,8 @@ def search(order, corners, boxes, last_level, points, square, place, on_mesh):
             _measure(boxes, node, p, lanes)
             below = waiting
             for lane in range(WIDE):
-                if lanes[lane] > least:
+                # Empty boxes are infinitely far, also from points beyond all numbers.
+                if not lanes[lane] <= least or lanes[lane] == np.inf:
                     continue
                 if node < last_level:
                     # The nearest on top.

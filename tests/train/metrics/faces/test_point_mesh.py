@@ -133,3 +133,11 @@ def test_points_alone_give_what_they_give_together():
     together, alone = nearest(tree, points), nearest(tree, points[-10:])
     np.testing.assert_array_equal(together.distance[-10:], alone.distance)
     np.testing.assert_array_equal(together.face[-10:], alone.face)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e200])
+def test_what_is_beyond_all_numbers_is_as_far_and_ends(value):
+    tree = face_tree(Mesh(*bumpy_sphere(0, subdivisions=1)))
+    point = nearest(tree, np.array([[value, 0.0, 0.0], [2.0, 0.0, 0.0]]))
+    assert not np.isfinite(point.distance[0])
+    assert point.distance[1] == nearest(tree, np.array([[2.0, 0.0, 0.0]])).distance[0]
