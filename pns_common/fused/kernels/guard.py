@@ -21,7 +21,10 @@ from pns_common.geometry.frames import NO_AREA
 
 
 def _moved(p, displacement, scale, v):
-    s = scale[v] if len(scale) else 1.0
+    return _by_share(p, displacement, v, scale[v] if len(scale) else 1.0)
+
+
+def _by_share(p, displacement, v, s):
     return (
         p[0] + s * displacement[v, 0],
         p[1] + s * displacement[v, 1],
@@ -58,11 +61,7 @@ def _by_itself(p, displacement, scale, shared, v):
     """Return where a vertex is while none moves but the shared ones."""
     if shared[v]:
         return _moved(p, displacement, scale, v)
-    return (
-        p[0] + 0.0 * displacement[v, 0],
-        p[1] + 0.0 * displacement[v, 1],
-        p[2] + 0.0 * displacement[v, 2],
-    )
+    return _by_share(p, displacement, v, 0.0)
 
 
 @kernel(

@@ -12,6 +12,7 @@ from pns_common.base.arrays import norm
 from pns_common.mesh import LARGEST_COORDINATE, SMALLEST_EXTENT
 
 from ...errors import UnrefinableError
+from ...meshes.extent import extent
 from .arrays import ArrayMesh, blocks_of, let_go
 
 
@@ -46,18 +47,19 @@ def survey(mesh: ArrayMesh) -> Survey:
     inner_low, inner_high = low.copy(), high.copy()
     for rows in blocks_of(len(mesh.positions)):
         points = _checked(mesh, rows)
-        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+        least, most = extent(points)
+        low, high = np.minimum(low, least), np.maximum(high, most)
         points = points[used[rows]]
         if len(points):
             # One after the other, in the order of their numbers, as the mean of all is taken.
             total = np.cumsum(np.concatenate([total[None], points]), axis=0)[-1]
             count += len(points)
-            inner_low = np.minimum(inner_low, points.min(axis=0))
-            inner_high = np.maximum(inner_high, points.max(axis=0))
+            least, most = extent(points)
+            inner_low, inner_high = np.minimum(inner_low, least), np.maximum(inner_high, most)
         let_go(mesh.positions)
-    extent = (high - low).max()
-    if 0 < extent < SMALLEST_EXTENT:
-        raise UnrefinableError(f"extent {extent:g}, expected at least {SMALLEST_EXTENT:g}")
+    longest = (high - low).max()
+    if 0 < longest < SMALLEST_EXTENT:
+        raise UnrefinableError(f"extent {longest:g}, expected at least {SMALLEST_EXTENT:g}")
     centre, largest = total / count, 0.0
     for rows in blocks_of(len(mesh.positions)):
         points = np.asarray(mesh.positions[rows][used[rows]], dtype=np.float64)

@@ -18,6 +18,7 @@ from pns_common.base.whole_file import replace_file
 from pns_common.pieces import RefinedPiece
 
 from ...errors import UnrefinableError
+from ...meshes.extent import extent
 from ...meshfiles.indexed_triangles import IndexedTriangles
 from ...meshfiles.single_precision import LARGEST
 from ...meshfiles.triangles_glb import triangles_glb
@@ -61,7 +62,7 @@ def write_tile(tiles: Tiles, part: int, cut: Cutout, made: RefinedPiece, levels:
     points = points.astype(np.float32)
     glb = triangles_glb(IndexedTriangles(points, local.reshape(-1, 3)))
     replace_file(Path(tiles.folder) / tile_name(part), glb)
-    return [points.min(axis=0).tolist(), points.max(axis=0).tolist()]
+    return [bound.tolist() for bound in extent(points)]
 
 
 def write_tileset(tiles: Tiles, boxes: list[Any], report: dict[str, Any]) -> None:
