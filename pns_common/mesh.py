@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pns_common.base.extent import extent
 from pns_common.errors import MeshError
 
 # Fourth powers of lengths (squared cross products) must neither overflow nor vanish in float64.
@@ -52,9 +53,7 @@ class Mesh:
                 index=worst,
             )
         vertices, faces = _frozen(vertices, np.float64), _frozen(faces, np.int64)
-        # By columns: numpy takes eight times as long along rows of three.
-        low = np.array([column.min() for column in vertices.T])
-        high = np.array([column.max() for column in vertices.T])
+        low, high = extent(vertices)
         # Written so that NaN fails it too.
         if not ((low >= -LARGEST_COORDINATE) & (high <= LARGEST_COORDINATE)).all():
             fits = (np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1)
@@ -65,10 +64,10 @@ class Mesh:
                 element="vertex",
                 index=worst,
             )
-        extent = (high - low).max()
-        if 0 < extent < SMALLEST_EXTENT:
+        widest = (high - low).max()
+        if 0 < widest < SMALLEST_EXTENT:
             raise MeshError(
-                f"extent {extent:g}, expected at least {SMALLEST_EXTENT:g}: scale the mesh up",
+                f"extent {widest:g}, expected at least {SMALLEST_EXTENT:g}: scale the mesh up",
                 element="vertices",
             )
         object.__setattr__(self, "vertices", vertices)
@@ -115,9 +114,7 @@ def clean(mesh: Mesh) -> Cleaned:
     if degenerate.all():
         raise MeshError("every face is degenerate", element="faces")
     proper = np.flatnonzero(~degenerate)
-    corners = np.sort(mesh.faces[proper], axis=1)
-    _, first, group = np.unique(corners, axis=0, return_index=True, return_inverse=True)
-    leader = first[group.reshape(-1)]
+    leader = _first_alike(np.take(mesh.faces, proper, axis=0), len(mesh.vertices))
     is_leader = leader == np.arange(len(proper))
     number = np.cumsum(is_leader) - 1
 
@@ -126,12 +123,13 @@ def clean(mesh: Mesh) -> Cleaned:
     face_map = np.full(len(mesh.faces), -1, dtype=np.int64)
     face_map[proper[is_leader]] = number[is_leader]
 
-    kept = mesh.faces[proper[is_leader]]
+    kept = np.take(mesh.faces, proper[is_leader], axis=0)
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[kept] = True
     vertex_map = np.where(used, np.cumsum(used) - 1, -1)
+    same = len(kept) == len(mesh.faces) and used.all()
     return Cleaned(
-        mesh=Mesh(mesh.vertices[used], vertex_map[kept]),
+        mesh=mesh if same else Mesh(mesh.vertices[used], vertex_map[kept]),
         vertex_map=vertex_map,
         face_map=face_map,
         representative=representative,
@@ -145,6 +143,22 @@ def repeated_vertex(faces: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
     """Return whether a face names a vertex twice."""
     a, b, c = faces.T
     return (a == b) | (b == c) | (c == a)
+
+
+def _first_alike(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Int[np.ndarray, " F"]:
+    """Return for each face the first that has the same three vertices, in whatever order."""
+    # A face's number is the sum of its vertices', which are far apart: faces that are alike have
+    # one number, and hardly any others do. Most meshes have no two, and a sort of numbers tells.
+    of_vertex = np.arange(1, vertex_count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    of_vertex ^= of_vertex >> np.uint64(29)
+    of_vertex *= np.uint64(0xBF58476D1CE4E5B9)
+    number = sum(np.take(of_vertex, corners) for corners in faces.T)
+    number.sort()
+    if (number[1:] != number[:-1]).all():
+        return np.arange(len(faces))
+    corners = np.sort(faces, axis=1)
+    _, first, group = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+    return first[group.reshape(-1)]
 
 
 def _array(values: object, element: str) -> np.ndarray:

@@ -26,6 +26,9 @@ class BarycentricGrid:
         slot: (T,) for each point one of the 3 · 4^L corners of `faces` (flattened) that is it.
         sides: (3, n − 1) points inside the side from corner k to corner k + 1, in that order.
         inner: (I,) points inside the triangle.
+        owner: (T,) what has each point: a corner (0, 1, 2), a side (3, 4, 5) or the inside (6).
+        place: (8, T) which of its owner's points each is, where those sides k run backwards that
+            have bit 2ᵏ in the row's number.
         reorder: (9, T) for a triangle whose corners 0 and 1 are corners i and j of another, row
             3 i + j says which point of the other each of its points is.
     """
@@ -36,6 +39,8 @@ class BarycentricGrid:
     slot: Int[np.ndarray, " T"]
     sides: Int[np.ndarray, "3 n"]
     inner: Int[np.ndarray, " I"]
+    owner: Int[np.ndarray, " T"]
+    place: Int[np.ndarray, "8 T"]
     reorder: Int[np.ndarray, "9 T"]
 
 
@@ -54,13 +59,17 @@ def barycentric_grid(levels: int) -> BarycentricGrid:
     number_at[points[:, 0], points[:, 1]] = np.arange(len(points))
     slot = np.empty(len(points), dtype=np.int64)
     slot[faces.reshape(-1)] = np.arange(faces.size)
+    sides, inner = _sides(number_at, segments), np.flatnonzero((points > 0).all(axis=1))
+    owner, place = _owners(sides, inner)
     return BarycentricGrid(
         segments=segments,
         points=points,
         faces=faces,
         slot=slot,
-        sides=_sides(number_at, segments),
-        inner=np.flatnonzero((points > 0).all(axis=1)),
+        sides=sides,
+        inner=inner,
+        owner=owner,
+        place=place,
         reorder=_reorder(number_at, points),
     )
 
@@ -71,6 +80,21 @@ def _sides(number_at: Int[np.ndarray, "S S"], segments: int) -> Int[np.ndarray, 
     return np.stack(
         [number_at[segments - step, step], number_at[zero, segments - step], number_at[step, zero]]
     )
+
+
+def _owners(
+    sides: Int[np.ndarray, "3 n"], inner: Int[np.ndarray, " I"]
+) -> tuple[Int[np.ndarray, " T"], Int[np.ndarray, "8 T"]]:
+    owner = np.empty(3 + sides.size + len(inner), dtype=np.int64)
+    place = np.zeros((8, len(owner)), dtype=np.int64)
+    owner[:3], owner[inner] = range(3), 6
+    place[:, inner] = np.arange(len(inner))
+    for side, points in enumerate(sides):
+        owner[points] = 3 + side
+        for row in range(8):
+            along = points[::-1] if row >> side & 1 else points
+            place[row, along] = np.arange(len(points))
+    return owner, place
 
 
 def _reorder(

@@ -42,9 +42,8 @@ def smooth_uv(
     one where vertex and coordinates are.
     """
     corner = distinct_rows(np.hstack([as_words(vertex[:, None]), as_words(uv)]))
-    flat = number_by_first_appearance(corner[connectivity.faces.reshape(-1)])
-    columns = np.empty((int(flat.max()) + 1, 2))
-    columns[flat] = uv[connectivity.faces.reshape(-1)]
+    flat, first = number_by_first_appearance(corner[connectivity.faces.reshape(-1)])
+    columns = uv[connectivity.faces.reshape(-1)[first]].astype(np.float64)
     grid = connectivity.grid
     levels = grid.segments.bit_length() - 1
     topologies = level_topologies(flat.reshape(-1, 3), len(columns), levels)

@@ -53,9 +53,8 @@ def weld_by_label(
 ) -> Weld:
     """Join the vertices that share a label, at the position of the first corner of each."""
     flat = faces.reshape(-1)
-    group = number_by_first_appearance(labels[flat])
-    points = np.empty((group.max(initial=-1) + 1, 3))
-    points[group[::-1]] = positions[flat[::-1]]
+    group, first = number_by_first_appearance(labels[flat])
+    points = np.take(positions, flat[first], axis=0).astype(np.float64)
     vertex_of = np.full(len(positions), -1, dtype=np.int64)
     vertex_of[flat] = group
     return Weld(points=points, faces=group.reshape(-1, 3), vertex_of=vertex_of)
@@ -86,16 +85,20 @@ def distinct_rows(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
     return np.unique(whole, return_inverse=True)[1].reshape(-1)
 
 
-def number_by_first_appearance(labels: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    """Rename non-negative labels 0, 1, 2, … in the order in which they first occur."""
-    if not len(labels):
-        return labels
-    first = np.full(int(labels.max()) + 1, -1, dtype=np.int64)
+def number_by_first_appearance(
+    labels: Int[np.ndarray, " N"],
+) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " M"]]:
+    """Rename non-negative labels 0, 1, 2, … in the order in which they first occur.
+
+    Return them, and where each occurs first.
+    """
+    earliest = np.full(int(labels.max(initial=-1)) + 1, -1, dtype=np.int64)
     # Written backwards, so that the earliest occurrence is the one that remains.
-    first[labels[::-1]] = np.arange(len(labels) - 1, -1, -1)
-    is_first = np.zeros(len(labels), dtype=bool)
-    is_first[first[first >= 0]] = True
-    return (np.cumsum(is_first) - 1)[first[labels]]
+    earliest[labels[::-1]] = np.arange(len(labels) - 1, -1, -1)
+    first = np.sort(earliest[earliest >= 0])
+    number = np.empty_like(earliest)
+    number[labels[first]] = np.arange(len(first))
+    return number[labels], first
 
 
 def as_words(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, "N W"]:

@@ -130,7 +130,7 @@ def _distinct_corners(
 ) -> tuple[Int[np.ndarray, "P 3"], Int[np.ndarray, " C"], Float[np.ndarray, "C 2"]]:
     """Return faces over distinct pairs of welded vertex and texture coordinates, and these."""
     rows = np.column_stack([welded.vertex_of.astype(np.float64), uv])
-    corners = number_by_first_appearance(distinct_rows(rows)[faces.reshape(-1)])
-    row = np.empty(corners.max() + 1, dtype=np.int64)
-    row[corners] = faces.reshape(-1)
+    flat = faces.reshape(-1)
+    corners, first = number_by_first_appearance(distinct_rows(rows)[flat])
+    row = flat[first]
     return corners.reshape(-1, 3), welded.vertex_of[row], uv[row]

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from pns_common.base.extent import extent
+
 from ..gltf.constants import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, FLOAT, UNSIGNED_INT
 from ..gltf.read.container import read_glb, write_glb
 from ..gltf.read.json_text import decode_object, encode
-from ..meshes.extent import extent
 from ..options import Limits
 from .indexed_triangles import IndexedTriangles
 

@@ -132,8 +132,5 @@ def distinct_corners(
     ]
     words = np.hstack([welded.astype(np.uint32)[:, None], *(as_words(o) for o in others)])
     flat = corners.reshape(-1)
-    distinct = number_by_first_appearance(distinct_rows(words)[flat])
-    row = np.empty(distinct.max(initial=-1) + 1, dtype=np.int64)
-    # Backwards, so that the earliest row stands for its equals.
-    row[distinct[::-1]] = flat[::-1]
-    return distinct.reshape(-1, 3), row
+    distinct, first = number_by_first_appearance(distinct_rows(words)[flat])
+    return distinct.reshape(-1, 3), flat[first]

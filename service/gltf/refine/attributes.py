@@ -24,7 +24,7 @@ class RefinedVertices:
         row: for each of the C corners a row of the primitive's attributes.
         welded: the welded vertex of each corner.
         connectivity: how corners spread over refined vertices.
-        positions: the refined positions.
+        positions: the refined positions, in float32.
         normals: the new normals; None where the primitive has none.
         skin_and_morph: skin binding and morph deltas.
         morphed_normals: for each morph target the normals under it; None where none is wanted.
@@ -50,7 +50,7 @@ def refined_attributes(
     for name, values in primitive.attributes.items():
         corners = values[refined_vertices.row]
         if name == "POSITION":
-            refined[name] = refined_vertices.positions.astype(np.float32)
+            refined[name] = refined_vertices.positions
         elif name == "NORMAL" and refined_vertices.normals is not None:
             refined[name] = refined_vertices.normals.astype(np.float32)
         elif name == "TANGENT":

@@ -103,7 +103,8 @@ def _vertex_counts(
     """Count the vertices of each part, numbered part by part as they first appear."""
     if not len(faces):
         return np.zeros(len(starts), dtype=np.int64)
-    return np.diff(np.maximum.reduceat(faces.max(axis=1), starts), prepend=-1)
+    a, b, c = faces.T
+    return np.diff(np.maximum.reduceat(np.maximum(np.maximum(a, b), c), starts), prepend=-1)
 
 
 def vertex_rows(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, " V"]:

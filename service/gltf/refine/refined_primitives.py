@@ -12,7 +12,7 @@ from pns_common.refine import Refinement
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
-from ...meshes.split_connectivity import split_connectivity
+from ...meshes.split_connectivity import blocks_of, index_type, split_connectivity
 from ...meshes.uv_charts import UvBlend
 from ...meshes.weld import Weld
 from ..read.primitives import TrianglePrimitive, distinct_corners
@@ -72,12 +72,16 @@ def refined_primitives(
             course,
         )
     made: list[RefinedPrimitive] = []
+    positions = points.astype(np.float32)
     with course.part(SHADING, 1.0):
         for number, rows in enumerate(ends):
             course.reach(rows.start / len(ids))
             if rows.stop > rows.start:
+                own = ids[rows]
                 made.append(
-                    _refined_primitive(control, number, ids[rows], grid, refined, shading, uv_blend)
+                    _refined_primitive(
+                        control, number, own, grid, positions, refined, shading, uv_blend
+                    )
                 )
     return made
 
@@ -92,8 +96,16 @@ def refined_ids(
     """
     proper = cleaned.representative >= 0
     leader = cleaned.representative[proper]
-    blocks = refinement.mesh.faces.reshape(len(cleaned.mesh.faces), -1)
-    ids = np.take(np.take(blocks, grid.slot, axis=1), leader, axis=0)
+    corners = refinement.mesh.faces.reshape(len(cleaned.mesh.faces), -1)
+    narrow = index_type(len(refinement.mesh.vertices))
+    ids = np.empty((len(corners), len(grid.slot)), dtype=narrow)
+
+    def take(rows: slice) -> None:
+        ids[rows] = np.take(corners[rows], grid.slot, axis=1)
+
+    blocks_of(grid).run(len(corners), take)
+    if not np.array_equal(leader, np.arange(len(leader))):
+        ids = np.take(ids, leader, axis=0)
     copies = np.flatnonzero(cleaned.face_map[proper] < 0)
     if len(copies):
         own = cleaned.vertex_map[welded.faces[proper][copies]]
@@ -109,6 +121,7 @@ def _refined_primitive(
     number: int,
     ids: Int[np.ndarray, "F T"],
     grid: BarycentricGrid,
+    positions: Float[np.ndarray, "V 3"],
     refined: RefinedMesh,
     shading: Shading | None,
     uv_blend: UvBlend,
@@ -125,7 +138,7 @@ def _refined_primitive(
         row=row,
         welded=welded[row],
         connectivity=own,
-        positions=np.take(refined.refinement.mesh.vertices, vertex, axis=0),
+        positions=np.take(positions, vertex, axis=0),
         normals=normals,
         skin_and_morph=refined.skin_and_morph.take(vertex),
         morphed_normals=morphed,

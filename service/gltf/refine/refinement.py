@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
+from pns_common.base.extent import extent
 from pns_common.errors import MeshError
 from pns_common.masks.linear import LinearRefinement, level_topologies
 from pns_common.mesh import Cleaned
@@ -64,7 +65,7 @@ def refine_control_mesh(
         )
     except MeshError as error:
         raise UnrefinableError(str(error), pointer=pointer) from error
-    if np.abs(refinement.mesh.vertices).max() > np.finfo(np.float32).max:
+    if leaves_single_precision(refinement.mesh.vertices):
         raise UnrefinableError("refined positions leave the range of float32", pointer=pointer)
     return RefinedMesh(
         refinement,
@@ -72,6 +73,12 @@ def refine_control_mesh(
         _scalars(refinement, options),
         refinement.normals if options.normals == "limit" else None,
     )
+
+
+def leaves_single_precision(points: Float[np.ndarray, "V 3"]) -> bool:
+    """Return whether a coordinate is too large for float32."""
+    low, high = extent(points)
+    return max(-low.min(), high.max()) > np.finfo(np.float32).max
 
 
 def changes_of_mesh(

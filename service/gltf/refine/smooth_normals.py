@@ -71,7 +71,7 @@ def _fans(cleaned: Cleaned, creases: Int[np.ndarray, "N 2"] | None) -> Int[np.nd
         if np.array_equal(new, label):
             break
         label = new
-    return number_by_first_appearance(label).reshape(-1, 3)
+    return number_by_first_appearance(label)[0].reshape(-1, 3)
 
 
 def _normals(cleaned: Cleaned, fans: Int[np.ndarray, "F 3"]) -> Float[np.ndarray, "G 3"]:

@@ -113,7 +113,8 @@ def _split_groups(
         for number, part in zip(chosen, starts, strict=True)
     ]
     normals, flat = np.concatenate(old).astype(np.float64), np.concatenate(rows).reshape(-1)
-    corners = number_by_first_appearance(joined_normals(np.concatenate(welded), normals)[flat])
+    labels = joined_normals(np.concatenate(welded), normals)
+    corners, _ = number_by_first_appearance(labels[flat])
     before = np.empty((corners.max() + 1, 3))
     before[corners] = normals[flat]
     return split_connectivity(corners.reshape(-1, 3), len(before), grid), before

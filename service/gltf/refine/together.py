@@ -32,7 +32,14 @@ from .control_mesh import ControlMesh, control_mesh, slices, vertex_rows
 from .local_joints import local_joints
 from .parts import Parts
 from .refined_primitives import RefinedMesh, RefinedPrimitive, refined_primitives
-from .refinement import GATE, RATIO, changes_of_primitive, changes_of_vertices, creases_of
+from .refinement import (
+    GATE,
+    RATIO,
+    changes_of_primitive,
+    changes_of_vertices,
+    creases_of,
+    leaves_single_precision,
+)
 from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
 from .smooth_normals import with_normal_accessor, with_smooth_normals
 from .union import divided, joined
@@ -196,7 +203,7 @@ def _refined(
     )
     if made is None:
         return None
-    if np.abs(made.mesh.vertices).max() > np.finfo(np.float32).max:
+    if leaves_single_precision(made.mesh.vertices):
         raise MeshError("refined positions leave the range of float32", element="vertices")
     skin_and_morph, cut = _skin_and_morph(control, cleaned, parts, creases, made, options)
     scalars = {RATIO: made.ratio, GATE: made.gate} if options.diagnostics == "full" else {}

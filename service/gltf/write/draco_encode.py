@@ -13,7 +13,7 @@ import DracoPy
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from ...meshes.extent import extent
+from pns_common.base.extent import extent
 
 POSITION_BITS, NORMAL_BITS, TEXCOORD_BITS = 16, 10, 14
 # 0 is the fastest, 10 the smallest; 7 is where Draco's own tools stand.

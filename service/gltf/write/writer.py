@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
-from jaxtyping import Shaped
+from jaxtyping import Int, Shaped
+
+from pns_common.base.extent import extent
 
 from ...course import Course
-from ...meshes.extent import extent
 from ...report import Change
 from ..constants import ARRAY_BUFFER, COLUMNS, COMPONENT_TYPES, ELEMENT_ARRAY_BUFFER
 from ..read.modes import TRIANGLES
@@ -71,11 +72,8 @@ class Writer:
             ]
         if primitive.get("mode", TRIANGLES) != TRIANGLES:
             primitive["mode"] = TRIANGLES
-        small = refined.faces.max() <= LARGEST_UINT16_INDEX
-        indices = refined.faces.astype(np.uint16 if small else np.uint32)
-        primitive["indices"] = self._accessor(
-            indices.reshape(-1, 1), ELEMENT_ARRAY_BUFFER, "SCALAR"
-        )
+        indices = as_indices(refined.faces).reshape(-1, 1)
+        primitive["indices"] = self._accessor(indices, ELEMENT_ARRAY_BUFFER, "SCALAR")
 
     def remove(self, spare: Spare) -> None:
         """Take what refinement has left without use out of the tree, and its bytes out of BIN."""
@@ -176,6 +174,13 @@ def describe(
         accessor.update({key: value for key, value in given.items() if value is not None})
     if name == "POSITION":
         accessor["min"], accessor["max"] = (bound.tolist() for bound in extent(values))
+
+
+def as_indices(faces: Int[np.ndarray, "F 3"]) -> Shaped[np.ndarray, "F 3"]:
+    """Return faces in the narrowest type that may hold them; not copied where they are int32."""
+    if faces.max() <= LARGEST_UINT16_INDEX:
+        return faces.astype(np.uint16)
+    return faces.view(np.uint32) if faces.dtype == np.int32 else faces.astype(np.uint32)
 
 
 def in_words(values: Shaped[np.ndarray, "N K"], kind: str) -> Shaped[np.ndarray, "N B"]:

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.base.arrays import norm
+from pns_common.base.extent import extent
 from pns_common.mesh import LARGEST_COORDINATE, SMALLEST_EXTENT
 
 from ...errors import UnrefinableError
-from ...meshes.extent import extent
 from .arrays import ArrayMesh, blocks_of, let_go
 
 

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from pns_common.base.extent import extent
 from pns_common.base.whole_file import replace_file
 from pns_common.pieces import RefinedPiece
 
 from ...errors import UnrefinableError
-from ...meshes.extent import extent
 from ...meshfiles.indexed_triangles import IndexedTriangles
 from ...meshfiles.single_precision import LARGEST
 from ...meshfiles.triangles_glb import triangles_glb

@@ -76,4 +76,7 @@ def test_rows_of_odd_width_are_compared_whole(rows):
 @given(st.lists(st.integers(0, 9), max_size=30))
 def test_numbers_follow_first_appearance(labels):
     expected = [list(dict.fromkeys(labels)).index(label) for label in labels]
-    assert number_by_first_appearance(np.array(labels, dtype=np.int64)).tolist() == expected
+    numbers, first = number_by_first_appearance(np.array(labels, dtype=np.int64))
+    assert numbers.tolist() == expected
+    assert [labels[place] for place in first] == list(dict.fromkeys(labels))
+    assert first.tolist() == [labels.index(label) for label in dict.fromkeys(labels)]

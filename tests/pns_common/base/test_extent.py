@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from service.meshes.extent import extent
+from pns_common.base.extent import extent
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
