@@ -48,26 +48,32 @@ class MeasuredFile:
 
 def measure_file(path: Path, levels: int, model: str | None = None) -> MeasuredFile:
     """Refine a file on disk in a process of its own; `model` is a name or file, or the default."""
-    return in_fresh_process(_measure, path.read_bytes(), levels, model, folder_of(path))
+    data = path.read_bytes()
+    return in_fresh_process(_measure, data, levels, model, False, folder_of(path))
 
 
-def measure_generated(faces: int, levels: int, model: str | None = None) -> MeasuredFile:
-    """Refine a generated GLB of about so many faces in a process of its own."""
+def measure_generated(
+    faces: int, levels: int, model: str | None = None, *, normals: bool = False
+) -> MeasuredFile:
+    """Refine a generated GLB of about so many faces in a process of its own; give it normals."""
     mesh = torus(faces)
     data = triangles_glb(IndexedTriangles(mesh.vertices, mesh.faces, None))
-    return in_fresh_process(_measure, data, levels, model)
+    return in_fresh_process(_measure, data, levels, model, normals)
 
 
 def _measure(
-    data: bytes, levels: int, source: str | None, siblings: SiblingFiles = ALONE
+    data: bytes,
+    levels: int,
+    source: str | None,
+    normals: bool,
+    siblings: SiblingFiles = ALONE,
 ) -> MeasuredFile:
     model, limits = load_model(source), Limits(max_faces=10**8, max_memory_bytes=10**11)
     media = "glb" if data[:4] == b"glTF" else "gltf"
+    options = Options(levels, normals="smooth" if normals else "keep")
 
     def run(course: Course) -> Subdivided:
-        return subdivide_gltf(
-            data, media, Options(levels), model, limits, course=course, siblings=siblings
-        )
+        return subdivide_gltf(data, media, options, model, limits, course=course, siblings=siblings)
 
     try:
         done = run(Course())  # warm

@@ -41,9 +41,12 @@ def main(
     console.print(f"model: {model}")
     console.print(operator_table([size for size in SIZES if size <= largest], runs, model))
     named = {
-        f"torus, {size:,} faces": measure_generated(size, levels, model)
+        f"torus, {size:,} faces{', normals' * normals}": measure_generated(
+            size, levels, model, normals=normals
+        )
         for size in FILE_SIZES
         if size <= largest
+        for normals in (False, True)
     }
     for path in sorted(assets.glob("*.gl*")) if assets else []:
         named[path.name] = measure_file(path, levels, model)

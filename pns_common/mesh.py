@@ -149,11 +149,11 @@ def _first_alike(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Int[np.nda
     """Return for each face the first that has the same three vertices, in whatever order."""
     # A face's number is the sum of its vertices', which are far apart: faces that are alike have
     # one number, and hardly any others do. Most meshes have no two, and a sort of numbers tells.
-    of_vertex = np.arange(1, vertex_count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    of_vertex: Int[np.ndarray, " V"] = np.arange(1, vertex_count + 1, dtype=np.uint64)
+    of_vertex *= np.uint64(0x9E3779B97F4A7C15)
     of_vertex ^= of_vertex >> np.uint64(29)
     of_vertex *= np.uint64(0xBF58476D1CE4E5B9)
-    number = sum(np.take(of_vertex, corners) for corners in faces.T)
-    number.sort()
+    number = np.sort(of_vertex[faces[:, 0]] + of_vertex[faces[:, 1]] + of_vertex[faces[:, 2]])
     if (number[1:] != number[:-1]).all():
         return np.arange(len(faces))
     corners = np.sort(faces, axis=1)

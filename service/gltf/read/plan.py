@@ -12,14 +12,14 @@ from .modes import SURFACES, triangle_count
 from .schema import Document, Primitive
 
 # Peak bytes for each refined face: at least 1.15 times what was measured on generated meshes of
-# 240,000 to 960,000 faces, levels 1 to 6, smooth ones and ones where every corner is a vertex, by
-# models with and without a vertex rule.
-BYTES_PER_FACE = 350
-BYTES_PER_FACE_WITH_NORMALS = 550
+# 240,000 faces, levels 1 to 6, smooth ones and ones where every corner is a vertex, by models with
+# and without a vertex rule, with compiled kernels and without them.
+BYTES_PER_FACE = 280
+BYTES_PER_FACE_WITH_NORMALS = 400
 # The same for primitives that get normals on the way, with the three floats of each.
 BYTES_FOR_NORMALS = BYTES_PER_FACE_WITH_NORMALS - BYTES_PER_FACE + 36
 # The levels' connectivity again, and a block of columns, for skins and morph targets.
-BYTES_PER_FACE_WITH_FOLLOWERS = 200
+BYTES_PER_FACE_WITH_FOLLOWERS = 350
 # The limit masks, and exact normals: the largest rise measured over what refining took.
 BYTES_FOR_LIMIT = 120
 # A refined face has at most 1.5 vertices: made, cast to float32, written.

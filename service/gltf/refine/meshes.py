@@ -178,6 +178,8 @@ def _alone(
     pointer = f"/meshes/{plan.mesh}"
     with course.stage("refine", shares.refine, shares.attributes):
         made = refine_control_mesh(control, creases, scheme, options, pointer, course)
+        # Read here, since the levels' tables are kept until it is.
+        report = None if made is None else made.refinement.report
     refined: list[RefinedPrimitive] = []
     with course.stage("attributes", shares.attributes, shares.write):
         if made is not None and control.cleaned is not None:
@@ -189,6 +191,6 @@ def _alone(
         kept=control.kept,
         refined=refined,
         copies=control.copies,
-        report=None if made is None else made.refinement.report,
+        report=report,
         changes=changes_of_mesh(control, made, pointer),
     )

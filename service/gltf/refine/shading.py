@@ -11,7 +11,6 @@ from jaxtyping import Float, Int
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
 from .control_mesh import ControlMesh
-from .normals import safe_unit
 from .skin_and_morph import SkinAndMorph
 from .smoothing import NormalGroups, normal_groups
 
@@ -38,7 +37,9 @@ class Shading:
         self, group: Int[np.ndarray, " N"]
     ) -> tuple[Float[np.ndarray, "N 3"], tuple[Float[np.ndarray, "N 3"] | None, ...]]:
         """Return the normals at rest, and morphed, at vertices of which the groups are given."""
-        return self.rest[group], tuple(None if m is None else m[group] for m in self.morphed)
+        return np.take(self.rest, group, axis=0), tuple(
+            None if morphed is None else np.take(morphed, group, axis=0) for morphed in self.morphed
+        )
 
 
 def shade(
@@ -61,7 +62,7 @@ def shade(
         return None
     poses = 1 + len(skin_and_morph.deltas)
     with course.part(GROUPING, GROUPING + (1 - GROUPING) / poses):
-        rest = groups.normals(points, safe_unit(groups.before), course)
+        rest = groups.normals(points, groups.before, course)
         if limit_normals is not None:
             rest = groups.with_limit(rest, limit_normals)
     morphed: list[Float[np.ndarray, "G 3"] | None] = []
@@ -70,7 +71,8 @@ def shade(
             with course.part(target / (poses - 1), (target + 1) / (poses - 1)):
                 normals = None
                 if _bends(control, target):
-                    normals = groups.normals(points + delta, rest, course).astype(np.float32)
+                    posed = groups.normals(points + delta, lambda: rest, course)
+                    normals = posed.astype(np.float32)
                 morphed.append(normals)
     return Shading(groups, rest, tuple(morphed))
 

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks, available_threads
 from pns_common.connectivity.topology import build_topology, next_corner
+from pns_common.fused.corner_normals import angle_weighted_normals
 from pns_common.mesh import Cleaned
 
 from ...meshes.weld import number_by_first_appearance
@@ -16,7 +17,7 @@ from ..constants import FLOAT
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
 from .control_mesh import ControlMesh
-from .normals import angle_weighted_normals, safe_unit
+from .normals import safe_unit
 
 
 def with_smooth_normals(

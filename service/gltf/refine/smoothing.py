@@ -1,12 +1,14 @@
 """Which corners share a normal: those that shared a position and a normal before refinement.
 
+Normals are recomputed from the refined faces; over these groups a hard edge stays hard.
+
 The groups run over all primitives of a mesh, so that a change of material in a smooth surface does
 not become an edge in its shading.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,13 +16,14 @@ from jaxtyping import Float, Int
 
 from pns_common.base.arrays import dot, norm
 from pns_common.base.blocks import Blocks, available_threads
+from pns_common.fused.corner_normals import angle_weighted_normals
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import SplitConnectivity, at_descendants, split_connectivity
 from ...meshes.weld import number_by_first_appearance
 from .control_mesh import ControlMesh, slices
-from .normals import angle_weighted_normals
+from .normals import safe_unit
 
 # Exporters compute the two sides of a UV seam apart and round differently: in real files up to
 # about 0.01°. Normals within 0.1° are one; an edge that is meant to be hard has degrees.
@@ -36,28 +39,31 @@ class NormalGroups:
     Attributes:
         vertices: (D, 3) the refined vertices of the faces that have normals.
         groups: (D, 3) their corners' groups.
-        before: (G, 3) the old normals, blended linearly: what is left where faces have no area.
+        count: G.
         ids: by primitive the groups of its faces' grid points.
+        before: makes the old normals (G, 3), blended linearly: what is left where faces have no
+            area.
     """
 
     vertices: Int[np.ndarray, "D 3"]
     groups: Int[np.ndarray, "D 3"]
-    before: Float[np.ndarray, "G 3"]
+    count: int
     ids: dict[int, Int[np.ndarray, "F T"]]
+    before: Callable[[], Float[np.ndarray, "G 3"]]
 
     def normals(
         self,
         points: Float[np.ndarray, "V 3"],
-        otherwise: Float[np.ndarray, "G 3"],
+        otherwise: Callable[[], Float[np.ndarray, "G 3"]],
         course: Course,
     ) -> Float[np.ndarray, "G 3"]:
-        """Return the groups' unit normals at refined vertices; `otherwise` where they have none."""
+        """Return the groups' unit normals at refined vertices; those of `otherwise` if need be."""
         blocks = Blocks(available_threads(), before=course.count(len(self.vertices)))
-        values = angle_weighted_normals(
-            points, self.vertices, self.groups, len(self.before), blocks
-        )
-        undefined = np.flatnonzero(~values.any(axis=1))
-        values[undefined] = otherwise[undefined]
+        values = angle_weighted_normals(points, self.vertices, self.groups, self.count, blocks)
+        x, y, z = values.T
+        undefined = np.flatnonzero((x == 0) & (y == 0) & (z == 0))
+        if len(undefined):
+            values[undefined] = otherwise()[undefined]
         return values
 
     def with_limit(
@@ -96,8 +102,9 @@ def normal_groups(
     return NormalGroups(
         vertices=at_descendants(used, grid),
         groups=groups.refined_faces,
-        before=groups.linear(before),
+        count=groups.count,
         ids={number: groups.ids[part] for number, part in zip(chosen, shares, strict=True)},
+        before=lambda: safe_unit(groups.linear(before)),
     )
 
 

@@ -1,0 +1,56 @@
+"""Unit normals at groups of corners: sums of the faces' own, weighted by the angle at the corner.
+
+After Thürmer and Wüthrich 1998: however a flat side is cut into triangles, it weighs the same.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.base.blocks import Blocks
+
+# A sum of unit normals times angles below this has no direction that could be trusted.
+NO_DIRECTION = 1e-9
+
+
+def angle_weighted_normals(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    groups: Int[np.ndarray, "F 3"],
+    count: int,
+    blocks: Blocks,
+) -> Float[np.ndarray, "G 3"]:
+    """Return the unit normal of each group of corners; 0 where faces have no area or cancel out.
+
+    `groups` names the group, 0 … count − 1, of each face's corners.
+    """
+    # Coordinates as rows: arithmetic on contiguous rows takes a third of the time.
+    rows_of = np.ascontiguousarray(points.T)
+    weighted = np.empty((3, 3, len(faces)))
+
+    def block(rows: slice) -> None:
+        a, b, c = (np.take(rows_of, faces[rows, corner], axis=1) for corner in range(3))
+        ab, bc, ca = b - a, c - b, a - c
+        normal = _cross(ca, ab)
+        twice_area = np.sqrt(_dot(normal, normal))
+        normal /= np.where(twice_area > 0, twice_area, 1.0)
+        at_a = np.arctan2(twice_area, -_dot(ab, ca))
+        at_b = np.arctan2(twice_area, -_dot(bc, ab))
+        for corner, angle in enumerate([at_a, at_b, np.pi - at_a - at_b]):
+            weighted[:, corner, rows] = angle * normal
+
+    blocks.run(len(faces), block)
+    corners = groups.T.reshape(-1)
+    total = np.stack([np.bincount(corners, w.reshape(-1), count) for w in weighted])
+    length = np.sqrt(_dot(total, total))
+    total[:, length <= NO_DIRECTION] = 0
+    return np.ascontiguousarray((total / np.where(length > NO_DIRECTION, length, 1.0)).T)
+
+
+def _cross(u: Float[np.ndarray, "3 M"], v: Float[np.ndarray, "3 M"]) -> Float[np.ndarray, "3 M"]:
+    return u[[1, 2, 0]] * v[[2, 0, 1]] - u[[2, 0, 1]] * v[[1, 2, 0]]
+
+
+def _dot(u: Float[np.ndarray, "3 M"], v: Float[np.ndarray, "3 M"]) -> Float[np.ndarray, " M"]:
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
