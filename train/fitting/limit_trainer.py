@@ -1,6 +1,7 @@
 """Training on the limit surface after one learned level, on a stream of coarse meshes."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -9,6 +10,7 @@ from pns_common.levels.step import level_step
 from pns_common.schemes import Scheme
 from train.data.pairs.pair_stream import pair_stream
 from train.data.pairs.references import Pair
+from train.fitting.ahead import ahead
 from train.fitting.determinism import deterministic
 from train.fitting.limit_batch import LimitBatch, limit_batch
 from train.fitting.limit_loss import LimitMeasures, Standards, limit_loss, measure
@@ -72,15 +74,35 @@ def standards_of(batch: LimitBatch) -> Standards:
 def _batches(recipe: Recipe, plan: ToLimit) -> Iterator[tuple[LimitBatch, Standards]]:
     """Yield one batch a step, drawn from a pool that grows until its oldest give way to new ones.
 
-    Making a batch takes as long as some ten steps on it.
+    Making a batch takes as long as some ten steps on it, so another process makes the next one.
     """
-    rng = np.random.default_rng(recipe.seed)
-    fresh = _fresh(recipe, plan, rng)
     pool: list[tuple[LimitBatch, Standards]] = []
-    for step in range(recipe.steps):
-        if step % plan.reuse == 0:
-            pool = [*pool, next(fresh)][-plan.pool :]
-        yield pool[rng.integers(len(pool))]
+    # A process takes as long to start as a batch: one batch is made here.
+    several = recipe.steps > plan.reuse
+    for draw in ahead(_draws, recipe, plan) if several else _draws(recipe, plan):
+        pool = [*pool, (draw.batch, draw.standards)][-plan.pool :]
+        for place in draw.places:
+            yield pool[place]
+
+
+@dataclass(frozen=True, eq=False)
+class _Draw:
+    """A new batch of a pool, and the places in the pool that the steps after it take."""
+
+    batch: LimitBatch
+    standards: Standards
+    places: list[int]
+
+
+def _draws(recipe: Recipe, plan: ToLimit) -> Iterator[_Draw]:
+    rng = np.random.default_rng(recipe.seed)
+    with deterministic():
+        fresh = _fresh(recipe, plan, rng)
+        for number, first in enumerate(range(0, recipe.steps, plan.reuse), start=1):
+            batch, standards = next(fresh)
+            steps = min(plan.reuse, recipe.steps - first)
+            places = rng.integers(min(number, plan.pool), size=steps)
+            yield _Draw(batch, standards, places.tolist())
 
 
 def _fresh(

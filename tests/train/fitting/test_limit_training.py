@@ -1,5 +1,6 @@
 """Training to the limit: the linear maps, the measures, and that a few steps help."""
 
+import pickle
 from dataclasses import replace
 from itertools import islice
 
@@ -15,6 +16,7 @@ from train.data.pairs import pair_stream as stream
 from train.data.pairs.grid import grid_pair
 from train.data.pairs.references import AUTHORED, Pair, Reference
 from train.data.primitives import box, globe, torus
+from train.fitting import limit_trainer
 from train.fitting.limit_batch import SMOOTH_KINDS, limit_batch
 from train.fitting.limit_loss import Standards, limit_loss, measure
 from train.fitting.limit_maps import applied, limit_maps, loop_matrix
@@ -161,6 +163,27 @@ def test_measures_see_a_shift(batch):
         here, away = measure(batch, points), measure(batch, points + shift)
     assert (away.mean > here.mean + 0.02).all()
     torch.testing.assert_close(away.bend, here.bend)
+
+
+def test_batches_made_ahead_are_those_made_here(no_solids, monkeypatch):
+    base = general()
+    plan = msgspec.structs.replace(base.training, faces=200, pool=2, reuse=2)
+    recipe = replace(base, steps=7, training=plan)
+    # A process would draw from the stream as it is, not from this one.
+    monkeypatch.setattr(limit_trainer, "ahead", lambda make, *arguments: make(*arguments))
+    drawn = list(limit_trainer._draws(recipe, plan))
+    assert [len(draw.places) for draw in drawn] == [2, 2, 2, 1]
+    given = [batch for batch, _ in limit_trainer._batches(recipe, plan)]
+    kept = [[0], [0, 1], [1, 2], [2, 3]]
+    expected = [drawn[kept[n][place]] for n, draw in enumerate(drawn) for place in draw.places]
+    for batch, draw in zip(given, expected, strict=True):
+        assert torch.equal(batch.level.points, draw.batch.level.points)
+    # A batch that has travelled has the measures that it had.
+    travelled = pickle.loads(pickle.dumps(drawn[0]))
+    measured = standards_of(travelled.batch)
+    for name in ("mean", "normal", "bend"):
+        own = getattr(drawn[0].standards.loop, name)
+        assert torch.equal(getattr(measured.loop, name), own)
 
 
 def test_a_few_steps_lower_the_loss_and_are_the_same_again(no_solids):
