@@ -11,6 +11,7 @@ from jaxtyping import Float
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from train.fitting.chords import squared_chords
 from train.fitting.limit_batch import LimitBatch, LimitSurface
 from train.models.recipes import LimitWeights
 
@@ -129,8 +130,7 @@ def _ratio(measure: Tensor, reference: Tensor, floor: float) -> Tensor:
 def _bending(batch: LimitBatch, limit: LimitSurface) -> tuple[Tensor, Tensor]:
     """Return bending and jump; cotangents and areas from the squared lengths of sides alone."""
     square, turned = (
-        ((values[batch.fair_edges[:, 1]] - values[batch.fair_edges[:, 0]]) ** 2).sum(dim=1)
-        for values in (limit.points, limit.normals)
+        squared_chords(values, batch.fair_edges) for values in (limit.points, limit.normals)
     )
     a, b, c = (square[batch.fair_sides[:, side]] for side in range(3))
     u, v, w = (turned[batch.fair_sides[:, side]] for side in range(3))
