@@ -12,6 +12,7 @@ from functools import cache
 from typing import TypeVar
 
 from pns_common.base.arrays import Array, namespace
+from pns_common.base.processors import current_processor, leave
 
 T = TypeVar("T")
 
@@ -74,8 +75,15 @@ class Blocks:
         if helpers < 1:
             drain()
             return
+        here = current_processor()
+
+        def help_out() -> None:
+            leave(here)
+            drain()
+
         # Each helper in the caller's context: numpy's error state is part of it.
-        jobs = [_pool(self.threads - 1).submit(copy_context().run, drain) for _ in range(helpers)]
+        pool = _pool(self.threads - 1)
+        jobs = [pool.submit(copy_context().run, help_out) for _ in range(helpers)]
         try:
             drain()
         finally:
