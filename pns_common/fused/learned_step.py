@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from pns_common.base.blocks import Blocks
 from pns_common.fused.additions import Additions
-from pns_common.fused.boundary import boundary_of
+from pns_common.fused.boundary import Boundary, boundary_of
 from pns_common.fused.child_faces import look_at_children
 from pns_common.fused.edge_rule import add_at_edges
 from pns_common.fused.guard import guard_scale
@@ -72,22 +72,9 @@ def learned_points(
     """
     mesh, count = level.mesh, level.mesh.vertex_count
     boundary = boundary_of(_boundary_rule(scheme), level.points, mesh, length)
-    of_level = level.points, mesh, level.several_fans
-    seen = Surroundings(*of_level, length, blocks, boundary, _altitudes(scheme))
+    vertices, edges, added = _added_by_rules(level, scheme, length, blocks, boundary)
+    # Not before: what the rules read has the most memory.
     loop = loop_points(level.points, mesh, blocks)
-    edge_rule, vertex_rule = scheme.edge_rule, scheme.vertex_rule
-    moves = isinstance(vertex_rule, LearnedVertexRule | ScaleFreeVertexRule)
-    assert isinstance(edge_rule, LearnedEdgeRule | ScaleFreeEdgeRule)
-    added = Additions.unwritten(len(loop))
-    vertices, edges = added.rows(slice(0, count)), added.rows(slice(count, None))
-    if moves:
-        # A copy: the boundary's rule moves more vertices.
-        vertices = replace(vertices, corrected=seen.rings.smooth.copy())
-        add_at_vertices(vertex_rule, seen, vertices)
-        seen.forget_rings()
-    else:
-        vertices.clear(slice(None))
-    add_at_edges(edge_rule, seen, edges)
     boundary.move_vertices(loop[:count], vertices)
     boundary.move_edges(loop[count:], edges)
     scale = None
@@ -102,9 +89,36 @@ def learned_points(
     # What the guard lets stand is at clearly less than a right angle to Loop's: none is flipped.
     guarded = scheme.guard is not None and math.cos(scheme.guard.angle) > CLEAR_COSINE
     points = loop if guarded else loop.copy()
-    largest = add_to(points, added.displacement, 0 if moves else count, blocks)
+    first = count if vertices.corrected is None else 0
+    largest = add_to(points, added.displacement, first, blocks)
     step = AddedStep(vertices, edges, learned=True, guard=scale)
     return LearnedPoints(points, largest, None if guarded else loop, step, added)
+
+
+def _added_by_rules(
+    level: FusedLevel,
+    scheme: Scheme,
+    length: float | Float[np.ndarray, " V"],
+    blocks: Blocks,
+    boundary: Boundary,
+) -> tuple[Additions, Additions, Additions]:
+    """Return what both rules add but at boundaries: to vertices, to edges, and both together."""
+    mesh, count = level.mesh, level.mesh.vertex_count
+    of_level = level.points, mesh, level.several_fans
+    seen = Surroundings(*of_level, length, blocks, boundary, _altitudes(scheme))
+    edge_rule, vertex_rule = scheme.edge_rule, scheme.vertex_rule
+    assert isinstance(edge_rule, LearnedEdgeRule | ScaleFreeEdgeRule)
+    added = Additions.unwritten(count + len(mesh.edges))
+    vertices, edges = added.rows(slice(0, count)), added.rows(slice(count, None))
+    if isinstance(vertex_rule, LearnedVertexRule | ScaleFreeVertexRule):
+        # A copy: the boundary's rule moves more vertices.
+        vertices = replace(vertices, corrected=seen.rings.smooth.copy())
+        add_at_vertices(vertex_rule, seen, vertices)
+        seen.forget_rings()
+    else:
+        vertices.clear(slice(None))
+    add_at_edges(edge_rule, seen, edges)
+    return vertices, edges, added
 
 
 def _boundary_rule(scheme: Scheme) -> BoundaryRule | None:

@@ -18,6 +18,10 @@ from pns_common.fused.fans import multi_fan_vertices
 from pns_common.fused.loop_points import largest_size, loop_points
 from pns_common.fused.mesh_edges import MeshEdges, build_edges, split_mesh_edges
 from pns_common.levels.diagnostics import LevelReport, edge_counts
+from pns_common.mesh import LARGEST_COORDINATE
+
+# Far more than the sums of Loop's masks are wrong by.
+ROUNDING = 1 + 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +65,9 @@ class FusedLevel:
 class FusedStep:
     """What a step made of a level; the faces follow from the level's edges.
 
-    ``largest`` is the largest absolute coordinate, NaN where one is; ``added`` is None for Loop.
-    ``report`` looks at the step when it is called.
+    No absolute coordinate is above ``largest``, which is NaN where one is, and above
+    LARGEST_COORDINATE only where one is. ``added`` is None for Loop. ``report`` looks at the step
+    when it is called.
     """
 
     points: Float[np.ndarray, "W 3"]
@@ -97,7 +102,11 @@ def next_level(level: FusedLevel, points: Float[np.ndarray, "W 3"], blocks: Bloc
 def loop_step(level: FusedLevel, blocks: Blocks) -> FusedStep:
     """Place a level's vertices where Loop does."""
     points = loop_points(level.points, level.mesh, blocks)
-    largest = largest_size(points, blocks)
+    # All of Loop's masks are means: its points lie among those that they are made of, a quarter as
+    # many.
+    largest = ROUNDING * largest_size(level.points, blocks)
+    if largest > LARGEST_COORDINATE:
+        largest = largest_size(points, blocks)
     return FusedStep(points, largest, lambda: _loop_report(level.mesh, points, blocks), None)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.base.blocks import Blocks
+from pns_common.fused.freed_memory import make_room
 from pns_common.fused.kernels.masks import (
     add_displacement,
     blend_vertices,
@@ -24,6 +25,7 @@ def loop_points(
     """Place old vertices, then edge vertices, where Loop puts them."""
     count, edge_count = mesh.vertex_count, len(mesh.edges)
     placed = np.empty((count + edge_count, 3))
+    make_room(placed.nbytes)
     edge_points = placed[count:]
 
     def edges(rows: slice) -> None:
@@ -87,8 +89,7 @@ def place_vertices(
 ) -> None:
     """Write Loop's old vertices into ``placed``."""
     count = mesh.vertex_count
-    placed[:] = 0
-    valence = np.zeros(count, dtype=np.int32)
+    valence = np.empty(count, dtype=np.int32)
 
     def rings(rows: slice) -> None:
         sum_rings(points, mesh.edges, rows.start, rows.stop, placed, valence)

@@ -10,6 +10,7 @@ from jaxtyping import Int
 
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.fused.freed_memory import make_room
 from pns_common.fused.kernels.children import (
     number_halves,
     split_edges,
@@ -83,9 +84,10 @@ def build_edges(faces: Int[np.ndarray, "F 3"], vertex_count: int, blocks: Blocks
         return _sorted_edges(faces, vertex_count)
     edges, half_edges = (np.empty((edge_count, 2), dtype=np.int32) for _ in range(2))
     edge_class = np.empty(edge_count, dtype=np.int8)
+    chains, made = (faces, low, links, int(plain[0])), (edges, half_edges, edge_class)
 
     def run(rows: slice) -> None:
-        classify(faces, low, links, rows.start, rows.stop, edges, half_edges, edge_class)
+        classify(*chains, rows.start, rows.stop, *made)
 
     blocks.run(edge_count, run)
     return MeshEdges(
@@ -147,6 +149,7 @@ def split_mesh_faces(
 ) -> Int[np.ndarray, "C 3"]:
     """Return the children of the faces, as ``topology.split`` orders them."""
     faces = np.empty((4 * len(parent.faces), 3), dtype=dtype)
+    make_room(faces.nbytes)
     split = split_faces if dtype is np.int32 else split_faces_long
 
     def fill(rows: slice) -> None:

@@ -49,12 +49,13 @@ def refine_fused(
         reports.append(step.report)
         after_level()
     added = step.added
-    nothing = len(step.points) if added is None else 0
+    # All of it is one number in memory.
+    nothing = np.broadcast_to(0.0, len(step.points))
     return RefinedLevels(
         points=step.points,
         faces=split_mesh_faces(level.mesh, np.int64, blocks),
-        ratio=np.zeros(nothing) if added is None else added.ratio,
-        gate=np.zeros(nothing) if added is None else added.gate,
+        ratio=nothing if added is None else added.ratio,
+        gate=nothing if added is None else added.gate,
         looked_at=Deferred(lambda: _look(control, reports)),
         split_topology=level.topology,
     )

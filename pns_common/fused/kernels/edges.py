@@ -103,11 +103,12 @@ def chain_edges(faces, most_steps, head, low, links, face_edges, plain):
     return count
 
 
-@kernel(SIZE, INDICES, INDEX, INTEGERS_2, SIZE, SIZE, INDICES_OUT, INDICES_OUT, CLASSES_OUT)
-def classify(faces, low, links, begin, end, edges, half_edges, edge_class):
+@kernel(SIZE, INDICES, INDEX, INTEGERS_2, SIZE, SIZE, SIZE, INDICES_OUT, INDICES_OUT, CLASSES_OUT)
+def classify(faces, low, links, plain, begin, end, edges, half_edges, edge_class):
     """Write ends, half-edges, classes of edges begin … end − 1; returns how many are not interior.
 
     Args:
+        plain: 1 where no face repeats a vertex: then no edge asks its faces. 0 where one may.
         edges: (E, 2) out: endpoints a < b.
         half_edges: (E, 2) out: the first half-edge, and the second where there are two.
         edge_class: (E,) out: EdgeClass values.
@@ -118,10 +119,10 @@ def classify(faces, low, links, begin, end, edges, half_edges, edge_class):
         edges[e, 0], edges[e, 1] = low[e], links[e, HIGH]
         half_edges[e, 0], half_edges[e, 1] = first, second
         kind = IRREGULAR
-        if not _repeats(faces, first // 3):
+        if plain or not _repeats(faces, first // 3):
             if second == NONE:
                 kind = BOUNDARY
-            elif second >= 0 and not _repeats(faces, second // 3):
+            elif second >= 0 and (plain or not _repeats(faces, second // 3)):
                 # Two half-edges that run against each other.
                 first_start = faces[first // 3, first % 3]
                 second_start = faces[second // 3, second % 3]

@@ -53,7 +53,11 @@ def place_edges(points, faces, edges, half_edges, edge_class, begin, end, placed
 
 @kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
 def sum_rings(points, edges, begin, end, sums, valence):
-    """Sum neighbours and valences of vertices begin … end − 1; both are 0 on entry."""
+    """Write sums of neighbours, and valences, of vertices begin … end − 1."""
+    for v in range(begin, end):
+        valence[v] = 0
+        for k in range(3):
+            sums[v, k] = 0.0
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
         if begin <= a < end:

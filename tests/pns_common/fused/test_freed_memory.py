@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from pns_common.fused import freed_memory
+
 PROGRAM = """
 import resource
 import numpy as np
@@ -21,8 +23,28 @@ faults()
 print(faults())
 """
 
+ROOM = """
+import numpy as np
+from pns_common.fused.freed_memory import LARGEST_KEPT, keep_freed_memory, make_room
 
-@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
+def mib():
+    with open("/proc/self/statm") as status:
+        return int(status.read().split()[1]) >> 8
+
+keep_freed_memory()
+tables = [np.ones(3 * 2**20, dtype=np.uint8) for _ in range(12)]
+last = np.ones(2**20, dtype=np.uint8)
+del tables
+before = mib()
+make_room(LARGEST_KEPT)
+kept = mib()
+make_room(LARGEST_KEPT + 1)
+print(before - kept, before - mib())
+"""
+GLIBC = pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
+
+
+@GLIBC
 def test_tables_of_the_second_call_are_the_firsts_memory():
     counts = [
         int(subprocess.check_output([sys.executable, "-c", PROGRAM.format(first=first)]))
@@ -31,3 +53,20 @@ def test_tables_of_the_second_call_are_the_firsts_memory():
     # 18 MiB are 4,608 pages, or 9 where they are huge.
     assert counts[1] <= counts[0] // 4
     assert counts[1] < 500
+
+
+@GLIBC
+def test_there_is_room_for_what_cannot_be_made_of_freed_memory():
+    kept, given_back = map(int, subprocess.check_output([sys.executable, "-c", ROOM]).split())
+    assert kept == 0
+    assert given_back > 20
+
+
+def test_elsewhere_nothing_is_done_for_room(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "another")
+    freed_memory._trim.cache_clear()
+    try:
+        freed_memory.make_room(freed_memory.LARGEST_KEPT + 1)
+        assert freed_memory._trim() is int
+    finally:
+        freed_memory._trim.cache_clear()

@@ -11,7 +11,9 @@ from pns_common import Mesh, ParameterError
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.creases import crease_children, with_creases
 from pns_common.connectivity.topology import Topology, build_topology, split
-from pns_common.fused.level import control_level, loop_step, next_level
+from pns_common.fused.level import ROUNDING, control_level, loop_step, next_level
+from pns_common.levels.refined_levels import check_coordinates
+from pns_common.mesh import LARGEST_COORDINATE
 from tests.support.kernels import by_arrays, by_kernels, edges_of
 from tests.support.meshes import TETRAHEDRON, bent, grid, manifolds, soups
 
@@ -47,5 +49,15 @@ def test_a_step_of_loop_adds_nothing_and_reports_what_the_arrays_do():
     arrays = by_arrays(mesh, 1)
     assert step.added is None
     np.testing.assert_array_equal(step.points, arrays.points)
-    assert step.largest == np.abs(arrays.points).max()
     assert [step.report()] == arrays.reports
+
+
+def test_how_large_loops_points_are_is_told_from_those_they_are_made_of():
+    points, faces = grid(4, bent)
+    size = np.abs(points).max()
+    for scale in (1.0, LARGEST_COORDINATE / size):
+        level = control_level(scale * points, faces, None, Blocks(1))
+        step = loop_step(level, Blocks(1))
+        assert np.abs(step.points).max() <= step.largest <= ROUNDING * scale * size
+        # As exact as the limit asks.
+        check_coordinates(step.largest)

@@ -53,7 +53,8 @@ def test_edges_are_numbered_as_they_appear_and_told_by_their_faces(shape, way):
     assert made == len(uses)
     edges, halves = (np.empty((made, 2), np.int32) for _ in range(2))
     kinds = np.empty(made, np.int8)
-    sharp = WAYS[way](classify)(faces.astype(np.int32), low, links, 0, made, edges, halves, kinds)
+    given = faces.astype(np.int32), low, links, int(plain), 0, made
+    sharp = WAYS[way](classify)(*given, edges, halves, kinds)
     assert list(map(tuple, edges.tolist())) == list(uses)
     number = {edge: e for e, edge in enumerate(uses)}
     for face, three in zip(faces.tolist(), face_edges.tolist(), strict=True):
