@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import msgspec
 import numpy as np
@@ -15,10 +16,15 @@ from .schema import Accessor, BufferView, Document, Sparse
 
 def element_size(accessor: Accessor) -> int:
     """Return the bytes of one element; a matrix's columns begin at multiples of four bytes."""
-    component = COMPONENT_TYPES[accessor.component_type].itemsize
-    rows = COLUMNS.get(accessor.type)
+    return _element_size(accessor.component_type, accessor.type)
+
+
+@cache
+def _element_size(component_type: int, kind: str) -> int:
+    component = COMPONENT_TYPES[component_type].itemsize
+    rows = COLUMNS.get(kind)
     if rows is None:
-        return component * COMPONENT_COUNTS[accessor.type]
+        return component * COMPONENT_COUNTS[kind]
     column = rows * component
     return rows * (column + -column % 4)
 

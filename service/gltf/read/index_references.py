@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 INSTANCING = "EXT_mesh_gpu_instancing"
@@ -43,21 +42,8 @@ KNOWN = frozenset(
 )
 
 
-@dataclass(slots=True)
-class Reference:
-    """A number at `holder[key]`; there are many, and a frozen one takes three times as long."""
-
-    holder: dict[str, Any]
-    key: str
-
-    @property
-    def index(self) -> int:
-        """What it points at."""
-        return self.holder[self.key]
-
-    def point_at(self, index: int) -> None:
-        """Let it name another index."""
-        self.holder[self.key] = index
+# A number at `holder[key]`. There are many: an object of its own for each takes as long again.
+Reference = tuple[dict[str, Any], str]
 
 
 def unknown_extensions(tree: dict[str, Any], text: bytes) -> list[str]:
@@ -86,21 +72,20 @@ def accessor_references(tree: dict[str, Any]) -> Iterator[Reference]:
     for mesh in tree.get("meshes", []):
         for primitive in mesh.get("primitives", []):
             for attributes in (primitive["attributes"], *primitive.get("targets", [])):
-                yield from (Reference(attributes, name) for name in attributes)
+                yield from ((attributes, name) for name in attributes)
             yield from _at(primitive, "indices")
     for skin in tree.get("skins", []):
         yield from _at(skin, "inverseBindMatrices")
     for animation in tree.get("animations", []):
         for sampler in animation["samplers"]:
-            yield from (Reference(sampler, key) for key in ("input", "output"))
+            yield sampler, "input"
+            yield sampler, "output"
     for node in tree.get("nodes", []):
         instances = node.get("extensions", {}).get(INSTANCING, {})
         if isinstance(instances, dict) and isinstance(instances.get("attributes"), dict):
             attributes = instances["attributes"]
             yield from (
-                Reference(attributes, name)
-                for name, index in attributes.items()
-                if isinstance(index, int)
+                (attributes, name) for name, index in attributes.items() if isinstance(index, int)
             )
 
 
@@ -109,18 +94,17 @@ def view_references(tree: dict[str, Any], accessors: list[dict[str, Any]]) -> It
     for image in tree.get("images", []):
         yield from _at(image, "bufferView")
     for accessor in accessors:
-        yield from _at(accessor, "bufferView")
+        if "bufferView" in accessor:
+            yield accessor, "bufferView"
         if "sparse" in accessor:
-            yield from (
-                Reference(accessor["sparse"][part], "bufferView") for part in ("indices", "values")
-            )
+            yield from ((accessor["sparse"][part], "bufferView") for part in ("indices", "values"))
     for mesh in tree.get("meshes", []):
         for primitive in mesh.get("primitives", []):
             draco = primitive.get("extensions", {}).get("KHR_draco_mesh_compression")
             if draco is not None:
-                yield Reference(draco, "bufferView")
+                yield draco, "bufferView"
 
 
 def _at(holder: dict[str, Any], key: str) -> Iterator[Reference]:
     if key in holder:
-        yield Reference(holder, key)
+        yield holder, key

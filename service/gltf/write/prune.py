@@ -7,10 +7,10 @@ as they were. What the file carried without use stays too: it was not ours to ju
 from __future__ import annotations
 
 import sys
-from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from operator import itemgetter
 from typing import Any
+
+import numpy as np
 
 from ..read.index_references import Reference, accessor_references, view_references
 from ..read.spare import Spare
@@ -26,7 +26,7 @@ def remove_unused(tree: dict[str, Any], spare: Spare) -> list[tuple[int, int]]:
     """
     accessors = tree.get("accessors", [])
     named = list(accessor_references(tree))
-    used = {reference.index for reference in named}
+    used = {holder[key] for holder, key in named}
     kept = [
         index in used or (index < spare.accessor_count and index not in spare.accessors)
         for index in range(len(accessors))
@@ -35,7 +35,7 @@ def remove_unused(tree: dict[str, Any], spare: Spare) -> list[tuple[int, int]]:
 
     views = tree.get("bufferViews", [])
     named = list(view_references(tree, tree["accessors"]))
-    used = {reference.index for reference in named}
+    used = {holder[key] for holder, key in named}
     kept = [
         index in used or (index < spare.view_count and index not in spare.views)
         for index in range(len(views))
@@ -61,9 +61,9 @@ def _renumbered(
     result = entries[:count]
     for old, new in place.items():
         result[new] = entries[old]
-    for reference in references:
-        if reference.index in place:
-            reference.point_at(place[reference.index])
+    for holder, key in references:
+        if holder[key] in place:
+            holder[key] = place[holder[key]]
     return result
 
 
@@ -104,10 +104,12 @@ def cut(
     return result, shifts
 
 
-def moved(offset: int, shifts: Sequence[tuple[int, int]]) -> int:
-    """Return where a byte lies after the cuts."""
-    cuts = bisect_right(shifts, offset, key=itemgetter(0))
-    return offset - (shifts[cuts - 1][1] if cuts else 0)
+def moved(offsets: Sequence[int], shifts: Sequence[tuple[int, int]]) -> list[int]:
+    """Return where bytes lie after the cuts."""
+    ends, removed = np.array([(0, 0), *shifts], dtype=np.int64).T
+    before = np.array(offsets, dtype=np.int64)
+    after: list[int] = (before - removed[np.searchsorted(ends, before, side="right") - 1]).tolist()
+    return after
 
 
 def _merged(ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:

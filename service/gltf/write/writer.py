@@ -84,13 +84,12 @@ class Writer:
         ]
         views = self.tree.get("bufferViews", [])
         stored = [self.bytes_of(view) for view in views]
-        needed = [
-            (p.get("byteOffset", 0), p.get("byteOffset", 0) + p["byteLength"]) for p in stored
-        ]
-        self.pieces, shifts = cut(self.pieces, gone, needed)
-        for place in stored:
+        starts = [place.get("byteOffset", 0) for place in stored]
+        ends = [start + place["byteLength"] for start, place in zip(starts, stored, strict=True)]
+        self.pieces, shifts = cut(self.pieces, gone, zip(starts, ends, strict=True))
+        for place, start in zip(stored, moved(starts, shifts), strict=True):
             if "byteOffset" in place:
-                place["byteOffset"] = moved(place["byteOffset"], shifts)
+                place["byteOffset"] = start
         self.length = sum(len(piece) for piece in self.pieces)
 
     def bytes_of(self, view: dict[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from ....errors import GltfError
 from ...constants import COMPONENT_TYPES, UNSIGNED_INTEGERS
 from ..accessors import element_size, extent
 from ..json_text import escaped
-from ..schema import Accessor, Document, Material, Primitive, TextureInfo
+from ..schema import Accessor, Document, Material, Primitive, Sparse, TextureInfo
 
 
 def check_references(document: Document, buffers: Sequence[memoryview]) -> None:
@@ -22,25 +22,23 @@ def check_references(document: Document, buffers: Sequence[memoryview]) -> None:
         GltfError: with the JSON pointer of the first reference or range that does not hold.
     """
     _check_buffer_views(document, buffers)
-    for number, accessor in enumerate(document.accessors):
-        _check_accessor(document, accessor, f"/accessors/{number}")
+    _check_accessors(document)
     for number, mesh in enumerate(document.meshes):
         for place, primitive in enumerate(mesh.primitives):
             _check_primitive(document, primitive, f"/meshes/{number}/primitives/{place}")
     for number, material in enumerate(document.materials):
         for name, texture in _texture_infos(material):
             refer(texture.index, document.textures, f"/materials/{number}/{name}/index")
-    for number, texture in enumerate(document.textures):
-        refer(texture.source, document.images, f"/textures/{number}/source")
-        refer(texture.sampler, document.samplers, f"/textures/{number}/sampler")
-    for number, image in enumerate(document.images):
-        refer(image.buffer_view, document.buffer_views, f"/images/{number}/bufferView")
+    textures = document.textures
+    refer_each([each.source for each in textures], document.images, "/textures", "/source")
+    refer_each([each.sampler for each in textures], document.samplers, "/textures", "/sampler")
+    views = [image.buffer_view for image in document.images]
+    refer_each(views, document.buffer_views, "/images", "/bufferView")
     for number, skin in enumerate(document.skins):
         pointer = f"/skins/{number}"
         refer(skin.inverse_bind_matrices, document.accessors, f"{pointer}/inverseBindMatrices")
         refer(skin.skeleton, document.nodes, f"{pointer}/skeleton")
-        for place, joint in enumerate(skin.joints):
-            refer(joint, document.nodes, f"{pointer}/joints/{place}")
+        refer_each(skin.joints, document.nodes, f"{pointer}/joints")
     _check_animations(document)
 
 
@@ -50,33 +48,45 @@ def refer(index: int | None, targets: Sequence[Any], pointer: str) -> None:
         raise GltfError(f"index {index}, but there are {len(targets)}", pointer=pointer)
 
 
+def refer_each(
+    indices: Sequence[int | None], targets: Sequence[Any], pointer: str, name: str = ""
+) -> None:
+    """Raise GltfError unless each is absent or one of the targets'; the first stands at 0/name."""
+    count = len(targets)
+    for place, index in enumerate(indices):
+        if index is not None and index >= count:
+            refer(index, targets, f"{pointer}/{place}{name}")
+
+
 def _check_buffer_views(document: Document, buffers: Sequence[memoryview]) -> None:
-    for number, view in enumerate(document.buffer_views):
-        pointer = f"/bufferViews/{number}"
-        refer(view.buffer, buffers, f"{pointer}/buffer")
-        end, available = view.byte_offset + view.byte_length, len(buffers[view.buffer])
+    views = document.buffer_views
+    refer_each([view.buffer for view in views], buffers, "/bufferViews", "/buffer")
+    lengths = [len(buffer) for buffer in buffers]
+    for number, view in enumerate(views):
+        end, available = view.byte_offset + view.byte_length, lengths[view.buffer]
         if end > available:
-            raise GltfError(f"the view ends at byte {end} of {available}", pointer=pointer)
-
-
-def _check_accessor(document: Document, accessor: Accessor, pointer: str) -> None:
-    refer(accessor.buffer_view, document.buffer_views, f"{pointer}/bufferView")
-    if accessor.buffer_view is not None:
-        view = document.buffer_views[accessor.buffer_view]
-        if view.byte_stride and view.byte_stride < element_size(accessor):
             raise GltfError(
-                f"elements of {element_size(accessor)} bytes at a stride of {view.byte_stride}",
-                pointer=pointer,
+                f"the view ends at byte {end} of {available}", pointer=f"/bufferViews/{number}"
             )
-        _check_end(extent(accessor, view), view.byte_length, pointer)
-    if accessor.sparse is not None:
-        _check_sparse(document, accessor, f"{pointer}/sparse")
 
 
-def _check_sparse(document: Document, accessor: Accessor, pointer: str) -> None:
-    sparse = accessor.sparse
-    if sparse is None:
-        return
+def _check_accessors(document: Document) -> None:
+    accessors, views = document.accessors, document.buffer_views
+    refer_each([each.buffer_view for each in accessors], views, "/accessors", "/bufferView")
+    for number, accessor in enumerate(accessors):
+        if accessor.buffer_view is not None:
+            view = views[accessor.buffer_view]
+            if view.byte_stride and view.byte_stride < element_size(accessor):
+                raise GltfError(
+                    f"elements of {element_size(accessor)} bytes at a stride of {view.byte_stride}",
+                    pointer=f"/accessors/{number}",
+                )
+            _check_end(extent(accessor, view), view.byte_length, f"/accessors/{number}")
+        if accessor.sparse is not None:
+            _check_sparse(document, accessor, accessor.sparse, f"/accessors/{number}/sparse")
+
+
+def _check_sparse(document: Document, accessor: Accessor, sparse: Sparse, pointer: str) -> None:
     if sparse.count > accessor.count:
         raise GltfError(
             f"{sparse.count} replacements of {accessor.count} elements", pointer=f"{pointer}/count"
@@ -136,11 +146,10 @@ def _texture_infos(material: Material) -> Iterable[tuple[str, TextureInfo]]:
 
 def _check_animations(document: Document) -> None:
     for number, animation in enumerate(document.animations):
-        pointer = f"/animations/{number}"
-        for place, sampler in enumerate(animation.samplers):
-            refer(sampler.input, document.accessors, f"{pointer}/samplers/{place}/input")
-            refer(sampler.output, document.accessors, f"{pointer}/samplers/{place}/output")
-        for place, channel in enumerate(animation.channels):
-            target = f"{pointer}/channels/{place}"
-            refer(channel.sampler, animation.samplers, f"{target}/sampler")
-            refer(channel.target.node, document.nodes, f"{target}/target/node")
+        samplers, pointer = animation.samplers, f"/animations/{number}/samplers"
+        refer_each([each.input for each in samplers], document.accessors, pointer, "/input")
+        refer_each([each.output for each in samplers], document.accessors, pointer, "/output")
+        channels, pointer = animation.channels, f"/animations/{number}/channels"
+        refer_each([each.sampler for each in channels], samplers, pointer, "/sampler")
+        nodes = [each.target.node for each in channels]
+        refer_each(nodes, document.nodes, pointer, "/target/node")

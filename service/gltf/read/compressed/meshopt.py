@@ -52,7 +52,7 @@ def placeholders(document: Document) -> set[int]:
     return {
         view.buffer
         for view in document.buffer_views
-        if any(name in view.extensions for name in EXTENSIONS)
+        if view.extensions and any(name in view.extensions for name in EXTENSIONS)
     }
 
 
