@@ -6,11 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.base.blocks import Blocks
-from pns_common.fused.kernels.normals import (
-    flipped_children,
-    largest_jump_across,
-    largest_jump_inside,
-)
+from pns_common.fused.kernels.normals import flipped_children, largest_jump
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.geometry.child_faces import ChildAngles, angle_between
 
@@ -22,25 +18,17 @@ def look_at_children(
     blocks: Blocks,
 ) -> ChildAngles:
     """Look at the faces that ``parent`` was split into, as pns_common.geometry.child_faces does."""
-    count, edge_count = len(parent.faces), len(parent.edges)
-    inside, across = np.zeros(blocks.count(count)), np.zeros(blocks.count(edge_count))
-    flipped, largest_yet = np.zeros(blocks.count(count), dtype=np.int64), np.zeros(1)
+    count = len(parent.faces)
+    jumps, largest_yet = np.zeros(blocks.count(count)), np.zeros(1)
+    flipped = np.zeros(blocks.count(count), dtype=np.int64)
     faces, vertices = (parent.faces, parent.face_edges), parent.vertex_count
     edges = parent.half_edges, parent.edge_class
 
-    def look_inside(rows: slice) -> None:
+    def look(rows: slice) -> None:
         block, bounds = blocks.number(rows, count), (vertices, rows.start, rows.stop)
-        inside[block] = largest_jump_inside(points, *faces, *bounds, largest_yet)
+        jumps[block] = largest_jump(points, *faces, *edges, *bounds, largest_yet)
         if loop_points is not None:
             flipped[block] = flipped_children(points, loop_points, *faces, *bounds)
 
-    def look_across(rows: slice) -> None:
-        bounds = vertices, rows.start, rows.stop
-        across[blocks.number(rows, edge_count)] = largest_jump_across(
-            points, *faces, *edges, *bounds, largest_yet
-        )
-
-    blocks.run(count, look_inside)
-    blocks.run(edge_count, look_across)
-    chord = max(inside.max(initial=0), across.max(initial=0))
-    return ChildAngles(int(flipped.sum()), angle_between(chord))
+    blocks.run(count, look)
+    return ChildAngles(int(flipped.sum()), angle_between(jumps.max(initial=0)))

@@ -14,11 +14,7 @@ from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import Topology
-from pns_common.fused.kernels.normals import (
-    flipped_children,
-    largest_jump_across,
-    largest_jump_inside,
-)
+from pns_common.fused.kernels.normals import flipped_children, largest_jump
 from pns_common.fused.learned_step import learned_points
 from pns_common.fused.level import FusedLevel, control_level, next_level
 from pns_common.fused.loop_points import largest_size, loop_points
@@ -197,12 +193,11 @@ def _children(
     faces, edges = (mesh.faces, mesh.face_edges), (mesh.half_edges, mesh.edge_class)
     count, seen = mesh.vertex_count, list[ChildAngles]()
     for part in range(parts.count):
-        at_faces, at_edges = parts.faces[part : part + 2], parts.edges[part : part + 2]
-        largest_yet = np.zeros(1)
-        inside = largest_jump_inside(points, *faces, count, *at_faces, largest_yet)
-        across = largest_jump_across(points, *faces, *edges, count, *at_edges, largest_yet)
+        at_faces = parts.faces[part : part + 2]
+        # What is across an edge of a part is of that part.
+        jump = largest_jump(points, *faces, *edges, count, *at_faces, np.zeros(1))
         flipped = 0
         if counterpart is not None:
             flipped = flipped_children(points, counterpart, *faces, count, *at_faces)
-        seen.append(ChildAngles(int(flipped), angle_between(max(inside, across))))
+        seen.append(ChildAngles(int(flipped), angle_between(jump)))
     return seen

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.arrays import dot
+from pns_common.base.blocks import BLOCK_ROWS
 from pns_common.connectivity.topology import Connectivity, EdgeClass
 from pns_common.geometry.child_faces import ChildAngles
 from pns_common.levels.step import AddedStep
@@ -89,30 +90,32 @@ class LimitDistances(TypedDict):
 def level_report(topology: Connectivity, step: AddedStep, children: ChildAngles) -> LevelReport:
     """Summarise the step that refined ``topology``."""
     vertices, edges = step.vertices, step.edges
-    interior = topology.interior
+    gate, shut = _of(edges.gate, topology.interior), 0
     report: LevelReport = {
         "vertices": topology.vertex_count + len(topology.edge_class),
         "faces": 4 * len(topology.faces),
         "edges": edge_counts(topology.edge_class),
         "degenerate_frames": int(edges.degenerate.sum() + vertices.degenerate.sum()),
         "flipped_faces": children.flipped,
-        "proximity_ratio": _ratio_summary(edges.ratio[interior]),
-        "gate": _gate_summary(edges.gate[interior]),
+        "proximity_ratio": _ratio_summary(_of(edges.ratio, topology.interior)),
+        "gate": _gate_summary(gate),
         "normal_jump_max": children.normal_jump_max,
     }
     if vertices.corrected is not None:
+        vertex_gate = _of(vertices.gate, vertices.corrected)
         report["vertex_rule"] = {
             "vertices": int(vertices.corrected.sum()),
-            "proximity_ratio": _ratio_summary(vertices.ratio[vertices.corrected]),
-            "gate": _gate_summary(vertices.gate[vertices.corrected]),
+            "proximity_ratio": _ratio_summary(_of(vertices.ratio, vertices.corrected)),
+            "gate": _gate_summary(vertex_gate),
         }
+        shut = _shut(vertex_gate)
     if step.learned:
         rules = (vertices, edges)
         report["displacement_max"] = max(_longest(rule.displacement) for rule in rules)
         envelopes = [_largest(rule) for rule in rules]
         bounds = [bound for bound in envelopes if bound is not None]
         report["envelope_max"] = max(bounds) if len(bounds) == len(rules) else None
-        report["shut"] = _shut(edges, interior) + _shut(vertices, vertices.corrected)
+        report["shut"] = _shut(gate) + shut
     if step.guard is not None:
         report["guarded"] = int((step.guard < 1).sum())
     return report
@@ -134,11 +137,21 @@ def limit_distances(levels: Sequence[LevelReport]) -> LimitDistances:
     }
 
 
+def _of(values: Float[np.ndarray, " N"], rows: np.ndarray) -> Float[np.ndarray, " M"]:
+    """Return some of the values, by indices or flags; no copy where they are all."""
+    all_of_them = rows.all() if rows.dtype == bool else len(rows) == len(values)
+    return values if all_of_them else values[rows]
+
+
 def _longest(displacement: Float[np.ndarray, "N 3"] | None) -> float:
     """Return the largest length; of the squares, since a root keeps their order."""
     if displacement is None:
         return 0.0
-    return math.sqrt(dot(displacement, displacement).max(initial=0))
+    largest = 0.0
+    for start in range(0, len(displacement), BLOCK_ROWS):
+        some = displacement[start : start + BLOCK_ROWS]
+        largest = max(largest, float(dot(some, some).max()))
+    return math.sqrt(largest)
 
 
 def _largest(rule: Added) -> float | None:
@@ -148,18 +161,20 @@ def _largest(rule: Added) -> float | None:
     return None if rule.envelope is None else float(rule.envelope.max(initial=0))
 
 
-def _shut(rule: Added, rows: np.ndarray | None) -> int:
-    """Count those of some vertices that have a gate of 0."""
-    return 0 if rows is None else int(np.count_nonzero(rule.gate[rows] == 0))
+def _shut(gate: Float[np.ndarray, " N"]) -> int:
+    return int(np.count_nonzero(gate == 0))
 
 
 def edge_counts(edge_class: Int[np.ndarray, " E"]) -> EdgeCounts:
     """Count the edges of each class."""
-    count = np.bincount(edge_class, minlength=len(EdgeClass)).tolist()
+
+    def count(kind: EdgeClass) -> int:
+        return int(np.count_nonzero(edge_class == kind))
+
     counts: EdgeCounts = {
-        "interior": count[EdgeClass.INTERIOR],
-        "boundary": count[EdgeClass.BOUNDARY],
-        "irregular": count[EdgeClass.IRREGULAR],
+        "interior": count(EdgeClass.INTERIOR),
+        "boundary": count(EdgeClass.BOUNDARY),
+        "irregular": count(EdgeClass.IRREGULAR),
     }
     rest = len(edge_class) - counts["interior"] - counts["boundary"] - counts["irregular"]
     if rest:

@@ -117,33 +117,6 @@ def _chord_inside(points, vertex_count, faces, face_edges, f):
     return largest
 
 
-@kernel(REAL, POINTS, INDICES, INDICES, SIZE, SIZE, SIZE, NUMBERS_OUT)
-def largest_jump_inside(points, faces, face_edges, vertex_count, begin, end, largest_yet):
-    """Return the largest squared chord between normals inside one of faces begin … end − 1.
-
-    Args:
-        largest_yet: (1,) in and out: the largest found anywhere. It only spares work: threads may
-            overwrite each other's, so the answer is the largest that any call returns.
-    """
-    largest, bound = 0.0, _bound(largest_yet[0])
-    for f in range(begin, end):
-        a, b, c = _row(points, faces[f, 0]), _row(points, faces[f, 1]), _row(points, faces[f, 2])
-        ab = _row(points, vertex_count + face_edges[f, 0])
-        bc = _row(points, vertex_count + face_edges[f, 1])
-        ca = _row(points, vertex_count + face_edges[f, 2])
-        centre = area(ab, bc, ca)
-        if (
-            clearly_less(centre, area(a, ab, ca), bound)
-            and clearly_less(centre, area(b, bc, ab), bound)
-            and clearly_less(centre, area(c, ca, bc), bound)
-        ):
-            continue
-        largest = max(largest, _chord_inside(points, vertex_count, faces, face_edges, f))
-        largest_yet[0] = max(largest, largest_yet[0])
-        bound = _bound(largest_yet[0])
-    return largest
-
-
 @called_seldom
 def _chord_across(points, vertex_count, faces, face_edges, f, i, g, j):
     """Return the larger squared chord across an edge: face f's at corner i, g's at corner j."""
@@ -160,31 +133,56 @@ def _chord_across(points, vertex_count, faces, face_edges, f, i, g, j):
 
 
 @kernel(REAL, POINTS, INDICES, INDICES, INDICES, CLASSES, SIZE, SIZE, SIZE, NUMBERS_OUT)
-def largest_jump_across(
+def largest_jump(
     points, faces, face_edges, half_edges, edge_class, vertex_count, begin, end, largest_yet
 ):
-    """Return the same between children across interior edges begin … end − 1."""
+    """Return the largest squared chord between normals of children of faces begin … end − 1.
+
+    Children are compared inside a face, and across those interior edges that it is the first of.
+
+    Args:
+        largest_yet: (1,) in and out: the largest found anywhere. It only spares work: threads may
+            overwrite each other's, so the answer is the largest that any call returns.
+    """
     largest, bound = 0.0, _bound(largest_yet[0])
-    for e in range(begin, end):
-        if edge_class[e] != INTERIOR:
-            continue
-        # The two faces run along their edge in opposite directions.
-        f, g = half_edges[e, 0] // 3, half_edges[e, 1] // 3
-        i, j = half_edges[e, 0] - 3 * f, half_edges[e, 1] - 3 * g
-        start, stop = _row(points, faces[f, i]), _row(points, faces[g, j])
-        middle = _row(points, vertex_count + e)
-        left_start = _row(points, vertex_count + face_edges[f, _before(i)])
-        left_stop = _row(points, vertex_count + face_edges[f, _after(i)])
-        right_start = _row(points, vertex_count + face_edges[g, _after(j)])
-        right_stop = _row(points, vertex_count + face_edges[g, _before(j)])
-        if clearly_less(
-            area(start, middle, left_start), area(start, right_start, middle), bound
-        ) and clearly_less(area(stop, left_stop, middle), area(stop, middle, right_stop), bound):
-            continue
-        chord = _chord_across(points, vertex_count, faces, face_edges, f, i, g, j)
-        largest = max(largest, chord)
-        largest_yet[0] = max(largest, largest_yet[0])
-        bound = _bound(largest_yet[0])
+    for f in range(begin, end):
+        a, b, c = _row(points, faces[f, 0]), _row(points, faces[f, 1]), _row(points, faces[f, 2])
+        ab = _row(points, vertex_count + face_edges[f, 0])
+        bc = _row(points, vertex_count + face_edges[f, 1])
+        ca = _row(points, vertex_count + face_edges[f, 2])
+        centre, at_a = area(ab, bc, ca), area(a, ab, ca)
+        at_b, at_c = area(b, bc, ab), area(c, ca, bc)
+        if not (
+            clearly_less(centre, at_a, bound)
+            and clearly_less(centre, at_b, bound)
+            and clearly_less(centre, at_c, bound)
+        ):
+            largest = max(largest, _chord_inside(points, vertex_count, faces, face_edges, f))
+            largest_yet[0] = max(largest, largest_yet[0])
+            bound = _bound(largest_yet[0])
+        for i in range(3):
+            e = face_edges[f, i]
+            if edge_class[e] != INTERIOR or half_edges[e, 0] != 3 * f + i:
+                continue
+            if i == 0:
+                start, middle, stop, at_start, at_stop = a, ab, b, at_a, at_b
+            elif i == 1:
+                start, middle, stop, at_start, at_stop = b, bc, c, at_b, at_c
+            else:
+                start, middle, stop, at_start, at_stop = c, ca, a, at_c, at_a
+            # The other face runs along the edge in the opposite direction.
+            g = half_edges[e, 1] // 3
+            j = half_edges[e, 1] - 3 * g
+            by_start = _row(points, vertex_count + face_edges[g, _after(j)])
+            by_stop = _row(points, vertex_count + face_edges[g, _before(j)])
+            if clearly_less(at_start, area(start, by_start, middle), bound) and clearly_less(
+                at_stop, area(stop, middle, by_stop), bound
+            ):
+                continue
+            chord = _chord_across(points, vertex_count, faces, face_edges, f, i, g, j)
+            largest = max(largest, chord)
+            largest_yet[0] = max(largest, largest_yet[0])
+            bound = _bound(largest_yet[0])
     return largest
 
 

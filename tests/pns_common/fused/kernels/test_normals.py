@@ -11,8 +11,7 @@ from pns_common.fused.kernels.normals import (
     area,
     clearly_less,
     flipped_children,
-    largest_jump_across,
-    largest_jump_inside,
+    largest_jump,
     squared_chord,
     unit_normal,
 )
@@ -40,16 +39,22 @@ def chords(pairs):
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("yet", [0.0, 1.0])
 def test_the_largest_jump_is_that_of_all_pairs(way, yet):
-    pairs = AFTER.edge_faces[AFTER.interior]
-    inside = pairs[:, 0] // 4 == pairs[:, 1] // 4
-    faces, largest = (MESH.faces, MESH.face_edges), np.array([yet])
-    found = WAYS[way](largest_jump_inside)(MOVED, *faces, 16, 0, len(FACES), largest)
-    assert found == pytest.approx(chords(pairs[inside]).max(), rel=1e-13) == largest[0]
-    largest = np.array([yet])
+    pairs, largest = AFTER.edge_faces[AFTER.interior], np.array([yet])
     edges = MESH.half_edges, MESH.edge_class
-    count = len(MESH.edges)
-    found = WAYS[way](largest_jump_across)(MOVED, *faces, *edges, 16, 0, count, largest)
-    assert found == pytest.approx(chords(pairs[~inside]).max(), rel=1e-13) == largest[0]
+    found = WAYS[way](largest_jump)(
+        MOVED, MESH.faces, MESH.face_edges, *edges, 16, 0, len(FACES), largest
+    )
+    assert found == pytest.approx(chords(pairs).max(), rel=1e-13) == largest[0]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_face_looks_inside_and_across_the_edges_that_it_is_the_first_of(way):
+    pairs = AFTER.edge_faces[AFTER.interior]
+    first = pairs.min(axis=1) // 4
+    for f in range(len(FACES)):
+        given_ = MOVED, MESH.faces, MESH.face_edges, MESH.half_edges, MESH.edge_class, 16
+        found = WAYS[way](largest_jump)(*given_, f, f + 1, np.zeros(1))
+        assert found == pytest.approx(chords(pairs[first == f]).max(), rel=1e-13)
 
 
 @pytest.mark.parametrize("way", WAYS)
