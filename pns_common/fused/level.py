@@ -39,26 +39,7 @@ class FusedLevel:
 
     def topology(self) -> Topology:
         """Return the same connectivity as the array kernels keep it."""
-        mesh = self.mesh
-        faces, edges = mesh.faces.astype(np.int64), mesh.edges.astype(np.int64)
-        opposed = (mesh.edge_class == EdgeClass.INTERIOR) | (mesh.edge_class == EdgeClass.CREASE)
-        half_edges = np.where(opposed[:, None], mesh.half_edges, np.int64(-1))
-        stencil = np.full((len(edges), 4), -1, dtype=np.int64)
-        stencil[:, :2] = edges
-        rows = np.flatnonzero(opposed)
-        # The vertex of a triangle that is on neither end: all three less those two.
-        three, two = faces.sum(axis=1)[half_edges[rows] // 3], edges[rows].sum(axis=1)
-        stencil[rows, 2:] = three - two[:, None]
-        return Topology(
-            vertex_count=mesh.vertex_count,
-            faces=faces,
-            edges=edges,
-            face_edges=mesh.face_edges.astype(np.int64),
-            half_edges=half_edges,
-            stencil=stencil,
-            edge_class=mesh.edge_class,
-            interior=mesh.interior.astype(np.int64),
-        )
+        return topology_of(self.mesh)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,16 +68,56 @@ def control_level(
     Raises:
         ParameterError: a crease is no edge of the mesh.
     """
-    mesh = build_edges(faces.astype(np.int32), len(points), blocks)
-    return FusedLevel(points, _with_creases(mesh, creases), blocks)
+    return FusedLevel(points, control_edges(faces, len(points), creases, blocks), blocks)
 
 
 def next_level(level: FusedLevel, points: Float[np.ndarray, "W 3"], blocks: Blocks) -> FusedLevel:
-    """Return the level whose points a step has placed; the children of creases are creases."""
-    mesh, made = level.mesh, split_mesh_edges(level.mesh, blocks)
+    """Return the level whose points a step has placed."""
+    return FusedLevel(points, next_edges(level.mesh, blocks), blocks)
+
+
+def control_edges(
+    faces: Int[np.ndarray, "F 3"],
+    vertex_count: int,
+    creases: Int[np.ndarray, "N 2"] | None,
+    blocks: Blocks,
+) -> MeshEdges:
+    """Return the edges of a control mesh.
+
+    Raises:
+        ParameterError: a crease is no edge of the mesh.
+    """
+    return _with_creases(build_edges(faces.astype(np.int32), vertex_count, blocks), creases)
+
+
+def next_edges(mesh: MeshEdges, blocks: Blocks) -> MeshEdges:
+    """Return the edges of the split mesh; the children of creases are creases."""
     # Where the edges were split by arithmetic their classes were too.
     creases = None if mesh.plain else crease_halves(mesh.edges, mesh.edge_class, mesh.vertex_count)
-    return FusedLevel(points, _with_creases(made, creases), blocks)
+    return _with_creases(split_mesh_edges(mesh, blocks), creases)
+
+
+def topology_of(mesh: MeshEdges) -> Topology:
+    """Return the same connectivity as the array kernels keep it."""
+    faces, edges = mesh.faces.astype(np.int64), mesh.edges.astype(np.int64)
+    opposed = (mesh.edge_class == EdgeClass.INTERIOR) | (mesh.edge_class == EdgeClass.CREASE)
+    half_edges = np.where(opposed[:, None], mesh.half_edges, np.int64(-1))
+    stencil = np.full((len(edges), 4), -1, dtype=np.int64)
+    stencil[:, :2] = edges
+    rows = np.flatnonzero(opposed)
+    # The vertex of a triangle that is on neither end: all three less those two.
+    three, two = faces.sum(axis=1)[half_edges[rows] // 3], edges[rows].sum(axis=1)
+    stencil[rows, 2:] = three - two[:, None]
+    return Topology(
+        vertex_count=mesh.vertex_count,
+        faces=faces,
+        edges=edges,
+        face_edges=mesh.face_edges.astype(np.int64),
+        half_edges=half_edges,
+        stencil=stencil,
+        edge_class=mesh.edge_class,
+        interior=mesh.interior.astype(np.int64),
+    )
 
 
 def loop_step(level: FusedLevel, blocks: Blocks) -> FusedStep:

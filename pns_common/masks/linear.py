@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -44,6 +45,19 @@ def refine_linear(
         vertices = loop_vertex_vertices(columns, topology)
         columns = np.concatenate([vertices, loop_edge_vertices(columns, topology)])
     return columns
+
+
+class ColumnRefinement(Protocol):
+    """What refines columns, however it does that."""
+
+    @property
+    def count(self) -> int:
+        """How many refined vertices there are."""
+        ...
+
+    def __call__(self, columns: Float[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
+        """Refine columns."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.base.extent import extent
 from pns_common.errors import MeshError
-from pns_common.masks.linear import LinearRefinement, level_topologies
+from pns_common.fused.linear import linear_refinement
 from pns_common.mesh import Cleaned
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme
@@ -123,8 +123,7 @@ def _skin_and_morph(
         return control.skin_and_morph
     at_vertices = control.skin_and_morph.take(vertex_rows(control, cleaned))
     faces, count = cleaned.mesh.faces, len(cleaned.mesh.vertices)
-    topologies = level_topologies(faces, count, options.levels, creases)
-    linear = LinearRefinement(topologies, options.limit)
+    linear = linear_refinement(faces, count, options.levels, creases, limit=options.limit)
     return refine_skin_and_morph(at_vertices, linear)
 
 

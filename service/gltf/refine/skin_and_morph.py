@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.masks.linear import LinearRefinement
+from pns_common.masks.linear import ColumnRefinement
 
 from ...meshes.weld import as_words, canonical_zero, distinct_rows
 from ..read.primitives import TrianglePrimitive
@@ -63,7 +63,7 @@ def read_skin_and_morph(primitives: Sequence[TrianglePrimitive]) -> SkinAndMorph
     return SkinAndMorph(read_binding(primitives), tuple(deltas), _NONE)
 
 
-def refine_skin_and_morph(control: SkinAndMorph, linear: LinearRefinement) -> SkinAndMorph:
+def refine_skin_and_morph(control: SkinAndMorph, linear: ColumnRefinement) -> SkinAndMorph:
     """Refine skin and morph; deltas in float32, as they will be written."""
     binding, cut = None, _NONE
     if control.binding is not None:

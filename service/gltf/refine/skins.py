@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.masks.linear import LinearRefinement
+from pns_common.masks.linear import ColumnRefinement
 
 from ..read.primitives import TrianglePrimitive
 from ..read.quantization import as_float
 
 SLOTS = 4
 # Joints refined at a time: the memory does not grow with the skeleton.
-COLUMNS = 8
+COLUMNS = 9
 # Integers up to here are exact in float32, and so are their sums: weights that are multiples of
 # 2⁻²⁴ add up to exactly 1 in any order.
 FLOAT_UNITS = 2**24
@@ -71,7 +71,7 @@ def read_binding(primitives: Sequence[TrianglePrimitive]) -> Binding | None:
 
 
 def refine_binding(
-    binding: Binding, linear: LinearRefinement
+    binding: Binding, linear: ColumnRefinement
 ) -> tuple[Binding, Int[np.ndarray, " V"]]:
     """Refine the binding; return also which vertices lost a joint for want of slots."""
     width = binding.weights.shape[1]
@@ -89,11 +89,11 @@ def refine_binding(
         dense[row[here], column[here] - start] = value[here]
         part = linear(dense)
         # Joints are local: most vertices have none of a block.
-        rows = np.flatnonzero(part.any(axis=1))
+        rows = np.flatnonzero(_row_sums(part))
         named = np.broadcast_to(block, (len(rows), len(block)))
         heavy = np.hstack([weights[rows], part[rows]])
         joints[rows], weights[rows] = _heaviest(np.hstack([joints[rows], named]), heavy, width)
-        cut[rows] += heavy.sum(axis=1) - weights[rows].sum(axis=1)
+        cut[rows] += _row_sums(heavy) - _row_sums(weights[rows])
     return _normalised(joints, weights), np.flatnonzero(cut > NOTHING)
 
 
@@ -172,6 +172,11 @@ def _heaviest(
     order = np.argsort(-weights, axis=1, kind="stable")[:, :count]
     joints, weights = (np.take_along_axis(part, order, axis=1) for part in (joints, weights))
     return np.where(weights > 0, joints, 0), weights
+
+
+def _row_sums(weights: Float[np.ndarray, "N K"]) -> Float[np.ndarray, " N"]:
+    """Return what each row weighs, to rounding: numpy's own sums take long over short rows."""
+    return weights @ np.ones(weights.shape[1])
 
 
 def _normalised(joints: Int[np.ndarray, "N K"], weights: Float[np.ndarray, "N K"]) -> Binding:

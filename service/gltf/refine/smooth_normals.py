@@ -104,9 +104,11 @@ def _with_normals(
     """Return rows of their own for each vertex, fan and side that the corners name."""
     side = np.full(primitive.corners.shape, -1)
     side[keep] = 2 * fan + turned[:, None]
-    pairs = np.column_stack([primitive.corners.reshape(-1), side.reshape(-1)])
-    distinct, corners = np.unique(pairs, axis=0, return_inverse=True)
-    row, of_fan = distinct.T
+    # Pairs of row and side as one number each: numpy sorts pairs ten times as slowly.
+    sides = int(side.max()) + 2
+    code = primitive.corners.reshape(-1) * sides + (side.reshape(-1) + 1)
+    distinct, corners = np.unique(code, return_inverse=True)
+    row, of_fan = distinct // sides, distinct % sides - 1
     old = primitive.attributes.get("NORMAL")
     normals = np.zeros((len(row), 3)) if old is None else old[row].astype(np.float64)
     known = of_fan >= 0

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Int
 
 from pns_common.base.deferred import Deferred
 from pns_common.errors import MeshError
-from pns_common.masks.linear import LinearRefinement, level_topologies
+from pns_common.fused.linear import linear_refinement
 from pns_common.mesh import Cleaned
 from pns_common.refine import Refinement, Report
 from pns_common.refine_parts import PartsRefinement, refine_parts
@@ -230,8 +230,9 @@ def _skin_and_morph(
         table, binding = local_joints(own.binding, before, parts.count)
         own = replace(own, binding=binding)
     mesh = cleaned.mesh
-    topologies = level_topologies(mesh.faces, len(mesh.vertices), options.levels, creases)
-    after = refine_skin_and_morph(own, LinearRefinement(topologies, options.limit))
+    count = len(mesh.vertices)
+    linear = linear_refinement(mesh.faces, count, options.levels, creases, limit=options.limit)
+    after = refine_skin_and_morph(own, linear)
     part_of = np.empty(len(made.mesh.vertices), dtype=np.int64)
     # Descendants lie as their faces do.
     part_of[made.mesh.faces] = np.repeat(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pns_common import load_model
+from pns_common.fused.linear import FusedLinearRefinement
 from pns_common.masks.linear import LinearRefinement
 from service.course import Course
 from service.gltf.read.plan import MeshPlan
@@ -141,6 +144,18 @@ def test_no_small_mesh_goes_alone(
     assert refine(files.glb(*whole), **asked).report["totals"]["meshes"] == len(whole)
 
 
+def counting(
+    linear: Callable[[object, np.ndarray], np.ndarray], columns: list[int]
+) -> Callable[[object, np.ndarray], np.ndarray]:
+    """Also keep how many columns are refined."""
+
+    def counted(self: object, block: np.ndarray) -> np.ndarray:
+        columns.append(block.shape[1])
+        return linear(self, block)
+
+    return counted
+
+
 def test_joints_of_one_mesh_do_not_wait_for_those_of_another() -> None:
     rng = np.random.default_rng(1)
     shapes = []
@@ -151,12 +166,8 @@ def test_joints_of_one_mesh_do_not_wait_for_those_of_another() -> None:
         shapes.append([shape])
     columns: list[int] = []
     with pytest.MonkeyPatch.context() as patch:
-        linear = LinearRefinement.__call__
-        patch.setattr(
-            LinearRefinement,
-            "__call__",
-            lambda self, block: columns.append(block.shape[1]) or linear(self, block),
-        )
+        for kind in (LinearRefinement, FusedLinearRefinement):
+            patch.setattr(kind, "__call__", counting(kind.__call__, columns))
         assert refine(files.glb(*shapes)).report["totals"]["meshes"] == 40
     assert columns == [4]
 

@@ -1,0 +1,39 @@
+"""Columns refined by kernels: the bits of the array kernels, whoever refines them."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pns_common.fused import linear, load_kernels
+from pns_common.fused.linear import FusedLinearRefinement, linear_refinement
+from pns_common.masks.linear import LinearRefinement, level_topologies
+from tests.support.kernels import edges_of
+from tests.support.meshes import manifolds, soups
+
+MESHES = st.one_of(manifolds(), soups())
+
+
+def refiners(mesh, levels, creases=None, *, limit=False):
+    load_kernels()
+    count = len(mesh.vertices)
+    arrays = LinearRefinement(level_topologies(mesh.faces, count, levels, creases), limit)
+    return arrays, linear_refinement(mesh.faces, count, levels, creases, limit=limit)
+
+
+@given(MESHES, st.integers(1, 7), st.integers(1, 2), st.booleans(), st.booleans())
+def test_columns_have_the_bits_of_the_arrays(mesh, width, levels, sharp, limit):
+    creases = edges_of(mesh, 3, 0) if sharp else None
+    arrays, kernels = refiners(mesh, levels, creases, limit=limit)
+    assert isinstance(kernels, FusedLinearRefinement)
+    assert kernels.count == arrays.count
+    columns = np.random.default_rng(0).standard_normal((len(mesh.vertices), width))
+    refined = kernels(columns)
+    assert refined.tobytes() == np.ascontiguousarray(arrays(columns)).tobytes()
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+def test_kernels_serve_where_they_are_loaded(loaded, monkeypatch):
+    monkeypatch.setattr(linear, "kernels_loaded", lambda: loaded)
+    made = linear_refinement(np.array([[0, 1, 2]]), 3, 1, None, limit=False)
+    assert isinstance(made, FusedLinearRefinement) is loaded
