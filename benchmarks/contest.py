@@ -42,6 +42,7 @@ class Contestant:
         self._process = subprocess.Popen(
             [*command, str(mesh), str(levels)],
             cwd=ROOT,
+            env=as_installed(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -74,6 +75,11 @@ class Contestant:
         self._process.stdin.close()
         self._process.stdout.close()
         self._process.wait()
+
+
+def as_installed() -> dict[str, str]:
+    """Return an environment that keeps modules compiled, as an installed package's are."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
 def contest(

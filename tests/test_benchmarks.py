@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.answers import upload
-from benchmarks.contest import ROOT, Case, contest, ours
+from benchmarks.contest import ROOT, Case, as_installed, contest, ours
 from benchmarks.generated import ORDERS
 from benchmarks.peers.protocol import read_mesh, write_mesh
 from pns_common.connectivity.topology import EdgeClass, build_topology
@@ -50,6 +50,13 @@ def test_a_method_that_fails_is_left_out_by_name():
     )
     assert contested["left_out"] == {"broken": "failed"}
     assert contested["methods"]["pns loop"]["runs"] == 2
+
+
+def test_modules_are_kept_compiled_as_an_installed_packages_are(monkeypatch):
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    assert "PYTHONDONTWRITEBYTECODE" not in as_installed()
+    assert as_installed()["OMP_NUM_THREADS"] == "3"
 
 
 def test_a_method_that_would_be_too_slow_is_not_started():

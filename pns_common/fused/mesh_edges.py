@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Int
 
 from pns_common.base.blocks import Blocks
-from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.connectivity.topology import build_topology
 from pns_common.fused.freed_memory import make_room
 from pns_common.fused.kernels.children import (
     number_halves,
@@ -18,6 +18,7 @@ from pns_common.fused.kernels.children import (
     split_faces_long,
 )
 from pns_common.fused.kernels.edges import (
+    BOUNDARY,
     INTERIOR,
     NONE,
     SEVERAL,
@@ -141,7 +142,7 @@ def split_mesh_edges(parent: MeshEdges, blocks: Blocks) -> MeshEdges:
 
 def has_boundary(mesh: MeshEdges) -> bool:
     """Return whether an edge has a single face."""
-    return bool((mesh.edge_class == EdgeClass.BOUNDARY).any())
+    return bool((mesh.edge_class == BOUNDARY).any())
 
 
 def split_mesh_faces(

