@@ -18,8 +18,9 @@ BYTES_PER_FACE = 280
 BYTES_PER_FACE_WITH_NORMALS = 400
 # The same for primitives that get normals on the way, with the three floats of each.
 BYTES_FOR_NORMALS = BYTES_PER_FACE_WITH_NORMALS - BYTES_PER_FACE + 36
-# The levels' connectivity again, and a block of columns, for skins and morph targets.
-BYTES_PER_FACE_WITH_FOLLOWERS = 350
+# For each refined vertex of a skin or morph target: the levels' connectivity again, a block of
+# columns, and each set of joints and weights while they are rounded.
+BYTES_PER_FOLLOWING_VERTEX = 640
 # The limit masks, and exact normals: the largest rise measured over what refining took.
 BYTES_FOR_LIMIT = 120
 # A refined face has at most 1.5 vertices: made, cast to float32, written.
@@ -110,12 +111,25 @@ def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, l
             )
             has_normals = "NORMAL" in primitive.attributes
             base = BYTES_PER_FACE_WITH_NORMALS if has_normals else BYTES_PER_FACE
-            if primitive.targets or "JOINTS_0" in primitive.attributes:
-                base += BYTES_PER_FACE_WITH_FOLLOWERS
-            corners = _corner_count(document, primitive)
-            faces = triangle_count(corners, primitive.mode, "") * 4**levels
+            before = triangle_count(_corner_count(document, primitive), primitive.mode, "")
+            faces = before * 4**levels
             total += BYTES_PER_PRIMITIVE + faces * (base + BYTES_PER_VERTEX_BYTE * width)
+            sets = sum(name.startswith("JOINTS_") for name in primitive.attributes)
+            if primitive.targets or sets:
+                count = document.accessors[primitive.attributes["POSITION"]].count
+                following = _refined_vertices(before, min(count, 3 * before), levels)
+                total += following * BYTES_PER_FOLLOWING_VERTEX * max(sets, 1)
     return total
+
+
+def _refined_vertices(faces: int, vertices: int, levels: int) -> int:
+    """Return how many vertices a mesh has after some levels, as Euler counts its edges.
+
+    A closed mesh has 3/2 edges a face; none has more than three.
+    """
+    inside = 2**levels - 1  # vertices on an edge
+    edges = min(3 * faces, max(3 * faces // 2, vertices + faces))
+    return vertices + inside * edges + inside * (inside - 1) // 2 * faces
 
 
 def _corner_count(document: Document, primitive: Primitive) -> int:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from pns_common.base.blocks import Blocks, available_threads
 from pns_common.masks.linear import ColumnRefinement
 
 from ..read.primitives import TrianglePrimitive
@@ -89,11 +90,16 @@ def refine_binding(
         dense[row[here], column[here] - start] = value[here]
         part = linear(dense)
         # Joints are local: most vertices have none of a block.
-        rows = np.flatnonzero(_row_sums(part))
-        named = np.broadcast_to(block, (len(rows), len(block)))
-        heavy = np.hstack([weights[rows], part[rows]])
-        joints[rows], weights[rows] = _heaviest(np.hstack([joints[rows], named]), heavy, width)
-        cut[rows] += _row_sums(heavy) - _row_sums(weights[rows])
+        touched = np.flatnonzero(_row_sums(part))
+
+        def merge(share: slice, touched=touched, block=block, part=part) -> None:
+            rows = touched[share]
+            named = np.broadcast_to(block, (len(rows), len(block)))
+            heavy = np.hstack([weights[rows], part[rows]])
+            joints[rows], weights[rows] = _heaviest(np.hstack([joints[rows], named]), heavy, width)
+            cut[rows] += _row_sums(heavy) - _row_sums(weights[rows])
+
+        Blocks(available_threads()).run(len(touched), merge)
     return _normalised(joints, weights), np.flatnonzero(cut > NOTHING)
 
 

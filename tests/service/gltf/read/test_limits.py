@@ -41,7 +41,8 @@ def test_predicted_memory_is_checked():
 
 @pytest.mark.parametrize("levels", [1, 3])
 @pytest.mark.parametrize("smooth", [True, False])
-def test_predicted_memory_bounds_what_is_used(levels, smooth):
+@pytest.mark.parametrize("skinned", [True, False])
+def test_predicted_memory_bounds_what_is_used(levels, smooth, skinned):
     # Noise over a grid; smooth shares every vertex, the other has one for each corner.
     n = 64 // 2 ** (levels - 1)
     x, y = np.meshgrid(np.arange(float(n + 1)), np.arange(n + 1), indexing="ij")
@@ -57,6 +58,10 @@ def test_predicted_memory_bounds_what_is_used(levels, smooth):
         "TEXCOORD_0": points[:, :2],
         "indices": faces,
     }
+    if skinned:
+        joints = np.random.default_rng(2).integers(0, 20, (len(points), 4))
+        shape["JOINTS_0"] = joints.astype(np.uint8)
+        shape["WEIGHTS_0"] = np.full((len(points), 4), 0.25, dtype=np.float32)
     data = files.glb([shape])
     refine(files.glb([octahedron()]), levels=levels)
     tracemalloc.start()
