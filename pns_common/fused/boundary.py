@@ -46,7 +46,9 @@ class SharpLevel:
         """Take the boundaries of a mesh; ``length`` is R, or each vertex's own."""
         edges = mesh.sharp_edges
         ends = mesh.edges[edges].astype(np.int64)
-        vertices = np.unique(ends)
+        at_boundary = np.zeros(len(points), dtype=bool)
+        at_boundary[ends] = True
+        vertices = np.flatnonzero(at_boundary)
         pairs = np.searchsorted(vertices, ends)
         no_faces, no_normals = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3))
         nothing = np.full((len(edges), 2), -1)
