@@ -159,8 +159,14 @@ def split(topology: Topology) -> Int[np.ndarray, "C 3"]:
 
     These are faces 4f … 4f+3. The vertex of edge e is V + e; old vertices keep their numbers.
     """
-    middles = topology.face_edges + topology.vertex_count
-    six = np.concatenate([topology.faces, middles], axis=1)  # a, b, c, ab, bc, ca
+    return split_faces(topology.faces, topology.face_edges, topology.vertex_count)
+
+
+def split_faces(
+    faces: Int[np.ndarray, "F 3"], face_edges: Int[np.ndarray, "F 3"], vertex_count: int
+) -> Int[np.ndarray, "C 3"]:
+    """Return the same of faces with their edges (a, b), (b, c), (c, a)."""
+    six = np.concatenate([faces, face_edges + vertex_count], axis=1)  # a, b, c, ab, bc, ca
     return np.take(six, CHILDREN.reshape(-1), axis=1).reshape(-1, 3)
 
 

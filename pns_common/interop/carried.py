@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.connectivity.topology import CHILDREN, split
-from pns_common.masks.linear import level_topologies
+from pns_common.base.distinct import distinct_rows, number_by_first_appearance
+from pns_common.connectivity.topology import CHILDREN, split_faces
+from pns_common.fused.face_edges import number_edges
 from pns_common.mesh import Mesh
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme
@@ -61,19 +62,18 @@ def refine_carried(
         options["creases"] = joined[np.asarray(options["creases"])]
     refinement = refine(Mesh(given.vertices[first], joined[given.faces]), scheme, levels, **options)
 
-    topologies = level_topologies(given.faces, len(given.vertices), levels)
+    faces, count = given.faces, len(given.vertices)
     points, corners, cells = dict(mesh.points), dict(mesh.corners), dict(mesh.cells)
-    for topology in topologies:
+    for _ in range(levels):
+        edges, face_edges = number_edges(faces, count)
         for name, values in points.items():
-            points[name] = np.concatenate([values, between(*_ends(values, topology.edges))])
-    for _ in topologies:
+            points[name] = np.concatenate([values, between(*_ends(values, edges))])
         corners = {name: corner_children(values) for name, values in corners.items()}
+        faces, count = split_faces(faces, face_edges, count), count + len(edges)
     cells = {name: np.repeat(values, 4**levels, axis=0) for name, values in cells.items()}
 
-    last = topologies[-1]
-    faces = split(last)
     # Both meshes have their faces in one order, so their corners correspond.
-    surface = np.zeros(last.vertex_count + len(last.edges), dtype=np.int64)
+    surface = np.zeros(count, dtype=np.int64)
     surface[: len(joined)] = joined
     surface[faces.reshape(-1)] = refinement.mesh.faces.reshape(-1)
     positions = refinement.mesh.vertices[surface]
@@ -88,11 +88,7 @@ def join_by_position(
     They are numbered by first appearance: a mesh without equal positions keeps its numbers.
     """
     # Adding 0 makes −0 the 0 that it equals.
-    _, first, group = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    number = np.empty_like(order)
-    number[order] = np.arange(len(order))
-    return number[group.reshape(-1)], first[order]
+    return number_by_first_appearance(distinct_rows(vertices + 0.0))
 
 
 def corner_children(corners: Shaped[np.ndarray, " F 3 *K"]) -> Shaped[np.ndarray, " G 3 *K"]:

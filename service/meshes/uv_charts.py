@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from pns_common.base.distinct import as_words, distinct_rows, number_by_first_appearance
 from pns_common.connectivity.topology import Topology, sharp_edge_count, split
 from pns_common.masks.linear import level_topologies
 from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 
 from ..options import Options
 from .split_connectivity import SplitConnectivity
-from .weld import as_words, distinct_rows, number_by_first_appearance
 
 # How C corners over welded vertices (C,) spread their texture coordinates (C, 2) over (N, 2).
 UvBlend = Callable[

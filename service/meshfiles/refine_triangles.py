@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common.base.distinct import distinct_rows, number_by_first_appearance
 from pns_common.errors import MeshError
 from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
 from pns_common.refine import Refinement, refine
@@ -21,7 +22,7 @@ from ..meshes.barycentric_grid import barycentric_grid
 from ..meshes.crease_angle import edges_sharper_than
 from ..meshes.split_connectivity import split_connectivity
 from ..meshes.uv_charts import uv_blend
-from ..meshes.weld import Weld, distinct_rows, number_by_first_appearance, weld
+from ..meshes.weld import Weld, weld
 from ..meshes.weld_tolerance import weld_within
 from ..options import Limits, Options
 from ..report import Change, dropped

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from pns_common.base.distinct import distinct_rows
 from pns_common.mesh import repeated_vertex
 
 from ..errors import UnrefinableError
-from ..meshes.weld import canonical_zero, distinct_rows
+from ..meshes.weld import canonical_zero
 from ..report import Change
 from .indexed_triangles import IndexedTriangles
 

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int, Shaped
 
+from pns_common.base.distinct import as_words, distinct_rows, number_by_first_appearance
+
 from ...errors import GltfError
-from ...meshes.weld import as_words, distinct_rows, number_by_first_appearance
 from ..constants import FLOAT
 from .accessors import read, read_rows
 from .modes import triangles

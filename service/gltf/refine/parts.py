@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int
 
-from ...meshes.weld import distinct_rows
+from pns_common.base.distinct import distinct_rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common.base.distinct import as_words, distinct_rows
 from pns_common.masks.linear import ColumnRefinement
 
-from ...meshes.weld import as_words, canonical_zero, distinct_rows
+from ...meshes.weld import canonical_zero
 from ..read.primitives import TrianglePrimitive
 from .skins import Binding, read_binding, refine_binding
 

@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks, available_threads
+from pns_common.base.distinct import number_by_first_appearance
 from pns_common.connectivity.topology import build_topology, next_corner
 from pns_common.fused.corner_normals import angle_weighted_normals
 from pns_common.mesh import Cleaned
 
-from ...meshes.weld import number_by_first_appearance
 from ..constants import FLOAT
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor

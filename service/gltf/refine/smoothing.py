@@ -16,12 +16,12 @@ from jaxtyping import Float, Int
 
 from pns_common.base.arrays import dot, norm
 from pns_common.base.blocks import Blocks, available_threads
+from pns_common.base.distinct import number_by_first_appearance
 from pns_common.fused.corner_normals import angle_weighted_normals
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import SplitConnectivity, at_descendants, split_connectivity
-from ...meshes.weld import number_by_first_appearance
 from .control_mesh import ControlMesh, slices
 from .normals import safe_unit
 

@@ -1,12 +1,8 @@
 """Welding by exact position, in the precision that it comes in."""
 
 import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra import numpy as hnp
 
-from service.meshes import weld as module
-from service.meshes.weld import distinct_rows, number_by_first_appearance, weld
+from service.meshes.weld import weld
 
 
 def test_vertices_are_numbered_by_first_appearance_over_corners():
@@ -34,49 +30,3 @@ def test_double_precision_is_welded_as_double():
     welded = weld(positions, np.array([[0, 1, 2], [3, 2, 0]]))
     assert welded.vertex_of.tolist() == [0, 1, 2, 1]
     np.testing.assert_array_equal(welded.points, positions[:3])
-
-
-# Values whose sums and bits are easy to confuse.
-VALUES = np.array([0, 1, 2, 1e-45, 3e38], dtype=np.float32).tolist()
-ROWS = hnp.arrays(
-    np.float32,
-    st.tuples(st.integers(1, 40), st.integers(1, 5)),
-    elements=st.sampled_from(VALUES),
-)
-NARROW_ROWS = hnp.arrays(
-    np.uint8, st.tuples(st.integers(1, 20), st.integers(1, 7)), elements=st.integers(0, 2)
-)
-
-
-@given(ROWS)
-def test_rows_share_a_number_exactly_where_they_are_equal(rows):
-    ids = distinct_rows(rows)
-    equal = (rows[:, None] == rows[None]).all(axis=2)
-    np.testing.assert_array_equal(ids[:, None] == ids[None], equal)
-
-
-@given(ROWS)
-def test_colliding_hashes_join_nothing(rows):
-    collide = module._hash
-    module._hash = lambda words: words[:, 0].astype(np.uint64) * 0
-    try:
-        ids = distinct_rows(rows)
-    finally:
-        module._hash = collide
-    equal = (rows[:, None] == rows[None]).all(axis=2)
-    np.testing.assert_array_equal(ids[:, None] == ids[None], equal)
-
-
-@given(NARROW_ROWS)
-def test_rows_of_odd_width_are_compared_whole(rows):
-    ids = distinct_rows(rows)
-    np.testing.assert_array_equal(ids[:, None] == ids[None], (rows[:, None] == rows).all(axis=2))
-
-
-@given(st.lists(st.integers(0, 9), max_size=30))
-def test_numbers_follow_first_appearance(labels):
-    expected = [list(dict.fromkeys(labels)).index(label) for label in labels]
-    numbers, first = number_by_first_appearance(np.array(labels, dtype=np.int64))
-    assert numbers.tolist() == expected
-    assert [labels[place] for place in first] == list(dict.fromkeys(labels))
-    assert first.tolist() == [labels.index(label) for label in dict.fromkeys(labels)]
