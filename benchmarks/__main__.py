@@ -36,7 +36,8 @@ FILE_WIDTH = 150
 
 
 def main(
-    runs: Annotated[int, typer.Option(help="runs of each method on each mesh")] = 6,
+    runs: Annotated[int, typer.Option(help="turns of each method on each mesh")] = 6,
+    in_a_row: Annotated[int, typer.Option(help="runs of a turn, one right after the other")] = 1,
     largest: Annotated[int, typer.Option(help="leave out meshes above this")] = CASES[-1].faces,
     model: Annotated[list[str] | None, typer.Option(help="bundled models to measure")] = None,
     write: Annotated[bool, typer.Option(help="write results.json and the plot")] = True,
@@ -61,7 +62,7 @@ def main(
             continue
         outputs = case.faces * 4**case.levels
         expected = {name: rate * outputs for name, rate in speed.items()}
-        contested = contest(case, commands, runs, expected)
+        contested = contest(case, commands, runs, expected, in_a_row)
         for name, method in contested["methods"].items():
             speed[name] = method["processor"] / method["made_faces"]
         done.append(contested)

@@ -83,13 +83,18 @@ def as_installed() -> dict[str, str]:
 
 
 def contest(
-    case: Case, commands: Mapping[str, Sequence[str]], rounds: int, expected: Mapping[str, float]
+    case: Case,
+    commands: Mapping[str, Sequence[str]],
+    rounds: int,
+    expected: Mapping[str, float],
+    in_a_row: int = 1,
 ) -> dict[str, Any]:
     """Measure all methods on a case, interleaved.
 
     Args:
         commands: how each method is started, by name.
-        rounds: runs of each; the first is the first call, the rest are warm.
+        rounds: turns of each; the first is the first call, the rest are warm.
+        in_a_row: runs of a warm turn, one right after the other.
         expected: processor seconds that a method would take, by an earlier size.
     """
     mesh = ORDERS[case.order](case.faces)
@@ -114,13 +119,15 @@ def contest(
             for name, contestant in playing.items():
                 # Ours may have loaded its kernels in the first call.
                 if name.startswith(OURS) or contestant.runs[0]["processor"] < SLOW * fastest:
-                    contestant.run()
+                    for _ in range(in_a_row):
+                        contestant.run()
         for contestant in playing.values():
             contestant.stop()
     return {
         "order": case.order,
         "faces": len(mesh.faces),
         "levels": case.levels,
+        "in_a_row": in_a_row,
         "load": round(os.getloadavg()[0], 1),
         "copy_bytes_per_second": median(copies),
         "sgemm_flops_per_second": sgemm_rate(),
