@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
@@ -38,7 +39,7 @@ class SplitConnectivity:
     ids: Int[np.ndarray, "F T"]
     count: int
 
-    @property
+    @cached_property
     def refined_faces(self) -> Int[np.ndarray, "D 3"]:
         """(F · 4^L, 3) the refined faces, in the operator's order."""
         return at_descendants(self.ids, self.grid)

@@ -129,7 +129,11 @@ def _refined_primitive(
     primitive = control.primitives[number]
     welded = control.weld.vertex_of[control.rows[number]]
     corners, row = distinct_corners(primitive, primitive.corners[control.kept[number]], welded)
-    own = split_connectivity(corners, len(row), grid)
+    if shading is not None and np.array_equal(corners, shading.groups.connectivity.faces):
+        # No seam but where normals part: the same has been split before.
+        own = shading.groups.connectivity
+    else:
+        own = split_connectivity(corners, len(row), grid)
     vertex = own.at_vertices(ids)
     normals, morphed = None, (None,) * len(refined.skin_and_morph.deltas)
     if shading is not None and number in shading.groups.ids:

@@ -38,16 +38,14 @@ class NormalGroups:
 
     Attributes:
         vertices: (D, 3) the refined vertices of the faces that have normals.
-        groups: (D, 3) their corners' groups.
-        count: G.
+        connectivity: that of the groups before they were split; their corners are its vertices.
         ids: by primitive the groups of its faces' grid points.
         before: makes the old normals (G, 3), blended linearly: what is left where faces have no
             area.
     """
 
     vertices: Int[np.ndarray, "D 3"]
-    groups: Int[np.ndarray, "D 3"]
-    count: int
+    connectivity: SplitConnectivity
     ids: dict[int, Int[np.ndarray, "F T"]]
     before: Callable[[], Float[np.ndarray, "G 3"]]
 
@@ -59,7 +57,8 @@ class NormalGroups:
     ) -> Float[np.ndarray, "G 3"]:
         """Return the groups' unit normals at refined vertices; those of `otherwise` if need be."""
         blocks = Blocks(available_threads(), before=course.count(len(self.vertices)))
-        values = angle_weighted_normals(points, self.vertices, self.groups, self.count, blocks)
+        groups, count = self.connectivity.refined_faces, self.connectivity.count
+        values = angle_weighted_normals(points, self.vertices, groups, count, blocks)
         x, y, z = values.T
         undefined = np.flatnonzero((x == 0) & (y == 0) & (z == 0))
         if len(undefined):
@@ -74,7 +73,7 @@ class NormalGroups:
         Where several are (creases), the limit has a normal for each side, and one cannot serve.
         """
         vertex = np.empty(len(values), dtype=np.int64)
-        vertex[self.groups.reshape(-1)] = self.vertices.reshape(-1)
+        vertex[self.connectivity.refined_faces.reshape(-1)] = self.vertices.reshape(-1)
         exact = limit[vertex]
         alone = (np.bincount(vertex, minlength=len(limit))[vertex] == 1) & exact.any(axis=1)
         # A face that is there turned over has the other side.
@@ -101,8 +100,7 @@ def normal_groups(
     shares = slices([len(ids[number]) for number in chosen])
     return NormalGroups(
         vertices=at_descendants(used, grid),
-        groups=groups.refined_faces,
-        count=groups.count,
+        connectivity=groups,
         ids={number: groups.ids[part] for number, part in zip(chosen, shares, strict=True)},
         before=lambda: safe_unit(groups.linear(before)),
     )
@@ -135,11 +133,14 @@ def joined_normals(
     SiblingFiles along one direction are compared: rows with equal normals are always joined, rows
     that nearly agree all but always, at the cost of one sort however many meet at a vertex.
     """
+    # Where a vertex has one row there is nothing to compare: most are inside smooth surfaces.
+    several = np.flatnonzero((np.bincount(vertex) > 1)[vertex])
+    v, n = vertex[several], normals[several]
     # Not by matrix product, whose bits depend on where a row stands.
-    order = np.lexsort((*normals.T, dot(normals, SCAN[None]), vertex))
-    v, n = vertex[order], normals[order]
+    order = np.lexsort((*n.T, dot(n, SCAN[None]), v))
+    v, n = v[order], n[order]
     opens = np.ones(len(order), dtype=bool)
     opens[1:] = (v[1:] != v[:-1]) | (norm(n[1:] - n[:-1]) > SAME_NORMAL)
-    labels = np.empty(len(order), dtype=np.int64)
-    labels[order] = np.cumsum(opens) - 1
+    labels = vertex.copy()
+    labels[several[order]] = vertex.max(initial=-1) + np.cumsum(opens)
     return labels
