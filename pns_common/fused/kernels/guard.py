@@ -42,19 +42,17 @@ def _turned(a, b, c, moved_a, moved_b, moved_c, cosine, clear):
     ``clear`` is a bound for ``clearly_less``: no root need be taken where the angle is clear.
     """
     u, v = _difference(a, b), _difference(a, c)
-    old = cross(u, v)
-    old_square = dot(old, old)
+    old, new = cross(u, v), cross(_difference(moved_a, moved_b), _difference(moved_a, moved_c))
+    old_square, new_square = dot(old, old), dot(new, new)
+    shrunk = not new_square >= LEAST_AREA**2 * old_square
+    # Whether it had an area or not: most faces end here.
+    if not shrunk and clearly_less((*old, old_square), (*new, new_square), clear):
+        return False
     least = NO_AREA * (dot(u, u) + dot(v, v))
     if not old_square > least * least:
         return False
-    new = cross(_difference(moved_a, moved_b), _difference(moved_a, moved_c))
-    new_square = dot(new, new)
-    if not new_square >= LEAST_AREA**2 * old_square:
-        return True
-    if clearly_less((*old, old_square), (*new, new_square), clear):
-        return False
     size = math.sqrt(old_square) * math.sqrt(new_square)
-    return not dot(old, new) >= cosine * size
+    return shrunk or not dot(old, new) >= cosine * size
 
 
 def _by_itself(p, displacement, scale, shared, v):
