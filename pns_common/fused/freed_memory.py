@@ -32,7 +32,7 @@ def keep_freed_memory() -> None:
 def make_room(size: int) -> None:
     """Give all that is freed back to the system, before so many bytes are written.
 
-    Only where they cannot be taken of that: a quarter of the peak at 1.3 million faces.
+    Only where they cannot be taken of that: a fifth of the peak at 1.3 million faces.
     """
     if size > LARGEST_KEPT:
         _trim()(0)
