@@ -9,7 +9,7 @@ Where to read, each room seeing only those above it:
 
     base/           arrays of any backend, row blocks, whole files; errors.py beside it
     mesh.py         the control mesh; connectivity/ what follows from its faces: topology.py (split)
-    geometry/       what is measured on it: frames.py F, rings.py, thin_faces.py ℓ
+    geometry/       what is measured on it: frames.py F, rings.py, thin_faces.py ℓ, crease_lines.py
     masks/          Loop: stencils.py one step's masks, limit/ those of the limit surface
     features/       φ, what the networks read of an edge and of a vertex's ring
     formula/        correction.py (edges) and vertex_operator.py (old vertices); side_gate.py γ,
@@ -25,6 +25,8 @@ Where to read, each room seeing only those above it:
     interop/        meshes of other libraries
 """
 
+from pns_common.connectivity.creases import Creases
+from pns_common.crease_lines import crease_lines
 from pns_common.errors import MeshError, ModelError, ParameterError, PnsError
 from pns_common.interop.subdivide import subdivide
 from pns_common.mesh import Mesh, clean
@@ -33,6 +35,7 @@ from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import Scheme, loop, pns
 
 __all__ = [
+    "Creases",
     "Mesh",
     "MeshError",
     "ModelError",
@@ -41,6 +44,7 @@ __all__ = [
     "Refinement",
     "Scheme",
     "clean",
+    "crease_lines",
     "load_model",
     "loop",
     "pns",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import islice
-from typing import TypedDict
+from typing import Literal, TypedDict
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -15,6 +15,8 @@ from pns_common.base.arrays import norm
 from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
 from pns_common.base.deferred import Deferred
 from pns_common.base.parameters import is_number, is_whole
+from pns_common.connectivity.creases import Creases, crease_children
+from pns_common.connectivity.topology import Topology
 from pns_common.errors import ParameterError
 from pns_common.fused import (
     fits,
@@ -33,21 +35,24 @@ from pns_common.levels.refined_levels import (
     RefinedLevels,
     check_coordinates,
 )
+from pns_common.masks.crease_shift import limit_crease_shift
 from pns_common.masks.limit import refined_limit_normals, refined_limit_positions
 from pns_common.mesh import Mesh
 from pns_common.schemes import Scheme
 
 HIGHEST_LEVELS = 16
+NO_SHIFT = Deferred(lambda: 0.0)
 
 
 class Report(TypedDict):
     """What a refinement did and how near to Loop it stayed. No times: same input, same report.
 
     ``learned_levels`` are those at which the scheme's own rules acted. ``limit_distance`` is the
-    sum over them of the largest displacement, in the mesh's units: no vertex, and no point of the
-    limit surface that Loop makes of the result, is farther than that from where Loop would have had
-    it. ``limit_distance_bound`` is the same sum of the largest displacements that the budget
-    allows; None where the scheme names no bound.
+    sum over all levels of the largest displacement, in the mesh's units: no vertex, and no point of
+    the limit surface that Loop makes of the result, is farther than that from where Loop would have
+    had it. Where edges are kept sharp, what that keeps back from Loop's smooth rules counts too.
+    ``limit_distance_bound`` is the same sum of the largest displacements that the budget allows;
+    None where the scheme names no bound.
     """
 
     scheme: str
@@ -96,7 +101,7 @@ def refine(
     reference_length: float | str = "auto",
     *,
     limit: bool = False,
-    creases: Int[np.ndarray, "N 2"] | None = None,
+    creases: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Refinement:
@@ -113,7 +118,9 @@ def refine(
             ever, and give the limit surface's normals there. The report is that of the levels.
         creases: edges to keep sharp, as pairs of vertices: no correction, and the rules of Hoppe
             et al. 1994. Their children are creases too; boundary and irregular edges stay what
-            they are.
+            they are. "auto": the crease lines that the mesh shows (``crease_lines``), where the
+            model's card asks for them, sharp at as many levels as it says; None: no edge.
+            ``Creases`` says of pairs at how many levels they are sharp.
         threads: worker threads, default all processors; the result does not depend on it.
         progress: called as the work goes on, inside levels too, with (faces made so far, faces made
             in the end). It may be called from another thread, one at a time; what it raises ends
@@ -136,23 +143,26 @@ def refine(
     costs = level_costs(len(mesh.faces), levels, scheme.learned_levels)
     # Loop has no use for a unit of length; its report names one when it is read.
     unit = 1.0 if scheme.learned_levels == 0 else length()
-    arguments = (mesh, scheme, levels, unit, creases)
-    if kernels_can_serve(*arguments) and kernels_pay(costs):
+    arguments = (mesh, scheme, levels, unit, chosen_creases(creases, scheme))
+    if kernels_can_serve(mesh, scheme, levels, unit) and kernels_pay(costs):
         # Loads the compiler's runtime, which whoever only imports the package does not need.
         from pns_common.fused.refine import refine_fused
 
         made = refine_fused(*arguments, kernel_blocks(workers, work.rows), work.level_ends)
     else:
         made = refine_arrays(*arguments, Blocks(workers, BLOCK_ROWS, work.rows), work.level_ends)
-    points, normals = made.points, None
+    points, normals, kept_back = made.points, None, NO_SHIFT
     if limit:
         topology, blocks = made.split_topology(), Blocks(workers, BLOCK_ROWS, work.rows)
+        kept_back = Deferred(lambda: limit_shift(made.points, made.faces, topology))
         points = refined_limit_positions(made.points, topology, blocks)
         normals = refined_limit_normals(made.points, topology, blocks)
         work.level_ends()
     return Refinement(
         mesh=Mesh.of_refined(points, made.faces),
-        make_report=Deferred(lambda: report_of(scheme, length(), made.several_fans, made.reports)),
+        make_report=Deferred(
+            lambda: report_of(scheme, length(), made.several_fans, made.reports, kept_back())
+        ),
         ratio=made.ratio,
         gate=made.gate,
         normals=normals,
@@ -160,9 +170,13 @@ def refine(
 
 
 def report_of(
-    scheme: Scheme, reference_length: float, several_fans: int, levels: list[LevelReport]
+    scheme: Scheme,
+    reference_length: float,
+    several_fans: int,
+    levels: list[LevelReport],
+    limit_shift: float = 0.0,
 ) -> Report:
-    """Make the report of a refinement from those of its levels."""
+    """Make the report of a refinement from those of its levels; the last as of limit_distances."""
     return {
         "scheme": scheme.name,
         "budget": scheme.budget,
@@ -170,7 +184,7 @@ def report_of(
         "model_hash": scheme.model_hash,
         "reference_length": reference_length,
         "multi_fan_vertices": several_fans,
-        **limit_distances(levels),
+        **limit_distances(levels, limit_shift),
         "levels": levels,
     }
 
@@ -180,7 +194,7 @@ def refine_arrays(
     scheme: Scheme,
     levels: int,
     reference_length: float,
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     blocks: Blocks,
     after_level: AfterLevel,
 ) -> RefinedLevels:
@@ -198,7 +212,7 @@ def refine_arrays(
         if last.several_fans is not None:
             several_fans = int(last.several_fans.sum())
         check_coordinates(np.abs(last.placed.points).max())
-        reports.append(level_report(last.topology, last.placed, last.children))
+        reports.append(level_report(last.topology, last.placed, last.children, last.crease_shift))
         after_level()
     assert last is not None  # levels ≥ 1
     placed, topology = last.placed, last.topology
@@ -213,12 +227,34 @@ def kernels_can_serve(
     scheme: Scheme,
     levels: int,
     reference_length: float,
-    creases: Int[np.ndarray, "N 2"] | None,
 ) -> bool:
     """Return whether compiled kernels can take the array kernels' place, with the same bits."""
     if not (kernels_available() and fits(len(mesh.vertices), len(mesh.faces), levels)):
         return False
     return scheme.learned_levels == 0 or (reference_length > 0 and kernels_know(scheme))
+
+
+def limit_shift(
+    points: Float[np.ndarray, "W 3"], faces: Int[np.ndarray, "C 3"], topology: Topology
+) -> float:
+    """Return the longest way that creases keep a limit from Loop's; ``topology`` was split last."""
+    shift = limit_crease_shift(points, faces, crease_children(topology))
+    return 0.0 if shift is None else shift.largest
+
+
+def chosen_creases(
+    given: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None, scheme: Scheme
+) -> Creases:
+    """Return which edges are kept sharp.
+
+    Raises:
+        ParameterError: a word that is not "auto".
+    """
+    if isinstance(given, str):
+        if given != "auto":
+            raise ParameterError("creases", given, expected='"auto", None or pairs of vertices')
+        return scheme.creases
+    return given if isinstance(given, Creases) else Creases(given)
 
 
 def measure_reference_length(

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
+from pns_common.connectivity.creases import Creases, crease_children
 from pns_common.errors import ParameterError
 from pns_common.fused import kernel_blocks
+from pns_common.masks.crease_shift import limit_crease_shift
 from pns_common.masks.limit import refined_limit_normals, refined_limit_positions
 from pns_common.mesh import Mesh
 from pns_common.refine import (
     Report,
     available_threads,
+    chosen_creases,
     kernels_can_serve,
     measure_reference_length,
     report_of,
@@ -41,7 +45,7 @@ def refine_parts(
     reference_length: float | str = "auto",
     *,
     limit: bool = False,
-    creases: Int[np.ndarray, "N 2"] | None = None,
+    creases: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
     threads: int | None = None,
 ) -> PartsRefinement | None:
     """Refine the parts of a mesh, each as if it were alone: same positions, same report, same bits.
@@ -73,24 +77,32 @@ def refine_parts(
         )
     else:
         lengths = np.full(len(part_faces) - 1, float(reference_length))
-    if not kernels_can_serve(mesh, scheme, levels, float(lengths.min()), creases):
+    kept = chosen_creases(creases, scheme)
+    if not kernels_can_serve(mesh, scheme, levels, float(lengths.min())):
         return None
     from pns_common.fused.refine_parts import refine_parts_fused
 
     workers = available_threads() if threads is None else threads
     blocks = kernel_blocks(workers)
-    made = refine_parts_fused(mesh, part_faces, scheme, levels, lengths, creases, blocks)
+    made = refine_parts_fused(mesh, part_faces, scheme, levels, lengths, kept, blocks)
     points, normals = made.points, None
+    kept_back = np.zeros(len(lengths))
     if limit:
         topology, blocks = made.split_topology(), Blocks(workers, BLOCK_ROWS)
+        shift = limit_crease_shift(made.points, made.faces, crease_children(topology))
+        if shift is not None:
+            part_of = np.empty(len(made.points), dtype=np.int64)
+            of_faces = np.repeat(np.arange(len(lengths)), np.diff(part_faces) * 4**levels)
+            part_of[made.faces] = of_faces[:, None]
+            np.maximum.at(kept_back, part_of[shift.vertices], shift.of_vertices)
         points = refined_limit_positions(made.points, topology, blocks)
         normals = refined_limit_normals(made.points, topology, blocks)
     return PartsRefinement(
         mesh=Mesh.of_refined(points, made.faces),
         reports=[
-            report_of(scheme, float(length), several_fans, reports)
-            for length, several_fans, reports in zip(
-                lengths, made.several_fans, made.reports, strict=True
+            report_of(scheme, float(length), several_fans, reports, float(back))
+            for length, several_fans, reports, back in zip(
+                lengths, made.several_fans, made.reports, kept_back, strict=True
             )
         ],
         ratio=made.ratio,

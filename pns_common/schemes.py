@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from pns_common.base.arrays import Array
 from pns_common.base.parameters import is_number
+from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.errors import ModelError, ParameterError
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.orientation import ORIENTATIONS
@@ -61,6 +62,7 @@ class Scheme:
         guard: what scales the displacements of a level back where a child face would fold.
         moves_boundaries: whether the rules move boundaries, by the boundary alone.
         wide_bound: whether h of an edge's bound C h² / R is the longest edge of its two faces.
+        creases: those that it keeps unless others are named.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Scheme:
     guard: FoldGuard | None = field(default=None, repr=False)
     moves_boundaries: bool = field(default=False, repr=False)
     wide_bound: bool = field(default=False, repr=False)
+    creases: Creases = field(default=NO_CREASES, repr=False)
 
 
 def loop() -> Scheme:
@@ -101,7 +104,10 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     edges, vertices = edge_operator(model), vertex_operator(model)
     form = scale_free_form(card, budget)
     if form is not None and vertices is not None:
-        return scale_free_scheme(edges, vertices, form, model.name, model.hash)
+        # Without a budget it is Loop, to the bit.
+        kept = Creases(line_angle=card.crease_angle, levels=card.crease_levels)
+        creases = kept if budget > 0 else NO_CREASES
+        return scale_free_scheme(edges, vertices, form, model.name, model.hash, creases)
     return Scheme(
         "pns",
         loop_vertex_rule if vertices is None else LearnedVertexRule(vertices, budget),
@@ -118,8 +124,12 @@ def scale_free_scheme(
     form: ScaleFreeForm,
     model: str | None = None,
     model_hash: str | None = None,
+    creases: Creases = NO_CREASES,
 ) -> Scheme:
-    """Return the default scheme: scale-free rules at K levels, each guarded, then Loop."""
+    """Return the default scheme: scale-free rules at K levels, each guarded, then Loop.
+
+    ``creases`` are those that it keeps unless others are named.
+    """
     boundary = BoundaryRule(form, vertices.gate_sharpness) if form.boundary_strength > 0 else None
     return Scheme(
         "pns",
@@ -132,6 +142,7 @@ def scale_free_scheme(
         guard=FoldGuard(math.radians(form.fold_angle)),
         moves_boundaries=boundary is not None,
         wide_bound=form.wide_bound,
+        creases=creases,
     )
 
 

@@ -79,6 +79,8 @@ def _further_rows(card: ModelCard) -> dict[str, Any]:
         "side gates": card.side_gates,
         "network altitudes α": card.network_altitudes,
         "wide bound": card.wide_bound,
+        "crease angle θ": card.crease_angle,
+        "crease levels": card.crease_levels,
     }
     return {name: value for name, value in rows.items() if value is not None}
 

@@ -18,8 +18,8 @@ NormalRule = Literal["keep", "smooth", "limit"]
 Compression = Literal["none", "draco", "meshopt"]
 # A weld further than a hundredth of R is a different tool: it would take features away.
 MAX_WELD_TOLERANCE = 0.01
-# `off`, `normals`, or `angle:` and degrees.
-CREASE_PATTERN = r"off|normals|angle:\d{1,3}(\.\d{1,6})?"
+# `angle:` is followed by degrees.
+CREASE_PATTERN = r"auto|off|lines|normals|angle:\d{1,3}(\.\d{1,6})?"
 
 # The upload, its decoded JSON, and its bytes again in the answer.
 BYTES_PER_INPUT_BYTE = 4
@@ -41,7 +41,7 @@ class Options:
     diagnostics: Diagnostics = "summary"
     uv: UvRule = "linear"
     normals: NormalRule = "keep"
-    crease: str = "off"
+    crease: str = "auto"
     weld_tolerance: float = 0.0
     compress: Compression = "none"
     limit: bool = False
@@ -68,7 +68,8 @@ class Options:
             )
         if not re.fullmatch(CREASE_PATTERN, self.crease) or not (self.crease_angle or 0) <= math.pi:
             raise InvalidParameter(
-                "crease", "crease must be 'off', 'normals' or 'angle:' and 0 to 180 degrees"
+                "crease",
+                "crease must be 'auto', 'off', 'lines', 'normals' or 'angle:' and 0 to 180 degrees",
             )
         if not 0 <= self.weld_tolerance <= MAX_WELD_TOLERANCE:
             raise InvalidParameter(

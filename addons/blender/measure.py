@@ -70,7 +70,9 @@ def longest_pieces(obj: bpy.types.Object, scheme: str) -> float:
     from pns_common import load_model
     from pns_common.runtimes.onnx_model import DEFAULT_MODEL
 
-    asked = SimpleNamespace(scheme=scheme, levels=1, limit=False, crease_angle=math.pi, quads=False)
+    asked = SimpleNamespace(
+        scheme=scheme, levels=1, limit=False, crease_angle=math.pi, crease_lines=False, quads=False
+    )
     asked.model, asked.model_file, asked.budget = DEFAULT_MODEL, "", load_model().card.budget
     run = Run(refine_meshes([obj], choice_of(asked), Share()))
     longest, done = 0.0, False

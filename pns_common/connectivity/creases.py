@@ -1,8 +1,8 @@
-"""Creases: interior edges that are kept sharp on request, and followed through the levels."""
+"""Creases: interior edges that are kept sharp, named or found, and followed through the levels."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Int
@@ -11,12 +11,51 @@ from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.errors import ParameterError
 
 
-def with_creases(topology: Topology, creases: Int[np.ndarray, "N 2"]) -> Topology:
+@dataclass(frozen=True, eq=False)
+class Creases:
+    """Which edges of a control mesh are kept sharp.
+
+    Attributes:
+        named: pairs of vertices.
+        line_angle: θ in degrees of the crease lines that the mesh shows
+            (geometry/crease_lines.py); None: none are looked for.
+        levels: at how many levels they are sharp, and smooth from then on (semi-sharp creases,
+            DeRose, Kass and Truong 1998); None: for good. Where they are sharp at the last level,
+            limits take them as sharp for good.
+    """
+
+    named: Int[np.ndarray, "N 2"] | None = None
+    line_angle: float | None = None
+    levels: int | None = None
+
+    def sharp_at(self, depth: int) -> bool:
+        """Return whether they are sharp at a level; 0 is the control mesh's."""
+        return self.levels is None or depth < self.levels
+
+    def left_after(self, levels: int) -> Int[np.ndarray, "N 2"] | None:
+        """Return those named that are sharp at the last of so many levels."""
+        return self.named if self.sharp_at(levels - 1) else None
+
+
+NO_CREASES = Creases()
+
+
+def with_crease_rows(topology: Topology, rows: Int[np.ndarray, " N"]) -> Topology:
+    """Return the topology with some interior edges as creases."""
+    edge_class = topology.edge_class.copy()
+    edge_class[rows] = EdgeClass.CREASE
+    interior = np.flatnonzero(edge_class == EdgeClass.INTERIOR)
+    return replace(topology, edge_class=edge_class, interior=interior)
+
+
+def with_creases(topology: Topology, creases: Int[np.ndarray, "N 2"] | None) -> Topology:
     """Return the topology with those interior edges as creases that the vertex pairs name.
 
     Raises:
         ParameterError: a pair is no edge of the mesh.
     """
+    if creases is None:
+        return topology
     edge_class = crease_classes(topology.edges, topology.edge_class, topology.vertex_count, creases)
     interior = np.flatnonzero(edge_class == EdgeClass.INTERIOR)
     return replace(topology, edge_class=edge_class, interior=interior)
@@ -33,15 +72,23 @@ def crease_classes(
     Raises:
         ParameterError: a pair is no edge.
     """
-    count = np.int64(vertex_count)
-    keys = edges[:, 0] * count + edges[:, 1]
     named = _checked(creases, vertex_count)
-    named = named.min(axis=1) * count + named.max(axis=1)
-    lost = named[~np.isin(named, keys)]
+    if len(named) == 0:
+        return edge_class
+    # Few edges have both ends at creases: all others need no look.
+    at_creases = np.zeros(vertex_count, dtype=bool)
+    at_creases[named.reshape(-1)] = True
+    rows = np.flatnonzero(at_creases[edges[:, 0]] & at_creases[edges[:, 1]])
+    count = np.int64(vertex_count)
+    keys = edges[rows, 0] * count + edges[rows, 1]
+    named_keys = named.min(axis=1) * count + named.max(axis=1)
+    lost = named_keys[~np.isin(named_keys, keys)]
     if len(lost):
         raise ParameterError("creases", divmod(int(lost[0]), int(count)), expected="edges")
-    kept = np.isin(keys, named) & (edge_class == EdgeClass.INTERIOR)
-    return np.where(kept, np.int8(EdgeClass.CREASE), edge_class)
+    rows = rows[np.isin(keys, named_keys)]
+    kept = edge_class.copy()
+    kept[rows[kept[rows] == EdgeClass.INTERIOR]] = EdgeClass.CREASE
+    return kept
 
 
 def crease_children(topology: Topology) -> Int[np.ndarray, "N 2"]:

@@ -14,7 +14,7 @@ from pns_common.fused.boundary import Boundary, boundary_of
 from pns_common.fused.child_faces import look_at_children
 from pns_common.fused.edge_rule import add_at_edges
 from pns_common.fused.guard import guard_scale
-from pns_common.fused.level import FusedLevel, FusedStep
+from pns_common.fused.level import FusedLevel, FusedStep, crease_shift_of
 from pns_common.fused.loop_points import add_to, loop_points
 from pns_common.fused.surroundings import Surroundings
 from pns_common.fused.vertex_rule import add_at_vertices
@@ -53,11 +53,12 @@ def learned_step(level: FusedLevel, scheme: Scheme, length: float, blocks: Block
         ModelError: a network returned something that is not finite, or of another shape.
     """
     made = learned_points(level, scheme, length, blocks)
-    mesh = level.mesh
+    mesh, shift_of = level.mesh, crease_shift_of(level)
 
     def report() -> LevelReport:
         children = look_at_children(mesh, made.points, made.counterpart, blocks.unheard())
-        return level_report(mesh, made.step, children)
+        shift = shift_of()
+        return level_report(mesh, made.step, children, None if shift is None else shift.largest)
 
     return FusedStep(made.points, made.largest, report, made.added)
 

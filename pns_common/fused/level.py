@@ -10,14 +10,16 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
-from pns_common.connectivity.creases import crease_classes, crease_halves
+from pns_common.connectivity.creases import Creases, crease_classes, crease_halves
 from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.fused.additions import Additions
 from pns_common.fused.child_faces import look_at_children
+from pns_common.fused.crease_lines import crease_line_rows
 from pns_common.fused.fans import multi_fan_vertices
 from pns_common.fused.loop_points import largest_size, loop_points
 from pns_common.fused.mesh_edges import MeshEdges, build_edges, split_mesh_edges
-from pns_common.levels.diagnostics import LevelReport, edge_counts
+from pns_common.levels.diagnostics import Displacements, LevelReport, edge_counts
+from pns_common.masks.crease_shift import CreaseShift, crease_shift
 from pns_common.mesh import LARGEST_COORDINATE
 
 # Far more than the sums of Loop's masks are wrong by.
@@ -60,7 +62,7 @@ class FusedStep:
 def control_level(
     points: Float[np.ndarray, "V 3"],
     faces: Int[np.ndarray, "F 3"],
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     blocks: Blocks,
 ) -> FusedLevel:
     """Return the level of a control mesh.
@@ -68,12 +70,21 @@ def control_level(
     Raises:
         ParameterError: a crease is no edge of the mesh.
     """
-    return FusedLevel(points, control_edges(faces, len(points), creases, blocks), blocks)
+    mesh = control_edges(faces, len(points), creases.named, blocks)
+    if creases.line_angle is not None:
+        rows = crease_line_rows(points, mesh, creases.line_angle, blocks.unheard())
+        if len(rows):
+            classes = mesh.edge_class.copy()
+            classes[rows] = EdgeClass.CREASE
+            mesh = replace(mesh, edge_class=classes)
+    return FusedLevel(points, mesh, blocks)
 
 
-def next_level(level: FusedLevel, points: Float[np.ndarray, "W 3"], blocks: Blocks) -> FusedLevel:
-    """Return the level whose points a step has placed."""
-    return FusedLevel(points, next_edges(level.mesh, blocks), blocks)
+def next_level(
+    level: FusedLevel, points: Float[np.ndarray, "W 3"], blocks: Blocks, *, sharp: bool = True
+) -> FusedLevel:
+    """Return the level whose points a step has placed; ``sharp`` as in ``next_edges``."""
+    return FusedLevel(points, next_edges(level.mesh, blocks, sharp=sharp), blocks)
 
 
 def control_edges(
@@ -90,8 +101,10 @@ def control_edges(
     return _with_creases(build_edges(faces.astype(np.int32), vertex_count, blocks), creases)
 
 
-def next_edges(mesh: MeshEdges, blocks: Blocks) -> MeshEdges:
-    """Return the edges of the split mesh; the children of creases are creases."""
+def next_edges(mesh: MeshEdges, blocks: Blocks, *, sharp: bool = True) -> MeshEdges:
+    """Return the edges of the split mesh; children of creases are creases, unless they end here."""
+    if not sharp:
+        return split_mesh_edges(_without_creases(mesh), blocks)
     # Where the edges were split by arithmetic their classes were too.
     creases = None if mesh.plain else crease_halves(mesh.edges, mesh.edge_class, mesh.vertex_count)
     return _with_creases(split_mesh_edges(mesh, blocks), creases)
@@ -128,10 +141,32 @@ def loop_step(level: FusedLevel, blocks: Blocks) -> FusedStep:
     largest = ROUNDING * largest_size(level.points, blocks)
     if largest > LARGEST_COORDINATE:
         largest = largest_size(points, blocks)
-    return FusedStep(points, largest, lambda: _loop_report(level.mesh, points, blocks), None)
+    mesh, shift = level.mesh, crease_shift_of(level)
+    return FusedStep(points, largest, lambda: _loop_report(mesh, points, shift(), blocks), None)
 
 
-def _loop_report(mesh: MeshEdges, points: Float[np.ndarray, "W 3"], blocks: Blocks) -> LevelReport:
+def crease_shift_of(level: FusedLevel) -> Callable[[], CreaseShift | None]:
+    """Return what tells how far a level's creases keep vertices back: None without creases.
+
+    It keeps the level's points only where there are some.
+    """
+    mesh, rows = level.mesh, crease_rows(level.mesh)
+    if len(rows) == 0:
+        return lambda: None
+    points, creases = level.points, mesh.edges[rows].astype(np.int64)
+    return lambda: crease_shift(points, mesh.faces, rows, creases)
+
+
+def crease_rows(mesh: MeshEdges) -> Int[np.ndarray, " N"]:
+    """Return the indices of the creases."""
+    sharp = mesh.sharp_edges
+    return sharp[mesh.edge_class[sharp] == EdgeClass.CREASE].astype(np.int64)
+
+
+def _loop_report(
+    mesh: MeshEdges, points: Float[np.ndarray, "W 3"], shift: CreaseShift | None, blocks: Blocks
+) -> LevelReport:
+    of_creases: Displacements = {} if shift is None else {"crease_shift_max": shift.largest}
     return {
         "vertices": len(points),
         "faces": 4 * len(mesh.faces),
@@ -141,7 +176,17 @@ def _loop_report(mesh: MeshEdges, points: Float[np.ndarray, "W 3"], blocks: Bloc
         "proximity_ratio": {"max": 0.0, "mean": 0.0, "p99": 0.0},
         "gate": {"mean": 0.0, "max": 0.0, "active": 0.0},
         "normal_jump_max": look_at_children(mesh, points, None, blocks.unheard()).normal_jump_max,
+        **of_creases,
     }
+
+
+def _without_creases(mesh: MeshEdges) -> MeshEdges:
+    rows = crease_rows(mesh)
+    if len(rows) == 0:
+        return mesh
+    classes = mesh.edge_class.copy()
+    classes[rows] = EdgeClass.INTERIOR
+    return replace(mesh, edge_class=classes)
 
 
 def _with_creases(mesh: MeshEdges, creases: Int[np.ndarray, "N 2"] | None) -> MeshEdges:

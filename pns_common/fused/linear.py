@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks, available_threads
+from pns_common.connectivity.creases import Creases
 from pns_common.fused import fits, kernel_blocks, kernels_loaded
 from pns_common.fused.level import control_edges, next_edges, topology_of
 from pns_common.fused.loop_points import loop_points
@@ -53,7 +54,7 @@ def linear_refinement(
     faces: Int[np.ndarray, "F 3"],
     vertex_count: int,
     levels: int,
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     *,
     limit: bool,
 ) -> ColumnRefinement:
@@ -64,7 +65,7 @@ def linear_refinement(
     if not (kernels_loaded() and fits(vertex_count, len(faces), levels)):
         return LinearRefinement(level_topologies(faces, vertex_count, levels, creases), limit)
     blocks = kernel_blocks(available_threads())
-    meshes = [control_edges(faces, vertex_count, creases, blocks)]
-    for _ in range(1, levels):
-        meshes.append(next_edges(meshes[-1], blocks))
+    meshes = [control_edges(faces, vertex_count, creases.named, blocks)]
+    for depth in range(1, levels):
+        meshes.append(next_edges(meshes[-1], blocks, sharp=creases.sharp_at(depth)))
     return FusedLinearRefinement(meshes, limit, blocks)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from jaxtyping import Int
 
 from pns_common.base.blocks import Blocks
 from pns_common.base.deferred import Deferred
+from pns_common.connectivity.creases import Creases
 from pns_common.fused.level import FusedLevel, FusedStep, control_level, loop_step, next_level
 from pns_common.fused.mesh_edges import split_mesh_faces
 from pns_common.levels.diagnostics import LevelReport
@@ -27,7 +27,7 @@ def refine_fused(
     scheme: Scheme,
     levels: int,
     reference_length: float,
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     blocks: Blocks,
     after_level: AfterLevel,
 ) -> RefinedLevels:
@@ -44,7 +44,7 @@ def refine_fused(
     reports = [step.report]
     after_level()
     for depth in range(1, levels):
-        level = next_level(level, step.points, blocks)
+        level = next_level(level, step.points, blocks, sharp=creases.sharp_at(depth))
         step = _checked_step(level, scheme, reference_length, depth, blocks)
         reports.append(step.report)
         after_level()

@@ -13,10 +13,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import Creases
 from pns_common.connectivity.topology import Topology
 from pns_common.fused.kernels.normals import flipped_children, largest_jump
 from pns_common.fused.learned_step import learned_points
-from pns_common.fused.level import FusedLevel, control_level, next_level
+from pns_common.fused.level import FusedLevel, control_level, crease_shift_of, next_level
 from pns_common.fused.loop_points import largest_size, loop_points
 from pns_common.fused.mesh_edges import MeshEdges, split_mesh_faces
 from pns_common.geometry.child_faces import ChildAngles, angle_between
@@ -89,7 +90,7 @@ def refine_parts_fused(
     scheme: Scheme,
     levels: int,
     reference_lengths: Float[np.ndarray, " P"],
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     blocks: Blocks,
 ) -> RefinedParts:
     """Refine all parts; ``part_faces`` says where the faces of each begin, and where the last end.
@@ -110,11 +111,12 @@ def refine_parts_fused(
     points, step = mesh.vertices, None
     for depth in range(levels):
         if step is not None:
-            level, parts = next_level(level, points, blocks), parts.next()
+            sharp = creases.sharp_at(depth)
+            level, parts = next_level(level, points, blocks, sharp=sharp), parts.next()
         parts = parts.with_edges_of(level.mesh)
         points, counterpart, step = _placed(level, parts, scheme, reference_lengths, depth, blocks)
         check_coordinates(largest_size(points, blocks))
-        for part, report in enumerate(_reports(level.mesh, parts, points, counterpart, step)):
+        for part, report in enumerate(_reports(level, parts, points, counterpart, step)):
             reports[part].append(report)
     assert step is not None  # levels ≥ 1
     return RefinedParts(
@@ -150,13 +152,14 @@ def _placed(
 
 
 def _reports(
-    mesh: MeshEdges,
+    level: FusedLevel,
     parts: _Parts,
     points: Float[np.ndarray, "W 3"],
     counterpart: Float[np.ndarray, "W 3"] | None,
     step: AddedStep,
 ) -> list[LevelReport]:
     """Return what ``level_report`` says of each part."""
+    mesh, shifts = level.mesh, _crease_shifts(level, parts)
     children = _children(mesh, parts, points, counterpart)
     order = np.argsort(parts.of_vertex, kind="stable")
     starts = np.searchsorted(parts.of_vertex[order], np.arange(parts.count + 1))
@@ -179,8 +182,21 @@ def _reports(
         if guard is not None:
             scales = np.concatenate([guard[0][own_vertices], guard[1][own_edges]])
         its = AddedStep(vertices.rows(own_vertices), edges.rows(own_edges), step.learned, scales)
-        reports.append(level_report(own, its, children[part]))
+        reports.append(level_report(own, its, children[part], shifts[part]))
     return reports
+
+
+def _crease_shifts(level: FusedLevel, parts: _Parts) -> list[float | None]:
+    """Return the longest way that each part's creases keep a vertex back; None without creases."""
+    shift = crease_shift_of(level)()
+    if shift is None:
+        return [None] * parts.count
+    of_edge = np.searchsorted(parts.edges, shift.edges, side="right") - 1
+    longest = np.zeros(parts.count)
+    np.maximum.at(longest, parts.of_vertex[shift.vertices], shift.of_vertices)
+    np.maximum.at(longest, of_edge, shift.of_edges)
+    creased = np.bincount(of_edge, minlength=parts.count) > 0
+    return [float(longest[part]) if creased[part] else None for part in range(parts.count)]
 
 
 def _children(

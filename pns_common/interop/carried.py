@@ -8,13 +8,14 @@ data are interpolated linearly along each edge, which leaves them where they wer
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.base.distinct import distinct_rows, number_by_first_appearance
+from pns_common.connectivity.creases import Creases
 from pns_common.connectivity.topology import CHILDREN, split_faces
 from pns_common.fused.face_edges import number_edges
 from pns_common.mesh import Mesh
@@ -58,8 +59,11 @@ def refine_carried(
     given = Mesh(mesh.vertices, mesh.faces)
     joined, first = join_by_position(given.vertices)
     options = dict(options)
-    if options.get("creases") is not None:
-        options["creases"] = joined[np.asarray(options["creases"])]
+    creases = options.get("creases", "auto")
+    if isinstance(creases, Creases) and creases.named is not None:
+        options["creases"] = replace(creases, named=joined[creases.named])
+    elif creases is not None and not isinstance(creases, str | Creases):
+        options["creases"] = joined[np.asarray(creases)]
     refinement = refine(Mesh(given.vertices[first], joined[given.faces]), scheme, levels, **options)
 
     faces, count = given.faces, len(given.vertices)

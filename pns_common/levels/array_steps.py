@@ -10,11 +10,19 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
-from pns_common.connectivity.creases import crease_children, with_creases
-from pns_common.connectivity.topology import Topology, build_topology, multi_fan_vertices, split
+from pns_common.connectivity.creases import Creases, crease_children, with_creases
+from pns_common.connectivity.topology import (
+    EdgeClass,
+    Topology,
+    build_topology,
+    multi_fan_vertices,
+    split,
+)
 from pns_common.geometry.child_faces import ChildFaces, child_faces
+from pns_common.geometry.crease_lines import with_crease_lines
 from pns_common.geometry.frames import face_normals
 from pns_common.levels.step import LevelStep, level_step
+from pns_common.masks.crease_shift import crease_shift
 from pns_common.rules.control_level import ControlLevel
 from pns_common.schemes import Scheme
 
@@ -24,12 +32,14 @@ class ArrayStep:
     """One step of all rows.
 
     Attributes:
+        control: the points that it split.
         topology: the connectivity that it split, creases marked.
         placed: what the rules placed.
         several_fans: of the control mesh the vertices with more than one fan; None later.
         blocks: how row-wise work is divided.
     """
 
+    control: Float[np.ndarray, "V 3"]
     topology: Topology
     placed: LevelStep
     several_fans: Bool[np.ndarray, " V"] | None
@@ -45,11 +55,19 @@ class ArrayStep:
         """Their normals, and how they lie to those that they came from."""
         return child_faces(self.topology, self.placed.points, self.placed.loop_points, self.blocks)
 
+    @property
+    def crease_shift(self) -> float | None:
+        """The longest way that creases keep a vertex back; None without creases."""
+        topology = self.topology
+        rows = np.flatnonzero(topology.edge_class == EdgeClass.CREASE)
+        shift = crease_shift(self.control, topology.faces, rows, topology.edges[rows])
+        return None if shift is None else shift.largest
+
 
 def array_steps(
     points: Float[np.ndarray, "V 3"],
     faces: Int[np.ndarray, "F 3"],
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     scheme: Scheme,
     reference_length: float,
     blocks: Blocks,
@@ -62,17 +80,18 @@ def array_steps(
     """
     (normals,) = blocks.gather(len(faces), lambda rows: (face_normals(points, faces[rows]),))
     depth = 0
+    topology = with_creases(build_topology(faces, len(points)), creases.named)
+    topology = with_crease_lines(topology, points, creases.line_angle)
     while True:
-        topology = build_topology(faces, len(points))
         several_fans = multi_fan_vertices(topology) if depth == 0 else None
-        if creases is not None:
-            topology = with_creases(topology, creases)
-            creases = crease_children(topology)
         control = ControlLevel(points, topology, normals, reference_length, blocks, depth)
         # What overflows under an absurd budget is for the caller to find.
         with np.errstate(over="ignore", invalid="ignore"):
             placed = level_step(control, scheme)
-        step = ArrayStep(topology, placed, several_fans, blocks)
+        step = ArrayStep(points, topology, placed, several_fans, blocks)
         yield step
         points, faces, normals = placed.points, step.faces, step.children.normals
         depth += 1
+        plain = build_topology(faces, len(points))
+        sharp = creases.sharp_at(depth)
+        topology = with_creases(plain, crease_children(topology)) if sharp else plain

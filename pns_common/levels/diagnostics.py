@@ -53,7 +53,15 @@ class VertexSummary(TypedDict):
     gate: GateSummary
 
 
-class LevelReport(TypedDict):
+class Displacements(TypedDict):
+    """How far a level left Loop, where it did; see LevelReport."""
+
+    displacement_max: NotRequired[float]
+    envelope_max: NotRequired[float | None]
+    crease_shift_max: NotRequired[float]
+
+
+class LevelReport(Displacements):
     """One level: counts of the mesh it made and diagnostics of the step that made it.
 
     ``vertex_rule`` stands only where the model has one; ``proximity_ratio`` and ``gate`` are the
@@ -61,7 +69,8 @@ class LevelReport(TypedDict):
     ``envelope_max``, the longest that the budget allows (None where the rules name no bound), both
     in the mesh's units; ``shut``, at how many interior edges and movable vertices the gate is 0, so
     that the network was not run for them; and ``guarded``, how many vertices the fold guard scaled,
-    where there is one.
+    where there is one. Where there are creases, ``crease_shift_max`` is the longest way that they
+    keep a vertex from where Loop's smooth rules would have it.
     """
 
     vertices: int
@@ -73,8 +82,6 @@ class LevelReport(TypedDict):
     gate: GateSummary
     normal_jump_max: float
     vertex_rule: NotRequired[VertexSummary]
-    displacement_max: NotRequired[float]
-    envelope_max: NotRequired[float | None]
     shut: NotRequired[int]
     guarded: NotRequired[int]
 
@@ -87,8 +94,10 @@ class LimitDistances(TypedDict):
     limit_distance_bound: float | None
 
 
-def level_report(topology: Connectivity, step: AddedStep, children: ChildAngles) -> LevelReport:
-    """Summarise the step that refined ``topology``."""
+def level_report(
+    topology: Connectivity, step: AddedStep, children: ChildAngles, shift: float | None = None
+) -> LevelReport:
+    """Summarise the step that refined ``topology``; ``shift`` is the longest that creases made."""
     vertices, edges = step.vertices, step.edges
     gate, shut = _of(edges.gate, topology.interior), 0
     report: LevelReport = {
@@ -118,22 +127,30 @@ def level_report(topology: Connectivity, step: AddedStep, children: ChildAngles)
         report["shut"] = _shut(gate) + shut
     if step.guard is not None:
         report["guarded"] = int((step.guard < 1).sum())
+    if shift is not None:
+        report["crease_shift_max"] = shift
     return report
 
 
-def limit_distances(levels: Sequence[LevelReport]) -> LimitDistances:
-    """Sum what the levels' displacements may add up to.
+def limit_distances(levels: Sequence[Displacements], limit_shift: float = 0.0) -> LimitDistances:
+    """Sum what the levels' displacements may add up to; what creases keep back is one as well.
 
     Loop's masks and limit masks are non-negative and sum to 1, so a displacement at one level moves
-    no later vertex, and no point of the limit, by more than its own length.
+    no later vertex, and no point of the limit, by more than its own length. A vertex is moved by
+    creases or by a learned rule, never by both. ``limit_shift`` is the longest way that creases
+    keep a vertex that was put on the limit surface.
     """
-    distances = [level["displacement_max"] for level in levels if "displacement_max" in level]
-    bounds = [level["envelope_max"] for level in levels if "envelope_max" in level]
-    known = [bound for bound in bounds if bound is not None]
+    shifts = [level.get("crease_shift_max", 0.0) for level in levels]
+    moved = [level.get("displacement_max", 0.0) for level in levels]
+    allowed = [level.get("envelope_max", 0.0) for level in levels]
+    known = [bound for bound in allowed if bound is not None]
+    bound = None
+    if len(known) == len(levels):
+        bound = float(sum(map(max, known, shifts)) + limit_shift)
     return {
-        "learned_levels": len(distances),
-        "limit_distance": float(sum(distances)),
-        "limit_distance_bound": float(sum(known)) if len(known) == len(bounds) else None,
+        "learned_levels": sum("displacement_max" in level for level in levels),
+        "limit_distance": float(sum(map(max, moved, shifts)) + limit_shift),
+        "limit_distance_bound": bound,
     }
 
 

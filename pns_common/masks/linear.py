@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.connectivity.creases import crease_children, with_creases
+from pns_common.connectivity.creases import NO_CREASES, Creases, crease_children, with_creases
 from pns_common.connectivity.topology import Topology, build_topology, split
 from pns_common.masks.limit import refined_limit_positions
 from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
@@ -23,15 +23,19 @@ def level_topologies(
     faces: Int[np.ndarray, "F 3"],
     vertex_count: int,
     levels: int,
-    creases: Int[np.ndarray, "N 2"] | None = None,
+    creases: Creases = NO_CREASES,
 ) -> list[Topology]:
-    """Return the topologies that ``levels`` steps of ``refine`` go through, control mesh first."""
+    """Return the topologies that ``levels`` steps of ``refine`` go through, control mesh first.
+
+    The creases are those that are named: nothing is known here of the mesh's shape.
+    """
     topologies: list[Topology] = []
-    for _ in range(levels):
+    named = creases.named
+    for depth in range(levels):
         topology = build_topology(faces, vertex_count)
-        if creases is not None:
-            topology = with_creases(topology, creases)
-            creases = crease_children(topology)
+        if named is not None and creases.sharp_at(depth):
+            topology = with_creases(topology, named)
+            named = crease_children(topology)
         topologies.append(topology)
         faces, vertex_count = split(topology), vertex_count + len(topology.edges)
     return topologies
@@ -47,6 +51,7 @@ def refine_linear(
     return columns
 
 
+@runtime_checkable
 class ColumnRefinement(Protocol):
     """What refines columns, however it does that."""
 

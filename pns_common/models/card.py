@@ -22,6 +22,7 @@ FORMAT, VERTEX_FORMAT, SCALE_FREE_FORMAT = 1, 2, 3
 FORMATS = (FORMAT, VERTEX_FORMAT, SCALE_FREE_FORMAT)
 SCALE_FREE_FIELDS = ("learned_levels", "prior_strength", "network_scale", "fold_angle")
 OPTIONAL_FIELDS = ("boundary_strength", "side_gates", "network_altitudes", "wide_bound")
+CREASE_FIELDS = ("crease_angle", "crease_levels")
 MOST_LEARNED_LEVELS = 16
 
 
@@ -52,6 +53,9 @@ class ModelCard:
             thinner face; None counts edge lengths alone.
         wide_bound: whether h of an edge's bound is the longest edge of its two faces; None is
             false.
+        crease_angle: θ of the crease lines that are kept where no creases are named, degrees
+            between 0 and 180; None looks for none.
+        crease_levels: at how many levels they are sharp, at least 1; with ``crease_angle``.
     """
 
     format: int
@@ -71,6 +75,8 @@ class ModelCard:
     side_gates: bool | None = None
     network_altitudes: float | None = None
     wide_bound: bool | None = None
+    crease_angle: float | None = None
+    crease_levels: int | None = None
 
     def to_json(self) -> str:
         """Return the card as JSON, keys in the order of the attributes; none that is None."""
@@ -175,8 +181,8 @@ def _scale_free_problem(card: ModelCard) -> str | None:
     """Return what is wrong with the fields of the scale-free rule, or None."""
     values = {name: getattr(card, name) for name in SCALE_FREE_FIELDS}
     boundary = card.boundary_strength
-    optional = [name for name in OPTIONAL_FIELDS if getattr(card, name) is not None]
-    given = [name for name, value in values.items() if value is not None] + optional
+    names = (*SCALE_FREE_FIELDS, *OPTIONAL_FIELDS, *CREASE_FIELDS)
+    given = [name for name in names if _given(card, name)]
     if card.format < SCALE_FREE_FORMAT:
         return f"{given[0]} in format {card.format}, not {SCALE_FREE_FORMAT}" if given else None
     missing = [name for name in ("vertex_features", *SCALE_FREE_FIELDS) if not _given(card, name)]
@@ -196,6 +202,12 @@ def _scale_free_problem(card: ModelCard) -> str | None:
         return f"network_altitudes {altitudes}, not a finite number > 0"
     if not 0 < angle < 90:
         return f"fold_angle {angle}, not between 0 and 90 degrees"
+    if card.crease_angle is not None and not 0 < card.crease_angle < 180:
+        return f"crease_angle {card.crease_angle}, not between 0 and 180 degrees"
+    if (card.crease_angle is None) != (card.crease_levels is None):
+        return "one of crease_angle and crease_levels without the other"
+    if card.crease_levels is not None and card.crease_levels < 1:
+        return f"crease_levels {card.crease_levels}, not at least 1"
     return None
 
 

@@ -16,6 +16,8 @@ with theirs.
 - The fold guard then halves displacements round after round, and a round reaches a child's ring. It
   reaches nowhere through a face that no scales in [0, 1] could fold (see exact.py). One ring for it
   is two of children: the outermost, whose neighbours are not known, and one to spare.
+- Crease lines are looked for on the control mesh alone, before its level: whether an edge is of
+  one is read of edges up to ``ROUNDS`` farther along, and of the faces beside these.
 
 Splitting turns a ring into two rings of children: all faces within two rings of f's children lie
 in children of faces within one ring of f (each has a corner at, or on an edge from, a corner of f).
@@ -28,6 +30,7 @@ from __future__ import annotations
 
 from pns_common.errors import ParameterError, PnsError
 from pns_common.features.edge_features import paper_features
+from pns_common.geometry.crease_lines import ROUNDS
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
 from pns_common.rules.loop import loop_vertex_rule
 from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
@@ -36,6 +39,8 @@ from pns_common.schemes import Scheme
 LOOP_REACH, FIELDS_REACH = 1, 2
 # Rings for the fold guard, where nothing is known yet of how far it goes.
 GUARD_RINGS = 1
+# A ring for each round, one for the sides of the farthest edge, and one for the faces beside those.
+LINES_REACH = ROUNDS + 2
 
 
 class ThinHaloError(PnsError):
@@ -46,8 +51,12 @@ class ThinHaloError(PnsError):
         self.level, self.faces = level, faces
 
 
-def halo_rings(scheme: Scheme, levels: int, guard_rings: int = GUARD_RINGS) -> int:
+def halo_rings(
+    scheme: Scheme, levels: int, guard_rings: int = GUARD_RINGS, lines: bool = False
+) -> int:
     """Return the rings of control faces that a piece needs for so many levels.
+
+    ``lines`` says whether crease lines are looked for.
 
     The guard may go further than ``guard_rings``; refining the piece then says so (ThinHaloError).
     """
@@ -56,7 +65,7 @@ def halo_rings(scheme: Scheme, levels: int, guard_rings: int = GUARD_RINGS) -> i
         guarded = scheme.guard is not None and is_learned(scheme, level)
         own = reach(scheme, level) + guarded * guard_rings
         needed = own + (1 if level == levels - 1 else -(-needed // 2))
-    return needed
+    return needed + lines * LINES_REACH
 
 
 def reach(scheme: Scheme, level: int) -> int:

@@ -15,12 +15,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.fused import fits, kernels_available
 from pns_common.fused.known import kernels_know
 from pns_common.levels.refined_levels import check_coordinates
 from pns_common.levels.step import AddedStep
 from pns_common.pieces.exact import guarded_exact, shrunk
-from pns_common.pieces.halo import ThinHaloError, is_learned, reach
+from pns_common.pieces.halo import LINES_REACH, ThinHaloError, is_learned, reach
 from pns_common.pieces.steps import Links, Step, steps_by_arrays, steps_by_kernels
 from pns_common.pieces.tally import LevelTally
 from pns_common.pieces.tally_of_step import tally_of
@@ -36,14 +37,14 @@ class Piece:
         faces: (F, 3) rows of ``points``, int64.
         own: the faces to be refined; the others are the halo.
         whole: vertices whose faces are all here.
-        creases: edges of the piece to keep sharp; None without.
+        creases: edges of the piece to keep sharp, named in its numbers or to be found.
     """
 
     points: Float[np.ndarray, "V 3"]
     faces: Int[np.ndarray, "F 3"]
     own: Bool[np.ndarray, " F"]
     whole: Bool[np.ndarray, " V"]
-    creases: Int[np.ndarray, "N 2"] | None = None
+    creases: Creases = NO_CREASES
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +93,9 @@ def refine_piece(
         links = step.links
         if level == 0:
             own_vertices = first_at_own(links, own)
+            if piece.creases.line_angle is not None:
+                for _ in range(LINES_REACH):
+                    exact = shrunk(exact, links.faces, rim)
             assert links.several_fans is not None
             several_fans = int((links.several_fans & own_vertices).sum())
         own_edges = own[links.first // 3]

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import Creases
 from pns_common.connectivity.topology import Topology
 from pns_common.levels.array_steps import array_steps
 from pns_common.levels.step import AddedStep
@@ -39,12 +40,14 @@ class Step:
     """One level of a piece: what it split, what it made.
 
     Attributes:
+        control: the points that it split.
         placed: what the rules placed; None where it is Loop's and was not kept.
         loop: where Loop puts the vertices; None where they are there.
         may_flip: whether a child can have turned over against Loop's.
     """
 
     links: Links
+    control: Float[np.ndarray, "V 3"]
     points: Float[np.ndarray, "W 3"]
     children: Int[np.ndarray, "C 3"]
     placed: AddedStep | None
@@ -55,7 +58,7 @@ class Step:
 def steps_by_arrays(
     points: Float[np.ndarray, "V 3"],
     faces: Int[np.ndarray, "F 3"],
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     scheme: Scheme,
     length: float,
     blocks: Blocks,
@@ -64,13 +67,15 @@ def steps_by_arrays(
     for step in array_steps(points, faces, creases, scheme, length, blocks):
         links, loop = _links(step.topology, step.several_fans), step.placed.loop_points
         kept = step.placed if step.placed.learned else None
-        yield Step(links, step.placed.points, step.faces, kept, loop, loop is not None)
+        yield Step(
+            links, step.control, step.placed.points, step.faces, kept, loop, loop is not None
+        )
 
 
 def steps_by_kernels(
     points: Float[np.ndarray, "V 3"],
     faces: Int[np.ndarray, "F 3"],
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     scheme: Scheme,
     length: float,
     blocks: Blocks,
@@ -106,8 +111,9 @@ def steps_by_kernels(
             level.several_fans if depth == 0 else None,
         )
         children = split_mesh_faces(mesh, np.int32, blocks)
-        yield Step(links, made, children, placed, loop, may_flip)
-        level, depth = next_level(level, made, blocks), depth + 1
+        yield Step(links, level.points, made, children, placed, loop, may_flip)
+        depth += 1
+        level = next_level(level, made, blocks, sharp=creases.sharp_at(depth))
 
 
 def _links(topology: Topology, several_fans: Bool[np.ndarray, " V"] | None) -> Links:

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.geometry.child_faces import angle_between
-from pns_common.levels.diagnostics import GATE_ACTIVE, EdgeCounts
+from pns_common.levels.diagnostics import GATE_ACTIVE, Displacements, EdgeCounts, limit_distances
 
 STEPS = 2**40
 # Steps are summed in two halves: one sum of them all would leave 63 bits at 2²³ numbers near 1.
@@ -66,6 +66,7 @@ class LevelTally:
         displacement, envelope: the largest; of learned levels, and None without a bound.
         shut: of learned levels, rows that the networks were not run for.
         guarded: None where there is no guard.
+        crease_shift: None where there are no creases.
     """
 
     vertices: int
@@ -83,6 +84,7 @@ class LevelTally:
     envelope: float | None = None
     shut: int = 0
     guarded: int | None = None
+    crease_shift: float | None = None
 
     def __add__(self, other: LevelTally) -> LevelTally:
         return LevelTally(
@@ -101,6 +103,7 @@ class LevelTally:
             envelope=_larger(self.envelope, other.envelope),
             shut=self.shut + other.shut,
             guarded=_sum(self.guarded, other.guarded),
+            crease_shift=_longer(self.crease_shift, other.crease_shift),
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -134,7 +137,7 @@ class ReducedVertices(TypedDict):
     gate: Measured
 
 
-class ReducedLevel(TypedDict):
+class ReducedLevel(Displacements):
     """``diagnostics.LevelReport`` without percentiles."""
 
     vertices: int
@@ -146,8 +149,6 @@ class ReducedLevel(TypedDict):
     gate: Measured
     normal_jump_max: float
     vertex_rule: NotRequired[ReducedVertices]
-    displacement_max: NotRequired[float]
-    envelope_max: NotRequired[float | None]
     shut: NotRequired[int]
     guarded: NotRequired[int]
 
@@ -164,14 +165,8 @@ class ReducedReport(TypedDict):
 def reduced_report(pieces: Iterable[list[LevelTally]]) -> ReducedReport:
     """Make the report of the whole mesh from the tallies of all its pieces, in any order."""
     levels = [reduce(operator.add, level) for level in zip(*pieces, strict=True)]
-    learned = [level for level in levels if level.learned]
-    bounds = [level.envelope for level in learned if level.envelope is not None]
-    return {
-        "learned_levels": len(learned),
-        "limit_distance": float(sum(level.displacement for level in learned)),
-        "limit_distance_bound": float(sum(bounds)) if len(bounds) == len(learned) else None,
-        "levels": [_reduced(level) for level in levels],
-    }
+    reduced = [_reduced(level) for level in levels]
+    return {**limit_distances(reduced), "levels": reduced}
 
 
 def _reduced(level: LevelTally) -> ReducedLevel:
@@ -201,6 +196,8 @@ def _reduced(level: LevelTally) -> ReducedLevel:
         report["shut"] = level.shut
     if level.guarded is not None:
         report["guarded"] = level.guarded
+    if level.crease_shift is not None:
+        report["crease_shift_max"] = level.crease_shift
     return report
 
 
@@ -225,6 +222,11 @@ def _both(first: Summed | None, second: Summed | None) -> Summed | None:
 
 def _larger(first: float | None, second: float | None) -> float | None:
     return None if first is None or second is None else max(first, second)
+
+
+def _longer(first: float | None, second: float | None) -> float | None:
+    """Return the larger of two; None is nothing at all."""
+    return max((value for value in (first, second) if value is not None), default=None)
 
 
 def _sum(first: int | None, second: int | None) -> int | None:

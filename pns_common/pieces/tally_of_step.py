@@ -11,6 +11,7 @@ from pns_common.base.arrays import dot, norm
 from pns_common.connectivity.topology import EdgeClass, next_corner
 from pns_common.geometry.frames import face_normals
 from pns_common.levels.step import AddedStep
+from pns_common.masks.crease_shift import crease_shift
 from pns_common.pieces.steps import Links, Step
 from pns_common.pieces.tally import LevelTally, Summed
 from pns_common.rules.placement import Added
@@ -34,6 +35,7 @@ def tally_of(
         ratio=Summed(interior),
         gate=Summed(interior),
         chord=_largest_chord(step, own, own_edges),
+        crease_shift=_crease_shift(step, own_vertices, own_edges),
     )
     return tally if placed is None else _with_rules(tally, placed, links, own_vertices, own_edges)
 
@@ -76,6 +78,24 @@ def _with_rules(
         displacement=max(_longest(rule, rows) for rule, rows in both),
         envelope=max(known) if len(known) == len(bounds) else None,
     )
+
+
+def _crease_shift(
+    step: Step, own_vertices: Bool[np.ndarray, " W"], own_edges: Bool[np.ndarray, " E"]
+) -> float | None:
+    """Return the longest way that creases keep an own vertex back; None without own creases."""
+    links = step.links
+    rows = np.flatnonzero(links.edge_class == EdgeClass.CREASE)
+    corners = links.faces.reshape(-1)
+    half_edges = np.asarray(links.first[rows], dtype=np.int64)
+    ends = np.stack([corners[half_edges], corners[next_corner(half_edges)]], axis=1)
+    shift = crease_shift(step.control, links.faces, rows, ends.astype(np.int64))
+    if shift is None:
+        return None
+    old, new = own_vertices[shift.vertices], own_edges[shift.edges]
+    if not (old.any() or new.any()):
+        return None
+    return float(max(shift.of_vertices[old].max(initial=0), shift.of_edges[new].max(initial=0)))
 
 
 def _longest(rule: Added, rows: Bool[np.ndarray, " N"]) -> float:

@@ -88,8 +88,10 @@ class Parameters(BaseModel):
     crease: str = Field(
         default=DEFAULTS.crease,
         pattern=f"^({CREASE_PATTERN})$",
-        description="edges to keep sharp: `off`, `normals` (where the two sides carry different "
-        "normals) or `angle:` and degrees (where the faces meet at more)",
+        description="edges to keep sharp: `lines` (those that the mesh shows: sharp, flat on both "
+        "sides, and going on), `auto` (the same where the model's card asks for it), `off`, "
+        "`normals` (where the two sides carry different normals) or `angle:` and degrees (where "
+        "the faces meet at more)",
     )
     weld_tolerance: float = Field(
         default=DEFAULTS.weld_tolerance,

@@ -19,7 +19,7 @@ from ..errors import InvalidParameter, UnrefinableError, check_limit
 from ..gltf.read.plan import BYTES_FOR_LIMIT, BYTES_PER_FACE, check_memory
 from ..gltf.refine.refined_primitives import refined_ids
 from ..meshes.barycentric_grid import barycentric_grid
-from ..meshes.crease_angle import edges_sharper_than
+from ..meshes.shape_creases import creases_by_shape
 from ..meshes.split_connectivity import split_connectivity
 from ..meshes.uv_charts import uv_blend
 from ..meshes.weld import Weld, weld
@@ -54,14 +54,13 @@ def refine_triangles(
     if not proper.any():
         raise UnrefinableError("no face has three different vertices")
     cleaned = clean(Mesh(welded.points, welded.faces))
-    angle = options.crease_angle
     refinement = refine(
         cleaned.mesh,
         scheme,
         options.levels,
         options.reference_length,
         limit=options.limit,
-        creases=None if angle is None else edges_sharper_than(cleaned.mesh, angle),
+        creases=creases_by_shape(cleaned.mesh, options, scheme),
         progress=lambda done, total: course.reach(done / total),
     )
     ids = refined_ids(welded, cleaned, refinement, barycentric_grid(options.levels))

@@ -58,6 +58,12 @@ class ModelEntry(BaseModel):
     wide_bound: bool | None = Field(
         description="whether h of an edge's bound is the longest edge of both faces; null: its own"
     )
+    crease_angle: float | None = Field(
+        description="of the crease lines that `crease=auto` keeps, in degrees; null: none"
+    )
+    crease_levels: int | None = Field(
+        description="at how many levels these lines are sharp; null: there are none"
+    )
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")
 

@@ -36,10 +36,11 @@ def test_the_form_has_each_number_of_the_card_and_the_callers_budget():
 
 
 def test_a_scheme_says_what_its_rules_do():
-    scheme = pns(scale_free_model(0, **NUMBERS), 4)
+    scheme = pns(scale_free_model(0, **NUMBERS, crease_angle=50.0, crease_levels=3), 4)
     assert (scheme.name, scheme.budget, scheme.model) == ("pns", 4.0, "scale-free")
     assert (scheme.learned_levels, scheme.moves_boundaries, scheme.wide_bound) == (2, True, True)
     assert scheme.guard.angle == math.radians(60)
+    assert (scheme.creases.line_angle, scheme.creases.levels) == (50.0, 3)
     assert scheme.edge_rule.boundary == scheme.vertex_rule.boundary is not None
     plain = pns(scale_free_model(0))
     assert (plain.moves_boundaries, plain.wide_bound, plain.edge_rule.boundary) == (

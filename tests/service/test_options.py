@@ -29,6 +29,7 @@ WRONG = [
     ("normals", "hard"),
     ("normals", "limit"),
     ("crease", "on"),
+    ("crease", "lines:66"),
     ("crease", "angle"),
     ("crease", "angle:"),
     ("crease", "angle:-3"),
@@ -57,6 +58,8 @@ def test_a_value_outside_its_range_is_refused_by_name(name, value):
         {"budget": 0.0, "reference_length": 1.0},
         {"uv": "smooth", "crease": "angle:180", "weld_tolerance": 0.01},
         {"crease": "normals"},
+        {"crease": "lines"},
+        {"crease": "off"},
         {"normals": "limit", "limit": True},
     ],
 )

@@ -6,6 +6,7 @@ import numpy as np
 
 from pns_common import loop
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import Creases
 from pns_common.fused import KERNEL_ROWS
 from pns_common.fused.mesh_edges import build_edges
 from pns_common.fused.refine import refine_fused
@@ -18,12 +19,14 @@ def _nothing():
 
 def by_arrays(mesh, levels, creases=None, scheme=None, length=1.0):
     scheme = scheme or loop()
-    return refine_arrays(mesh, scheme, levels, length, creases, Blocks(1), _nothing)
+    return refine_arrays(mesh, scheme, levels, length, Creases(creases), Blocks(1), _nothing)
 
 
 def by_kernels(mesh, levels, creases=None, scheme=None, length=1.0, threads=1, rows=KERNEL_ROWS):
     scheme = scheme or loop()
-    return refine_fused(mesh, scheme, levels, length, creases, Blocks(threads, rows), _nothing)
+    return refine_fused(
+        mesh, scheme, levels, length, Creases(creases), Blocks(threads, rows), _nothing
+    )
 
 
 def assert_same_bits(left, right):

@@ -156,3 +156,32 @@ def _midpoint_split(points, faces):
         ab, bc, ca = mid(a, b), mid(b, c), mid(c, a)
         out += [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
     return np.array(points), np.array(out)
+
+
+def block(cells=3, noise=0.0, seed=0, closed=True):
+    """A box of cells³ squares, outwards: twelve crease lines; not ``closed``: without its lid."""
+    side = np.linspace(-1, 1, cells + 1)
+    u, v = (values.reshape(-1) for values in np.meshgrid(side, side, indexing="ij"))
+    quads = [
+        (i * (cells + 1) + j, (i + 1) * (cells + 1) + j, (i + 1) * (cells + 1) + j + 1)
+        for i in range(cells)
+        for j in range(cells)
+    ]
+    lower = np.array(quads)
+    upper = lower[:, [0, 2, 2]] - [0, 0, cells + 1]
+    one = np.concatenate([lower, upper])
+    points, faces = [], []
+    for axis in range(3):
+        for sign in (-1, 1):
+            if axis == 2 and sign == 1 and not closed:
+                continue
+            faces.append((one if sign > 0 else one[:, ::-1]) + len(u) * len(points))
+            points.append(
+                np.roll(np.stack([u, v, np.full(len(u), sign)], axis=1), axis + 1, axis=1)
+            )
+    sides = np.concatenate(points)
+    rounded = np.round(sides * 4 * cells)
+    _, first, number = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    rng = np.random.default_rng(seed)
+    points = sides[first] + noise * rng.standard_normal((len(first), 3))
+    return points, number.reshape(-1)[np.concatenate(faces)]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.pieces import Piece, RefinedPiece, ThinHaloError, halo_rings, refine_piece
 
 
@@ -30,7 +31,7 @@ def adjacent(faces, chosen, rings):
     return chosen
 
 
-def piece_of(mesh, own, rings, creases=None):
+def piece_of(mesh, own, rings, creases=None, lines=NO_CREASES):
     chosen = adjacent(mesh.faces, own, rings)
     faces = np.flatnonzero(chosen)
     vertices, local = np.unique(mesh.faces[chosen], return_inverse=True)
@@ -42,20 +43,23 @@ def piece_of(mesh, own, rings, creases=None):
         pairs = [[number.get(int(v), -1) for v in sorted(pair)] for pair in creases]
         here = set(map(tuple, edges))
         creases = np.array([p for p in pairs if tuple(p) in here], dtype=int).reshape(-1, 2)
-    return Cut(Piece(mesh.vertices[vertices], local, own[chosen], whole, creases), faces)
+    kept = lines if creases is None else Creases(creases)
+    return Cut(Piece(mesh.vertices[vertices], local, own[chosen], whole, kept), faces)
 
 
-def pieces_refined(mesh, owner, scheme, levels, length, creases=None):
+def pieces_refined(mesh, owner, scheme, levels, length, creases=None, lines=NO_CREASES):
     """All pieces of a mesh refined, each with as many rings as it turns out to need."""
     return [
-        _refined(mesh, owner == part, scheme, levels, length, creases) for part in np.unique(owner)
+        _refined(mesh, owner == part, scheme, levels, length, creases, lines)
+        for part in np.unique(owner)
     ]
 
 
-def _refined(mesh, own, scheme, levels, length, creases):
+def _refined(mesh, own, scheme, levels, length, creases, lines):
     guard_rings = 1
     while True:
-        cut = piece_of(mesh, own, halo_rings(scheme, levels, guard_rings), creases)
+        rings = halo_rings(scheme, levels, guard_rings, lines=lines.line_angle is not None)
+        cut = piece_of(mesh, own, rings, creases, lines)
         try:
             refined = refine_piece(cut.piece, scheme, levels, length, Blocks(1))
             break

@@ -7,6 +7,7 @@ from types import MappingProxyType
 import msgspec
 
 from pns_common.errors import ParameterError
+from pns_common.geometry.crease_lines import CREASE_ANGLE, CREASE_LEVELS
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +74,8 @@ class ScaleFree:
         network_altitudes: α, the longest that τ's unit may be, in altitudes; None for no limit. As
             the next, it acts in use, and not in training.
         wide_bound: whether h of an edge's bound is the longest edge of its two faces.
+        crease_angle: θ in degrees of the crease lines that are kept in use; training sees none.
+        crease_levels: at how many levels these are sharp.
     """
 
     prior_strength: float
@@ -83,6 +86,8 @@ class ScaleFree:
     side_gates: bool | None = None
     network_altitudes: float | None = None
     wide_bound: bool | None = None
+    crease_angle: float | None = None
+    crease_levels: int | None = None
 
 
 class OneStep(msgspec.Struct, frozen=True, tag=True):
@@ -288,6 +293,8 @@ def general(seed: int = 0) -> Recipe:
             side_gates=True,
             network_altitudes=3.0,
             wide_bound=True,
+            crease_angle=CREASE_ANGLE,
+            crease_levels=CREASE_LEVELS,
         ),
     )
 

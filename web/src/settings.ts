@@ -7,7 +7,7 @@ export interface Settings {
   /** C, dimensionless; null: the model's own. */
   budget: number | null;
   limit: boolean;
-  crease: "off" | "normals" | "angle";
+  crease: "auto" | "off" | "lines" | "normals" | "angle";
   /** Degrees. */
   angle: number;
   uv: "linear" | "smooth";
@@ -21,7 +21,7 @@ export const DEFAULTS: Settings = {
   model: "",
   budget: null,
   limit: false,
-  crease: "off",
+  crease: "auto",
   angle: 40,
   uv: "linear",
   normals: "keep",
@@ -75,7 +75,7 @@ export function fromHash(hash: string): { settings: Settings; view: Record<strin
   settings.model = model ?? settings.model;
   settings.budget = number(budget, 0, Infinity);
   settings.limit = limit === "true";
-  settings.crease = oneOf(crease, ["off", "normals", "angle"]) ?? settings.crease;
+  settings.crease = oneOf(crease, ["auto", "off", "lines", "normals", "angle"]) ?? settings.crease;
   settings.angle = number(angle, 0, 180) ?? settings.angle;
   settings.uv = oneOf(uv, ["linear", "smooth"]) ?? settings.uv;
   settings.normals = oneOf(normals, ["keep", "smooth", "limit"]) ?? settings.normals;

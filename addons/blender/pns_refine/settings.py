@@ -94,6 +94,11 @@ class Settings:
         min=0.0,
         max=NO_ANGLE,
     )
+    crease_lines: BoolProperty(
+        name="Keep Crease Lines",
+        description="Keep edges sharp that the mesh shows to be: between flat sides, and going on",
+        default=True,
+    )
     quads: BoolProperty(
         name="Join Quads",
         description="Join the triangles that come of a quad to quads again",
@@ -110,6 +115,9 @@ class Settings:
         column.prop(self, "model_file")
         column.prop(self, "budget", slider=True)
         layout.prop(self, "limit")
+        column = layout.column()
+        column.enabled = self.scheme == "PNS"
+        column.prop(self, "crease_lines")
         layout.prop(self, "crease_angle")
         layout.prop(self, "quads")
 
@@ -128,5 +136,6 @@ def choice_of(settings: Settings) -> Choice:
         budget=settings.budget,
         limit=settings.limit,
         crease_angle=None if angle >= NO_ANGLE else angle,
+        crease_lines=settings.crease_lines,
         quads=settings.quads,
     )

@@ -171,9 +171,10 @@ def _alone(
 ) -> MeshOutcome:
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options.weld_tolerance, options.weld_unit)
-        creases = creases_of(control, options)
+        creases = creases_of(control, options, scheme)
         if options.normals != "keep" and control.cleaned is not None:
-            primitives = with_smooth_normals(control, control.cleaned, creases)
+            sharp = creases.left_after(options.levels)
+            primitives = with_smooth_normals(control, control.cleaned, sharp)
             control = control_mesh(primitives, options.weld_tolerance, options.weld_unit)
     pointer = f"/meshes/{plan.mesh}"
     with course.stage("refine", shares.refine, shares.attributes):

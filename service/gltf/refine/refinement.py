@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from pns_common.base.extent import extent
+from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.errors import MeshError
 from pns_common.fused.linear import linear_refinement
 from pns_common.mesh import Cleaned
@@ -14,7 +15,7 @@ from pns_common.schemes import Scheme
 
 from ...course import Course
 from ...errors import UnrefinableError
-from ...meshes.crease_angle import edges_sharper_than
+from ...meshes.shape_creases import creases_by_shape
 from ...options import Options
 from ...report import Change
 from .control_mesh import ControlMesh, vertex_rows
@@ -25,19 +26,18 @@ from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
 RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 
 
-def creases_of(control: ControlMesh, options: Options) -> Int[np.ndarray, "N 2"] | None:
-    """Return the cleaned mesh's edges that the options keep sharp; None if none are asked for."""
-    angle = options.crease_angle
-    if control.cleaned is None or (angle is None and options.crease != "normals"):
-        return None
-    if angle is None:
-        return hard_edges(control, control.cleaned)
-    return edges_sharper_than(control.cleaned.mesh, angle)
+def creases_of(control: ControlMesh, options: Options, scheme: Scheme) -> Creases:
+    """Return the cleaned mesh's edges that the options keep sharp, by name."""
+    if control.cleaned is None:
+        return NO_CREASES
+    if options.crease == "normals":
+        return Creases(hard_edges(control, control.cleaned))
+    return creases_by_shape(control.cleaned.mesh, options, scheme)
 
 
 def refine_control_mesh(
     control: ControlMesh,
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     scheme: Scheme,
     options: Options,
     pointer: str,
@@ -117,7 +117,7 @@ def _skin_and_morph(
     control: ControlMesh,
     cleaned: Cleaned,
     options: Options,
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
 ) -> SkinAndMorph:
     if not control.skin_and_morph.any:
         return control.skin_and_morph

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from pns_common.base.deferred import Deferred
+from pns_common.connectivity.creases import Creases
 from pns_common.errors import MeshError
 from pns_common.fused.linear import linear_refinement
 from pns_common.mesh import Cleaned
@@ -98,7 +99,7 @@ def refine_together(
     if control.cleaned is None or not able.all():
         return _chosen_together(able, meshes, pointers, scheme, options, course, shares)
     with course.stage("weld", shares.weld, shares.refine):
-        creases = creases_of(control, options)
+        creases = creases_of(control, options, scheme)
         if options.normals != "keep":
             control, parts = _smoothed(control, control.cleaned, parts, creases, options)
     with course.stage("refine", shares.refine, shares.attributes):
@@ -141,11 +142,11 @@ def _smoothed(
     control: ControlMesh,
     cleaned: Cleaned,
     parts: Parts,
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     options: Options,
 ) -> tuple[ControlMesh, Parts]:
     """Return the union with new normals, for which vertices are split into more rows."""
-    primitives = with_smooth_normals(control, cleaned, creases)
+    primitives = with_smooth_normals(control, cleaned, creases.left_after(options.levels))
     of_row = np.concatenate(
         [
             parts.of_row[share][primitive.rows]
@@ -179,7 +180,7 @@ def _chosen_together(
 def _refined(
     control: ControlMesh,
     parts: Parts,
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     scheme: Scheme,
     options: Options,
 ) -> _Refined | None:
@@ -216,7 +217,7 @@ def _skin_and_morph(
     control: ControlMesh,
     cleaned: Cleaned,
     parts: Parts,
-    creases: Int[np.ndarray, "N 2"] | None,
+    creases: Creases,
     made: PartsRefinement,
     options: Options,
 ) -> tuple[SkinAndMorph, Int[np.ndarray, " P"]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
+from pns_common.connectivity.creases import Creases
 from pns_common.pieces import Piece
 
 from .adjacency import Adjacency, ring_of, whole_vertices
@@ -37,7 +38,7 @@ def cutout(mesh: ArrayMesh, adjacency: Adjacency, own: Int[np.ndarray, " N"], ri
     is_own[np.searchsorted(faces, own)] = True
     points = np.asarray(mesh.positions[vertices], dtype=np.float64)
     whole = whole_vertices(adjacency, vertices, local)
-    piece = Piece(points, local, is_own, whole, _local_creases(mesh, vertices, local))
+    piece = Piece(points, local, is_own, whole, Creases(_local_creases(mesh, vertices, local)))
     return Cutout(piece, vertices, faces)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import resource
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Int
 
 from pns_common.base.whole_file import replace_file, replacing
+from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.errors import PnsError
 from pns_common.fused import kernel_blocks, load_kernels
 from pns_common.mesh import Mesh
@@ -22,7 +23,7 @@ from pns_common.schemes import Scheme
 
 from ...errors import LimitError, NoModelError, UnrefinableError
 from ...gltf.subdivide import make_scheme
-from ...meshes.crease_angle import edges_sharper_than
+from ...meshes.shape_creases import edges_sharper_than, lines_of
 from ...options import Options
 from .adjacency import Adjacency
 from .arrays import ArrayMesh, open_mesh
@@ -148,18 +149,23 @@ def _surely_refined(
         LimitError: with its halo it is larger than its memory.
     """
     levels, guard_rings = task.options.levels, 1
+    lines = lines_of(task.options, scheme)
+    if mesh.creases is not None:
+        lines = NO_CREASES  # as in Python: who names creases gets those
+    looks = lines.line_angle is not None
     while True:
-        rings = halo_rings(scheme, levels, guard_rings)
+        rings = halo_rings(scheme, levels, guard_rings, looks)
         cut = cutout(mesh, adjacency, own, rings)
         _check_memory(task, cut, adjacency)
         piece = with_angle_creases(cut.piece, task.options.crease_angle)
+        piece = replace(piece, creases=lines) if looks else piece
         blocks = kernel_blocks(task.threads)
         try:
             return rings, cut, refine_piece(piece, scheme, levels, task.length, blocks)
         except ThinHaloError:
             # Only the guard goes farther than is known beforehand, and in all of the mesh no more.
             guard_rings *= 2
-            if cut.is_all or halo_rings(scheme, levels, guard_rings) == rings:
+            if cut.is_all or halo_rings(scheme, levels, guard_rings, looks) == rings:
                 raise
 
 
@@ -202,9 +208,9 @@ def with_angle_creases(piece: Piece, angle: float | None) -> Piece:
     if angle is None:
         return piece
     sharp = edges_sharper_than(Mesh(piece.points, piece.faces), angle)
-    given = np.zeros((0, 2), dtype=np.int64) if piece.creases is None else piece.creases
-    creases = np.concatenate([given, sharp])
-    return Piece(piece.points, piece.faces, piece.own, piece.whole, creases)
+    given = piece.creases.named
+    creases = sharp if given is None else np.concatenate([given, sharp])
+    return replace(piece, creases=Creases(creases))
 
 
 @cache

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pns_common import Mesh, ParameterError, loop, pns, refine
+from pns_common import Creases, Mesh, ParameterError, loop, pns, refine
 from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.masks.linear import level_topologies
 from tests.support.meshes import bent, bumpy_sphere, grid
@@ -36,7 +36,7 @@ def test_crease_edges_get_no_correction_and_are_counted():
     counts = [level["edges"] for level in refined.report["levels"]]
     assert [count["crease"] for count in counts] == [len(rim), 2 * len(rim)]
     assert sum(counts[0].values()) == 3 * len(faces) // 2
-    control, fine = level_topologies(faces, len(vertices), 2, rim)
+    control, fine = level_topologies(faces, len(vertices), 2, Creases(rim))
     crease = fine.vertex_count + np.flatnonzero(fine.edge_class == EdgeClass.CREASE)
     assert len(crease) == 2 * len(rim)
     assert not refined.ratio[crease].any()

@@ -7,6 +7,7 @@ import pytest
 
 from pns_common import Mesh, ModelError, pns
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import NO_CREASES
 from pns_common.connectivity.topology import build_topology
 from pns_common.fused.learned_step import learned_points
 from pns_common.fused.level import control_level
@@ -37,7 +38,7 @@ def test_what_a_network_may_not_return_is_refused(card, edges, vertices):
 def test_a_step_is_the_array_kernels_and_only_without_a_guard_can_faces_be_flipped(model):
     points, faces = bumpy_sphere(1, subdivisions=0)
     scheme = pns(model)
-    level = control_level(points, faces, None, Blocks(1))
+    level = control_level(points, faces, NO_CREASES, Blocks(1))
     made = learned_points(level, scheme, 0.7, Blocks(1))
     step = level_step(array_level(points, build_topology(faces, 12), 0.7), scheme)
     np.testing.assert_array_equal(made.points, step.points)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from pns_common import Mesh, ParameterError
 from pns_common.base.blocks import Blocks
-from pns_common.connectivity.creases import crease_children, with_creases
+from pns_common.connectivity.creases import NO_CREASES, Creases, crease_children, with_creases
 from pns_common.connectivity.topology import Topology, build_topology, split
 from pns_common.fused.level import ROUNDING, control_level, loop_step, next_level
 from pns_common.levels.refined_levels import check_coordinates
@@ -29,7 +29,7 @@ def assert_same_topology(compiled, expected):
 @given(soups() | manifolds(), SEEDS)
 def test_a_levels_topology_is_the_array_kernels(mesh, seed):
     creases = edges_of(mesh, 3, seed)
-    level = control_level(mesh.vertices, mesh.faces, creases, Blocks(1))
+    level = control_level(mesh.vertices, mesh.faces, Creases(creases), Blocks(1))
     expected = with_creases(build_topology(mesh.faces, len(mesh.vertices)), creases)
     assert_same_topology(level.topology(), expected)
     below = next_level(level, np.zeros((len(mesh.vertices) + len(expected.edges), 3)), Blocks(1))
@@ -45,7 +45,7 @@ def test_a_crease_that_is_no_edge_is_refused():
 
 def test_a_step_of_loop_adds_nothing_and_reports_what_the_arrays_do():
     mesh = Mesh(*grid(4, bent))
-    step = loop_step(control_level(mesh.vertices, mesh.faces, None, Blocks(1)), Blocks(1))
+    step = loop_step(control_level(mesh.vertices, mesh.faces, NO_CREASES, Blocks(1)), Blocks(1))
     arrays = by_arrays(mesh, 1)
     assert step.added is None
     np.testing.assert_array_equal(step.points, arrays.points)
@@ -56,7 +56,7 @@ def test_how_large_loops_points_are_is_told_from_those_they_are_made_of():
     points, faces = grid(4, bent)
     size = np.abs(points).max()
     for scale in (1.0, LARGEST_COORDINATE / size):
-        level = control_level(scale * points, faces, None, Blocks(1))
+        level = control_level(scale * points, faces, NO_CREASES, Blocks(1))
         step = loop_step(level, Blocks(1))
         assert np.abs(step.points).max() <= step.largest <= ROUNDING * scale * size
         # As exact as the limit asks.

@@ -86,7 +86,7 @@ def test_kernels_agree_on_faces_without_area():
 def test_refine_takes_the_kernels_for_loop():
     assert kernels_available()
     mesh = Mesh(*bumpy_sphere(0))
-    assert kernels_can_serve(mesh, loop(), 8, 1.0, None)
+    assert kernels_can_serve(mesh, loop(), 8, 1.0)
     made = refine(mesh, loop(), 2)
     assert made.mesh.vertices.tobytes() == by_arrays(mesh, 2).points.tobytes()
 
@@ -96,11 +96,11 @@ def test_numbers_that_do_not_fit_in_int32_are_left_to_the_arrays():
     assert not fits(0, LARGEST_INDEX // 12 + 1, 1)
     assert not fits(LARGEST_INDEX, 1, 1)
     mesh = Mesh(*bumpy_sphere(0))
-    assert not kernels_can_serve(mesh, loop(), 16, 1.0, None)
+    assert not kernels_can_serve(mesh, loop(), 16, 1.0)
 
 
 def test_without_numba_the_arrays_serve(monkeypatch):
     mesh = Mesh(*bumpy_sphere(0))
     monkeypatch.setattr(sys.modules["pns_common.refine"], "kernels_available", lambda: False)
-    assert not kernels_can_serve(mesh, loop(), 1, 1.0, None)
+    assert not kernels_can_serve(mesh, loop(), 1, 1.0)
     assert refine(mesh, loop()).mesh.vertices.tobytes() == by_arrays(mesh, 1).points.tobytes()

@@ -5,6 +5,7 @@ import pytest
 
 from pns_common import Mesh, ParameterError, loop, pns
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.fused.refine_parts import refine_parts_fused
 from tests.support.kernels import by_kernels
 from tests.support.meshes import bow_tie, bumpy_sphere
@@ -20,7 +21,7 @@ STARTS, LENGTHS = np.array([0, 20, 22]), np.array([0.5, 3.0])
 
 @pytest.mark.parametrize("scheme", [loop(), pns(scale_free_model(0))], ids=["loop", "pns"])
 def test_each_part_is_what_it_is_alone(scheme):
-    made = refine_parts_fused(BOTH, STARTS, scheme, 2, LENGTHS, None, Blocks(1))
+    made = refine_parts_fused(BOTH, STARTS, scheme, 2, LENGTHS, NO_CREASES, Blocks(1))
     alone = [
         by_kernels(part, 2, scheme=scheme, length=length)
         for part, length in zip(PARTS, LENGTHS.tolist(), strict=True)
@@ -36,4 +37,6 @@ def test_each_part_is_what_it_is_alone(scheme):
 
 def test_a_crease_across_parts_is_no_edge():
     with pytest.raises(ParameterError, match="creases"):
-        refine_parts_fused(BOTH, STARTS, loop(), 1, LENGTHS, np.array([[0, 12]]), Blocks(1))
+        refine_parts_fused(
+            BOTH, STARTS, loop(), 1, LENGTHS, Creases(np.array([[0, 12]])), Blocks(1)
+        )

@@ -6,6 +6,7 @@ import numpy as np
 
 from pns_common import Mesh, loop, pns, refine
 from pns_common.base.blocks import WHOLE
+from pns_common.connectivity.creases import Creases
 from pns_common.connectivity.topology import EdgeClass
 from pns_common.levels.array_steps import array_steps
 from tests.support.meshes import bow_tie, bumpy_sphere
@@ -15,7 +16,7 @@ POINTS, FACES = bumpy_sphere(2, subdivisions=0)
 
 
 def steps(scheme, count, points=POINTS, faces=FACES, creases=None):
-    return list(islice(array_steps(points, faces, creases, scheme, 1.0, WHOLE), count))
+    return list(islice(array_steps(points, faces, Creases(creases), scheme, 1.0, WHOLE), count))
 
 
 def test_the_steps_are_refine_of_one_level_again_and_again():

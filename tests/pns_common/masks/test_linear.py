@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, refine
+from pns_common.connectivity.creases import Creases
 from pns_common.masks.linear import level_topologies, refine_linear
 from tests.support.meshes import manifolds, soups
 
@@ -47,5 +48,5 @@ def test_creases_are_followed():
     mesh = Mesh(vertices, np.array([[0, 1, 2], [2, 1, 3]]))
     crease = np.array([[2, 1]])
     expected = refine(mesh, loop(), 3, creases=crease).mesh.vertices
-    steps = level_topologies(mesh.faces, 4, 3, crease)
+    steps = level_topologies(mesh.faces, 4, 3, Creases(crease))
     np.testing.assert_array_equal(refine_linear(vertices, steps), expected)

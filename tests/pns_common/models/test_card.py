@@ -21,6 +21,10 @@ from tests.support.networks import CARD, SCALE_FREE_CARD, VERTEX_CARD
         ({"format": 2}, "learned_levels in format 2"),
         ({"side_gates": 1}, "side_gates of type int"),
         ({"network_altitudes": 0.0}, "network_altitudes 0.0, not a finite number > 0"),
+        ({"crease_angle": 180.0}, "crease_angle 180.0, not between 0 and 180 degrees"),
+        ({"crease_angle": 0.0}, "crease_angle 0.0"),
+        ({"crease_angle": 66.0}, "one of crease_angle and crease_levels without the other"),
+        ({"crease_angle": 66.0, "crease_levels": 0}, "crease_levels 0, not at least 1"),
     ],
 )
 def test_a_wrong_number_on_a_card_is_named(changes, says):
@@ -35,6 +39,8 @@ def test_a_card_reads_back_as_it_was_written():
         boundary_strength=1.0,
         network_altitudes=3.0,
         wide_bound=True,
+        crease_angle=66.0,
+        crease_levels=2,
     )
     for card in (CARD, VERTEX_CARD, SCALE_FREE_CARD, thin):
         assert ModelCard.from_json(card.to_json()) == card

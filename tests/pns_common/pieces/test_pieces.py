@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pns_common import Mesh, load_model, loop, pns, refine
+from pns_common import Creases, Mesh, crease_lines, load_model, loop, pns, refine
+from pns_common.connectivity.creases import NO_CREASES
 from pns_common.connectivity.topology import build_topology
 from pns_common.pieces import (
     reduced_report,
@@ -26,12 +27,12 @@ SMALL = {
 }
 
 
-def assert_pieces_are_the_whole(mesh, owner, scheme, levels, creases=None):
-    whole = refine(mesh, scheme, levels, creases=creases)
+def assert_pieces_are_the_whole(mesh, owner, scheme, levels, creases=None, lines=NO_CREASES):
+    whole = refine(mesh, scheme, levels, creases=lines if creases is None else creases)
     length = whole.report["reference_length"]
     if length == 0:
         return
-    made = pieces_refined(mesh, owner, scheme, levels, length, creases)
+    made = pieces_refined(mesh, owner, scheme, levels, length, creases, lines)
     written = np.zeros(len(whole.mesh.faces), dtype=int)
     for piece in made:
         corners = piece.refined.points[piece.refined.faces[piece.own_children]]
@@ -83,6 +84,23 @@ def test_pieces_with_boundaries_and_creases_are_the_whole(name):
     owner = (points[mesh.faces].mean(axis=1)[:, :2] > 0.1) @ [1, 2]
     creases = edges[rng.choice(len(edges), 40, replace=False)]
     assert_pieces_are_the_whole(mesh, owner, SCHEMES[name], 2, creases)
+
+
+def pleats(n, seed):
+    """A sheet of pleats, each smoothed out from somewhere on: lines with loose ends everywhere."""
+    points, faces = grid(n)
+    row, column = np.divmod(np.arange(n * n), n)
+    ends = np.random.default_rng(seed).integers(6, n + 6, n)
+    points[:, 2] = np.where((row % 2 == 1) & (column < ends[row]), 2 / (n - 1), 0)
+    return Mesh(points, faces)
+
+
+def test_pieces_find_the_lines_of_the_whole():
+    """Lines run on, out of a piece and along its halo: it is wide enough to tell where they end."""
+    mesh, lines = pleats(24, 0), Creases(line_angle=66.0, levels=2)
+    owner = (mesh.vertices[mesh.faces].mean(axis=1)[:, :2] // 0.3) @ [1, 20]
+    assert_pieces_are_the_whole(mesh, owner, loop(), 3, lines=lines)
+    assert len(crease_lines(mesh)) > 100
 
 
 @pytest.mark.parametrize("name", SMALL)

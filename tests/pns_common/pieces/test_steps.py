@@ -7,6 +7,7 @@ import pytest
 
 from pns_common import loop, pns
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import Creases
 from pns_common.pieces.steps import steps_by_arrays, steps_by_kernels
 from tests.support.meshes import bent, bow_tie, grid, three_pages
 from tests.support.networks import scale_free_model, vertex_model
@@ -16,7 +17,7 @@ MESHES = {"open": grid(4, bent), "bow-tie": bow_tie(), "three pages": three_page
 
 
 def both(mesh, scheme, creases=None):
-    arguments = (*MESHES[mesh], creases, SCHEMES[scheme], 1.0, Blocks(1))
+    arguments = (*MESHES[mesh], Creases(creases), SCHEMES[scheme], 1.0, Blocks(1))
     return [list(islice(steps(*arguments), 2)) for steps in (steps_by_arrays, steps_by_kernels)]
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from pns_common import Mesh, pns, refine
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import NO_CREASES
 from pns_common.pieces.steps import steps_by_arrays, steps_by_kernels
 from pns_common.pieces.tally import reduced_report
 from pns_common.pieces.tally_of_step import tally_of
@@ -20,7 +21,7 @@ SCHEMES = {"guarded": pns(scale_free_model(0)), "flipping": pns(vertex_model(0, 
 @pytest.mark.parametrize("steps", [steps_by_arrays, steps_by_kernels])
 @pytest.mark.parametrize("name", SCHEMES)
 def test_of_everything_it_is_the_report(name, steps):
-    (step,) = islice(steps(POINTS, FACES, None, SCHEMES[name], 1.0, Blocks(1)), 1)
+    (step,) = islice(steps(POINTS, FACES, NO_CREASES, SCHEMES[name], 1.0, Blocks(1)), 1)
     everything = (np.ones(n, dtype=bool) for n in (len(FACES), len(step.points), 85))
     (level,) = reduced_report([[tally_of(step, *everything)]])["levels"]
     (expected,) = refine(Mesh(POINTS, FACES), SCHEMES[name], 1, 1.0).report["levels"]
@@ -34,7 +35,9 @@ def test_of_everything_it_is_the_report(name, steps):
 
 
 def test_what_is_not_the_pieces_own_does_not_count():
-    (step,) = islice(steps_by_arrays(POINTS, FACES, None, SCHEMES["flipping"], 1.0, Blocks(1)), 1)
+    (step,) = islice(
+        steps_by_arrays(POINTS, FACES, NO_CREASES, SCHEMES["flipping"], 1.0, Blocks(1)), 1
+    )
     own_faces = np.arange(len(FACES)) == 20
     own_edges = np.arange(85) == step.links.interior[7]
     own_vertices = np.zeros(len(step.points), dtype=bool)

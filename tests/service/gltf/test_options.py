@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pns_common import load_model
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from tests.support.gltf import files
@@ -66,6 +67,25 @@ def test_every_edge_of_a_cube_is_a_crease_and_its_corners_stay():
             attributes["POSITION"]
         )
     assert "crease" not in subdivide([box()], crease="angle:91").report["levels"][0]["edges"]
+
+
+@pytest.mark.parametrize(
+    ("options", "count"),
+    [
+        ({"scheme": "pns"}, 12),
+        ({"scheme": "pns", "crease": "off"}, 0),
+        ({"scheme": "pns", "budget": 0.0}, 0),
+        ({"scheme": "loop"}, 0),
+        ({"scheme": "loop", "crease": "lines"}, 12),
+    ],
+)
+def test_lines_are_kept_where_the_model_asks_or_the_request_does(options, count):
+    given = [[box()], [box()]]  # two meshes, which are refined together
+    result = subdivide_gltf(files.glb(*given), "glb", Options(**options), load_model(), Limits())
+    for mesh in result.report["meshes"]:
+        assert mesh["levels"][0]["edges"].get("crease", 0) == count
+    _, attributes = files.primitive_of(result.glb)
+    assert (np.abs(attributes["POSITION"]).max(axis=1) == 1).all() == (count > 0)
 
 
 def test_smooth_normals_and_absent_ones_make_no_crease():

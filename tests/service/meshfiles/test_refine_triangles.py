@@ -1,9 +1,11 @@
 """Creases, smooth UVs and the weld tolerance for formats without a scene."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from pns_common import loop
+from pns_common import Creases, loop
 from service.errors import InvalidParameter
 from service.meshfiles.indexed_triangles import IndexedTriangles
 from service.meshfiles.refine_triangles import refine_triangles
@@ -11,15 +13,25 @@ from service.options import Limits, Options
 from tests.support.gltf.shapes import box, octahedron
 
 
-def refined(shape, texture=None, **options):
+def refined(shape, texture=None, scheme=None, **options):
     triangles = IndexedTriangles(shape["POSITION"], shape["indices"].astype(np.int64), texture)
-    return refine_triangles(triangles, loop(), Options(**options), Limits())
+    return refine_triangles(triangles, scheme or loop(), Options(**options), Limits())
 
 
 def test_mesh_files_take_creases_by_angle():
     triangles, report = refined(box(), levels=2, crease="angle:60")
     assert report["levels"][0]["edges"]["crease"] == 12
     assert (np.abs(triangles.vertices).max(axis=1) == 1).all()
+
+
+def test_mesh_files_keep_the_lines_that_the_model_asks_for():
+    asking = replace(loop(), creases=Creases(line_angle=66.0))
+    for scheme, crease, count in (
+        *((asking, "auto", 12), (asking, "off", 0)),
+        *((loop(), "auto", 0), (loop(), "lines", 12)),
+    ):
+        _, report = refined(box(), scheme=scheme, crease=crease)
+        assert report["levels"][0]["edges"].get("crease", 0) == count
 
 
 def test_creases_by_normals_need_a_gltf():

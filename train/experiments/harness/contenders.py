@@ -1,5 +1,12 @@
-"""Who is compared everywhere: the untrained controls, Butterfly, Loop, and the default model."""
+"""Who is compared everywhere: the untrained controls, Butterfly, Loop, and the default model.
 
+The default keeps crease lines sharp: what that alone gains stands beside it, by Loop and by N1 with
+the same lines, and what the rest gains, by the default without them.
+"""
+
+from dataclasses import replace
+
+from pns_common.connectivity.creases import NO_CREASES
 from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import Scheme, loop, pns
 from train.baselines.butterfly import modified_butterfly
@@ -7,10 +14,12 @@ from train.baselines.controls import flat, nc
 from train.surfaces.quasi_interpolation import n1, q1
 
 LOOP, OURS = "Loop", "PNS"
+LOOP_CREASED, N1_CREASED, OURS_SMOOTH = "Loop, creases", "N1, creases", "PNS, no creases"
 
 
 def contenders() -> dict[str, Scheme]:
     """Return all schemes by the names of the tables, Loop first and ours last."""
+    ours = pns(load_model())
     return {
         LOOP: loop(),
         "Flat": flat(),
@@ -18,5 +27,8 @@ def contenders() -> dict[str, Scheme]:
         "Q1": q1(),
         "N1": n1(),
         "NC": nc(),
-        OURS: pns(load_model()),
+        LOOP_CREASED: replace(loop(), creases=ours.creases),
+        N1_CREASED: replace(n1(), creases=ours.creases),
+        OURS_SMOOTH: replace(ours, creases=NO_CREASES),
+        OURS: ours,
     }

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common import Mesh, Scheme, loop, pns
+from pns_common import Creases, Mesh, Scheme, crease_lines, loop, pns
 from pns_common.base.arrays import norm
+from pns_common.connectivity.creases import NO_CREASES
 from pns_common.connectivity.topology import EdgeClass, Topology, build_topology
 from pns_common.geometry.frames import face_normals
 from pns_common.masks.limit import limit_positions
@@ -41,7 +42,8 @@ class Choice:
 
     ``model`` is the learned correction and ``budget`` its C; without a model it is Loop.
     ``crease_angle`` (radians) makes edges sharp whose faces meet at a larger angle; None makes
-    none. ``quads`` joins the triangles of quads again.
+    none. ``crease_lines`` keeps those sharp that the mesh shows, where the model's card asks for
+    it. ``quads`` joins the triangles of quads again.
     """
 
     model: VertexModel | None
@@ -49,6 +51,7 @@ class Choice:
     budget: float | None = None
     limit: bool = False
     crease_angle: float | None = None
+    crease_lines: bool = True
     quads: bool = False
 
 
@@ -65,7 +68,8 @@ def compute(
     if choice.model is not None:
         scheme = pns(WatchedModel(choice.model, bar.look_up), choice.budget)
     mesh = Mesh(snapshot.points, snapshot.triangles)
-    pairs, crease_sharpness = all_creases(snapshot, choice.crease_angle)
+    lines = _lines(mesh, scheme.creases) if choice.crease_lines else NO_CREASES
+    pairs, crease_sharpness = all_creases(snapshot, choice.crease_angle, lines)
     steps = level_steps(mesh.faces, len(mesh.vertices), choice.levels, pairs, crease_sharpness)
     positions = refine_positions(
         mesh, scheme, steps, limit=choice.limit, progress=bar.within("positions")
@@ -115,18 +119,29 @@ def compute(
 
 
 def all_creases(
-    snapshot: Snapshot, angle: float | None
+    snapshot: Snapshot, angle: float | None, lines: Creases = NO_CREASES
 ) -> tuple[Int[np.ndarray, "N 2"], Float[np.ndarray, " N"]]:
-    """Return sharp edges, for how many levels: those marked, and those bent beyond ``angle``."""
+    """Return sharp edges, for how many levels: marked, bent beyond ``angle``, or named lines."""
     marked = (snapshot.crease_sharpness > 0) & snapshot.edge_used
     pairs, crease_sharpness = snapshot.edges[marked], snapshot.crease_sharpness[marked]
-    if angle is not None:
-        bent = bent_edges(snapshot, angle)
-        pairs = np.concatenate([bent, pairs])
-        crease_sharpness = np.concatenate([np.full(len(bent), np.inf), crease_sharpness])
-    # An edge that is both is sharp for good: the first of equals stays.
+    found = [] if angle is None else [(bent_edges(snapshot, angle), np.inf)]
+    if lines.named is not None:
+        found.append((lines.named, np.inf if lines.levels is None else float(lines.levels)))
+    for sharp, sharpness in found:
+        pairs = np.concatenate([sharp, pairs])
+        crease_sharpness = np.concatenate([np.full(len(sharp), sharpness), crease_sharpness])
+    # An edge that is several has the largest sharpness: the first of equals stays.
+    order = np.argsort(-crease_sharpness, kind="stable")
+    pairs, crease_sharpness = pairs[order], crease_sharpness[order]
     _, first = np.unique(edge_keys(pairs), return_index=True)
     return pairs[first], crease_sharpness[first]
+
+
+def _lines(mesh: Mesh, creases: Creases) -> Creases:
+    """Return the crease lines that a scheme keeps, by name."""
+    if creases.line_angle is None:
+        return creases
+    return Creases(crease_lines(mesh, creases.line_angle), levels=creases.levels)
 
 
 def split_vertices(snapshot: Snapshot, topology: Topology) -> int:

@@ -110,6 +110,21 @@ def test_diagonals_of_flat_quads_are_never_sharp():
     assert (made.crease_sharpness > 0).sum() == 24
 
 
+@pytest.mark.parametrize(("kept", "sharp"), [(True, 24), (False, 0)])
+def test_lines_are_kept_where_the_model_asks_for_them(kept, sharp):
+    shape, model = cube(), load_model(DEFAULT_MODEL)
+    made = compute(shape, Choice(model, 1, crease_lines=kept))
+    # Of two levels one is left.
+    assert (made.crease_sharpness == 1).sum() == sharp
+    deep = compute(shape, Choice(model, 3, crease_lines=kept))
+    assert not deep.crease_sharpness.any()
+    creases = "auto" if kept else None
+    expected = refine(Mesh(shape.points, shape.triangles), pns(model), 3, creases=creases)
+    np.testing.assert_array_equal(deep.points, expected.mesh.vertices)
+    of_loop = compute(cube(), Choice(None, 1, crease_lines=kept))
+    assert not (of_loop.crease_sharpness > 0).any()
+
+
 def test_a_mixture_stays_within_the_budget_of_loops():
     made = compute(cube(0.6), Choice(load_model("paper"), 2))
     assert [level["faces"] for level in made.report["levels"]] == [48, 192]

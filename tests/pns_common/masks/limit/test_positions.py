@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pns_common.connectivity.creases import Creases
 from pns_common.connectivity.topology import build_topology
 from pns_common.masks.limit import limit_positions
 from pns_common.masks.linear import level_topologies, refine_linear
@@ -28,7 +29,7 @@ def test_where_two_fans_meet_nothing_moves():
 @pytest.mark.parametrize("creases", [None, np.array([[7, 8], [8, 14], [14, 15]])])
 def test_deep_refinement_arrives_there(creases):
     points, faces = grid(6, bent)
-    topologies = level_topologies(faces, len(points), 6, creases)
+    topologies = level_topologies(faces, len(points), 6, Creases(creases))
     deep = refine_linear(points, topologies)
     limit = limit_positions(points, topologies[0])
     np.testing.assert_allclose(deep[: len(points)], limit, rtol=0, atol=2e-4)

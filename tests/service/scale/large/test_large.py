@@ -13,7 +13,7 @@ from pns_common.connectivity.topology import build_topology
 from service.cli import app
 from service.options import Options
 from tests.service.scale.large.parts import arrays, assert_is, contents, many_kinds, refined
-from tests.support.meshes import bent, grid, manifolds, soups
+from tests.support.meshes import bent, block, grid, manifolds, soups
 
 
 @pytest.mark.parametrize("parts", [1, 2, 7, 64])
@@ -75,6 +75,21 @@ def test_creases_by_angle_cross_parts(tmp_path):
     one = refined(tmp_path / "in", tmp_path / "one", 1, options)
     assert one == report
     assert contents(tmp_path / "one") == contents(tmp_path / "out")
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_parts_keep_the_lines_of_the_whole_unless_creases_are_named(tmp_path, named):
+    mesh = Mesh(*block(5))
+    creases = mesh.faces[:3, :2] if named else None
+    source = arrays(tmp_path / "in", mesh, creases)
+    report = refined(source, tmp_path / "out", 4, Options(levels=2))
+    whole = refine(mesh, pns(load_model()), 2, creases=creases if named else "auto")
+    assert_is(tmp_path / "out", whole)
+    assert report["limit_distance"] == whole.report["limit_distance"]
+    first = report["levels"][0]
+    assert first["edges"] == whole.report["levels"][0]["edges"]
+    assert first["crease_shift_max"] == whole.report["levels"][0]["crease_shift_max"]
+    assert (first["edges"]["crease"] == 60) != named
 
 
 def test_the_command_refines_and_reports(tmp_path, monkeypatch):

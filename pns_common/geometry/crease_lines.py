@@ -1,0 +1,159 @@
+"""Crease lines: edges that the mesh itself shows to be sharp, found by three marks.
+
+A coarse mesh does not say which of its turns are sharp and which are round: an edge of a cube turns
+by 90 degrees, and one of an octahedron, which may stand for a sphere, by 71. What tells them apart
+is what lies around:
+
+1. *it is sharp*: its two faces' normals differ by more than θ;
+2. *its sides are flat*: in each of the two faces another edge turns by less than half as much;
+3. *it goes on*: at both ends it meets another such edge that runs on within θ of straight, or a
+   corner of three or more, or the mesh's boundary; what does not is dropped, ``ROUNDS`` times over,
+   so that a line that ends in a smooth surface loses as many edges there.
+
+θ of 66 degrees lies between the turns of a hexagon and a pentagon: tubes of six sides stay round,
+and a rim of six corners is a circle. Turning, moving, scaling, mirroring or renumbering a mesh does
+not change the answer.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.base.arrays import dot, segment_sum, unit
+from pns_common.connectivity.creases import with_crease_rows
+from pns_common.connectivity.topology import EdgeClass, Topology
+from pns_common.geometry.frames import face_normals
+
+# θ in degrees, and at how many levels what is found is sharp: then it is smooth, and by then round
+# within a quarter of an edge.
+CREASE_ANGLE, CREASE_LEVELS = 66.0, 2
+ROUNDS = 5
+# So many lines that meet are a corner.
+CORNER = 3
+
+
+@runtime_checkable
+class Edges(Protocol):
+    """What is asked of a mesh's connectivity, whoever built it (``topology.Topology``)."""
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices."""
+        ...
+
+    @property
+    def faces(self) -> Int[np.ndarray, "F 3"]:
+        """Vertices of each face."""
+        ...
+
+    @property
+    def edges(self) -> Int[np.ndarray, "E 2"]:
+        """Endpoints."""
+        ...
+
+    @property
+    def face_edges(self) -> Int[np.ndarray, "F 3"]:
+        """Edges of each face."""
+        ...
+
+    @property
+    def half_edges(self) -> Int[np.ndarray, "E 2"]:
+        """The two half-edges 3 f + i of an interior edge."""
+        ...
+
+    @property
+    def edge_class(self) -> Int[np.ndarray, " E"]:
+        """EdgeClass values."""
+        ...
+
+
+def with_crease_lines(
+    topology: Topology, points: Float[np.ndarray, "V 3"], angle: float | None
+) -> Topology:
+    """Return the topology with its crease lines as creases; unchanged where no angle is given."""
+    if angle is None:
+        return topology
+    return with_crease_rows(topology, line_rows(points, topology, angle))
+
+
+def line_rows(
+    points: Float[np.ndarray, "V 3"], mesh: Topology, angle: float
+) -> Int[np.ndarray, " N"]:
+    """Return the edges of a mesh's crease lines; ``angle`` is θ in degrees."""
+    sharp = edges_beyond(points, mesh, mesh.interior, math.cos(math.radians(angle)))
+    return lines_among(points, mesh, sharp, angle)
+
+
+def edges_beyond(
+    points: Float[np.ndarray, "V 3"], mesh: Edges, rows: Int[np.ndarray, " N"], cosine: float
+) -> Int[np.ndarray, " M"]:
+    """Return those of some interior edges whose faces' normals have a smaller cosine.
+
+    Faces without area have no normal, and no edge of theirs is sharp.
+    """
+    n1, n2 = _normals_at(points, mesh, rows)
+    defined = (dot(n1, n1) > 0) & (dot(n2, n2) > 0)
+    return rows[defined & (dot(n1, n2) < cosine)]
+
+
+def lines_among(
+    points: Float[np.ndarray, "V 3"], mesh: Edges, sharp: Int[np.ndarray, " N"], angle: float
+) -> Int[np.ndarray, " M"]:
+    """Return those of all edges beyond ``angle`` (degrees) that are of lines: marks 2 and 3."""
+    if len(sharp) == 0:
+        return sharp
+    flat = sharp[_have_flat_sides(points, mesh, sharp)]
+    return flat[_go_on(points, mesh, flat, math.cos(math.radians(angle)))]
+
+
+def _have_flat_sides(
+    points: Float[np.ndarray, "V 3"], mesh: Edges, sharp: Int[np.ndarray, " N"]
+) -> np.ndarray:
+    """Return at which sharp edges both faces have another edge that turns less than half as much.
+
+    An edge that is not interior turns by nothing.
+    """
+    sides = mesh.face_edges[mesh.half_edges[sharp] // 3]
+    interior = mesh.edge_class[sides] == EdgeClass.INTERIOR
+    cosines = np.ones(sides.shape)
+    cosines[interior] = dot(*_normals_at(points, mesh, sides[interior]))
+    cosines[sides == sharp[:, None, None]] = -1.0
+    flattest = cosines.max(axis=-1).min(axis=-1)
+    n1, n2 = _normals_at(points, mesh, sharp)
+    half = np.sqrt((1 + np.maximum(dot(n1, n2), -1.0)) / 2)  # cos(t / 2) of cos t
+    return flattest > half
+
+
+def _go_on(
+    points: Float[np.ndarray, "V 3"], mesh: Edges, flat: Int[np.ndarray, " N"], cosine: float
+) -> np.ndarray:
+    """Return which edges are left when those are dropped that do not go on at both ends."""
+    ends = mesh.edges[flat]
+    along = unit(points[ends[:, 1]] - points[ends[:, 0]])
+    at_rim = np.zeros(mesh.vertex_count, dtype=bool)
+    at_rim[mesh.edges[mesh.edge_class != EdgeClass.INTERIOR].reshape(-1)] = True
+    left = np.ones(len(flat), dtype=bool)
+    for _ in range(ROUNDS):
+        at = ends[left].T.reshape(-1)
+        count = np.bincount(at, minlength=mesh.vertex_count)
+        # Of two that meet, u and v away from there: ‖u + v‖² = 2 + 2 u · v, 0 where they are
+        # straight. Two numbers have one sum in either order.
+        away = np.concatenate([along[left], -along[left]])
+        total = segment_sum(away, at, mesh.vertex_count)
+        straight = (count == 2) & (dot(total, total) < 2 - 2 * cosine)
+        on = at_rim | straight | (count >= CORNER)
+        left = left & on[ends].all(axis=1)
+    return left
+
+
+def _normals_at(
+    points: Float[np.ndarray, "V 3"], mesh: Edges, rows: Int[np.ndarray, " N"]
+) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 3"]]:
+    """Return the unit normals of the two faces of interior edges; 0 without area."""
+    faces = mesh.half_edges[rows] // 3
+    first, second = (face_normals(points, mesh.faces[faces[:, side]]) for side in (0, 1))
+    return first, second

@@ -1,0 +1,125 @@
+"""Crease lines: what is sharp stays, what is round does not, whatever stands for it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pns_common import Mesh
+from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.geometry.crease_lines import (
+    CREASE_ANGLE,
+    ROUNDS,
+    edges_beyond,
+    line_rows,
+    with_crease_lines,
+)
+from tests.support.meshes import block, bumpy_sphere, grid, manifolds, rotation, soups
+from train.data.primitives import box, cone, cylinder, globe, icosphere, l_block, tetrahedron, torus
+
+ROUND = {
+    "tetrahedron": tetrahedron(),
+    "octahedron": globe(4, 1),
+    "icosahedron": icosphere(0),
+    "icosphere": icosphere(2),
+    "globe": globe(20, 9),
+    "tube of eight sides": torus(12, 8),
+    "tube of six sides": torus(12, 6),
+    "bumpy sphere": Mesh(*bumpy_sphere()),
+    "flat": Mesh(*grid(5)),
+    "waves": Mesh(*grid(12, lambda x, y: 0.2 * np.sin(4 * x) * np.cos(3 * y))),
+}
+# Each with how many of its edges are of lines.
+SHARP = {
+    "box": (box(), 12),
+    "thin box": (box(4, 2, 0.1), 12),
+    "L block": (l_block(), 22),
+    "cylinder of six sides": (cylinder(6), 12),
+    "cylinder of 16 sides": (cylinder(16, rows=6), 32),
+    "prism of five sides": (cylinder(5), 15),
+    "cone": (cone(16), 16),
+    "block": (Mesh(*block(4)), 48),
+    "block without a lid": (Mesh(*block(4, closed=False)), 32),
+    "noisy block": (Mesh(*block(4, noise=0.02)), 48),
+}
+
+
+def lines(mesh, angle=CREASE_ANGLE):
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    return {tuple(pair) for pair in topology.edges[line_rows(mesh.vertices, topology, angle)]}
+
+
+@pytest.mark.parametrize("name", ROUND)
+def test_what_may_stand_for_a_round_shape_has_no_lines(name):
+    assert lines(ROUND[name]) == set()
+
+
+@pytest.mark.parametrize("name", SHARP)
+def test_edges_between_flat_sides_are_lines(name):
+    mesh, count = SHARP[name]
+    assert len(lines(mesh)) == count
+
+
+@given(
+    manifolds() | soups() | st.sampled_from([mesh for mesh, _ in SHARP.values()]),
+    st.integers(0, 99),
+    st.floats(0.01, 100),
+    st.booleans(),
+)
+def test_lines_do_not_depend_on_where_a_mesh_lies_nor_on_its_numbers(mesh, seed, scale, mirrored):
+    rng = np.random.default_rng(seed)
+    turned = scale * (mesh.vertices @ rotation(rng).T) + rng.standard_normal(3)
+    faces = mesh.faces
+    if mirrored:
+        turned, faces = turned * [1, 1, -1], faces[:, ::-1]
+    order = rng.permutation(len(turned))
+    moved = np.empty_like(turned)
+    moved[order] = turned
+    renumbered = Mesh(moved, np.roll(order[faces][rng.permutation(len(faces))], seed % 3, axis=1))
+    expected = {tuple(sorted(order[list(pair)])) for pair in lines(mesh)}
+    assert lines(renumbered) == expected
+
+
+def folded_sheet(length, loose):
+    """A sheet, folded by a right angle along its middle row up to ``loose`` cells from its end."""
+    points, faces = grid(2 * length + 1)
+    points = points * [length, 1, 1]  # a narrow one: the fold runs along x at y = 0
+    opening = np.clip((length - loose - points[:, 0]) / 2, 0, 1)
+    half = np.pi / 4 * opening
+    y, up = np.abs(points[:, 1]), np.sign(points[:, 1])
+    points = np.stack([points[:, 0], up * y * np.cos(half), -y * np.sin(half)], axis=1)
+    return Mesh(points, faces)
+
+
+@pytest.mark.parametrize("loose", [4, 6, 8])
+def test_a_line_that_ends_in_a_smooth_surface_loses_as_many_edges_as_there_are_rounds(loose):
+    mesh = folded_sheet(12, loose)
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    sharp = edges_beyond(mesh.vertices, topology, topology.interior, np.cos(np.radians(66)))
+    on_fold = np.abs(mesh.vertices[:, 1]) < 1e-12
+    folds = sharp[on_fold[topology.edges[sharp]].all(axis=1)]
+    assert len(folds) > ROUNDS
+    assert len(lines(mesh)) == len(folds) - ROUNDS
+
+
+def test_a_line_from_boundary_to_boundary_loses_none():
+    assert len(lines(folded_sheet(6, loose=-6))) == 12
+
+
+def test_an_edge_is_beyond_an_angle_where_both_faces_have_a_normal():
+    cube = box()
+    topology = build_topology(cube.faces, 8)
+    for degrees, count in ((89.9, 12), (90.1, 0)):
+        cosine = np.cos(np.radians(degrees))
+        assert len(edges_beyond(cube.vertices, topology, topology.interior, cosine)) == count
+    flat = cube.vertices * [1, 1, 0]
+    assert len(edges_beyond(flat, topology, topology.interior, 2.0)) < 18
+
+
+def test_lines_become_creases_beside_those_that_are_there():
+    mesh = box()
+    plain = build_topology(mesh.faces, 8)
+    creased = with_crease_lines(plain, mesh.vertices, CREASE_ANGLE)
+    assert (creased.edge_class == EdgeClass.CREASE).sum() == 12
+    assert len(creased.interior) == 6
+    assert with_crease_lines(plain, mesh.vertices, None) is plain
