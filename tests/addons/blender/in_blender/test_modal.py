@@ -16,7 +16,7 @@ class Large(operator.Refining):
     def __init__(self, **settings):
         self.levels, self.scheme, self.model, self.model_file = 2, "PNS", "full", ""
         self.budget, self.limit, self.crease_angle, self.quads = 0.5, False, 10.0, False
-        self.keep_original = True
+        self.crease_lines, self.keep_original = True, True
         self.said = []
         for name, value in settings.items():
             setattr(self, name, value)
