@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Int, Shaped
+from jaxtyping import Int, Shaped, UInt
 
 
 def distinct_rows(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
@@ -42,7 +42,7 @@ def number_by_first_appearance(
     return number[labels], first
 
 
-def as_words(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, "N W"]:
+def as_words(rows: Shaped[np.ndarray, "N K"]) -> UInt[np.ndarray, "N W"]:
     """Return the rows' bits as unsigned 32-bit words, padded with zeros."""
     narrow = np.ascontiguousarray(rows)
     width = narrow.itemsize * narrow.shape[1]
@@ -52,7 +52,7 @@ def as_words(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, "N W"]:
     return np.ascontiguousarray(octets).view(np.uint32)
 
 
-def _hash(words: Int[np.ndarray, "N W"]) -> Int[np.ndarray, " N"]:
+def _hash(words: UInt[np.ndarray, "N W"]) -> UInt[np.ndarray, " N"]:
     """Return a 64-bit mix of each row."""
     mixed = np.full(len(words), 0x9E3779B97F4A7C15, dtype=np.uint64)
     for word in words.T:
