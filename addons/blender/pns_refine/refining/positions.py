@@ -10,12 +10,15 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, Refinement, Scheme, loop, refine
+from pns_common.masks.crease_shift import limit_crease_shift
 from pns_common.masks.limit import limit_normals, limit_positions
 from pns_common.refine import measure_reference_length
 
 from .steps import Steps
 
 Progress = Callable[[int, int], None]
+# How far from Loop a level may have gone, and how far its budget allows; None: not known.
+_Distances = tuple[float, float | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +37,7 @@ def refine_positions(
 ) -> Positions:
     """Refine the vertices of a mesh; ``limit`` puts them where Loop's rules would end.
 
-    A crease of which something is left is then sharp for good.
+    A crease that the last level keeps sharp is then sharp for good, as ``refine`` has it.
 
     Raises:
         PnsError: the mesh cannot be refined, or the model fails; and whatever ``progress`` raises.
@@ -52,34 +55,57 @@ def _level_by_level(
     """Refine level by level with the creases of each; half sharp ones mix two readings.
 
     Both readings lie within the budget of Loop's, so their mixture lies within the budget of the
-    mixture of Loop's. Such a level's report is the sharper reading's.
+    mixture of Loop's. Such a level's report is the sharper reading's; its distance to Loop is the
+    larger of both.
     """
     length = measure_reference_length(mesh.vertices, mesh.faces)
     counter = _Counter(progress, steps)
     reports: list[Any] = []
+    distances: list[_Distances] = []
     for depth, step in enumerate(steps.steps):
         rule = scheme if _is_learned(scheme, depth) else loop()
         smooth = made = counter.reading(mesh, rule, length, step.creases)
-        points = made.mesh.vertices
+        points, readings = made.mesh.vertices, [_distances(made.report)]
         if step.mixture is not None:
             made = counter.reading(mesh, rule, length, step.mixture.creases)
             points = step.mixture.of(smooth.mesh.vertices, made.mesh.vertices)
+            readings.append(_distances(made.report))
         reports.append(made.report)
+        distances.append(_combined(readings, max))
         mesh = Mesh(points, made.mesh.faces)
     points, normals = mesh.vertices, None
     if limit:
+        shift = limit_crease_shift(mesh.vertices, mesh.faces, steps.last_creases)
+        kept_back = 0.0 if shift is None else shift.largest
+        distances.append((kept_back, kept_back))
         points = limit_positions(mesh.vertices, steps.at_last)
         normals = limit_normals(mesh.vertices, steps.at_last).vertices
-    return Positions(points, made.ratio, made.gate, normals, _one_report(reports))
+    report = _one_report(reports, _combined(distances, sum))
+    return Positions(points, made.ratio, made.gate, normals, report)
 
 
-def _one_report(reports: list[Any]) -> dict[str, Any]:
-    """Return the report of all levels, from those of each; sums over levels are added up."""
-    report = dict(reports[0]) | {"levels": [level for part in reports for level in part["levels"]]}
-    for name in ("learned_levels", "limit_distance", "limit_distance_bound"):
-        values = [part[name] for part in reports if part["learned_levels"]]
-        report[name] = None if None in values else sum(values)
-    return report
+def _distances(report: Any) -> _Distances:
+    return report["limit_distance"], report["limit_distance_bound"]
+
+
+def _combined(
+    distances: list[_Distances], combine: Callable[[list[float]], float]
+) -> _Distances:
+    """Return the largest or the sum of some; one that is not known makes the whole not known."""
+    bounds = [bound for _, bound in distances if bound is not None]
+    bound = combine(bounds) if len(bounds) == len(distances) else None
+    return combine([distance for distance, _ in distances]), bound
+
+
+def _one_report(reports: list[Any], distances: _Distances) -> dict[str, Any]:
+    """Return the report of all levels, from those of each."""
+    distance, bound = distances
+    return dict(reports[0]) | {
+        "levels": [level for part in reports for level in part["levels"]],
+        "learned_levels": sum(part["learned_levels"] for part in reports),
+        "limit_distance": distance,
+        "limit_distance_bound": bound,
+    }
 
 
 class _Counter:

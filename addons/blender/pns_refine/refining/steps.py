@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.connectivity.creases import with_creases
+from pns_common.connectivity.creases import crease_children, with_creases
 from pns_common.connectivity.topology import Topology, build_topology, split
 from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 
@@ -57,8 +57,13 @@ class Steps:
 
     @cached_property
     def at_last(self) -> Topology:
-        """The final topology with the creases that are left."""
-        return with_creases(self.final, self.pairs) if len(self.pairs) else self.final
+        """The final topology with the creases that the last level kept sharp, for limits."""
+        return with_creases(self.final, self.last_creases)
+
+    @cached_property
+    def last_creases(self) -> Int[np.ndarray, "N 2"]:
+        """The halves of the creases that the last level kept sharp."""
+        return crease_children(self.steps[-1].topology)
 
     @property
     def wears_off(self) -> bool:

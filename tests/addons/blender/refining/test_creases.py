@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from addons.blender.pns_refine.refining.compute import Choice, compute
@@ -12,7 +12,7 @@ from addons.blender.pns_refine.refining.steps import (
     level_steps,
     refine_columns,
 )
-from pns_common import Mesh, load_model, loop, pns, refine
+from pns_common import Creases, Mesh, crease_lines, load_model, loop, pns, refine
 from pns_common.masks.linear import level_topologies, refine_linear
 from pns_common.runtimes.onnx_model import DEFAULT_MODEL
 from tests.addons.blender.quads import cube, grid
@@ -158,3 +158,32 @@ def test_the_report_of_a_mixture_adds_up():
     report = compute(cube(1.5), Choice(load_model("paper"), 2)).report
     assert report["learned_levels"] == 2
     assert report["limit_distance"] <= report["limit_distance_bound"] * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("limit", [False, True])
+@pytest.mark.parametrize("levels", [1, 2, 3])
+def test_lines_make_the_operators_report_and_limits_of_all_that_moves(levels, limit):
+    shape, model = cube(), load_model(DEFAULT_MODEL)
+    shape = type(shape)(**{**shape.__dict__, "offsets": shape.points[None].copy()})
+    made = compute(shape, Choice(model, levels, limit=limit))
+    mesh = Mesh(shape.points, shape.triangles)
+    expected = refine(mesh, pns(model), levels, limit=limit)
+    np.testing.assert_allclose(made.points, expected.mesh.vertices, atol=1e-14)
+    for name in ("learned_levels", "limit_distance", "limit_distance_bound"):
+        assert made.report[name] == pytest.approx(expected.report[name], rel=1e-12)
+    # Offsets go through the masks that place the points.
+    lines = Creases(crease_lines(mesh), levels=2)
+    by_loop = refine(mesh, loop(), levels, limit=limit, creases=lines).mesh.vertices
+    np.testing.assert_allclose(made.offsets[0], by_loop, atol=1e-14)
+
+
+@pytest.mark.parametrize("limit", [False, True])
+@given(seed=st.integers(0, 1000), levels=st.integers(1, 3))
+@settings(max_examples=20, deadline=None)
+def test_creases_that_wear_off_stay_as_near_to_plain_loop_as_the_report_says(seed, levels, limit):
+    rng = np.random.default_rng(seed)
+    shape = cube(rng.choice([0, 0.4, 1, 1.5, 2, np.inf], size=len(cube().edges)))
+    made = compute(shape, Choice(load_model(DEFAULT_MODEL), levels, limit=limit))
+    plain = refine(Mesh(shape.points, shape.triangles), loop(), levels, limit=limit).mesh.vertices
+    apart = np.linalg.norm(made.points - plain, axis=1).max()
+    assert apart <= made.report["limit_distance"] * (1 + 1e-12)
