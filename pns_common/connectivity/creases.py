@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Int
 
+from pns_common.base.parameters import is_number, is_whole
 from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.errors import ParameterError
 
@@ -22,11 +23,21 @@ class Creases:
         levels: at how many levels they are sharp, and smooth from then on (semi-sharp creases,
             DeRose, Kass and Truong 1998); None: for good. Where they are sharp at the last level,
             limits take them as sharp for good.
+
+    Raises:
+        ParameterError: the angle or the levels are out of range.
     """
 
     named: Int[np.ndarray, "N 2"] | None = None
     line_angle: float | None = None
     levels: int | None = None
+
+    def __post_init__(self) -> None:
+        angle, levels = self.line_angle, self.levels
+        if angle is not None and not (is_number(angle) and 0 < angle < 180):
+            raise ParameterError("line_angle", angle, expected="degrees between 0 and 180")
+        if levels is not None and not (is_whole(levels) and levels >= 1):
+            raise ParameterError("levels", levels, expected="a whole number, at least 1")
 
     def sharp_at(self, depth: int) -> bool:
         """Return whether they are sharp at a level; 0 is the control mesh's."""

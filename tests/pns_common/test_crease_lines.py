@@ -33,6 +33,18 @@ def test_an_angle_that_is_none_is_refused(angle):
         crease_lines(box(), angle)
 
 
+@pytest.mark.parametrize("angle", [0, 180, -1, np.nan])
+def test_creases_of_such_an_angle_are_refused_too(angle):
+    with pytest.raises(ParameterError, match="line_angle"):
+        Creases(line_angle=angle)
+
+
+@pytest.mark.parametrize("levels", [0, -1, True])
+def test_creases_are_sharp_at_one_level_at_least(levels):
+    with pytest.raises(ParameterError, match="levels"):
+        Creases(levels=levels)
+
+
 @pytest.mark.parametrize("limit", [False, True])
 def test_the_default_keeps_the_lines_as_if_they_had_been_named(limit):
     by_default = refine(BLOCK, GENERAL, 2, limit=limit)

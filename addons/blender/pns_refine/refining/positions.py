@@ -88,9 +88,7 @@ def _distances(report: Any) -> _Distances:
     return report["limit_distance"], report["limit_distance_bound"]
 
 
-def _combined(
-    distances: list[_Distances], combine: Callable[[list[float]], float]
-) -> _Distances:
+def _combined(distances: list[_Distances], combine: Callable[[list[float]], float]) -> _Distances:
     """Return the largest or the sum of some; one that is not known makes the whole not known."""
     bounds = [bound for _, bound in distances if bound is not None]
     bound = combine(bounds) if len(bounds) == len(distances) else None
