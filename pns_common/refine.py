@@ -51,8 +51,8 @@ class Report(TypedDict):
     sum over all levels of the largest displacement, in the mesh's units: no vertex, and no point of
     the limit surface that Loop makes of the result, is farther than that from where Loop would have
     had it. Where edges are kept sharp, what that keeps back from Loop's smooth rules counts too.
-    ``limit_distance_bound`` is the same sum of the largest displacements that the budget allows;
-    None where the scheme names no bound.
+    ``limit_distance_bound`` is the same sum of the largest displacements that the budget allows,
+    and of what creases were measured to keep back; None where the scheme names no bound.
     """
 
     scheme: str

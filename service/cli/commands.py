@@ -177,7 +177,7 @@ def large(
     model: ModelOption = None,
     reference_length: LengthOption = "auto",
     crease: Annotated[
-        str, typer.Option(metavar="off|angle:DEG", help="edges to keep sharp")
+        str, typer.Option(metavar="auto|lines|off|angle:DEG", help="edges to keep sharp")
     ] = DEFAULTS.crease,
     parts: Annotated[
         int | None, typer.Option(min=1, help="how many parts; default: as --memory asks for")

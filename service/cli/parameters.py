@@ -66,7 +66,11 @@ NormalsOption = Annotated[
     typer.Option(help="smooth: new ones in a glTF, but across creases"),
 ]
 CreaseOption = Annotated[
-    str, typer.Option(metavar="off|normals|angle:DEG", help="edges to keep sharp")
+    str,
+    typer.Option(
+        metavar="auto|lines|off|normals|angle:DEG",
+        help="edges to keep sharp; auto: the lines that the mesh shows, if the model asks for them",
+    ),
 ]
 WeldOption = Annotated[float, typer.Option(metavar="X", help="join vertices nearer than X times R")]
 CompressOption = Annotated[Compression, typer.Option(help="how a glTF's geometry is written")]
