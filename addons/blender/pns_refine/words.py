@@ -33,7 +33,7 @@ def certificate(
     lines.append(f"no point of the limit surface farther than {length(report['limit_distance'])}")
     bound = report["limit_distance_bound"]
     if bound is not None:
-        lines.append(f"The budget allows {length(bound)}")
+        lines.append(f"Budget and creases allow {length(bound)}")
     worst = max(level["proximity_ratio"]["max"] for level in levels)
     lines.append(f"At most {100 * worst:.0f} % of the allowed correction was used")
     flipped = sum(level["flipped_faces"] for level in levels)

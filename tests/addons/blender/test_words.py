@@ -24,7 +24,7 @@ def test_the_certificate_names_distance_share_and_folds():
         "C = 0.8",
         "250 mm",
         "500 mm",
-        "allows 2000 mm",
+        "allow 2000 mm",
         "50 %",
         "No face is flipped",
     ):

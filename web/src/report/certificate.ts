@@ -14,7 +14,7 @@ export interface Statement {
 export interface Lengths {
   /** No point of the limit surface is farther from Loop's: what the report proves. */
   proved: number;
-  /** What the budget would have allowed; null where it says nothing. */
+  /** What the budget would have allowed, with what creases keep back; null where it says nothing. */
   allowed: number | null;
   /** Largest distance of a vertex from its counterpart by Loop; null until that has come. */
   measured: number | null;
@@ -30,22 +30,23 @@ export function certificate(report: Report, lengths: Lengths): Statement[] {
   }
   const learned = report.scheme !== "loop";
   return [
-    ...(learned ? nearness(report, lengths) : [loopAlone]),
+    ...(learned ? nearness(report, lengths) : [loopAlone(lengths)]),
     folds(report),
     ...(learned ? [planes(report)] : []),
   ];
 }
 
-const loopAlone: Statement = {
-  holds: true,
-  text: "Loop’s rules alone",
-  note: "Nothing learned took part: the distance to Loop is zero.",
-};
+function loopAlone({ proved, unit }: Lengths): Statement {
+  const note = proved
+    ? `Creases alone keep it from Loop’s smooth rules, by at most ${length(proved, unit)}.`
+    : "The distance to Loop is zero.";
+  return { holds: true, text: "Loop’s rules alone", note: `Nothing learned took part. ${note}` };
+}
 
 function nearness(report: Report, lengths: Lengths): Statement[] {
   const { proved, allowed, measured, size, unit } = lengths;
   const used = Math.max(...report.levels.map(largestRatio));
-  const bound = allowed === null ? "" : ` Its budget allows ${length(allowed, unit)}.`;
+  const bound = allowed === null ? "" : ` Its budget and creases allow ${length(allowed, unit)}.`;
   const apart = measured === null ? "" : ` Between the refined vertices: ${length(measured, unit)}.`;
   return [
     {
@@ -56,7 +57,7 @@ function nearness(report: Report, lengths: Lengths): Statement[] {
     {
       holds: used <= 1 + 1e-12,
       text: `Within its budget: at most ${percent(Math.min(used, 1))} of it used`,
-      note: "Each vertex may leave Loop’s place by C h² / R and no more, whatever the model says.",
+      note: "Each vertex may leave Loop’s place (by the same creases) by C h² / R and no more, whatever the model says.",
     },
   ];
 }

@@ -36,7 +36,7 @@ export interface MeshReport {
   learned_levels: number;
   /** No point of the limit surface is farther from Loop's, in the mesh's own units. */
   limit_distance: number;
-  /** What the budget would have allowed; null where it says nothing. */
+  /** What the budget would have allowed, with what creases keep back; null where it says nothing. */
   limit_distance_bound: number | null;
 }
 
