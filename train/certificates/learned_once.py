@@ -87,19 +87,21 @@ def limit_distance(subject: Subject, bodies: Sequence[Body], levels: int = 2) ->
 
 
 def smoothness_class(subject: Subject, bodies: Sequence[Body]) -> Certificate:
-    """Certify that after K levels the rule is Loop's: its limits are C² off extraordinary points.
+    """Certify that the rule becomes Loop's: its limits are C² off extraordinary points.
 
-    The value is the largest difference from an independent Loop at the level after, in the mesh's
-    extents; NaN for a scheme that never stops to correct.
+    It does after K levels, or later where it keeps crease lines for longer. The value is the
+    largest difference from an independent Loop at the level after, in the mesh's extents; NaN for a
+    scheme that never stops to correct.
     """
     name, levels = "smoothness class", subject.scheme.learned_levels
     if levels is None:
         return Certificate("class", name, math.nan, high=SAME, where="corrects at every level")
+    first = max(levels, subject.scheme.creases.levels or 1)
     measured = []
     for body in bodies:
         last, after = (
             refine(body.mesh, subject.scheme, count, 1.0, threads=1).mesh
-            for count in (max(levels, 1), max(levels, 1) + 1)
+            for count in (first, first + 1)
         )
         expected = plain_loop(last.vertices, last.faces).positions
         extent = np.ptp(last.vertices, axis=0).max()

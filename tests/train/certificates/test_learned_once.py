@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pns_common import Mesh, load_model, loop, pns
+from pns_common import Creases, Mesh, load_model, loop, pns
 from pns_common.rules.placement import Placement
 from pns_common.rules.scale_free import ScaleFreeEdgeRule
 from pns_common.schemes import loop_edge_rule, loop_vertex_rule, scale_free_form
@@ -23,6 +23,7 @@ from train.certificates.learned_once import (
 )
 from train.certificates.planar_spectrum import planar_spectrum
 from train.certificates.subject import Subject
+from train.data.primitives import box, cylinder
 
 BODIES = (*synthetic_bodies(0), Body("rough", Mesh(*bumpy_sphere(0, bump=0.4))))
 CERTIFICATES = (fold_free, limit_distance, smoothness_class, resolution_independence)
@@ -44,6 +45,17 @@ def test_any_weights_pass(certificate, scale, changes):
     if certificate is smoothness_class or changes == {} or scale == 2.0:
         result = certificate(subject(scale, **changes), BODIES)
         assert result.passed, (result.value, result.where)
+
+
+@pytest.mark.parametrize("certificate", CERTIFICATES)
+def test_the_default_passes_on_meshes_whose_lines_it_keeps(certificate):
+    general = subject_of_scheme(pns(load_model()), 20.0)
+    assert certificate(general, [Body("box", box()), Body("cylinder", cylinder(16, rows=3))]).passed
+
+
+def test_lines_that_are_sharp_for_good_are_not_smooth():
+    scheme = replace(loop(), creases=Creases(line_angle=66.0))
+    assert not smoothness_class(subject_of_scheme(scheme, 0.0), [Body("box", box())]).passed
 
 
 def test_rules_without_a_guard_fold():
