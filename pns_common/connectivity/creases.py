@@ -83,7 +83,7 @@ def crease_classes(
     Raises:
         ParameterError: a pair is no edge.
     """
-    named = _checked(creases, vertex_count)
+    named = checked_pairs(creases, vertex_count)
     if len(named) == 0:
         return edge_class
     # Few edges have both ends at creases: all others need no look.
@@ -116,8 +116,12 @@ def crease_halves(
     return np.stack([edges[creases], np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
 
 
-def _checked(creases: Int[np.ndarray, "N 2"], vertex_count: int) -> Int[np.ndarray, "N 2"]:
-    """Return the pairs, refused unless they are pairs of vertices."""
+def checked_pairs(creases: Int[np.ndarray, "N 2"], vertex_count: int) -> Int[np.ndarray, "N 2"]:
+    """Return creases, refused unless they are pairs of vertices.
+
+    Raises:
+        ParameterError: they are not.
+    """
     pairs = np.asarray(creases)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
         raise ParameterError("creases", pairs.shape, expected="an integer array of shape (N, 2)")

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.base.distinct import distinct_rows, number_by_first_appearance
-from pns_common.connectivity.creases import Creases
+from pns_common.connectivity.creases import Creases, checked_pairs
 from pns_common.connectivity.topology import CHILDREN, split_faces
 from pns_common.fused.face_edges import number_edges
 from pns_common.mesh import Mesh
@@ -61,9 +61,9 @@ def refine_carried(
     options = dict(options)
     creases = options.get("creases", "auto")
     if isinstance(creases, Creases) and creases.named is not None:
-        options["creases"] = replace(creases, named=joined[creases.named])
+        options["creases"] = replace(creases, named=_renamed(creases.named, joined))
     elif creases is not None and not isinstance(creases, str | Creases):
-        options["creases"] = joined[np.asarray(creases)]
+        options["creases"] = _renamed(creases, joined)
     refinement = refine(Mesh(given.vertices[first], joined[given.faces]), scheme, levels, **options)
 
     faces, count = given.faces, len(given.vertices)
@@ -82,6 +82,15 @@ def refine_carried(
     surface[faces.reshape(-1)] = refinement.mesh.faces.reshape(-1)
     positions = refinement.mesh.vertices[surface]
     return CarriedMesh(positions, faces, points, corners, cells), refinement
+
+
+def _renamed(creases: Any, joined: Int[np.ndarray, " V"]) -> Int[np.ndarray, "N 2"]:
+    """Return creases by the joined vertices.
+
+    Raises:
+        ParameterError: they are not pairs of the mesh's vertices.
+    """
+    return joined[checked_pairs(creases, len(joined))]
 
 
 def join_by_position(

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pns_common import Mesh, loop, refine
+from pns_common import Creases, Mesh, ParameterError, loop, refine
 from pns_common.interop.carried import CarriedMesh, between, join_by_position, refine_carried
-from tests.support.meshes import bumpy_sphere
+from tests.support.meshes import bumpy_sphere, grid
 
 
 def seamed(vertices, faces):
@@ -96,3 +96,11 @@ def test_isolated_vertices_stay():
     lone = np.concatenate([vertices, [[9.0, 9, 9]]])
     refined, _ = refine_carried(CarriedMesh(lone, faces), loop(), 1, {})
     assert refined.vertices[len(vertices)].tolist() == [9, 9, 9]
+
+
+@pytest.mark.parametrize("pairs", [[[0, 99]], [[-1, 0]]])
+def test_creases_of_other_vertices_are_refused(pairs):
+    vertices, faces = grid(3)
+    for creases in (np.array(pairs), Creases(np.array(pairs), levels=2)):
+        with pytest.raises(ParameterError, match="creases"):
+            refine_carried(CarriedMesh(vertices, faces), loop(), 1, {"creases": creases})
