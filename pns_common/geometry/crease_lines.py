@@ -121,10 +121,11 @@ def _have_flat_sides(
     interior = mesh.edge_class[sides] == EdgeClass.INTERIOR
     cosines = np.ones(sides.shape)
     cosines[interior] = dot(*_normals_at(points, mesh, sides[interior]))
-    cosines[sides == sharp[:, None, None]] = -1.0
+    own = sides == sharp[:, None, None]
+    turn = cosines[:, 0][own[:, 0]]
+    cosines[own] = -1.0
     flattest = cosines.max(axis=-1).min(axis=-1)
-    n1, n2 = _normals_at(points, mesh, sharp)
-    half = np.sqrt((1 + np.maximum(dot(n1, n2), -1.0)) / 2)  # cos(t / 2) of cos t
+    half = np.sqrt((1 + np.maximum(turn, -1.0)) / 2)  # cos(t / 2) of cos t
     return flattest > half
 
 
@@ -146,7 +147,10 @@ def _go_on(
         total = segment_sum(away, at, mesh.vertex_count)
         straight = (count == 2) & (dot(total, total) < 2 - 2 * cosine)
         on = at_rim | straight | (count >= CORNER)
-        left = left & on[ends].all(axis=1)
+        going_on = left & on[ends].all(axis=1)
+        if (going_on == left).all():
+            break
+        left = going_on
     return left
 
 
