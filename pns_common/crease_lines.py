@@ -7,6 +7,7 @@ from jaxtyping import Int
 
 from pns_common.base.blocks import available_threads
 from pns_common.base.parameters import is_number
+from pns_common.connectivity.creases import Creases
 from pns_common.connectivity.topology import build_topology
 from pns_common.errors import ParameterError
 from pns_common.fused import fits, kernel_blocks, kernels_available, kernels_loaded
@@ -36,3 +37,10 @@ def crease_lines(mesh: Mesh, angle: float = CREASE_ANGLE) -> Int[np.ndarray, "N 
         return edges.edges[rows].astype(np.int64)
     topology = build_topology(faces, len(points))
     return topology.edges[line_rows(points, topology, float(angle))]
+
+
+def named_on(mesh: Mesh, creases: Creases) -> Creases:
+    """Return creases with the lines that they look for found on a mesh, by name."""
+    if creases.line_angle is None:
+        return creases
+    return Creases(crease_lines(mesh, creases.line_angle), levels=creases.levels)

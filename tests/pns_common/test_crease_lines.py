@@ -8,6 +8,7 @@ import pytest
 
 from pns_common import Creases, Mesh, ParameterError, crease_lines, load_model, loop, pns, refine
 from pns_common.connectivity.topology import build_topology
+from pns_common.crease_lines import named_on
 from pns_common.geometry.crease_lines import line_rows
 from pns_common.refine_parts import refine_parts
 from tests.support.meshes import block, bumpy_sphere
@@ -114,3 +115,11 @@ def test_parts_keep_their_lines_as_they_do_alone(limit):
     assert made.reports == [part.report for part in alone]
     corners = np.concatenate([part.mesh.vertices[part.mesh.faces] for part in alone])
     np.testing.assert_array_equal(made.mesh.vertices[made.mesh.faces], corners)
+
+
+def test_lines_that_are_looked_for_can_be_named():
+    named = named_on(BLOCK, Creases(line_angle=66.0, levels=2))
+    np.testing.assert_array_equal(named.named, crease_lines(BLOCK))
+    assert (named.line_angle, named.levels) == (None, 2)
+    given = Creases(np.array([[0, 1]]))
+    assert named_on(BLOCK, given) is given

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common import Creases, Mesh, Scheme, crease_lines, loop, pns
+from pns_common import Creases, Mesh, Scheme, loop, pns
 from pns_common.base.arrays import norm
 from pns_common.connectivity.creases import NO_CREASES
 from pns_common.connectivity.topology import EdgeClass, Topology, build_topology
+from pns_common.crease_lines import named_on
 from pns_common.geometry.frames import face_normals
 from pns_common.masks.limit import limit_positions
 from pns_common.schemes import VertexModel
@@ -68,7 +69,7 @@ def compute(
     if choice.model is not None:
         scheme = pns(WatchedModel(choice.model, bar.look_up), choice.budget)
     mesh = Mesh(snapshot.points, snapshot.triangles)
-    lines = _lines(mesh, scheme.creases) if choice.crease_lines else NO_CREASES
+    lines = named_on(mesh, scheme.creases) if choice.crease_lines else NO_CREASES
     pairs, crease_sharpness = all_creases(snapshot, choice.crease_angle, lines)
     steps = level_steps(mesh.faces, len(mesh.vertices), choice.levels, pairs, crease_sharpness)
     positions = refine_positions(
@@ -135,13 +136,6 @@ def all_creases(
     pairs, crease_sharpness = pairs[order], crease_sharpness[order]
     _, first = np.unique(edge_keys(pairs), return_index=True)
     return pairs[first], crease_sharpness[first]
-
-
-def _lines(mesh: Mesh, creases: Creases) -> Creases:
-    """Return the crease lines that a scheme keeps, by name."""
-    if creases.line_angle is None:
-        return creases
-    return Creases(crease_lines(mesh, creases.line_angle), levels=creases.levels)
 
 
 def split_vertices(snapshot: Snapshot, topology: Topology) -> int:
