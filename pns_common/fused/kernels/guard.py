@@ -13,18 +13,21 @@ from pns_common.fused.kernels.compiled import (
     POINTS,
     REAL,
     SIZE,
+    called_seldom,
     kernel,
 )
-from pns_common.fused.kernels.normals import COSINE_MARGIN, clearly_less
+from pns_common.fused.kernels.normals import (
+    COSINE_MARGIN,
+    TOGETHER,
+    area,
+    child_corners,
+    clearly_less,
+)
 from pns_common.fused.kernels.rings import cross, dot, row
 from pns_common.geometry.frames import NO_AREA
 
 
-def _moved(p, displacement, scale, v):
-    return _by_share(p, displacement, v, scale[v] if len(scale) else 1.0)
-
-
-def _by_share(p, displacement, v, s):
+def _moved(p, displacement, v, s):
     return (
         p[0] + s * displacement[v, 0],
         p[1] + s * displacement[v, 1],
@@ -32,34 +35,42 @@ def _by_share(p, displacement, v, s):
     )
 
 
+def _corner(loop, displacement, scale, v):
+    """Return where Loop puts a vertex, and where it is moved to."""
+    p = row(loop, v)
+    return p, _moved(p, displacement, v, scale[v] if len(scale) else 1.0)
+
+
+def _shared_corner(loop, displacement, scale, shared, v):
+    """Return the same while none moves but the shared ones."""
+    p, moved = _corner(loop, displacement, scale, v)
+    return (p, moved) if shared[v] else (p, _moved(p, displacement, v, 0.0))
+
+
+def _stays(a, b, c, clear):
+    """Return whether a child clearly neither turned nor shrank too much; False if in doubt.
+
+    ``clear`` is a bound for ``clearly_less``: no root need be taken where the angle is clear.
+    """
+    old, new = area(a[0], b[0], c[0]), area(a[1], b[1], c[1])
+    return (new[3] >= LEAST_AREA**2 * old[3]) & clearly_less(old, new, clear)
+
+
 def _difference(p, q):
     return q[0] - p[0], q[1] - p[1], q[2] - p[2]
 
 
-def _turned(a, b, c, moved_a, moved_b, moved_c, cosine, clear):
-    """Return whether a face turned or shrank too much; False if it had no area (``turned``).
-
-    ``clear`` is a bound for ``clearly_less``: no root need be taken where the angle is clear.
-    """
-    u, v = _difference(a, b), _difference(a, c)
-    old, new = cross(u, v), cross(_difference(moved_a, moved_b), _difference(moved_a, moved_c))
+@called_seldom
+def _turned(a, b, c, cosine):
+    """Return whether a child turned or shrank too much; False if it had no area (``turned``)."""
+    u, v = _difference(a[0], b[0]), _difference(a[0], c[0])
+    old, new = cross(u, v), cross(_difference(a[1], b[1]), _difference(a[1], c[1]))
     old_square, new_square = dot(old, old), dot(new, new)
-    shrunk = not new_square >= LEAST_AREA**2 * old_square
-    # Whether it had an area or not: most faces end here.
-    if not shrunk and clearly_less((*old, old_square), (*new, new_square), clear):
-        return False
     least = NO_AREA * (dot(u, u) + dot(v, v))
     if not old_square > least * least:
         return False
     size = math.sqrt(old_square) * math.sqrt(new_square)
-    return shrunk or not dot(old, new) >= cosine * size
-
-
-def _by_itself(p, displacement, scale, shared, v):
-    """Return where a vertex is while none moves but the shared ones."""
-    if shared[v]:
-        return _moved(p, displacement, scale, v)
-    return _by_share(p, displacement, v, 0.0)
+    return not new_square >= LEAST_AREA**2 * old_square or not dot(old, new) >= cosine * size
 
 
 @kernel(
@@ -90,40 +101,34 @@ def find_folds(
         touched: out, False on entry; threads may write the same True at once.
     """
     clear = (cosine + COSINE_MARGIN) * (cosine + COSINE_MARGIN)
-    for f in range(begin, end):
-        ab = vertex_count + face_edges[f, 0]
-        bc = vertex_count + face_edges[f, 1]
-        ca = vertex_count + face_edges[f, 2]
-        # Three of the four children share each of these.
-        p, q, r = row(loop, ab), row(loop, bc), row(loop, ca)
-        moved_p = _moved(p, displacement, scale, ab)
-        moved_q = _moved(q, displacement, scale, bc)
-        moved_r = _moved(r, displacement, scale, ca)
-        for i in range(4):
-            if i == 3:
-                v, a, moved_a = ab, p, moved_p
-                s, b, moved_b = bc, q, moved_q
-                t, c, moved_c = ca, r, moved_r
-            else:
-                v = faces[f, i]
-                a = row(loop, v)
-                moved_a = _moved(a, displacement, scale, v)
-                if i == 0:
-                    s, b, moved_b, t, c, moved_c = ab, p, moved_p, ca, r, moved_r
-                elif i == 1:
-                    s, b, moved_b, t, c, moved_c = bc, q, moved_q, ab, p, moved_p
-                else:
-                    s, b, moved_b, t, c, moved_c = ca, r, moved_r, bc, q, moved_q
-            if len(changed) and not (changed[v] or changed[s] or changed[t]):
-                continue
-            if _turned(a, b, c, moved_a, moved_b, moved_c, cosine, clear):
+    moves = loop, displacement, scale
+    for first in range(begin, end, TOGETHER):
+        last, doubtful = min(first + TOGETHER, end), 0
+        for f in range(first, last):
+            a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+            p, q, r = _corner(*moves, a), _corner(*moves, b), _corner(*moves, c)
+            pq = _corner(*moves, vertex_count + face_edges[f, 0])
+            qr = _corner(*moves, vertex_count + face_edges[f, 1])
+            rp = _corner(*moves, vertex_count + face_edges[f, 2])
+            stays = _stays(pq, qr, rp, clear) & _stays(p, pq, rp, clear)
+            doubtful += not (stays & _stays(q, qr, pq, clear) & _stays(r, rp, qr, clear))
+        if doubtful == 0:
+            continue
+        for f in range(first, last):
+            for i in range(4):
+                u, v, w = child_corners(faces, face_edges, vertex_count, f, i)
+                if len(changed) and not (changed[u] or changed[v] or changed[w]):
+                    continue
+                p, q, r = _corner(*moves, u), _corner(*moves, v), _corner(*moves, w)
+                if not _turned(p, q, r, cosine):
+                    continue
                 by_itself = True
                 if len(shared):
-                    alone_a = _by_itself(a, displacement, scale, shared, v)
-                    alone_b = _by_itself(b, displacement, scale, shared, s)
-                    alone_c = _by_itself(c, displacement, scale, shared, t)
-                    by_itself = _turned(a, b, c, alone_a, alone_b, alone_c, cosine, clear)
-                for w in (v, s, t):
-                    if (by_itself or not shared[w]) and (len(scale) == 0 or scale[w] > 0):
-                        touched[w] = True
+                    p = _shared_corner(*moves, shared, u)
+                    q = _shared_corner(*moves, shared, v)
+                    r = _shared_corner(*moves, shared, w)
+                    by_itself = _turned(p, q, r, cosine)
+                for corner in (u, v, w):
+                    if (by_itself or not shared[corner]) and (len(scale) == 0 or scale[corner] > 0):
+                        touched[corner] = True
     return 0
