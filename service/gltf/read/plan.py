@@ -15,7 +15,7 @@ from .schema import Document, Primitive
 # 240,000 faces, levels 1 to 6, smooth ones and ones where every corner is a vertex, by models with
 # and without a vertex rule, with compiled kernels and without them.
 BYTES_PER_FACE = 280
-BYTES_PER_FACE_WITH_NORMALS = 400
+BYTES_PER_FACE_WITH_NORMALS = 300
 # The same for primitives that get normals on the way, with the three floats of each.
 BYTES_FOR_NORMALS = BYTES_PER_FACE_WITH_NORMALS - BYTES_PER_FACE + 36
 # For each refined vertex of a skin or morph target: the levels' connectivity again, a block of

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from pns_common.connectivity.grid_points import index_type
+from pns_common.fused.grid_points import rounded_rows, take_points
 from pns_common.mesh import Cleaned
 from pns_common.refine import Refinement
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
-from ...meshes.split_connectivity import blocks_of, index_type, split_connectivity
+from ...meshes.split_connectivity import blocks_of, split_connectivity
 from ...meshes.uv_charts import UvBlend
 from ...meshes.weld import Weld
 from ..read.primitives import TrianglePrimitive, distinct_corners
@@ -72,16 +74,13 @@ def refined_primitives(
             course,
         )
     made: list[RefinedPrimitive] = []
-    positions = points.astype(np.float32)
     with course.part(SHADING, 1.0):
         for number, rows in enumerate(ends):
             course.reach(rows.start / len(ids))
             if rows.stop > rows.start:
                 own = ids[rows]
                 made.append(
-                    _refined_primitive(
-                        control, number, own, grid, positions, refined, shading, uv_blend
-                    )
+                    _refined_primitive(control, number, own, grid, refined, shading, uv_blend)
                 )
     return made
 
@@ -98,12 +97,7 @@ def refined_ids(
     leader = cleaned.representative[proper]
     corners = refinement.mesh.faces.reshape(len(cleaned.mesh.faces), -1)
     narrow = index_type(len(refinement.mesh.vertices))
-    ids = np.empty((len(corners), len(grid.slot)), dtype=narrow)
-
-    def take(rows: slice) -> None:
-        ids[rows] = np.take(corners[rows], grid.slot, axis=1)
-
-    blocks_of(grid).run(len(corners), take)
+    ids = take_points(corners, grid.slot, narrow, blocks_of(grid))
     if not np.array_equal(leader, np.arange(len(leader))):
         ids = np.take(ids, leader, axis=0)
     copies = np.flatnonzero(cleaned.face_map[proper] < 0)
@@ -121,12 +115,11 @@ def _refined_primitive(
     number: int,
     ids: Int[np.ndarray, "F T"],
     grid: BarycentricGrid,
-    positions: Float[np.ndarray, "V 3"],
     refined: RefinedMesh,
     shading: Shading | None,
     uv_blend: UvBlend,
 ) -> RefinedPrimitive:
-    primitive = control.primitives[number]
+    primitive, points = control.primitives[number], refined.refinement.mesh.vertices
     welded = control.weld.vertex_of[control.rows[number]]
     corners, row = distinct_corners(primitive, primitive.corners[control.kept[number]], welded)
     if shading is not None and np.array_equal(corners, shading.groups.connectivity.faces):
@@ -142,7 +135,7 @@ def _refined_primitive(
         row=row,
         welded=welded[row],
         connectivity=own,
-        positions=np.take(positions, vertex, axis=0),
+        positions=rounded_rows(points, vertex, blocks_of(grid)),
         normals=normals,
         skin_and_morph=refined.skin_and_morph.take(vertex),
         morphed_normals=morphed,

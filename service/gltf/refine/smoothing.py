@@ -15,13 +15,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.arrays import dot, norm
-from pns_common.base.blocks import Blocks, available_threads
+from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
 from pns_common.base.distinct import number_by_first_appearance
 from pns_common.fused.corner_normals import angle_weighted_normals
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
-from ...meshes.split_connectivity import SplitConnectivity, at_descendants, split_connectivity
+from ...meshes.split_connectivity import SplitConnectivity, split_connectivity
 from .control_mesh import ControlMesh, slices
 from .normals import safe_unit
 
@@ -37,14 +37,14 @@ class NormalGroups:
     """The G groups of refined corners that share a normal.
 
     Attributes:
-        vertices: (D, 3) the refined vertices of the faces that have normals.
+        vertices: (F, T) the refined vertices at the grid points of the faces that have normals.
         connectivity: that of the groups before they were split; their corners are its vertices.
         ids: by primitive the groups of its faces' grid points.
         before: makes the old normals (G, 3), blended linearly: what is left where faces have no
             area.
     """
 
-    vertices: Int[np.ndarray, "D 3"]
+    vertices: Int[np.ndarray, "F T"]
     connectivity: SplitConnectivity
     ids: dict[int, Int[np.ndarray, "F T"]]
     before: Callable[[], Float[np.ndarray, "G 3"]]
@@ -56,11 +56,19 @@ class NormalGroups:
         course: Course,
     ) -> Float[np.ndarray, "G 3"]:
         """Return the groups' unit normals at refined vertices; those of `otherwise` if need be."""
-        blocks = Blocks(available_threads(), before=course.count(len(self.vertices)))
-        groups, count = self.connectivity.refined_faces, self.connectivity.count
-        values = angle_weighted_normals(points, self.vertices, groups, count, blocks)
-        x, y, z = values.T
-        undefined = np.flatnonzero((x == 0) & (y == 0) & (z == 0))
+        of_groups, triangles = self.connectivity, self.connectivity.grid.faces
+        rows, begun = max(BLOCK_ROWS // len(triangles), 1), course.count(len(self.vertices))
+        values = angle_weighted_normals(
+            points,
+            self.vertices,
+            of_groups.ids,
+            of_groups.count,
+            Blocks(available_threads(), rows, begun),
+            triangles,
+        )
+        # Few have a 0 to begin with.
+        undefined = np.flatnonzero(values[:, 0] == 0)
+        undefined = undefined[~values[undefined].any(axis=1)]
         if len(undefined):
             values[undefined] = otherwise()[undefined]
         return values
@@ -72,8 +80,7 @@ class NormalGroups:
 
         Where several are (creases), the limit has a normal for each side, and one cannot serve.
         """
-        vertex = np.empty(len(values), dtype=np.int64)
-        vertex[self.connectivity.refined_faces.reshape(-1)] = self.vertices.reshape(-1)
+        vertex = self.connectivity.at_vertices(self.vertices)
         exact = limit[vertex]
         alone = (np.bincount(vertex, minlength=len(limit))[vertex] == 1) & exact.any(axis=1)
         # A face that is there turned over has the other side.
@@ -96,10 +103,9 @@ def normal_groups(
     if not chosen:
         return None
     groups, before = _split_groups(control, chosen, grid)
-    used = np.concatenate([ids[number] for number in chosen])
     shares = slices([len(ids[number]) for number in chosen])
     return NormalGroups(
-        vertices=at_descendants(used, grid),
+        vertices=np.concatenate([ids[number] for number in chosen]),
         connectivity=groups,
         ids={number: groups.ids[part] for number, part in zip(chosen, shares, strict=True)},
         before=lambda: safe_unit(groups.linear(before)),

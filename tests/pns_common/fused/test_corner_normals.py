@@ -31,3 +31,17 @@ def test_normals_have_the_bits_of_the_arrays(name, index, loaded, monkeypatch):
     made = corner_normals.angle_weighted_normals(*given, Blocks(threads=2, rows=7))
     np.testing.assert_array_equal(made, expected)
     assert made.flags.c_contiguous
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+def test_faces_cut_into_triangles_have_the_normals_of_these(loaded, monkeypatch):
+    if loaded:
+        load_kernels()
+    monkeypatch.setattr(corner_normals, "kernels_loaded", lambda: loaded)
+    points, triangles = np.random.default_rng(1).random((30, 3)), np.array([[0, 1, 3], [3, 1, 2]])
+    faces, groups = np.random.default_rng(2).integers(0, [[[30]], [[9]]], (2, 40, 4))
+    cut, of_cut = (of_points[:, triangles].reshape(-1, 3) for of_points in (faces, groups))
+    expected = arrays.angle_weighted_normals(points, cut, of_cut, 9, Blocks(1))
+    blocks = Blocks(threads=2, rows=4)
+    made = corner_normals.angle_weighted_normals(points, faces, groups, 9, blocks, triangles)
+    np.testing.assert_array_equal(made, expected)
