@@ -10,10 +10,8 @@ from pns_common.formula.side_gate import of_gentler, opened
 from pns_common.fused.additions import Additions
 from pns_common.fused.kernels.edge_correction import (
     DIHEDRAL,
-    LENGTHS,
     correct,
     correct_scale_free,
-    fill_log_ratios,
     look,
 )
 from pns_common.fused.surroundings import Surroundings
@@ -36,7 +34,7 @@ def add_at_edges(
     """
     mesh = level.mesh
     to.clear(mesh.sharp_edges)
-    args = mesh.faces, mesh.edges, mesh.half_edges, mesh.interior
+    args = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.interior
     out = to.displacement, to.ratio, to.gate, to.envelope
     # Before the blocks: what several threads ask for is computed once.
     normals = level.faces.normals
@@ -45,29 +43,18 @@ def add_at_edges(
     pushes = level.pushes if isinstance(rule, ScaleFreeEdgeRule) else NO_FIELDS
     reads_sides = isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates
     bends = level.bends if reads_sides else NO_BENDS
+    around = normals, fields, bends, level.lengths.lengths, level.lengths.logs
     symmetric = int(rule.operator.orientation is SYMMETRIC)
 
     def add(rows: slice) -> None:
         count = rows.stop - rows.start
         frame, features = np.empty((count, 9)), np.empty((count, rule.operator.features.count))
         length, longest, curvature = np.empty(count), np.empty(count), np.empty(count)
-        lengths, gentlest = np.empty((LENGTHS, count)), np.empty(count if reads_sides else 0)
         stencils, degenerate = np.empty((count, 4), dtype=np.int32), np.empty(count, dtype=bool)
-        looked = (
-            stencils,
-            frame,
-            length,
-            longest,
-            curvature,
-            degenerate,
-            lengths,
-            features,
-            gentlest,
-        )
-        of_faces = normals, fields, bends
-        look(level.points, *of_faces, *args, rows.start, rows.stop, symmetric, *looked)
-        # numpy's logarithm and hyperbolic tangent run on vectors, and have the array kernels' bits.
-        fill_log_ratios(np.log(lengths, out=lengths), features)
+        gentlest = np.empty(count if reads_sides else 0)
+        looked = stencils, frame, length, longest, curvature, degenerate, features, gentlest
+        look(level.points, *around, *args, rows.start, rows.stop, symmetric, *looked)
+        # numpy's hyperbolic tangent runs on vectors, and has the array kernels' bits.
         axes = frame[:, :3], frame[:, 3:6], frame[:, 6:]
         gate = rule.operator.gate(EdgeFrames(*axes, length, curvature, degenerate))
         if isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates:

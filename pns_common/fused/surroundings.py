@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.fused.boundary import NO_RULE, Boundary
+from pns_common.fused.edge_lengths import EdgeLengths, edge_lengths
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.fused.rings import (
     FaceMeasures,
@@ -77,6 +78,11 @@ class Surroundings:
     def bends(self) -> Float[np.ndarray, " F"]:
         """b of the gates that read sides."""
         return measure_bends(self.rings.jumps, self.mesh, self.blocks)
+
+    @cached_property
+    def lengths(self) -> EdgeLengths:
+        """Lengths of the edges, and their logarithms."""
+        return edge_lengths(self.points, self.mesh, self.blocks)
 
     @property
     def network_blocks(self) -> Blocks:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from pns_common.features.edge_features import SHORTEST
 from pns_common.fused.kernels.compiled import (
     FLAGS_OUT,
     INDEX,
@@ -25,8 +24,6 @@ from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
 
 # Feature columns: curvature, four log ratios, then those with a sign.
 LOGS, DIHEDRAL, ENDS, WINGS, UMBRELLAS = 1, 5, 6, 10, 14
-# How many lengths have their logarithms taken: the four sides, then h.
-LENGTHS = 5
 
 
 def _unit(v):
@@ -35,14 +32,25 @@ def _unit(v):
     return v[0] / length, v[1] / length, v[2] / length
 
 
-def _no_shorter(length):
-    return length if length > SHORTEST else SHORTEST
+def _from_end(face_edges, half_edge):
+    """Return the edge of a half-edge's face that leaves where it ends."""
+    f = half_edge // 3
+    i = half_edge - 3 * f
+    return face_edges[f, i + 1 if i < 2 else 0]
+
+
+def _to_start(face_edges, half_edge):
+    """Return the edge of a half-edge's face that comes to where it starts."""
+    f = half_edge // 3
+    i = half_edge - 3 * f
+    return face_edges[f, i - 1 if i > 0 else 2]
 
 
 @kernel(
     SIZE,
-    *(POINTS, POINTS, POINTS, NUMBERS, INDICES, INDICES, INDICES, INDEX, SIZE, SIZE, SIZE),
-    *(INDICES_OUT, POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT, FLAGS_OUT, POINTS_OUT),
+    *(POINTS, POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS),
+    *(INDICES, INDICES, INDICES, INDICES, INDEX, SIZE, SIZE, SIZE),
+    *(INDICES_OUT, POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT, FLAGS_OUT),
     *(POINTS_OUT, NUMBERS_OUT),
 )
 def look(
@@ -50,8 +58,11 @@ def look(
     normals,
     fields,
     bends,
+    lengths,
+    logs,
     faces,
     edges,
+    face_edges,
     half_edges,
     interior,
     begin,
@@ -63,7 +74,6 @@ def look(
     longest,
     curvature,
     degenerate,
-    lengths,
     features,
     gentlest,
 ):
@@ -72,13 +82,13 @@ def look(
     Args:
         fields: (V, 4) mean normal and umbrella height; read where ``features`` has signed columns.
         bends: (F,) b of each face; empty where gates do not read it.
+        lengths, logs: (E,) h of each edge, and its logarithm.
         symmetric: 1 where c lies to the left of a → b and degenerate edges have x = 0, else 0.
         stencils: (N, 4) out: a, b, c, d.
         frame: (N, 9) out: T, N, B.
         length, longest: out: h and h̄, the longest edge of both faces.
         curvature, degenerate: out: x, and whether the frame is the fallback.
-        lengths: (5, N) out: of which the logarithms are to be taken.
-        features: (N, K) out: all columns but those of the log ratios.
+        features: (N, K) out.
         gentlest: out: the smaller b of both faces; empty where ``bends`` is.
     """
     wide = features.shape[1]
@@ -86,21 +96,21 @@ def look(
         e = interior[begin + i]
         a, b = edges[e, 0], edges[e, 1]
         h1, h2 = half_edges[e, 0], half_edges[e, 1]
-        if symmetric and faces[h1 // 3, h1 % 3] != a:
-            h1, h2 = h2, h1
+        forwards = faces[h1 // 3, h1 % 3] == a
+        if symmetric and not forwards:
+            h1, h2, forwards = h2, h1, True
         c, d = opposite(faces, h1), opposite(faces, h2)
         n1, n2 = row(normals, h1 // 3), row(normals, h2 // 3)
         stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3] = a, b, c, d
 
-        edge = between(points, a, b)
-        h = norm(edge)
+        h = lengths[e]
         cosine = dot(n1, n2)
         undefined = h == 0 or dot(n1, n1) == 0 or dot(n2, n2) == 0
         fallback = undefined or cosine <= -1 + ANTIPARALLEL
         if fallback:
             tangent, mean = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
         else:
-            tangent = _unit(edge)
+            tangent = _unit(between(points, a, b))
             mean = n1[0] + n2[0], n1[1] + n2[1], n1[2] + n2[2]
         along = dot(mean, tangent)
         normal = _unit(
@@ -119,14 +129,16 @@ def look(
             gentlest[i] = min(bends[h1 // 3], bends[h2 // 3])
 
         features[i, 0] = x
-        ac, bc = norm(between(points, a, c)), norm(between(points, b, c))
-        ad, bd = norm(between(points, a, d)), norm(between(points, b, d))
-        longest[i] = max(max(max(max(h, ac), bc), ad), bd)
-        lengths[0, i] = _no_shorter(ac)
-        lengths[1, i] = _no_shorter(bc)
-        lengths[2, i] = _no_shorter(ad)
-        lengths[3, i] = _no_shorter(bd)
-        lengths[4, i] = _no_shorter(h)
+        # The two half-edges run against each other.
+        ac, bc = _to_start(face_edges, h1), _from_end(face_edges, h1)
+        ad, bd = _from_end(face_edges, h2), _to_start(face_edges, h2)
+        if not forwards:
+            ac, bc, ad, bd = bc, ac, bd, ad
+        longest[i] = max(max(max(max(h, lengths[ac]), lengths[bc]), lengths[ad]), lengths[bd])
+        features[i, LOGS] = logs[ac] - logs[e]
+        features[i, LOGS + 1] = logs[bc] - logs[e]
+        features[i, LOGS + 2] = logs[ad] - logs[e]
+        features[i, LOGS + 3] = logs[bd] - logs[e]
         if wide > DIHEDRAL:
             features[i, DIHEDRAL] = dot(cross(n1, n2), tangent)
             features[i, ENDS] = dot(row(fields, a), tangent)
@@ -142,15 +154,6 @@ def look(
             features[i, UMBRELLAS + 1] = fields[b, HEIGHT]
             features[i, UMBRELLAS + 2] = fields[c, HEIGHT]
             features[i, UMBRELLAS + 3] = fields[d, HEIGHT]
-    return 0
-
-
-@kernel(SIZE, POINTS, POINTS_OUT)
-def fill_log_ratios(logs, features):
-    """Write the log ratios of the sides, from the logarithms of ``lengths``."""
-    for i in range(features.shape[0]):
-        for k in range(LENGTHS - 1):
-            features[i, LOGS + k] = logs[k, i] - logs[LENGTHS - 1, i]
     return 0
 
 

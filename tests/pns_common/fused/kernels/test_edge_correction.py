@@ -8,7 +8,6 @@ from pns_common.connectivity.topology import build_topology
 from pns_common.fused.kernels.edge_correction import (
     correct,
     correct_scale_free,
-    fill_log_ratios,
     in_ball,
     look,
     shortened,
@@ -33,18 +32,17 @@ PER_LENGTH = RNG.uniform(0.1, 0.5, COUNT)
 
 def looked(way, width, begin=0, end=COUNT):
     n = end - begin
-    frame, features, lengths = np.empty((n, 9)), np.zeros((n, width)), np.empty((5, n))
+    frame, features = np.empty((n, 9)), np.zeros((n, width))
     h, longest, x = np.empty(n), np.empty(n), np.empty(n)
     degenerate = np.ones(n, dtype=bool)
-    mesh = MESH.faces, MESH.edges, MESH.half_edges, MESH.interior
-    gentlest = np.empty(n)
+    mesh = MESH.faces, MESH.edges, MESH.face_edges, MESH.half_edges, MESH.interior
+    gentlest, around = np.empty(n), (NORMALS, FIELDS, BENDS, LENGTH, np.log(LENGTH))
     stencils = np.empty((n, 4), dtype=np.int32)
-    out = stencils, frame, h, longest, x, degenerate, lengths, features, gentlest
-    WAYS[way](look)(POINTS, NORMALS, FIELDS, BENDS, *mesh, begin, end, 1, *out)
+    out = stencils, frame, h, longest, x, degenerate, features, gentlest
+    WAYS[way](look)(POINTS, *around, *mesh, begin, end, 1, *out)
     np.testing.assert_array_equal(gentlest, BENDS[MESH.half_edges[begin:end] // 3].min(axis=1))
     np.testing.assert_array_equal(stencils[:, :2], STENCILS[begin:end, :2])
     np.testing.assert_array_equal(np.sort(stencils), np.sort(STENCILS[begin:end]))
-    WAYS[way](fill_log_ratios)(np.log(lengths), features)
     assert not degenerate.any()
     return frame, h, longest, x, features
 
@@ -67,15 +65,15 @@ def test_antiparallel_faces_have_the_worlds_axes_and_shut_only_where_reading_is_
     points = np.array([[0.0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 1, 0]])
     folded = edges_built(Mesh(points, np.array([[0, 1, 2], [1, 0, 3]])))
     normals = np.array([[0.0, 0, 1], [0, 0, -1]])
-    mesh = folded.faces, folded.edges, folded.half_edges, folded.interior
+    mesh = folded.faces, folded.edges, folded.face_edges, folded.half_edges, folded.interior
     for symmetric, curvature in ((0, 2.0), (1, 0.0)):
-        frame, features, lengths = np.empty((1, 9)), np.zeros((1, 5)), np.empty((5, 1))
+        frame, features = np.empty((1, 9)), np.zeros((1, 5))
         h, longest, x = np.empty(1), np.empty(1), np.empty(1)
         degenerate = np.zeros(1, dtype=bool)
-        of_faces = normals, np.zeros((0, 4)), np.zeros(0)
+        around = normals, np.zeros((0, 4)), np.zeros(0), np.ones(5), np.zeros(5)
         stencils = np.empty((1, 4), dtype=np.int32)
-        out = stencils, frame, h, longest, x, degenerate, lengths, features, np.zeros(0)
-        WAYS[way](look)(points, *of_faces, *mesh, 0, 1, symmetric, *out)
+        out = stencils, frame, h, longest, x, degenerate, features, np.zeros(0)
+        WAYS[way](look)(points, *around, *mesh, 0, 1, symmetric, *out)
         np.testing.assert_array_equal(frame.reshape(3, 3), np.eye(3))
         assert (bool(degenerate[0]), x[0], features[0, 0]) == (True, curvature, curvature)
 
