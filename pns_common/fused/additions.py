@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -10,12 +10,15 @@ from jaxtyping import Bool, Float, Int
 
 @dataclass(frozen=True, eq=False)
 class Additions:
-    """What is added to N of Loop's vertices, as ``placement.Added`` has it."""
+    """What is added to N of Loop's vertices, as ``placement.Added`` has it.
 
-    displacement: Float[np.ndarray, "N 3"]
+    ``displacement`` and ``envelope`` have no rows once they are forgotten.
+    """
+
+    displacement: Float[np.ndarray, "M 3"]
     ratio: Float[np.ndarray, " N"]
     gate: Float[np.ndarray, " N"]
-    envelope: Float[np.ndarray, " N"]
+    envelope: Float[np.ndarray, " M"]
     degenerate: Bool[np.ndarray, " N"]
     corrected: Bool[np.ndarray, " N"] | None = None
 
@@ -35,6 +38,12 @@ class Additions:
             self.degenerate[rows],
             None if self.corrected is None else self.corrected[rows],
         )
+
+    def forgotten(self) -> Additions:
+        """Return the same without δ and ρ, two thirds of what it takes."""
+        none = slice(0, 0)
+        displacement, envelope = self.displacement[none].copy(), self.envelope[none].copy()
+        return replace(self, displacement=displacement, envelope=envelope)
 
     def clear(self, rows: slice | Int[np.ndarray, " N"]) -> None:
         """Add nothing to some of the rows."""

@@ -18,7 +18,7 @@ from pns_common.fused.level import FusedLevel, FusedStep, crease_shift_of
 from pns_common.fused.loop_points import add_to, loop_points
 from pns_common.fused.surroundings import Surroundings
 from pns_common.fused.vertex_rule import add_at_vertices
-from pns_common.levels.diagnostics import LevelReport, level_report
+from pns_common.levels.diagnostics import LevelReport, Reach, bound_of, level_report
 from pns_common.levels.step import AddedStep
 from pns_common.rules.boundary import BoundaryRule
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
@@ -33,15 +33,24 @@ CLEAR_COSINE = 1e-9
 class LearnedPoints:
     """What a learned level made, before anybody looks at its children.
 
-    ``largest`` is the largest absolute coordinate, NaN where one is. ``counterpart`` is where Loop
-    would have put the points; None where no child can be flipped.
+    ``largest`` is the largest absolute coordinate, NaN where one is; ``longest`` the longest δ.
+    ``counterpart`` is where Loop would have put the points; None where no child can be flipped.
+    ``added`` is what was added at ``vertices`` and ``edges`` together, ``guard`` the guard's s.
     """
 
     points: Float[np.ndarray, "W 3"]
     largest: float
+    longest: float
     counterpart: Float[np.ndarray, "W 3"] | None
-    step: AddedStep
+    vertices: Additions
+    edges: Additions
     added: Additions
+    guard: Float[np.ndarray, " W"] | None
+
+    @property
+    def step(self) -> AddedStep:
+        """What was added, as reports have it."""
+        return AddedStep(self.vertices, self.edges, learned=True, guard=self.guard)
 
 
 def learned_step(level: FusedLevel, scheme: Scheme, length: float, blocks: Blocks) -> FusedStep:
@@ -54,13 +63,18 @@ def learned_step(level: FusedLevel, scheme: Scheme, length: float, blocks: Block
     """
     made = learned_points(level, scheme, length, blocks)
     mesh, shift_of = level.mesh, crease_shift_of(level)
+    points, counterpart, added = made.points, made.counterpart, made.added.forgotten()
+    reach = Reach(made.longest, bound_of(made.step))
+    # This is kept until the report is asked for.
+    rules = made.vertices.forgotten(), made.edges.forgotten()
+    step = AddedStep(*rules, learned=True, guard=made.guard)
 
     def report() -> LevelReport:
-        children = look_at_children(mesh, made.points, made.counterpart, blocks.unheard())
-        shift = shift_of()
-        return level_report(mesh, made.step, children, None if shift is None else shift.largest)
+        children, shift = look_at_children(mesh, points, counterpart, blocks.unheard()), shift_of()
+        largest_shift = None if shift is None else shift.largest
+        return level_report(mesh, step, children, largest_shift, reach)
 
-    return FusedStep(made.points, made.largest, report, made.added)
+    return FusedStep(points, made.largest, report, added)
 
 
 def learned_points(
@@ -91,9 +105,9 @@ def learned_points(
     guarded = scheme.guard is not None and math.cos(scheme.guard.angle) > CLEAR_COSINE
     points = loop if guarded else loop.copy()
     first = count if vertices.corrected is None else 0
-    largest = add_to(points, added.displacement, first, blocks)
-    step = AddedStep(vertices, edges, learned=True, guard=scale)
-    return LearnedPoints(points, largest, None if guarded else loop, step, added)
+    largest, longest = add_to(points, added.displacement, first, blocks)
+    counterpart = None if guarded else loop
+    return LearnedPoints(points, largest, longest, counterpart, vertices, edges, added, scale)
 
 
 def _added_by_rules(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from jaxtyping import Float
 
@@ -69,16 +71,21 @@ def add_to(
     displacement: Float[np.ndarray, "W 3"],
     first: int,
     blocks: Blocks,
-) -> float:
-    """Add to points from ``first`` on, in their place; ``largest_size`` of them all."""
-    sizes = np.zeros(blocks.count(len(points)))
+) -> tuple[float, float]:
+    """Add to points from ``first`` on, in their place.
+
+    Returns ``largest_size`` of them all, and the largest length of what was added.
+    """
+    count = blocks.count(len(points))
+    sizes, squares = np.zeros(count), np.zeros((count, 1))
 
     def add(rows: slice) -> None:
         block = blocks.number(rows, len(points))
-        sizes[block] = add_displacement(displacement, first, rows.start, rows.stop, points)
+        bounds = first, rows.start, rows.stop
+        sizes[block] = add_displacement(displacement, *bounds, points, squares[block])
 
     blocks.run(len(points), add)
-    return float(sizes.max(initial=0))
+    return float(sizes.max(initial=0)), math.sqrt(squares.max(initial=0))
 
 
 def place_vertices(

@@ -41,14 +41,14 @@ class RingMeasures:
     Attributes:
         fields: mean normal and umbrella height.
         means: over the spokes of each vertex; none once forgotten.
-        jumps: x of each edge, 0 where it is not interior.
+        jumps: x of each edge, 0 where it is not interior; none once forgotten.
         network_lengths: ℓ of each edge.
         smooth: vertices with one closed ring of interior edges.
     """
 
     fields: Float[np.ndarray, "V 4"]
     means: Float[np.ndarray, "N M"]
-    jumps: Float[np.ndarray, " E"]
+    jumps: Float[np.ndarray, " J"]
     network_lengths: Float[np.ndarray, " E"]
     valence: Int[np.ndarray, " V"]
     smooth: Bool[np.ndarray, " V"]

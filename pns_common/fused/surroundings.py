@@ -77,7 +77,10 @@ class Surroundings:
     @cached_property
     def bends(self) -> Float[np.ndarray, " F"]:
         """b of the gates that read sides."""
-        return measure_bends(self.rings.jumps, self.mesh, self.blocks)
+        made = measure_bends(self.rings.jumps, self.mesh, self.blocks)
+        # Nothing else reads them.
+        vars(self)["rings"] = replace(self.rings, jumps=self.rings.jumps[:0].copy())
+        return made
 
     @cached_property
     def lengths(self) -> EdgeLengths:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NotRequired, TypedDict
 
 import numpy as np
@@ -86,6 +87,17 @@ class LevelReport(Displacements):
     guarded: NotRequired[int]
 
 
+@dataclass(frozen=True)
+class Reach:
+    """How far a learned step left Loop: the longest δ, and the longest that the budget allows.
+
+    ``bound`` is None where the rules name none.
+    """
+
+    longest: float
+    bound: float | None
+
+
 class LimitDistances(TypedDict):
     """How far all levels together left Loop; see ``refine.Report``."""
 
@@ -94,10 +106,30 @@ class LimitDistances(TypedDict):
     limit_distance_bound: float | None
 
 
+def reach_of(step: AddedStep) -> Reach:
+    """Look for the longest that a learned step added, and the longest that it might have."""
+    rules = (step.vertices, step.edges)
+    return Reach(max(_longest(rule.displacement) for rule in rules), bound_of(step))
+
+
+def bound_of(step: AddedStep) -> float | None:
+    """Return the longest that a learned step might have added; None where rules name no bound."""
+    bounds = [_largest(rule) for rule in (step.vertices, step.edges)]
+    known = [bound for bound in bounds if bound is not None]
+    return max(known) if len(known) == len(bounds) else None
+
+
 def level_report(
-    topology: Connectivity, step: AddedStep, children: ChildAngles, shift: float | None = None
+    topology: Connectivity,
+    step: AddedStep,
+    children: ChildAngles,
+    shift: float | None = None,
+    reach: Reach | None = None,
 ) -> LevelReport:
-    """Summarise the step that refined ``topology``; ``shift`` is the longest that creases made."""
+    """Summarise the step that refined ``topology``; ``shift`` is the longest that creases made.
+
+    ``reach`` is that of a learned step, where it is known.
+    """
     vertices, edges = step.vertices, step.edges
     gate, shut = _of(edges.gate, topology.interior), 0
     report: LevelReport = {
@@ -119,11 +151,9 @@ def level_report(
         }
         shut = _shut(vertex_gate)
     if step.learned:
-        rules = (vertices, edges)
-        report["displacement_max"] = max(_longest(rule.displacement) for rule in rules)
-        envelopes = [_largest(rule) for rule in rules]
-        bounds = [bound for bound in envelopes if bound is not None]
-        report["envelope_max"] = max(bounds) if len(bounds) == len(rules) else None
+        reach = reach or reach_of(step)
+        report["displacement_max"] = reach.longest
+        report["envelope_max"] = reach.bound
         report["shut"] = _shut(gate) + shut
     if step.guard is not None:
         report["guarded"] = int((step.guard < 1).sum())

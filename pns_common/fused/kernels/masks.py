@@ -12,6 +12,7 @@ from pns_common.fused.kernels.compiled import (
     INDEX_OUT,
     INDICES,
     NUMBERS,
+    NUMBERS_OUT,
     POINTS,
     POINTS_OUT,
     REAL,
@@ -136,13 +137,21 @@ def largest_coordinate(points, begin, end):
     return _largest(points, begin, end)
 
 
-@kernel(REAL, POINTS, SIZE, SIZE, SIZE, POINTS_OUT)
-def add_displacement(displacement, first, begin, end, points):
+@kernel(REAL, POINTS, SIZE, SIZE, SIZE, POINTS_OUT, NUMBERS_OUT)
+def add_displacement(displacement, first, begin, end, points, longest):
     """Add δ to rows begin … end − 1 from ``first`` on; return the largest coordinate of all.
 
     Before ``first`` Loop's rule stands, and nothing is added: not even 0, which makes 0 of −0.
+
+    Args:
+        longest: (1,) out: the largest ‖δ‖² of what is added.
     """
+    largest = 0.0
     for v in range(max(first, begin), end):
-        for k in range(3):
-            points[v, k] += displacement[v, k]
+        x, y, z = displacement[v, 0], displacement[v, 1], displacement[v, 2]
+        points[v, 0] += x
+        points[v, 1] += y
+        points[v, 2] += z
+        largest = max(largest, x * x + y * y + z * z)
+    longest[0] = largest
     return _largest(points, begin, end)

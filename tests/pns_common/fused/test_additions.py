@@ -32,3 +32,11 @@ def test_a_scale_is_of_the_displacement_and_of_its_share_of_the_bound_alone():
     assert added.displacement.tolist() == [[2, 2, 2], [0, 0, 0]]
     assert added.ratio.tolist() == [2, 0]
     assert added.gate.tolist() == added.envelope.tolist() == [4, 4]
+
+
+def test_what_is_forgotten_has_no_rows_and_the_rest_stays():
+    left = nothing(3).forgotten()
+    assert left.displacement.shape == (0, 3)
+    assert left.envelope.shape == (0,)
+    assert left.displacement.base is None
+    assert left.rows(slice(1, None)).gate.tolist() == [0, 0]

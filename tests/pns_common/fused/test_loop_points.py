@@ -45,8 +45,11 @@ def test_a_coordinate_out_of_range_is_found_in_any_block(bad):
     points = np.ones((100, 3))
     points[57, 2] = bad
     largest = largest_size(points, Blocks(2, rows=10))
-    added = add_to(points.copy(), np.zeros((100, 3)), 30, Blocks(2, rows=10))
-    np.testing.assert_equal(added, largest)
+    added = np.zeros((100, 3))
+    added[[40, 77]] = [[3, 0, 4], [0, 12, 5]]
+    moved, longest = add_to(points.copy() - added, added, 30, Blocks(2, rows=10))
+    np.testing.assert_equal(moved, largest)
+    assert longest == 13
     assert largest == abs(bad) or np.isnan(bad) == np.isnan(largest)
     with pytest.raises(MeshError, match="too large"):
         check_coordinates(largest)

@@ -44,6 +44,7 @@ def test_what_edges_read_outlives_the_rings():
         np.testing.assert_array_equal(getattr(seen.rings, part), getattr(whole.rings, part))
     np.testing.assert_array_equal(seen.pushes, whole.pushes)
     np.testing.assert_array_equal(seen.bends, whole.bends)
+    assert len(seen.rings.jumps) == 0
     np.testing.assert_array_equal(seen.faces.normals, whole.faces.normals)
 
 

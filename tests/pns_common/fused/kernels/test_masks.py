@@ -92,8 +92,11 @@ def test_the_largest_coordinate_is_told_with_its_faults(way):
 def test_what_is_added_leaves_loops_rows_alone_and_is_measured_with_them(way):
     points = np.array([[-0.0, -9, 0], [1, 2, 3], [-0.0, 4, 0], [7, 7, 7]])
     delta = np.array([[0.0, 0, 0], [0, 0, 0], [0, -20, 1], [1, 1, 1]])
-    assert WAYS[way](add_displacement)(delta, 1, 0, 3, points) == 16
+    longest = np.full(1, 99.0)
+    assert WAYS[way](add_displacement)(delta, 1, 0, 3, points, longest) == 16
+    assert longest[0] == 401
     np.testing.assert_array_equal(points, [[0, -9, 0], [1, 2, 3], [0, -16, 1], [7, 7, 7]])
     assert np.signbit(points[0, 0])
     assert not np.signbit(points[2, 0])
-    assert WAYS[way](add_displacement)(delta, 4, 3, 4, points) == 7
+    assert WAYS[way](add_displacement)(delta, 4, 3, 4, points, longest) == 7
+    assert longest[0] == 0
