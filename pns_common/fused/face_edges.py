@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.base.blocks import available_threads
 from pns_common.connectivity.topology import build_topology
-from pns_common.fused import fits, kernel_blocks, kernels_loaded
+from pns_common.fused import fits, kernels_loaded
 
 
 def number_edges(
@@ -17,11 +16,11 @@ def number_edges(
 
     The kernels do it in a tenth of the time; they are not loaded for this.
     """
-    if not (kernels_loaded() and fits(vertex_count, len(faces), 1)):
-        topology = build_topology(faces, vertex_count)
-        return topology.edges, topology.face_edges
-    from pns_common.fused.mesh_edges import build_edges
+    if kernels_loaded() and fits(vertex_count, len(faces), 1):
+        from pns_common.fused.mesh_edges import chains_of
 
-    in_order = np.ascontiguousarray(faces, dtype=np.int32)
-    mesh = build_edges(in_order, vertex_count, kernel_blocks(available_threads()))
-    return mesh.edges.astype(np.int64), mesh.face_edges.astype(np.int64)
+        chains = chains_of(np.ascontiguousarray(faces, dtype=np.int32), vertex_count)
+        if chains is not None:
+            return chains.edges.astype(np.int64), chains.face_edges.astype(np.int64)
+    topology = build_topology(faces, vertex_count)
+    return topology.edges, topology.face_edges

@@ -10,7 +10,6 @@ from jaxtyping import Int
 from pns_common.base.arrays import dot
 from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.connectivity.topology import build_topology
-from pns_common.crease_lines import named_on
 from pns_common.geometry.crease_lines import CREASE_ANGLE, CREASE_LEVELS
 from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
@@ -27,10 +26,10 @@ def lines_of(options: Options, scheme: Scheme) -> Creases:
 
 
 def creases_by_shape(mesh: Mesh, options: Options, scheme: Scheme) -> Creases:
-    """Return the edges that the options keep sharp by the mesh's shape, by name."""
+    """Return the edges that the options keep sharp by the mesh's shape; lines are to be found."""
     if options.crease_angle is not None:
         return Creases(edges_sharper_than(mesh, options.crease_angle))
-    return named_on(mesh, lines_of(options, scheme))
+    return lines_of(options, scheme)
 
 
 def edges_sharper_than(mesh: Mesh, angle: float) -> Int[np.ndarray, "N 2"]:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from pns_common.base.blocks import Blocks, available_threads
+
 from ...meshes.split_connectivity import SplitConnectivity
 from ...meshes.uv_charts import UvBlend
 from ..read.primitives import TrianglePrimitive
@@ -90,7 +92,13 @@ def tangent_directions(
     """Return unit tangents at a right angle to the normals, where there are normals."""
     if normals is None:
         return safe_unit(directions)
-    return perpendicular_tangents(directions, normals)
+    made = np.empty_like(directions)
+
+    def turn(rows: slice) -> None:
+        made[rows] = perpendicular_tangents(directions[rows], normals[rows])
+
+    Blocks(available_threads()).run(len(made), turn)
+    return made
 
 
 def in_type_of(

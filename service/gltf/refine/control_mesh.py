@@ -50,6 +50,19 @@ class ControlMesh:
         """Faces with the same three vertices as an earlier one: refined once, kept each."""
         return 0 if self.cleaned is None else self.cleaned.dropped_duplicate
 
+    def with_split_rows(self, primitives: Sequence[TrianglePrimitive]) -> ControlMesh:
+        """Return the same mesh over primitives whose faces have more rows in the same places."""
+        rows = _rows_of(primitives)
+        vertex_of = np.full(rows[-1].stop, -1, dtype=np.int64)
+        vertex_of[np.concatenate(_corners_of(primitives, rows))] = self.weld.faces
+        return replace(
+            self,
+            primitives=primitives,
+            weld=replace(self.weld, vertex_of=vertex_of),
+            rows=rows,
+            skin_and_morph=read_skin_and_morph(primitives),
+        )
+
 
 def control_mesh(
     primitives: Sequence[TrianglePrimitive],
@@ -62,9 +75,9 @@ def control_mesh(
     `parts` of a union are never joined, and come in their order in the mesh to refine; None: it is
     one mesh.
     """
-    rows = slices([len(primitive.attributes["POSITION"]) for primitive in primitives])
+    rows = _rows_of(primitives)
     positions = np.concatenate([primitive.attributes["POSITION"] for primitive in primitives])
-    corners = [p.corners + part.start for p, part in zip(primitives, rows, strict=True)]
+    corners = _corners_of(primitives, rows)
     skin_and_morph = read_skin_and_morph(primitives)
     movement, faces = skin_and_morph.labels, np.concatenate(corners)
     order, starts = None, WHOLE
@@ -95,6 +108,16 @@ def control_mesh(
         skin_and_morph=skin_and_morph,
         near=near,
     )
+
+
+def _rows_of(primitives: Sequence[TrianglePrimitive]) -> list[slice]:
+    return slices([len(primitive.attributes["POSITION"]) for primitive in primitives])
+
+
+def _corners_of(
+    primitives: Sequence[TrianglePrimitive], rows: Sequence[slice]
+) -> list[Int[np.ndarray, "F 3"]]:
+    return [p.corners + part.start for p, part in zip(primitives, rows, strict=True)]
 
 
 def _vertex_counts(

@@ -45,7 +45,7 @@ def _corner_labels(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
     if chosen:
         rows = np.concatenate([np.arange(part.start, part.stop) for part in _rows(control, chosen)])
         normals = np.concatenate([control.primitives[n].attributes["NORMAL"] for n in chosen])
-        labels[rows] = joined_normals(control.weld.vertex_of[rows], normals.astype(np.float64))
+        labels[rows] = joined_normals(control.weld.vertex_of[rows], normals)
     return np.concatenate(
         [
             labels[primitive.corners[keep] + part.start]

@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float
 
 from pns_common.base.extent import extent
 from pns_common.connectivity.creases import NO_CREASES, Creases
+from pns_common.crease_lines import named_on
 from pns_common.errors import MeshError
 from pns_common.fused.linear import linear_refinement
 from pns_common.mesh import Cleaned
@@ -27,12 +28,18 @@ RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 
 
 def creases_of(control: ControlMesh, options: Options, scheme: Scheme) -> Creases:
-    """Return the cleaned mesh's edges that the options keep sharp, by name."""
+    """Return the cleaned mesh's edges that the options keep sharp.
+
+    By name where others than the operator have to know them; it finds lines on its way.
+    """
     if control.cleaned is None:
         return NO_CREASES
     if options.crease == "normals":
         return Creases(hard_edges(control, control.cleaned))
-    return creases_by_shape(control.cleaned.mesh, options, scheme)
+    mesh = control.cleaned.mesh
+    creases = creases_by_shape(mesh, options, scheme)
+    known = control.skin_and_morph.any or options.normals != "keep"
+    return named_on(mesh, creases) if known else creases
 
 
 def refine_control_mesh(

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks, available_threads
-from pns_common.base.distinct import number_by_first_appearance
-from pns_common.connectivity.topology import build_topology, next_corner
+from pns_common.connectivity.topology import stable_sort
 from pns_common.fused.corner_normals import angle_weighted_normals
+from pns_common.fused.smooth_fans import smooth_fans
 from pns_common.mesh import Cleaned
 
 from ..constants import FLOAT
@@ -28,7 +28,7 @@ def with_smooth_normals(
     A vertex is split where creases part its faces. Copies of a face take its normals, turned over
     where they are; faces that will be dropped keep what they had.
     """
-    fans = _fans(cleaned, creases)
+    fans = smooth_fans(cleaned.mesh.faces, len(cleaned.mesh.vertices), creases)
     values = _normals(cleaned, fans)
     fan, turned = _of_all_faces(control, cleaned, fans)
     primitives: list[TrianglePrimitive] = []
@@ -48,33 +48,6 @@ def with_normal_accessor(accessors: dict[str, Accessor], count: int) -> dict[str
     return {"NORMAL": plain} | accessors
 
 
-def _fans(cleaned: Cleaned, creases: Int[np.ndarray, "N 2"] | None) -> Int[np.ndarray, "F 3"]:
-    """Return a number for each corner that the corners of one smooth fan of faces share."""
-    faces = cleaned.mesh.faces
-    topology = build_topology(faces, len(cleaned.mesh.vertices))
-    smooth = np.ones(len(topology.interior), dtype=bool)
-    if creases is not None and len(creases):
-        count = len(cleaned.mesh.vertices)
-        code = np.sort(topology.edges[topology.interior], axis=1) @ [count, 1]
-        smooth = ~np.isin(code, np.sort(creases, axis=1) @ [count, 1])
-    there, back = topology.half_edges[topology.interior[smooth]].T
-    # Both ends of an edge join the corners of its two faces.
-    corners = np.concatenate([there, next_corner(there)])
-    facing = np.concatenate([next_corner(back), back])
-    label = np.arange(3 * len(faces))
-    while True:
-        least = np.minimum(label[corners], label[facing])
-        new = label.copy()
-        np.minimum.at(new, corners, least)
-        np.minimum.at(new, facing, least)
-        # A label names a corner of the same fan, whose own label may be less by now.
-        new = new[new]
-        if np.array_equal(new, label):
-            break
-        label = new
-    return number_by_first_appearance(label)[0].reshape(-1, 3)
-
-
 def _normals(cleaned: Cleaned, fans: Int[np.ndarray, "F 3"]) -> Float[np.ndarray, "G 3"]:
     mesh = cleaned.mesh
     blocks = Blocks(threads=available_threads())
@@ -88,6 +61,8 @@ def _of_all_faces(
     """Return the fans of all proper faces' corners, and which faces are copies turned over."""
     proper = np.concatenate(control.kept)
     leader = cleaned.representative[proper]
+    if np.array_equal(leader, np.arange(len(fans))):
+        return fans, np.zeros(len(fans), dtype=bool)
     own = cleaned.vertex_map[control.weld.faces[proper]]
     place = (own[:, :, None] == cleaned.mesh.faces[leader][:, None, :]).argmax(axis=2)
     turned = (place[:, 1] - place[:, 0]) % 3 != 1
@@ -106,9 +81,12 @@ def _with_normals(
     side[keep] = 2 * fan + turned[:, None]
     # Pairs of row and side as one number each: numpy sorts pairs ten times as slowly.
     sides = int(side.max()) + 2
-    code = primitive.corners.reshape(-1) * sides + (side.reshape(-1) + 1)
-    distinct, corners = np.unique(code, return_inverse=True)
-    row, of_fan = distinct // sides, distinct % sides - 1
+    code, order = stable_sort(primitive.corners.reshape(-1) * sides + (side.reshape(-1) + 1))
+    opens = np.diff(code, prepend=-1) > 0
+    corners = np.empty_like(order)
+    corners[order] = np.cumsum(opens) - 1
+    row, of_fan = np.divmod(code[opens], sides)
+    of_fan -= 1
     old = primitive.attributes.get("NORMAL")
     normals = np.zeros((len(row), 3)) if old is None else old[row].astype(np.float64)
     known = of_fan >= 0

@@ -108,14 +108,14 @@ def normal_groups(
         vertices=np.concatenate([ids[number] for number in chosen]),
         connectivity=groups,
         ids={number: groups.ids[part] for number, part in zip(chosen, shares, strict=True)},
-        before=lambda: safe_unit(groups.linear(before)),
+        before=lambda: safe_unit(groups.linear(before())),
     )
 
 
 def _split_groups(
     control: ControlMesh, chosen: Sequence[int], grid: BarycentricGrid
-) -> tuple[SplitConnectivity, Float[np.ndarray, "C 3"]]:
-    """Split the connectivity of (welded vertex, old normal) pairs; return it and their normals."""
+) -> tuple[SplitConnectivity, Callable[[], Float[np.ndarray, "C 3"]]]:
+    """Split the connectivity of (welded vertex, old normal) pairs; what tells their normals."""
     old = [control.primitives[number].attributes["NORMAL"] for number in chosen]
     welded = [control.weld.vertex_of[control.rows[number]] for number in chosen]
     starts = slices([len(normals) for normals in old])
@@ -123,12 +123,16 @@ def _split_groups(
         control.primitives[number].corners[control.kept[number]] + part.start
         for number, part in zip(chosen, starts, strict=True)
     ]
-    normals, flat = np.concatenate(old).astype(np.float64), np.concatenate(rows).reshape(-1)
+    normals, flat = np.concatenate(old), np.concatenate(rows).reshape(-1)
     labels = joined_normals(np.concatenate(welded), normals)
-    corners, _ = number_by_first_appearance(labels[flat])
-    before = np.empty((corners.max() + 1, 3))
-    before[corners] = normals[flat]
-    return split_connectivity(corners.reshape(-1, 3), len(before), grid), before
+    corners, first = number_by_first_appearance(labels[flat])
+
+    def before() -> Float[np.ndarray, "C 3"]:
+        values = np.empty((len(first), 3))
+        values[corners] = normals[flat]
+        return values
+
+    return split_connectivity(corners.reshape(-1, 3), len(first), grid), before
 
 
 def joined_normals(
@@ -136,12 +140,12 @@ def joined_normals(
 ) -> Int[np.ndarray, " N"]:
     """Return labels that rows share where they have the same vertex and, nearly, the same normal.
 
-    SiblingFiles along one direction are compared: rows with equal normals are always joined, rows
+    Neighbours along one direction are compared: rows with equal normals are always joined, rows
     that nearly agree all but always, at the cost of one sort however many meet at a vertex.
     """
     # Where a vertex has one row there is nothing to compare: most are inside smooth surfaces.
     several = np.flatnonzero((np.bincount(vertex) > 1)[vertex])
-    v, n = vertex[several], normals[several]
+    v, n = vertex[several], normals[several].astype(np.float64)
     # Not by matrix product, whose bits depend on where a row stands.
     order = np.lexsort((*n.T, dot(n, SCAN[None]), v))
     v, n = v[order], n[order]

@@ -153,8 +153,7 @@ def _smoothed(
             for share, primitive in zip(control.rows, primitives, strict=True)
         ]
     )
-    parts = replace(parts, of_row=of_row)
-    return control_mesh(primitives, options.weld_tolerance, options.weld_unit, parts), parts
+    return control.with_split_rows(primitives), replace(parts, of_row=of_row)
 
 
 def _chosen_together(

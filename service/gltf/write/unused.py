@@ -34,9 +34,13 @@ class VertexUse:
             if keep.any():
                 source = self.document.meshes[mesh].primitives[primitive.number]
                 self.refined.add((mesh, primitive.number))
-                used = np.zeros(len(primitive.rows), dtype=bool)
-                used[primitive.corners[keep]] = True
-                self.rows[source.attributes["POSITION"]].append(primitive.rows[used])
+                rows = primitive.rows
+                # A primitive's rows are those that its faces name.
+                if not keep.all():
+                    used = np.zeros(len(rows), dtype=bool)
+                    used[primitive.corners[keep]] = True
+                    rows = rows[used]
+                self.rows[source.attributes["POSITION"]].append(rows)
 
     def unused(self) -> int:
         """Count elements that no refined face uses, of accessors that nothing else uses either."""

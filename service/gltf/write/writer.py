@@ -72,7 +72,8 @@ class Writer:
             ]
         if primitive.get("mode", TRIANGLES) != TRIANGLES:
             primitive["mode"] = TRIANGLES
-        indices = as_indices(refined.faces).reshape(-1, 1)
+        count = len(refined.attributes["POSITION"])
+        indices = as_indices(refined.faces, count).reshape(-1, 1)
         primitive["indices"] = self._accessor(indices, ELEMENT_ARRAY_BUFFER, "SCALAR")
 
     def remove(self, spare: Spare) -> None:
@@ -175,9 +176,9 @@ def describe(
         accessor["min"], accessor["max"] = (bound.tolist() for bound in extent(values))
 
 
-def as_indices(faces: Int[np.ndarray, "F 3"]) -> Shaped[np.ndarray, "F 3"]:
-    """Return faces in the narrowest type that may hold them; not copied where they are int32."""
-    if faces.max() <= LARGEST_UINT16_INDEX:
+def as_indices(faces: Int[np.ndarray, "F 3"], count: int) -> Shaped[np.ndarray, "F 3"]:
+    """Return faces over so many vertices in the narrowest type; not copied where they are int32."""
+    if count - 1 <= LARGEST_UINT16_INDEX:
         return faces.astype(np.uint16)
     return faces.view(np.uint32) if faces.dtype == np.int32 else faces.astype(np.uint32)
 
