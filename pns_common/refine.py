@@ -270,6 +270,15 @@ def measure_reference_length(
     return float(norm(referenced - referenced.mean(axis=0)).max()) / math.sqrt(2)
 
 
+def reference_length_of(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> float:
+    """Return the same, by kernels where they are loaded."""
+    if kernels_available() and kernels_loaded():
+        from pns_common.fused.extent import reference_length
+
+        return reference_length(vertices, faces)
+    return measure_reference_length(vertices, faces)
+
+
 def _nobody_listens(done: int, total: int) -> None:
     pass
 
@@ -301,10 +310,4 @@ def _check_reference_length(given: float | str) -> None:
 
 
 def _length_of(mesh: Mesh, given: float | str) -> float:
-    if given != "auto":
-        return float(given)
-    if kernels_available() and kernels_loaded():
-        from pns_common.fused.extent import reference_length
-
-        return reference_length(mesh.vertices, mesh.faces)
-    return measure_reference_length(mesh.vertices, mesh.faces)
+    return float(given) if given != "auto" else reference_length_of(mesh.vertices, mesh.faces)

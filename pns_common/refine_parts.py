@@ -20,7 +20,7 @@ from pns_common.refine import (
     available_threads,
     chosen_creases,
     kernels_can_serve,
-    measure_reference_length,
+    reference_length_of,
     report_of,
 )
 from pns_common.schemes import Scheme
@@ -68,7 +68,7 @@ def refine_parts(
     if reference_length == "auto":
         lengths = np.array(
             [
-                measure_reference_length(
+                reference_length_of(
                     mesh.vertices[first[part] : first[part + 1]],
                     mesh.faces[part_faces[part] : part_faces[part + 1]] - first[part],
                 )

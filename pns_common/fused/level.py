@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -153,8 +153,8 @@ def crease_shift_of(level: FusedLevel) -> Callable[[], CreaseShift | None]:
     mesh, rows = level.mesh, crease_rows(level.mesh)
     if len(rows) == 0:
         return lambda: None
-    points, creases = level.points, mesh.edges[rows].astype(np.int64)
-    return lambda: crease_shift(points, mesh.faces, rows, creases)
+    connectivity = mesh.faces, mesh.edges, mesh.half_edges, mesh.edge_class
+    return partial(crease_shift, level.points, *connectivity, rows)
 
 
 def crease_rows(mesh: MeshEdges) -> Int[np.ndarray, " N"]:

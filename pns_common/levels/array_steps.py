@@ -59,8 +59,14 @@ class ArrayStep:
     def crease_shift(self) -> float | None:
         """The longest way that creases keep a vertex back; None without creases."""
         topology = self.topology
-        rows = np.flatnonzero(topology.edge_class == EdgeClass.CREASE)
-        shift = crease_shift(self.control, topology.faces, rows, topology.edges[rows])
+        shift = crease_shift(
+            self.control,
+            topology.faces,
+            topology.edges,
+            topology.half_edges,
+            topology.edge_class,
+            np.flatnonzero(topology.edge_class == EdgeClass.CREASE),
+        )
         return None if shift is None else shift.largest
 
 

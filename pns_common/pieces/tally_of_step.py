@@ -86,12 +86,13 @@ def _crease_shift(
     """Return the longest way that creases keep an own vertex back; None without own creases."""
     links = step.links
     rows = np.flatnonzero(links.edge_class == EdgeClass.CREASE)
-    corners = links.faces.reshape(-1)
-    half_edges = np.asarray(links.first[rows], dtype=np.int64)
-    ends = np.stack([corners[half_edges], corners[next_corner(half_edges)]], axis=1)
-    shift = crease_shift(step.control, links.faces, rows, ends.astype(np.int64))
-    if shift is None:
+    if len(rows) == 0:
         return None
+    corners, first = links.faces.reshape(-1), np.asarray(links.first, dtype=np.int64)
+    ends = np.stack([corners[first], corners[next_corner(first)]], axis=1)
+    half_edges = np.stack([first, links.second], axis=1)
+    shift = crease_shift(step.control, links.faces, ends, half_edges, links.edge_class, rows)
+    assert shift is not None  # there are creases
     old, new = own_vertices[shift.vertices], own_edges[shift.edges]
     if not (old.any() or new.any()):
         return None

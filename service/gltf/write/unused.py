@@ -51,12 +51,14 @@ class VertexUse:
             if (mesh, number) not in self.refined and "POSITION" in primitive.attributes
         }
         return sum(
-            self.document.accessors[accessor].count - _count_distinct(np.concatenate(rows))
+            self.document.accessors[accessor].count - _count_distinct(rows)
             for accessor, rows in self.rows.items()
             if accessor not in others
         )
 
 
-def _count_distinct(rows: Int[np.ndarray, " N"]) -> int:
+def _count_distinct(rows: Sequence[Int[np.ndarray, " N"]]) -> int:
+    """Count what primitives name, each of them in ascending order."""
     # np.unique, which has no use for their order, takes several times as long.
-    return int(np.count_nonzero(np.diff(np.sort(rows), prepend=-1)))
+    ordered = rows[0] if len(rows) == 1 else np.sort(np.concatenate(rows))
+    return 1 + int(np.count_nonzero(ordered[1:] != ordered[:-1]))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, crease_lines, load_model, loop, pns, refine
+from pns_common.connectivity.creases import with_creases
 from pns_common.connectivity.topology import build_topology
 from pns_common.masks.crease_shift import crease_shift, limit_crease_shift
 from tests.support.meshes import block, bumpy_sphere
@@ -16,10 +17,10 @@ GENERAL = pns(load_model())
 @pytest.mark.parametrize("name", MESHES)
 def test_a_shift_is_the_difference_that_the_creases_make(name):
     mesh, pairs = MESHES[name], crease_lines(MESHES[name])
-    topology = build_topology(mesh.faces, len(mesh.vertices))
+    topology = with_creases(build_topology(mesh.faces, len(mesh.vertices)), pairs)
     numbers = {tuple(pair): number for number, pair in enumerate(topology.edges.tolist())}
     rows = np.array([numbers[tuple(pair)] for pair in pairs.tolist()])
-    shift = crease_shift(mesh.vertices, mesh.faces, rows, pairs)
+    shift = shift_of(mesh, topology, rows)
     with_, without = (refine(mesh, loop(), creases=given).mesh.vertices for given in (pairs, None))
     apart = np.linalg.norm(with_ - without, axis=1)
     count = len(mesh.vertices)
@@ -43,6 +44,11 @@ def test_a_limits_shift_is_the_difference_of_the_limits(name):
     assert shift.largest == pytest.approx(apart.max(), rel=1e-9)
 
 
+def shift_of(mesh, topology, rows):
+    of_edges = topology.edges, topology.half_edges, topology.edge_class
+    return crease_shift(mesh.vertices, mesh.faces, *of_edges, rows)
+
+
 def halves(mesh, pairs):
     """The halves of creases after one level: their ends and their middles."""
     edges = build_topology(mesh.faces, len(mesh.vertices)).edges.tolist()
@@ -53,9 +59,11 @@ def halves(mesh, pairs):
 
 def test_without_creases_there_is_no_shift():
     nothing = np.zeros(0, dtype=np.int64)
-    args = box().vertices, box().faces
-    assert crease_shift(*args, nothing, np.zeros((0, 2), dtype=np.int64)) is None
-    assert limit_crease_shift(*args, np.zeros((0, 2), dtype=np.int64)) is None
+    mesh = box()
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    assert shift_of(mesh, topology, nothing) is None
+    nobody = np.zeros((0, 2), dtype=np.int64)
+    assert limit_crease_shift(mesh.vertices, mesh.faces, nobody) is None
 
 
 @pytest.mark.parametrize("limit", [False, True])
