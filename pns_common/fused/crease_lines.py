@@ -18,7 +18,7 @@ def crease_line_rows(
 ) -> Int[np.ndarray, " N"]:
     """Return the edges of the crease lines; ``angle`` is θ in degrees."""
     cosine, count = math.cos(math.radians(angle)), len(mesh.edges)
-    beyond, found = np.empty(count, dtype=bool), np.zeros(blocks.count(count), dtype=np.int64)
+    beyond, found = np.zeros(count, dtype=bool), np.zeros(blocks.count(count), dtype=np.int64)
     of_mesh = mesh.faces, mesh.half_edges, mesh.edge_class
 
     def mark(rows: slice) -> None:

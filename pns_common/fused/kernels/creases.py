@@ -14,7 +14,14 @@ from pns_common.fused.kernels.compiled import (
     kernel,
 )
 from pns_common.fused.kernels.edges import INTERIOR
-from pns_common.fused.kernels.normals import COSINE_MARGIN, area, clearly_less, unit_normal
+from pns_common.fused.kernels.normals import (
+    COSINE_MARGIN,
+    TOGETHER,
+    area,
+    clearly_less,
+    unit_normal,
+)
+from pns_common.fused.kernels.rings import row
 
 
 @called_seldom
@@ -27,27 +34,37 @@ def _is_beyond(points, faces, f, g, cosine):
     return False
 
 
-def _row(points, i):
-    return points[i, 0], points[i, 1], points[i, 2]
+def _area(points, faces, f):
+    return area(row(points, faces[f, 0]), row(points, faces[f, 1]), row(points, faces[f, 2]))
+
+
+def _is_clear(points, faces, half_edges, edge_class, bound, e):
+    """Return whether an edge clearly turns less, or is not interior."""
+    interior = edge_class[e] == INTERIOR
+    first = half_edges[e, 0]
+    second = half_edges[e, 1] if interior else first
+    n, m = _area(points, faces, first // 3), _area(points, faces, second // 3)
+    return clearly_less(n, m, bound) | (not interior)
 
 
 @kernel(SIZE, POINTS, INDICES, INTEGERS_2, CLASSES, REAL, SIZE, SIZE, FLAGS_OUT)
 def mark_edges_beyond(points, faces, half_edges, edge_class, cosine, begin, end, beyond):
     """Mark interior edges begin … end − 1 whose faces' normals have a smaller cosine.
 
-    Returns how many there are.
+    ``beyond`` is False on entry. Returns how many there are.
     """
     above, found = max(cosine, 0.0) + COSINE_MARGIN, 0
-    for e in range(begin, end):
-        beyond[e] = False
-        if edge_class[e] != INTERIOR:
+    bound, around = above * above, (points, faces, half_edges, edge_class)
+    for first in range(begin, end, TOGETHER):
+        last, doubtful = min(first + TOGETHER, end), 0
+        for e in range(first, last):
+            doubtful += not _is_clear(*around, bound, e)
+        if doubtful == 0:
             continue
-        f, g = half_edges[e, 0] // 3, half_edges[e, 1] // 3
-        n = area(_row(points, faces[f, 0]), _row(points, faces[f, 1]), _row(points, faces[f, 2]))
-        m = area(_row(points, faces[g, 0]), _row(points, faces[g, 1]), _row(points, faces[g, 2]))
-        if clearly_less(n, m, above * above):
-            continue
-        if _is_beyond(points, faces, f, g, cosine):
-            beyond[e] = True
-            found += 1
+        for e in range(first, last):
+            if edge_class[e] != INTERIOR:
+                continue
+            if _is_beyond(points, faces, half_edges[e, 0] // 3, half_edges[e, 1] // 3, cosine):
+                beyond[e] = True
+                found += 1
     return found

@@ -26,8 +26,8 @@ COSINE_MARGIN = 1e-14
 CLEARLY_SAME_SIDE = 1e-20
 # Products above this have all their digits.
 NORMAL_NUMBERS = 1e-300
-# Faces that are asked at once, without a branch and so eight at a time on a processor with such
-# vectors, whether any is in doubt: only then they are asked one by one.
+# Faces or edges that are asked at once, without a branch and so eight at a time on a processor with
+# such vectors, whether any is in doubt: only then they are asked one by one.
 TOGETHER = 64
 
 
