@@ -135,8 +135,8 @@ def refine(
     _check_kinds(mesh, scheme)
     _check_levels(levels)
     _check_reference_length(reference_length)
-    length = Deferred(lambda: _length_of(mesh, reference_length))
     workers = _threads(threads)
+    length = Deferred(lambda: _length_of(mesh, reference_length, workers))
     work = RefinementProgress(
         len(mesh.faces), levels, scheme.learned_levels, limit, progress or _nobody_listens
     )
@@ -270,12 +270,14 @@ def measure_reference_length(
     return float(norm(referenced - referenced.mean(axis=0)).max()) / math.sqrt(2)
 
 
-def reference_length_of(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> float:
+def reference_length_of(
+    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"], threads: int = 1
+) -> float:
     """Return the same, by kernels where they are loaded."""
     if kernels_available() and kernels_loaded():
         from pns_common.fused.extent import reference_length
 
-        return reference_length(vertices, faces)
+        return reference_length(vertices, faces, kernel_blocks(threads))
     return measure_reference_length(vertices, faces)
 
 
@@ -309,5 +311,7 @@ def _check_reference_length(given: float | str) -> None:
         raise ParameterError("reference_length", given, expected='"auto" or a number > 0')
 
 
-def _length_of(mesh: Mesh, given: float | str) -> float:
-    return float(given) if given != "auto" else reference_length_of(mesh.vertices, mesh.faces)
+def _length_of(mesh: Mesh, given: float | str, threads: int) -> float:
+    if given != "auto":
+        return float(given)
+    return reference_length_of(mesh.vertices, mesh.faces, threads)

@@ -7,11 +7,15 @@ import math
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.fused.kernels.extent import farthest, sum_referenced
+from pns_common.base.blocks import Blocks
+from pns_common.fused.kernels.extent import farthest, mark_referenced, sum_referenced
 
 
-def reference_length(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> float:
+def reference_length(
+    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"], blocks: Blocks
+) -> float:
     """Return R: the largest distance of a referenced vertex from their centroid, over √2."""
-    used, total = np.zeros(len(vertices), dtype=bool), np.zeros(3)
-    count = sum_referenced(vertices, faces, used, total)
+    used, total = np.zeros(len(vertices), dtype=bool), np.empty(3)
+    blocks.run(len(faces), lambda rows: mark_referenced(faces, rows.start, rows.stop, used))
+    count = sum_referenced(vertices, used, total)
     return farthest(vertices, used, total / count) / math.sqrt(2)

@@ -17,7 +17,7 @@ from pns_common.fused.child_faces import look_at_children
 from pns_common.fused.crease_lines import crease_line_rows
 from pns_common.fused.fans import multi_fan_vertices
 from pns_common.fused.loop_points import largest_size, loop_points
-from pns_common.fused.mesh_edges import MeshEdges, build_edges, split_mesh_edges
+from pns_common.fused.mesh_edges import MeshEdges, build_edges, in_int32, split_mesh_edges
 from pns_common.levels.diagnostics import Displacements, LevelReport, edge_counts
 from pns_common.masks.crease_shift import CreaseShift, crease_shift
 from pns_common.mesh import LARGEST_COORDINATE
@@ -98,7 +98,7 @@ def control_edges(
     Raises:
         ParameterError: a crease is no edge of the mesh.
     """
-    return _with_creases(build_edges(faces.astype(np.int32), vertex_count, blocks), creases)
+    return _with_creases(build_edges(in_int32(faces, blocks), vertex_count, blocks), creases)
 
 
 def next_edges(mesh: MeshEdges, blocks: Blocks, *, sharp: bool = True) -> MeshEdges:

@@ -74,6 +74,17 @@ class MeshEdges:
         return np.bincount(ends, minlength=self.vertex_count).astype(np.int32)
 
 
+def in_int32(faces: Int[np.ndarray, "F 3"], blocks: Blocks) -> Int[np.ndarray, "F 3"]:
+    """Return a copy of faces for the kernels, row by row."""
+    narrow = np.empty(faces.shape, dtype=np.int32)
+
+    def copy(rows: slice) -> None:
+        narrow[rows] = faces[rows]
+
+    blocks.unheard().run(len(faces), copy)
+    return narrow
+
+
 @dataclass(frozen=True, eq=False)
 class Chains:
     """The edges of a face list as ``chain_edges`` writes them, of which there are ``count``."""

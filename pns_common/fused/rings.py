@@ -98,8 +98,8 @@ def measure_rings(
 ) -> RingMeasures:
     """Look around every vertex of a level; ``altitudes`` is α of the network's lengths."""
     count, by_owner = mesh.vertex_count, owners(blocks, mesh.vertex_count)
-    fields, means = np.zeros((count, 4)), np.zeros((count, VERTEX_COLUMNS))
-    valence = np.zeros(count, dtype=np.int32)
+    fields, means = np.empty((count, 4)), np.empty((count, VERTEX_COLUMNS))
+    valence = np.empty(count, dtype=np.int32)
     args = mesh.faces, mesh.edges, mesh.half_edges, mesh.edge_class
     of_faces = at_faces.normals, at_faces.areas
     bends, jumps, network_lengths = (np.empty(len(mesh.edges)) for _ in range(3))

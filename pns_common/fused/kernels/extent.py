@@ -17,18 +17,26 @@ from pns_common.fused.kernels.compiled import (
 )
 
 
-@kernel(SIZE, POINTS, LONG_INDICES, FLAGS_OUT, NUMBERS_OUT)
-def sum_referenced(points, faces, used, total):
-    """Mark the vertices of faces and sum them; returns how many there are."""
-    for f in range(faces.shape[0]):
+@kernel(SIZE, LONG_INDICES, SIZE, SIZE, FLAGS_OUT)
+def mark_referenced(faces, begin, end, used):
+    """Mark the vertices of faces begin … end − 1; threads may write the same True at once."""
+    for f in range(begin, end):
         for i in range(3):
             used[faces[f, i]] = True
-    count = 0
+    return 0
+
+
+@kernel(SIZE, POINTS, FLAGS, NUMBERS_OUT)
+def sum_referenced(points, used, total):
+    """Write the sum of the marked vertices; returns how many there are."""
+    count, x, y, z = 0, 0.0, 0.0, 0.0
     for v in range(points.shape[0]):
         if used[v]:
             count += 1
-            for k in range(3):
-                total[k] += points[v, k]
+            x += points[v, 0]
+            y += points[v, 1]
+            z += points[v, 2]
+    total[0], total[1], total[2] = x, y, z
     return count
 
 

@@ -82,7 +82,10 @@ def measure_faces(points, faces, begin, end, normals, areas):
 
 @kernel(SIZE, INDICES, POINTS, SIZE, SIZE, POINTS_OUT)
 def mean_normals(faces, areas, begin, end, fields):
-    """Write m_v into the first three columns of ``fields`` (V, 4), all 0 on entry."""
+    """Write m_v into the first three columns of ``fields`` (V, 4)."""
+    for v in range(begin, end):
+        for k in range(4):
+            fields[v, k] = 0.0
     for f in range(faces.shape[0]):
         for i in range(3):
             v = faces[f, i]
@@ -177,7 +180,11 @@ def _add_spoke(sums, v, spoke, square, jump, bend, length, network_square):
 
 @kernel(SIZE, POINTS, INDICES, NUMBERS, NUMBERS, NUMBERS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
 def mean_spokes(points, edges, bends, jumps, network_lengths, begin, end, means, valence):
-    """Write means over the spokes of vertices begin … end − 1; ``means`` (V, 15), 0 on entry."""
+    """Write means over the spokes of vertices begin … end − 1, and 0 to the rest of ``means``."""
+    for v in range(begin, end):
+        valence[v] = 0
+        for k in range(VERTEX_COLUMNS):
+            means[v, k] = 0.0
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
         mine, theirs = begin <= a < end, begin <= b < end
