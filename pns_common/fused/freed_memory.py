@@ -1,32 +1,38 @@
-"""Memory that a call frees stays with the process for the next one, up to some 50 MB.
+"""Memory that a call frees stays with the process for the next one, up to 96 MiB.
 
-glibc gives memory back to the system as soon as the free end of its heap is larger than twice the
-largest block that was ever freed on its own, and then each call's tables are new pages again, which
-the system clears: a third of Loop's time at 80,000 faces. That bound grows with what is freed, up
-to blocks of 32 MiB. One such block, never written and so never in memory, sets it once for all, as
-a call of 320,000 faces would.
+glibc gives memory back to the system as soon as the free end of its heap is larger than a bound,
+128 KiB at first, and then each call's tables are new pages again, which the system clears: a third
+of three levels from 20,000 faces. It takes blocks above another bound from the system each time,
+and gives them back; that one grows by itself, up to 32 MiB, and has to be set too, or setting the
+first would stop it.
 """
 
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
 from collections.abc import Callable
 from functools import cache
 
-import numpy as np
-
-# More would save the system's help in calls of more than 100,000 faces too, and costs memory: at
-# 1.3 million faces in random order the peak is 440 MiB, 480 with blocks of 31 MiB, 370 with none.
-KEPT_BLOCK = 24 * 2**20
-# glibc takes larger blocks from the system each time, whatever it has kept.
+# What three levels from 20,000 faces free, and one from 320,000: less, and their pages are new ones
+# each time. Before large results all of it goes back (``make_room``).
+KEPT = 96 * 2**20
+# glibc takes larger blocks from the system each time, whatever it has kept; it allows no more.
 LARGEST_KEPT = 32 * 2**20
+# Of glibc's malloc.h.
+TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3
 
 
 def keep_freed_memory() -> None:
-    """Let the allocator keep what this process frees; where it is not glibc's nothing changes."""
-    block = np.empty(KEPT_BLOCK, dtype=np.uint8)
-    del block
+    """Let the allocator keep what this process frees; where it is not glibc's nothing changes.
+
+    Nor where the environment's MALLOC_TRIM_THRESHOLD_ says what is to be kept.
+    """
+    if "MALLOC_TRIM_THRESHOLD_" not in os.environ:
+        set_option = _of_glibc("mallopt")
+        set_option(MMAP_THRESHOLD, LARGEST_KEPT)
+        set_option(TRIM_THRESHOLD, KEPT)
 
 
 def make_room(size: int) -> None:
@@ -35,11 +41,15 @@ def make_room(size: int) -> None:
     Only where they cannot be taken of that: a fifth of the peak at 1.3 million faces.
     """
     if size > LARGEST_KEPT:
-        _trim()(0)
+        _of_glibc("malloc_trim")(0)
 
 
 @cache
-def _trim() -> Callable[[int], object]:
-    """Return glibc's ``malloc_trim``; where there is none what does nothing."""
-    found = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
-    return found or int
+def _of_glibc(name: str) -> Callable[..., object]:
+    """Return a function of glibc; where it is not there what does nothing."""
+    found = getattr(ctypes.CDLL(None), name, None) if sys.platform == "linux" else None
+    return found or _nothing
+
+
+def _nothing(*arguments: int) -> None:
+    """Do nothing."""

@@ -1,5 +1,6 @@
 """What a process frees it has again without the system's help, once the kernels are loaded."""
 
+import os
 import platform
 import subprocess
 import sys
@@ -62,11 +63,20 @@ def test_there_is_room_for_what_cannot_be_made_of_freed_memory():
     assert given_back > 20
 
 
-def test_elsewhere_nothing_is_done_for_room(monkeypatch):
+@GLIBC
+def test_the_environment_may_say_what_is_kept():
+    program = PROGRAM.format(first="keep_freed_memory()")
+    given = os.environ | {"MALLOC_TRIM_THRESHOLD_": "65536", "MALLOC_MMAP_THRESHOLD_": "1048576"}
+    faults = int(subprocess.check_output([sys.executable, "-c", program], env=given))
+    assert faults >= 9  # each page is a new one, and huge at most
+
+
+def test_elsewhere_nothing_is_done(monkeypatch):
     monkeypatch.setattr(sys, "platform", "another")
-    freed_memory._trim.cache_clear()
+    freed_memory._of_glibc.cache_clear()
     try:
+        freed_memory.keep_freed_memory()
         freed_memory.make_room(freed_memory.LARGEST_KEPT + 1)
-        assert freed_memory._trim() is int
+        assert freed_memory._of_glibc("malloc_trim") is freed_memory._nothing
     finally:
-        freed_memory._trim.cache_clear()
+        freed_memory._of_glibc.cache_clear()
