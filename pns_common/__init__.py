@@ -13,10 +13,10 @@ Where to read, each room seeing only those above it:
     masks/          Loop: stencils.py one step's masks, limit/ those of the limit surface
     features/       φ, what the networks read of an edge and of a vertex's ring
     formula/        correction.py (edges) and vertex_operator.py (old vertices); side_gate.py γ,
-                    prior.py D, fold_guard.py G, boundary_prior.py
+                    prior.py D, tips.py, curve_prior.py, fold_guard.py G
     models/         what a model says of itself: card.py, contract.py; the bundled files
     rules/          control_level.py what a rule sees, placement.py what it answers; loop.py,
-                    learned.py (the paper's), scale_free.py (the default's), boundary.py
+                    learned.py (the paper's), scale_free.py (the default's), curves.py
     schemes.py      a rule for old vertices and one for edges
     levels/         step.py one level in formulas, array_steps.py one after the other; the report
     fused/          the same compiled: each module names the one whose bits it has

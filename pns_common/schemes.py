@@ -22,8 +22,8 @@ from pns_common.formula.fold_guard import FoldGuard
 from pns_common.formula.vertex_operator import VertexOperator
 from pns_common.models.card import ModelCard
 from pns_common.models.protocol import Model, VertexModel
-from pns_common.rules.boundary import BoundaryRule
 from pns_common.rules.control_level import ControlLevel, Rule
+from pns_common.rules.curves import CurveRule
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
 from pns_common.rules.loop import loop_edge_rule, loop_vertex_rule
 from pns_common.rules.placement import Placement, without_correction
@@ -130,17 +130,17 @@ def scale_free_scheme(
 
     ``creases`` are those that it keeps unless others are named.
     """
-    boundary = BoundaryRule(form, vertices.gate_sharpness) if form.boundary_strength > 0 else None
+    curves = CurveRule(form, vertices.gate_sharpness) if form.boundary_strength > 0 else None
     return Scheme(
         "pns",
-        ScaleFreeVertexRule(vertices, form, boundary),
-        ScaleFreeEdgeRule(edges, form, boundary, vertices.gate_sharpness),
+        ScaleFreeVertexRule(vertices, form, curves),
+        ScaleFreeEdgeRule(edges, form, curves, vertices.gate_sharpness),
         budget=form.budget,
         model=model,
         model_hash=model_hash,
         learned_levels=form.learned_levels,
         guard=FoldGuard(math.radians(form.fold_angle)),
-        moves_boundaries=boundary is not None,
+        moves_boundaries=curves is not None,
         wide_bound=form.wide_bound,
         creases=creases,
     )
@@ -162,6 +162,8 @@ def scale_free_form(card: ModelCard, budget: float) -> ScaleFreeForm | None:
         side_gates=card.side_gates or False,
         network_altitudes=card.network_altitudes,
         wide_bound=card.wide_bound or False,
+        crease_prior=card.crease_prior or False,
+        tip_strength=card.tip_strength or 0.0,
     )
 
 

@@ -79,6 +79,8 @@ def _further_rows(card: ModelCard) -> dict[str, Any]:
         "side gates": card.side_gates,
         "network altitudes α": card.network_altitudes,
         "wide bound": card.wide_bound,
+        "crease prior": card.crease_prior,
+        "tip strength a": card.tip_strength,
         "crease angle θ": card.crease_angle,
         "crease levels": card.crease_levels,
     }

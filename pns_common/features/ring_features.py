@@ -41,7 +41,7 @@ def ring_features(rings: Rings) -> Float[Array, "V 10"]:
         rings.mean(rings.of_neighbour(height)),
         divided(opening, spoke_length),
         divided(rings.mean(length), spoke_length),
-        rings.mean(rings.of_neighbour(rings.mean_jump)),
+        rings.near_jump,
     ]
     return xp.concat(columns, axis=1)
 

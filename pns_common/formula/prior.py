@@ -26,10 +26,13 @@ CLEAR_NORMAL = 1 / 4
 
 def normal_pushes(rings: Rings) -> Float[Array, "V 3"]:
     """Return d_v of all vertices for s = 1; everything after it is linear in s."""
-    xp = namespace(rings.points)
-    agreement = norm(rings.normal)[:, None]
-    normal = rings.normal / xp.where(agreement > CLEAR_NORMAL, agreement, CLEAR_NORMAL)
-    topology = rings.topology
+    normal, topology = clear_normals(rings.normal), rings.topology
     weight = limit_ring_weight(topology.valence) * topology.smooth_vertices
     inwards = beside(rings.points, weight, rings.points.dtype) * dot(rings.umbrella, normal)
     return -inwards[:, None] * normal
+
+
+def clear_normals(mean: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
+    """Return m̂ of mean normals: of length 1, less where they are shorter than ``CLEAR_NORMAL``."""
+    agreement = norm(mean)[:, None]
+    return mean / namespace(mean).where(agreement > CLEAR_NORMAL, agreement, CLEAR_NORMAL)

@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
-from pns_common.fused import fits, kernel_blocks, kernels_loaded
+from pns_common.fused import fits, kernels_loaded
 from pns_common.fused.kernels.corner_normals import scale_to_unit, sum_corners, triangle_normals
+from pns_common.fused.loop_points import owners
 from pns_common.geometry import corner_normals
 
 
@@ -43,8 +44,10 @@ def angle_weighted_normals(
 
     blocks.run(len(faces), measure)
     total = np.zeros((count, 3))
-    # By one thread: several would each have to read all corners.
-    sum_corners(normals, angles, groups, triangles, total)
-    owners = kernel_blocks(blocks.threads)
-    owners.run(count, lambda rows: scale_to_unit(rows.start, rows.stop, total))
+
+    def add_up(rows: slice) -> None:
+        sum_corners(normals, angles, groups, triangles, rows.start, rows.stop, total)
+        scale_to_unit(rows.start, rows.stop, total)
+
+    owners(blocks.unheard(), count).run(count, add_up)
     return total

@@ -39,7 +39,7 @@ def add_at_edges(
     # Before the blocks: what several threads ask for is computed once.
     normals = level.faces.normals
     fields = level.rings.fields if rule.operator.features.count > DIHEDRAL else NO_FIELDS
-    bounds = level.boundary
+    bounds = level.curves
     pushes = level.pushes if isinstance(rule, ScaleFreeEdgeRule) else NO_FIELDS
     reads_sides = isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates
     bends = level.bends if reads_sides else NO_BENDS

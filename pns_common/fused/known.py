@@ -5,7 +5,7 @@ from __future__ import annotations
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.orientation import FIRST_FACE, SYMMETRIC
 from pns_common.features.ring_features import RING_10
-from pns_common.rules.boundary import BoundaryRule
+from pns_common.rules.curves import CurveRule
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
 from pns_common.rules.loop import loop_vertex_rule
 from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
@@ -17,7 +17,7 @@ def kernels_know(scheme: Scheme) -> bool:
     edges, vertices = scheme.edge_rule, scheme.vertex_rule
     if not isinstance(edges, LearnedEdgeRule | ScaleFreeEdgeRule):
         return False
-    if _boundary(edges) != _boundary(vertices):
+    if _curves(edges) != _curves(vertices):
         return False
     if isinstance(vertices, LearnedVertexRule | ScaleFreeVertexRule):
         if vertices.operator.features is not RING_10:
@@ -28,5 +28,5 @@ def kernels_know(scheme: Scheme) -> bool:
     return known and edges.operator.orientation in (FIRST_FACE, SYMMETRIC)
 
 
-def _boundary(rule: Rule) -> BoundaryRule | None:
-    return rule.boundary if isinstance(rule, ScaleFreeEdgeRule | ScaleFreeVertexRule) else None
+def _curves(rule: Rule) -> CurveRule | None:
+    return rule.curves if isinstance(rule, ScaleFreeEdgeRule | ScaleFreeVertexRule) else None

@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 from pns_common.base.blocks import Blocks
 from pns_common.fused.additions import Additions
-from pns_common.fused.boundary import Boundary, boundary_of
 from pns_common.fused.child_faces import look_at_children
+from pns_common.fused.curves import Curves, curves_of
 from pns_common.fused.edge_rule import add_at_edges
 from pns_common.fused.guard import guard_scale
 from pns_common.fused.level import FusedLevel, FusedStep, crease_shift_of
@@ -20,7 +20,7 @@ from pns_common.fused.surroundings import Surroundings
 from pns_common.fused.vertex_rule import add_at_vertices
 from pns_common.levels.diagnostics import LevelReport, Reach, bound_of, level_report
 from pns_common.levels.step import AddedStep
-from pns_common.rules.boundary import BoundaryRule
+from pns_common.rules.curves import CurveRule
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
 from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
 from pns_common.schemes import Scheme
@@ -70,7 +70,8 @@ def learned_step(level: FusedLevel, scheme: Scheme, length: float, blocks: Block
     step = AddedStep(*rules, learned=True, guard=made.guard)
 
     def report() -> LevelReport:
-        children, shift = look_at_children(mesh, points, counterpart, blocks.unheard()), shift_of()
+        children = look_at_children(mesh, points, counterpart, blocks.unheard())
+        shift = shift_of(points)
         largest_shift = None if shift is None else shift.largest
         return level_report(mesh, step, children, largest_shift, reach)
 
@@ -86,15 +87,15 @@ def learned_points(
         ModelError: a network returned something that is not finite, or of another shape.
     """
     mesh, count = level.mesh, level.mesh.vertex_count
-    boundary = boundary_of(_boundary_rule(scheme), level.points, mesh, length)
-    vertices, edges, added = _added_by_rules(level, scheme, length, blocks, boundary)
+    curves = curves_of(_curve_rule(scheme), level.points, mesh, length)
+    vertices, edges, added = _added_by_rules(level, scheme, length, blocks, curves)
     # Not before: what the rules read has the most memory.
     loop = loop_points(level.points, mesh, blocks)
-    boundary.move_vertices(loop[:count], vertices)
-    boundary.move_edges(loop[count:], edges)
+    curves.move_vertices(loop[:count], vertices)
+    curves.move_edges(loop[count:], edges)
     scale = None
     if scheme.guard is not None:
-        shared = boundary.shared(count, len(edges.ratio))
+        shared = curves.shared(count, len(edges.ratio))
         scale = guard_scale(scheme.guard, mesh, loop, added.displacement, blocks, shared)
         if scale is None:
             scale = np.broadcast_to(1.0, len(loop))
@@ -115,18 +116,18 @@ def _added_by_rules(
     scheme: Scheme,
     length: float | Float[np.ndarray, " V"],
     blocks: Blocks,
-    boundary: Boundary,
+    curves: Curves,
 ) -> tuple[Additions, Additions, Additions]:
-    """Return what both rules add but at boundaries: to vertices, to edges, and both together."""
+    """Return what both rules add but on curves: to vertices, to edges, and both together."""
     mesh, count = level.mesh, level.mesh.vertex_count
     of_level = level.points, mesh, level.several_fans
-    seen = Surroundings(*of_level, length, blocks, boundary, _altitudes(scheme))
+    seen = Surroundings(*of_level, length, blocks, curves, _altitudes(scheme))
     edge_rule, vertex_rule = scheme.edge_rule, scheme.vertex_rule
     assert isinstance(edge_rule, LearnedEdgeRule | ScaleFreeEdgeRule)
     added = Additions.unwritten(count + len(mesh.edges))
     vertices, edges = added.rows(slice(0, count)), added.rows(slice(count, None))
     if isinstance(vertex_rule, LearnedVertexRule | ScaleFreeVertexRule):
-        # A copy: the boundary's rule moves more vertices.
+        # A copy: the rule of curves moves more vertices.
         vertices = replace(vertices, corrected=seen.rings.smooth.copy())
         add_at_vertices(vertex_rule, seen, vertices)
         seen.forget_rings()
@@ -136,9 +137,9 @@ def _added_by_rules(
     return vertices, edges, added
 
 
-def _boundary_rule(scheme: Scheme) -> BoundaryRule | None:
+def _curve_rule(scheme: Scheme) -> CurveRule | None:
     rule = scheme.edge_rule
-    return rule.boundary if isinstance(rule, ScaleFreeEdgeRule) else None
+    return rule.curves if isinstance(rule, ScaleFreeEdgeRule) else None
 
 
 def _altitudes(scheme: Scheme) -> float:

@@ -142,17 +142,21 @@ def loop_step(level: FusedLevel, blocks: Blocks) -> FusedStep:
     if largest > LARGEST_COORDINATE:
         largest = largest_size(points, blocks)
     mesh, shift = level.mesh, crease_shift_of(level)
-    return FusedStep(points, largest, lambda: _loop_report(mesh, points, shift(), blocks), None)
+    return FusedStep(
+        points, largest, lambda: _loop_report(mesh, points, shift(points), blocks), None
+    )
 
 
-def crease_shift_of(level: FusedLevel) -> Callable[[], CreaseShift | None]:
-    """Return what tells how far a level's creases keep vertices back: None without creases.
+def crease_shift_of(
+    level: FusedLevel,
+) -> Callable[[Float[np.ndarray, "W 3"]], CreaseShift | None]:
+    """Return what tells how far from smooth the points are that a level's creases became.
 
-    It keeps the level's points only where there are some.
+    None without creases: it keeps the level's points only where there are some.
     """
     mesh, rows = level.mesh, crease_rows(level.mesh)
     if len(rows) == 0:
-        return lambda: None
+        return lambda placed: None
     connectivity = mesh.faces, mesh.edges, mesh.half_edges, mesh.edge_class
     return partial(crease_shift, level.points, *connectivity, rows)
 

@@ -18,7 +18,6 @@ from pns_common.fused.kernels.children import (
     split_faces_long,
 )
 from pns_common.fused.kernels.edges import (
-    BOUNDARY,
     HIGH,
     INTERIOR,
     NONE,
@@ -174,11 +173,6 @@ def split_mesh_edges(parent: MeshEdges, blocks: Blocks) -> MeshEdges:
 
     blocks.run(count, fill)
     return MeshEdges(vertices, faces, edges, face_edges, half_edges, edge_class, plain=True)
-
-
-def has_boundary(mesh: MeshEdges) -> bool:
-    """Return whether an edge has a single face."""
-    return bool((mesh.edge_class == BOUNDARY).any())
 
 
 def split_mesh_faces(

@@ -159,7 +159,7 @@ def _reports(
     step: AddedStep,
 ) -> list[LevelReport]:
     """Return what ``level_report`` says of each part."""
-    mesh, shifts = level.mesh, _crease_shifts(level, parts)
+    mesh, shifts = level.mesh, _crease_shifts(level, parts, points)
     children = _children(mesh, parts, points, counterpart)
     order = np.argsort(parts.of_vertex, kind="stable")
     starts = np.searchsorted(parts.of_vertex[order], np.arange(parts.count + 1))
@@ -186,9 +186,11 @@ def _reports(
     return reports
 
 
-def _crease_shifts(level: FusedLevel, parts: _Parts) -> list[float | None]:
-    """Return the longest way that each part's creases keep a vertex back; None without creases."""
-    shift = crease_shift_of(level)()
+def _crease_shifts(
+    level: FusedLevel, parts: _Parts, points: Float[np.ndarray, "W 3"]
+) -> list[float | None]:
+    """Return the longest way from smooth of each part's vertices at creases; None without."""
+    shift = crease_shift_of(level)(points)
     if shift is None:
         return [None] * parts.count
     of_edge = np.searchsorted(parts.edges, shift.edges, side="right") - 1

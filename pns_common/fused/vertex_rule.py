@@ -7,8 +7,8 @@ import numpy as np
 from pns_common.formula.correction import where_open
 from pns_common.fused.additions import Additions
 from pns_common.fused.kernels.vertex_correction import correct, correct_scale_free, look_around
-from pns_common.fused.loop_points import place_vertices
 from pns_common.fused.surroundings import Surroundings
+from pns_common.fused.vertex_prior import priors_at
 from pns_common.rules.learned import LearnedVertexRule
 from pns_common.rules.scale_free import ScaleFreeVertexRule
 
@@ -27,15 +27,9 @@ def add_at_vertices(
     vertices = np.flatnonzero(rings.smooth).astype(np.int32)
     to.clear(np.flatnonzero(~rings.smooth))
     out = to.displacement, to.ratio, to.gate, to.envelope
-    pushes = np.empty((0, 3))
-    of_boundary = level.boundary.pushes, level.boundary.nothing
+    prior = np.empty((0, 3))
     if isinstance(rule, ScaleFreeVertexRule):
-        pushes = np.empty_like(level.pushes)
-        place_vertices(level.pushes, level.mesh, level.blocks, pushes)
-        if len(level.boundary.pushes):
-            placed = np.empty_like(pushes)
-            place_vertices(level.boundary.pushes, level.mesh, level.blocks, placed)
-            of_boundary = placed, 0.0
+        prior = priors_at(vertices, rule.form, level)
 
     def add(rows: slice) -> None:
         count = rows.stop - rows.start
@@ -52,8 +46,6 @@ def add_at_vertices(
             form = rule.form
             budget_per_length = level.budget_per_length(vertices[rows], form.budget)
             answer = z, gate, *around, budget_per_length, vertices, rows.start
-            correct_scale_free(
-                *answer, pushes, *of_boundary, form.prior_strength, form.network_scale, *out
-            )
+            correct_scale_free(*answer, prior, level.curves.nothing, form.network_scale, *out)
 
     level.network_blocks.run(len(vertices), add)

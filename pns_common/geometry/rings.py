@@ -98,6 +98,11 @@ class Rings:
         return self.mean(self.jump)
 
     @cached_property
+    def near_jump(self) -> Float[Array, "V 1"]:
+        """The mean of that at the neighbours."""
+        return self.mean(self.of_neighbour(self.mean_jump))
+
+    @cached_property
     def spoke_length(self) -> Float[Array, "V 1"]:
         """h_v, with gradient 0 at 0."""
         return root(self.square)

@@ -57,7 +57,7 @@ class ArrayStep:
 
     @property
     def crease_shift(self) -> float | None:
-        """The longest way that creases keep a vertex back; None without creases."""
+        """The longest way from smooth of a vertex at creases; None without creases."""
         topology = self.topology
         shift = crease_shift(
             self.control,
@@ -66,6 +66,7 @@ class ArrayStep:
             topology.half_edges,
             topology.edge_class,
             np.flatnonzero(topology.edge_class == EdgeClass.CREASE),
+            self.placed.points,
         )
         return None if shift is None else shift.largest
 

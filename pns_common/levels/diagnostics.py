@@ -70,8 +70,8 @@ class LevelReport(Displacements):
     ``envelope_max``, the longest that the budget allows (None where the rules name no bound), both
     in the mesh's units; ``shut``, at how many interior edges and movable vertices the gate is 0, so
     that the network was not run for them; and ``guarded``, how many vertices the fold guard scaled,
-    where there is one. Where there are creases, ``crease_shift_max`` is the longest way that they
-    keep a vertex from where Loop's smooth rules would have it.
+    where there is one. Where there are creases, ``crease_shift_max`` is the longest way from where
+    Loop's smooth rules would have had a vertex at them to where it is.
     """
 
     vertices: int
@@ -126,7 +126,7 @@ def level_report(
     shift: float | None = None,
     reach: Reach | None = None,
 ) -> LevelReport:
-    """Summarise the step that refined ``topology``; ``shift`` is the longest that creases made.
+    """Summarise the step that refined ``topology``; ``shift`` is the longest way at creases.
 
     ``reach`` is that of a learned step, where it is known.
     """
@@ -166,9 +166,9 @@ def limit_distances(levels: Sequence[Displacements], limit_shift: float = 0.0) -
     """Sum what the levels' displacements may add up to; what creases keep back is one as well.
 
     Loop's masks and limit masks are non-negative and sum to 1, so a displacement at one level moves
-    no later vertex, and no point of the limit, by more than its own length. A vertex is moved by
-    creases or by a learned rule, never by both. ``limit_shift`` is the longest way that creases
-    keep a vertex that was put on the limit surface.
+    no later vertex, and no point of the limit, by more than its own length. At a crease a shift is
+    all that a vertex was moved by, a learned rule's part with it. ``limit_shift`` is the longest
+    way that creases keep a vertex that was put on the limit surface.
     """
     shifts = [level.get("crease_shift_max", 0.0) for level in levels]
     moved = [level.get("displacement_max", 0.0) for level in levels]

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from pns_common.base.arrays import Array, beside, namespace
 from pns_common.connectivity.topology import split
-from pns_common.formula.boundary_prior import on_boundary
+from pns_common.formula.curve_prior import on_boundary
 from pns_common.rules.control_level import ControlLevel
 from pns_common.rules.loop import loop_edge_rule, loop_vertex_rule
 from pns_common.rules.placement import Added, Placement

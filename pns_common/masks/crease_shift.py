@@ -1,13 +1,13 @@
-"""How far creases move a mesh's vertices from where Loop's smooth rules would put them.
+"""How far a mesh's vertices at creases lie from where Loop's smooth rules would have put them.
 
 The learned correction is measured from Loop with the same creases, which keeps a creased edge at
 its middle and a corner where it is; so what a report says of the distance to Loop itself counts
-this in.
+this in: all of it, with what was added to such a vertex.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -16,7 +16,7 @@ from pns_common.base.arrays import norm
 from pns_common.connectivity.creases import with_creases
 from pns_common.connectivity.topology import EdgeClass, Topology, build_topology
 from pns_common.masks.limit.positions import limit_positions
-from pns_common.masks.stencils import MIDPOINT, loop_edge_point, loop_vertex_vertices
+from pns_common.masks.stencils import loop_edge_point, loop_vertex_vertices
 
 # Compared in 64 bits an enumeration's members take seven times as long.
 INTERIOR, CREASE = int(EdgeClass.INTERIOR), int(EdgeClass.CREASE)
@@ -24,7 +24,7 @@ INTERIOR, CREASE = int(EdgeClass.INTERIOR), int(EdgeClass.CREASE)
 
 @dataclass(frozen=True, eq=False)
 class CreaseShift:
-    """Vertices at creases, and how far these move them; creases, and how far their vertices move.
+    """Vertices at creases, and how far they moved; creases, and how far their vertices did.
 
     Attributes:
         vertices, edges: their numbers.
@@ -49,11 +49,12 @@ def crease_shift(
     half_edges: Int[np.ndarray, "E 2"],
     edge_class: Int[np.ndarray, " E"],
     rows: Int[np.ndarray, " N"],
+    placed: Float[np.ndarray, "W 3"],
 ) -> CreaseShift | None:
-    """Return how far creases move the vertices of the next level; None without creases.
+    """Return how far from Loop's smooth rules a step placed what lies at creases; None without.
 
     ``rows`` are their numbers among the level's edges; the others as ``Topology`` has them, ends in
-    any order.
+    any order. ``placed`` are all vertices of the next level.
     """
     if len(rows) == 0:
         return None
@@ -62,16 +63,16 @@ def crease_shift(
     three = faces[half_edges[rows] // 3].sum(axis=2, dtype=np.int64)
     across = three - ends.sum(axis=1, dtype=np.int64)[:, None]
     a, b, c, d = (np.take(points, column, axis=0) for column in (*ends.T, *across.T))
-    middle = norm(MIDPOINT * (a + b) - loop_edge_point(a, b, c, d))
+    middle = norm(placed[len(points) + rows] - loop_edge_point(a, b, c, d))
     at_creases = np.zeros(len(points), dtype=bool)
     at_creases[ends.reshape(-1)] = True
     around = np.flatnonzero(at_creases[edges[:, 0]] | at_creases[edges[:, 1]])
-    near, creased = _cut_out(edges[around], edge_class[around], len(points))
-    plain_class = np.where(creased.edge_class == CREASE, INTERIOR, creased.edge_class)
-    plain, own = replace(creased, edge_class=plain_class), points[near]
-    moved = norm(loop_vertex_vertices(own, creased) - loop_vertex_vertices(own, plain))
+    classes = edge_class[around]
+    smooth_class = np.where(classes == CREASE, INTERIOR, classes)
+    near, plain = _cut_out(edges[around], smooth_class, len(points))
     known = at_creases[near]
-    return CreaseShift(near[known], moved[known], rows, middle)
+    vertices, smooth = near[known], loop_vertex_vertices(points[near], plain)[known]
+    return CreaseShift(vertices, norm(placed[vertices] - smooth), rows, middle)
 
 
 def limit_crease_shift(

@@ -27,12 +27,17 @@ def loop_beta(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
     return np.where(valence > 0, beta, 0.0)
 
 
+def loop_ring_weight(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+    """Return k β_k, the weight of the neighbours' mean in Loop's vertex mask."""
+    return valence * loop_beta(valence)
+
+
 def limit_ring_weight(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
     """Return w_k = 1 / (1 + 3 / (8 k β_k)), the ring's weight in Loop's limit mask; 0 for k = 0.
 
     The limit of a vertex is (1 − w_k) p + w_k (mean of its neighbours).
     """
-    ring = valence * loop_beta(valence)
+    ring = loop_ring_weight(valence)
     return ring / (ring + 3 / 8)
 
 

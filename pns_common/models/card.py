@@ -21,7 +21,14 @@ CARD_KEY = "pns_card"
 FORMAT, VERTEX_FORMAT, SCALE_FREE_FORMAT = 1, 2, 3
 FORMATS = (FORMAT, VERTEX_FORMAT, SCALE_FREE_FORMAT)
 SCALE_FREE_FIELDS = ("learned_levels", "prior_strength", "network_scale", "fold_angle")
-OPTIONAL_FIELDS = ("boundary_strength", "side_gates", "network_altitudes", "wide_bound")
+OPTIONAL_FIELDS = (
+    "boundary_strength",
+    "side_gates",
+    "network_altitudes",
+    "wide_bound",
+    "crease_prior",
+    "tip_strength",
+)
 CREASE_FIELDS = ("crease_angle", "crease_levels")
 MOST_LEARNED_LEVELS = 16
 
@@ -53,6 +60,8 @@ class ModelCard:
             thinner face; None counts edge lengths alone.
         wide_bound: whether h of an edge's bound is the longest edge of its two faces; None is
             false.
+        crease_prior: whether the boundary's prior acts at creases too; None is false.
+        tip_strength: a ≥ 0, how much of Loop's own move is given back at tips; None is 0.
         crease_angle: θ of the crease lines that are kept where no creases are named, degrees
             between 0 and 180; None looks for none.
         crease_levels: at how many levels they are sharp, at least 1; with ``crease_angle``.
@@ -75,6 +84,8 @@ class ModelCard:
     side_gates: bool | None = None
     network_altitudes: float | None = None
     wide_bound: bool | None = None
+    crease_prior: bool | None = None
+    tip_strength: float | None = None
     crease_angle: float | None = None
     crease_levels: int | None = None
 
@@ -197,6 +208,9 @@ def _scale_free_problem(card: ModelCard) -> str | None:
         return f"network_scale {scale}, not a finite number > 0"
     if boundary is not None and not (math.isfinite(boundary) and boundary >= 0):
         return f"boundary_strength {boundary}, not a finite number ≥ 0"
+    tips = card.tip_strength
+    if tips is not None and not (math.isfinite(tips) and tips >= 0):
+        return f"tip_strength {tips}, not a finite number ≥ 0"
     altitudes = card.network_altitudes
     if altitudes is not None and not (math.isfinite(altitudes) and altitudes > 0):
         return f"network_altitudes {altitudes}, not a finite number > 0"

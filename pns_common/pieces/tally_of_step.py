@@ -83,7 +83,7 @@ def _with_rules(
 def _crease_shift(
     step: Step, own_vertices: Bool[np.ndarray, " W"], own_edges: Bool[np.ndarray, " E"]
 ) -> float | None:
-    """Return the longest way that creases keep an own vertex back; None without own creases."""
+    """Return the longest way from smooth of an own vertex at creases; None without own ones."""
     links = step.links
     rows = np.flatnonzero(links.edge_class == EdgeClass.CREASE)
     if len(rows) == 0:
@@ -91,7 +91,8 @@ def _crease_shift(
     corners, first = links.faces.reshape(-1), np.asarray(links.first, dtype=np.int64)
     ends = np.stack([corners[first], corners[next_corner(first)]], axis=1)
     half_edges = np.stack([first, links.second], axis=1)
-    shift = crease_shift(step.control, links.faces, ends, half_edges, links.edge_class, rows)
+    of_edges = ends, half_edges, links.edge_class
+    shift = crease_shift(step.control, links.faces, *of_edges, rows, step.points)
     assert shift is not None  # there are creases
     old, new = own_vertices[shift.vertices], own_edges[shift.edges]
     if not (old.any() or new.any()):

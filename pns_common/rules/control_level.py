@@ -12,8 +12,8 @@ from jaxtyping import Float, Int
 from pns_common.base.arrays import Array
 from pns_common.base.blocks import WHOLE, Blocks
 from pns_common.connectivity.topology import Topology
-from pns_common.formula.boundary_prior import boundary_pushes
 from pns_common.formula.correction import BudgetPerLength
+from pns_common.formula.curve_prior import Kinds, curve_pushes
 from pns_common.formula.prior import normal_pushes
 from pns_common.geometry.frames import face_normals
 from pns_common.geometry.rings import Rings
@@ -65,9 +65,9 @@ class ControlLevel:
         return cache(partial(network_lengths, self.rings))
 
     @cached_property
-    def boundary_pushes(self) -> Callable[[float], Float[Array, "V 3"]]:
-        """d of the boundary's prior at b = 1, a function of c_v: computed once, read four times."""
-        return cache(partial(boundary_pushes, self.points, self.topology))
+    def curve_pushes(self) -> Callable[[float, Kinds], Float[Array, "V 3"]]:
+        """d of the curves' prior at b = 1, by c_v and kinds: computed once, read four times."""
+        return cache(partial(curve_pushes, self.points, self.topology))
 
 
 def control_level(

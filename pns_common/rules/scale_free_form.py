@@ -15,11 +15,13 @@ class ScaleFreeForm:
         network_scale: τ > 0, the longest that the network may ask for, in edge lengths.
         fold_angle: θ of the fold guard in degrees, 0 < θ < 90.
         learned_levels: K ≥ 1.
-        boundary_strength: b ≥ 0 of the boundary's prior; 1 is full quasi-interpolation.
+        boundary_strength: b ≥ 0 of the prior of curves; 1 is full quasi-interpolation.
         side_gates: whether an edge's gate reads the sides of its two faces beside their normals.
         network_altitudes: α > 0, the longest that τ's unit may be, in altitudes of the thinner
             face; None counts edge lengths alone.
         wide_bound: whether h of an edge's bound is the longest edge of its two faces.
+        crease_prior: whether creases are such curves too; else boundaries alone are.
+        tip_strength: a ≥ 0, how much of Loop's own move is given back at tips; 0: none.
     """
 
     budget: float
@@ -31,3 +33,5 @@ class ScaleFreeForm:
     side_gates: bool = False
     network_altitudes: float | None = None
     wide_bound: bool = False
+    crease_prior: bool = False
+    tip_strength: float = 0.0

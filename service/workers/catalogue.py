@@ -58,6 +58,12 @@ class ModelEntry(BaseModel):
     wide_bound: bool | None = Field(
         description="whether h of an edge's bound is the longest edge of both faces; null: its own"
     )
+    crease_prior: bool | None = Field(
+        description="whether the boundaries' prior acts at creases too; null: creases are Loop's"
+    )
+    tip_strength: float | None = Field(
+        description="how much of Loop's own move is given back at tips; null: none"
+    )
     crease_angle: float | None = Field(
         description="of the crease lines that `crease=auto` keeps, in degrees; null: none"
     )

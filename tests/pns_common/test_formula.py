@@ -72,6 +72,8 @@ def plain_vertex(card, v, answer):
     if card is FORMAT_2:
         return PLAIN.loop_vertex(v, POINTS) + gate * longest * shortened(asked, 1)
     prior = card.prior_strength * PLAIN.loop_vertex(v, PUSHES)
+    if card.tip_strength:
+        prior = PLAIN.kept_at_tip(v, prior, PUSHES, card.tip_strength)
     asked = prior + card.network_scale * PLAIN.length_at(v, card.network_altitudes) * asked
     return PLAIN.loop_vertex(v, POINTS) + gate * shortened(asked, longest)
 
@@ -80,6 +82,7 @@ CARDS = {
     "format 2": FORMAT_2,
     "format 3": FORMAT_3,
     "sides": replace(FORMAT_3, side_gates=True),
+    "tips": replace(FORMAT_3, tip_strength=0.7),
     "thin faces": replace(FORMAT_3, network_altitudes=1.1, wide_bound=True, budget=0.15),
 }
 

@@ -26,6 +26,8 @@ NUMBERS = {
     "side_gates": True,
     "network_altitudes": 2.5,
     "wide_bound": True,
+    "crease_prior": True,
+    "tip_strength": 0.6,
 }
 
 
@@ -41,9 +43,9 @@ def test_a_scheme_says_what_its_rules_do():
     assert (scheme.learned_levels, scheme.moves_boundaries, scheme.wide_bound) == (2, True, True)
     assert scheme.guard.angle == math.radians(60)
     assert (scheme.creases.line_angle, scheme.creases.levels) == (50.0, 3)
-    assert scheme.edge_rule.boundary == scheme.vertex_rule.boundary is not None
+    assert scheme.edge_rule.curves == scheme.vertex_rule.curves is not None
     plain = pns(scale_free_model(0))
-    assert (plain.moves_boundaries, plain.wide_bound, plain.edge_rule.boundary) == (
+    assert (plain.moves_boundaries, plain.wide_bound, plain.edge_rule.curves) == (
         *(False, False),
         None,
     )

@@ -133,6 +133,26 @@ class PlainMesh:
         m = m / max(np.linalg.norm(m), 1 / 4)
         return -(self.umbrella(v) @ m) * m / (1 + 3 / (8 * k * beta))
 
+    def limit(self, v, values):
+        """Where Loop's limit puts a vertex."""
+        k = len(self.ring[v])
+        beta = (5 / 8 - (3 / 8 + cos(2 * pi / k) / 4) ** 2) / k
+        weight = 1 / (1 + 3 / (8 * k * beta))
+        return (1 - weight) * values[v] + weight * np.mean(
+            [values[j] for j in self.ring[v]], axis=0
+        )
+
+    def kept_at_tip(self, v, prior, pushes, strength):
+        """D' of D: how far the limit of the pushed vertices stays behind the vertex says t."""
+        pushed = {j: self.points[j] + pushes[j] for j in [v, *self.ring[v]]}
+        m = self.mean_normal[v] / max(np.linalg.norm(self.mean_normal[v]), 1 / 4)
+        left = abs((self.points[v] - self.limit(v, pushed)) @ m) / self.spoke_length(v)
+        more = self.mean_jump[v] / np.mean([self.mean_jump[j] for j in self.ring[v]])
+        rises = [min(1.0, max(0.0, share)) for share in ((left - 0.05) / 0.1, more - 1)]
+        tip = np.prod([3 * rise**2 - 2 * rise**3 for rise in rises])
+        back = self.points[v] - self.loop_vertex(v, self.points)
+        return (1 - tip) * prior + tip * strength * back
+
     def length(self, a, b, altitudes):
         """ℓ: h, or so many times the lower of both faces' altitudes over the edge."""
         h = np.linalg.norm(self.points[b] - self.points[a])

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pns_common.formula.boundary_prior import on_boundary
+from pns_common.formula.curve_prior import on_boundary
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
 from pns_common.schemes import Scheme, loop

@@ -137,9 +137,9 @@ def unbounded(scheme: Scheme) -> Scheme:
     if not (isinstance(vertices, ScaleFreeVertexRule) and isinstance(edges, ScaleFreeEdgeRule)):
         return scheme
     form = replace(edges.form, budget=UNBOUNDED)
-    boundary = None if edges.boundary is None else replace(edges.boundary, form=form)
+    curves = None if edges.curves is None else replace(edges.curves, form=form)
     return replace(
         scheme,
-        vertex_rule=replace(vertices, form=form, boundary=boundary),
-        edge_rule=replace(edges, form=form, boundary=boundary),
+        vertex_rule=replace(vertices, form=form, curves=curves),
+        edge_rule=replace(edges, form=form, curves=curves),
     )

@@ -98,7 +98,8 @@ def recipe_scheme(recipe: Recipe, network: BoundedNet, vertex_network: BoundedNe
     """Return the scheme that a scale-free recipe trains, differentiable in its networks' weights.
 
     s is that of training. What the card says of thin faces acts in use alone: a network that is
-    trained with it asks for more beside them, and is rougher there.
+    trained with it asks for more beside them, and is rougher there. Creases and tips came after the
+    weights, and act in use alone as well.
 
     Raises:
         ParameterError: the recipe is not scale-free, or has no vertex rule.
@@ -112,8 +113,8 @@ def recipe_scheme(recipe: Recipe, network: BoundedNet, vertex_network: BoundedNe
         form.network_scale,
         form.fold_angle,
         form.learned_levels,
-        form.boundary_strength or 0.0,
-        form.side_gates or False,
+        boundary_strength=form.boundary_strength or 0.0,
+        side_gates=form.side_gates or False,
     )
     edges = recipe_operator(recipe, network)
     return scale_free_scheme(edges, vertex_rule_operator(rule, vertex_network), numbers)

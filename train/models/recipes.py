@@ -74,6 +74,8 @@ class ScaleFree:
         network_altitudes: α, the longest that τ's unit may be, in altitudes; None for no limit. As
             the next, it acts in use, and not in training.
         wide_bound: whether h of an edge's bound is the longest edge of its two faces.
+        crease_prior: whether the boundary's prior acts at creases too, in use; training sees none.
+        tip_strength: a, how much of Loop's own move is given back at tips; in use alone, too.
         crease_angle: θ in degrees of the crease lines that are kept in use; training sees none.
         crease_levels: at how many levels these are sharp.
     """
@@ -86,6 +88,8 @@ class ScaleFree:
     side_gates: bool | None = None
     network_altitudes: float | None = None
     wide_bound: bool | None = None
+    crease_prior: bool | None = None
+    tip_strength: float | None = None
     crease_angle: float | None = None
     crease_levels: int | None = None
 
@@ -293,6 +297,8 @@ def general(seed: int = 0) -> Recipe:
             side_gates=True,
             network_altitudes=3.0,
             wide_bound=True,
+            crease_prior=True,
+            tip_strength=1.0,
             crease_angle=CREASE_ANGLE,
             crease_levels=CREASE_LEVELS,
         ),

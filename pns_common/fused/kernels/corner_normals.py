@@ -59,9 +59,9 @@ def triangle_normals(points, faces, triangles, begin, end, normals, sides):
     return 0
 
 
-@kernel(SIZE, POINTS, POINTS, INDICES, INDICES, POINTS_OUT)
-def sum_corners(normals, angles, groups, triangles, total):
-    """Add the triangles' normals to the groups of their corners.
+@kernel(SIZE, POINTS, POINTS, INDICES, INDICES, SIZE, SIZE, POINTS_OUT)
+def sum_corners(normals, angles, groups, triangles, begin, end, total):
+    """Add the triangles' normals to those groups begin … end − 1 that their corners are of.
 
     Each counts as much as its angle there: ``angles`` (2, n) are those at a and b. ``groups`` are
     of the faces' points (F, T).
@@ -71,15 +71,16 @@ def sum_corners(normals, angles, groups, triangles, total):
         i = 0
         for f in range(groups.shape[0]):
             for d in range(triangles.shape[0]):
-                angle = angles[0, i]
-                if corner == 1:
-                    angle = angles[1, i]
-                elif corner == 2:
-                    angle = math.pi - angles[0, i] - angles[1, i]
                 g = groups[f, triangles[d, corner]]
-                total[g, 0] += angle * normals[i, 0]
-                total[g, 1] += angle * normals[i, 1]
-                total[g, 2] += angle * normals[i, 2]
+                if begin <= g < end:
+                    angle = angles[0, i]
+                    if corner == 1:
+                        angle = angles[1, i]
+                    elif corner == 2:
+                        angle = math.pi - angles[0, i] - angles[1, i]
+                    total[g, 0] += angle * normals[i, 0]
+                    total[g, 1] += angle * normals[i, 1]
+                    total[g, 2] += angle * normals[i, 2]
                 i += 1
     return 0
 

@@ -230,9 +230,9 @@ def _at_edge(pushes, a, b, c, d, k):
     return EDGE_ENDPOINT * ends + EDGE_OPPOSITE * sides
 
 
-def _prior(pushes, of_boundary, nothing, a, b, c, d, k, strength):
-    """Return a coordinate of D_e, with the boundary's part."""
-    part = _at_edge(of_boundary, a, b, c, d, k) if len(of_boundary) else nothing
+def _prior(pushes, of_curves, nothing, a, b, c, d, k, strength):
+    """Return a coordinate of D_e, with the curves' part."""
+    part = _at_edge(of_curves, a, b, c, d, k) if len(of_curves) else nothing
     return strength * _at_edge(pushes, a, b, c, d, k) + part
 
 
@@ -252,7 +252,7 @@ def correct_scale_free(
     interior,
     begin,
     pushes,
-    of_boundary,
+    of_curves,
     nothing,
     stencils,
     strength,
@@ -265,7 +265,7 @@ def correct_scale_free(
     """Write δ = γ Π_ρ(D + τ ℓ F z) into the edges' rows (``correction.correct_scale_free``).
 
     ``network_lengths`` are ℓ of all edges, ``bound_length`` is h of the bound.
-    ``of_boundary`` are the boundary's pushes; (0, 3) where there are none. Then ``nothing`` is
+    ``of_curves`` are the curves' pushes; (0, 3) where there are none. Then ``nothing`` is
     added in their place: 0, or −0 where there is no rule for boundaries, which changes no −0.
     """
     for i in range(z.shape[0]):
@@ -275,12 +275,12 @@ def correct_scale_free(
         turned = _rotated(frame, i, in_ball(row(z, i)))
         asked = scale * network_lengths[e]
         wanted = (
-            _prior(pushes, of_boundary, nothing, a, b, c, d, 0, strength) + asked * turned[0],
-            _prior(pushes, of_boundary, nothing, a, b, c, d, 1, strength) + asked * turned[1],
-            _prior(pushes, of_boundary, nothing, a, b, c, d, 2, strength) + asked * turned[2],
+            _prior(pushes, of_curves, nothing, a, b, c, d, 0, strength) + asked * turned[0],
+            _prior(pushes, of_curves, nothing, a, b, c, d, 1, strength) + asked * turned[1],
+            _prior(pushes, of_curves, nothing, a, b, c, d, 2, strength) + asked * turned[2],
         )
         allowed = shortened(wanted, envelope)
-        # A rule for boundaries adds its nothing here too.
+        # A rule for curves adds its nothing here too.
         delta = (
             gate[i] * allowed[0] + nothing,
             gate[i] * allowed[1] + nothing,

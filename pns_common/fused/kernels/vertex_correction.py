@@ -107,15 +107,9 @@ def correct(
     return 0
 
 
-def _prior(pushes, of_boundary, nothing, v, k, strength):
-    """Return a coordinate of D_v, with the boundary's part."""
-    part = of_boundary[v, k] if len(of_boundary) else nothing
-    return strength * pushes[v, k] + part
-
-
 @kernel(
     SIZE,
-    *(POINTS, NUMBERS, POINTS, POINTS, NUMBERS, INDEX, SIZE, POINTS, POINTS, REAL, REAL, REAL),
+    *(POINTS, NUMBERS, POINTS, POINTS, NUMBERS, INDEX, SIZE, POINTS, REAL, REAL),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
 )
 def correct_scale_free(
@@ -126,10 +120,8 @@ def correct_scale_free(
     budget_per_length,
     vertices,
     begin,
-    pushes,
-    of_boundary,
+    prior,
     nothing,
-    strength,
     scale,
     displacement,
     ratio,
@@ -138,7 +130,7 @@ def correct_scale_free(
 ):
     """Write δ = γ_v Π_ρ(D + τ ℓ_v Σ z_i e_i) likewise.
 
-    ``pushes`` are Loop's vertex mask of d, ``of_boundary`` and ``nothing`` as at edges.
+    ``prior`` is D_v, ``nothing`` as at edges.
     """
     for i in range(z.shape[0]):
         v = vertices[begin + i]
@@ -146,12 +138,12 @@ def correct_scale_free(
         learned = _combined(in_ball(row(z, i)), means, fields, v)
         asked = scale * _root(means[v, MEAN_NETWORK_SQUARE])
         wanted = (
-            _prior(pushes, of_boundary, nothing, v, 0, strength) + asked * learned[0],
-            _prior(pushes, of_boundary, nothing, v, 1, strength) + asked * learned[1],
-            _prior(pushes, of_boundary, nothing, v, 2, strength) + asked * learned[2],
+            prior[v, 0] + asked * learned[0],
+            prior[v, 1] + asked * learned[1],
+            prior[v, 2] + asked * learned[2],
         )
         allowed = shortened(wanted, envelope)
-        # A rule for boundaries adds its nothing here too.
+        # A rule for curves adds its nothing here too.
         delta = (
             gate[i] * allowed[0] + nothing,
             gate[i] * allowed[1] + nothing,

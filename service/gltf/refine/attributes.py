@@ -54,7 +54,7 @@ def refined_attributes(
         if name == "POSITION":
             refined[name] = refined_vertices.positions
         elif name == "NORMAL" and refined_vertices.normals is not None:
-            refined[name] = refined_vertices.normals.astype(np.float32, copy=False)
+            refined[name] = refined_vertices.normals.astype(np.float32)
         elif name == "TANGENT":
             direction = tangent_directions(
                 refined_vertices.connectivity.linear(corners[:, :3]), refined_vertices.normals

@@ -130,9 +130,7 @@ def _refined_primitive(
     vertex = own.at_vertices(ids)
     normals, morphed = None, (None,) * len(refined.skin_and_morph.deltas)
     if shading is not None and number in shading.groups.ids:
-        group = own.at_vertices(shading.groups.ids[number])
-        # Tangents are turned to a right angle with them.
-        normals, morphed = shading.take(group, exact="TANGENT" in primitive.attributes)
+        normals, morphed = shading.take(own.at_vertices(shading.groups.ids[number]))
     refined_vertices = RefinedVertices(
         row=row,
         welded=welded[row],

@@ -8,9 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.blocks import Blocks, available_threads
-from pns_common.fused.grid_points import rounded_rows
-
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
 from .control_mesh import ControlMesh
@@ -37,17 +34,10 @@ class Shading:
     morphed: tuple[Float[np.ndarray, "G 3"] | None, ...]
 
     def take(
-        self, group: Int[np.ndarray, " N"], *, exact: bool
+        self, group: Int[np.ndarray, " N"]
     ) -> tuple[Float[np.ndarray, "N 3"], tuple[Float[np.ndarray, "N 3"] | None, ...]]:
-        """Return the normals at rest, and morphed, at vertices of which the groups are given.
-
-        `exact`: those at rest are not rounded to float32.
-        """
-        blocks = Blocks(available_threads())
-        rest = (
-            np.take(self.rest, group, axis=0) if exact else rounded_rows(self.rest, group, blocks)
-        )
-        return rest, tuple(
+        """Return the normals at rest, and morphed, at vertices of which the groups are given."""
+        return np.take(self.rest, group, axis=0), tuple(
             None if morphed is None else np.take(morphed, group, axis=0) for morphed in self.morphed
         )
 

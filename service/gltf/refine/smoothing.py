@@ -57,7 +57,7 @@ class NormalGroups:
     ) -> Float[np.ndarray, "G 3"]:
         """Return the groups' unit normals at refined vertices; those of `otherwise` if need be."""
         of_groups, triangles = self.connectivity, self.connectivity.grid.faces
-        rows, begun = max(4 * BLOCK_ROWS // len(triangles), 1), course.count(len(self.vertices))
+        rows, begun = max(BLOCK_ROWS // len(triangles), 1), course.count(len(self.vertices))
         values = angle_weighted_normals(
             points,
             self.vertices,

@@ -52,6 +52,15 @@ SCHEMES = {
         scale_free_model(network_altitudes=0.4, side_gates=True, boundary_strength=1.0), budget=0.3
     ),
     "format 3, wide bound, tight": pns(scale_free_model(wide_bound=True), budget=0.3),
+    "format 3, tips": pns(scale_free_model(tip_strength=0.8)),
+    "format 3, curves and tips": pns(
+        scale_free_model(
+            boundary_strength=1.0, crease_prior=True, tip_strength=1.3, learned_levels=2
+        )
+    ),
+    "format 3, creases, tight": pns(
+        scale_free_model(boundary_strength=1.0, crease_prior=True, fold_angle=3.0), budget=0.3
+    ),
     "format 3, no budget": pns(scale_free_model(), budget=0.0),
 }
 SHAPES = {

@@ -9,7 +9,6 @@ from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import EdgeClass, build_topology, split
 from pns_common.fused.mesh_edges import (
     _sorted_edges,
-    has_boundary,
     split_mesh_edges,
     split_mesh_faces,
 )
@@ -51,7 +50,6 @@ def test_sharp_edges_are_counted_at_their_ends():
     assert mesh.sharp.tolist() == [2, 2, 2, 2, 0, 2, 2, 2, 2]
     closed = edges_built(Mesh(*bumpy_sphere(0)))
     assert len(closed.sharp) == 0
-    assert (has_boundary(mesh), has_boundary(closed)) == (True, False)
 
 
 def test_kernels_agree_where_all_corners_meet_in_one_hub():

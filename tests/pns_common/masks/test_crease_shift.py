@@ -20,8 +20,8 @@ def test_a_shift_is_the_difference_that_the_creases_make(name):
     topology = with_creases(build_topology(mesh.faces, len(mesh.vertices)), pairs)
     numbers = {tuple(pair): number for number, pair in enumerate(topology.edges.tolist())}
     rows = np.array([numbers[tuple(pair)] for pair in pairs.tolist()])
-    shift = shift_of(mesh, topology, rows)
     with_, without = (refine(mesh, loop(), creases=given).mesh.vertices for given in (pairs, None))
+    shift = shift_of(mesh, topology, rows, with_)
     apart = np.linalg.norm(with_ - without, axis=1)
     count = len(mesh.vertices)
     np.testing.assert_allclose(shift.of_vertices, apart[:count][shift.vertices], atol=1e-14)
@@ -44,9 +44,9 @@ def test_a_limits_shift_is_the_difference_of_the_limits(name):
     assert shift.largest == pytest.approx(apart.max(), rel=1e-9)
 
 
-def shift_of(mesh, topology, rows):
+def shift_of(mesh, topology, rows, placed):
     of_edges = topology.edges, topology.half_edges, topology.edge_class
-    return crease_shift(mesh.vertices, mesh.faces, *of_edges, rows)
+    return crease_shift(mesh.vertices, mesh.faces, *of_edges, rows, placed)
 
 
 def halves(mesh, pairs):
@@ -61,7 +61,7 @@ def test_without_creases_there_is_no_shift():
     nothing = np.zeros(0, dtype=np.int64)
     mesh = box()
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    assert shift_of(mesh, topology, nothing) is None
+    assert shift_of(mesh, topology, nothing, mesh.vertices) is None
     nobody = np.zeros((0, 2), dtype=np.int64)
     assert limit_crease_shift(mesh.vertices, mesh.faces, nobody) is None
 

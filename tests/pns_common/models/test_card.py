@@ -21,6 +21,8 @@ from tests.support.networks import CARD, SCALE_FREE_CARD, VERTEX_CARD
         ({"format": 2}, "learned_levels in format 2"),
         ({"side_gates": 1}, "side_gates of type int"),
         ({"network_altitudes": 0.0}, "network_altitudes 0.0, not a finite number > 0"),
+        ({"tip_strength": -0.1}, "tip_strength -0.1, not a finite number ≥ 0"),
+        ({"crease_prior": 1}, "crease_prior of type int"),
         ({"crease_angle": 180.0}, "crease_angle 180.0, not between 0 and 180 degrees"),
         ({"crease_angle": 0.0}, "crease_angle 0.0"),
         ({"crease_angle": 66.0}, "one of crease_angle and crease_levels without the other"),
@@ -39,6 +41,8 @@ def test_a_card_reads_back_as_it_was_written():
         boundary_strength=1.0,
         network_altitudes=3.0,
         wide_bound=True,
+        crease_prior=True,
+        tip_strength=0.9,
         crease_angle=66.0,
         crease_levels=2,
     )

@@ -29,9 +29,13 @@ def test_each_corner_adds_its_angle_times_the_normal_to_its_group(way):
     total, normals = np.zeros((3, 3)), np.array([[0.0, 0, 2], [1, 1, 1]])
     groups = np.array([[2, 1, 0]], dtype=np.int32)
     triangles = np.array([[2, 0, 2], [1, 1, 1]], dtype=np.int32)
-    WAYS[way](sum_corners)(normals, angles, groups, triangles, total)
+    WAYS[way](sum_corners)(normals, angles, groups, triangles, 0, 3, total)
     expected = np.array([[0, 0, 1.5 * np.pi], [np.pi, np.pi, np.pi], [0, 0, np.pi / 2]])
     np.testing.assert_allclose(total, expected)
+    # Who owns some of the groups adds to no other.
+    total[:] = 0
+    WAYS[way](sum_corners)(normals, angles, groups, triangles, 1, 2, total)
+    np.testing.assert_allclose(total, [[0, 0, 0], expected[1], [0, 0, 0]])
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -100,10 +100,10 @@ def test_the_papers_correction(way):
 @pytest.mark.parametrize("boundary", [False, True])
 def test_the_scale_free_correction(way, boundary):
     pushes, rim = 0.05 * RNG.standard_normal((2, 12, 3))
-    of_boundary = rim if boundary else np.zeros((0, 3))
+    of_curves = rim if boundary else np.zeros((0, 3))
     delta, ratio, _, envelope = out = outputs()
     answer = Z, FRAMES, 0.9 * LENGTH, 1.1 * LENGTH, GATE, PER_LENGTH, MESH.interior, 0
-    WAYS[way](correct_scale_free)(*answer, pushes, of_boundary, 0.0, STENCILS, 0.8, 0.4, *out)
+    WAYS[way](correct_scale_free)(*answer, pushes, of_curves, 0.0, STENCILS, 0.8, 0.4, *out)
     for e, (a, b) in enumerate(PAIRS):
         local = plain_operator.shortened(Z[e], 1)
         asked = 0.4 * 0.9 * LENGTH[e] * FRAMES[e].reshape(3, 3).T @ local

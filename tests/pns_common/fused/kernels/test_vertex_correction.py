@@ -56,16 +56,14 @@ def test_the_correction_of_format_2(way):
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("boundary", [False, True])
-def test_the_scale_free_correction(way, boundary):
-    pushes, rim = 0.03 * RNG.standard_normal((2, COUNT, 3))
+def test_the_scale_free_correction(way):
+    prior = 0.03 * RNG.standard_normal((COUNT, 3))
     delta, _, _, envelope = out = outputs()
-    answer = Z, GATE, *AROUND, PER_LENGTH, CHOSEN, 0, pushes
-    of_boundary = rim if boundary else np.zeros((0, 3))
-    WAYS[way](correct_scale_free)(*answer, of_boundary, 0.0, 0.9, 0.5, *out)
+    answer = Z, GATE, *AROUND, PER_LENGTH, CHOSEN, 0, prior
+    WAYS[way](correct_scale_free)(*answer, 0.0, 0.5, *out)
     for i, v in enumerate(CHOSEN):
         combined = shortened(Z[i], 1) @ np.array(PLAIN.ring_vectors(v))
-        wanted = 0.9 * pushes[v] + boundary * rim[v] + 0.5 * PLAIN.length_at(v, 0.8) * combined
+        wanted = prior[v] + 0.5 * PLAIN.length_at(v, 0.8) * combined
         bound = PER_LENGTH[i] * PLAIN.spoke_length(v) ** 2
         np.testing.assert_allclose(delta[v], GATE[i] * shortened(wanted, bound), atol=1e-15)
         assert envelope[v] == pytest.approx(bound)

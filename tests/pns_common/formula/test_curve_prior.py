@@ -1,4 +1,4 @@
-"""The boundary's prior: made of the boundary alone, bounded, and nothing where it is straight."""
+"""The prior of curves: made of the curve alone, bounded, and nothing where it is straight."""
 
 from dataclasses import replace
 
@@ -9,8 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, pns, refine
+from pns_common.connectivity.creases import with_creases
 from pns_common.connectivity.topology import build_topology
-from pns_common.formula.boundary_prior import boundary_pushes, boundary_vertices
+from pns_common.formula.curve_prior import (
+    BOUNDARIES,
+    BOUNDARIES_AND_CREASES,
+    curve_pushes,
+    curve_vertices,
+)
 from pns_common.levels.step import level_step
 from pns_common.masks.limit import limit_positions
 from pns_common.rules.control_level import control_level
@@ -24,6 +30,8 @@ from tests.support.meshes import bent, grid, manifolds, soups
 from tests.support.networks import SCALE_FREE_CARD, scale_free_model
 
 STRONG, WITHOUT = (scale_free_model(0, 2.0, boundary_strength=b) for b in (1.0, None))
+OF_CREASES = scale_free_model(0, 2.0, boundary_strength=1.0, crease_prior=True)
+WITH_TIPS = scale_free_model(0, 2.0, boundary_strength=1.0, tip_strength=1.0)
 
 
 def cone(rim, tip):
@@ -46,7 +54,7 @@ def test_two_pieces_with_a_common_boundary_meet_again(seed):
     rims = []
     for piece in refined:
         topology = build_topology(piece.mesh.faces, len(piece.mesh.vertices))
-        rims.append(piece.mesh.vertices[boundary_vertices(topology)])
+        rims.append(piece.mesh.vertices[curve_vertices(topology, BOUNDARIES)])
     assert len(rims[0]) == 48
     np.testing.assert_array_equal(rims[0], rims[1])
 
@@ -54,8 +62,8 @@ def test_two_pieces_with_a_common_boundary_meet_again(seed):
 def test_straight_boundaries_and_right_angles_stay():
     points, faces = grid(6)
     topology = build_topology(faces, len(points))
-    assert boundary_vertices(topology).sum() == 20
-    assert (boundary_pushes(points, topology, 1e3) == 0).all()
+    assert curve_vertices(topology, BOUNDARIES).sum() == 20
+    assert (curve_pushes(points, topology, 1e3, BOUNDARIES) == 0).all()
 
 
 def test_the_boundary_of_a_disc_keeps_its_radius():
@@ -72,6 +80,56 @@ def test_the_boundary_of_a_disc_keeps_its_radius():
     np.testing.assert_allclose(rims[1], limit_positions(mesh.vertices, topology)[:16], atol=1e-12)
 
 
+def two_cones(sides):
+    """Two fans of faces on one rim, and the rim as creases."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    up, down = cone(rim, [0, 0, 1.0]).faces, cone(rim, [0, 0, -1.0]).faces[:, ::-1]
+    faces = np.concatenate([up, np.where(down == sides, sides + 1, down)])
+    around = np.arange(sides)
+    creases = np.stack([around, (around + 1) % sides], axis=1)
+    return Mesh(np.concatenate([rim, [[0, 0, 1.0], [0, 0, -1.0]]]), faces), creases
+
+
+def test_a_round_crease_keeps_its_radius_where_the_card_says_so():
+    mesh, creases = two_cones(16)
+    rims = [
+        refine(mesh, pns(model), 1, limit=True, creases=creases).mesh.vertices[:16]
+        for model in (OF_CREASES, STRONG)
+    ]
+    moved, plain = (np.abs(np.linalg.norm(rim, axis=1) - 1).max() for rim in rims)
+    assert moved < plain / 5
+    topology = with_creases(build_topology(mesh.faces, 18), creases)
+    np.testing.assert_allclose(rims[1], limit_positions(mesh.vertices, topology)[:16], atol=1e-12)
+
+
+def test_a_line_of_creases_is_pushed_as_the_same_boundary():
+    mesh, creases = two_cones(9)
+    half = build_topology(mesh.faces[:9], len(mesh.vertices))
+    whole = with_creases(build_topology(mesh.faces, len(mesh.vertices)), creases)
+    open_, creased = (
+        curve_pushes(mesh.vertices, topology, 1e3, BOUNDARIES_AND_CREASES)
+        for topology in (half, whole)
+    )
+    assert np.linalg.norm(creased[:9], axis=1).min() > 0.05
+    np.testing.assert_array_equal(creased, open_)
+    assert not curve_pushes(mesh.vertices, whole, 1e3, BOUNDARIES).any()
+
+
+def test_a_corner_of_a_sheet_stays_with_tips_on_the_card():
+    """Loop cuts off half of the way to the middle of its sides."""
+    mesh = Mesh(*grid(4))
+    corners = [0, 3, 12, 15]
+    kept, cut = (
+        refine(mesh, pns(model, 1e6), 1).mesh.vertices[corners] for model in (WITH_TIPS, STRONG)
+    )
+    np.testing.assert_allclose(kept, mesh.vertices[corners], rtol=0, atol=1e-12)
+    assert np.linalg.norm(cut - kept, axis=1).min() > 0.1
+    other = np.setdiff1d(np.arange(16), corners)
+    rest = [refine(mesh, pns(m, 1e6), 1).mesh.vertices[other] for m in (WITH_TIPS, STRONG)]
+    np.testing.assert_allclose(rest[0], rest[1], rtol=0, atol=1e-15)
+
+
 @given(manifolds() | soups(), st.floats(1e-3, 1e6))
 def test_boundaries_stay_within_the_budget_and_nothing_folds(mesh, budget):
     refined = refine(mesh, pns(STRONG, budget))
@@ -83,7 +141,7 @@ def test_boundaries_stay_within_the_budget_and_nothing_folds(mesh, budget):
 def test_without_a_strength_boundaries_are_loops(mesh):
     corrected, base = (refine(mesh, scheme).mesh.vertices for scheme in (pns(WITHOUT), loop()))
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    rows = np.flatnonzero(boundary_vertices(topology))
+    rows = np.flatnonzero(curve_vertices(topology, BOUNDARIES))
     np.testing.assert_array_equal(corrected[rows], base[rows])
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pns_common.connectivity.topology import build_topology
-from pns_common.rules.boundary import BoundaryRule
 from pns_common.rules.control_level import control_level
+from pns_common.rules.curves import CurveRule
 from pns_common.rules.placement import Placement
 from pns_common.rules.scale_free_form import ScaleFreeForm
 
@@ -20,7 +20,7 @@ AT_RIM = np.flatnonzero((LEVEL.topology.edges < SIDES).all(axis=1))
 
 
 def rule(budget):
-    return BoundaryRule(ScaleFreeForm(budget, 1.0, 0.4, 75.0, 1, boundary_strength=0.8), 1e6)
+    return CurveRule(ScaleFreeForm(budget, 1.0, 0.4, 75.0, 1, boundary_strength=0.8), 1e6)
 
 
 def placed(count):

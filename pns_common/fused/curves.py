@@ -1,6 +1,6 @@
-"""The boundary's prior beside the kernels: its rule is the array kernels', on the few it moves.
+"""The prior of curves beside the kernels: its rule is the array kernels', on the few it moves.
 
-The rule knows a boundary alone, so it is given a level of the vertices on sharp edges, and of those
+The rule knows curves alone, so it is given a level of the vertices on sharp edges, and of those
 edges: what it makes of them is what it makes of them in the whole mesh, bit for bit.
 """
 
@@ -13,11 +13,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.connectivity.topology import Topology
-from pns_common.formula.boundary_prior import on_boundary
+from pns_common.formula.curve_prior import on_boundary
 from pns_common.fused.additions import Additions
-from pns_common.fused.mesh_edges import MeshEdges, has_boundary
-from pns_common.rules.boundary import BoundaryRule
+from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.rules.control_level import ControlLevel
+from pns_common.rules.curves import CurveRule
 from pns_common.rules.placement import Placement
 
 Move = Callable[[ControlLevel, Placement], Placement]
@@ -43,12 +43,12 @@ class SharpLevel:
         mesh: MeshEdges,
         length: float | Float[np.ndarray, " V"],
     ) -> SharpLevel:
-        """Take the boundaries of a mesh; ``length`` is R, or each vertex's own."""
+        """Take the sharp edges of a mesh; ``length`` is R, or each vertex's own."""
         edges = mesh.sharp_edges
         ends = mesh.edges[edges].astype(np.int64)
-        at_boundary = np.zeros(len(points), dtype=bool)
-        at_boundary[ends] = True
-        vertices = np.flatnonzero(at_boundary)
+        at_sharp = np.zeros(len(points), dtype=bool)
+        at_sharp[ends] = True
+        vertices = np.flatnonzero(at_sharp)
         pairs = np.searchsorted(vertices, ends)
         no_faces, no_normals = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3))
         nothing = np.full((len(edges), 2), -1)
@@ -67,27 +67,27 @@ class SharpLevel:
 
 
 @dataclass(frozen=True, eq=False)
-class Boundary:
-    """What a rule makes of a level's boundary.
+class Curves:
+    """What a rule makes of a level's curves.
 
     Attributes:
-        rule, sharp: None where there is no rule, or no boundary.
+        rule, sharp: None where there is no rule, or no curve.
         pushes: of all vertices; (0, 3) where there are none.
         nothing: what is added in their place: 0, or −0 where there is no rule.
     """
 
-    rule: BoundaryRule | None
+    rule: CurveRule | None
     sharp: SharpLevel | None
     pushes: Float[np.ndarray, "P 3"]
     nothing: float
 
     def move_vertices(self, loop: Float[np.ndarray, "V 3"], added: Additions) -> None:
-        """Add to boundary vertices, which Loop puts at ``loop``."""
+        """Add to curves' vertices, which Loop puts at ``loop``."""
         if self.rule is not None and self.sharp is not None:
             _move(self.rule.move_vertices, self.sharp.level, self.sharp.vertices, loop, added)
 
     def move_edges(self, loop: Float[np.ndarray, "E 3"], added: Additions) -> None:
-        """Add to boundary edges likewise."""
+        """Add to curves' edges likewise."""
         if self.rule is not None and self.sharp is not None:
             _move(self.rule.move_edges, self.sharp.level, self.sharp.edges, loop, added)
 
@@ -96,30 +96,32 @@ class Boundary:
         if self.sharp is None:
             return None
         alone = on_boundary(self.sharp.level.topology)
+        if not alone.any():
+            return None
         shared = np.zeros(vertex_count + edge_count, dtype=bool)
         shared[self.sharp.vertices] = alone[: len(self.sharp.vertices)]
         shared[vertex_count + self.sharp.edges] = alone[len(self.sharp.vertices) :]
         return shared
 
 
-NO_RULE = Boundary(None, None, np.zeros((0, 3)), -0.0)
+NO_RULE = Curves(None, None, np.zeros((0, 3)), -0.0)
 
 
-def boundary_of(
-    rule: BoundaryRule | None,
+def curves_of(
+    rule: CurveRule | None,
     points: Float[np.ndarray, "V 3"],
     mesh: MeshEdges,
     length: float | Float[np.ndarray, " V"],
-) -> Boundary:
-    """Make what ``rule`` adds at a level's boundary; ``length`` is R, or each vertex's own."""
+) -> Curves:
+    """Make what ``rule`` adds at a level's curves; ``length`` is R, or each vertex's own."""
     if rule is None:
         return NO_RULE
-    if not has_boundary(mesh):
-        return Boundary(rule, None, np.zeros((0, 3)), 0.0)
+    if not np.isin(mesh.edge_class[mesh.sharp_edges], rule.kinds).any():
+        return Curves(rule, None, np.zeros((0, 3)), 0.0)
     sharp = SharpLevel.of(points, mesh, length)
     pushes = np.zeros_like(points)
     pushes[sharp.vertices] = rule.pushes(sharp.level)
-    return Boundary(rule, sharp, pushes, 0.0)
+    return Curves(rule, sharp, pushes, 0.0)
 
 
 def _move(

@@ -1,4 +1,4 @@
-"""What the boundary's prior adds to Loop's curve rule, at boundary vertices and edges."""
+"""What the prior of curves adds to Loop's curve rule, at the vertices and edges of curves."""
 
 from __future__ import annotations
 
@@ -7,10 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.arrays import Array, dot, gather, namespace, scatter
-from pns_common.connectivity.topology import EdgeClass
-from pns_common.formula.boundary_prior import boundary_square, boundary_vertices
+from pns_common.base.arrays import Array, dot, gather, namespace, norm, scatter, unit
 from pns_common.formula.correction import Correction, proximity_ratio, shortened
+from pns_common.formula.curve_prior import (
+    BOUNDARIES,
+    BOUNDARIES_AND_CREASES,
+    Kinds,
+    across,
+    curve_edges,
+    curve_spokes,
+    curve_vertices,
+)
+from pns_common.formula.tips import CURVE_FURTHER, far_behind, kept_at_tips, left_behind
+from pns_common.geometry.rings import root
 from pns_common.masks.stencils import MIDPOINT, loop_vertex_vertices
 from pns_common.rules.control_level import ControlLevel
 from pns_common.rules.placement import Placement
@@ -18,31 +27,47 @@ from pns_common.rules.scale_free_form import ScaleFreeForm
 
 
 @dataclass(frozen=True)
-class BoundaryRule:
-    """What the boundary's prior adds to boundary vertices and edges; ``gate_sharpness`` is c_v."""
+class CurveRule:
+    """What the prior adds at boundaries, and at creases with ``crease_prior``.
+
+    ``gate_sharpness`` is c_v.
+    """
 
     form: ScaleFreeForm
     gate_sharpness: float
 
+    @property
+    def kinds(self) -> Kinds:
+        """The edges of its curves."""
+        return BOUNDARIES_AND_CREASES if self.form.crease_prior else BOUNDARIES
+
     def pushes(self, level: ControlLevel) -> Float[Array, "V 3"]:
-        """Return d of the boundary's vertices, 0 elsewhere."""
-        return self.form.boundary_strength * level.boundary_pushes(self.gate_sharpness)
+        """Return d of the curves' vertices, 0 elsewhere."""
+        return self.form.boundary_strength * level.curve_pushes(self.gate_sharpness, self.kinds)
 
     def move_vertices(self, level: ControlLevel, placed: Placement) -> Placement:
-        """Move boundary vertices too: Loop's curve mask of the pushes, within ρ."""
-        topology = level.topology
-        movable = boundary_vertices(topology)
+        """Move curves' vertices too: Loop's curve mask of the pushes, within ρ; less at tips."""
+        topology, kinds = level.topology, self.kinds
+        movable = curve_vertices(topology, kinds)
         rows = np.flatnonzero(movable)
-        wanted = gather(loop_vertex_vertices(self.pushes(level), topology), rows)
-        square = boundary_square(level.points, topology, rows)
+        pushes = self.pushes(level)
+        wanted = gather(loop_vertex_vertices(pushes, topology), rows)
+        a, b = curve_spokes(level.points, topology, rows, kinds)
+        square = (dot(a, a) + dot(b, b)) / 2
+        if self.form.tip_strength:
+            moved = gather(placed.loop, rows) - gather(level.points, rows)
+            behind = left_behind(gather(pushes, rows), wanted, moved, CURVE_FURTHER)
+            left = norm(across(behind, unit(b - a)))[:, None]
+            tip = far_behind(left, root(square[:, None]))
+            wanted = kept_at_tips(wanted, moved, tip, self.form.tip_strength)
         budget_per_length = level.budget_per_length(rows, self.form.budget)
-        moved = self._within(placed, rows, wanted, budget_per_length * square)
+        changed = self._within(placed, rows, wanted, budget_per_length * square)
         corrected = movable if placed.corrected is None else placed.corrected | movable
-        return replace(moved, corrected=corrected)
+        return replace(changed, corrected=corrected)
 
     def move_edges(self, level: ControlLevel, placed: Placement) -> Placement:
-        """Move boundary edges too: the mean of the pushes at their ends, within ρ."""
-        rows = np.flatnonzero(level.topology.edge_class == EdgeClass.BOUNDARY)
+        """Move curves' edges too: the mean of the pushes at their ends, within ρ."""
+        rows = curve_edges(level.topology, self.kinds)
         ends, pushes = level.topology.edges[rows], self.pushes(level)
         wanted = MIDPOINT * (gather(pushes, ends[:, 0]) + gather(pushes, ends[:, 1]))
         edge = gather(level.points, ends[:, 1]) - gather(level.points, ends[:, 0])

@@ -6,15 +6,15 @@ import numpy as np
 
 from pns_common import Mesh, pns
 from pns_common.connectivity.topology import EdgeClass, build_topology
-from pns_common.formula.boundary_prior import on_boundary
-from pns_common.fused.boundary import NO_RULE, SharpLevel, boundary_of
+from pns_common.formula.curve_prior import on_boundary
+from pns_common.fused.curves import NO_RULE, SharpLevel, curves_of
 from pns_common.rules.control_level import control_level
 from tests.support.kernels import assert_same_bits, by_arrays, by_kernels, edges_built
 from tests.support.meshes import bent, bumpy_sphere, grid, three_pages
 from tests.support.networks import SCALE_FREE_CARD, scale_free_model
 from tests.support.stand_in_models import Constant
 
-RULE = pns(scale_free_model(0, boundary_strength=1.0)).edge_rule.boundary
+RULE = pns(scale_free_model(0, boundary_strength=1.0)).edge_rule.curves
 OPEN = Mesh(*grid(5, bent))
 
 
@@ -46,7 +46,7 @@ def test_a_level_of_sharp_edges_alone_has_their_vertices_and_classes():
 
 def test_its_pushes_and_what_is_shared_are_the_whole_meshs():
     whole = control_level(OPEN.vertices, build_topology(OPEN.faces, 25))
-    boundary = boundary_of(RULE, OPEN.vertices, edges_built(OPEN), 1.0)
+    boundary = curves_of(RULE, OPEN.vertices, edges_built(OPEN), 1.0)
     np.testing.assert_array_equal(boundary.pushes, RULE.pushes(whole))
     edge_count = len(whole.topology.edges)
     np.testing.assert_array_equal(boundary.shared(25, edge_count), on_boundary(whole.topology))
@@ -56,7 +56,7 @@ def test_its_pushes_and_what_is_shared_are_the_whole_meshs():
 
 def test_where_there_is_no_rule_or_no_boundary_nothing_is_shared():
     closed = Mesh(*bumpy_sphere(0, subdivisions=0))
-    without = boundary_of(RULE, closed.vertices, edges_built(closed), 1.0)
+    without = curves_of(RULE, closed.vertices, edges_built(closed), 1.0)
     assert (without.sharp, without.shared(12, 30), str(without.nothing)) == (None, None, "0.0")
-    assert boundary_of(None, OPEN.vertices, edges_built(OPEN), 1.0) is NO_RULE
+    assert curves_of(None, OPEN.vertices, edges_built(OPEN), 1.0) is NO_RULE
     assert str(NO_RULE.nothing) == "-0.0"  # which leaves a -0 as it is

@@ -1,0 +1,103 @@
+"""The prior of old vertices, with the bits of rules/scale_free.py and formula/tips.py."""
+
+from __future__ import annotations
+
+import math
+
+from pns_common.formula.prior import CLEAR_NORMAL
+from pns_common.formula.tips import BENDS_MORE, LEFT
+from pns_common.fused.kernels.compiled import INDEX, NUMBERS, POINTS, POINTS_OUT, REAL, SIZE, kernel
+from pns_common.fused.kernels.rings import (
+    MEAN_JUMP,
+    NEAR_JUMP,
+    RING_SQUARE,
+    UMBRELLA,
+    dot,
+    norm,
+    row,
+)
+
+# A kernel reads numbers, not pairs.
+(LEFT_FROM, LEFT_TO), (BENDS_FROM, BENDS_TO) = LEFT, BENDS_MORE
+
+
+def _prior(pushed, of_curves, nothing, strength, v, k):
+    """Return a coordinate of D_v, with the curves' part."""
+    part = of_curves[v, k] if len(of_curves) else nothing
+    return strength * pushed[v, k] + part
+
+
+def _rise(value, by, begin, end):
+    """Return the smooth step of a quotient; 0 where ``by`` is 0 (``tips.far_behind``)."""
+    quotient = value / by if by > 0 else 0.0
+    way = min(max((quotient - begin) / (end - begin), 0.0), 1.0)
+    return way * way * (3 - 2 * way)
+
+
+@kernel(SIZE, POINTS, REAL, REAL, INDEX, SIZE, SIZE, POINTS_OUT)
+def add_priors(of_curves, nothing, strength, vertices, begin, end, pushed):
+    """Write D_v over ``pushed``, Loop's vertex mask of d, in the rows vertices[begin:end].
+
+    ``of_curves`` is the same of curves' pushes; (0, 3) where there are none. Then ``nothing`` is
+    added: 0 where a rule moves curves, −0 where none does.
+    """
+    for i in range(begin, end):
+        v = vertices[i]
+        for k in range(3):
+            pushed[v, k] = _prior(pushed, of_curves, nothing, strength, v, k)
+    return 0
+
+
+@kernel(
+    SIZE,
+    *(POINTS, REAL, REAL, INDEX, SIZE, SIZE),
+    *(POINTS, POINTS, POINTS, INDEX, NUMBERS, NUMBERS, REAL, POINTS_OUT),
+)
+def add_priors_but_at_tips(
+    of_curves,
+    nothing,
+    strength,
+    vertices,
+    begin,
+    end,
+    pushes,
+    means,
+    fields,
+    valence,
+    ring_weight,
+    further,
+    tip_strength,
+    pushed,
+):
+    """Write D'_v likewise (``tips.kept_at_tips``).
+
+    Args:
+        pushes: d.
+        ring_weight, further: k β_k and λ for each valence that occurs.
+        tip_strength: a.
+    """
+    for i in range(begin, end):
+        v = vertices[i]
+        step, ahead = ring_weight[valence[v]], further[valence[v]]
+        moved = (
+            step * means[v, UMBRELLA],
+            step * means[v, UMBRELLA + 1],
+            step * means[v, UMBRELLA + 2],
+        )
+        behind = (
+            ahead * (pushes[v, 0] - pushed[v, 0] - moved[0]) - pushes[v, 0],
+            ahead * (pushes[v, 1] - pushed[v, 1] - moved[1]) - pushes[v, 1],
+            ahead * (pushes[v, 2] - pushed[v, 2] - moved[2]) - pushes[v, 2],
+        )
+        mean = row(fields, v)
+        agreement = norm(mean)
+        clear = agreement if agreement > CLEAR_NORMAL else CLEAR_NORMAL
+        left = abs(dot(behind, (mean[0] / clear, mean[1] / clear, mean[2] / clear)))
+        square = means[v, RING_SQUARE]
+        length = math.sqrt(square) if square > 0 else 0.0
+        far = _rise(left, length, LEFT_FROM, LEFT_TO)
+        tip = far * _rise(means[v, MEAN_JUMP], means[v, NEAR_JUMP], BENDS_FROM, BENDS_TO)
+        for k in range(3):
+            prior = _prior(pushed, of_curves, nothing, strength, v, k)
+            pushed[v, k] = prior - tip * (tip_strength * moved[k] + prior)
+    return 0

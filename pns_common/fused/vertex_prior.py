@@ -1,0 +1,43 @@
+"""The prior of old vertices beside the kernels: of rings, of curves, and less at tips."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.formula.tips import ring_further
+from pns_common.fused.kernels.vertex_prior import add_priors, add_priors_but_at_tips
+from pns_common.fused.loop_points import place_vertices
+from pns_common.fused.surroundings import Surroundings
+from pns_common.masks.stencils import loop_ring_weight
+from pns_common.rules.scale_free_form import ScaleFreeForm
+
+
+def priors_at(
+    vertices: Int[np.ndarray, " N"], form: ScaleFreeForm, level: Surroundings
+) -> Float[np.ndarray, "V 3"]:
+    """Return D of some vertices, in rows for all."""
+    rings, curves = level.rings, level.curves
+    prior = _placed(level.pushes, level)
+    of_curves = _placed(curves.pushes, level) if len(curves.pushes) else curves.pushes
+    parts = of_curves, curves.nothing, form.prior_strength, vertices
+    each = np.arange(int(rings.valence.max(initial=0)) + 1)
+    weights = loop_ring_weight(each), ring_further(each)
+    around = level.pushes, rings.means, rings.fields, rings.valence, *weights
+
+    def add(rows: slice) -> None:
+        add_priors(*parts, rows.start, rows.stop, prior)
+
+    def add_but_at_tips(rows: slice) -> None:
+        strength = form.tip_strength
+        add_priors_but_at_tips(*parts, rows.start, rows.stop, *around, strength, prior)
+
+    level.blocks.run(len(vertices), add_but_at_tips if form.tip_strength else add)
+    return prior
+
+
+def _placed(pushes: Float[np.ndarray, "V 3"], level: Surroundings) -> Float[np.ndarray, "V 3"]:
+    """Return what Loop's vertex mask makes of pushes."""
+    placed = np.empty_like(pushes)
+    place_vertices(pushes, level.mesh, level.blocks, placed)
+    return placed
