@@ -110,17 +110,31 @@ def _next(units, held, before, width, hidden, at, biases, bias_at):
     return at
 
 
+def _square(held, lane):
+    """Return ‖z‖² in double precision, where no square of a single overflows."""
+    x = np.float64(held[SEEN, 0, lane])
+    y = np.float64(held[SEEN, 1, lane])
+    z = np.float64(held[SEEN, 2, lane])
+    return x * x + y * y + z * z
+
+
 def _write(held, begin, budget, answers):
-    """Write budget · z / max(1, ‖z‖) in double precision, where no square of a single overflows."""
-    for lane in range(min(LANES, len(answers) - begin)):
-        x = np.float64(held[SEEN, 0, lane])
-        y = np.float64(held[SEEN, 1, lane])
-        z = np.float64(held[SEEN, 2, lane])
-        length = math.sqrt(x * x + y * y + z * z)
+    """Write budget · z / max(1, ‖z‖) in double precision."""
+    present, long = min(LANES, len(answers) - begin), 0
+    for lane in range(LANES):
+        long += not _square(held, lane) <= 1
+    if long == 0:
+        # As in most: neither a root nor a division.
+        for lane in range(present):
+            for c in range(3):
+                answers[begin + lane, c] = np.float32(np.float64(held[SEEN, c, lane]) * budget)
+        return
+    for lane in range(present):
+        length = math.sqrt(_square(held, lane))
         divisor = length if length > 1 else 1.0
-        answers[begin + lane, 0] = np.float32(x / divisor * budget)
-        answers[begin + lane, 1] = np.float32(y / divisor * budget)
-        answers[begin + lane, 2] = np.float32(z / divisor * budget)
+        for c in range(3):
+            z = np.float64(held[SEEN, c, lane])
+            answers[begin + lane, c] = np.float32(z / divisor * budget)
 
 
 @kernel(
