@@ -46,7 +46,7 @@ class Binding:
 
     def take(self, rows: Int[np.ndarray, " M"]) -> Binding:
         """Return the binding of some of the vertices."""
-        return Binding(self.joints[rows], self.weights[rows])
+        return Binding(*(np.take(part, rows, axis=0) for part in (self.joints, self.weights)))
 
 
 def skin_sets(primitive: TrianglePrimitive) -> list[int]:
@@ -114,7 +114,8 @@ def skin_attributes(
         return attributes
     dtype = primitive.attributes[f"WEIGHTS_{sets[0]}"].dtype
     total_units = FLOAT_UNITS if dtype.kind == "f" else int(np.iinfo(dtype).max)
-    units = whole_units(kept.weights, total_units)
+    blocks, weights = Blocks(available_threads()), kept.weights
+    (units,) = blocks.gather(len(weights), lambda at: (whole_units(weights[at], total_units),))
     joints = np.where(units > 0, kept.joints, 0)
     # Another primitive's joints may reach across their common edge.
     wide = np.uint16 if joints.max(initial=0) > np.iinfo(np.uint8).max else np.uint8
@@ -122,8 +123,8 @@ def skin_attributes(
         slots = slice(SLOTS * place, SLOTS * (place + 1))
         old = primitive.attributes[f"JOINTS_{number}"].dtype
         attributes[f"JOINTS_{number}"] = joints[:, slots].astype(np.promote_types(old, wide))
-        weights = units[:, slots] / total_units if dtype.kind == "f" else units[:, slots]
-        attributes[f"WEIGHTS_{number}"] = weights.astype(dtype)
+        shares = units[:, slots] / total_units if dtype.kind == "f" else units[:, slots]
+        attributes[f"WEIGHTS_{number}"] = shares.astype(dtype)
     return attributes
 
 
