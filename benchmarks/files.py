@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
+from typing import Literal, get_args
 
-from benchmarks.generated import torus
+from benchmarks.generated import torus, unrolled_torus
 from benchmarks.memory import in_fresh_process, peak_mib, reset_peak
 from pns_common import load_model
 from service.bodies.folder import folder_of
@@ -19,6 +20,9 @@ from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Limits, Options
 
 RUNS = 5
+# What a generated file has beside positions, or gets on the way.
+Shading = Literal["", "new normals", "normals and UVs"]
+SHADINGS: tuple[Shading, ...] = get_args(Shading)
 STAGES = ("read", "weld", "refine", "attributes", "write")
 
 
@@ -53,12 +57,16 @@ def measure_file(path: Path, levels: int, model: str | None = None) -> MeasuredF
 
 
 def measure_generated(
-    faces: int, levels: int, model: str | None = None, *, normals: bool = False
+    faces: int, levels: int, model: str | None = None, *, shading: Shading = ""
 ) -> MeasuredFile:
-    """Refine a generated GLB of about so many faces in a process of its own; give it normals."""
-    mesh = torus(faces)
-    data = triangles_glb(IndexedTriangles(mesh.vertices, mesh.faces, None))
-    return in_fresh_process(_measure, data, levels, model, normals)
+    """Refine a generated GLB of about so many faces in a process of its own."""
+    if shading == "normals and UVs":
+        triangles, normals = unrolled_torus(faces)
+        data = triangles_glb(triangles, normals=normals)
+    else:
+        mesh = torus(faces)
+        data = triangles_glb(IndexedTriangles(mesh.vertices, mesh.faces, None))
+    return in_fresh_process(_measure, data, levels, model, shading == "new normals")
 
 
 def _measure(

@@ -14,7 +14,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.files import STAGES, MeasuredFile, measure_file, measure_generated
+from benchmarks.files import SHADINGS, STAGES, MeasuredFile, measure_file, measure_generated
 from benchmarks.operator import METHODS, measure_operator
 from pns_common.runtimes.onnx_model import DEFAULT_MODEL
 
@@ -41,12 +41,12 @@ def main(
     console.print(f"model: {model}")
     console.print(operator_table([size for size in SIZES if size <= largest], runs, model))
     named = {
-        f"torus, {size:,} faces{', normals' * normals}": measure_generated(
-            size, levels, model, normals=normals
+        f"torus, {size:,} faces{shading and ', '}{shading}": measure_generated(
+            size, levels, model, shading=shading
         )
         for size in FILE_SIZES
         if size <= largest
-        for normals in (False, True)
+        for shading in SHADINGS
     }
     for path in sorted(assets.glob("*.gl*")) if assets else []:
         named[path.name] = measure_file(path, levels, model)

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.answers import upload
 from benchmarks.contest import ROOT, Case, as_installed, contest, ours
-from benchmarks.generated import ORDERS
+from benchmarks.generated import ORDERS, unrolled_torus
 from benchmarks.peers.protocol import read_mesh, write_mesh
 from pns_common.connectivity.topology import EdgeClass, build_topology
 
@@ -21,6 +21,17 @@ def test_generated_meshes_are_manifold_and_about_as_large_as_asked(order):
     assert abs(len(mesh.faces) - 2000) < 200
     assert classes[EdgeClass.IRREGULAR] == 0
     assert (classes[EdgeClass.BOUNDARY] > 0) == (order == "open")
+
+
+def test_an_unrolled_torus_is_the_torus_cut_open():
+    whole, (cut, normals) = ORDERS["closed"](2000), unrolled_torus(2000)
+    corners = [of_mesh.vertices[of_mesh.faces] for of_mesh in (whole, cut)]
+    np.testing.assert_array_equal(*corners)
+    assert len(cut.vertices) == len(cut.uv) == len(normals) > len(whole.vertices)
+    edges = build_topology(cut.faces, len(cut.vertices))
+    assert set(edges.edge_class) == {EdgeClass.INTERIOR, EdgeClass.BOUNDARY}
+    # No texture lies across the cut.
+    assert np.ptp(cut.uv[cut.faces], axis=1).max() < 0.2
 
 
 def test_a_mesh_file_holds_what_was_written(tmp_path):
