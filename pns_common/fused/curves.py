@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.connectivity.topology import Topology
-from pns_common.formula.curve_prior import on_boundary
+from pns_common.formula.curve_prior import are_of, on_boundary
 from pns_common.fused.additions import Additions
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.rules.control_level import ControlLevel
@@ -116,7 +116,7 @@ def curves_of(
     """Make what ``rule`` adds at a level's curves; ``length`` is R, or each vertex's own."""
     if rule is None:
         return NO_RULE
-    if not np.isin(mesh.edge_class[mesh.sharp_edges], rule.kinds).any():
+    if not are_of(rule.kinds, mesh.edge_class[mesh.sharp_edges]).any():
         return Curves(rule, None, np.zeros((0, 3)), 0.0)
     sharp = SharpLevel.of(points, mesh, length)
     pushes = np.zeros_like(points)
