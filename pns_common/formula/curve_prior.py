@@ -16,6 +16,8 @@ would fold a face of one piece, and what lies inside does not go along, do they 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -30,16 +32,32 @@ BOUNDARIES: Kinds = (EdgeClass.BOUNDARY,)
 BOUNDARIES_AND_CREASES: Kinds = (EdgeClass.BOUNDARY, EdgeClass.CREASE)
 
 
-def curve_vertices(topology: Topology, kinds: Kinds) -> Bool[np.ndarray, " V"]:
-    """Return the vertices on exactly two edges of these kinds, and on no other sharp edge."""
-    edges = topology.edges[curve_edges(topology, kinds)]
-    count = np.bincount(edges.reshape(-1), minlength=topology.vertex_count)
-    return (count == 2) & (sharp_edge_count(topology) == 2)
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """The curves of a level's edges of some kinds.
+
+    Attributes:
+        edges: those of these kinds.
+        movable: of all vertices those on exactly two of them, and on no other edge that is sharp.
+        rows: their numbers.
+        a, b: from each of these to its two neighbours along the curve.
+    """
+
+    edges: Int[np.ndarray, " M"]
+    movable: Bool[np.ndarray, " V"]
+    rows: Int[np.ndarray, " N"]
+    a: Float[Array, "N 3"]
+    b: Float[Array, "N 3"]
 
 
-def curve_edges(topology: Topology, kinds: Kinds) -> Int[np.ndarray, " N"]:
-    """Return the edges of these kinds."""
-    return np.flatnonzero(are_of(kinds, topology.edge_class))
+def find_curves(points: Float[Array, "V 3"], topology: Topology, kinds: Kinds) -> Curves:
+    """Return the curves of a level."""
+    edges = np.flatnonzero(are_of(kinds, topology.edge_class))
+    movable = _between_two(topology, topology.edges[edges])
+    rows = np.flatnonzero(movable)
+    sides, middle = _along(topology.edges[edges], movable), gather(points, rows)
+    a, b = (gather(points, sides[:, side]) - middle for side in (0, 1))
+    return Curves(edges, movable, rows, a, b)
 
 
 def are_of(kinds: Kinds, edge_class: Int[np.ndarray, " E"]) -> Bool[np.ndarray, " E"]:
@@ -53,30 +71,8 @@ def are_of(kinds: Kinds, edge_class: Int[np.ndarray, " E"]) -> Bool[np.ndarray, 
 
 def on_boundary(topology: Topology) -> Bool[np.ndarray, " N"]:
     """Return which vertices of the split of a mesh its boundaries alone place."""
-    is_boundary = topology.edge_class == EdgeClass.BOUNDARY
-    return np.concatenate([curve_vertices(topology, BOUNDARIES), is_boundary])
-
-
-def along_curves(
-    topology: Topology, vertices: Int[np.ndarray, " N"], kinds: Kinds
-) -> Int[np.ndarray, "N 2"]:
-    """Return the two neighbours of curves' vertices along them."""
-    edges = topology.edges[curve_edges(topology, kinds)]
-    ends, others = edges.reshape(-1), edges[:, ::-1].reshape(-1)
-    wanted = np.zeros(topology.vertex_count, dtype=bool)
-    wanted[vertices] = True
-    spokes = np.flatnonzero(wanted[ends])
-    order = spokes[np.argsort(ends[spokes], kind="stable")]
-    return others[order].reshape(-1, 2)
-
-
-def curve_spokes(
-    points: Float[Array, "V 3"], topology: Topology, vertices: Int[np.ndarray, " N"], kinds: Kinds
-) -> tuple[Float[Array, "N 3"], Float[Array, "N 3"]]:
-    """Return a − p and b − p of curves' vertices."""
-    sides, middle = along_curves(topology, vertices, kinds), gather(points, vertices)
-    a, b = (gather(points, sides[:, side]) - middle for side in (0, 1))
-    return a, b
+    is_boundary = are_of(BOUNDARIES, topology.edge_class)
+    return np.concatenate([_between_two(topology, topology.edges[is_boundary]), is_boundary])
 
 
 def across(vectors: Float[Array, "N 3"], along: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
@@ -84,15 +80,28 @@ def across(vectors: Float[Array, "N 3"], along: Float[Array, "N 3"]) -> Float[Ar
     return vectors - dot(vectors, along)[:, None] * along
 
 
-def curve_pushes(
-    points: Float[Array, "V 3"], topology: Topology, gate_sharpness: float, kinds: Kinds
-) -> Float[Array, "V 3"]:
+def curve_pushes(curves: Curves, gate_sharpness: float) -> Float[Array, "V 3"]:
     """Return d of all vertices at b = 1; ``gate_sharpness`` is c_v."""
-    xp = namespace(points)
-    vertices = np.flatnonzero(curve_vertices(topology, kinds))
-    a, b = curve_spokes(points, topology, vertices, kinds)
+    a, b = curves.a, curves.b
+    xp = namespace(a)
     turning = 1 + dot(unit(a), unit(b))
     fade = (CORNER - turning) / (CORNER - BEND)
     gate = xp.tanh(gate_sharpness * turning) * xp.clip(fade, 0.0, 1.0)
     pushes = -(gate / 3)[:, None] * across((a + b) / 2, unit(b - a))
-    return scatter(pushes, vertices, points.shape[0])
+    return scatter(pushes, curves.rows, len(curves.movable))
+
+
+def _between_two(topology: Topology, edges: Int[np.ndarray, "M 2"]) -> Bool[np.ndarray, " V"]:
+    """Return the vertices on exactly two of some edges, and on no other edge that is sharp."""
+    count = np.bincount(edges.reshape(-1), minlength=topology.vertex_count)
+    return (count == 2) & (sharp_edge_count(topology) == 2)
+
+
+def _along(
+    edges: Int[np.ndarray, "M 2"], movable: Bool[np.ndarray, " V"]
+) -> Int[np.ndarray, "N 2"]:
+    """Return the two neighbours of movable vertices along the edges."""
+    ends, others = edges.reshape(-1), edges[:, ::-1].reshape(-1)
+    spokes = np.flatnonzero(movable[ends])
+    order = spokes[np.argsort(ends[spokes], kind="stable")]
+    return others[order].reshape(-1, 2)

@@ -72,7 +72,7 @@ class Curves:
 
     Attributes:
         rule, sharp: None where there is no rule, or no curve.
-        pushes: of all vertices; (0, 3) where there are none.
+        pushes: of all vertices; (0, 3) where none is of a curve, and none moves.
         nothing: what is added in their place: 0, or −0 where there is no rule.
     """
 
@@ -83,12 +83,12 @@ class Curves:
 
     def move_vertices(self, loop: Float[np.ndarray, "V 3"], added: Additions) -> None:
         """Add to curves' vertices, which Loop puts at ``loop``."""
-        if self.rule is not None and self.sharp is not None:
+        if self.rule is not None and self.sharp is not None and len(self.pushes):
             _move(self.rule.move_vertices, self.sharp.level, self.sharp.vertices, loop, added)
 
     def move_edges(self, loop: Float[np.ndarray, "E 3"], added: Additions) -> None:
         """Add to curves' edges likewise."""
-        if self.rule is not None and self.sharp is not None:
+        if self.rule is not None and self.sharp is not None and len(self.pushes):
             _move(self.rule.move_edges, self.sharp.level, self.sharp.edges, loop, added)
 
     def shared(self, vertex_count: int, edge_count: int) -> Bool[np.ndarray, " W"] | None:
@@ -119,6 +119,8 @@ def curves_of(
     if not are_of(rule.kinds, mesh.edge_class[mesh.sharp_edges]).any():
         return Curves(rule, None, np.zeros((0, 3)), 0.0)
     sharp = SharpLevel.of(points, mesh, length)
+    if len(sharp.level.curves(rule.kinds).rows) == 0:
+        return Curves(rule, sharp, np.zeros((0, 3)), 0.0)
     pushes = np.zeros_like(points)
     pushes[sharp.vertices] = rule.pushes(sharp.level)
     return Curves(rule, sharp, pushes, 0.0)

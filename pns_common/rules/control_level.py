@@ -13,7 +13,7 @@ from pns_common.base.arrays import Array
 from pns_common.base.blocks import WHOLE, Blocks
 from pns_common.connectivity.topology import Topology
 from pns_common.formula.correction import BudgetPerLength
-from pns_common.formula.curve_prior import Kinds, curve_pushes
+from pns_common.formula.curve_prior import Curves, Kinds, curve_pushes, find_curves
 from pns_common.formula.prior import normal_pushes
 from pns_common.geometry.frames import face_normals
 from pns_common.geometry.rings import Rings
@@ -65,9 +65,14 @@ class ControlLevel:
         return cache(partial(network_lengths, self.rings))
 
     @cached_property
+    def curves(self) -> Callable[[Kinds], Curves]:
+        """The curves of edges of some kinds: found once, read by both rules."""
+        return cache(partial(find_curves, self.points, self.topology))
+
+    @cached_property
     def curve_pushes(self) -> Callable[[float, Kinds], Float[Array, "V 3"]]:
         """d of the curves' prior at b = 1, by c_v and kinds: computed once, read four times."""
-        return cache(partial(curve_pushes, self.points, self.topology))
+        return cache(lambda sharpness, kinds: curve_pushes(self.curves(kinds), sharpness))
 
 
 def control_level(

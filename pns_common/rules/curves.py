@@ -14,9 +14,6 @@ from pns_common.formula.curve_prior import (
     BOUNDARIES_AND_CREASES,
     Kinds,
     across,
-    curve_edges,
-    curve_spokes,
-    curve_vertices,
 )
 from pns_common.formula.tips import CURVE_FURTHER, far_behind, kept_at_tips, left_behind
 from pns_common.geometry.rings import root
@@ -47,12 +44,12 @@ class CurveRule:
 
     def move_vertices(self, level: ControlLevel, placed: Placement) -> Placement:
         """Move curves' vertices too: Loop's curve mask of the pushes, within ρ; less at tips."""
-        topology, kinds = level.topology, self.kinds
-        movable = curve_vertices(topology, kinds)
-        rows = np.flatnonzero(movable)
+        curves = level.curves(self.kinds)
+        rows, a, b = curves.rows, curves.a, curves.b
+        if len(rows) == 0:
+            return placed
         pushes = self.pushes(level)
-        wanted = gather(loop_vertex_vertices(pushes, topology), rows)
-        a, b = curve_spokes(level.points, topology, rows, kinds)
+        wanted = gather(loop_vertex_vertices(pushes, level.topology), rows)
         square = (dot(a, a) + dot(b, b)) / 2
         if self.form.tip_strength:
             moved = gather(placed.loop, rows) - gather(level.points, rows)
@@ -62,17 +59,20 @@ class CurveRule:
             wanted = kept_at_tips(wanted, moved, tip, self.form.tip_strength)
         budget_per_length = level.budget_per_length(rows, self.form.budget)
         changed = self._within(placed, rows, wanted, budget_per_length * square)
-        corrected = movable if placed.corrected is None else placed.corrected | movable
+        corrected = placed.corrected
+        corrected = curves.movable if corrected is None else corrected | curves.movable
         return replace(changed, corrected=corrected)
 
     def move_edges(self, level: ControlLevel, placed: Placement) -> Placement:
         """Move curves' edges too: the mean of the pushes at their ends, within ρ."""
-        rows = curve_edges(level.topology, self.kinds)
-        ends, pushes = level.topology.edges[rows], self.pushes(level)
+        curves = level.curves(self.kinds)
+        if len(curves.rows) == 0:
+            return placed
+        ends, pushes = level.topology.edges[curves.edges], self.pushes(level)
         wanted = MIDPOINT * (gather(pushes, ends[:, 0]) + gather(pushes, ends[:, 1]))
         edge = gather(level.points, ends[:, 1]) - gather(level.points, ends[:, 0])
         budget_per_length = level.budget_per_length(ends[:, 0], self.form.budget)
-        return self._within(placed, rows, wanted, budget_per_length * dot(edge, edge))
+        return self._within(placed, curves.edges, wanted, budget_per_length * dot(edge, edge))
 
     def _within(
         self,

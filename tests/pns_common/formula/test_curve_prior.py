@@ -15,7 +15,7 @@ from pns_common.formula.curve_prior import (
     BOUNDARIES,
     BOUNDARIES_AND_CREASES,
     curve_pushes,
-    curve_vertices,
+    find_curves,
 )
 from pns_common.levels.step import level_step
 from pns_common.masks.limit import limit_positions
@@ -54,7 +54,9 @@ def test_two_pieces_with_a_common_boundary_meet_again(seed):
     rims = []
     for piece in refined:
         topology = build_topology(piece.mesh.faces, len(piece.mesh.vertices))
-        rims.append(piece.mesh.vertices[curve_vertices(topology, BOUNDARIES)])
+        rims.append(
+            piece.mesh.vertices[find_curves(piece.mesh.vertices, topology, BOUNDARIES).rows]
+        )
     assert len(rims[0]) == 48
     np.testing.assert_array_equal(rims[0], rims[1])
 
@@ -62,8 +64,9 @@ def test_two_pieces_with_a_common_boundary_meet_again(seed):
 def test_straight_boundaries_and_right_angles_stay():
     points, faces = grid(6)
     topology = build_topology(faces, len(points))
-    assert curve_vertices(topology, BOUNDARIES).sum() == 20
-    assert (curve_pushes(points, topology, 1e3, BOUNDARIES) == 0).all()
+    curves = find_curves(points, topology, BOUNDARIES)
+    assert len(curves.rows) == 20
+    assert (curve_pushes(curves, 1e3) == 0).all()
 
 
 def test_the_boundary_of_a_disc_keeps_its_radius():
@@ -108,12 +111,12 @@ def test_a_line_of_creases_is_pushed_as_the_same_boundary():
     half = build_topology(mesh.faces[:9], len(mesh.vertices))
     whole = with_creases(build_topology(mesh.faces, len(mesh.vertices)), creases)
     open_, creased = (
-        curve_pushes(mesh.vertices, topology, 1e3, BOUNDARIES_AND_CREASES)
+        curve_pushes(find_curves(mesh.vertices, topology, BOUNDARIES_AND_CREASES), 1e3)
         for topology in (half, whole)
     )
     assert np.linalg.norm(creased[:9], axis=1).min() > 0.05
     np.testing.assert_array_equal(creased, open_)
-    assert not curve_pushes(mesh.vertices, whole, 1e3, BOUNDARIES).any()
+    assert not curve_pushes(find_curves(mesh.vertices, whole, BOUNDARIES), 1e3).any()
 
 
 def test_a_corner_of_a_sheet_stays_with_tips_on_the_card():
@@ -141,7 +144,7 @@ def test_boundaries_stay_within_the_budget_and_nothing_folds(mesh, budget):
 def test_without_a_strength_boundaries_are_loops(mesh):
     corrected, base = (refine(mesh, scheme).mesh.vertices for scheme in (pns(WITHOUT), loop()))
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    rows = np.flatnonzero(curve_vertices(topology, BOUNDARIES))
+    rows = find_curves(mesh.vertices, topology, BOUNDARIES).rows
     np.testing.assert_array_equal(corrected[rows], base[rows])
 
 
