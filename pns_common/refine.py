@@ -116,11 +116,12 @@ def refine(
             unit. It is fixed here for all levels: pass the first call's R when calling again.
         limit: put the last level's vertices where Loop's rules would take them if they went on for
             ever, and give the limit surface's normals there. The report is that of the levels.
-        creases: edges to keep sharp, as pairs of vertices: no correction, and the rules of Hoppe
-            et al. 1994. Their children are creases too; boundary and irregular edges stay what
-            they are. "auto": the crease lines that the mesh shows (``crease_lines``), where the
-            model's card asks for them, sharp at as many levels as it says; None: no edge.
-            ``Creases`` says of pairs at how many levels they are sharp.
+        creases: edges to keep sharp, as pairs of vertices: the rules of Hoppe et al. 1994, and of
+            corrections only that of curves, where the model has it (formula/curve_prior.py). Their
+            children are creases too; boundary and irregular edges stay what they are. "auto": the
+            crease lines that the mesh shows (``crease_lines``), where the model's card asks for
+            them, sharp at as many levels as it says; None: no edge. ``Creases`` says of pairs at
+            how many levels they are sharp.
         threads: worker threads, default all processors; the result does not depend on it.
         progress: called as the work goes on, inside levels too, with (faces made so far, faces made
             in the end). It may be called from another thread, one at a time; what it raises ends

@@ -21,11 +21,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import Array, dot, gather, namespace, scatter, unit
+from pns_common.base.arrays import Array, dot, gather, namespace, norm, scatter, unit
 from pns_common.connectivity.topology import EdgeClass, Topology, sharp_edge_count
+from pns_common.geometry.ring_sums import divided
 
 # f falls from 1 where a curve turns by 60 degrees to 0 at 90.
 BEND, CORNER = 1 / 2, 1.0
+# Of the way along a curve, its chord across a vertex; below that a curve's direction fades.
+CLEAR_CHORD = 1 / 4
 # The edges that a curve may be made of.
 Kinds = tuple[EdgeClass, ...]
 BOUNDARIES: Kinds = (EdgeClass.BOUNDARY,)
@@ -37,14 +40,14 @@ class Curves:
     """The curves of a level's edges of some kinds.
 
     Attributes:
-        edges: those of these kinds.
-        movable: of all vertices those on exactly two of them, and on no other edge that is sharp.
+        movable: of all vertices those on exactly two such edges, and on no other that is sharp.
+        edges: those that end at a movable vertex; what happens at others does not change them.
         rows: their numbers.
         a, b: from each of these to its two neighbours along the curve.
     """
 
-    edges: Int[np.ndarray, " M"]
     movable: Bool[np.ndarray, " V"]
+    edges: Int[np.ndarray, " M"]
     rows: Int[np.ndarray, " N"]
     a: Float[Array, "N 3"]
     b: Float[Array, "N 3"]
@@ -54,10 +57,10 @@ def find_curves(points: Float[Array, "V 3"], topology: Topology, kinds: Kinds) -
     """Return the curves of a level."""
     edges = np.flatnonzero(are_of(kinds, topology.edge_class))
     movable = _between_two(topology, topology.edges[edges])
-    rows = np.flatnonzero(movable)
+    edges, rows = edges[movable[topology.edges[edges]].any(axis=1)], np.flatnonzero(movable)
     sides, middle = _along(topology.edges[edges], movable), gather(points, rows)
     a, b = (gather(points, sides[:, side]) - middle for side in (0, 1))
-    return Curves(edges, movable, rows, a, b)
+    return Curves(movable, edges, rows, a, b)
 
 
 def are_of(kinds: Kinds, edge_class: Int[np.ndarray, " E"]) -> Bool[np.ndarray, " E"]:
@@ -78,6 +81,16 @@ def on_boundary(topology: Topology) -> Bool[np.ndarray, " N"]:
 def across(vectors: Float[Array, "N 3"], along: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
     """Return the part of vectors that is at right angles to unit vectors."""
     return vectors - dot(vectors, along)[:, None] * along
+
+
+def curve_direction(a: Float[Array, "N 3"], b: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
+    """Return the direction from a to b: of length 1, less where the curve turns back on itself.
+
+    There it is 0, and it stays Lipschitz: turns of up to 150 degrees have length 1.
+    """
+    chord, clear = norm(b - a), (norm(a) + norm(b)) * CLEAR_CHORD
+    longer = namespace(a).where(chord > clear, chord, clear)[:, None]
+    return divided(b - a, longer)
 
 
 def curve_pushes(curves: Curves, gate_sharpness: float) -> Float[Array, "V 3"]:

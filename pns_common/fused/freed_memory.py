@@ -1,4 +1,4 @@
-"""Memory that a call frees stays with the process for the next one, up to 96 MiB.
+"""Memory that a call frees stays with the process for the next one, up to 96 MiB a thread.
 
 glibc gives memory back to the system as soon as the free end of its heap is larger than a bound,
 128 KiB at first, and then each call's tables are new pages again, which the system clears: a third
@@ -20,6 +20,8 @@ from functools import cache
 KEPT = 96 * 2**20
 # glibc takes larger blocks from the system each time, whatever it has kept; it allows no more.
 LARGEST_KEPT = 32 * 2**20
+# Whoever has set one of these has had his reasons.
+OF_THE_ENVIRONMENT = "GLIBC_TUNABLES", "MALLOC_TRIM_THRESHOLD_", "MALLOC_MMAP_THRESHOLD_"
 # Of glibc's malloc.h.
 TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3
 
@@ -27,9 +29,9 @@ TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3
 def keep_freed_memory() -> None:
     """Let the allocator keep what this process frees; where it is not glibc's nothing changes.
 
-    Nor where the environment's MALLOC_TRIM_THRESHOLD_ says what is to be kept.
+    Nor where the environment has a word to say of it.
     """
-    if "MALLOC_TRIM_THRESHOLD_" not in os.environ:
+    if not any(name in os.environ for name in OF_THE_ENVIRONMENT):
         set_option = _of_glibc("mallopt")
         set_option(MMAP_THRESHOLD, LARGEST_KEPT)
         set_option(TRIM_THRESHOLD, KEPT)

@@ -211,6 +211,8 @@ def _scale_free_problem(card: ModelCard) -> str | None:
     tips = card.tip_strength
     if tips is not None and not (math.isfinite(tips) and tips >= 0):
         return f"tip_strength {tips}, not a finite number ≥ 0"
+    if card.crease_prior and not boundary:
+        return "crease_prior without a boundary_strength, which is its strength"
     altitudes = card.network_altitudes
     if altitudes is not None and not (math.isfinite(altitudes) and altitudes > 0):
         return f"network_altitudes {altitudes}, not a finite number > 0"

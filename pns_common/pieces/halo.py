@@ -9,9 +9,9 @@ with theirs.
 - Learned rules: w = 2. The edge (a, b) of f reads mean normals, umbrella heights and pushes at the
   vertex d opposite f, so the faces at d, which is a neighbour of f's corners; an old vertex reads
   its neighbours' heights, mean jumps and pushes, so the faces at these. What they count (valence,
-  sharp edges, fans) is of the same faces, and boundaries' pushes are of neighbours along them. At a
-  boundary the bend of the face beside f is that of its neighbours too: these touch f, and what they
-  bend against lies at d.
+  sharp edges, fans) is of the same faces, and pushes of boundaries and creases are of neighbours
+  along them. At a boundary the bend of the face beside f is that of its neighbours too: these touch
+  f, and what they bend against lies at d.
 - Edge rules that read no fields and leave old vertices to Loop (``paper-5``): w = 1: two faces.
 - The fold guard then halves displacements round after round, and a round reaches a child's ring. It
   reaches nowhere through a face that no scales in [0, 1] could fold (see exact.py). One ring for it

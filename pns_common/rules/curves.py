@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.arrays import Array, dot, gather, namespace, norm, scatter, unit
+from pns_common.base.arrays import Array, dot, gather, namespace, norm, scatter
 from pns_common.formula.correction import Correction, proximity_ratio, shortened
 from pns_common.formula.curve_prior import (
     BOUNDARIES,
     BOUNDARIES_AND_CREASES,
     Kinds,
     across,
+    curve_direction,
 )
 from pns_common.formula.tips import CURVE_FURTHER, far_behind, kept_at_tips, left_behind
 from pns_common.geometry.rings import root
@@ -54,7 +55,7 @@ class CurveRule:
         if self.form.tip_strength:
             moved = gather(placed.loop, rows) - gather(level.points, rows)
             behind = left_behind(gather(pushes, rows), wanted, moved, CURVE_FURTHER)
-            left = norm(across(behind, unit(b - a)))[:, None]
+            left = norm(across(behind, curve_direction(a, b)))[:, None]
             tip = far_behind(left, root(square[:, None]))
             wanted = kept_at_tips(wanted, moved, tip, self.form.tip_strength)
         budget_per_length = level.budget_per_length(rows, self.form.budget)

@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pns_common import Mesh, load_model, loop, pns, refine
+from pns_common import Mesh, crease_lines, load_model, loop, pns, refine
 from pns_common.connectivity.disjoint_union import disjoint_faces
 from pns_common.errors import MeshError, ParameterError
 from pns_common.fused import kernels_available
 from pns_common.levels.diagnostics import _p99
 from pns_common.refine_parts import refine_parts
 from tests.support.meshes import bumpy_sphere
+from train.data.primitives import cylinder
 
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
@@ -131,3 +132,25 @@ def test_a_part_of_no_size_goes_alone() -> None:
 def test_the_percentile_is_numpys(count: int, seed: int, power: int) -> None:
     values = np.random.default_rng(seed).random(count) * 10.0**power
     assert _p99(values) == float(np.percentile(values, 99))
+
+
+@needs_kernels
+def test_creases_that_nothing_moves_are_reported_alike_beside_creases_that_are_pushed():
+    """All edges of an octahedron end at corners; the rims of a cylinder are round."""
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2]])
+    faces = np.concatenate([faces, [[1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]])
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    round_, rims = cylinder(12), crease_lines(cylinder(12))
+    meshes, creases = [Mesh(axes, faces), round_], [edges, rims]
+    together = Mesh(
+        np.concatenate([axes, round_.vertices + np.array([9, 0, 0])]),
+        np.concatenate([faces, round_.faces + len(axes)]),
+    )
+    of_parts = np.cumsum([0, len(faces), len(round_.faces)])
+    named = np.concatenate([edges, rims + len(axes)])
+    made = refine_parts(together, of_parts, pns(load_model()), 1, creases=named)
+    for part, (mesh, own) in enumerate(zip(meshes, creases, strict=True)):
+        alone = refine(mesh, pns(load_model()), 1, creases=own).report
+        for name in ("limit_distance", "limit_distance_bound"):
+            assert made.reports[part][name] == pytest.approx(alone[name], rel=1e-9)

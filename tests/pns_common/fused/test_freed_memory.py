@@ -64,9 +64,18 @@ def test_there_is_room_for_what_cannot_be_made_of_freed_memory():
 
 
 @GLIBC
-def test_the_environment_may_say_what_is_kept():
+@pytest.mark.parametrize(
+    "setting",
+    [
+        {"MALLOC_TRIM_THRESHOLD_": "65536", "MALLOC_MMAP_THRESHOLD_": "1048576"},
+        {"MALLOC_MMAP_THRESHOLD_": "1048576"},
+        {"GLIBC_TUNABLES": "glibc.malloc.trim_threshold=65536"},
+    ],
+    ids=["trim", "mmap", "tunables"],
+)
+def test_the_environment_may_say_what_is_kept(setting):
     program = PROGRAM.format(first="keep_freed_memory()")
-    given = os.environ | {"MALLOC_TRIM_THRESHOLD_": "65536", "MALLOC_MMAP_THRESHOLD_": "1048576"}
+    given = os.environ | setting
     faults = int(subprocess.check_output([sys.executable, "-c", program], env=given))
     assert faults >= 9  # each page is a new one, and huge at most
 

@@ -23,6 +23,7 @@ from tests.support.networks import CARD, SCALE_FREE_CARD, VERTEX_CARD
         ({"network_altitudes": 0.0}, "network_altitudes 0.0, not a finite number > 0"),
         ({"tip_strength": -0.1}, "tip_strength -0.1, not a finite number ≥ 0"),
         ({"crease_prior": 1}, "crease_prior of type int"),
+        ({"crease_prior": True}, "crease_prior without a boundary_strength"),
         ({"crease_angle": 180.0}, "crease_angle 180.0, not between 0 and 180 degrees"),
         ({"crease_angle": 0.0}, "crease_angle 0.0"),
         ({"crease_angle": 66.0}, "one of crease_angle and crease_levels without the other"),
