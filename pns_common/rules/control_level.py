@@ -72,7 +72,11 @@ class ControlLevel:
     @cached_property
     def curve_pushes(self) -> Callable[[float, Kinds], Float[Array, "V 3"]]:
         """d of the curves' prior at b = 1, by c_v and kinds: computed once, read four times."""
-        return cache(lambda sharpness, kinds: curve_pushes(self.curves(kinds), sharpness))
+
+        def pushes(gate_sharpness: float, kinds: Kinds) -> Float[Array, "V 3"]:
+            return curve_pushes(self.curves(kinds), gate_sharpness)
+
+        return cache(pushes)
 
 
 def control_level(

@@ -26,7 +26,7 @@ from pns_common.schemes import (
     scale_free_scheme,
     vertex_operator,
 )
-from tests.support.meshes import bent, grid, manifolds, rotation, soups
+from tests.support.meshes import bent, grid, manifolds, soups
 from tests.support.networks import SCALE_FREE_CARD, scale_free_model
 
 STRONG, WITHOUT = (scale_free_model(0, 2.0, boundary_strength=b) for b in (1.0, None))
@@ -133,21 +133,17 @@ def test_a_corner_of_a_sheet_stays_with_tips_on_the_card():
     np.testing.assert_allclose(rest[0], rest[1], rtol=0, atol=1e-15)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_where_a_boundary_turns_back_on_itself_rounding_decides_nothing(seed):
-    """A disc with a slit whose sides lie side by side: from a to b there is no direction."""
+@pytest.mark.parametrize("apart", [[0, 0, 0], [1e-15, 0, 0], [0, 1e-15, 0], [0, 0, 1e-15]])
+def test_where_a_boundary_turns_back_on_itself_rounding_decides_nothing(apart):
+    """A disc with a slit whose sides lie side by side: from one to the other is no direction."""
     angle = np.linspace(0, 2 * np.pi, 9)
-    points = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    points = np.concatenate([np.zeros((1, 3)), points])
+    rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    points = np.concatenate([np.zeros((1, 3)), rim])
+    points[9] = points[1] + apart
     around = np.arange(1, 9)
-    faces = np.stack([0 * around, around, around + 1], axis=1)
-    rng = np.random.default_rng(seed)
-    points[9] = points[1] + 1e-15 * rng.standard_normal(3)
-    turned = points @ rotation(rng).T
-    tips = [
-        refine(Mesh(p, faces), pns(WITH_TIPS), 1, 1.0).mesh.vertices[0] for p in (points, turned)
-    ]
-    assert np.abs(tips).max() < 1e-9
+    mesh = Mesh(points, np.stack([0 * around, around, around + 1], axis=1))
+    tip = refine(mesh, pns(WITH_TIPS), 1, 1.0).mesh.vertices[0]
+    assert np.abs(tip).max() < 1e-9
 
 
 @given(manifolds() | soups(), st.floats(1e-3, 1e6))
