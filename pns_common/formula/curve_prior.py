@@ -42,7 +42,7 @@ class Curves:
     Attributes:
         movable: of all vertices those on exactly two such edges, and on no other that is sharp.
         edges: those that end at a movable vertex; what happens at others does not change them.
-        rows: their numbers.
+        rows: the numbers of the movable vertices.
         a, b: from each of these to its two neighbours along the curve.
     """
 

@@ -67,7 +67,7 @@ class SharpLevel:
 
 
 @dataclass(frozen=True, eq=False)
-class Curves:
+class CurveMoves:
     """What a rule makes of a level's curves.
 
     Attributes:
@@ -104,7 +104,7 @@ class Curves:
         return shared
 
 
-NO_RULE = Curves(None, None, np.zeros((0, 3)), -0.0)
+NO_RULE = CurveMoves(None, None, np.zeros((0, 3)), -0.0)
 
 
 def curves_of(
@@ -112,18 +112,18 @@ def curves_of(
     points: Float[np.ndarray, "V 3"],
     mesh: MeshEdges,
     length: float | Float[np.ndarray, " V"],
-) -> Curves:
+) -> CurveMoves:
     """Make what ``rule`` adds at a level's curves; ``length`` is R, or each vertex's own."""
     if rule is None:
         return NO_RULE
     if not are_of(rule.kinds, mesh.edge_class[mesh.sharp_edges]).any():
-        return Curves(rule, None, np.zeros((0, 3)), 0.0)
+        return CurveMoves(rule, None, np.zeros((0, 3)), 0.0)
     sharp = SharpLevel.of(points, mesh, length)
     if len(sharp.level.curves(rule.kinds).rows) == 0:
-        return Curves(rule, sharp, np.zeros((0, 3)), 0.0)
+        return CurveMoves(rule, sharp, np.zeros((0, 3)), 0.0)
     pushes = np.zeros_like(points)
     pushes[sharp.vertices] = rule.pushes(sharp.level)
-    return Curves(rule, sharp, pushes, 0.0)
+    return CurveMoves(rule, sharp, pushes, 0.0)
 
 
 def _move(

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from pns_common.base.blocks import Blocks
 from pns_common.fused.additions import Additions
 from pns_common.fused.child_faces import look_at_children
-from pns_common.fused.curves import Curves, curves_of
+from pns_common.fused.curves import CurveMoves, curves_of
 from pns_common.fused.edge_rule import add_at_edges
 from pns_common.fused.guard import guard_scale
 from pns_common.fused.level import FusedLevel, FusedStep, crease_shift_of
@@ -116,7 +116,7 @@ def _added_by_rules(
     scheme: Scheme,
     length: float | Float[np.ndarray, " V"],
     blocks: Blocks,
-    curves: Curves,
+    curves: CurveMoves,
 ) -> tuple[Additions, Additions, Additions]:
     """Return what both rules add but on curves: to vertices, to edges, and both together."""
     mesh, count = level.mesh, level.mesh.vertex_count

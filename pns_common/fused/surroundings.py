@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
-from pns_common.fused.curves import NO_RULE, Curves
+from pns_common.fused.curves import NO_RULE, CurveMoves
 from pns_common.fused.edge_lengths import EdgeLengths, edge_lengths
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.fused.rings import (
@@ -37,7 +37,7 @@ class Surroundings:
     several_fans: Bool[np.ndarray, " V"]
     reference_length: float | Float[np.ndarray, " V"]
     blocks: Blocks
-    curves: Curves = NO_RULE
+    curves: CurveMoves = NO_RULE
     altitudes: float = math.inf
 
     def budget_per_length(

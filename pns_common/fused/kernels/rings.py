@@ -61,6 +61,13 @@ def norm(v):
     return math.sqrt(square) if square > 0 else 0.0
 
 
+def clear_normal(mean):
+    """Return m̂ of a mean normal, as in ``prior.clear_normals``."""
+    agreement = norm(mean)
+    clear = agreement if agreement > CLEAR_NORMAL else CLEAR_NORMAL
+    return mean[0] / clear, mean[1] / clear, mean[2] / clear
+
+
 def row(values, i):
     """Return the first three columns of a row."""
     return values[i, 0], values[i, 1], values[i, 2]
@@ -234,10 +241,7 @@ def prior_pushes(means, fields, valence, smooth, ring_weight, begin, end, pushes
         ring_weight: w_k for each valence that occurs.
     """
     for v in range(begin, end):
-        mean = row(fields, v)
-        agreement = norm(mean)
-        clear = agreement if agreement > CLEAR_NORMAL else CLEAR_NORMAL
-        normal = mean[0] / clear, mean[1] / clear, mean[2] / clear
+        normal = clear_normal(row(fields, v))
         weight = ring_weight[valence[v]] * smooth[v]
         inwards = weight * dot(row(means, v), normal)
         for k in range(3):

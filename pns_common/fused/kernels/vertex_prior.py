@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from pns_common.formula.prior import CLEAR_NORMAL
 from pns_common.formula.tips import BENDS_MORE, LEFT
 from pns_common.fused.kernels.compiled import INDEX, NUMBERS, POINTS, POINTS_OUT, REAL, SIZE, kernel
 from pns_common.fused.kernels.rings import (
@@ -12,8 +11,8 @@ from pns_common.fused.kernels.rings import (
     NEAR_JUMP,
     RING_SQUARE,
     UMBRELLA,
+    clear_normal,
     dot,
-    norm,
     row,
 )
 
@@ -89,10 +88,7 @@ def add_priors_but_at_tips(
             ahead * (pushes[v, 1] - pushed[v, 1] - moved[1]) - pushes[v, 1],
             ahead * (pushes[v, 2] - pushed[v, 2] - moved[2]) - pushes[v, 2],
         )
-        mean = row(fields, v)
-        agreement = norm(mean)
-        clear = agreement if agreement > CLEAR_NORMAL else CLEAR_NORMAL
-        left = abs(dot(behind, (mean[0] / clear, mean[1] / clear, mean[2] / clear)))
+        left = abs(dot(behind, clear_normal(row(fields, v))))
         square = means[v, RING_SQUARE]
         length = math.sqrt(square) if square > 0 else 0.0
         far = _rise(left, length, LEFT_FROM, LEFT_TO)

@@ -1,7 +1,5 @@
 """The prior of curves: made of the curve alone, bounded, and nothing where it is straight."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import torch
@@ -17,17 +15,10 @@ from pns_common.formula.curve_prior import (
     curve_pushes,
     find_curves,
 )
-from pns_common.levels.step import level_step
 from pns_common.masks.limit import limit_positions
-from pns_common.rules.control_level import control_level
-from pns_common.schemes import (
-    edge_operator,
-    scale_free_form,
-    scale_free_scheme,
-    vertex_operator,
-)
 from tests.support.meshes import bent, grid, manifolds, soups
-from tests.support.networks import SCALE_FREE_CARD, scale_free_model
+from tests.support.networks import scale_free_model
+from tests.support.prior_step import prior_step
 
 STRONG, WITHOUT = (scale_free_model(0, 2.0, boundary_strength=b) for b in (1.0, None))
 OF_CREASES = scale_free_model(0, 2.0, boundary_strength=1.0, crease_prior=True)
@@ -163,12 +154,7 @@ def test_without_a_strength_boundaries_are_loops(mesh):
 
 def step_on(points, topology, xp):
     """The prior alone."""
-    form = replace(scale_free_form(SCALE_FREE_CARD, 20.0), boundary_strength=0.7)
-    edges = replace(edge_operator(STRONG), network=lambda rows: xp.zeros_like(rows[:, :3]))
-    vertices = replace(vertex_operator(STRONG), network=lambda rows: xp.zeros_like(rows[:, :3]))
-    return level_step(
-        control_level(points, topology), scale_free_scheme(edges, vertices, form)
-    ).points
+    return prior_step(points, topology, xp, boundary_strength=0.7)
 
 
 @given(manifolds() | soups())

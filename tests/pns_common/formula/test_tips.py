@@ -1,7 +1,5 @@
 """Tips: λ and what is left behind by Loop's limits, and what becomes of spikes and spheres."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import torch
@@ -20,13 +18,12 @@ from pns_common.formula.tips import (
     left_behind,
     ring_further,
 )
-from pns_common.levels.step import level_step
 from pns_common.masks.limit import limit_positions
 from pns_common.masks.stencils import loop_vertex_vertices
 from pns_common.rules.control_level import control_level
-from pns_common.schemes import edge_operator, scale_free_form, scale_free_scheme, vertex_operator
 from tests.support.meshes import bumpy_sphere, grid, icosphere, manifolds, soups, tilted_plane
-from tests.support.networks import SCALE_FREE_CARD, scale_free_model
+from tests.support.networks import scale_free_model
+from tests.support.prior_step import prior_step
 
 # The prior alone, its gates open: what becomes of a vertex is what the tips make of it.
 OPEN = {"budget": 1e6, "vertex_gate_sharpness": 1e9, "gate_sharpness": 1e9}
@@ -142,12 +139,7 @@ def test_tips_stay_within_the_budget_and_nothing_folds(mesh, budget, strength):
 
 def step_on(points, topology, xp):
     """The prior alone, with tips on curves and surfaces."""
-    form = replace(scale_free_form(SCALE_FREE_CARD, 20.0), boundary_strength=0.7, tip_strength=0.8)
-    model = scale_free_model()
-    edges = replace(edge_operator(model), network=lambda rows: xp.zeros_like(rows[:, :3]))
-    vertices = replace(vertex_operator(model), network=lambda rows: xp.zeros_like(rows[:, :3]))
-    scheme = scale_free_scheme(edges, vertices, form)
-    return level_step(control_level(points, topology), scheme).points
+    return prior_step(points, topology, xp, boundary_strength=0.7, tip_strength=0.8)
 
 
 @given(manifolds() | soups())
