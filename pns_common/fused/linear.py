@@ -37,17 +37,24 @@ class FusedLinearRefinement:
     def __call__(self, columns: Float[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
         """Refine columns."""
         width = columns.shape[1]
-        refined = np.empty((self.count, width))
-        for start in range(0, width, WIDTH):
-            given = columns[:, start : start + WIDTH]
-            points = np.zeros((len(columns), WIDTH))
-            points[:, : given.shape[1]] = given
-            for mesh in self.meshes:
-                points = loop_points(points, mesh, self.blocks)
-            refined[:, start : start + WIDTH] = points[:, : given.shape[1]]
+        if width == WIDTH:
+            refined = self._three(columns)
+        else:
+            refined = np.empty((self.count, width))
+            for start in range(0, width, WIDTH):
+                given = columns[:, start : start + WIDTH]
+                points = np.zeros((len(columns), WIDTH))
+                points[:, : given.shape[1]] = given
+                refined[:, start : start + WIDTH] = self._three(points)[:, : given.shape[1]]
         if self.limit:
             return refined_limit_positions(refined, topology_of(self.meshes[-1]))
         return refined
+
+    def _three(self, points: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "W 3"]:
+        points = np.ascontiguousarray(points)
+        for mesh in self.meshes:
+            points = loop_points(points, mesh, self.blocks)
+        return points
 
 
 def linear_refinement(

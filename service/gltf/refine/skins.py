@@ -13,15 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.base.blocks import Blocks, available_threads
+from pns_common.base.blocks import available_threads
+from pns_common.fused import kernel_blocks
+from pns_common.fused.shares import keep_heaviest, scale_rows, whole_units
 from pns_common.masks.linear import ColumnRefinement
 
 from ..read.primitives import TrianglePrimitive
 from ..read.quantization import as_float
 
 SLOTS = 4
-# Joints refined at a time: the memory does not grow with the skeleton.
-COLUMNS = 9
+# Joints refined at a time, as many as a point has coordinates: the memory does not grow with the
+# skeleton.
+COLUMNS = 3
 # Integers up to here are exact in float32, and so are their sums: weights that are multiples of
 # 2⁻²⁴ add up to exactly 1 in any order.
 FLOAT_UNITS = 2**24
@@ -75,32 +78,22 @@ def refine_binding(
     binding: Binding, linear: ColumnRefinement
 ) -> tuple[Binding, Int[np.ndarray, " V"]]:
     """Refine the binding; return also which vertices lost a joint for want of slots."""
-    width = binding.weights.shape[1]
+    width, blocks = binding.weights.shape[1], kernel_blocks(available_threads())
     bound = binding.weights > 0
-    used = np.unique(binding.joints[bound])
-    row, slot = np.nonzero(bound)
-    column, value = np.searchsorted(used, binding.joints[row, slot]), binding.weights[row, slot]
-    shape = linear.count, width
-    joints, weights = np.zeros(shape, dtype=np.int64), np.zeros(shape)
-    cut = np.zeros(linear.count)
-    for start in range(0, len(used), COLUMNS):
-        block = used[start : start + COLUMNS]
-        here = (column >= start) & (column < start + COLUMNS)
-        dense = np.zeros((len(bound), len(block)))
-        dense[row[here], column[here] - start] = value[here]
-        part = linear(dense)
-        # Joints are local: most vertices have none of a block.
-        touched = np.flatnonzero(_row_sums(part))
-
-        def merge(share: slice, touched=touched, block=block, part=part) -> None:
-            rows = touched[share]
-            named = np.broadcast_to(block, (len(rows), len(block)))
-            heavy = np.hstack([weights[rows], part[rows]])
-            joints[rows], weights[rows] = _heaviest(np.hstack([joints[rows], named]), heavy, width)
-            cut[rows] += _row_sums(heavy) - _row_sums(weights[rows])
-
-        Blocks(available_threads()).run(len(touched), merge)
-    return _normalised(joints, weights), np.flatnonzero(cut > NOTHING)
+    used, column = np.unique(binding.joints[bound], return_inverse=True)
+    row, value = np.nonzero(bound)[0], binding.weights[bound]
+    order = np.argsort(column, kind="stable")
+    starts = np.searchsorted(column[order], np.arange(len(used) + COLUMNS))
+    joints = np.zeros((linear.count, width), dtype=np.int32)
+    weights, lost = np.zeros((linear.count, width)), np.zeros(linear.count)
+    for first in range(0, len(used), COLUMNS):
+        names = used[first : first + COLUMNS]
+        here = order[starts[first] : starts[first + len(names)]]
+        dense = np.zeros((len(bound), len(names)))
+        dense[row[here], column[here] - first] = value[here]
+        keep_heaviest(linear(dense), names, joints, weights, lost, blocks)
+    scale_rows(weights, blocks)
+    return Binding(joints, weights), np.flatnonzero(lost > NOTHING)
 
 
 def skin_attributes(
@@ -114,8 +107,7 @@ def skin_attributes(
         return attributes
     dtype = primitive.attributes[f"WEIGHTS_{sets[0]}"].dtype
     total_units = FLOAT_UNITS if dtype.kind == "f" else int(np.iinfo(dtype).max)
-    blocks, weights = Blocks(available_threads()), kept.weights
-    (units,) = blocks.gather(len(weights), lambda at: (whole_units(weights[at], total_units),))
+    units = whole_units(kept.weights, total_units, kernel_blocks(available_threads()))
     joints = np.where(units > 0, kept.joints, 0)
     # Another primitive's joints may reach across their common edge.
     wide = np.uint16 if joints.max(initial=0) > np.iinfo(np.uint8).max else np.uint8
@@ -126,30 +118,6 @@ def skin_attributes(
         shares = units[:, slots] / total_units if dtype.kind == "f" else units[:, slots]
         attributes[f"WEIGHTS_{number}"] = shares.astype(dtype)
     return attributes
-
-
-def whole_units(weights: Float[np.ndarray, "N K"], total_units: int) -> Int[np.ndarray, "N K"]:
-    """Round weights to integers that sum to `total_units` a row: largest remainders go up.
-
-    Rows without weight stay 0.
-    """
-    total = weights.sum(axis=1, keepdims=True)
-    exact = total_units * weights / np.where(total > 0, total, 1.0)
-    units = np.floor(exact).astype(np.int64)
-    missing = np.where(total[:, 0] > 0, total_units - units.sum(axis=1), 0)
-    return units + (_places(units - exact) < missing[:, None])
-
-
-def _places(keys: Float[np.ndarray, "N K"]) -> Int[np.ndarray, "N K"]:
-    """Return which in its row each number is, ascending; of equals, the earlier comes first."""
-    slots = np.ascontiguousarray(keys.T)
-    places = np.empty(slots.shape, dtype=np.int64)
-    # A loop over slots, of which there are four a set.
-    for slot, own in enumerate(slots):
-        less = own < slots[:slot]
-        places[:slot] += less
-        places[slot] = slot - less.sum(axis=0)
-    return places.T
 
 
 def _fractions(weights: Shaped[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 4"]:
@@ -179,11 +147,6 @@ def _heaviest(
     order = np.argsort(-weights, axis=1, kind="stable")[:, :count]
     joints, weights = (np.take_along_axis(part, order, axis=1) for part in (joints, weights))
     return np.where(weights > 0, joints, 0), weights
-
-
-def _row_sums(weights: Float[np.ndarray, "N K"]) -> Float[np.ndarray, " N"]:
-    """Return what each row weighs, to rounding: numpy's own sums take long over short rows."""
-    return weights @ np.ones(weights.shape[1])
 
 
 def _normalised(joints: Int[np.ndarray, "N K"], weights: Float[np.ndarray, "N K"]) -> Binding:

@@ -169,7 +169,7 @@ def test_joints_of_one_mesh_do_not_wait_for_those_of_another() -> None:
         for kind in (LinearRefinement, FusedLinearRefinement):
             patch.setattr(kind, "__call__", counting(kind.__call__, columns))
         assert refine(files.glb(*shapes)).report["totals"]["meshes"] == 40
-    assert columns == [4]
+    assert sum(columns) == 4
 
 
 def test_one_mesh_without_a_face_does_not_send_the_others_alone(
