@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from jaxtyping import Float, Float32
 
+from pns_common.fused.kernels.gelu import LIMIT
 from pns_common.fused.kernels.tied_network import LANES, answer
 from pns_common.models.tied_form import TiedForm
 
@@ -18,9 +17,7 @@ def answers_of(
 ) -> Float32[np.ndarray, "N 3"]:
     """Return what ``tied_network.arrays.answers_of`` gives, bit for bit."""
     answers = np.empty((len(features), 3), dtype=np.float32)
-    widest = int(form.widths.max())
-    units = _on_cache_lines(form.copies, widest, LANES)
-    held = _on_cache_lines(2, max(widest, features.shape[1]), LANES)
+    units = form.copies * int(form.widths.max())
     answer(
         features,
         form.pairs,
@@ -29,20 +26,23 @@ def answers_of(
         form.first,
         form.hidden,
         form.biases,
-        form.last,
+        form.last.reshape(-1),
         form.last_characters,
         form.last_bias,
+        form.copies,
+        float(LIMIT),
         budget,
-        units,
-        held,
+        _on_cache_lines(max(features.shape[1], 3) * LANES),
+        _on_cache_lines(units * LANES),
+        _on_cache_lines(units * LANES),
         answers,
     )
     return answers
 
 
-def _on_cache_lines(*shape: int) -> Float32[np.ndarray, "G M L"]:
+def _on_cache_lines(size: int) -> Float32[np.ndarray, " N"]:
     """Make space that begins with a cache line, so no vector lies on two: a quarter sooner."""
-    size = np.dtype(np.float32).itemsize
-    space = np.empty(math.prod(shape) + CACHE_LINE // size, dtype=np.float32)
-    start = -space.ctypes.data % CACHE_LINE // size
-    return space[start : start + math.prod(shape)].reshape(shape)
+    line = CACHE_LINE // np.dtype(np.float32).itemsize
+    space = np.empty(size + line, dtype=np.float32)
+    start = -space.ctypes.data % CACHE_LINE // np.dtype(np.float32).itemsize
+    return space[start : start + size]

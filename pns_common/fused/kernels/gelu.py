@@ -30,7 +30,10 @@ def gelu_within(x: Any, limited: Any) -> Any:
     return half + half * (limited * p / q)
 
 
-def gelu(x):
-    """Return x Φ(x) of a number; NaN of −∞, as x/2 (1 + erf(x/√2)) is."""
-    above = x if x > -LIMIT else -LIMIT
-    return gelu_within(x, above if above < LIMIT else LIMIT)
+def gelu(x, limit):
+    """Return x Φ(x) of a number; NaN of −∞, as x/2 (1 + erf(x/√2)) is.
+
+    ``limit`` is LIMIT. A compiler that knew the number would take four steps for these two.
+    """
+    above = x if x > -limit else -limit
+    return gelu_within(x, above if above < limit else limit)

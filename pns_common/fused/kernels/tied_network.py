@@ -15,132 +15,233 @@ from pns_common.fused.kernels.compiled import (
     SINGLES,
     SINGLES_2,
     SINGLES_2_OUT,
-    SINGLES_3_OUT,
+    SINGLES_OUT,
     SIZE,
     kernel,
 )
 from pns_common.fused.kernels.gelu import gelu
 
-# Rows that are computed together: what they take stays in the first-level cache.
+# Rows that are computed together, one beside the other: what they take stays in the first-level
+# cache. A number of a row stands LANES after the one before it, whatever the network: so machine
+# code knows that those that it reads do not overlap those that it writes.
 LANES = 128
-# What is held beside the units: features, and what the layer before said.
-SEEN, SAID = 0, 1
 NOTHING = np.float32(0)
 
 
-def _read(features, begin, held):
-    """Read rows from ``begin`` on, one beside the other; 0 past the last."""
+def _read(features, begin, seen):
+    """Read rows from ``begin`` on; 0 past the last."""
     present = min(LANES, features.shape[0] - begin)
     for k in range(features.shape[1]):
         for lane in range(present):
-            held[SEEN, k, lane] = np.float32(features[begin + lane, k])
+            seen[k * LANES + lane] = np.float32(features[begin + lane, k])
         for lane in range(present, LANES):
-            held[SEEN, k, lane] = NOTHING
+            seen[k * LANES + lane] = NOTHING
 
 
-def _add_and_subtract(x, g, i, h, j):
-    """Put the sum and the difference of two rows in their place."""
+def _start(i):
+    """Return where row i begins; that it is no negative index a compiler cannot know."""
+    return max(i * LANES, 0)
+
+
+def _add_and_subtract(x, i, j):
+    """Put the sum and the difference of rows i and j of ``x`` in their place."""
+    first, second = _start(i), _start(j)
     for lane in range(LANES):
-        a, b = x[g, i, lane], x[h, j, lane]
-        x[g, i, lane] = a + b
-        x[h, j, lane] = a - b
+        a, b = x[first + lane], x[second + lane]
+        x[first + lane] = a + b
+        x[second + lane] = a - b
 
 
-def _fill(x, g, i, value):
+def _fill(x, i, value):
+    to = _start(i)
     for lane in range(LANES):
-        x[g, i, lane] = value
+        x[to + lane] = value
 
 
-def _add_product(x, g, i, weight, y, h, j):
+def _add_one(x, i, y, j, weight):
+    to, of = _start(i), _start(j)
     for lane in range(LANES):
-        x[g, i, lane] += weight * y[h, j, lane]
+        x[to + lane] += weight * y[of + lane]
 
 
-def _add_two_products(x, g, i, weight, next_weight, y, h, j):
-    """Add those of two rows, one after the other: what they are added to is read and kept once."""
+def _add_two(x, i, y, j, k, weight, next_weight):
+    """Add products of two rows, one after the other: what they are added to is read once."""
+    to, of, then = _start(i), _start(j), _start(k)
     for lane in range(LANES):
-        sum_so_far = x[g, i, lane] + weight * y[h, j, lane]
-        x[g, i, lane] = sum_so_far + next_weight * y[h, j + 1, lane]
+        total = x[to + lane] + weight * y[of + lane]
+        x[to + lane] = total + next_weight * y[then + lane]
 
 
-def _transform(units, width):
+def _add_four(x, i, y, j, step, weights, at):
+    """Add those of four rows likewise."""
+    a, b, c, d = weights[at], weights[at + 1], weights[at + 2], weights[at + 3]
+    to, first, second = _start(i), _start(j), _start(j + step)
+    third, fourth = _start(j + 2 * step), _start(j + 3 * step)
+    for lane in range(LANES):
+        total = x[to + lane] + a * y[first + lane]
+        total += b * y[second + lane]
+        total += c * y[third + lane]
+        x[to + lane] = total + d * y[fourth + lane]
+
+
+def _weigh(x, i, bias, y, j, step, count, weights, at):
+    """Put a bias and the products of rows j, j + step, … of ``y`` into row i, in this order."""
+    _fill(x, i, bias)
+    done = 0
+    while done + 4 <= count:
+        _add_four(x, i, y, j + done * step, step, weights, at + done)
+        done += 4
+    if done + 2 <= count:
+        row = j + done * step
+        _add_two(x, i, y, row, row + step, weights[at + done], weights[at + done + 1])
+        done += 2
+    if done < count:
+        _add_one(x, i, y, j + done * step, weights[at + done])
+
+
+def _two(a, b):
+    return a + b, a - b
+
+
+def _eight(a, b, c, d, e, f, g, h):
+    """Return the sums and differences of eight copies by their characters."""
+    a, b = _two(a, b)
+    c, d = _two(c, d)
+    e, f = _two(e, f)
+    g, h = _two(g, h)
+    a, c = _two(a, c)
+    b, d = _two(b, d)
+    e, g = _two(e, g)
+    f, h = _two(f, h)
+    a, e = _two(a, e)
+    b, f = _two(b, f)
+    c, g = _two(c, g)
+    d, h = _two(d, h)
+    return a, b, c, d, e, f, g, h
+
+
+def _activate_eight(units, said, width, limit):
+    for i in range(width):
+        for lane in range(LANES):
+            k = i * 8 * LANES + lane
+            a, b, c, d, e, f, g, h = _eight(
+                units[k],
+                units[k + LANES],
+                units[k + 2 * LANES],
+                units[k + 3 * LANES],
+                units[k + 4 * LANES],
+                units[k + 5 * LANES],
+                units[k + 6 * LANES],
+                units[k + 7 * LANES],
+            )
+            a, b, c, d = gelu(a, limit), gelu(b, limit), gelu(c, limit), gelu(d, limit)
+            e, f, g, h = gelu(e, limit), gelu(f, limit), gelu(g, limit), gelu(h, limit)
+            a, b, c, d, e, f, g, h = _eight(a, b, c, d, e, f, g, h)
+            said[k] = a
+            said[k + LANES] = b
+            said[k + 2 * LANES] = c
+            said[k + 3 * LANES] = d
+            said[k + 4 * LANES] = e
+            said[k + 5 * LANES] = f
+            said[k + 6 * LANES] = g
+            said[k + 7 * LANES] = h
+
+
+def _activate_two(units, said, width, limit):
+    for i in range(width):
+        for lane in range(LANES):
+            k = i * 2 * LANES + lane
+            a, b = _two(units[k], units[k + LANES])
+            a, b = _two(gelu(a, limit), gelu(b, limit))
+            said[k] = a
+            said[k + LANES] = b
+
+
+def _transform(units, copies, width):
     """Put Σ_g χ_s(g) x_g in place of x_s."""
     step = 1
-    while step < units.shape[0]:
-        for g in range(units.shape[0]):
-            if g & step == 0:
-                for i in range(width):
-                    _add_and_subtract(units, g, i, g + step, i)
+    while step < copies:
+        for i in range(width):
+            for g in range(copies):
+                if g & step == 0:
+                    _add_and_subtract(units, i * copies + g, i * copies + g + step)
         step *= 2
 
 
-def _activate(units, width):
-    """Apply GELU to all copies, between two transforms."""
-    _transform(units, width)
-    for g in range(units.shape[0]):
-        for i in range(width):
-            for lane in range(LANES):
-                units[g, i, lane] = gelu(units[g, i, lane])
-    _transform(units, width)
+def _activate(units, said, copies, width, limit):
+    """Write GELU of all copies, between two transforms."""
+    if copies == 8:
+        _activate_eight(units, said, width, limit)
+    elif copies == 2:
+        _activate_two(units, said, width, limit)
+    else:
+        _transform(units, copies, width)
+        for k in range(width * copies * LANES):
+            said[k] = gelu(units[k], limit)
+        _transform(said, copies, width)
 
 
-def _first(units, held, width, characters, first, biases):
-    for s in range(units.shape[0]):
+def _first(units, seen, copies, width, characters, first, biases):
+    for s in range(copies):
         for i in range(width):
-            _fill(units, s, i, biases[i] if s == 0 else NOTHING)
-    for k in range(len(characters)):
-        for i in range(width):
-            _add_product(units, characters[k], i, first[k, i], held, SEEN, k)
+            _fill(units, i * copies + s, biases[i] if s == 0 else NOTHING)
+        waits = -1
+        for k in range(len(characters)):
+            if characters[k] != s:
+                continue
+            if waits < 0:
+                waits = k
+                continue
+            for i in range(width):
+                _add_two(units, i * copies + s, seen, waits, k, first[waits, i], first[k, i])
+            waits = -1
+        if waits >= 0:
+            for i in range(width):
+                _add_one(units, i * copies + s, seen, waits, first[waits, i])
 
 
-def _next(units, held, before, width, hidden, at, biases, bias_at):
-    """Put a layer in place of the one before it: a block of products for each character."""
-    for s in range(units.shape[0]):
-        for j in range(before):
-            for lane in range(LANES):
-                held[SAID, j, lane] = units[s, j, lane]
+def _next(units, said, copies, before, width, hidden, at, biases, bias_at):
+    """Write a layer of what the one before it said: a block of products for each character."""
+    for s in range(copies):
         for i in range(width):
-            _fill(units, s, i, biases[bias_at + i] if s == 0 else NOTHING)
-            for j in range(0, before - 1, 2):
-                _add_two_products(units, s, i, hidden[at], hidden[at + 1], held, SAID, j)
-                at += 2
-            if before % 2 == 1:
-                _add_product(units, s, i, hidden[at], held, SAID, before - 1)
-                at += 1
+            bias = biases[bias_at + i] if s == 0 else NOTHING
+            _weigh(units, i * copies + s, bias, said, s, copies, before, hidden, at)
+            at += before
     return at
 
 
-def _square(held, lane):
+def _square(z, lane):
     """Return ‖z‖² in double precision, where no square of a single overflows."""
-    x = np.float64(held[SEEN, 0, lane])
-    y = np.float64(held[SEEN, 1, lane])
-    z = np.float64(held[SEEN, 2, lane])
-    return x * x + y * y + z * z
+    x, y = np.float64(z[lane]), np.float64(z[LANES + lane])
+    w = np.float64(z[2 * LANES + lane])
+    return x * x + y * y + w * w
 
 
-def _write(held, begin, budget, answers):
+def _write(z, begin, budget, answers):
     """Write budget · z / max(1, ‖z‖) in double precision."""
     present, long = min(LANES, len(answers) - begin), 0
     for lane in range(LANES):
-        long += not _square(held, lane) <= 1
+        long += not _square(z, lane) <= 1
     if long == 0:
         # As in most: neither a root nor a division.
         for lane in range(present):
             for c in range(3):
-                answers[begin + lane, c] = np.float32(np.float64(held[SEEN, c, lane]) * budget)
+                said = np.float64(z[c * LANES + lane])
+                answers[begin + lane, c] = np.float32(said * budget)
         return
     for lane in range(present):
-        length = math.sqrt(_square(held, lane))
+        length = math.sqrt(_square(z, lane))
         divisor = length if length > 1 else 1.0
         for c in range(3):
-            z = np.float64(held[SEEN, c, lane])
-            answers[begin + lane, c] = np.float32(z / divisor * budget)
+            said = np.float64(z[c * LANES + lane])
+            answers[begin + lane, c] = np.float32(said / divisor * budget)
 
 
 @kernel(
     SIZE,
     *(POINTS, INDICES, INDEX, INTEGERS, SINGLES_2, SINGLES, SINGLES),
-    *(SINGLES_2, INDEX, SINGLES, REAL, SINGLES_3_OUT, SINGLES_3_OUT, SINGLES_2_OUT),
+    *(SINGLES, INDEX, SINGLES, SIZE, REAL, REAL),
+    *(SINGLES_OUT, SINGLES_OUT, SINGLES_OUT, SINGLES_2_OUT),
 )
 def answer(
     features,
@@ -153,33 +254,38 @@ def answer(
     last,
     last_characters,
     last_bias,
+    copies,
+    limit,
     budget,
+    seen,
     units,
-    held,
+    said,
     answers,
 ):
     """Answer all rows of features; the weights are those of ``form.TiedForm``.
 
     Args:
-        units: (n, M, LANES) for the widest M layer, overwritten.
-        held: (2, the larger of K and M, LANES), likewise.
+        limit: GELU's.
+        last: (3 M,) products of one coordinate after the other.
+        seen: LANES for each of the larger of K and 3, overwritten.
+        units, said: LANES for each of n M units of the widest layer, likewise: before GELU, and
+            after it.
         answers: (N, 3) out.
     """
     for begin in range(0, len(features), LANES):
-        _read(features, begin, held)
+        _read(features, begin, seen)
         for pair in range(len(pairs)):
-            _add_and_subtract(held, SEEN, pairs[pair, 0], SEEN, pairs[pair, 1])
+            _add_and_subtract(seen, pairs[pair, 0], pairs[pair, 1])
         width, at, bias_at = widths[0], 0, widths[0]
-        _first(units, held, width, characters, first, biases)
+        _first(units, seen, copies, width, characters, first, biases)
         for layer in range(1, len(widths)):
-            _activate(units, width)
-            at = _next(units, held, width, widths[layer], hidden, at, biases, bias_at)
-            width = widths[layer]
+            _activate(units, said, copies, width, np.float32(limit))
+            before, width = width, widths[layer]
+            at = _next(units, said, copies, before, width, hidden, at, biases, bias_at)
             bias_at += width
-        _activate(units, width)
+        _activate(units, said, copies, width, np.float32(limit))
         for c in range(3):
-            _fill(held, SEEN, c, last_bias[c])
-            for i in range(width):
-                _add_product(held, SEEN, c, last[c, i], units, last_characters[c], i)
-        _write(held, begin, budget, answers)
+            s = last_characters[c]
+            _weigh(seen, c, last_bias[c], said, s, copies, width, last, c * width)
+        _write(seen, begin, budget, answers)
     return 0
