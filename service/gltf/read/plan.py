@@ -19,8 +19,8 @@ BYTES_PER_FACE_WITH_NORMALS = 300
 # The same for primitives that get normals on the way, with the three floats of each.
 BYTES_FOR_NORMALS = BYTES_PER_FACE_WITH_NORMALS - BYTES_PER_FACE + 36
 # For each refined vertex of a skin or morph target: the levels' connectivity again, a block of
-# columns, and each set of joints and weights while they are rounded.
-BYTES_PER_FOLLOWING_VERTEX = 640
+# columns, and each set of joints and weights while they are rounded (257 measured).
+BYTES_PER_FOLLOWING_VERTEX = 320
 # The limit masks, and exact normals: the largest rise measured over what refining took.
 BYTES_FOR_LIMIT = 120
 # A refined face has at most 1.5 vertices: made, cast to float32, written.
