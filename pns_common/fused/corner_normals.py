@@ -7,6 +7,7 @@ from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
 from pns_common.fused import fits, kernels_loaded
+from pns_common.fused.kernels.angles import corner_angles
 from pns_common.fused.kernels.corner_normals import scale_to_unit, sum_corners, triangle_normals
 from pns_common.fused.loop_points import owners
 from pns_common.geometry import corner_normals
@@ -39,8 +40,7 @@ def angle_weighted_normals(
         made = slice(each * rows.start, each * rows.stop)
         sides = np.empty((3, made.stop - made.start))
         triangle_normals(points, faces, triangles, rows.start, rows.stop, normals[made], sides)
-        # By numpy, whose bits no other arctangent has.
-        np.arctan2(sides[0], sides[1:], out=angles[:, made])
+        corner_angles(sides, made.start, angles)
 
     blocks.run(len(faces), measure)
     total = np.zeros((count, 3))

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.geometry.angles import angle_between
 
 # A sum of unit normals times angles below this has no direction that could be trusted.
 NO_DIRECTION = 1e-9
@@ -39,8 +40,8 @@ def angle_weighted_normals(
         normal = _cross(ca, ab)
         twice_area = np.sqrt(_dot(normal, normal))
         normal /= np.where(twice_area > 0, twice_area, 1.0)
-        at_a = np.arctan2(twice_area, -_dot(ab, ca))
-        at_b = np.arctan2(twice_area, -_dot(bc, ab))
+        at_a = angle_between(twice_area, -_dot(ab, ca))
+        at_b = angle_between(twice_area, -_dot(bc, ab))
         for corner, angle in enumerate([at_a, at_b, np.pi - at_a - at_b]):
             weighted[:, corner, rows] = angle * normal
 
