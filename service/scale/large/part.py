@@ -17,13 +17,13 @@ from pns_common.base.whole_file import replace_file, replacing
 from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.errors import PnsError
 from pns_common.fused import kernel_blocks, load_kernels
-from pns_common.mesh import Mesh
+from pns_common.geometry.sharp_edges import edges_sharper_than
 from pns_common.pieces import Piece, RefinedPiece, ThinHaloError, halo_rings, refine_piece
 from pns_common.schemes import Scheme
 
 from ...errors import LimitError, NoModelError, UnrefinableError
 from ...gltf.subdivide import make_scheme
-from ...meshes.shape_creases import edges_sharper_than, lines_of
+from ...meshes.shape_creases import lines_of
 from ...options import Options
 from .adjacency import Adjacency
 from .arrays import ArrayMesh, open_mesh
@@ -207,7 +207,7 @@ def with_angle_creases(piece: Piece, angle: float | None) -> Piece:
     """Return the piece with its edges sharper than ``angle`` as creases too."""
     if angle is None:
         return piece
-    sharp = edges_sharper_than(Mesh(piece.points, piece.faces), angle)
+    sharp = edges_sharper_than(piece.points, piece.faces, angle)
     given = piece.creases.named
     creases = sharp if given is None else np.concatenate([given, sharp])
     return replace(piece, creases=Creases(creases))

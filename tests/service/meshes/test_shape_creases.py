@@ -8,7 +8,8 @@ import pytest
 from pns_common import Creases, crease_lines, loop
 from pns_common.connectivity.creases import NO_CREASES
 from pns_common.crease_lines import named_on
-from service.meshes.shape_creases import creases_by_shape, edges_sharper_than, lines_of
+from pns_common.geometry.sharp_edges import edges_sharper_than
+from service.meshes.shape_creases import creases_by_shape, lines_of
 from service.options import Options
 from train.data.primitives import box, cylinder
 
@@ -36,7 +37,9 @@ def test_who_asks_for_lines(crease, scheme, lines):
 def test_an_angle_takes_every_edge_beyond_it_for_good_and_lines_are_fewer_and_wear_off():
     mesh = cylinder(6)  # its walls meet at 60 degrees
     by_angle = creases_by_shape(mesh, Options(crease="angle:59"), ASKING)
-    np.testing.assert_array_equal(by_angle.named, edges_sharper_than(mesh, np.radians(59)))
+    np.testing.assert_array_equal(
+        by_angle.named, edges_sharper_than(mesh.vertices, mesh.faces, np.radians(59))
+    )
     of_lines = named_on(mesh, creases_by_shape(mesh, Options(crease="lines"), ASKING))
     np.testing.assert_array_equal(of_lines.named, crease_lines(mesh))
     assert (len(by_angle.named), len(of_lines.named)) == (18, 12)

@@ -11,9 +11,9 @@ from jaxtyping import Float, Int
 from pns_common import Creases, Mesh, Scheme, loop, pns
 from pns_common.base.arrays import norm
 from pns_common.connectivity.creases import NO_CREASES
-from pns_common.connectivity.topology import EdgeClass, Topology, build_topology
+from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.crease_lines import named_on
-from pns_common.geometry.frames import face_normals
+from pns_common.geometry.sharp_edges import edges_sharper_than
 from pns_common.masks.limit import limit_positions
 from pns_common.schemes import VertexModel
 
@@ -125,7 +125,10 @@ def all_creases(
     """Return sharp edges, for how many levels: marked, bent beyond ``angle``, or named lines."""
     marked = (snapshot.crease_sharpness > 0) & snapshot.edge_used
     pairs, crease_sharpness = snapshot.edges[marked], snapshot.crease_sharpness[marked]
-    found = [] if angle is None else [(bent_edges(snapshot, angle), np.inf)]
+    found = []
+    if angle is not None:
+        bent = edges_sharper_than(snapshot.points, snapshot.triangles, angle)
+        found.append((bent, np.inf))
     if lines.named is not None:
         found.append((lines.named, np.inf if lines.levels is None else float(lines.levels)))
     for sharp, sharpness in found:
@@ -147,18 +150,6 @@ def split_vertices(snapshot: Snapshot, topology: Topology) -> int:
     order = np.lexsort(places.T)
     same = (np.diff(places[order], axis=0) == 0).all(axis=1)
     return int((np.r_[False, same] | np.r_[same, False]).sum())
-
-
-def bent_edges(snapshot: Snapshot, angle: float) -> Int[np.ndarray, "N 2"]:
-    """Return interior edges whose faces' normals are more than ``angle`` apart."""
-    topology = build_topology(snapshot.triangles, len(snapshot.points))
-    interior = topology.edges[topology.interior]
-    normals = face_normals(snapshot.points, snapshot.triangles)
-    first, second = (normals[side] for side in topology.edge_faces[topology.interior].T)
-    # The chord keeps small angles that 1 − cos would round away.
-    chord = norm(first - second)
-    has_area = (norm(first) > 0) & (norm(second) > 0)
-    return interior[has_area & (chord > 2 * np.sin(min(angle, np.pi) / 2))]
 
 
 def _distance_from_loop(
