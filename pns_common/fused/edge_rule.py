@@ -10,10 +10,12 @@ from pns_common.formula.side_gate import of_gentler, opened
 from pns_common.fused.additions import Additions
 from pns_common.fused.kernels.edge_correction import (
     DIHEDRAL,
+    HELD,
     correct,
     correct_scale_free,
     look,
 )
+from pns_common.fused.kernels.normals import TOGETHER
 from pns_common.fused.surroundings import Surroundings
 from pns_common.geometry.frames import EdgeFrames
 from pns_common.rules.learned import LearnedEdgeRule
@@ -53,7 +55,8 @@ def add_at_edges(
         stencils, degenerate = np.empty((count, 4), dtype=np.int32), np.empty(count, dtype=bool)
         gentlest = np.empty(count if reads_sides else 0)
         looked = stencils, frame, length, longest, curvature, degenerate, features, gentlest
-        look(level.points, *around, *args, rows.start, rows.stop, symmetric, *looked)
+        held = np.zeros(HELD * TOGETHER)
+        look(level.points, *around, *args, rows.start, rows.stop, symmetric, *looked, held)
         # numpy's hyperbolic tangent runs on vectors, and has the array kernels' bits.
         axes = frame[:, :3], frame[:, 3:6], frame[:, 6:]
         gate = rule.operator.gate(EdgeFrames(*axes, length, curvature, degenerate))

@@ -57,6 +57,8 @@ class MeshEdges:
 
     @cached_property
     def _interior(self) -> Int[np.ndarray, " I"]:
+        if len(self.sharp_edges) == 0:
+            return np.arange(len(self.edge_class), dtype=np.int32)
         return np.flatnonzero(self.edge_class == INTERIOR).astype(np.int32)
 
     @cached_property

@@ -18,18 +18,25 @@ from pns_common.fused.kernels.compiled import (
     kernel,
 )
 from pns_common.fused.kernels.masks import opposite
+from pns_common.fused.kernels.normals import NORMAL_NUMBERS, TOGETHER
 from pns_common.fused.kernels.rings import HEIGHT, between, cross, dot, norm, row
 from pns_common.geometry.frames import ANTIPARALLEL
 from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
 
+# By so much less no rounding makes a vector longer than its bound.
+CLEARLY_SHORTER = 1 - 1e-14
 # Feature columns: curvature, four log ratios, then those with a sign.
 LOGS, DIHEDRAL, ENDS, WINGS, UMBRELLAS = 1, 5, 6, 10, 14
+# What is held of TOGETHER edges, a row of numbers each: first normals of both faces, the spoke and
+# h, then what is made of them in their place.
+FIRST, SECOND, SPOKE, H = 0, 3, 6, 9
+TANGENT, NORMAL, BINORMAL, X, SINE, FALLBACK, HELD = 0, 3, 6, 9, 10, 11, 12
 
 
-def _unit(v):
+def _reach(v):
+    """Return the length of a vector that others are divided by; infinite where it has none."""
     square = dot(v, v)
-    length = math.sqrt(square) if square > 0 else math.inf
-    return v[0] / length, v[1] / length, v[2] / length
+    return math.sqrt(square) if square > 0 else math.inf
 
 
 def _from_end(face_edges, half_edge):
@@ -46,12 +53,61 @@ def _to_start(face_edges, half_edge):
     return face_edges[f, i - 1 if i > 0 else 2]
 
 
+def _at(held, k, lane):
+    """Return three rows of what is held of an edge."""
+    at = k * TOGETHER + lane
+    return held[at], held[at + TOGETHER], held[at + 2 * TOGETHER]
+
+
+def _keep(held, k, lane, v):
+    at = k * TOGETHER + lane
+    held[at], held[at + TOGETHER], held[at + 2 * TOGETHER] = v[0], v[1], v[2]
+
+
+def _turn(held, symmetric):
+    """Put frames, x, sin of the dihedral angle and fallback in place of what they are made of.
+
+    It does not branch, so that it runs on vectors: edge by edge its roots and quotients would take
+    half of all time.
+    """
+    for lane in range(TOGETHER):
+        n, m, spoke = _at(held, FIRST, lane), _at(held, SECOND, lane), _at(held, SPOKE, lane)
+        cosine = dot(n, m)
+        undefined = (held[H * TOGETHER + lane] == 0) | (dot(n, n) == 0) | (dot(m, m) == 0)
+        fallback = undefined | (cosine <= -1 + ANTIPARALLEL)
+        size = _reach(spoke)
+        tangent = (
+            1.0 if fallback else spoke[0] / size,
+            0.0 if fallback else spoke[1] / size,
+            0.0 if fallback else spoke[2] / size,
+        )
+        mean = (
+            0.0 if fallback else n[0] + m[0],
+            1.0 if fallback else n[1] + m[1],
+            0.0 if fallback else n[2] + m[2],
+        )
+        along = dot(mean, tangent)
+        upwards = (
+            mean[0] - along * tangent[0],
+            mean[1] - along * tangent[1],
+            mean[2] - along * tangent[2],
+        )
+        size = _reach(upwards)
+        normal = upwards[0] / size, upwards[1] / size, upwards[2] / size
+        _keep(held, TANGENT, lane, tangent)
+        _keep(held, NORMAL, lane, normal)
+        _keep(held, BINORMAL, lane, cross(tangent, normal))
+        held[X * TOGETHER + lane] = 0.0 if undefined | (symmetric & fallback) else 1 - cosine
+        held[SINE * TOGETHER + lane] = dot(cross(n, m), tangent)
+        held[FALLBACK * TOGETHER + lane] = 1.0 if fallback else 0.0
+
+
 @kernel(
     SIZE,
     *(POINTS, POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS),
     *(INDICES, INDICES, INDICES, INDICES, INDEX, SIZE, SIZE, SIZE),
     *(INDICES_OUT, POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT, FLAGS_OUT),
-    *(POINTS_OUT, NUMBERS_OUT),
+    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT),
 )
 def look(
     points,
@@ -76,6 +132,7 @@ def look(
     degenerate,
     features,
     gentlest,
+    held,
 ):
     """Write frames and features of the interior edges begin … end − 1; row 0 is edge ``begin``'s.
 
@@ -90,75 +147,70 @@ def look(
         curvature, degenerate: out: x, and whether the frame is the fallback.
         features: (N, K) out.
         gentlest: out: the smaller b of both faces; empty where ``bends`` is.
+        held: (HELD TOGETHER,) finite on entry, overwritten: of some edges, one beside the other.
     """
     wide = features.shape[1]
-    for i in range(end - begin):
-        e = interior[begin + i]
-        a, b = edges[e, 0], edges[e, 1]
-        h1, h2 = half_edges[e, 0], half_edges[e, 1]
-        forwards = faces[h1 // 3, h1 % 3] == a
-        if symmetric and not forwards:
-            h1, h2, forwards = h2, h1, True
-        c, d = opposite(faces, h1), opposite(faces, h2)
-        n1, n2 = row(normals, h1 // 3), row(normals, h2 // 3)
-        stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3] = a, b, c, d
-
-        h = lengths[e]
-        cosine = dot(n1, n2)
-        undefined = h == 0 or dot(n1, n1) == 0 or dot(n2, n2) == 0
-        fallback = undefined or cosine <= -1 + ANTIPARALLEL
-        if fallback:
-            tangent, mean = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-        else:
-            tangent = _unit(between(points, a, b))
-            mean = n1[0] + n2[0], n1[1] + n2[1], n1[2] + n2[2]
-        along = dot(mean, tangent)
-        normal = _unit(
-            (
-                mean[0] - along * tangent[0],
-                mean[1] - along * tangent[1],
-                mean[2] - along * tangent[2],
-            )
-        )
-        binormal = cross(tangent, normal)
-        x = 0.0 if undefined or (symmetric and fallback) else 1 - cosine
-        for k in range(3):
-            frame[i, k], frame[i, 3 + k], frame[i, 6 + k] = tangent[k], normal[k], binormal[k]
-        length[i], curvature[i], degenerate[i] = h, x, fallback
-        if len(bends):
-            gentlest[i] = min(bends[h1 // 3], bends[h2 // 3])
-
-        features[i, 0] = x
-        # The two half-edges run against each other.
-        ac, bc = _to_start(face_edges, h1), _from_end(face_edges, h1)
-        ad, bd = _from_end(face_edges, h2), _to_start(face_edges, h2)
-        if not forwards:
-            ac, bc, ad, bd = bc, ac, bd, ad
-        longest[i] = max(max(max(max(h, lengths[ac]), lengths[bc]), lengths[ad]), lengths[bd])
-        features[i, LOGS] = logs[ac] - logs[e]
-        features[i, LOGS + 1] = logs[bc] - logs[e]
-        features[i, LOGS + 2] = logs[ad] - logs[e]
-        features[i, LOGS + 3] = logs[bd] - logs[e]
-        if wide > DIHEDRAL:
-            features[i, DIHEDRAL] = dot(cross(n1, n2), tangent)
-            features[i, ENDS] = dot(row(fields, a), tangent)
-            features[i, ENDS + 1] = dot(row(fields, b), tangent)
-            features[i, ENDS + 2] = dot(row(fields, a), binormal)
-            features[i, ENDS + 3] = dot(row(fields, b), binormal)
-            features[i, WINGS] = dot(row(fields, c), tangent)
-            features[i, WINGS + 1] = dot(row(fields, d), tangent)
-            features[i, WINGS + 2] = dot(row(fields, c), binormal)
-            features[i, WINGS + 3] = dot(row(fields, d), binormal)
-        if wide > UMBRELLAS:
-            features[i, UMBRELLAS] = fields[a, HEIGHT]
-            features[i, UMBRELLAS + 1] = fields[b, HEIGHT]
-            features[i, UMBRELLAS + 2] = fields[c, HEIGHT]
-            features[i, UMBRELLAS + 3] = fields[d, HEIGHT]
+    for first in range(0, end - begin, TOGETHER):
+        count = min(TOGETHER, end - begin - first)
+        for lane in range(count):
+            i = first + lane
+            e = interior[begin + i]
+            a, b = edges[e, 0], edges[e, 1]
+            h1, h2 = half_edges[e, 0], half_edges[e, 1]
+            forwards = faces[h1 // 3, h1 % 3] == a
+            if symmetric and not forwards:
+                h1, h2, forwards = h2, h1, True
+            c, d = opposite(faces, h1), opposite(faces, h2)
+            stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3] = a, b, c, d
+            _keep(held, FIRST, lane, row(normals, h1 // 3))
+            _keep(held, SECOND, lane, row(normals, h2 // 3))
+            _keep(held, SPOKE, lane, between(points, a, b))
+            h = lengths[e]
+            held[H * TOGETHER + lane] = length[i] = h
+            if len(bends):
+                gentlest[i] = min(bends[h1 // 3], bends[h2 // 3])
+            # The two half-edges run against each other.
+            ac, bc = _to_start(face_edges, h1), _from_end(face_edges, h1)
+            ad, bd = _from_end(face_edges, h2), _to_start(face_edges, h2)
+            if not forwards:
+                ac, bc, ad, bd = bc, ac, bd, ad
+            longest[i] = max(max(max(max(h, lengths[ac]), lengths[bc]), lengths[ad]), lengths[bd])
+            features[i, LOGS] = logs[ac] - logs[e]
+            features[i, LOGS + 1] = logs[bc] - logs[e]
+            features[i, LOGS + 2] = logs[ad] - logs[e]
+            features[i, LOGS + 3] = logs[bd] - logs[e]
+        _turn(held, symmetric != 0)
+        for lane in range(count):
+            i = first + lane
+            tangent, normal = _at(held, TANGENT, lane), _at(held, NORMAL, lane)
+            binormal, x = _at(held, BINORMAL, lane), held[X * TOGETHER + lane]
+            for k in range(3):
+                frame[i, k], frame[i, 3 + k], frame[i, 6 + k] = tangent[k], normal[k], binormal[k]
+            features[i, 0] = curvature[i] = x
+            degenerate[i] = held[FALLBACK * TOGETHER + lane] > 0
+            a, b, c, d = stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3]
+            if wide > DIHEDRAL:
+                features[i, DIHEDRAL] = held[SINE * TOGETHER + lane]
+                features[i, ENDS] = dot(row(fields, a), tangent)
+                features[i, ENDS + 1] = dot(row(fields, b), tangent)
+                features[i, ENDS + 2] = dot(row(fields, a), binormal)
+                features[i, ENDS + 3] = dot(row(fields, b), binormal)
+                features[i, WINGS] = dot(row(fields, c), tangent)
+                features[i, WINGS + 1] = dot(row(fields, d), tangent)
+                features[i, WINGS + 2] = dot(row(fields, c), binormal)
+                features[i, WINGS + 3] = dot(row(fields, d), binormal)
+            if wide > UMBRELLAS:
+                features[i, UMBRELLAS] = fields[a, HEIGHT]
+                features[i, UMBRELLAS + 1] = fields[b, HEIGHT]
+                features[i, UMBRELLAS + 2] = fields[c, HEIGHT]
+                features[i, UMBRELLAS + 3] = fields[d, HEIGHT]
     return 0
 
 
 def in_ball(z):
     """Shorten a vector to length 1, as ``correction.project_to_ball`` does."""
+    if dot(z, z) <= 1:
+        return z  # as most are: nor is the root of that more than 1
     largest = max(max(abs(z[0]), abs(z[1])), abs(z[2]))
     if largest > 1:
         length = norm((z[0] / largest, z[1] / largest, z[2] / largest)) * largest
@@ -180,6 +232,9 @@ def _rotated(frame, i, z):
 
 def shortened(v, longest):
     """Shorten a vector to ``longest``, as ``correction.shortened`` does."""
+    bound = CLEARLY_SHORTER * (longest * longest)
+    if bound > NORMAL_NUMBERS and dot(v, v) <= bound:
+        return v  # as most are: no root need be taken
     length = norm(v)
     if length > longest:
         factor = longest / length

@@ -31,9 +31,10 @@ NOTHING = np.float32(0)
 def _read(features, begin, seen):
     """Read rows from ``begin`` on; 0 past the last."""
     present = min(LANES, features.shape[0] - begin)
-    for k in range(features.shape[1]):
-        for lane in range(present):
+    for lane in range(present):
+        for k in range(features.shape[1]):
             seen[k * LANES + lane] = np.float32(features[begin + lane, k])
+    for k in range(features.shape[1]):
         for lane in range(present, LANES):
             seen[k * LANES + lane] = NOTHING
 

@@ -6,12 +6,14 @@ import pytest
 from pns_common import Mesh
 from pns_common.connectivity.topology import build_topology
 from pns_common.fused.kernels.edge_correction import (
+    HELD,
     correct,
     correct_scale_free,
     in_ball,
     look,
     shortened,
 )
+from pns_common.fused.kernels.normals import TOGETHER
 from tests.support import plain_operator
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bumpy_sphere
@@ -38,7 +40,8 @@ def looked(way, width, begin=0, end=COUNT):
     mesh = MESH.faces, MESH.edges, MESH.face_edges, MESH.half_edges, MESH.interior
     gentlest, around = np.empty(n), (NORMALS, FIELDS, BENDS, LENGTH, np.log(LENGTH))
     stencils = np.empty((n, 4), dtype=np.int32)
-    out = stencils, frame, h, longest, x, degenerate, features, gentlest
+    held = np.zeros(HELD * TOGETHER)
+    out = stencils, frame, h, longest, x, degenerate, features, gentlest, held
     WAYS[way](look)(POINTS, *around, *mesh, begin, end, 1, *out)
     np.testing.assert_array_equal(gentlest, BENDS[MESH.half_edges[begin:end] // 3].min(axis=1))
     np.testing.assert_array_equal(stencils[:, :2], STENCILS[begin:end, :2])
@@ -72,7 +75,8 @@ def test_antiparallel_faces_have_the_worlds_axes_and_shut_only_where_reading_is_
         degenerate = np.zeros(1, dtype=bool)
         around = normals, np.zeros((0, 4)), np.zeros(0), np.ones(5), np.zeros(5)
         stencils = np.empty((1, 4), dtype=np.int32)
-        out = stencils, frame, h, longest, x, degenerate, features, np.zeros(0)
+        held = np.zeros(HELD * TOGETHER)
+        out = stencils, frame, h, longest, x, degenerate, features, np.zeros(0), held
         WAYS[way](look)(points, *around, *mesh, 0, 1, symmetric, *out)
         np.testing.assert_array_equal(frame.reshape(3, 3), np.eye(3))
         assert (bool(degenerate[0]), x[0], features[0, 0]) == (True, curvature, curvature)
@@ -121,3 +125,6 @@ def test_vectors_are_shortened_and_never_lengthened():
     assert shortened((3.0, 0.0, 4.0), 10.0) == (3, 0, 4)
     np.testing.assert_allclose(shortened((3.0, 0.0, 4.0), 1.0), (0.6, 0, 0.8))
     assert shortened((3.0, 0.0, 4.0), 0.0) == (0, 0, 0)
+    assert shortened((3.0, 0.0, 4.0), 5.0) == (3, 0, 4)
+    # Also by less than squares of this size can tell.
+    assert shortened((3e-160, 0.0, 4e-160), 4.9999719e-160)[2] < 4e-160
