@@ -6,10 +6,14 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
-from pns_common.fused import fits, kernels_loaded
-from pns_common.fused.kernels.angles import corner_angles
-from pns_common.fused.kernels.corner_normals import scale_to_unit, sum_corners, triangle_normals
-from pns_common.fused.loop_points import owners
+from pns_common.base.in_order import InOrder
+from pns_common.fused import fits, kernel_blocks, kernels_loaded
+from pns_common.fused.kernels.corner_normals import (
+    add_corners,
+    measure_triangles,
+    normals_and_angles,
+    scale_to_unit,
+)
 from pns_common.geometry import corner_normals
 
 
@@ -34,20 +38,23 @@ def angle_weighted_normals(
     faces, groups, triangles = (
         np.ascontiguousarray(indices, dtype=np.int32) for indices in (faces, groups, triangles)
     )
-    normals, angles = np.empty((each * len(faces), 3)), np.empty((2, each * len(faces)))
-
-    def measure(rows: slice) -> None:
-        made = slice(each * rows.start, each * rows.stop)
-        sides = np.empty((3, made.stop - made.start))
-        triangle_normals(points, faces, triangles, rows.start, rows.stop, normals[made], sides)
-        corner_angles(sides, made.start, angles)
-
-    blocks.run(len(faces), measure)
     total = np.zeros((count, 3))
 
-    def add_up(rows: slice) -> None:
-        sum_corners(normals, angles, groups, triangles, rows.start, rows.stop, total)
-        scale_to_unit(rows.start, rows.stop, total)
+    def add_up(measured: tuple[slice, np.ndarray]) -> None:
+        rows, normals = measured
+        add_corners(normals, groups, triangles, rows.start, rows.stop, total)
 
-    owners(blocks.unheard(), count).run(count, add_up)
+    # One thread adds up while others measure, in the order of faces: the sums are the same.
+    sums = InOrder(add_up)
+
+    def measure(rows: slice) -> None:
+        normals = np.empty((6, each * (rows.stop - rows.start)))
+        measure_triangles(points, faces, triangles, rows.start, rows.stop, normals)
+        normals_and_angles(normals)
+        sums.put(blocks.number(rows, len(faces)), (rows, normals))
+
+    blocks.run(len(faces), measure)
+    kernel_blocks(blocks.threads).run(
+        count, lambda rows: scale_to_unit(rows.start, rows.stop, total)
+    )
     return total

@@ -28,11 +28,11 @@ def angle_weighted_normals(
     """Return the unit normal of each group of corners; 0 where there is no area, or all cancel out.
 
     Each face has T points and is cut into D ``triangles`` of them. ``groups`` names the group,
-    0 … count − 1, of each point. Corners a of all triangles are added up first, then b, then c.
+    0 … count − 1, of each point. Corners are added up face by face, in the order of its triangles.
     """
     # Coordinates as rows: arithmetic on contiguous rows takes a third of the time.
     rows_of = np.ascontiguousarray(points.T)
-    weighted = np.empty((3, 3, len(faces), len(triangles)))
+    weighted = np.empty((3, len(faces), len(triangles), 3))
 
     def block(rows: slice) -> None:
         a, b, c = (np.take(rows_of, faces[rows, corner], axis=1) for corner in triangles.T)
@@ -43,10 +43,10 @@ def angle_weighted_normals(
         at_a = angle_between(twice_area, -_dot(ab, ca))
         at_b = angle_between(twice_area, -_dot(bc, ab))
         for corner, angle in enumerate([at_a, at_b, np.pi - at_a - at_b]):
-            weighted[:, corner, rows] = angle * normal
+            weighted[:, rows, :, corner] = angle * normal
 
     blocks.run(len(faces), block)
-    corners = groups[:, triangles].transpose(2, 0, 1).reshape(-1)
+    corners = groups[:, triangles].reshape(-1)
     total = np.stack([np.bincount(corners, w.reshape(-1), count) for w in weighted])
     length = np.sqrt(_dot(total, total))
     total[:, length <= NO_DIRECTION] = 0

@@ -1,10 +1,9 @@
-"""Angles, with the bits of ``pns_common.geometry.angles``."""
+"""Angles of kernels, with the bits of ``pns_common.geometry.angles``."""
 
 from __future__ import annotations
 
 import math
 
-from pns_common.fused.kernels.compiled import POINTS, POINTS_OUT, SIZE, kernel
 from pns_common.geometry.angles import (
     GENTLE,
     HALF_PI,
@@ -39,17 +38,3 @@ def angle_between(across, along):
     left = 0.0 if gentle else LEFT_OF_HALF if steep else LEFT_OF_QUARTER
     acute = base + (t * (z * p / q) + t + left)
     return math.pi - acute if along < 0 else acute
-
-
-@kernel(SIZE, POINTS, SIZE, POINTS_OUT)
-def corner_angles(sides, first, angles):
-    """Write angles at two corners of n triangles, from column ``first`` on.
-
-    Args:
-        sides: (3, n) twice the area, and the inner product of the two sides that leave each corner.
-        angles: (2, N), out.
-    """
-    for corner in range(2):
-        for i in range(sides.shape[1]):
-            angles[corner, first + i] = angle_between(sides[0, i], sides[1 + corner, i])
-    return 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from pns_common.fused.kernels.angles import angle_between
 from pns_common.fused.kernels.compiled import (
     INDICES,
     POINTS,
@@ -14,16 +15,15 @@ from pns_common.fused.kernels.compiled import (
 from pns_common.geometry.corner_normals import NO_DIRECTION
 
 
-@kernel(SIZE, POINTS, INDICES, INDICES, SIZE, SIZE, POINTS_OUT, POINTS_OUT)
-def triangle_normals(points, faces, triangles, begin, end, normals, sides):
-    """Write the triangles' unit normals, and what their angles follow from.
+@kernel(SIZE, POINTS, INDICES, INDICES, SIZE, SIZE, POINTS_OUT)
+def measure_triangles(points, faces, triangles, begin, end, measured):
+    """Write the area vectors of the triangles of faces begin … end − 1, and products of sides.
 
     Args:
-        faces: (F, T) points, of which rows begin … end − 1 are read.
+        faces: (F, T) points.
         triangles: (D, 3) columns that a face's triangles have at their corners; n in all.
-        normals: (n, 3), out; zeros where there is no area.
-        sides: (3, n), out: twice the area, and the inner product of the two sides that leave corner
-            a, then corner b.
+        measured: (6, n), out: the area vector, the inner product of the two sides that leave corner
+            a, then corner b. The last row is left.
     """
     i = 0
     for f in range(begin, end):
@@ -48,40 +48,66 @@ def triangle_normals(points, faces, triangles, begin, end, normals, sides):
                 points[c, 2] - points[b, 2],
                 points[a, 2] - points[c, 2],
             )
-            x, y, z = w1 * u2 - w2 * u1, w2 * u0 - w0 * u2, w0 * u1 - w1 * u0
-            twice_area = math.sqrt(x * x + y * y + z * z)
-            length = twice_area if twice_area > 0 else 1.0
-            normals[i, 0], normals[i, 1], normals[i, 2] = x / length, y / length, z / length
-            sides[0, i] = twice_area
-            sides[1, i] = -(u0 * w0 + u1 * w1 + u2 * w2)
-            sides[2, i] = -(v0 * u0 + v1 * u1 + v2 * u2)
+            measured[0, i] = w1 * u2 - w2 * u1
+            measured[1, i] = w2 * u0 - w0 * u2
+            measured[2, i] = w0 * u1 - w1 * u0
+            measured[3, i] = -(u0 * w0 + u1 * w1 + u2 * w2)
+            measured[4, i] = -(v0 * u0 + v1 * u1 + v2 * u2)
             i += 1
     return 0
 
 
-@kernel(SIZE, POINTS, POINTS, INDICES, INDICES, SIZE, SIZE, POINTS_OUT)
-def sum_corners(normals, angles, groups, triangles, begin, end, total):
-    """Add the triangles' normals to those groups begin … end − 1 that their corners are of.
+@kernel(SIZE, POINTS_OUT)
+def normals_and_angles(measured):
+    """Turn what was measured of n triangles into unit normals and angles, without a branch.
 
-    Each counts as much as its angle there: ``angles`` (2, n) are those at a and b. ``groups`` are
-    of the faces' points (F, T).
+    Args:
+        measured: (6, n) in and out: the normal, zeros where there is no area; the angles at a and
+            b; twice the area.
     """
-    # All corners a, then all b, then all c: numpy's order of summation.
-    for corner in range(3):
-        i = 0
-        for f in range(groups.shape[0]):
-            for d in range(triangles.shape[0]):
-                g = groups[f, triangles[d, corner]]
-                if begin <= g < end:
-                    angle = angles[0, i]
-                    if corner == 1:
-                        angle = angles[1, i]
-                    elif corner == 2:
-                        angle = math.pi - angles[0, i] - angles[1, i]
-                    total[g, 0] += angle * normals[i, 0]
-                    total[g, 1] += angle * normals[i, 1]
-                    total[g, 2] += angle * normals[i, 2]
-                i += 1
+    for i in range(measured.shape[1]):
+        x, y, z = measured[0, i], measured[1, i], measured[2, i]
+        twice_area = math.sqrt(x * x + y * y + z * z)
+        length = twice_area if twice_area > 0 else 1.0
+        measured[0, i], measured[1, i], measured[2, i] = x / length, y / length, z / length
+        measured[5, i] = twice_area
+    for corner in range(3, 5):
+        for i in range(measured.shape[1]):
+            measured[corner, i] = angle_between(measured[5, i], measured[corner, i])
+    return 0
+
+
+@kernel(SIZE, POINTS, INDICES, INDICES, SIZE, SIZE, POINTS_OUT)
+def add_corners(measured, groups, triangles, begin, end, total):
+    """Add the normals of the triangles of faces begin … end − 1 to the groups of their corners.
+
+    Each counts as much as its angle there. Threads take turns, in the order of faces.
+
+    Args:
+        measured: of these faces' triangles alone.
+        groups: (F, T) of the faces' points.
+    """
+    i = 0
+    for f in range(begin, end):
+        for d in range(triangles.shape[0]):
+            at_a, at_b = measured[3, i], measured[4, i]
+            at_c = math.pi - at_a - at_b
+            x, y, z = measured[0, i], measured[1, i], measured[2, i]
+            a, b, c = (
+                groups[f, triangles[d, 0]],
+                groups[f, triangles[d, 1]],
+                groups[f, triangles[d, 2]],
+            )
+            total[a, 0] += at_a * x
+            total[a, 1] += at_a * y
+            total[a, 2] += at_a * z
+            total[b, 0] += at_b * x
+            total[b, 1] += at_b * y
+            total[b, 2] += at_b * z
+            total[c, 0] += at_c * x
+            total[c, 1] += at_c * y
+            total[c, 2] += at_c * z
+            i += 1
     return 0
 
 
