@@ -8,12 +8,13 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.base.blocks import Blocks, available_threads
+from pns_common.fused.tangents import perpendicular_tangents
 
 from ...meshes.split_connectivity import SplitConnectivity
 from ...meshes.uv_charts import UvBlend
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
-from .normals import perpendicular_tangents, safe_unit
+from .normals import safe_unit
 from .skin_and_morph import SkinAndMorph
 from .skins import skin_attributes
 
@@ -92,17 +93,11 @@ def tangent_directions(
     """Return unit tangents at a right angle to the normals, where there are normals."""
     if normals is None:
         return safe_unit(directions)
-    made = np.empty_like(directions)
-
-    def turn(rows: slice) -> None:
-        made[rows] = perpendicular_tangents(directions[rows], normals[rows])
-
-    Blocks(available_threads()).run(len(made), turn)
-    return made
+    return perpendicular_tangents(directions, normals, Blocks(available_threads()))
 
 
 def in_type_of(
     old: Shaped[np.ndarray, "C K"], blended: Float[np.ndarray, "N K"]
 ) -> Shaped[np.ndarray, "N K"]:
-    """Return blended values in the component type that they had; integers rounded."""
-    return (blended if old.dtype.kind == "f" else np.rint(blended)).astype(old.dtype)
+    """Return blended values in the component type that they had; integers rounded, in place."""
+    return (blended if old.dtype.kind == "f" else np.rint(blended, out=blended)).astype(old.dtype)

@@ -54,7 +54,8 @@ class SkinAndMorph:
     def take(self, rows: Int[np.ndarray, " M"]) -> SkinAndMorph:
         """Return skin and morph of some of the vertices."""
         binding = None if self.binding is None else self.binding.take(rows)
-        return SkinAndMorph(binding, tuple(delta[rows] for delta in self.deltas), _NONE)
+        deltas = tuple(np.take(delta, rows, axis=0) for delta in self.deltas)
+        return SkinAndMorph(binding, deltas, _NONE)
 
 
 def read_skin_and_morph(primitives: Sequence[TrianglePrimitive]) -> SkinAndMorph:

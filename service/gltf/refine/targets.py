@@ -42,7 +42,7 @@ def _refined_target(
         if name == "POSITION":
             refined[name] = refined_vertices.skin_and_morph.deltas[number]
         elif name == "NORMAL" and normals is not None:
-            refined[name] = (normals - base[name]).astype(np.float32)
+            refined[name] = (normals - base[name]).astype(np.float32, copy=False)
         elif name == "TANGENT" and name in base:
             directions = refined_vertices.connectivity.linear(
                 primitive.attributes[name][refined_vertices.row, :3] + corners

@@ -1,26 +1,15 @@
-"""Directions of normals and tangents, and where there are none."""
+"""Directions of normals, where there are none, and which are one."""
 
 import numpy as np
 
 from pns_common.base.distinct import number_by_first_appearance
-from service.gltf.refine.normals import perpendicular_tangents, safe_unit
+from service.gltf.refine.normals import safe_unit
 from service.gltf.refine.smoothing import joined_normals
 
 
 def test_vectors_without_direction_become_the_z_axis():
     vectors = np.array([[0.0, 0, 0], [0, -3, 0], [1e-12, 0, 0]])
     np.testing.assert_array_equal(safe_unit(vectors), [[0, 0, 1], [0, -1, 0], [0, 0, 1]])
-
-
-def test_tangents_along_the_normal_are_replaced_by_a_perpendicular():
-    rng = np.random.default_rng(0)
-    normals = safe_unit(rng.standard_normal((50, 3)))
-    tangents = np.concatenate([2 * normals[:20], 0 * normals[20:30], rng.standard_normal((20, 3))])
-    flat = perpendicular_tangents(tangents, normals)
-    np.testing.assert_allclose(np.linalg.norm(flat, axis=1), 1, atol=1e-12)
-    np.testing.assert_allclose((flat * normals).sum(axis=1), 0, atol=1e-12)
-    # A tangent that has a direction keeps its side.
-    assert ((flat * tangents).sum(axis=1)[30:] > 0).all()
 
 
 def test_rows_join_by_vertex_and_normal():
