@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.base.blocks import Blocks
-from pns_common.fused.kernels.normals import flipped_children, largest_jump
+from pns_common.fused.kernels.normals import HELD, flipped_children, largest_jump
+from pns_common.fused.kernels.together import TOGETHER
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.geometry.child_faces import ChildAngles, angle_between
 
@@ -26,7 +27,8 @@ def look_at_children(
 
     def look(rows: slice) -> None:
         block, bounds = blocks.number(rows, count), (vertices, rows.start, rows.stop)
-        jumps[block] = largest_jump(points, *faces, *edges, *bounds, largest_yet)
+        held = np.empty(HELD * TOGETHER)
+        jumps[block] = largest_jump(points, *faces, *edges, *bounds, largest_yet, held)
         if loop_points is not None:
             flipped[block] = flipped_children(points, loop_points, *faces, *bounds)
 

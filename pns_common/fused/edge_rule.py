@@ -15,7 +15,7 @@ from pns_common.fused.kernels.edge_correction import (
     correct_scale_free,
     look,
 )
-from pns_common.fused.kernels.normals import TOGETHER
+from pns_common.fused.kernels.together import TOGETHER
 from pns_common.fused.surroundings import Surroundings
 from pns_common.geometry.frames import EdgeFrames
 from pns_common.rules.learned import LearnedEdgeRule

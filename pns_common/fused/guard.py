@@ -10,7 +10,8 @@ from jaxtyping import Bool, Float
 
 from pns_common.base.blocks import Blocks
 from pns_common.formula.fold_guard import ROUNDS, FoldGuard
-from pns_common.fused.kernels.guard import find_folds
+from pns_common.fused.kernels.guard import HELD, find_folds
+from pns_common.fused.kernels.together import TOGETHER
 from pns_common.fused.mesh_edges import MeshEdges
 
 # For the kernel: no vertex is shared, all faces are looked at, and s is 1 everywhere.
@@ -53,7 +54,7 @@ def _touched(
     args = mesh.faces, mesh.face_edges, mesh.vertex_count, changed
 
     def look(rows: slice) -> None:
-        find_folds(*around, *args, rows.start, rows.stop, touched)
+        find_folds(*around, *args, rows.start, rows.stop, np.empty(HELD * TOGETHER), touched)
 
     blocks.run(len(mesh.faces), look)
     return touched

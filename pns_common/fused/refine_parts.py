@@ -15,7 +15,8 @@ from jaxtyping import Float, Int
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.creases import Creases
 from pns_common.connectivity.topology import Topology
-from pns_common.fused.kernels.normals import flipped_children, largest_jump
+from pns_common.fused.kernels.normals import HELD, flipped_children, largest_jump
+from pns_common.fused.kernels.together import TOGETHER
 from pns_common.fused.learned_step import learned_points
 from pns_common.fused.level import FusedLevel, control_level, crease_shift_of, next_level
 from pns_common.fused.loop_points import largest_size, loop_points
@@ -210,10 +211,11 @@ def _children(
     """Return what ``look_at_children`` sees of each part."""
     faces, edges = (mesh.faces, mesh.face_edges), (mesh.half_edges, mesh.edge_class)
     count, seen = mesh.vertex_count, list[ChildAngles]()
+    held = np.empty(HELD * TOGETHER)
     for part in range(parts.count):
         at_faces = parts.faces[part : part + 2]
         # What is across an edge of a part is of that part.
-        jump = largest_jump(points, *faces, *edges, count, *at_faces, np.zeros(1))
+        jump = largest_jump(points, *faces, *edges, count, *at_faces, np.zeros(1), held)
         flipped = 0
         if counterpart is not None:
             flipped = flipped_children(points, counterpart, *faces, count, *at_faces)

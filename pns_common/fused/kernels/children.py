@@ -22,6 +22,7 @@ from pns_common.fused.kernels.compiled import (
     LONG_INDICES_OUT,
     SIZE,
     kernel,
+    natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
 
@@ -53,8 +54,8 @@ def number_halves(faces, face_edges, edges, half_edges, begin, end, halves):
     Args:
         halves: (E, 2) out: the child at the lower endpoint, and at the higher.
     """
-    following = 3 * begin + 2 * _opened_before(half_edges, begin)
-    for f in range(begin, end):
+    following = natural(3 * begin + 2 * _opened_before(half_edges, begin))
+    for f in range(natural(begin), end):
         for i in range(3):
             leaving, entering = face_edges[f, i], face_edges[f, _before(i)]
             vertex = faces[f, i]
@@ -108,8 +109,8 @@ def split_edges(
     to_class,
 ):
     """Write the edges of children of faces begin … end − 1, in the layout of ``edges.classify``."""
-    following = 3 * begin + 2 * _opened_before(half_edges, begin)
-    for f in range(begin, end):
+    following = natural(3 * begin + 2 * _opened_before(half_edges, begin))
+    for f in range(natural(begin), end):
         for i in range(3):
             before = _before(i)
             leaving, entering = face_edges[f, i], face_edges[f, before]
@@ -160,7 +161,7 @@ def split_edges(
 
 
 def _split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
-    for f in range(begin, end):
+    for f in range(natural(begin), end):
         for i in range(3):
             middle = vertex_count + face_edges[f, i]
             to_faces[4 * f + i, 0] = faces[f, i]

@@ -112,6 +112,15 @@ def called_seldom(helper: Callable[..., Any]) -> Callable[..., Any]:
     return helper
 
 
+def natural(number: Any) -> Any:
+    """Return a number that is not negative, so that a compiler knows it is not.
+
+    Machine code then need not ask of rows that are counted from there whether they count from the
+    end: a tenth to a third of all that it does.
+    """
+    return max(number, 0)
+
+
 def kernel(result: Scalar, *arguments: Array | Scalar) -> Callable[[Callable[..., Any]], Kernel]:
     """Declare a kernel.
 

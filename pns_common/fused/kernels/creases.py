@@ -12,16 +12,17 @@ from pns_common.fused.kernels.compiled import (
     SIZE,
     called_seldom,
     kernel,
+    natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.normals import (
     COSINE_MARGIN,
-    TOGETHER,
     area,
     clearly_less,
     unit_normal,
 )
 from pns_common.fused.kernels.rings import row
+from pns_common.fused.kernels.together import TOGETHER
 
 
 @called_seldom
@@ -55,7 +56,7 @@ def mark_edges_beyond(points, faces, half_edges, edge_class, cosine, begin, end,
     """
     above, found = max(cosine, 0.0) + COSINE_MARGIN, 0
     bound, around = above * above, (points, faces, half_edges, edge_class)
-    for first in range(begin, end, TOGETHER):
+    for first in range(natural(begin), end, TOGETHER):
         last, doubtful = min(first + TOGETHER, end), 0
         for e in range(first, last):
             doubtful += not _is_clear(*around, bound, e)

@@ -16,10 +16,12 @@ from pns_common.fused.kernels.compiled import (
     REAL,
     SIZE,
     kernel,
+    natural,
 )
 from pns_common.fused.kernels.masks import opposite
-from pns_common.fused.kernels.normals import NORMAL_NUMBERS, TOGETHER
+from pns_common.fused.kernels.normals import NORMAL_NUMBERS
 from pns_common.fused.kernels.rings import HEIGHT, between, cross, dot, norm, row
+from pns_common.fused.kernels.together import TOGETHER, keep, kept
 from pns_common.geometry.frames import ANTIPARALLEL
 from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
 
@@ -53,17 +55,6 @@ def _to_start(face_edges, half_edge):
     return face_edges[f, i - 1 if i > 0 else 2]
 
 
-def _at(held, k, lane):
-    """Return three rows of what is held of an edge."""
-    at = k * TOGETHER + lane
-    return held[at], held[at + TOGETHER], held[at + 2 * TOGETHER]
-
-
-def _keep(held, k, lane, v):
-    at = k * TOGETHER + lane
-    held[at], held[at + TOGETHER], held[at + 2 * TOGETHER] = v[0], v[1], v[2]
-
-
 def _turn(held, symmetric):
     """Put frames, x, sin of the dihedral angle and fallback in place of what they are made of.
 
@@ -71,7 +62,7 @@ def _turn(held, symmetric):
     half of all time.
     """
     for lane in range(TOGETHER):
-        n, m, spoke = _at(held, FIRST, lane), _at(held, SECOND, lane), _at(held, SPOKE, lane)
+        n, m, spoke = kept(held, FIRST, lane), kept(held, SECOND, lane), kept(held, SPOKE, lane)
         cosine = dot(n, m)
         undefined = (held[H * TOGETHER + lane] == 0) | (dot(n, n) == 0) | (dot(m, m) == 0)
         fallback = undefined | (cosine <= -1 + ANTIPARALLEL)
@@ -94,9 +85,9 @@ def _turn(held, symmetric):
         )
         size = _reach(upwards)
         normal = upwards[0] / size, upwards[1] / size, upwards[2] / size
-        _keep(held, TANGENT, lane, tangent)
-        _keep(held, NORMAL, lane, normal)
-        _keep(held, BINORMAL, lane, cross(tangent, normal))
+        keep(held, TANGENT, lane, tangent)
+        keep(held, NORMAL, lane, normal)
+        keep(held, BINORMAL, lane, cross(tangent, normal))
         held[X * TOGETHER + lane] = 0.0 if undefined | (symmetric & fallback) else 1 - cosine
         held[SINE * TOGETHER + lane] = dot(cross(n, m), tangent)
         held[FALLBACK * TOGETHER + lane] = 1.0 if fallback else 0.0
@@ -154,7 +145,7 @@ def look(
         count = min(TOGETHER, end - begin - first)
         for lane in range(count):
             i = first + lane
-            e = interior[begin + i]
+            e = interior[natural(begin) + i]
             a, b = edges[e, 0], edges[e, 1]
             h1, h2 = half_edges[e, 0], half_edges[e, 1]
             forwards = faces[h1 // 3, h1 % 3] == a
@@ -162,9 +153,9 @@ def look(
                 h1, h2, forwards = h2, h1, True
             c, d = opposite(faces, h1), opposite(faces, h2)
             stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3] = a, b, c, d
-            _keep(held, FIRST, lane, row(normals, h1 // 3))
-            _keep(held, SECOND, lane, row(normals, h2 // 3))
-            _keep(held, SPOKE, lane, between(points, a, b))
+            keep(held, FIRST, lane, row(normals, h1 // 3))
+            keep(held, SECOND, lane, row(normals, h2 // 3))
+            keep(held, SPOKE, lane, between(points, a, b))
             h = lengths[e]
             held[H * TOGETHER + lane] = length[i] = h
             if len(bends):
@@ -182,8 +173,8 @@ def look(
         _turn(held, symmetric != 0)
         for lane in range(count):
             i = first + lane
-            tangent, normal = _at(held, TANGENT, lane), _at(held, NORMAL, lane)
-            binormal, x = _at(held, BINORMAL, lane), held[X * TOGETHER + lane]
+            tangent, normal = kept(held, TANGENT, lane), kept(held, NORMAL, lane)
+            binormal, x = kept(held, BINORMAL, lane), held[X * TOGETHER + lane]
             for k in range(3):
                 frame[i, k], frame[i, 3 + k], frame[i, 6 + k] = tangent[k], normal[k], binormal[k]
             features[i, 0] = curvature[i] = x
@@ -270,7 +261,7 @@ def correct(
 ):
     """Write δ = h² γ F η into the rows of the edges (``correction.correct``)."""
     for i in range(eta.shape[0]):
-        e = interior[begin + i]
+        e = interior[natural(begin) + i]
         envelope = budget_per_length[i] * (length[i] * length[i])
         turned = _rotated(frame, i, in_ball(row(eta, i)))
         size = envelope * gate[i]
@@ -324,7 +315,7 @@ def correct_scale_free(
     added in their place: 0, or −0 where there is no rule for boundaries, which changes no −0.
     """
     for i in range(z.shape[0]):
-        e = interior[begin + i]
+        e = interior[natural(begin) + i]
         a, b, c, d = stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3]
         envelope = budget_per_length[i] * (bound_length[i] * bound_length[i])
         turned = _rotated(frame, i, in_ball(row(z, i)))

@@ -16,6 +16,7 @@ from pns_common.fused.kernels.compiled import (
     INTEGERS_2,
     SIZE,
     kernel,
+    natural,
 )
 
 INTERIOR, BOUNDARY, IRREGULAR, CREASE = (
@@ -114,7 +115,7 @@ def classify(faces, low, links, plain, begin, end, edges, half_edges, edge_class
         edge_class: (E,) out: EdgeClass values.
     """
     sharp = 0
-    for e in range(begin, end):
+    for e in range(natural(begin), end):
         first, second = links[e, FIRST], links[e, SECOND]
         edges[e, 0], edges[e, 1] = low[e], links[e, HIGH]
         half_edges[e, 0], half_edges[e, 1] = first, second

@@ -10,21 +10,27 @@ from pns_common.fused.kernels.compiled import (
     FLAGS_OUT,
     INDICES,
     NUMBERS,
+    NUMBERS_OUT,
     POINTS,
     REAL,
     SIZE,
     called_seldom,
     kernel,
+    natural,
 )
 from pns_common.fused.kernels.normals import (
     COSINE_MARGIN,
-    TOGETHER,
     area,
     child_corners,
     clearly_less,
 )
 from pns_common.fused.kernels.rings import cross, dot, row
+from pns_common.fused.kernels.together import TOGETHER, keep, kept
 from pns_common.geometry.frames import NO_AREA
+
+# What is held of a face: where Loop puts its corners and the middles of its edges, each with where
+# it is moved to.
+HELD = 36
 
 
 def _moved(p, displacement, v, s):
@@ -45,6 +51,23 @@ def _shared_corner(loop, displacement, scale, shared, v):
     """Return the same while none moves but the shared ones."""
     p, moved = _corner(loop, displacement, scale, v)
     return (p, moved) if shared[v] else (p, _moved(p, displacement, v, 0.0))
+
+
+def _hold(held, k, lane, corner):
+    keep(held, 6 * k, lane, corner[0])
+    keep(held, 6 * k + 3, lane, corner[1])
+
+
+def _held(held, k, lane):
+    return kept(held, 6 * k, lane), kept(held, 6 * k + 3, lane)
+
+
+def _all_stay(held, lane, clear):
+    """Return whether all children of a face that is held clearly stay."""
+    p, q, r = _held(held, 0, lane), _held(held, 1, lane), _held(held, 2, lane)
+    pq, qr, rp = _held(held, 3, lane), _held(held, 4, lane), _held(held, 5, lane)
+    stay = _stays(pq, qr, rp, clear) & _stays(p, pq, rp, clear)
+    return stay & _stays(q, qr, pq, clear) & _stays(r, rp, qr, clear)
 
 
 def _stays(a, b, c, clear):
@@ -75,7 +98,8 @@ def _turned(a, b, c, cosine):
 
 @kernel(
     SIZE,
-    *(POINTS, POINTS, NUMBERS, FLAGS, REAL, INDICES, INDICES, SIZE, FLAGS, SIZE, SIZE, FLAGS_OUT),
+    *(POINTS, POINTS, NUMBERS, FLAGS, REAL, INDICES, INDICES, SIZE, FLAGS, SIZE, SIZE),
+    *(NUMBERS_OUT, FLAGS_OUT),
 )
 def find_folds(
     loop,
@@ -89,6 +113,7 @@ def find_folds(
     changed,
     begin,
     end,
+    held,
     touched,
 ):
     """Mark the corners of folded children of faces begin … end − 1 whose s is not 0 yet.
@@ -98,23 +123,26 @@ def find_folds(
         shared: vertices that are marked only if they fold the child by themselves; empty for none.
         changed: vertices whose s changed in the last round: other faces are as they were. Empty in
             the first round.
+        held: (HELD TOGETHER,) overwritten.
         touched: out, False on entry; threads may write the same True at once.
     """
     clear = (cosine + COSINE_MARGIN) * (cosine + COSINE_MARGIN)
-    moves = loop, displacement, scale
-    for first in range(begin, end, TOGETHER):
-        last, doubtful = min(first + TOGETHER, end), 0
-        for f in range(first, last):
-            a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-            p, q, r = _corner(*moves, a), _corner(*moves, b), _corner(*moves, c)
-            pq = _corner(*moves, vertex_count + face_edges[f, 0])
-            qr = _corner(*moves, vertex_count + face_edges[f, 1])
-            rp = _corner(*moves, vertex_count + face_edges[f, 2])
-            stays = _stays(pq, qr, rp, clear) & _stays(p, pq, rp, clear)
-            doubtful += not (stays & _stays(q, qr, pq, clear) & _stays(r, rp, qr, clear))
+    moves, middles = (loop, displacement, scale), natural(vertex_count)
+    for first in range(natural(begin), end, TOGETHER):
+        count, doubtful = min(TOGETHER, end - first), 0
+        for lane in range(count):
+            f = first + lane
+            _hold(held, 0, lane, _corner(*moves, faces[f, 0]))
+            _hold(held, 1, lane, _corner(*moves, faces[f, 1]))
+            _hold(held, 2, lane, _corner(*moves, faces[f, 2]))
+            _hold(held, 3, lane, _corner(*moves, middles + face_edges[f, 0]))
+            _hold(held, 4, lane, _corner(*moves, middles + face_edges[f, 1]))
+            _hold(held, 5, lane, _corner(*moves, middles + face_edges[f, 2]))
+        for lane in range(count):
+            doubtful += not _all_stay(held, lane, clear)
         if doubtful == 0:
             continue
-        for f in range(first, last):
+        for f in range(first, first + count):
             for i in range(4):
                 u, v, w = child_corners(faces, face_edges, vertex_count, f, i)
                 if len(changed) and not (changed[u] or changed[v] or changed[w]):

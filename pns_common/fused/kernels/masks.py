@@ -18,6 +18,7 @@ from pns_common.fused.kernels.compiled import (
     REAL,
     SIZE,
     kernel,
+    natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.masks.stencils import (
@@ -39,7 +40,7 @@ def opposite(faces, half_edge):
 @kernel(SIZE, POINTS, INDICES, INDICES, INDICES, CLASSES, SIZE, SIZE, POINTS_OUT)
 def place_edges(points, faces, edges, half_edges, edge_class, begin, end, placed):
     """Write Loop's vertices of edges begin … end − 1 (equation 2); else midpoints."""
-    for e in range(begin, end):
+    for e in range(natural(begin), end):
         a, b = edges[e, 0], edges[e, 1]
         if edge_class[e] == INTERIOR:
             c, d = opposite(faces, half_edges[e, 0]), opposite(faces, half_edges[e, 1])
@@ -55,7 +56,7 @@ def place_edges(points, faces, edges, half_edges, edge_class, begin, end, placed
 @kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
 def sum_rings(points, edges, begin, end, sums, valence):
     """Write sums of neighbours, and valences, of vertices begin … end − 1."""
-    for v in range(begin, end):
+    for v in range(natural(begin), end):
         valence[v] = 0
         for k in range(3):
             sums[v, k] = 0.0
@@ -105,7 +106,7 @@ def blend_vertices(points, valence, sharp, beta, begin, end, sums):
         sharp: (V,) sharp edges at each vertex, or (0,) where there are none at all.
         beta: Loop's weight of one neighbour, for each valence that occurs.
     """
-    for v in range(begin, end):
+    for v in range(natural(begin), end):
         count = sharp[v] if len(sharp) else 0
         if count < 2:
             weight = beta[valence[v]]
@@ -121,7 +122,7 @@ def blend_vertices(points, valence, sharp, beta, begin, end, sums):
 
 def _largest(points, begin, end):
     largest = 0.0
-    for v in range(begin, end):
+    for v in range(natural(begin), end):
         for k in range(3):
             size = abs(points[v, k])
             if not size <= largest:

@@ -17,8 +17,10 @@ from pns_common.fused.kernels.compiled import (
     SIZE,
     called_seldom,
     kernel,
+    natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
+from pns_common.fused.kernels.together import TOGETHER, keep, kept
 from pns_common.geometry.frames import NO_AREA
 
 # Far more than the cosine of two computed area vectors is wrong by, and what it counts for.
@@ -26,9 +28,9 @@ COSINE_MARGIN = 1e-14
 CLEARLY_SAME_SIDE = 1e-20
 # Products above this have all their digits.
 NORMAL_NUMBERS = 1e-300
-# Faces or edges that are asked at once, without a branch and so eight at a time on a processor with
-# such vectors, whether any is in doubt: only then they are asked one by one.
-TOGETHER = 64
+# What is held of a face: its corners and the middles of its edges; the far corners of the children
+# across each edge, by its start and by where it ends; and 1 where nothing is across, else 0.
+CORNERS, MIDDLES, FAR, LONE, HELD = 0, 9, 18, 36, 39
 
 
 def unit_normal(points, a, b, c):
@@ -155,45 +157,63 @@ def _chord_of_face(points, faces, face_edges, half_edges, edge_class, vertex_cou
     return largest
 
 
-def _is_clear_across(
-    points, face_edges, half_edges, edge_class, vertex_count, f, i, ends, areas, bound
-):
-    """Return whether the children at an edge of face f clearly turn less from those across it.
+def _hold_side(points, faces, face_edges, half_edges, edge_class, vertex_count, f, i, lane, held):
+    """Hold corner i of face f, the edge that leaves it, and what is across."""
+    keep(held, CORNERS + 3 * i, lane, _row(points, faces[f, i]))
+    keep(held, MIDDLES + 3 * i, lane, _row(points, vertex_count + face_edges[f, i]))
+    h = _across(half_edges, edge_class, face_edges[f, i], 3 * f + i)
+    g = h // 3
+    j = h - 3 * g
+    # The other face runs along the edge in the opposite direction.
+    by_start = _row(points, vertex_count + face_edges[g, _after(j)])
+    by_stop = _row(points, vertex_count + face_edges[g, _before(j)])
+    keep(held, FAR + 6 * i, lane, by_start)
+    keep(held, FAR + 6 * i + 3, lane, by_stop)
+    held[(LONE + i) * TOGETHER + lane] = 1.0 if h == 3 * f + i else 0.0
+
+
+def _hold(points, faces, face_edges, half_edges, edge_class, vertex_count, f, lane, held):
+    """Hold what the children of face f, and those across its edges, are made of."""
+    around = points, faces, face_edges, half_edges, edge_class, vertex_count
+    _hold_side(*around, f, 0, lane, held)
+    _hold_side(*around, f, 1, lane, held)
+    _hold_side(*around, f, 2, lane, held)
+
+
+def _is_clear_across(held, lane, i, ends, areas, bound):
+    """Return whether the children at an edge of a face clearly turn less from those across it.
 
     ``ends`` are where the edge starts, its middle, and where it ends; ``areas`` those of the
     children there.
     """
-    h = _across(half_edges, edge_class, face_edges[f, i], 3 * f + i)
-    g = h // 3
-    j = h - 3 * g
     start, middle, stop = ends
-    # The other face runs along the edge in the opposite direction.
-    by_start = _row(points, vertex_count + face_edges[g, _after(j)])
-    by_stop = _row(points, vertex_count + face_edges[g, _before(j)])
+    by_start, by_stop = kept(held, FAR + 6 * i, lane), kept(held, FAR + 6 * i + 3, lane)
     at_start = clearly_less(areas[0], area(start, by_start, middle), bound)
     at_stop = clearly_less(areas[1], area(stop, middle, by_stop), bound)
-    return (at_start & at_stop) | (h == 3 * f + i)
+    return (at_start & at_stop) | (held[(LONE + i) * TOGETHER + lane] > 0)
 
 
-def _is_clear(points, faces, face_edges, half_edges, edge_class, vertex_count, f, bound):
-    """Return whether all children of face f clearly turn less from each other and across edges."""
-    a, b, c = _row(points, faces[f, 0]), _row(points, faces[f, 1]), _row(points, faces[f, 2])
-    ab = _row(points, vertex_count + face_edges[f, 0])
-    bc = _row(points, vertex_count + face_edges[f, 1])
-    ca = _row(points, vertex_count + face_edges[f, 2])
+def _is_clear(held, lane, bound):
+    """Return whether all children of a face clearly turn less from each other and across edges."""
+    a, ab = kept(held, CORNERS, lane), kept(held, MIDDLES, lane)
+    b, bc = kept(held, CORNERS + 3, lane), kept(held, MIDDLES + 3, lane)
+    c, ca = kept(held, CORNERS + 6, lane), kept(held, MIDDLES + 6, lane)
     centre, at_a = area(ab, bc, ca), area(a, ab, ca)
     at_b, at_c = area(b, bc, ab), area(c, ca, bc)
     clear = clearly_less(centre, at_a, bound) & clearly_less(centre, at_b, bound)
     clear &= clearly_less(centre, at_c, bound)
-    around = points, face_edges, half_edges, edge_class, vertex_count, f
-    clear &= _is_clear_across(*around, 0, (a, ab, b), (at_a, at_b), bound)
-    clear &= _is_clear_across(*around, 1, (b, bc, c), (at_b, at_c), bound)
-    return clear & _is_clear_across(*around, 2, (c, ca, a), (at_c, at_a), bound)
+    clear &= _is_clear_across(held, lane, 0, (a, ab, b), (at_a, at_b), bound)
+    clear &= _is_clear_across(held, lane, 1, (b, bc, c), (at_b, at_c), bound)
+    return clear & _is_clear_across(held, lane, 2, (c, ca, a), (at_c, at_a), bound)
 
 
-@kernel(REAL, POINTS, INDICES, INDICES, INDICES, CLASSES, SIZE, SIZE, SIZE, NUMBERS_OUT)
+@kernel(
+    REAL,
+    *(POINTS, INDICES, INDICES, INDICES, CLASSES, SIZE, SIZE, SIZE),
+    *(NUMBERS_OUT, NUMBERS_OUT),
+)
 def largest_jump(
-    points, faces, face_edges, half_edges, edge_class, vertex_count, begin, end, largest_yet
+    points, faces, face_edges, half_edges, edge_class, vertex_count, begin, end, largest_yet, held
 ):
     """Return the largest squared chord between normals of children of faces begin … end − 1.
 
@@ -202,18 +222,21 @@ def largest_jump(
     Args:
         largest_yet: (1,) in and out: the largest found anywhere. It only spares work: threads may
             overwrite each other's, so the answer is the largest that any call returns.
+        held: (HELD TOGETHER,) overwritten.
     """
     largest, bound = 0.0, _bound(largest_yet[0])
-    around = faces, face_edges, half_edges, edge_class, vertex_count
-    for first in range(begin, end, TOGETHER):
-        last, doubtful = min(first + TOGETHER, end), 0
-        for f in range(first, last):
-            doubtful += not _is_clear(points, *around, f, bound)
+    around = faces, face_edges, half_edges, edge_class, natural(vertex_count)
+    for first in range(natural(begin), end, TOGETHER):
+        count, doubtful = min(TOGETHER, end - first), 0
+        for lane in range(count):
+            _hold(points, *around, first + lane, lane, held)
+        for lane in range(count):
+            doubtful += not _is_clear(held, lane, bound)
         if doubtful == 0:
             continue
-        for f in range(first, last):
-            if not _is_clear(points, *around, f, bound):
-                largest = max(largest, _chord_of_face(points, *around, f))
+        for lane in range(count):
+            if not _is_clear(held, lane, bound):
+                largest = max(largest, _chord_of_face(points, *around, first + lane))
                 largest_yet[0] = max(largest, largest_yet[0])
                 bound = _bound(largest_yet[0])
     return largest

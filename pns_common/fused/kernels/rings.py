@@ -21,6 +21,7 @@ from pns_common.fused.kernels.compiled import (
     REAL,
     SIZE,
     kernel,
+    natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.normals import unit_normal
@@ -76,7 +77,7 @@ def row(values, i):
 @kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, POINTS_OUT)
 def measure_faces(points, faces, begin, end, normals, areas):
     """Write normals (F, 3), area vectors and their lengths (F, 4) of faces begin … end − 1."""
-    for f in range(begin, end):
+    for f in range(natural(begin), end):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         normal = unit_normal(points, a, b, c)
         vector = cross(between(points, a, b), between(points, a, c))
@@ -90,7 +91,7 @@ def measure_faces(points, faces, begin, end, normals, areas):
 @kernel(SIZE, INDICES, POINTS, SIZE, SIZE, POINTS_OUT)
 def mean_normals(faces, areas, begin, end, fields):
     """Write m_v into the first three columns of ``fields`` (V, 4)."""
-    for v in range(begin, end):
+    for v in range(natural(begin), end):
         for k in range(4):
             fields[v, k] = 0.0
     for f in range(faces.shape[0]):
@@ -99,7 +100,7 @@ def mean_normals(faces, areas, begin, end, fields):
             if begin <= v < end:
                 for k in range(4):
                     fields[v, k] += areas[f, k]
-    for v in range(begin, end):
+    for v in range(natural(begin), end):
         area = fields[v, AREA]
         for k in range(3):
             fields[v, k] = fields[v, k] / area if area > 0 else 0.0
@@ -131,7 +132,7 @@ def measure_edges(
 
     ``altitudes`` is α, infinite where the network speaks in units of h whatever the faces.
     """
-    for e in range(begin, end):
+    for e in range(natural(begin), end):
         spoke = between(points, edges[e, 0], edges[e, 1])
         square = dot(spoke, spoke)
         length = math.sqrt(square) if square > 0 else math.inf
@@ -161,7 +162,7 @@ def face_bends(face_edges, jumps, gentle, sharp, begin, end, bends):
 
     x counts between gentle and sharp.
     """
-    for f in range(begin, end):
+    for f in range(natural(begin), end):
         total = 0.0
         for i in range(3):
             x = jumps[face_edges[f, i]]
@@ -188,7 +189,7 @@ def _add_spoke(sums, v, spoke, square, jump, bend, length, network_square):
 @kernel(SIZE, POINTS, INDICES, NUMBERS, NUMBERS, NUMBERS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
 def mean_spokes(points, edges, bends, jumps, network_lengths, begin, end, means, valence):
     """Write means over the spokes of vertices begin … end − 1, and 0 to the rest of ``means``."""
-    for v in range(begin, end):
+    for v in range(natural(begin), end):
         valence[v] = 0
         for k in range(VERTEX_COLUMNS):
             means[v, k] = 0.0
@@ -208,7 +209,7 @@ def mean_spokes(points, edges, bends, jumps, network_lengths, begin, end, means,
                 valence[b] += 1
                 back = -spoke[0], -spoke[1], -spoke[2]
                 _add_spoke(means, b, back, square, jump, bend, length, network_square)
-    for v in range(begin, end):
+    for v in range(natural(begin), end):
         count = float(max(valence[v], 1))
         for k in range(OPENING):
             means[v, k] = means[v, k] / count
@@ -221,7 +222,7 @@ def umbrella_heights(means, sharp, begin, end, fields):
 
     ``sharp`` counts the sharp edges at each vertex; (0,) where there are none at all.
     """
-    for v in range(begin, end):
+    for v in range(natural(begin), end):
         fields[v, HEIGHT] = 0.0
         if len(sharp) and sharp[v]:
             continue
@@ -240,7 +241,7 @@ def prior_pushes(means, fields, valence, smooth, ring_weight, begin, end, pushes
         smooth: 1 where the vertex may move, else 0.
         ring_weight: w_k for each valence that occurs.
     """
-    for v in range(begin, end):
+    for v in range(natural(begin), end):
         normal = clear_normal(row(fields, v))
         weight = ring_weight[valence[v]] * smooth[v]
         inwards = weight * dot(row(means, v), normal)
@@ -268,7 +269,7 @@ def mean_neighbours(points, edges, fields, valence, begin, end, means):
                 means[b, OPENING] += opening
                 means[b, NEAR_HEIGHT] += fields[a, HEIGHT]
                 means[b, NEAR_JUMP] += means[a, MEAN_JUMP]
-    for v in range(begin, end):
+    for v in range(natural(begin), end):
         count = float(max(valence[v], 1))
         for k in range(OPENING, VERTEX_COLUMNS):
             means[v, k] = means[v, k] / count

@@ -13,6 +13,7 @@ from pns_common.fused.kernels.compiled import (
     REAL,
     SIZE,
     kernel,
+    natural,
 )
 from pns_common.fused.kernels.edge_correction import in_ball, shortened, write
 from pns_common.fused.kernels.rings import (
@@ -49,7 +50,7 @@ def _reach(means, v):
 def look_around(means, fields, vertices, begin, end, features, mean_jump):
     """Write the features of ``ring-10`` and x_v of vertices[begin:end]."""
     for i in range(end - begin):
-        v = vertices[begin + i]
+        v = vertices[natural(begin) + i]
         normal, umbrella, reach = row(fields, v), row(means, v), _reach(means, v)
         features[i, 0] = means[v, MEAN_JUMP]
         features[i, 1] = means[v, MEAN_BEND]
@@ -98,7 +99,7 @@ def correct(
 ):
     """Write δ = h_v² γ_v (C / R) v into the vertices' rows (``VertexOperator.correct``)."""
     for i in range(z.shape[0]):
-        v = vertices[begin + i]
+        v = vertices[natural(begin) + i]
         envelope = budget_per_length[i] * means[v, RING_SQUARE]
         vector = in_ball(_combined(in_ball(row(z, i)), means, fields, v))
         size = envelope * gate[i]
@@ -133,7 +134,7 @@ def correct_scale_free(
     ``prior`` is D_v, ``nothing`` as at edges.
     """
     for i in range(z.shape[0]):
-        v = vertices[begin + i]
+        v = vertices[natural(begin) + i]
         envelope = budget_per_length[i] * means[v, RING_SQUARE]
         learned = _combined(in_ball(row(z, i)), means, fields, v)
         asked = scale * _root(means[v, MEAN_NETWORK_SQUARE])

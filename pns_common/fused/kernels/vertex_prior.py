@@ -5,7 +5,16 @@ from __future__ import annotations
 import math
 
 from pns_common.formula.tips import BENDS_MORE, LEFT
-from pns_common.fused.kernels.compiled import INDEX, NUMBERS, POINTS, POINTS_OUT, REAL, SIZE, kernel
+from pns_common.fused.kernels.compiled import (
+    INDEX,
+    NUMBERS,
+    POINTS,
+    POINTS_OUT,
+    REAL,
+    SIZE,
+    kernel,
+    natural,
+)
 from pns_common.fused.kernels.rings import (
     MEAN_JUMP,
     NEAR_JUMP,
@@ -40,7 +49,7 @@ def add_priors(of_curves, nothing, strength, vertices, begin, end, pushed):
     ``of_curves`` is the same of curves' pushes; (0, 3) where there are none. Then ``nothing`` is
     added: 0 where a rule moves curves, −0 where none does.
     """
-    for i in range(begin, end):
+    for i in range(natural(begin), end):
         v = vertices[i]
         for k in range(3):
             pushed[v, k] = _prior(pushed, of_curves, nothing, strength, v, k)
@@ -75,7 +84,7 @@ def add_priors_but_at_tips(
         ring_weight, further: k β_k and λ for each valence that occurs.
         tip_strength: a.
     """
-    for i in range(begin, end):
+    for i in range(natural(begin), end):
         v = vertices[i]
         step, ahead = ring_weight[valence[v]], further[valence[v]]
         moved = (

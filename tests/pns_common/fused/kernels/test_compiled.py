@@ -13,6 +13,7 @@ from pns_common.fused.kernels.compiled import (
     Kernel,
     called_seldom,
     kernel,
+    natural,
 )
 
 
@@ -55,3 +56,7 @@ def test_a_helper_may_be_kept_out_of_loops():
 
     assert called_seldom(helper) is helper
     assert getattr(helper, SELDOM)
+
+
+def test_a_natural_number_is_kept_and_none_is_negative():
+    assert [natural(number) for number in (-2, 0, 5)] == [0, 0, 5]

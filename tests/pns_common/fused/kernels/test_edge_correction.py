@@ -13,7 +13,7 @@ from pns_common.fused.kernels.edge_correction import (
     look,
     shortened,
 )
-from pns_common.fused.kernels.normals import TOGETHER
+from pns_common.fused.kernels.together import TOGETHER
 from tests.support import plain_operator
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bumpy_sphere

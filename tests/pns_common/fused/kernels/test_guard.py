@@ -6,7 +6,8 @@ import pytest
 from pns_common import Mesh
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology, split
-from pns_common.fused.kernels.guard import find_folds
+from pns_common.fused.kernels.guard import HELD, find_folds
+from pns_common.fused.kernels.together import TOGETHER
 from pns_common.fused.loop_points import loop_points
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bent, grid
@@ -35,7 +36,8 @@ def touched(way, displacement, scale, changed, shared=NONE):
     marks = np.zeros(len(LOOP), dtype=bool)
     around = LOOP, displacement, scale, shared, COSINE
     mesh = MESH.faces, MESH.face_edges, MESH.vertex_count
-    WAYS[way](find_folds)(*around, *mesh, changed, 0, len(FACES), marks)
+    held = np.zeros(HELD * TOGETHER)
+    WAYS[way](find_folds)(*around, *mesh, changed, 0, len(FACES), held, marks)
     return marks
 
 

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from pns_common import Mesh
 from pns_common.connectivity.topology import build_topology, split
 from pns_common.fused.kernels.normals import (
+    HELD,
     area,
     clearly_less,
     flipped_children,
@@ -15,6 +16,7 @@ from pns_common.fused.kernels.normals import (
     squared_chord,
     unit_normal,
 )
+from pns_common.fused.kernels.together import TOGETHER
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bent, grid
 
@@ -42,7 +44,15 @@ def test_the_largest_jump_is_that_of_all_pairs(way, yet):
     pairs, largest = AFTER.edge_faces[AFTER.interior], np.array([yet])
     edges = MESH.half_edges, MESH.edge_class
     found = WAYS[way](largest_jump)(
-        MOVED, MESH.faces, MESH.face_edges, *edges, 16, 0, len(FACES), largest
+        MOVED,
+        MESH.faces,
+        MESH.face_edges,
+        *edges,
+        16,
+        0,
+        len(FACES),
+        largest,
+        np.zeros(HELD * TOGETHER),
     )
     assert found == pytest.approx(chords(pairs).max(), rel=1e-13) == largest[0]
 
@@ -52,7 +62,7 @@ def test_a_face_looks_inside_and_across_its_edges(way):
     pairs = AFTER.edge_faces[AFTER.interior]
     for f in range(len(FACES)):
         given_ = MOVED, MESH.faces, MESH.face_edges, MESH.half_edges, MESH.edge_class, 16
-        found = WAYS[way](largest_jump)(*given_, f, f + 1, np.zeros(1))
+        found = WAYS[way](largest_jump)(*given_, f, f + 1, np.zeros(1), np.zeros(HELD * TOGETHER))
         assert found == pytest.approx(chords(pairs[(pairs // 4 == f).any(axis=1)]).max(), rel=1e-13)
 
 

@@ -1,0 +1,25 @@
+"""Numbers of some faces or edges, one beside the other: loops over them run on vectors.
+
+What is gathered from all over a mesh does not; so it is gathered first, one by one, and then all
+that is computed of it is computed at once, without a branch. A number of one stands TOGETHER after
+the one before it, so a compiler knows how far apart they are.
+"""
+
+from __future__ import annotations
+
+# Faces or edges that are held at once: what is held of them stays in the first-level cache.
+TOGETHER = 64
+
+
+def keep(held, k, lane, v):
+    """Hold a vector as numbers k … k + 2 of a face or an edge."""
+    at = k * TOGETHER + lane
+    held[at] = v[0]
+    held[at + TOGETHER] = v[1]
+    held[at + 2 * TOGETHER] = v[2]
+
+
+def kept(held, k, lane):
+    """Return such a vector."""
+    at = k * TOGETHER + lane
+    return held[at], held[at + TOGETHER], held[at + 2 * TOGETHER]
