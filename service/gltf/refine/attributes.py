@@ -28,7 +28,8 @@ class RefinedVertices:
         welded: the welded vertex of each corner.
         connectivity: how corners spread over refined vertices.
         positions: the refined positions, in float32.
-        normals: the new normals; None where the primitive has none.
+        normals: the new normals, in float32; None where the primitive has none.
+        exact_normals: the same in float64, for tangents; None where the primitive has none of both.
         skin_and_morph: skin binding and morph deltas.
         morphed_normals: for each morph target the normals under it; None where none is wanted.
     """
@@ -38,6 +39,7 @@ class RefinedVertices:
     connectivity: SplitConnectivity
     positions: Float[np.ndarray, "N 3"]
     normals: Float[np.ndarray, "N 3"] | None
+    exact_normals: Float[np.ndarray, "N 3"] | None
     skin_and_morph: SkinAndMorph
     morphed_normals: tuple[Float[np.ndarray, "N 3"] | None, ...]
 
@@ -55,10 +57,11 @@ def refined_attributes(
         if name == "POSITION":
             refined[name] = refined_vertices.positions
         elif name == "NORMAL" and refined_vertices.normals is not None:
-            refined[name] = refined_vertices.normals.astype(np.float32)
+            refined[name] = refined_vertices.normals
         elif name == "TANGENT":
             direction = tangent_directions(
-                refined_vertices.connectivity.linear(corners[:, :3]), refined_vertices.normals
+                refined_vertices.connectivity.linear(corners[:, :3]),
+                refined_vertices.exact_normals,
             )
             sign = refined_vertices.connectivity.nearest(corners[:, 3:])
             refined[name] = np.hstack([direction, sign]).astype(np.float32)

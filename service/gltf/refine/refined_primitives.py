@@ -128,15 +128,18 @@ def _refined_primitive(
     else:
         own = split_connectivity(corners, len(row), grid)
     vertex = own.at_vertices(ids)
-    normals, morphed = None, (None,) * len(refined.skin_and_morph.deltas)
+    normals, exact, morphed = None, None, (None,) * len(refined.skin_and_morph.deltas)
     if shading is not None and number in shading.groups.ids:
-        normals, morphed = shading.take(own.at_vertices(shading.groups.ids[number]))
+        group = own.at_vertices(shading.groups.ids[number])
+        normals, morphed = shading.rounded(group), shading.under_targets(group)
+        exact = shading.exact(group) if "TANGENT" in primitive.attributes else None
     refined_vertices = RefinedVertices(
         row=row,
         welded=welded[row],
         connectivity=own,
         positions=rounded_rows(points, vertex, blocks_of(grid)),
         normals=normals,
+        exact_normals=exact,
         skin_and_morph=refined.skin_and_morph.take(vertex),
         morphed_normals=morphed,
     )

@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Float32, Int
+
+from pns_common.fused.grid_points import rounded_rows
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
+from ...meshes.split_connectivity import blocks_of
 from .control_mesh import ControlMesh
 from .skin_and_morph import SkinAndMorph
 from .smoothing import NormalGroups, normal_groups
@@ -33,11 +36,19 @@ class Shading:
     rest: Float[np.ndarray, "G 3"]
     morphed: tuple[Float[np.ndarray, "G 3"] | None, ...]
 
-    def take(
+    def exact(self, group: Int[np.ndarray, " N"]) -> Float[np.ndarray, "N 3"]:
+        """Return the normals at rest at vertices of which the groups are given."""
+        return np.take(self.rest, group, axis=0)
+
+    def rounded(self, group: Int[np.ndarray, " N"]) -> Float32[np.ndarray, "N 3"]:
+        """Return the same in single precision."""
+        return rounded_rows(self.rest, group, blocks_of(self.groups.connectivity.grid))
+
+    def under_targets(
         self, group: Int[np.ndarray, " N"]
-    ) -> tuple[Float[np.ndarray, "N 3"], tuple[Float[np.ndarray, "N 3"] | None, ...]]:
-        """Return the normals at rest, and morphed, at vertices of which the groups are given."""
-        return np.take(self.rest, group, axis=0), tuple(
+    ) -> tuple[Float[np.ndarray, "N 3"] | None, ...]:
+        """Return those with each morph target at weight 1; None as `morphed` has it."""
+        return tuple(
             None if morphed is None else np.take(morphed, group, axis=0) for morphed in self.morphed
         )
 

@@ -49,7 +49,7 @@ def _refined_target(
             )
             under = normals if "NORMAL" in primitive.targets[number] else None
             morphed = tangent_directions(
-                directions, refined_vertices.normals if under is None else under
+                directions, refined_vertices.exact_normals if under is None else under
             )
             refined[name] = (morphed - base[name][:, :3]).astype(np.float32)
         else:
