@@ -17,7 +17,8 @@ def answers_of(
 ) -> Float32[np.ndarray, "N 3"]:
     """Return what ``tied_network.arrays.answers_of`` gives, bit for bit."""
     answers = np.empty((len(features), 3), dtype=np.float32)
-    units = form.copies * int(form.widths.max())
+    seen, units = max(features.shape[1], 3), form.copies * int(form.widths.max())
+    space = _on_cache_lines((seen + 2 * units) * LANES)
     answer(
         features,
         form.pairs,
@@ -32,9 +33,9 @@ def answers_of(
         form.copies,
         float(LIMIT),
         budget,
-        _on_cache_lines(max(features.shape[1], 3) * LANES),
-        _on_cache_lines(units * LANES),
-        _on_cache_lines(units * LANES),
+        space[: seen * LANES],
+        space[seen * LANES : (seen + units) * LANES],
+        space[(seen + units) * LANES :],
         answers,
     )
     return answers

@@ -15,6 +15,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+# Of an array's flags, asked together: it is in C's order and aligned; and may be written.
+READ = 0x0001 | 0x0100
+WRITTEN = READ | 0x0400
+
 
 @dataclass(frozen=True)
 class Array:
@@ -33,11 +37,11 @@ class Array:
 
     def checked(self, value: np.ndarray) -> np.ndarray:
         """Return the value. Raises TypeError where a kernel would read it wrongly."""
-        flags = value.flags
-        suits = flags.carray if self.written else flags.c_contiguous and flags.aligned
-        if not suits or value.ndim != self.ndim or value.dtype != self._type:
-            kind = f"{value.dtype}, {value.ndim} dimensions"
-            raise TypeError(f"a kernel takes {self}, not {kind}, {flags}")
+        dtype, needed = value.dtype, WRITTEN if self.written else READ
+        same = dtype is self._type or dtype == self._type
+        if not same or value.ndim != self.ndim or value.flags.num & needed != needed:
+            kind = f"{dtype}, {value.ndim} dimensions"
+            raise TypeError(f"a kernel takes {self}, not {kind}, {value.flags}")
         return value
 
     @cached_property
