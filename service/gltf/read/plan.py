@@ -15,9 +15,8 @@ from .schema import Document, Primitive
 # 240,000 faces, levels 1 to 6, smooth ones and ones where every corner is a vertex, by models with
 # and without a vertex rule, with compiled kernels and without them.
 BYTES_PER_FACE = 280
-BYTES_PER_FACE_WITH_NORMALS = 300
-# The same for primitives that get normals on the way, with the three floats of each.
-BYTES_FOR_NORMALS = BYTES_PER_FACE_WITH_NORMALS - BYTES_PER_FACE + 36
+# Three floats of each vertex, beside that, where a primitive gets normals on the way.
+BYTES_FOR_NORMALS = 36
 # For each refined vertex of a skin or morph target: the levels' connectivity again, a block of
 # columns, and each set of joints and weights while they are rounded (257 measured).
 BYTES_PER_FOLLOWING_VERTEX = 320
@@ -109,11 +108,9 @@ def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, l
                 for attributes in (primitive.attributes, *primitive.targets)
                 for index in attributes.values()
             )
-            has_normals = "NORMAL" in primitive.attributes
-            base = BYTES_PER_FACE_WITH_NORMALS if has_normals else BYTES_PER_FACE
             before = triangle_count(_corner_count(document, primitive), primitive.mode, "")
             faces = before * 4**levels
-            total += BYTES_PER_PRIMITIVE + faces * (base + BYTES_PER_VERTEX_BYTE * width)
+            total += BYTES_PER_PRIMITIVE + faces * (BYTES_PER_FACE + BYTES_PER_VERTEX_BYTE * width)
             sets = sum(name.startswith("JOINTS_") for name in primitive.attributes)
             if primitive.targets or sets:
                 count = document.accessors[primitive.attributes["POSITION"]].count
