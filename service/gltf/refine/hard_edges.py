@@ -1,11 +1,14 @@
-"""Which edges of a glTF mesh are creases: those whose two sides carry different normals."""
+"""What a file's normals say of its edges: smooth where two faces share them, hard where not."""
 
 from __future__ import annotations
 
-import numpy as np
-from jaxtyping import Int
+from dataclasses import dataclass
 
-from pns_common.connectivity.topology import build_topology, next_corner
+import numpy as np
+from jaxtyping import Bool, Int
+
+from pns_common.connectivity.topology import next_corner
+from pns_common.fused.interior_edges import interior_edges
 from pns_common.mesh import Cleaned
 
 from .control_mesh import ControlMesh
@@ -14,32 +17,68 @@ from .smoothing import joined_normals
 _NO_NORMAL = -1
 
 
-def hard_edges(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, "N 2"]:
-    """Return the interior edges whose two faces carry different normals at both ends.
+@dataclass(frozen=True, eq=False)
+class Shading:
+    """The I interior edges of a mesh to refine, as its file shades them.
 
-    At both: the sides of a cone share the normals along its base and part at its tip alone, and
-    they are smooth. A face without normals says nothing, and makes no crease.
+    Attributes:
+        edges: pairs of vertices, the lower first.
+        faces: the two faces of each.
+        hard: whether the faces carry different normals at both ends. At both: the sides of a cone
+            share the normals along its base and part at its tip alone, and they are smooth.
+        smooth: whether they carry the same at both ends. A face without normals says nothing.
     """
-    place = cleaned.face_map[_proper(control)]
+
+    edges: Int[np.ndarray, "I 2"]
+    faces: Int[np.ndarray, "I 2"]
+    hard: Bool[np.ndarray, " I"]
+    smooth: Bool[np.ndarray, " I"]
+
+
+def hard_edges(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, "N 2"]:
+    """Return the interior edges whose two faces carry different normals at both ends."""
+    shading = shading_of(cleaned, corner_labels(control, cleaned))
+    return shading.edges[shading.hard]
+
+
+def corner_labels(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, "F 3"]:
+    """Label the corners of the mesh to refine: equal normals at one vertex share a number."""
+    place = cleaned.face_map[np.concatenate(control.kept)]
     labels = np.empty_like(cleaned.mesh.faces)
-    labels[place[place >= 0]] = _corner_labels(control)[place >= 0]
+    labels[place[place >= 0]] = _labels_of_faces(control)[place >= 0]
+    return labels
+
+
+def without_one_normal(cleaned: Cleaned, labels: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " V"]:
+    """Return the vertices whose corners carry several normals, or not all of them one."""
+    faces, label = cleaned.mesh.faces.reshape(-1), labels.reshape(-1)
+    of_vertex = np.empty(len(cleaned.mesh.vertices), dtype=label.dtype)
+    of_vertex[faces] = label
+    others = (of_vertex[faces] != label) | (label == _NO_NORMAL)
+    found = np.zeros(len(of_vertex), dtype=bool)
+    found[faces[others]] = True
+    return found
+
+
+def shading_of(cleaned: Cleaned, labels: Int[np.ndarray, "F 3"]) -> Shading:
+    """Return what the labels of its corners say of a mesh's edges."""
     label = labels.reshape(-1)
-    topology = build_topology(cleaned.mesh.faces, len(cleaned.mesh.vertices))
-    there, back = topology.half_edges[topology.interior].T
-    hard = np.ones(len(topology.interior), dtype=bool)
+    edges, half_edges = interior_edges(cleaned.mesh.faces, len(cleaned.mesh.vertices))
+    hard, smooth = np.zeros(len(edges), dtype=bool), np.ones(len(edges), dtype=bool)
+    # Most edges run between vertices with one normal each, and are smooth.
+    asked = np.flatnonzero(without_one_normal(cleaned, labels)[edges].any(axis=1))
+    hard[asked] = True
+    there, back = half_edges[asked].T
     for corners, facing in ((there, next_corner(back)), (next_corner(there), back)):
         first, second = label[corners], label[facing]
-        hard &= (first != second) & (first != _NO_NORMAL) & (second != _NO_NORMAL)
-    return topology.edges[topology.interior[hard]]
+        known = (first != _NO_NORMAL) & (second != _NO_NORMAL)
+        hard[asked] &= known & (first != second)
+        smooth[asked] &= known & (first == second)
+    return Shading(edges, half_edges // 3, hard, smooth)
 
 
-def _proper(control: ControlMesh) -> np.ndarray:
-    """Mark those of all faces that do not name a welded vertex twice."""
-    return np.concatenate(control.kept)
-
-
-def _corner_labels(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
-    """Label each corner of each proper face: equal normals at one vertex share a number."""
+def _labels_of_faces(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
+    """Label each corner of each proper face of the file."""
     labels = np.full(len(control.weld.vertex_of), _NO_NORMAL)
     chosen = [n for n, p in enumerate(control.primitives) if "NORMAL" in p.attributes]
     if chosen:

@@ -21,14 +21,18 @@ from ...options import Options
 from ...report import Change
 from .control_mesh import ControlMesh, vertex_rows
 from .hard_edges import hard_edges
+from .parts import Parts
 from .refined_primitives import RefinedMesh
+from .shaded_edges import creases_by_shading
 from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
 
 RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 
 
-def creases_of(control: ControlMesh, options: Options, scheme: Scheme) -> Creases:
-    """Return the cleaned mesh's edges that the options keep sharp.
+def creases_of(
+    control: ControlMesh, options: Options, scheme: Scheme, parts: Parts | None = None
+) -> Creases:
+    """Return the cleaned mesh's edges that the options keep sharp; `parts` as in `control_mesh`.
 
     By name where others than the operator have to know them; it finds lines on its way.
     """
@@ -38,6 +42,8 @@ def creases_of(control: ControlMesh, options: Options, scheme: Scheme) -> Crease
         return Creases(hard_edges(control, control.cleaned))
     mesh = control.cleaned.mesh
     creases = creases_by_shape(mesh, options, scheme)
+    if options.crease == "auto":
+        creases = creases_by_shading(control, control.cleaned, creases, parts)
     known = control.skin_and_morph.any or options.normals != "keep"
     return named_on(mesh, creases) if known else creases
 

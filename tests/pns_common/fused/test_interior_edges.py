@@ -1,0 +1,31 @@
+"""Interior edges are those of the arrays, whoever finds them."""
+
+import numpy as np
+import pytest
+
+from pns_common.connectivity.topology import build_topology
+from pns_common.fused import interior_edges, load_kernels
+from tests.support.meshes import bow_tie, bumpy_sphere, grid, one_way_pair, three_pages
+
+FACES = {
+    "closed": bumpy_sphere(0, subdivisions=2)[1],
+    "open": grid(4)[1],
+    "column by column": np.asfortranarray(grid(4)[1]),
+    "bow-tie": bow_tie()[1],
+    "three pages": three_pages()[1],
+    "one-way pair": one_way_pair()[1],
+    "irregular": np.random.default_rng(0).integers(0, 9, (40, 3)),
+}
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+@pytest.mark.parametrize("name", FACES)
+def test_interior_edges_stand_in_the_order_of_a_topology(name, loaded, monkeypatch):
+    if loaded:
+        load_kernels()
+    monkeypatch.setattr(interior_edges, "kernels_loaded", lambda: loaded)
+    faces = FACES[name]
+    topology = build_topology(np.ascontiguousarray(faces), int(faces.max()) + 1)
+    edges, half_edges = interior_edges.interior_edges(faces, topology.vertex_count)
+    np.testing.assert_array_equal(edges, topology.edges[topology.interior])
+    np.testing.assert_array_equal(half_edges, topology.half_edges[topology.interior])

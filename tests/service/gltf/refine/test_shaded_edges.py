@@ -1,0 +1,134 @@
+"""Hard edges of what is shaded smooth are kept, and lines however they are shaded."""
+
+import numpy as np
+import pytest
+
+from pns_common import load_model, loop
+from pns_common.crease_lines import named_on
+from service.gltf.read.primitives import read_primitive
+from service.gltf.read.upload import read_upload
+from service.gltf.refine.control_mesh import control_mesh
+from service.gltf.refine.hard_edges import hard_edges
+from service.gltf.refine.refinement import creases_of
+from service.gltf.subdivide import subdivide_gltf
+from service.options import Limits, Options
+from tests.support.gltf import files
+from tests.support.gltf.shapes import box
+from tests.support.shared import shared_path
+
+MODEL = load_model()
+SIDES = 12
+
+
+def spindle(shading, sides=SIDES):
+    """Two steep cones, base to base, whose rim turns by 37 degrees: no line by its shape."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    rim = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
+    step, after = np.arange(sides), (np.arange(sides) + 1) % sides
+    points, normals, faces = [], [], []
+    for side in (1.0, -1.0):
+        slope = np.column_stack([3 * rim[:, :2], np.full(sides, side)])
+        at_rim = rim if shading == "smooth" else slope
+        start = len(points) * (sides + 1)
+        points.append(np.vstack([rim, [[0, 0, 3 * side]]]))
+        normals.append(np.vstack([at_rim, [[0, 0, side]]]))
+        fan = np.column_stack([step, after, np.full(sides, sides)]) + start
+        faces.append(fan if side > 0 else fan[:, ::-1])
+    points, normals, faces = (np.concatenate(rows) for rows in (points, normals, faces))
+    if shading == "flat":
+        a, b, c = points[faces].transpose(1, 0, 2)
+        points = points[faces].reshape(-1, 3)
+        normals = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+        faces = np.arange(len(points)).reshape(-1, 3)
+    shape = {"POSITION": points, "NORMAL": normals / np.linalg.norm(normals, axis=1)[:, None]}
+    return {name: np.float32(rows) for name, rows in shape.items()} | {"indices": faces}
+
+
+def smooth_box():
+    """A box of eight vertices, each with one normal: what tools write that ask nobody."""
+    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    faces = np.array(quads)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    rows = {"POSITION": corners, "NORMAL": corners / np.sqrt(3)}
+    return {name: np.float32(values) for name, values in rows.items()} | {"indices": faces}
+
+
+def refined(*meshes, model=MODEL, **options):
+    given = Options(**{"levels": 3, "diagnostics": "none", **options})
+    return subdivide_gltf(files.glb(*meshes), "glb", given, model, Limits())
+
+
+def creases(result, mesh=0):
+    levels = result.report["meshes"][mesh]["levels"]
+    return [level["edges"].get("crease", 0) for level in levels]
+
+
+def control_meshes(folder):
+    """The meshes of a folder's files that have normals."""
+    for path in sorted(folder.glob("*.glb")):
+        upload = read_upload(path.read_bytes(), "glb", 1, Limits())
+        for plan in upload.plans:
+            primitives = [
+                read_primitive(upload.document, upload.buffers, plan.mesh, number)
+                for number in plan.primitives
+            ]
+            if any("NORMAL" in primitive.attributes for primitive in primitives):
+                yield control_mesh(primitives, 0.0, None)
+
+
+@pytest.mark.parametrize(
+    ("shading", "kept"), [("hard rim", [12, 24, 0]), ("smooth", [0, 0, 0]), ("flat", [0, 0, 0])]
+)
+def test_a_hard_rim_is_kept_for_two_levels_where_the_rest_is_smooth(shading, kept):
+    assert creases(refined([spindle(shading)])) == kept
+
+
+@pytest.mark.parametrize("crease", ["lines", "off"])
+def test_who_asks_for_lines_or_none_gets_no_hard_edges(crease):
+    assert creases(refined([spindle("hard rim")], crease=crease)) == [0, 0, 0]
+
+
+def test_models_that_keep_no_lines_keep_no_hard_edges():
+    assert creases(refined([spindle("hard rim")], model=load_model("paper"))) == [0, 0, 0]
+    assert creases(refined([spindle("hard rim")], scheme="loop")) == [0, 0, 0]
+
+
+def test_a_line_is_kept_however_it_is_shaded():
+    assert creases(refined([smooth_box()])) == creases(refined([box()])) == [12, 24, 0]
+
+
+def test_lines_and_hard_edges_of_one_mesh_are_kept_side_by_side():
+    apart = smooth_box()
+    apart["POSITION"] = apart["POSITION"] + np.float32([4, 0, 0])
+    assert creases(refined([spindle("hard rim", 48), apart])) == [48 + 12, 2 * (48 + 12), 0]
+
+
+def test_meshes_of_one_file_are_each_asked_for_themselves():
+    shadings = ["flat", "hard rim", "smooth", "hard rim", "flat"]
+    result = refined(*([spindle(shading)] for shading in shadings))
+    assert [creases(result, mesh)[0] for mesh in range(5)] == [0, 12, 0, 12, 0]
+    for number, shading in enumerate(shadings):
+        alone = files.primitive_of(refined([spindle(shading)]).glb)
+        faces, attributes = files.primitive_of(result.glb, mesh=number)
+        np.testing.assert_array_equal(faces, alone[0])
+        for name, values in alone[1].items():
+            np.testing.assert_array_equal(attributes[name], values)
+
+
+def test_a_primitive_without_normals_says_nothing():
+    bare = spindle("hard rim")
+    del bare["NORMAL"]
+    assert creases(refined([bare])) == [0, 0, 0]
+
+
+def test_artists_shade_hard_what_the_shape_shows_to_be_a_line():
+    """Lines know positions alone, and artists' normals are another's word on the same edges."""
+    lines = hard = 0
+    for control in control_meshes(shared_path("assets")):
+        shown = creases_of(control, Options(crease="lines"), loop())
+        named = named_on(control.cleaned.mesh, shown).named
+        meant = {tuple(edge) for edge in hard_edges(control, control.cleaned).tolist()}
+        lines += len(named)
+        hard += sum(tuple(edge) in meant for edge in named.tolist())
+    assert lines > 1000
+    assert hard > 0.99 * lines
