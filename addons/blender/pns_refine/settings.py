@@ -96,7 +96,8 @@ class Settings:
     )
     crease_lines: BoolProperty(
         name="Keep Crease Lines",
-        description="Keep edges sharp that the mesh shows to be: between flat sides, and going on",
+        description="Keep edges sharp that the mesh shows to be: between flat sides and going on, "
+        "or hard where most of it is shaded smooth",
         default=True,
     )
     quads: BoolProperty(

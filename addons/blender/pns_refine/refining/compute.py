@@ -12,7 +12,6 @@ from pns_common import Creases, Mesh, Scheme, loop, pns
 from pns_common.base.arrays import norm
 from pns_common.connectivity.creases import NO_CREASES
 from pns_common.connectivity.topology import EdgeClass, Topology
-from pns_common.crease_lines import named_on
 from pns_common.geometry.sharp_edges import edges_sharper_than
 from pns_common.masks.limit import limit_positions
 from pns_common.schemes import VertexModel
@@ -28,6 +27,7 @@ from .faces import (
     used_edges,
 )
 from .positions import Positions, refine_positions
+from .shown_creases import shown_creases
 from .snapshot import Faces, Layer, Refined, Rule, Snapshot, edge_keys
 from .steps import Steps, edge_numbers, level_steps, refine_columns
 from .votes import vote_at_corners, vote_at_points
@@ -43,8 +43,8 @@ class Choice:
 
     ``model`` is the learned correction and ``budget`` its C; without a model it is Loop.
     ``crease_angle`` (radians) makes edges sharp whose faces meet at a larger angle; None makes
-    none. ``crease_lines`` keeps those sharp that the mesh shows, where the model's card asks for
-    it. ``quads`` joins the triangles of quads again.
+    none. ``crease_lines`` keeps those sharp that the mesh or its shading shows, where the model's
+    card asks for it. ``quads`` joins the triangles of quads again.
     """
 
     model: VertexModel | None
@@ -69,7 +69,7 @@ def compute(
     if choice.model is not None:
         scheme = pns(WatchedModel(choice.model, bar.look_up), choice.budget)
     mesh = Mesh(snapshot.points, snapshot.triangles)
-    lines = named_on(mesh, scheme.creases) if choice.crease_lines else NO_CREASES
+    lines = shown_creases(snapshot, scheme.creases) if choice.crease_lines else NO_CREASES
     pairs, crease_sharpness = all_creases(snapshot, choice.crease_angle, lines)
     steps = level_steps(mesh.faces, len(mesh.vertices), choice.levels, pairs, crease_sharpness)
     positions = refine_positions(
