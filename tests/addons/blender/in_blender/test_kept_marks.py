@@ -71,6 +71,18 @@ def test_edges_of_large_angles_are_sharp_on_request():
     assert np.linalg.norm(points_of(blunt.data)[0]) < 1.2
 
 
+@pytest.mark.parametrize(("flat", "left"), [(False, 12), (True, 0)])
+def test_edges_marked_sharp_are_kept_where_the_mesh_is_shaded_smooth(flat, left):
+    obj = grid(6)
+    obj.data.polygons.foreach_set("use_smooth", np.full(36, not flat))
+    for edge in obj.data.edges:
+        edge.use_edge_sharp = all(v // 7 == 3 for v in edge.vertices)
+    made = refined(obj, levels=1).data.attributes.get("crease_edge")
+    # Sharp for two levels, of which one is left: 10 c² = 1.
+    kept = 0 if made is None else np.isclose(numbers(made.data, "value"), math.sqrt(0.1)).sum()
+    assert kept == left
+
+
 def test_seams_sharp_edges_and_marks_stay_on_their_edges():
     obj = cube()
     for edge in (0, 5):
