@@ -31,6 +31,7 @@ from jaxtyping import Bool, Float
 
 from pns_common.base.arrays import Array, as_numpy, namespace, norm
 from pns_common.errors import ModelError
+from pns_common.formula.gate import gate_of
 from pns_common.geometry.frames import EdgeFrames, EdgeStencil, edge_frames, rotate
 from pns_common.geometry.thin_faces import longest_side
 
@@ -65,7 +66,7 @@ def curvature_gate(gate_sharpness: float) -> Gate:
     """Return γ = tanh(c x²): 0, with derivative 0, where both faces are coplanar (equation 4)."""
 
     def gate(frames: EdgeFrames) -> Array:
-        return namespace(frames.curvature).tanh(gate_sharpness * frames.curvature**2)
+        return gate_of(gate_sharpness * frames.curvature**2)
 
     return gate
 

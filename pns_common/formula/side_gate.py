@@ -22,6 +22,7 @@ from jaxtyping import Float, Int
 from pns_common.base.arrays import Array, beside, gather, namespace, scatter
 from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.formula.correction import Gate
+from pns_common.formula.gate import gate_of
 from pns_common.geometry.frames import EdgeFrames
 
 # x of bends of 46 and 66 degrees.
@@ -71,7 +72,7 @@ def gentle_bend(
 
 def of_gentler(bends: Float[Array, " N"], gate_sharpness: float) -> Float[Array, " N"]:
     """Return the same from the smaller b of both faces."""
-    return namespace(bends).tanh(gate_sharpness * bends)
+    return gate_of(gate_sharpness * bends)
 
 
 def opened(gate: Float[Array, " N"], by: Float[Array, " N"]) -> Float[Array, " N"]:

@@ -30,6 +30,7 @@ from pns_common.formula.correction import (
     shortened,
     where_open,
 )
+from pns_common.formula.gate import gate_of
 from pns_common.geometry.rings import Rings, ring_vectors
 
 
@@ -89,7 +90,7 @@ class VertexOperator:
     ) -> tuple[Float[Array, " N"], Float[Array, " N"], Float[Array, "N 3"]]:
         """Return γ_v, ρ = h_v² C / R, and Σ z_i e_i."""
         xp = namespace(rings.normal)
-        gamma = xp.tanh(self.gate_sharpness * gather(rings.mean_jump, vertices)[:, 0])
+        gamma = gate_of(self.gate_sharpness * gather(rings.mean_jump, vertices)[:, 0])
         envelope = budget_per_length * gather(rings.square, vertices)[:, 0]
         basis = gather(ring_vectors(rings), vertices)
         features = gather(self.features(rings), vertices)

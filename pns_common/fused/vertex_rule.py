@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pns_common.formula.correction import where_open
+from pns_common.formula.gate import gate_of
 from pns_common.fused.additions import Additions
 from pns_common.fused.kernels.vertex_correction import correct, correct_scale_free, look_around
 from pns_common.fused.surroundings import Surroundings
@@ -36,7 +37,7 @@ def add_at_vertices(
         features, mean_jump = np.empty((count, operator.features.count)), np.empty(count)
         around = rings.means, rings.fields
         look_around(*around, vertices, rows.start, rows.stop, features, mean_jump)
-        gate = np.tanh(operator.gate_sharpness * mean_jump)
+        gate = gate_of(operator.gate_sharpness * mean_jump)
         like = np.empty((count, 3))
         z = np.ascontiguousarray(where_open(operator.network, features, gate, like))
         if isinstance(rule, LearnedVertexRule):
