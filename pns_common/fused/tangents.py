@@ -14,9 +14,9 @@ from pns_common.geometry import tangents as arrays
 def perpendicular_tangents(
     tangents: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"], blocks: Blocks
 ) -> Float[np.ndarray, "N 3"]:
-    """Return what ``pns_common.geometry.tangents`` makes, bit for bit, in a quarter of the time.
+    """Return what ``pns_common.geometry.tangents`` makes, in a quarter of the time.
 
-    The kernels are not loaded for this.
+    Of finite numbers it is the same bit for bit. The kernels are not loaded for this.
     """
     if not (kernels_loaded() and tangents.dtype == np.float64):
         return arrays.perpendicular_tangents(tangents, normals, blocks)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +15,7 @@ from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
 from ...meshes.weld import Weld, weld
 from ...meshes.weld_tolerance import WHOLE, weld_within
 from ..read.primitives import TrianglePrimitive
+from .joined_normals import joined_normals
 from .parts import Parts
 from .skin_and_morph import SkinAndMorph, read_skin_and_morph
 
@@ -49,6 +51,19 @@ class ControlMesh:
     def copies(self) -> int:
         """Faces with the same three vertices as an earlier one: refined once, kept each."""
         return 0 if self.cleaned is None else self.cleaned.dropped_duplicate
+
+    @cached_property
+    def normal_labels(self) -> Int[np.ndarray, " N"]:
+        """What rows share that have one normal at one vertex; −1 where a primitive has none."""
+        labels = np.full(len(self.weld.vertex_of), -1)
+        chosen = [n for n, p in enumerate(self.primitives) if "NORMAL" in p.attributes]
+        if chosen:
+            rows = np.concatenate(
+                [np.arange(self.rows[n].start, self.rows[n].stop) for n in chosen]
+            )
+            normals = np.concatenate([self.primitives[n].attributes["NORMAL"] for n in chosen])
+            labels[rows] = joined_normals(self.weld.vertex_of[rows], normals)
+        return labels
 
     def with_split_rows(self, primitives: Sequence[TrianglePrimitive]) -> ControlMesh:
         """Return the same mesh over primitives whose faces have more rows in the same places."""

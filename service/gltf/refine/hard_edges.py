@@ -12,13 +12,12 @@ from pns_common.fused.interior_edges import interior_edges
 from pns_common.mesh import Cleaned
 
 from .control_mesh import ControlMesh
-from .smoothing import joined_normals
 
 _NO_NORMAL = -1
 
 
 @dataclass(frozen=True, eq=False)
-class Shading:
+class EdgeShading:
     """The I interior edges of a mesh to refine, as its file shades them.
 
     Attributes:
@@ -26,7 +25,8 @@ class Shading:
         faces: the two faces of each.
         hard: whether the faces carry different normals at both ends. At both: the sides of a cone
             share the normals along its base and part at its tip alone, and they are smooth.
-        smooth: whether they carry the same at both ends. A face without normals says nothing.
+        smooth: whether they carry the same at both ends. Corners say nothing that have no normal,
+            or one without direction.
     """
 
     edges: Int[np.ndarray, "I 2"]
@@ -60,7 +60,7 @@ def without_one_normal(cleaned: Cleaned, labels: Int[np.ndarray, "F 3"]) -> Bool
     return found
 
 
-def shading_of(cleaned: Cleaned, labels: Int[np.ndarray, "F 3"]) -> Shading:
+def shading_of(cleaned: Cleaned, labels: Int[np.ndarray, "F 3"]) -> EdgeShading:
     """Return what the labels of its corners say of a mesh's edges."""
     label = labels.reshape(-1)
     edges, half_edges = interior_edges(cleaned.mesh.faces, len(cleaned.mesh.vertices))
@@ -74,17 +74,15 @@ def shading_of(cleaned: Cleaned, labels: Int[np.ndarray, "F 3"]) -> Shading:
         known = (first != _NO_NORMAL) & (second != _NO_NORMAL)
         hard[asked] &= known & (first != second)
         smooth[asked] &= known & (first == second)
-    return Shading(edges, half_edges // 3, hard, smooth)
+    return EdgeShading(edges, half_edges // 3, hard, smooth)
 
 
 def _labels_of_faces(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
     """Label each corner of each proper face of the file."""
-    labels = np.full(len(control.weld.vertex_of), _NO_NORMAL)
-    chosen = [n for n, p in enumerate(control.primitives) if "NORMAL" in p.attributes]
-    if chosen:
-        rows = np.concatenate([np.arange(part.start, part.stop) for part in _rows(control, chosen)])
-        normals = np.concatenate([control.primitives[n].attributes["NORMAL"] for n in chosen])
-        labels[rows] = joined_normals(control.weld.vertex_of[rows], normals)
+    labels = control.normal_labels.copy()
+    for primitive, part in zip(control.primitives, control.rows, strict=True):
+        if "NORMAL" in primitive.attributes:
+            labels[part][~primitive.attributes["NORMAL"].any(axis=1)] = _NO_NORMAL
     return np.concatenate(
         [
             labels[primitive.corners[keep] + part.start]
@@ -93,7 +91,3 @@ def _labels_of_faces(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
             )
         ]
     )
-
-
-def _rows(control: ControlMesh, chosen: list[int]) -> list[slice]:
-    return [control.rows[number] for number in chosen]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.arrays import dot, norm
+from pns_common.base.arrays import dot
 from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
 from pns_common.base.distinct import number_by_first_appearance
 from pns_common.fused.corner_normals import angle_weighted_normals
@@ -24,12 +24,6 @@ from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import SplitConnectivity, split_connectivity
 from .control_mesh import ControlMesh, slices
 from .normals import safe_unit
-
-# Exporters compute the two sides of a UV seam apart and round differently: in real files up to
-# about 0.01°. Normals within 0.1° are one; an edge that is meant to be hard has degrees.
-SAME_NORMAL = np.radians(0.1)
-# A direction in which different normals hardly ever have equal coordinates.
-SCAN = np.array([1.0, np.sqrt(2), np.sqrt(3)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +111,13 @@ def _split_groups(
 ) -> tuple[SplitConnectivity, Callable[[], Float[np.ndarray, "C 3"]]]:
     """Split the connectivity of (welded vertex, old normal) pairs; what tells their normals."""
     old = [control.primitives[number].attributes["NORMAL"] for number in chosen]
-    welded = [control.weld.vertex_of[control.rows[number]] for number in chosen]
     starts = slices([len(normals) for normals in old])
     rows = [
         control.primitives[number].corners[control.kept[number]] + part.start
         for number, part in zip(chosen, starts, strict=True)
     ]
     normals, flat = np.concatenate(old), np.concatenate(rows).reshape(-1)
-    labels = joined_normals(np.concatenate(welded), normals)
+    labels = np.concatenate([control.normal_labels[control.rows[number]] for number in chosen])
     corners, first = number_by_first_appearance(labels[flat])
 
     def before() -> Float[np.ndarray, "C 3"]:
@@ -133,24 +126,3 @@ def _split_groups(
         return values
 
     return split_connectivity(corners.reshape(-1, 3), len(first), grid), before
-
-
-def joined_normals(
-    vertex: Int[np.ndarray, " N"], normals: Float[np.ndarray, "N 3"]
-) -> Int[np.ndarray, " N"]:
-    """Return labels that rows share where they have the same vertex and, nearly, the same normal.
-
-    Neighbours along one direction are compared: rows with equal normals are always joined, rows
-    that nearly agree all but always, at the cost of one sort however many meet at a vertex.
-    """
-    # Where a vertex has one row there is nothing to compare: most are inside smooth surfaces.
-    several = np.flatnonzero((np.bincount(vertex) > 1)[vertex])
-    v, n = vertex[several], normals[several].astype(np.float64)
-    # Not by matrix product, whose bits depend on where a row stands.
-    order = np.lexsort((*n.T, dot(n, SCAN[None]), v))
-    v, n = v[order], n[order]
-    opens = np.ones(len(order), dtype=bool)
-    opens[1:] = (v[1:] != v[:-1]) | (norm(n[1:] - n[:-1]) > SAME_NORMAL)
-    labels = vertex.copy()
-    labels[several[order]] = vertex.max(initial=-1) + np.cumsum(opens)
-    return labels

@@ -3,8 +3,8 @@
 import numpy as np
 
 from pns_common.base.distinct import number_by_first_appearance
+from service.gltf.refine.joined_normals import joined_normals
 from service.gltf.refine.normals import safe_unit
-from service.gltf.refine.smoothing import joined_normals
 
 
 def test_vectors_without_direction_become_the_z_axis():
@@ -36,3 +36,9 @@ def test_zeros_of_either_sign_are_one_normal():
     normals = np.array([[0.0, 0.0, 1.0], [-0.0, -0.0, 1.0]])
     labels = joined_normals(np.zeros(2, dtype=np.int64), normals)
     assert labels[0] == labels[1]
+
+
+def test_directions_count_and_lengths_do_not():
+    normals = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.01], [0.0, 0.0, 1e-30], [0.0, 0.0, 0.0]])
+    labels = joined_normals(np.zeros(4, dtype=np.int64), normals)
+    assert number_by_first_appearance(labels)[0].tolist() == [0, 0, 0, 1]

@@ -121,6 +121,20 @@ def test_a_primitive_without_normals_says_nothing():
     assert creases(refined([bare])) == [0, 0, 0]
 
 
+@pytest.mark.parametrize("length", [0.0, 1.01])
+def test_a_smooth_mesh_stays_so_whose_faces_carry_normals_of_other_lengths_or_of_none(length):
+    shape = spindle("smooth")
+    # Some faces get rows of their own.
+    own = shape["indices"][::5].reshape(-1)
+    faces = shape["indices"].copy()
+    faces[::5] = len(shape["POSITION"]) + np.arange(len(own)).reshape(-1, 3)
+    rows = {
+        "POSITION": np.concatenate([shape["POSITION"], shape["POSITION"][own]]),
+        "NORMAL": np.concatenate([shape["NORMAL"], np.float32(length) * shape["NORMAL"][own]]),
+    }
+    assert creases(refined([rows | {"indices": faces}])) == [0, 0, 0]
+
+
 def test_artists_shade_hard_what_the_shape_shows_to_be_a_line():
     """Lines know positions alone, and artists' normals are another's word on the same edges."""
     lines = hard = 0
