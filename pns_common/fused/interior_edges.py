@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Int
 
 from pns_common.base.blocks import available_threads
-from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.connectivity.topology import build_topology
 from pns_common.fused import fits, kernel_blocks, kernels_loaded
 
 
@@ -24,7 +24,4 @@ def interior_edges(
 
     blocks = kernel_blocks(available_threads())
     mesh = build_edges(np.ascontiguousarray(faces, dtype=np.int32), vertex_count, blocks)
-    interior = mesh.edge_class == EdgeClass.INTERIOR
-    if interior.all():
-        return mesh.edges, mesh.half_edges
-    return mesh.edges[interior], mesh.half_edges[interior]
+    return mesh.edges[mesh.interior], mesh.half_edges[mesh.interior]

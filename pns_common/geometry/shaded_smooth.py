@@ -7,14 +7,16 @@ normals.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import dot
 from pns_common.geometry.frames import face_normals
+from pns_common.geometry.sharp_edges import turn_by_more
 
 # Edges that turn by less (radians) say nothing: a flat face of many corners has some.
-BENT = np.radians(1.0)
+BENT = math.radians(1.0)
 # A mesh is shaded smooth where more than this share of its bent edges is. Of quads that are shaded
 # flat the diagonals are smooth, a third of all edges.
 SMOOTH = 1 / 2
@@ -33,12 +35,7 @@ def shaded_smooth(
     ``edge_faces`` are the two faces of each edge, ``smooth`` says which are shaded as one surface,
     ``part`` of which part they are; None: all are of one.
     """
-    normals = face_normals(points, faces)
-    first, second = edge_faces.T
-    # A face without area has no normal: its edges turn by nothing.
-    has_area = normals.any(axis=1)
-    bent = dot(normals[first], normals[second]) < np.cos(BENT)
-    bent &= has_area[first] & has_area[second]
+    bent = turn_by_more(face_normals(points, faces), edge_faces, BENT)
     part = np.zeros(len(bent), dtype=np.int64) if part is None else part
     of_smooth = np.bincount(part[bent & smooth], minlength=part_count)
     return of_smooth > SMOOTH * np.bincount(part[bent], minlength=part_count)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from pns_common.base.arrays import dot
 from pns_common.connectivity.topology import build_topology
@@ -21,10 +21,20 @@ def edges_sharper_than(
     their edges is sharp.
     """
     topology = build_topology(faces, len(points))
-    normals = face_normals(points, faces)
-    n1, n2 = (normals[side] for side in topology.edge_faces[topology.interior].T)
+    edge_faces = topology.edge_faces[topology.interior]
+    sharp = turn_by_more(face_normals(points, faces), edge_faces, angle)
+    return topology.edges[topology.interior[sharp]]
+
+
+def turn_by_more(
+    normals: Float[np.ndarray, "F 3"], edge_faces: Int[np.ndarray, "I 2"], angle: float
+) -> Bool[np.ndarray, " I"]:
+    """Return where the unit normals of two faces differ by more than ``angle`` ≥ 0, radians.
+
+    The normal of a face without area is 0, and nothing turns there.
+    """
+    n1, n2 = (normals[side] for side in edge_faces.T)
     defined = (dot(n1, n1) > 0) & (dot(n2, n2) > 0)
     # The chord of an angle keeps small angles that a cosine would round away.
     chord = n1 - n2
-    sharp = defined & (dot(chord, chord) > (2 * math.sin(min(angle, math.pi) / 2)) ** 2)
-    return topology.edges[topology.interior[sharp]]
+    return defined & (dot(chord, chord) > (2 * math.sin(min(angle, math.pi) / 2)) ** 2)

@@ -103,6 +103,19 @@ def one_way_pair():
     return np.array(vertices, dtype=float), np.array([[0, 1, 2], [0, 1, 3]])
 
 
+def face_lists():
+    """Faces by name: closed, open, and what no surface has; one in Fortran's order."""
+    return {
+        "closed": bumpy_sphere(0, subdivisions=2)[1],
+        "open": grid(4)[1],
+        "column by column": np.asfortranarray(grid(4)[1]),
+        "bow-tie": bow_tie()[1],
+        "three pages": three_pages()[1],
+        "one-way pair": one_way_pair()[1],
+        "irregular": np.random.default_rng(0).integers(0, 9, (40, 3)),
+    }
+
+
 def rotation(rng):
     """A random rotation matrix."""
     q, r = np.linalg.qr(rng.standard_normal((3, 3)))

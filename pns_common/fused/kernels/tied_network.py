@@ -18,6 +18,7 @@ from pns_common.fused.kernels.compiled import (
     SINGLES_OUT,
     SIZE,
     kernel,
+    natural,
 )
 from pns_common.fused.kernels.gelu import gelu
 
@@ -40,8 +41,8 @@ def _read(features, begin, seen):
 
 
 def _start(i):
-    """Return where row i begins; that it is no negative index a compiler cannot know."""
-    return max(i * LANES, 0)
+    """Return where row i begins."""
+    return natural(i * LANES)
 
 
 def _add_and_subtract(x, i, j):

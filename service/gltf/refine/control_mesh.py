@@ -8,14 +8,14 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Int, Shaped
 
 from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
 
 from ...meshes.weld import Weld, weld
 from ...meshes.weld_tolerance import WHOLE, weld_within
 from ..read.primitives import TrianglePrimitive
-from .joined_normals import joined_normals
+from .joined_normals import NO_NORMAL, joined_normals
 from .parts import Parts
 from .skin_and_morph import SkinAndMorph, read_skin_and_morph
 
@@ -54,8 +54,8 @@ class ControlMesh:
 
     @cached_property
     def normal_labels(self) -> Int[np.ndarray, " N"]:
-        """What rows share that have one normal at one vertex; −1 where a primitive has none."""
-        labels = np.full(len(self.weld.vertex_of), -1)
+        """What rows share that have one normal at one vertex; NO_NORMAL where there is none."""
+        labels = np.full(len(self.weld.vertex_of), NO_NORMAL)
         chosen = [n for n, p in enumerate(self.primitives) if "NORMAL" in p.attributes]
         if chosen:
             rows = np.concatenate(
@@ -64,6 +64,15 @@ class ControlMesh:
             normals = np.concatenate([self.primitives[n].attributes["NORMAL"] for n in chosen])
             labels[rows] = joined_normals(self.weld.vertex_of[rows], normals)
         return labels
+
+    def of_cleaned(
+        self, cleaned: Cleaned, of_kept: Shaped[np.ndarray, "P ..."]
+    ) -> Shaped[np.ndarray, "F ..."]:
+        """Return for each face of the mesh to refine what belongs to the kept face that it is."""
+        place = cleaned.face_map[np.concatenate(self.kept)]
+        of_face = np.empty((len(cleaned.mesh.faces), *of_kept.shape[1:]), dtype=of_kept.dtype)
+        of_face[place[place >= 0]] = of_kept[place >= 0]
+        return of_face
 
     def with_split_rows(self, primitives: Sequence[TrianglePrimitive]) -> ControlMesh:
         """Return the same mesh over primitives whose faces have more rows in the same places."""

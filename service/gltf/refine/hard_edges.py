@@ -12,8 +12,7 @@ from pns_common.fused.interior_edges import interior_edges
 from pns_common.mesh import Cleaned
 
 from .control_mesh import ControlMesh
-
-_NO_NORMAL = -1
+from .joined_normals import NO_NORMAL
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,16 +36,14 @@ class EdgeShading:
 
 def hard_edges(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, "N 2"]:
     """Return the interior edges whose two faces carry different normals at both ends."""
-    shading = shading_of(cleaned, corner_labels(control, cleaned))
+    labels = corner_labels(control, cleaned)
+    shading = shading_of(cleaned, labels, without_one_normal(cleaned, labels))
     return shading.edges[shading.hard]
 
 
 def corner_labels(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, "F 3"]:
     """Label the corners of the mesh to refine: equal normals at one vertex share a number."""
-    place = cleaned.face_map[np.concatenate(control.kept)]
-    labels = np.empty_like(cleaned.mesh.faces)
-    labels[place[place >= 0]] = _labels_of_faces(control)[place >= 0]
-    return labels
+    return control.of_cleaned(cleaned, _labels_of_faces(control))
 
 
 def without_one_normal(cleaned: Cleaned, labels: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " V"]:
@@ -54,24 +51,29 @@ def without_one_normal(cleaned: Cleaned, labels: Int[np.ndarray, "F 3"]) -> Bool
     faces, label = cleaned.mesh.faces.reshape(-1), labels.reshape(-1)
     of_vertex = np.empty(len(cleaned.mesh.vertices), dtype=label.dtype)
     of_vertex[faces] = label
-    others = (of_vertex[faces] != label) | (label == _NO_NORMAL)
+    others = (of_vertex[faces] != label) | (label == NO_NORMAL)
     found = np.zeros(len(of_vertex), dtype=bool)
     found[faces[others]] = True
     return found
 
 
-def shading_of(cleaned: Cleaned, labels: Int[np.ndarray, "F 3"]) -> EdgeShading:
-    """Return what the labels of its corners say of a mesh's edges."""
+def shading_of(
+    cleaned: Cleaned, labels: Int[np.ndarray, "F 3"], parted: Bool[np.ndarray, " V"]
+) -> EdgeShading:
+    """Return what the labels of its corners say of a mesh's edges.
+
+    ``parted`` are the vertices without one normal.
+    """
     label = labels.reshape(-1)
     edges, half_edges = interior_edges(cleaned.mesh.faces, len(cleaned.mesh.vertices))
     hard, smooth = np.zeros(len(edges), dtype=bool), np.ones(len(edges), dtype=bool)
     # Most edges run between vertices with one normal each, and are smooth.
-    asked = np.flatnonzero(without_one_normal(cleaned, labels)[edges].any(axis=1))
+    asked = np.flatnonzero(parted[edges].any(axis=1))
     hard[asked] = True
     there, back = half_edges[asked].T
     for corners, facing in ((there, next_corner(back)), (next_corner(there), back)):
         first, second = label[corners], label[facing]
-        known = (first != _NO_NORMAL) & (second != _NO_NORMAL)
+        known = (first != NO_NORMAL) & (second != NO_NORMAL)
         hard[asked] &= known & (first != second)
         smooth[asked] &= known & (first == second)
     return EdgeShading(edges, half_edges // 3, hard, smooth)
@@ -82,7 +84,7 @@ def _labels_of_faces(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
     labels = control.normal_labels.copy()
     for primitive, part in zip(control.primitives, control.rows, strict=True):
         if "NORMAL" in primitive.attributes:
-            labels[part][~primitive.attributes["NORMAL"].any(axis=1)] = _NO_NORMAL
+            labels[part][~primitive.attributes["NORMAL"].any(axis=1)] = NO_NORMAL
     return np.concatenate(
         [
             labels[primitive.corners[keep] + part.start]

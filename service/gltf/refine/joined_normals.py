@@ -10,6 +10,8 @@ from pns_common.base.arrays import dot, norm, unit
 # Exporters compute the two sides of a UV seam apart and round differently: in real files up to
 # about 0.01°. Normals within 0.1° are one; an edge that is meant to be hard has degrees.
 SAME_NORMAL = np.radians(0.1)
+# The label of a row without a normal.
+NO_NORMAL = -1
 # A direction in which different normals hardly ever have equal coordinates.
 SCAN = np.array([1.0, np.sqrt(2), np.sqrt(3)])
 

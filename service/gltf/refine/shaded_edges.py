@@ -26,10 +26,12 @@ def creases_by_shading(
     if lines.line_angle is None or not _have_normals(control):
         return lines
     mesh, labels = cleaned.mesh, corner_labels(control, cleaned)
-    if not without_one_normal(cleaned, labels).any():
+    parted = without_one_normal(cleaned, labels)
+    if not parted.any():
         return lines
-    shading, part = shading_of(cleaned, labels), _part_of_face(control, cleaned, parts)
-    part_of_edge, count = part[shading.faces[:, 0]], 1 if parts is None else parts.count
+    shading = shading_of(cleaned, labels, parted)
+    part, count = _part_of_face(control, cleaned, parts), 1 if parts is None else parts.count
+    part_of_edge = part[shading.faces[:, 0]]
     is_smooth = shaded_smooth(
         mesh.vertices, mesh.faces, shading.faces, shading.smooth, part_of_edge, count
     )
@@ -48,9 +50,6 @@ def _part_of_face(
     control: ControlMesh, cleaned: Cleaned, parts: Parts | None
 ) -> Int[np.ndarray, " F"]:
     """Return the part of each face of the mesh to refine."""
-    of_face = np.zeros(len(cleaned.mesh.faces), dtype=np.int64)
-    if parts is not None:
-        kept = np.concatenate(control.kept)
-        place = cleaned.face_map[kept]
-        of_face[place[place >= 0]] = parts.of_face[kept][place >= 0]
-    return of_face
+    if parts is None:
+        return np.zeros(len(cleaned.mesh.faces), dtype=np.int64)
+    return control.of_cleaned(cleaned, parts.of_face[np.concatenate(control.kept)])

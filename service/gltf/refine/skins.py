@@ -71,7 +71,9 @@ def read_binding(primitives: Sequence[TrianglePrimitive]) -> Binding | None:
         parts = [_fractions(primitive.attributes[f"WEIGHTS_{n}"]) for n in own]
         joints.append(np.hstack([*names, padding.astype(np.int64)]))
         weights.append(np.hstack([*parts, padding]))
-    return _normalised(*_distinct_joints(np.concatenate(joints), np.concatenate(weights)))
+    binding = Binding(*_distinct_joints(np.concatenate(joints), np.concatenate(weights)))
+    scale_rows(binding.weights, kernel_blocks(available_threads()))
+    return binding
 
 
 def refine_binding(
@@ -128,7 +130,7 @@ def _fractions(weights: Shaped[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 4"]:
 def _distinct_joints(
     joints: Int[np.ndarray, "N K"], weights: Float[np.ndarray, "N K"]
 ) -> tuple[Int[np.ndarray, "N K"], Float[np.ndarray, "N K"]]:
-    """Sort each row by joint, and add up the weights of a joint that is named twice."""
+    """Return each row's joints, heaviest first; the weights of one that is named twice add up."""
     joints = np.where(weights > 0, joints, _NO_JOINT)
     order = np.argsort(joints, axis=1, kind="stable")
     joints, weights = (np.take_along_axis(part, order, axis=1) for part in (joints, weights))
@@ -137,18 +139,6 @@ def _distinct_joints(
         again = joints[:, slot] == joints[:, slot - 1]
         weights[again, slot] += weights[again, slot - 1]
         weights[again, slot - 1] = 0
-    return _heaviest(joints, weights, joints.shape[1])
-
-
-def _heaviest(
-    joints: Int[np.ndarray, "N K"], weights: Float[np.ndarray, "N K"], count: int
-) -> tuple[Int[np.ndarray, "N k"], Float[np.ndarray, "N k"]]:
-    """Return the slots of most weight, heaviest first; of equals, the earlier."""
-    order = np.argsort(-weights, axis=1, kind="stable")[:, :count]
+    order = np.argsort(-weights, axis=1, kind="stable")
     joints, weights = (np.take_along_axis(part, order, axis=1) for part in (joints, weights))
     return np.where(weights > 0, joints, 0), weights
-
-
-def _normalised(joints: Int[np.ndarray, "N K"], weights: Float[np.ndarray, "N K"]) -> Binding:
-    total = weights.sum(axis=1, keepdims=True)
-    return Binding(joints, weights / np.where(total > 0, total, 1.0))
