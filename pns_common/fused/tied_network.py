@@ -21,10 +21,11 @@ def answers_of(
     space = _on_cache_lines((seen + 2 * units) * LANES)
     answer(
         features,
+        form.order,
         form.pairs,
         form.characters,
         form.widths,
-        form.first,
+        form.first.reshape(-1),
         form.hidden,
         form.biases,
         form.last.reshape(-1),
@@ -36,7 +37,7 @@ def answers_of(
         space[: seen * LANES],
         space[seen * LANES : (seen + units) * LANES],
         space[(seen + units) * LANES :],
-        answers,
+        answers.reshape(-1),
     )
     return answers
 

@@ -36,10 +36,11 @@ class TiedForm:
     """A tied perceptron: n copies of m units in each of its L hidden layers.
 
     Attributes:
-        pairs: features that are replaced by their sum and their difference, in this order.
-        characters: s of each feature after that.
+        order: the features as they stand from here on, by character.
+        pairs: those that are replaced by their sum and their difference, in this order.
+        characters: s of each feature after that; they ascend.
         widths: m of each hidden layer.
-        first: products of the first layer: features with units.
+        first: products of the first layer: units with features.
         hidden: those of each later one, (n, m, m') after one another.
         biases: of the hidden layers, after one another.
         last: products of the last layer.
@@ -47,10 +48,11 @@ class TiedForm:
         last_bias: 0 but where s is.
     """
 
+    order: Int32[np.ndarray, " K"]
     pairs: Int32[np.ndarray, "P 2"]
     characters: Int32[np.ndarray, " K"]
     widths: Int32[np.ndarray, " L"]
-    first: Float32[np.ndarray, "K M"]
+    first: Float32[np.ndarray, "M K"]
     hidden: Float32[np.ndarray, " H"]
     biases: Float32[np.ndarray, " B"]
     last: Float32[np.ndarray, "3 N"]
@@ -76,17 +78,20 @@ def tied_form(layers: Sequence[Layer], group: Symmetries) -> TiedForm | None:
     pairs, characters, basis = feature_basis(group)
     images = first.weight.reshape(size, widths[0], -1)
     of_character = np.einsum("sg,gik->sik", mean, images)[characters]
-    products = np.einsum("kic,kc->ki", of_character, basis) / np.sum(basis**2, axis=1)[:, None]
+    products = np.einsum("kic,kc->ik", of_character, basis) / np.sum(basis**2, axis=1)
+    order = np.argsort(characters, kind="stable")
+    place = np.argsort(order)
     blocks = [
         np.einsum("sg,igj->sij", mean, layer.weight[:m].reshape(m, size, -1))
         for layer, m in zip(hidden, widths[1:], strict=True)
     ]
     biases = [layer.bias[:m] for layer, m in zip((first, *hidden), widths, strict=True)]
     return TiedForm(
-        pairs=np.array(pairs, dtype=np.int32).reshape(-1, 2),
-        characters=characters.astype(np.int32),
+        order=order.astype(np.int32),
+        pairs=place[np.array(pairs, dtype=np.int32).reshape(-1, 2)].astype(np.int32),
+        characters=characters[order].astype(np.int32),
         widths=np.array(widths, dtype=np.int32),
-        first=_single(products),
+        first=_single(products[:, order]),
         hidden=_single(np.concatenate([np.zeros(0), *(block.reshape(-1) for block in blocks)])),
         biases=_single(np.concatenate(biases)),
         last=_single(last.weight[:, : widths[-1]]),

@@ -59,7 +59,7 @@ INTEGERS, INTEGERS_2 = Array("int32", 1), Array("int32", 2)
 LONG_INDICES, LONG_INDICES_OUT = Array("int64", 2), Array("int64", 2, written=True)
 LONG_INDEX = Array("int64", 1)
 CLASSES, CLASSES_OUT = Array("int8", 1), Array("int8", 1, written=True)
-SINGLES, SINGLES_2 = Array("float32", 1), Array("float32", 2)
+SINGLES = Array("float32", 1)
 SINGLES_OUT, SINGLES_2_OUT = (Array("float32", n, written=True) for n in (1, 2))
 FLAGS, FLAGS_OUT = Array("bool", 1), Array("bool", 1, written=True)
 

@@ -13,8 +13,6 @@ from pns_common.fused.kernels.compiled import (
     POINTS,
     REAL,
     SINGLES,
-    SINGLES_2,
-    SINGLES_2_OUT,
     SINGLES_OUT,
     SIZE,
     kernel,
@@ -29,13 +27,13 @@ LANES = 128
 NOTHING = np.float32(0)
 
 
-def _read(features, begin, seen):
-    """Read rows from ``begin`` on; 0 past the last."""
+def _read(features, order, begin, seen):
+    """Read rows from ``begin`` on, their features in this order; 0 past the last."""
     present = min(LANES, features.shape[0] - begin)
     for lane in range(present):
-        for k in range(features.shape[1]):
-            seen[k * LANES + lane] = np.float32(features[begin + lane, k])
-    for k in range(features.shape[1]):
+        for k in range(len(order)):
+            seen[k * LANES + lane] = np.float32(features[begin + lane, order[k]])
+    for k in range(len(order)):
         for lane in range(present, LANES):
             seen[k * LANES + lane] = NOTHING
 
@@ -60,18 +58,28 @@ def _fill(x, i, value):
         x[to + lane] = value
 
 
-def _add_one(x, i, y, j, weight):
-    to, of = _start(i), _start(j)
+def _put_one(x, i, bias, y, j, weights, at):
+    a = weights[at]
+    to, first = _start(i), _start(j)
     for lane in range(LANES):
-        x[to + lane] += weight * y[of + lane]
+        x[to + lane] = bias + a * y[first + lane]
 
 
-def _add_two(x, i, y, j, k, weight, next_weight):
-    """Add products of two rows, one after the other: what they are added to is read once."""
-    to, of, then = _start(i), _start(j), _start(k)
+def _put_two(x, i, bias, y, j, step, weights, at):
+    a, b = weights[at], weights[at + 1]
+    to, first, second = _start(i), _start(j), _start(j + step)
     for lane in range(LANES):
-        total = x[to + lane] + weight * y[of + lane]
-        x[to + lane] = total + next_weight * y[then + lane]
+        total = bias + a * y[first + lane]
+        x[to + lane] = total + b * y[second + lane]
+
+
+def _add_two(x, i, y, j, step, weights, at):
+    """Add the products of two rows to what is there, which is read once."""
+    a, b = weights[at], weights[at + 1]
+    to, first, second = _start(i), _start(j), _start(j + step)
+    for lane in range(LANES):
+        total = x[to + lane] + a * y[first + lane]
+        x[to + lane] = total + b * y[second + lane]
 
 
 def _add_four(x, i, y, j, step, weights, at):
@@ -87,18 +95,25 @@ def _add_four(x, i, y, j, step, weights, at):
 
 
 def _weigh(x, i, bias, y, j, step, count, weights, at):
-    """Put a bias and the products of rows j, j + step, … of ``y`` into row i, in this order."""
-    _fill(x, i, bias)
-    done = 0
-    while done + 4 <= count:
+    """Put a bias and the products of rows j, j + step, … of ``y`` into row i, in this order.
+
+    The first one or two with the bias, and then so many that the others are fours.
+    """
+    if count == 0:
+        _fill(x, i, bias)
+        return
+    if count % 2 == 1:
+        done = 1
+        _put_one(x, i, bias, y, j, weights, at)
+    else:
+        done = 2
+        _put_two(x, i, bias, y, j, step, weights, at)
+    if (count - done) % 4 == 2:
+        _add_two(x, i, y, j + done * step, step, weights, at + done)
+        done += 2
+    while done < count:
         _add_four(x, i, y, j + done * step, step, weights, at + done)
         done += 4
-    if done + 2 <= count:
-        row = j + done * step
-        _add_two(x, i, y, row, row + step, weights[at + done], weights[at + done + 1])
-        done += 2
-    if done < count:
-        _add_one(x, i, y, j + done * step, weights[at + done])
 
 
 def _two(a, b):
@@ -184,22 +199,15 @@ def _activate(units, said, copies, width, limit):
 
 
 def _first(units, seen, copies, width, characters, first, biases):
+    """Write the first layer: of each character the features that know it."""
+    row = 0
     for s in range(copies):
+        begin = row
+        while row < len(characters) and characters[row] == s:
+            row += 1
         for i in range(width):
-            _fill(units, i * copies + s, biases[i] if s == 0 else NOTHING)
-        waits = -1
-        for k in range(len(characters)):
-            if characters[k] != s:
-                continue
-            if waits < 0:
-                waits = k
-                continue
-            for i in range(width):
-                _add_two(units, i * copies + s, seen, waits, k, first[waits, i], first[k, i])
-            waits = -1
-        if waits >= 0:
-            for i in range(width):
-                _add_one(units, i * copies + s, seen, waits, first[waits, i])
+            bias, at = biases[i] if s == 0 else NOTHING, i * len(characters) + begin
+            _weigh(units, i * copies + s, bias, seen, begin, 1, row - begin, first, at)
 
 
 def _next(units, said, copies, before, width, hidden, at, biases, bias_at):
@@ -221,32 +229,36 @@ def _square(z, lane):
 
 def _write(z, begin, budget, answers):
     """Write budget · z / max(1, ‖z‖) in double precision."""
-    present, long = min(LANES, len(answers) - begin), 0
+    present, at, long = min(LANES, len(answers) // 3 - begin), natural(3 * begin), 0
     for lane in range(LANES):
         long += not _square(z, lane) <= 1
     if long == 0:
         # As in most: neither a root nor a division.
         for lane in range(present):
-            for c in range(3):
-                said = np.float64(z[c * LANES + lane])
-                answers[begin + lane, c] = np.float32(said * budget)
+            answers[at + 3 * lane] = _scaled(z[lane], 1.0, budget)
+            answers[at + 3 * lane + 1] = _scaled(z[LANES + lane], 1.0, budget)
+            answers[at + 3 * lane + 2] = _scaled(z[2 * LANES + lane], 1.0, budget)
         return
     for lane in range(present):
         length = math.sqrt(_square(z, lane))
         divisor = length if length > 1 else 1.0
         for c in range(3):
-            said = np.float64(z[c * LANES + lane])
-            answers[begin + lane, c] = np.float32(said / divisor * budget)
+            answers[at + 3 * lane + c] = _scaled(z[c * LANES + lane], divisor, budget)
+
+
+def _scaled(said, divisor, budget):
+    return np.float32(np.float64(said) / divisor * budget)
 
 
 @kernel(
     SIZE,
-    *(POINTS, INDICES, INDEX, INTEGERS, SINGLES_2, SINGLES, SINGLES),
+    *(POINTS, INDEX, INDICES, INDEX, INTEGERS, SINGLES, SINGLES, SINGLES),
     *(SINGLES, INDEX, SINGLES, SIZE, REAL, REAL),
-    *(SINGLES_OUT, SINGLES_OUT, SINGLES_OUT, SINGLES_2_OUT),
+    *(SINGLES_OUT, SINGLES_OUT, SINGLES_OUT, SINGLES_OUT),
 )
 def answer(
     features,
+    order,
     pairs,
     characters,
     widths,
@@ -272,10 +284,10 @@ def answer(
         seen: LANES for each of the larger of K and 3, overwritten.
         units, said: LANES for each of n M units of the widest layer, likewise: before GELU, and
             after it.
-        answers: (N, 3) out.
+        answers: 3 N out, row by row.
     """
     for begin in range(0, len(features), LANES):
-        _read(features, begin, seen)
+        _read(features, order, begin, seen)
         for pair in range(len(pairs)):
             _add_and_subtract(seen, pairs[pair, 0], pairs[pair, 1])
         width, at, bias_at = widths[0], 0, widths[0]

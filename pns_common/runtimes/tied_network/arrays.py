@@ -35,14 +35,14 @@ def answers_of(
 
 def _z(form: TiedForm, features: Float[np.ndarray, "N K"]) -> Float32[np.ndarray, "3 N"]:
     """Return what the last layer says, before it is projected onto the ball."""
-    seen = np.ascontiguousarray(features.T, dtype=np.float32)
+    seen = np.ascontiguousarray(features.T[form.order], dtype=np.float32)
     for i, j in form.pairs:
         seen[i], seen[j] = seen[i] + seen[j], seen[i] - seen[j]
     size, rows = form.copies, seen.shape[1]
     begin, bias_begin = 0, form.widths[0]
     units = _biased(form.biases[:bias_begin], size, rows)
     for k, character in enumerate(form.characters):
-        units[character] += form.first[k][:, None] * seen[k]
+        units[character] += form.first[:, k, None] * seen[k]
     for before, width in zip(form.widths, form.widths[1:], strict=False):
         said = _transformed(gelu(_transformed(units)))
         units = _biased(form.biases[bias_begin : bias_begin + width], size, rows)

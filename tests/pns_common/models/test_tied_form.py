@@ -39,7 +39,7 @@ def test_a_form_holds_a_copy_of_each_unit_and_no_more():
     layers = [Layer(*layer) for layer in tied_layers(EDGES, (3, 5))]
     form = tied_form(layers, EDGES)
     assert (form.copies, form.widths.tolist()) == (8, [3, 5])
-    assert (form.first.shape, form.hidden.shape, form.last.shape) == ((18, 3), (8 * 5 * 3,), (3, 5))
+    assert (form.first.shape, form.hidden.shape, form.last.shape) == ((3, 18), (8 * 5 * 3,), (3, 5))
     np.testing.assert_array_equal(
         form.biases, np.concatenate([layers[0].bias[:3], layers[1].bias[:5]])
     )

@@ -41,7 +41,7 @@ def test_what_units_say_is_gelu_of_copies_by_characters_again(size):
     np.testing.assert_allclose(said, expected, rtol=0, atol=1e-5)
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 7, 8])
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 5, 6, 7, 8])
 def test_products_are_added_to_the_bias_one_after_the_other(count):
     said = RNG.standard_normal((2 * count, LANES)).astype(np.float32)
     weights, made = RNG.standard_normal(count + 1).astype(np.float32), np.zeros((3, LANES), "f4")
@@ -54,9 +54,10 @@ def test_products_are_added_to_the_bias_one_after_the_other(count):
 
 
 def test_rows_stand_side_by_side_and_nothing_past_the_last():
-    features, seen = RNG.standard_normal((5, 2)), np.full((2, LANES), 9, dtype=np.float32)
-    _read(features, 2, seen.reshape(-1))
-    np.testing.assert_array_equal(seen[:, :3], features[2:].T.astype(np.float32))
+    features, seen = RNG.standard_normal((5, 3)), np.full((3, LANES), 9, dtype=np.float32)
+    order = np.array([2, 0, 1], dtype=np.int32)
+    _read(features, order, 2, seen.reshape(-1))
+    np.testing.assert_array_equal(seen[:, :3], features[2:, order].T.astype(np.float32))
     assert not seen[:, 3:].any()
 
 
@@ -64,6 +65,6 @@ def test_an_answer_is_shortened_to_the_budget_also_where_its_square_is_no_single
     z = np.zeros((3, LANES), dtype=np.float32)
     z[:, 0], z[:, 1] = [0.3, 0, -0.4], [3e30, 0, 4e30]
     answers = np.full((4, 3), 9, dtype=np.float32)
-    _write(z.reshape(-1), 2, 0.5, answers)
+    _write(z.reshape(-1), 2, 0.5, answers.reshape(-1))
     np.testing.assert_allclose(answers[2:], [[0.15, 0, -0.2], [0.3, 0, 0.4]], rtol=1e-6)
     assert (answers[:2] == 9).all()
