@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.base.distinct import as_words, distinct_rows, number_by_first_appearance
-from pns_common.connectivity.topology import Topology, sharp_edge_count, split
+from pns_common.connectivity.creases import Creases
+from pns_common.connectivity.topology import EdgeClass, Topology, split
 from pns_common.masks.linear import level_topologies
 from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 
 from ..options import Options
 from .split_connectivity import SplitConnectivity
 
-# How C corners over welded vertices (C,) spread their texture coordinates (C, 2) over (N, 2).
+# How C corners at vertices (C,) of the mesh to refine spread their texture coordinates (C, 2) over
+# (N, 2).
 UvBlend = Callable[
     [SplitConnectivity, Int[np.ndarray, " C"], Shaped[np.ndarray, "C 2"]], Float[np.ndarray, "N 2"]
 ]
 
 
-def uv_blend(options: Options) -> UvBlend:
-    """Return the rule that the options name."""
-    return smooth_uv if options.uv == "smooth" else linear_uv
+def uv_blend(options: Options, creases: Creases) -> UvBlend:
+    """Return the rule that the options name; `creases` are named edges of the mesh to refine."""
+    return partial(smooth_uv, creases=creases) if options.uv == "smooth" else linear_uv
 
 
 def linear_uv(
@@ -34,19 +37,25 @@ def linear_uv(
 
 
 def smooth_uv(
-    connectivity: SplitConnectivity, vertex: Int[np.ndarray, " C"], uv: Shaped[np.ndarray, "C 2"]
+    connectivity: SplitConnectivity,
+    vertex: Int[np.ndarray, " C"],
+    uv: Shaped[np.ndarray, "C 2"],
+    creases: Creases,
 ) -> Float[np.ndarray, "N 2"]:
     """Blend by Loop's stencil inside charts; seams and the charts' boundaries stay linear.
 
     A chart is a piece of the surface within which texture coordinates are continuous: corners are
-    one where vertex and coordinates are.
+    one where vertex and coordinates are. Creases inside it are creases of its stencil too, at the
+    levels at which they are sharp, so that textures lie beside them as they lay.
     """
     corner = distinct_rows(np.hstack([as_words(vertex[:, None]), as_words(uv)]))
     flat, first = number_by_first_appearance(corner[connectivity.faces.reshape(-1)])
-    columns = uv[connectivity.faces.reshape(-1)[first]].astype(np.float64)
+    corner_of = connectivity.faces.reshape(-1)[first]
+    columns, faces = uv[corner_of].astype(np.float64), flat.reshape(-1, 3)
     grid = connectivity.grid
     levels = grid.segments.bit_length() - 1
-    topologies = level_topologies(flat.reshape(-1, 3), len(columns), levels)
+    sharp = Creases(_in_charts(creases.named, faces, vertex[corner_of]), levels=creases.levels)
+    topologies = level_topologies(faces, len(columns), levels, sharp)
     for topology in topologies:
         columns = np.concatenate(
             [_chart_vertices(columns, topology), loop_edge_vertices(columns, topology)]
@@ -55,9 +64,27 @@ def smooth_uv(
     return columns[connectivity.at_vertices(np.take(descendants, grid.slot, axis=1))]
 
 
+def _in_charts(
+    named: Int[np.ndarray, "N 2"] | None,
+    faces: Int[np.ndarray, "F 3"],
+    vertex: Int[np.ndarray, " P"],
+) -> Int[np.ndarray, "M 2"] | None:
+    """Return the sides of faces over points of charts that lie on named pairs of vertices."""
+    if named is None or len(named) == 0:
+        return None
+    sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    count = max(vertex.max(), named.max()) + 1
+    keys, wanted = (
+        pairs.min(axis=1) * count + pairs.max(axis=1) for pairs in (vertex[sides], named)
+    )
+    return sides[np.isin(keys, wanted)]
+
+
 def _chart_vertices(
     columns: Float[np.ndarray, "V 2"], topology: Topology
 ) -> Float[np.ndarray, "V 2"]:
     """Move vertices inside by Loop's rule; on a boundary they stay, as in linear blending."""
-    inside = sharp_edge_count(topology) == 0
-    return np.where(inside[:, None], loop_vertex_vertices(columns, topology), columns)
+    rim = (topology.edge_class != EdgeClass.INTERIOR) & (topology.edge_class != EdgeClass.CREASE)
+    at_rim = np.zeros(len(columns), dtype=bool)
+    at_rim[topology.edges[rim]] = True
+    return np.where(at_rim[:, None], columns, loop_vertex_vertices(columns, topology))

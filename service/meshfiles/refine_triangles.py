@@ -9,6 +9,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.distinct import distinct_rows, number_by_first_appearance
+from pns_common.connectivity.creases import Creases
+from pns_common.crease_lines import named_on
 from pns_common.errors import MeshError
 from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
 from pns_common.refine import Refinement, refine
@@ -54,17 +56,20 @@ def refine_triangles(
     if not proper.any():
         raise UnrefinableError("no face has three different vertices")
     cleaned = clean(Mesh(welded.points, welded.faces))
+    creases = creases_by_shape(cleaned.mesh, options, scheme)
+    if options.uv == "smooth":
+        # By name: texture coordinates have the same.
+        creases = named_on(cleaned.mesh, creases)
     refinement = refine(
         cleaned.mesh,
         scheme,
         options.levels,
         options.reference_length,
         limit=options.limit,
-        creases=creases_by_shape(cleaned.mesh, options, scheme),
+        creases=creases,
         progress=lambda done, total: course.reach(done / total),
     )
-    ids = refined_ids(welded, cleaned, refinement, barycentric_grid(options.levels))
-    refined = _with_corners(mesh_file, welded, proper, ids, refinement, options)
+    refined = _with_corners(mesh_file, welded, cleaned, refinement, options, creases)
     changes = [
         Change("", f"{name} dropped", count) for name, count in mesh_file.unsupported.items()
     ]
@@ -109,19 +114,20 @@ def _unused_vertices(mesh_file: IndexedTriangles, welded: Weld, cleaned: Cleaned
 def _with_corners(
     mesh_file: IndexedTriangles,
     welded: Weld,
-    proper: np.ndarray,
-    ids: Int[np.ndarray, "P T"],
+    cleaned: Cleaned,
     refinement: Refinement,
     options: Options,
+    creases: Creases,
 ) -> IndexedTriangles:
     """Cut the refined mesh open again where texture coordinates differ."""
-    points = refinement.mesh.vertices
-    grid = barycentric_grid(options.levels)
+    points, grid = refinement.mesh.vertices, barycentric_grid(options.levels)
+    ids = refined_ids(welded, cleaned, refinement, grid)
     if mesh_file.uv is None:
         return IndexedTriangles(points, ids[:, grid.faces.reshape(-1)].reshape(-1, 3))
-    corners, vertex, uv = _distinct_corners(mesh_file.faces[proper], welded, mesh_file.uv)
+    faces = mesh_file.faces[cleaned.representative >= 0]
+    corners, vertex, uv = _distinct_corners(faces, welded, mesh_file.uv)
     own = split_connectivity(corners, len(uv), grid)
-    blended = uv_blend(options)(own, vertex, uv)
+    blended = uv_blend(options, creases)(own, cleaned.vertex_map[vertex], uv)
     return IndexedTriangles(points[own.at_vertices(ids)], own.refined_faces, blended)
 
 

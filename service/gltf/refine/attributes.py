@@ -25,7 +25,7 @@ class RefinedVertices:
 
     Attributes:
         row: for each of the C corners a row of the primitive's attributes.
-        welded: the welded vertex of each corner.
+        vertex: of the mesh that was refined, for each corner.
         connectivity: how corners spread over refined vertices.
         positions: the refined positions, in float32.
         normals: the new normals, in float32; None where the primitive has none.
@@ -35,7 +35,7 @@ class RefinedVertices:
     """
 
     row: Int[np.ndarray, " C"]
-    welded: Int[np.ndarray, " C"]
+    vertex: Int[np.ndarray, " C"]
     connectivity: SplitConnectivity
     positions: Float[np.ndarray, "N 3"]
     normals: Float[np.ndarray, "N 3"] | None
@@ -68,7 +68,7 @@ def refined_attributes(
         elif name in skin:
             refined[name] = skin[name]
         elif name.startswith("TEXCOORD_"):
-            blended = uv_blend(refined_vertices.connectivity, refined_vertices.welded, corners)
+            blended = uv_blend(refined_vertices.connectivity, refined_vertices.vertex, corners)
             refined[name] = in_type_of(values, blended)
         else:
             refined[name] = blend(

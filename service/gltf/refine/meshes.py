@@ -184,7 +184,7 @@ def _alone(
     refined: list[RefinedPrimitive] = []
     with course.stage("attributes", shares.attributes, shares.write):
         if made is not None and control.cleaned is not None:
-            grid, blend = barycentric_grid(options.levels), uv_blend(options)
+            grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
             refined = refined_primitives(control, control.cleaned, made, grid, blend, course)
     return MeshOutcome(
         index=plan.mesh,

@@ -80,7 +80,9 @@ def refined_primitives(
             if rows.stop > rows.start:
                 own = ids[rows]
                 made.append(
-                    _refined_primitive(control, number, own, grid, refined, shading, uv_blend)
+                    _refined_primitive(
+                        control, cleaned, number, own, grid, refined, shading, uv_blend
+                    )
                 )
     return made
 
@@ -112,6 +114,7 @@ def refined_ids(
 
 def _refined_primitive(
     control: ControlMesh,
+    cleaned: Cleaned,
     number: int,
     ids: Int[np.ndarray, "F T"],
     grid: BarycentricGrid,
@@ -135,7 +138,7 @@ def _refined_primitive(
         exact = shading.exact(group) if "TANGENT" in primitive.attributes else None
     refined_vertices = RefinedVertices(
         row=row,
-        welded=welded[row],
+        vertex=cleaned.vertex_map[welded[row]],
         connectivity=own,
         positions=rounded_rows(points, vertex, blocks_of(grid)),
         normals=normals,

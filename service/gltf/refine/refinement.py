@@ -44,7 +44,7 @@ def creases_of(
     creases = creases_by_shape(mesh, options, scheme)
     if options.crease == "auto":
         creases = creases_by_shading(control, control.cleaned, creases, parts)
-    known = control.skin_and_morph.any or options.normals != "keep"
+    known = control.skin_and_morph.any or options.normals != "keep" or options.uv == "smooth"
     return named_on(mesh, creases) if known else creases
 
 

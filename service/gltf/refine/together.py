@@ -122,7 +122,7 @@ def refine_together(
     if made is None or control.cleaned is None:
         return [None] * len(meshes)
     with course.stage("attributes", shares.attributes, shares.write):
-        grid, blend = barycentric_grid(options.levels), uv_blend(options)
+        grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
         pieces = refined_primitives(control, control.cleaned, made.mesh, grid, blend, course)
         return [*_divided(control, control.cleaned, parts, made, pieces, meshes, pointers, options)]
 

@@ -141,6 +141,23 @@ def test_smooth_uvs_are_refined_as_positions_are_inside_a_chart(levels):
     assert np.abs(linear["TEXCOORD_0"] - attributes["TEXCOORD_0"]).max() > 0.01
 
 
+@pytest.mark.parametrize("meshes", [1, 3])
+@pytest.mark.parametrize("levels", [1, 3])
+@pytest.mark.parametrize("crease", ["normals", "lines", "angle:60"])
+def test_smooth_uvs_have_the_creases_of_the_positions(crease, levels, meshes):
+    # Lines are sharp at two levels. Small meshes of a file are refined together.
+    shapes = [cylinder(sides) for sides in (7, 8, 12)[:meshes]]
+    for shape in shapes:
+        shape["TEXCOORD_0"] = shape["POSITION"][:, 1:]
+    result = subdivide(*([shape] for shape in shapes), uv="smooth", crease=crease, levels=levels)
+    assert result.report["levels"][0]["edges"]["crease"] > 0
+    for mesh in range(meshes):
+        _, attributes = files.primitive_of(result.glb, mesh)
+        np.testing.assert_allclose(
+            attributes["TEXCOORD_0"], attributes["POSITION"][:, 1:], atol=1e-6
+        )
+
+
 @pytest.mark.parametrize("levels", [1, 2])
 def test_smooth_uvs_leave_seams_and_rims_linear(levels):
     # On each side of a box, a chart of two faces, every vertex lies on the rim.

@@ -46,6 +46,13 @@ def test_smooth_uvs_follow_the_positions_of_a_closed_chart():
     np.testing.assert_allclose(triangles.uv, triangles.vertices[:, :2], atol=1e-12)
 
 
+@pytest.mark.parametrize("crease", ["lines", "angle:60"])
+def test_smooth_uvs_have_the_creases_of_the_positions(crease):
+    shape = box()
+    triangles, _ = refined(shape, shape["POSITION"][:, 1:], levels=3, uv="smooth", crease=crease)
+    np.testing.assert_allclose(triangles.uv, triangles.vertices[:, 1:], atol=1e-12)
+
+
 def test_a_weld_tolerance_is_counted():
     flat = octahedron()["indices"].reshape(-1)
     noise = 1e-6 * np.random.default_rng(0).standard_normal((24, 3))
