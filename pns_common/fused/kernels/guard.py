@@ -138,8 +138,8 @@ def find_folds(
             _hold(held, 3, lane, _corner(*moves, middles + face_edges[f, 0]))
             _hold(held, 4, lane, _corner(*moves, middles + face_edges[f, 1]))
             _hold(held, 5, lane, _corner(*moves, middles + face_edges[f, 2]))
-        for lane in range(count):
-            doubtful += not _all_stay(held, lane, clear)
+        for lane in range(TOGETHER):
+            doubtful += (lane < count) & (not _all_stay(held, lane, clear))
         if doubtful == 0:
             continue
         for f in range(first, first + count):

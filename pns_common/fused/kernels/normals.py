@@ -230,8 +230,8 @@ def largest_jump(
         count, doubtful = min(TOGETHER, end - first), 0
         for lane in range(count):
             _hold(points, *around, first + lane, lane, held)
-        for lane in range(count):
-            doubtful += not _is_clear(held, lane, bound)
+        for lane in range(TOGETHER):
+            doubtful += (lane < count) & (not _is_clear(held, lane, bound))
         if doubtful == 0:
             continue
         for lane in range(count):
