@@ -46,7 +46,7 @@ from .smooth_normals import with_normal_accessor, with_smooth_normals
 from .union import divided, joined
 
 # More faces than this, refined, and a mesh's own work is more than what surrounds it.
-MOST_FACES = 2048
+MOST_FACES = 2**15
 # So much is refined at a time: the memory of a group is small beside that of a large mesh.
 GROUP_FACES = 2**17
 
