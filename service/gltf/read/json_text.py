@@ -129,7 +129,9 @@ def _depth(text: bytes) -> int:
     """
     # Without escapes, which are rare, every second quote ends a string: no pattern need be matched.
     bare = _STRING.sub(b"", text) if b"\\" in text else text
-    marks = _MARKS[np.frombuffer(bare.translate(None, _NO_MARKS), dtype=np.uint8)]
+    # Two quotes beside each other leave what stands inside of strings inside, and outside outside.
+    bare = bare.translate(None, _NO_MARKS).replace(b'""', b"")
+    marks = _MARKS[np.frombuffer(bare, dtype=np.uint8)]
     quotes = marks == _QUOTE
     inside = np.logical_xor.accumulate(quotes)
     return int(np.where(inside | quotes, 0, marks).cumsum(dtype=np.int64).max(initial=0))

@@ -7,7 +7,7 @@ as they were. What the file carried without use stays too: it was not ours to ju
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from typing import Any
 
 import numpy as np
@@ -25,23 +25,16 @@ def remove_unused(tree: dict[str, Any], spare: Spare) -> list[tuple[int, int]]:
     All buffers have been joined: every view lies in buffer 0, or is compressed.
     """
     accessors = tree.get("accessors", [])
-    named = list(accessor_references(tree))
-    used = {holder[key] for holder, key in named}
-    kept = [
-        index in used or (index < spare.accessor_count and index not in spare.accessors)
-        for index in range(len(accessors))
-    ]
-    tree["accessors"] = _renumbered(accessors, kept, named)
+    named = accessor_references(tree)
+    unused = _unused(named, len(accessors), spare.accessors, spare.accessor_count)
+    tree["accessors"] = _renumbered(accessors, unused, accessor_references(tree))
 
     views = tree.get("bufferViews", [])
-    named = list(view_references(tree, tree["accessors"]))
-    used = {holder[key] for holder, key in named}
-    kept = [
-        index in used or (index < spare.view_count and index not in spare.views)
-        for index in range(len(views))
-    ]
-    gone = [view for view, keep in zip(views, kept, strict=True) if not keep]
-    tree["bufferViews"] = _renumbered(views, kept, named)
+    named = view_references(tree, tree["accessors"])
+    unused = _unused(named, len(views), spare.views, spare.view_count)
+    gone = [views[index] for index in unused]
+    named = view_references(tree, tree["accessors"])
+    tree["bufferViews"] = _renumbered(views, unused, named)
     for key in ("accessors", "bufferViews"):
         if not tree[key]:
             del tree[key]
@@ -50,13 +43,22 @@ def remove_unused(tree: dict[str, Any], spare: Spare) -> list[tuple[int, int]]:
     ]
 
 
+def _unused(references: Iterable[Reference], count: int, spare: Set[int], old: int) -> list[int]:
+    """Return which of ``count`` entries nothing names, of spare ones and those that are not old.
+
+    References are not kept: of many objects, the garbage collector would look at all others too.
+    """
+    candidates = {*spare, *range(old, count)}
+    return sorted(candidates.difference(holder[key] for holder, key in references))
+
+
 def _renumbered(
-    entries: list[dict[str, Any]], kept: list[bool], references: Iterable[Reference]
+    entries: list[dict[str, Any]], unused: list[int], references: Iterable[Reference]
 ) -> list[dict[str, Any]]:
-    """Keep entries: those beyond their number move into the places of those that went."""
-    count = sum(kept)
-    holes = [index for index in range(count) if not kept[index]]
-    movers = [index for index in range(count, len(entries)) if kept[index]]
+    """Leave entries out: the last ones move into the places of those that went."""
+    count, gone = len(entries) - len(unused), set(unused)
+    holes = [index for index in unused if index < count]
+    movers = [index for index in range(count, len(entries)) if index not in gone]
     place = dict(zip(movers, holes, strict=True))
     result = entries[:count]
     for old, new in place.items():
@@ -113,13 +115,13 @@ def moved(offsets: Sequence[int], shifts: Sequence[tuple[int, int]]) -> list[int
 
 
 def _merged(ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-    merged: list[tuple[int, int]] = []
-    for start, end in sorted(ranges):
-        if merged and start <= merged[-1][1]:
-            merged[-1] = (merged[-1][0], max(merged[-1][1], end))
-        else:
-            merged.append((start, end))
-    return merged
+    """Return ascending ranges that do not touch, which cover the same."""
+    starts, ends = np.array(list(ranges), dtype=np.int64).reshape(-1, 2).T
+    order = np.argsort(starts)
+    starts, ends = starts[order], np.maximum.accumulate(ends[order])
+    opens, closes = (np.ones(len(starts), dtype=bool) for _ in range(2))
+    opens[1:] = closes[:-1] = starts[1:] > ends[:-1]
+    return list(zip(starts[opens].tolist(), ends[closes].tolist(), strict=True))
 
 
 def _without(ranges: list[tuple[int, int]], others: list[tuple[int, int]]) -> list[tuple[int, int]]:
