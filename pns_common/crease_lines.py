@@ -29,11 +29,13 @@ def crease_lines(mesh: Mesh, angle: float = CREASE_ANGLE) -> Int[np.ndarray, "N 
     points, faces = mesh.vertices, mesh.faces
     if kernels_available() and kernels_loaded() and fits(len(points), len(faces), 1):
         from pns_common.fused.crease_lines import crease_line_rows
+        from pns_common.fused.face_measures import face_normals
         from pns_common.fused.mesh_edges import build_edges
 
         blocks = kernel_blocks(available_threads())
         edges = build_edges(faces.astype(np.int32), len(points), blocks)
-        rows = crease_line_rows(points, edges, float(angle), blocks)
+        normals = face_normals(points, edges.faces, blocks)
+        rows = crease_line_rows(points, edges, normals, float(angle), blocks)
         return edges.edges[rows].astype(np.int64)
     topology = build_topology(faces, len(points))
     return topology.edges[line_rows(points, topology, float(angle))]

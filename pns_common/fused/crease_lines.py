@@ -14,18 +14,20 @@ from pns_common.geometry.crease_lines import lines_among
 
 
 def crease_line_rows(
-    points: Float[np.ndarray, "V 3"], mesh: MeshEdges, angle: float, blocks: Blocks
+    points: Float[np.ndarray, "V 3"],
+    mesh: MeshEdges,
+    normals: Float[np.ndarray, "F 3"],
+    angle: float,
+    blocks: Blocks,
 ) -> Int[np.ndarray, " N"]:
-    """Return the edges of the crease lines; ``angle`` is θ in degrees."""
+    """Return the edges of the crease lines; ``normals`` are the faces', ``angle`` θ in degrees."""
     cosine, count = math.cos(math.radians(angle)), len(mesh.edges)
-    beyond, found = np.zeros(count, dtype=bool), np.zeros(blocks.count(count), dtype=np.int64)
-    of_mesh = mesh.faces, mesh.half_edges, mesh.edge_class
+    beyond, found = np.empty(count, dtype=bool), np.zeros(blocks.count(count), dtype=np.int64)
+    around = normals, mesh.half_edges, mesh.edge_class, cosine
 
     def mark(rows: slice) -> None:
         bounds = rows.start, rows.stop
-        found[blocks.number(rows, count)] = mark_edges_beyond(
-            points, *of_mesh, cosine, *bounds, beyond
-        )
+        found[blocks.number(rows, count)] = mark_edges_beyond(*around, *bounds, beyond)
 
     blocks.run(count, mark)
     sharp = np.flatnonzero(beyond) if found.any() else np.zeros(0, dtype=np.int64)

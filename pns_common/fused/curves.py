@@ -121,7 +121,7 @@ def curves_of(
     sharp = SharpLevel.of(points, mesh, length)
     if len(sharp.level.curves(rule.kinds).rows) == 0:
         return CurveMoves(rule, sharp, np.zeros((0, 3)), 0.0)
-    pushes = np.zeros_like(points)
+    pushes = np.zeros(points.shape)
     pushes[sharp.vertices] = rule.pushes(sharp.level)
     return CurveMoves(rule, sharp, pushes, 0.0)
 

@@ -120,7 +120,7 @@ def _added_by_rules(
 ) -> tuple[Additions, Additions, Additions]:
     """Return what both rules add but on curves: to vertices, to edges, and both together."""
     mesh, count = level.mesh, level.mesh.vertex_count
-    of_level = level.points, mesh, level.several_fans
+    of_level = level.points, mesh, level.faces, level.several_fans
     seen = Surroundings(*of_level, length, blocks, curves, _altitudes(scheme))
     edge_rule, vertex_rule = scheme.edge_rule, scheme.vertex_rule
     assert isinstance(edge_rule, LearnedEdgeRule | ScaleFreeEdgeRule)
@@ -134,6 +134,7 @@ def _added_by_rules(
     else:
         vertices.clear(slice(None))
     add_at_edges(edge_rule, seen, edges)
+    level.faces.forget()
     return vertices, edges, added
 
 

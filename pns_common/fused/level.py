@@ -15,6 +15,7 @@ from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.fused.additions import Additions
 from pns_common.fused.child_faces import look_at_children
 from pns_common.fused.crease_lines import crease_line_rows
+from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.fans import multi_fan_vertices
 from pns_common.fused.loop_points import largest_size, loop_points
 from pns_common.fused.mesh_edges import MeshEdges, build_edges, in_int32, split_mesh_edges
@@ -33,6 +34,12 @@ class FusedLevel:
     points: Float[np.ndarray, "V 3"]
     mesh: MeshEdges
     blocks: Blocks
+    faces: FaceMeasures
+
+    @classmethod
+    def of(cls, points: Float[np.ndarray, "V 3"], mesh: MeshEdges, blocks: Blocks) -> FusedLevel:
+        """Return a mesh's level, of whose faces nothing is known yet."""
+        return cls(points, mesh, blocks, FaceMeasures(points, mesh.faces, blocks.unheard()))
 
     @cached_property
     def several_fans(self) -> Bool[np.ndarray, " V"]:
@@ -71,20 +78,22 @@ def control_level(
         ParameterError: a crease is no edge of the mesh.
     """
     mesh = control_edges(faces, len(points), creases.named, blocks)
+    level = FusedLevel.of(points, mesh, blocks)
     if creases.line_angle is not None:
-        rows = crease_line_rows(points, mesh, creases.line_angle, blocks.unheard())
+        of_lines = level.faces.normals, creases.line_angle, blocks.unheard()
+        rows = crease_line_rows(points, mesh, *of_lines)
         if len(rows):
             classes = mesh.edge_class.copy()
             classes[rows] = EdgeClass.CREASE
-            mesh = replace(mesh, edge_class=classes)
-    return FusedLevel(points, mesh, blocks)
+            level = replace(level, mesh=replace(mesh, edge_class=classes))
+    return level
 
 
 def next_level(
     level: FusedLevel, points: Float[np.ndarray, "W 3"], blocks: Blocks, *, sharp: bool = True
 ) -> FusedLevel:
     """Return the level whose points a step has placed; ``sharp`` as in ``next_edges``."""
-    return FusedLevel(points, next_edges(level.mesh, blocks, sharp=sharp), blocks)
+    return FusedLevel.of(points, next_edges(level.mesh, blocks, sharp=sharp), blocks)
 
 
 def control_edges(
@@ -135,6 +144,7 @@ def topology_of(mesh: MeshEdges) -> Topology:
 
 def loop_step(level: FusedLevel, blocks: Blocks) -> FusedStep:
     """Place a level's vertices where Loop does."""
+    level.faces.forget()
     points = loop_points(level.points, level.mesh, blocks)
     # All of Loop's masks are means: its points lie among those that they are made of, a quarter as
     # many.

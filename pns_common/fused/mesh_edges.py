@@ -51,6 +51,11 @@ class MeshEdges:
     plain: bool
 
     @property
+    def starts(self) -> Int[np.ndarray, " H"]:
+        """Where each half-edge starts."""
+        return self.faces.reshape(-1)
+
+    @property
     def interior(self) -> Int[np.ndarray, " I"]:
         """Indices of the interior edges."""
         return self._interior
@@ -122,7 +127,7 @@ def build_edges(faces: Int[np.ndarray, "F 3"], vertex_count: int, blocks: Blocks
         return _sorted_edges(faces, vertex_count)
     edges, half_edges = (np.empty((chains.count, 2), dtype=np.int32) for _ in range(2))
     edge_class = np.empty(chains.count, dtype=np.int8)
-    chained = faces, chains.low, chains.links, int(chains.plain)
+    chained = faces, faces.reshape(-1), chains.low, chains.links, int(chains.plain)
 
     def run(rows: slice) -> None:
         classify(*chained, rows.start, rows.stop, edges, half_edges, edge_class)

@@ -145,6 +145,7 @@ def _placed(
         with np.errstate(over="ignore", invalid="ignore"):
             made = learned_points(level, scheme, lengths[parts.of_vertex], blocks)
         return made.points, made.counterpart, made.step
+    level.faces.forget()
     points, count = loop_points(level.points, level.mesh, blocks), level.mesh.vertex_count
     step = AddedStep(
         without_correction(points[:count]), without_correction(points[count:]), False, None

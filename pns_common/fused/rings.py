@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import EdgeClass
 from pns_common.formula.side_gate import GENTLE_TO_SHARP, widest, with_neighbours
+from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.kernels.rings import (
     VERTEX_COLUMNS,
     face_bends,
@@ -17,21 +18,12 @@ from pns_common.fused.kernels.rings import (
     mean_normals,
     mean_spokes,
     measure_edges,
-    measure_faces,
     prior_pushes,
     umbrella_heights,
 )
 from pns_common.fused.loop_points import owners
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.masks.stencils import limit_ring_weight
-
-
-@dataclass(frozen=True, eq=False)
-class FaceMeasures:
-    """Unit normals of the faces, and area vectors with their lengths; none once forgotten."""
-
-    normals: Float[np.ndarray, "F 3"]
-    areas: Float[np.ndarray, "A 4"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,20 +44,6 @@ class RingMeasures:
     network_lengths: Float[np.ndarray, " E"]
     valence: Int[np.ndarray, " V"]
     smooth: Bool[np.ndarray, " V"]
-
-
-def measure_normals(
-    points: Float[np.ndarray, "V 3"], mesh: MeshEdges, blocks: Blocks
-) -> FaceMeasures:
-    """Look at the faces of a level."""
-    count = len(mesh.faces)
-    normals, areas = np.empty((count, 3)), np.empty((count, 4))
-
-    def measure(rows: slice) -> None:
-        measure_faces(points, mesh.faces, rows.start, rows.stop, normals, areas)
-
-    blocks.run(count, measure)
-    return FaceMeasures(normals, areas)
 
 
 def measure_bends(
@@ -100,7 +78,7 @@ def measure_rings(
     count, by_owner = mesh.vertex_count, owners(blocks, mesh.vertex_count)
     fields, means = np.empty((count, 4)), np.empty((count, VERTEX_COLUMNS))
     valence = np.empty(count, dtype=np.int32)
-    args = mesh.faces, mesh.edges, mesh.half_edges, mesh.edge_class
+    args = mesh.starts, mesh.edges, mesh.half_edges, mesh.edge_class
     of_faces = at_faces.normals, at_faces.areas
     bends, jumps, network_lengths = (np.empty(len(mesh.edges)) for _ in range(3))
     to = bends, jumps, network_lengths

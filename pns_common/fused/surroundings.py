@@ -12,12 +12,11 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.fused.curves import NO_RULE, CurveMoves
 from pns_common.fused.edge_lengths import EdgeLengths, edge_lengths
+from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.fused.rings import (
-    FaceMeasures,
     RingMeasures,
     measure_bends,
-    measure_normals,
     measure_pushes,
     measure_rings,
 )
@@ -34,6 +33,7 @@ class Surroundings:
 
     points: Float[np.ndarray, "V 3"]
     mesh: MeshEdges
+    faces: FaceMeasures
     several_fans: Bool[np.ndarray, " V"]
     reference_length: float | Float[np.ndarray, " V"]
     blocks: Blocks
@@ -49,17 +49,12 @@ class Surroundings:
         return np.full(len(vertices), budget / self.reference_length)
 
     @cached_property
-    def faces(self) -> FaceMeasures:
-        """Normals and areas."""
-        return measure_normals(self.points, self.mesh, self.blocks)
-
-    @cached_property
     def rings(self) -> RingMeasures:
         """The rings of all vertices."""
         mesh, fans = self.mesh, self.several_fans
         made = measure_rings(self.points, mesh, self.faces, fans, self.altitudes, self.blocks)
         # Nothing else reads them: a tenth of all memory.
-        vars(self)["faces"] = replace(self.faces, areas=self.faces.areas[:0].copy())
+        self.faces.forget_areas()
         return made
 
     def forget_rings(self) -> None:

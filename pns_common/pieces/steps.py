@@ -91,6 +91,7 @@ def steps_by_kernels(
         mesh = level.mesh
         placed, loop, may_flip = None, None, False
         if scheme.learned_levels is not None and depth >= scheme.learned_levels:
+            level.faces.forget()
             made = loop_points(level.points, mesh, blocks)
         else:
             with np.errstate(over="ignore", invalid="ignore"):

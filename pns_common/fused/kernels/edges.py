@@ -104,11 +104,16 @@ def chain_edges(faces, most_steps, head, low, links, face_edges, plain):
     return count
 
 
-@kernel(SIZE, INDICES, INDEX, INTEGERS_2, SIZE, SIZE, SIZE, INDICES_OUT, INDICES_OUT, CLASSES_OUT)
-def classify(faces, low, links, plain, begin, end, edges, half_edges, edge_class):
+@kernel(
+    SIZE,
+    *(INDICES, INDEX, INDEX, INTEGERS_2, SIZE, SIZE, SIZE),
+    *(INDICES_OUT, INDICES_OUT, CLASSES_OUT),
+)
+def classify(faces, starts, low, links, plain, begin, end, edges, half_edges, edge_class):
     """Write ends, half-edges, classes of edges begin … end − 1; returns how many are not interior.
 
     Args:
+        starts: (3 F,) where each half-edge starts.
         plain: 1 where no face repeats a vertex: then no edge asks its faces. 0 where one may.
         edges: (E, 2) out: endpoints a < b.
         half_edges: (E, 2) out: the first half-edge, and the second where there are two.
@@ -125,9 +130,7 @@ def classify(faces, low, links, plain, begin, end, edges, half_edges, edge_class
                 kind = BOUNDARY
             elif second >= 0 and (plain or not _repeats(faces, second // 3)):
                 # Two half-edges that run against each other.
-                first_start = faces[first // 3, first % 3]
-                second_start = faces[second // 3, second % 3]
-                kind = INTERIOR if first_start != second_start else IRREGULAR
+                kind = INTERIOR if starts[first] != starts[second] else IRREGULAR
         edge_class[e] = kind
         sharp += kind != INTERIOR
     return sharp

@@ -76,15 +76,20 @@ def row(values, i):
 
 @kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, POINTS_OUT)
 def measure_faces(points, faces, begin, end, normals, areas):
-    """Write normals (F, 3), area vectors and their lengths (F, 4) of faces begin … end − 1."""
+    """Write normals (F, 3), area vectors and their lengths (F, 4) of faces begin … end − 1.
+
+    ``areas`` is (0, 4) where nobody asks for them.
+    """
     for f in range(natural(begin), end):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         normal = unit_normal(points, a, b, c)
-        vector = cross(between(points, a, b), between(points, a, c))
         for k in range(3):
             normals[f, k] = normal[k]
-            areas[f, k] = vector[k]
-        areas[f, AREA] = norm(vector)
+        if len(areas):
+            vector = cross(between(points, a, b), between(points, a, c))
+            for k in range(3):
+                areas[f, k] = vector[k]
+            areas[f, AREA] = norm(vector)
     return 0
 
 
@@ -110,14 +115,14 @@ def mean_normals(faces, areas, begin, end, fields):
 
 @kernel(
     SIZE,
-    *(POINTS, POINTS, POINTS, INDICES, INDICES, INDICES, CLASSES, REAL, SIZE, SIZE),
+    *(POINTS, POINTS, POINTS, INDEX, INDICES, INDICES, CLASSES, REAL, SIZE, SIZE),
     *(NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
 )
 def measure_edges(
     points,
     normals,
     areas,
-    faces,
+    starts,
     edges,
     half_edges,
     edge_class,
@@ -130,7 +135,8 @@ def measure_edges(
 ):
     """Write s, x and ℓ of edges begin … end − 1.
 
-    ``altitudes`` is α, infinite where the network speaks in units of h whatever the faces.
+    ``starts`` (3 F,) is where each half-edge starts; ``altitudes`` is α, infinite where the network
+    speaks in units of h whatever the faces.
     """
     for e in range(natural(begin), end):
         spoke = between(points, edges[e, 0], edges[e, 1])
@@ -140,9 +146,11 @@ def measure_edges(
         jumps[e] = bends[e] = 0.0
         if edge_class[e] != INTERIOR:
             continue
-        f, g = half_edges[e, 0] // 3, half_edges[e, 1] // 3
-        if faces[f, half_edges[e, 0] - 3 * f] != edges[e, 0]:
-            f, g = g, f  # f is the face to the left of a → b
+        first, second = half_edges[e, 0], half_edges[e, 1]
+        if starts[first] != edges[e, 0]:
+            first, second = second, first
+        # To the left and to the right of a → b.
+        f, g = first // 3, second // 3
         n, m = row(normals, f), row(normals, g)
         if dot(n, n) > 0 and dot(m, m) > 0:
             chord = n[0] - m[0], n[1] - m[1], n[2] - m[2]

@@ -8,6 +8,7 @@ from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology
 from pns_common.fused.additions import Additions
 from pns_common.fused.edge_rule import add_at_edges
+from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.surroundings import Surroundings
 from pns_common.rules.control_level import control_level
 from tests.support.kernels import edges_built
@@ -28,9 +29,10 @@ MODELS = {
 @pytest.mark.parametrize("rows", [7, 10_000])
 def test_kernels_add_what_the_rule_adds(name, rows):
     rule, edges = pns(MODELS[name]).edge_rule, edges_built(MESH)
-    fans = np.zeros(25, dtype=bool)
+    fans, blocks = np.zeros(25, dtype=bool), Blocks(2, rows)
+    faces = FaceMeasures(MESH.vertices, edges.faces, blocks)
     added = Additions.unwritten(len(edges.edges))
-    add_at_edges(rule, Surroundings(MESH.vertices, edges, fans, 0.8, Blocks(2, rows)), added)
+    add_at_edges(rule, Surroundings(MESH.vertices, edges, faces, fans, 0.8, blocks), added)
     placed = rule(LEVEL)
     for part in ("displacement", "ratio", "gate", "envelope", "degenerate"):
         np.testing.assert_array_equal(getattr(added, part), getattr(placed, part), err_msg=part)

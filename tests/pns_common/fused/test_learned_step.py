@@ -1,5 +1,6 @@
 """A learned step: refused where a network says nonsense, guarded where faces would fold."""
 
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -32,6 +33,14 @@ def test_the_guard_takes_rounds_and_both_ways_take_the_same():
 def test_what_a_network_may_not_return_is_refused(card, edges, vertices):
     with pytest.raises(ModelError, match="finite"):
         by_kernels(Mesh(*bumpy_sphere(0)), 1, scheme=pns(Constant(card, edges, vertices)))
+
+
+def test_what_it_asked_of_faces_goes_with_the_rules():
+    points, faces = bumpy_sphere(1, subdivisions=0)
+    level = control_level(points, faces, NO_CREASES, Blocks(1))
+    normals = weakref.ref(level.faces.normals)
+    learned_points(level, pns(scale_free_model(0)), 0.7, Blocks(1))
+    assert normals() is None
 
 
 @pytest.mark.parametrize("model", [scale_free_model(0), vertex_model(0)])

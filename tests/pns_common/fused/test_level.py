@@ -1,5 +1,6 @@
 """A level of the kernels has the connectivity of the array kernels, level after level."""
 
+import weakref
 from dataclasses import fields
 
 import numpy as np
@@ -50,6 +51,14 @@ def test_a_step_of_loop_adds_nothing_and_reports_what_the_arrays_do():
     assert step.added is None
     np.testing.assert_array_equal(step.points, arrays.points)
     assert [step.report()] == arrays.reports
+
+
+def test_loop_lets_go_of_what_crease_lines_asked_of_faces():
+    points, faces = grid(4, bent)
+    level = control_level(points, faces, Creases(line_angle=60.0), Blocks(1))
+    normals = weakref.ref(level.faces.normals)
+    loop_step(level, Blocks(1))
+    assert normals() is None
 
 
 def test_how_large_loops_points_are_is_told_from_those_they_are_made_of():

@@ -5,8 +5,9 @@ import pytest
 
 from pns_common import Mesh
 from pns_common.base.blocks import Blocks
+from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.kernels import rings as columns
-from pns_common.fused.rings import measure_bends, measure_normals, measure_pushes, measure_rings
+from pns_common.fused.rings import measure_bends, measure_pushes, measure_rings
 from tests.support.kernels import edges_built
 from tests.support.meshes import bumpy_sphere
 from tests.support.plain_operator import PlainMesh
@@ -21,17 +22,9 @@ def blocks(request):
     return request.param
 
 
-def test_normals_and_areas_of_faces(blocks):
-    at_faces = measure_normals(POINTS, EDGES, blocks)
-    areas = [PLAIN.area(*face) for face in FACES]
-    sizes = np.linalg.norm(areas, axis=1)
-    np.testing.assert_allclose(at_faces.areas, np.column_stack([areas, sizes]), atol=1e-14)
-    np.testing.assert_allclose(at_faces.normals, areas / sizes[:, None], atol=1e-14)
-
-
 @pytest.mark.parametrize("altitudes", [np.inf, 0.8])
 def test_rings(blocks, altitudes):
-    at_faces = measure_normals(POINTS, EDGES, blocks)
+    at_faces = FaceMeasures(POINTS, EDGES.faces, blocks)
     rings = measure_rings(POINTS, EDGES, at_faces, FANS, altitudes, blocks)
     named = None if altitudes == np.inf else altitudes
     lengths = [PLAIN.length(a, b, named) for a, b in EDGES.edges.tolist()]
@@ -62,7 +55,7 @@ def test_rings(blocks, altitudes):
 
 
 def test_pushes_and_bends(blocks):
-    at_faces = measure_normals(POINTS, EDGES, blocks)
+    at_faces = FaceMeasures(POINTS, EDGES.faces, blocks)
     rings = measure_rings(POINTS, EDGES, at_faces, FANS, np.inf, blocks)
     pushes = [PLAIN.push(v) for v in range(len(POINTS))]
     np.testing.assert_allclose(measure_pushes(rings, blocks), pushes, atol=1e-14)

@@ -7,6 +7,7 @@ from pns_common import Mesh, pns
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology
 from pns_common.fused.curves import curves_of
+from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.surroundings import Surroundings
 from pns_common.fused.vertex_prior import priors_at
 from pns_common.rules.control_level import control_level
@@ -30,7 +31,8 @@ def test_it_is_what_the_rule_moves_a_vertex_by(tip_strength, boundary_strength, 
     scheme = pns(scale_free_model(scale=0, **strengths, **OPEN))
     rule, edges, blocks = scheme.vertex_rule, edges_built(mesh), Blocks(2, rows)
     curves = curves_of(rule.curves, points, edges, 1.0)
-    level = Surroundings(points, edges, np.zeros(COUNT, dtype=bool), 1.0, blocks, curves)
+    at_faces, fans = FaceMeasures(points, edges.faces, blocks), np.zeros(COUNT, dtype=bool)
+    level = Surroundings(points, edges, at_faces, fans, 1.0, blocks, curves)
     inside = np.flatnonzero(level.rings.smooth).astype(np.int32)
     prior = priors_at(inside, rule.form, level)
     placed = rule(control_level(points, build_topology(faces, COUNT)))

@@ -7,6 +7,7 @@ from pns_common import Mesh, pns
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology
 from pns_common.fused.additions import Additions
+from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.surroundings import Surroundings
 from pns_common.fused.vertex_rule import add_at_vertices
 from pns_common.rules.control_level import control_level
@@ -16,6 +17,12 @@ from tests.support.networks import scale_free_model, vertex_model
 
 MESH = Mesh(*grid(5, bent))
 LEVEL = control_level(MESH.vertices, build_topology(MESH.faces, 25), 0.8)
+
+
+def surroundings(fans, blocks, altitudes=np.inf):
+    mesh = edges_built(MESH)
+    faces = FaceMeasures(MESH.vertices, mesh.faces, blocks)
+    return Surroundings(MESH.vertices, mesh, faces, fans, 0.8, blocks, altitudes=altitudes)
 
 
 @pytest.mark.parametrize(
@@ -29,9 +36,7 @@ LEVEL = control_level(MESH.vertices, build_topology(MESH.faces, 25), 0.8)
 @pytest.mark.parametrize("rows", [4, 10_000])
 def test_kernels_add_what_the_rule_adds(model, altitudes, rows):
     rule, fans = pns(model).vertex_rule, np.zeros(25, dtype=bool)
-    seen = Surroundings(
-        MESH.vertices, edges_built(MESH), fans, 0.8, Blocks(2, rows), altitudes=altitudes
-    )
+    seen = surroundings(fans, Blocks(2, rows), altitudes)
     added = Additions.unwritten(25)
     add_at_vertices(rule, seen, added)
     placed = rule(LEVEL)
@@ -43,8 +48,6 @@ def test_kernels_add_what_the_rule_adds(model, altitudes, rows):
 def test_vertices_of_several_fans_are_left_alone():
     rule, fans = pns(vertex_model(0)).vertex_rule, np.arange(25) == 12
     added = Additions.unwritten(25)
-    add_at_vertices(
-        rule, Surroundings(MESH.vertices, edges_built(MESH), fans, 0.8, Blocks(1)), added
-    )
+    add_at_vertices(rule, surroundings(fans, Blocks(1)), added)
     assert not added.displacement[12].any()
     assert added.displacement[[6, 7, 8, 11, 13]].any(axis=1).all()

@@ -16,9 +16,9 @@ from tests.support.meshes import bumpy_sphere, manifolds, soups
 
 def marked(mesh, cosine, way):
     edges = edges_built(mesh)
-    beyond = np.zeros(len(edges.edges), dtype=bool)
-    of_mesh = mesh.vertices, edges.faces, edges.half_edges, edges.edge_class
-    count = way(mark_edges_beyond)(*of_mesh, cosine, 0, len(beyond), beyond)
+    beyond = np.ones(len(edges.edges), dtype=bool)
+    around = face_normals(mesh.vertices, mesh.faces), edges.half_edges, edges.edge_class
+    count = way(mark_edges_beyond)(*around, cosine, 0, len(beyond), beyond)
     assert count == beyond.sum()
     return np.flatnonzero(beyond)
 

@@ -53,7 +53,8 @@ def test_edges_are_numbered_as_they_appear_and_told_by_their_faces(shape, way):
     assert made == len(uses)
     edges, halves = (np.empty((made, 2), np.int32) for _ in range(2))
     kinds = np.empty(made, np.int8)
-    given = faces.astype(np.int32), low, links, int(plain), 0, made
+    narrow = faces.astype(np.int32)
+    given = narrow, narrow.reshape(-1), low, links, int(plain), 0, made
     sharp = WAYS[way](classify)(*given, edges, halves, kinds)
     assert list(map(tuple, edges.tolist())) == list(uses)
     number = {edge: e for e, edge in enumerate(uses)}

@@ -36,11 +36,18 @@ def test_vectors():
     assert row(POINTS, 3) == (0, -1, 0)
 
 
+@pytest.mark.parametrize("way", WAYS)
+def test_areas_are_measured_only_where_there_is_room_for_them(way):
+    normals, areas = np.empty((4, 3)), np.empty((0, 4))
+    WAYS[way](measure_faces)(POINTS, MESH.faces, 0, 4, normals, areas)
+    np.testing.assert_array_equal(normals, measured(way)[0])
+
+
 def measured(way, altitudes=np.inf):
     normals, areas = np.empty((4, 3)), np.empty((4, 4))
     WAYS[way](measure_faces)(POINTS, MESH.faces, 0, 4, normals, areas)
     bends, jumps, lengths = np.empty((3, 8))
-    mesh = MESH.faces, MESH.edges, MESH.half_edges, MESH.edge_class
+    mesh = MESH.starts, MESH.edges, MESH.half_edges, MESH.edge_class
     out = bends, jumps, lengths
     WAYS[way](measure_edges)(POINTS, normals, areas, *mesh, altitudes, 0, 8, *out)
     return normals, areas, *out

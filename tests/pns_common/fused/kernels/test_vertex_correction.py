@@ -5,8 +5,9 @@ import pytest
 
 from pns_common import Mesh
 from pns_common.base.blocks import Blocks
+from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.kernels.vertex_correction import correct, correct_scale_free, look_around
-from pns_common.fused.rings import measure_normals, measure_rings
+from pns_common.fused.rings import measure_rings
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bumpy_sphere
 from tests.support.plain_operator import PlainMesh, shortened
@@ -17,7 +18,7 @@ COUNT, RNG = 12, np.random.default_rng(1)
 RINGS = measure_rings(
     POINTS,
     MESH,
-    measure_normals(POINTS, MESH, Blocks(1)),
+    FaceMeasures(POINTS, MESH.faces, Blocks(1)),
     np.zeros(COUNT, dtype=bool),
     0.8,
     Blocks(1),

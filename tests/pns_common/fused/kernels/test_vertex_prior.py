@@ -6,8 +6,9 @@ import pytest
 from pns_common import Mesh
 from pns_common.base.blocks import Blocks
 from pns_common.formula.tips import ring_further
+from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.kernels.vertex_prior import add_priors, add_priors_but_at_tips
-from pns_common.fused.rings import measure_normals, measure_rings
+from pns_common.fused.rings import measure_rings
 from pns_common.masks.stencils import loop_ring_weight
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bumpy_sphere
@@ -39,7 +40,7 @@ def test_without_tips(way, curves):
 @pytest.mark.parametrize("curves", [False, True])
 def test_at_tips(way, curves):
     mesh = edges_built(Mesh(POINTS, FACES))
-    normals = measure_normals(POINTS, mesh, Blocks(1))
+    normals = FaceMeasures(POINTS, mesh.faces, Blocks(1))
     rings = measure_rings(POINTS, mesh, normals, np.zeros(COUNT, dtype=bool), 0.8, Blocks(1))
     each = np.arange(rings.valence.max() + 1)
     prior, of_curves = PUSHED.copy(), OF_CURVES if curves else np.zeros((0, 3))
