@@ -36,7 +36,7 @@ def add_at_edges(
     """
     mesh = level.mesh
     to.clear(mesh.sharp_edges)
-    args = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.interior
+    connectivity = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.interior
     out = to.displacement, to.ratio, to.gate, to.envelope
     # Before the blocks: what several threads ask for is computed once.
     normals = level.faces.normals
@@ -45,7 +45,8 @@ def add_at_edges(
     pushes = level.pushes if isinstance(rule, ScaleFreeEdgeRule) else NO_FIELDS
     reads_sides = isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates
     bends = level.bends if reads_sides else NO_BENDS
-    around = normals, fields, bends, level.lengths.lengths, level.lengths.logs
+    measures = level.points, normals, fields, bends, level.lengths.lengths, level.lengths.logs
+    read = [each.reshape(-1) for each in (*measures, *connectivity)]
     symmetric = int(rule.operator.orientation is SYMMETRIC)
 
     def add(rows: slice) -> None:
@@ -54,9 +55,9 @@ def add_at_edges(
         length, longest, curvature = np.empty(count), np.empty(count), np.empty(count)
         stencils, degenerate = np.empty((count, 4), dtype=np.int32), np.empty(count, dtype=bool)
         gentlest = np.empty(count if reads_sides else 0)
-        looked = stencils, frame, length, longest, curvature, degenerate, features, gentlest
-        held = np.zeros(HELD * TOGETHER)
-        look(level.points, *around, *args, rows.start, rows.stop, symmetric, *looked, held)
+        rest = length, longest, curvature, degenerate, features, gentlest
+        looked = stencils.reshape(-1), frame.reshape(-1), *rest, np.zeros(HELD * TOGETHER)
+        look(*read, rows.start, rows.stop, symmetric, *looked)
         # numpy's hyperbolic tangent runs on vectors, and has the array kernels' bits.
         axes = frame[:, :3], frame[:, 3:6], frame[:, 6:]
         gate = rule.operator.gate(EdgeFrames(*axes, length, curvature, degenerate))

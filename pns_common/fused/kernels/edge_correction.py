@@ -7,8 +7,8 @@ import math
 from pns_common.fused.kernels.compiled import (
     FLAGS_OUT,
     INDEX,
+    INDEX_OUT,
     INDICES,
-    INDICES_OUT,
     NUMBERS,
     NUMBERS_OUT,
     POINTS,
@@ -18,9 +18,8 @@ from pns_common.fused.kernels.compiled import (
     kernel,
     natural,
 )
-from pns_common.fused.kernels.masks import opposite
 from pns_common.fused.kernels.normals import NORMAL_NUMBERS
-from pns_common.fused.kernels.rings import HEIGHT, between, cross, dot, norm, row
+from pns_common.fused.kernels.rings import HEIGHT, cross, dot, norm, row
 from pns_common.fused.kernels.together import TOGETHER, keep, kept
 from pns_common.geometry.frames import ANTIPARALLEL
 from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
@@ -41,18 +40,21 @@ def _reach(v):
     return math.sqrt(square) if square > 0 else math.inf
 
 
-def _from_end(face_edges, half_edge):
-    """Return the edge of a half-edge's face that leaves where it ends."""
-    f = half_edge // 3
-    i = half_edge - 3 * f
-    return face_edges[f, i + 1 if i < 2 else 0]
+def _after(half_edge):
+    """Return the half-edge of the same face that leaves where it ends.
+
+    Computed: a processor foretells badly which corner is a face's last.
+    """
+    return natural(half_edge + 1 - 3 * (half_edge % 3 == 2))
 
 
-def _to_start(face_edges, half_edge):
-    """Return the edge of a half-edge's face that comes to where it starts."""
-    f = half_edge // 3
-    i = half_edge - 3 * f
-    return face_edges[f, i - 1 if i > 0 else 2]
+def _before(half_edge):
+    """Return the half-edge of the same face that comes to where it starts."""
+    return natural(half_edge - 1 + 3 * (half_edge % 3 == 0))
+
+
+def _vector(values, at):
+    return values[at], values[at + 1], values[at + 2]
 
 
 def _turn(held, symmetric):
@@ -95,9 +97,9 @@ def _turn(held, symmetric):
 
 @kernel(
     SIZE,
-    *(POINTS, POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS),
-    *(INDICES, INDICES, INDICES, INDICES, INDEX, SIZE, SIZE, SIZE),
-    *(INDICES_OUT, POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT, FLAGS_OUT),
+    *(NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS),
+    *(INDEX, INDEX, INDEX, INDEX, INDEX, SIZE, SIZE, SIZE),
+    *(INDEX_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT, FLAGS_OUT),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT),
 )
 def look(
@@ -107,9 +109,9 @@ def look(
     bends,
     lengths,
     logs,
-    faces,
+    starts,
     edges,
-    face_edges,
+    sides,
     half_edges,
     interior,
     begin,
@@ -127,13 +129,18 @@ def look(
 ):
     """Write frames and features of the interior edges begin … end − 1; row 0 is edge ``begin``'s.
 
+    All but ``features`` comes row after row in one: how far apart rows are is then compiled in.
+
     Args:
-        fields: (V, 4) mean normal and umbrella height; read where ``features`` has signed columns.
+        points, normals: (3 V,) and (3 F,).
+        fields: (4 V,) mean normal and umbrella height; read where ``features`` has signed columns.
         bends: (F,) b of each face; empty where gates do not read it.
         lengths, logs: (E,) h of each edge, and its logarithm.
+        starts, sides: (3 F,) where each half-edge starts, and its edge.
+        edges, half_edges: (2 E,) the ends of each edge, and its half-edges.
         symmetric: 1 where c lies to the left of a → b and degenerate edges have x = 0, else 0.
-        stencils: (N, 4) out: a, b, c, d.
-        frame: (N, 9) out: T, N, B.
+        stencils: (4 N,) out: a, b, c, d.
+        frame: (9 N,) out: T, N, B.
         length, longest: out: h and h̄, the longest edge of both faces.
         curvature, degenerate: out: x, and whether the frame is the fallback.
         features: (N, K) out.
@@ -144,25 +151,27 @@ def look(
     for first in range(0, end - begin, TOGETHER):
         count = min(TOGETHER, end - begin - first)
         for lane in range(count):
-            i = first + lane
+            i = natural(first + lane)
             e = interior[natural(begin) + i]
-            a, b = edges[e, 0], edges[e, 1]
-            h1, h2 = half_edges[e, 0], half_edges[e, 1]
-            forwards = faces[h1 // 3, h1 % 3] == a
+            a, b = edges[2 * e], edges[2 * e + 1]
+            h1, h2 = half_edges[2 * e], half_edges[2 * e + 1]
+            forwards = starts[h1] == a
             if symmetric and not forwards:
                 h1, h2, forwards = h2, h1, True
-            c, d = opposite(faces, h1), opposite(faces, h2)
-            stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3] = a, b, c, d
-            keep(held, FIRST, lane, row(normals, h1 // 3))
-            keep(held, SECOND, lane, row(normals, h2 // 3))
-            keep(held, SPOKE, lane, between(points, a, b))
+            f, g, before_h1, before_h2 = h1 // 3, h2 // 3, _before(h1), _before(h2)
+            stencils[4 * i], stencils[4 * i + 1] = a, b
+            stencils[4 * i + 2], stencils[4 * i + 3] = starts[before_h1], starts[before_h2]
+            p, q = _vector(points, 3 * a), _vector(points, 3 * b)
+            keep(held, FIRST, lane, _vector(normals, 3 * f))
+            keep(held, SECOND, lane, _vector(normals, 3 * g))
+            keep(held, SPOKE, lane, (q[0] - p[0], q[1] - p[1], q[2] - p[2]))
             h = lengths[e]
             held[H * TOGETHER + lane] = length[i] = h
             if len(bends):
-                gentlest[i] = min(bends[h1 // 3], bends[h2 // 3])
+                gentlest[i] = min(bends[f], bends[g])
             # The two half-edges run against each other.
-            ac, bc = _to_start(face_edges, h1), _from_end(face_edges, h1)
-            ad, bd = _from_end(face_edges, h2), _to_start(face_edges, h2)
+            ac, bc = sides[before_h1], sides[_after(h1)]
+            ad, bd = sides[_after(h2)], sides[before_h2]
             if not forwards:
                 ac, bc, ad, bd = bc, ac, bd, ad
             longest[i] = max(max(max(max(h, lengths[ac]), lengths[bc]), lengths[ad]), lengths[bd])
@@ -172,29 +181,33 @@ def look(
             features[i, LOGS + 3] = logs[bd] - logs[e]
         _turn(held, symmetric != 0)
         for lane in range(count):
-            i = first + lane
+            i = natural(first + lane)
             tangent, normal = kept(held, TANGENT, lane), kept(held, NORMAL, lane)
             binormal, x = kept(held, BINORMAL, lane), held[X * TOGETHER + lane]
             for k in range(3):
-                frame[i, k], frame[i, 3 + k], frame[i, 6 + k] = tangent[k], normal[k], binormal[k]
+                frame[9 * i + k], frame[9 * i + 3 + k] = tangent[k], normal[k]
+                frame[9 * i + 6 + k] = binormal[k]
             features[i, 0] = curvature[i] = x
             degenerate[i] = held[FALLBACK * TOGETHER + lane] > 0
-            a, b, c, d = stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3]
+            a, b = natural(4 * stencils[4 * i]), natural(4 * stencils[4 * i + 1])
+            c, d = natural(4 * stencils[4 * i + 2]), natural(4 * stencils[4 * i + 3])
             if wide > DIHEDRAL:
+                at_a, at_b = _vector(fields, a), _vector(fields, b)
+                at_c, at_d = _vector(fields, c), _vector(fields, d)
                 features[i, DIHEDRAL] = held[SINE * TOGETHER + lane]
-                features[i, ENDS] = dot(row(fields, a), tangent)
-                features[i, ENDS + 1] = dot(row(fields, b), tangent)
-                features[i, ENDS + 2] = dot(row(fields, a), binormal)
-                features[i, ENDS + 3] = dot(row(fields, b), binormal)
-                features[i, WINGS] = dot(row(fields, c), tangent)
-                features[i, WINGS + 1] = dot(row(fields, d), tangent)
-                features[i, WINGS + 2] = dot(row(fields, c), binormal)
-                features[i, WINGS + 3] = dot(row(fields, d), binormal)
+                features[i, ENDS] = dot(at_a, tangent)
+                features[i, ENDS + 1] = dot(at_b, tangent)
+                features[i, ENDS + 2] = dot(at_a, binormal)
+                features[i, ENDS + 3] = dot(at_b, binormal)
+                features[i, WINGS] = dot(at_c, tangent)
+                features[i, WINGS + 1] = dot(at_d, tangent)
+                features[i, WINGS + 2] = dot(at_c, binormal)
+                features[i, WINGS + 3] = dot(at_d, binormal)
             if wide > UMBRELLAS:
-                features[i, UMBRELLAS] = fields[a, HEIGHT]
-                features[i, UMBRELLAS + 1] = fields[b, HEIGHT]
-                features[i, UMBRELLAS + 2] = fields[c, HEIGHT]
-                features[i, UMBRELLAS + 3] = fields[d, HEIGHT]
+                features[i, UMBRELLAS] = fields[a + HEIGHT]
+                features[i, UMBRELLAS + 1] = fields[b + HEIGHT]
+                features[i, UMBRELLAS + 2] = fields[c + HEIGHT]
+                features[i, UMBRELLAS + 3] = fields[d + HEIGHT]
     return 0
 
 

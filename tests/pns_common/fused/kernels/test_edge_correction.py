@@ -32,17 +32,21 @@ Z, GATE = RNG.standard_normal((COUNT, 3)), RNG.random(COUNT)
 PER_LENGTH = RNG.uniform(0.1, 0.5, COUNT)
 
 
+def read(measures, mesh):
+    connectivity = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.interior
+    return [each.reshape(-1) for each in (*measures, *connectivity)]
+
+
 def looked(way, width, begin=0, end=COUNT):
     n = end - begin
     frame, features = np.empty((n, 9)), np.zeros((n, width))
     h, longest, x = np.empty(n), np.empty(n), np.empty(n)
     degenerate = np.ones(n, dtype=bool)
-    mesh = MESH.faces, MESH.edges, MESH.face_edges, MESH.half_edges, MESH.interior
-    gentlest, around = np.empty(n), (NORMALS, FIELDS, BENDS, LENGTH, np.log(LENGTH))
+    gentlest, around = np.empty(n), (POINTS, NORMALS, FIELDS, BENDS, LENGTH, np.log(LENGTH))
     stencils = np.empty((n, 4), dtype=np.int32)
+    out = stencils.reshape(-1), frame.reshape(-1), h, longest, x, degenerate, features, gentlest
     held = np.zeros(HELD * TOGETHER)
-    out = stencils, frame, h, longest, x, degenerate, features, gentlest, held
-    WAYS[way](look)(POINTS, *around, *mesh, begin, end, 1, *out)
+    WAYS[way](look)(*read(around, MESH), begin, end, 1, *out, held)
     np.testing.assert_array_equal(gentlest, BENDS[MESH.half_edges[begin:end] // 3].min(axis=1))
     np.testing.assert_array_equal(stencils[:, :2], STENCILS[begin:end, :2])
     np.testing.assert_array_equal(np.sort(stencils), np.sort(STENCILS[begin:end]))
@@ -68,16 +72,14 @@ def test_antiparallel_faces_have_the_worlds_axes_and_shut_only_where_reading_is_
     points = np.array([[0.0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 1, 0]])
     folded = edges_built(Mesh(points, np.array([[0, 1, 2], [1, 0, 3]])))
     normals = np.array([[0.0, 0, 1], [0, 0, -1]])
-    mesh = folded.faces, folded.edges, folded.face_edges, folded.half_edges, folded.interior
     for symmetric, curvature in ((0, 2.0), (1, 0.0)):
         frame, features = np.empty((1, 9)), np.zeros((1, 5))
         h, longest, x = np.empty(1), np.empty(1), np.empty(1)
         degenerate = np.zeros(1, dtype=bool)
-        around = normals, np.zeros((0, 4)), np.zeros(0), np.ones(5), np.zeros(5)
-        stencils = np.empty((1, 4), dtype=np.int32)
-        held = np.zeros(HELD * TOGETHER)
-        out = stencils, frame, h, longest, x, degenerate, features, np.zeros(0), held
-        WAYS[way](look)(points, *around, *mesh, 0, 1, symmetric, *out)
+        around = points, normals, np.zeros((0, 4)), np.zeros(0), np.ones(5), np.zeros(5)
+        out = np.empty(4, dtype=np.int32), frame.reshape(-1), h, longest, x, degenerate, features
+        rest = np.zeros(0), np.zeros(HELD * TOGETHER)
+        WAYS[way](look)(*read(around, folded), 0, 1, symmetric, *out, *rest)
         np.testing.assert_array_equal(frame.reshape(3, 3), np.eye(3))
         assert (bool(degenerate[0]), x[0], features[0, 0]) == (True, curvature, curvature)
 
