@@ -16,12 +16,11 @@ def gate_of(values: Float[Array, " N"]) -> Float[Array, " N"]:
 
     The gates of the default model are wide open at nearly all edges: there nothing is evaluated.
     """
-    xp = namespace(values)
-    if xp is not namespace(np.empty(0)):
-        return xp.tanh(values)
-    asked = ~(values >= SATURATED)
-    if 2 * np.count_nonzero(asked) > len(values):
-        return xp.tanh(values)
-    gates = xp.ones_like(values)
-    gates[asked] = xp.tanh(values[asked])
+    if type(values) is not np.ndarray:
+        return namespace(values).tanh(values)
+    is_open = values >= SATURATED
+    if 2 * np.count_nonzero(is_open) < len(values):
+        return np.tanh(values)
+    gates, asked = np.ones_like(values), ~is_open
+    gates[asked] = np.tanh(values[asked])
     return gates

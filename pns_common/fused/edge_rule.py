@@ -34,13 +34,13 @@ def add_at_edges(
     Raises:
         ModelError: the network returned something that is not finite, or of another shape.
     """
-    mesh = level.mesh
+    mesh, width = level.mesh, rule.operator.features.count
     to.clear(mesh.sharp_edges)
     connectivity = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.interior
     out = to.displacement, to.ratio, to.gate, to.envelope
     # Before the blocks: what several threads ask for is computed once.
     normals = level.faces.normals
-    fields = level.rings.fields if rule.operator.features.count > DIHEDRAL else NO_FIELDS
+    fields = level.rings.fields if width > DIHEDRAL else NO_FIELDS
     bounds = level.curves
     pushes = level.pushes if isinstance(rule, ScaleFreeEdgeRule) else NO_FIELDS
     reads_sides = isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates
@@ -51,7 +51,7 @@ def add_at_edges(
 
     def add(rows: slice) -> None:
         count = rows.stop - rows.start
-        frame, features = np.empty((count, 9)), np.empty((count, rule.operator.features.count))
+        frame, features = np.empty((count, 9)), np.empty((count, width))
         length, longest, curvature = np.empty(count), np.empty(count), np.empty(count)
         stencils, degenerate = np.empty((count, 4), dtype=np.int32), np.empty(count, dtype=bool)
         gentlest = np.empty(count if reads_sides else 0)
