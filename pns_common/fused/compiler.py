@@ -56,6 +56,7 @@ def _compiled(kernel: Kernel) -> Any:
     types = tuple(_type(each) for each in kernel.arguments)
     # Nothing is to be called from Python in numba's way, which needs numba.
     alone = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+    _numba.config.SLP_VECTORIZE = int(kernel.by_rows)
     compiled = _numba.njit(nogil=True, error_model="numpy", **alone)(kernel.function)
     compiled.compile(getattr(_numba, kernel.result)(*types))
     text = compiled.inspect_llvm(types)

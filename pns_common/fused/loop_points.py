@@ -96,10 +96,10 @@ def place_vertices(
 ) -> None:
     """Write Loop's old vertices into ``placed``."""
     count = mesh.vertex_count
-    valence = np.empty(count, dtype=np.int32)
+    valence, reach = np.empty(count, dtype=np.int32), mesh.edge_reach
 
     def rings(rows: slice) -> None:
-        sum_rings(points, mesh.edges, rows.start, rows.stop, placed, valence)
+        sum_rings(points, mesh.edges, reach, rows.start, rows.stop, placed, valence)
 
     owners(blocks, count).run(count, rings)
     sharp = mesh.sharp

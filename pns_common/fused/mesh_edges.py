@@ -26,6 +26,7 @@ from pns_common.fused.kernels.edges import (
     chain_edges,
     classify,
 )
+from pns_common.fused.kernels.owned import PASSED_BY
 from pns_common.mesh import repeated_vertex
 
 # Steps along chains that an edge may take on average: more, and a sort is as fast.
@@ -67,6 +68,16 @@ class MeshEdges:
         return np.flatnonzero(self.edge_class == INTERIOR).astype(np.int32)
 
     @cached_property
+    def edge_reach(self) -> Int[np.ndarray, "B 2"]:
+        """The smallest and the largest vertex of each block of edges (kernels/owned.py)."""
+        return _reach(self.edges.reshape(-1), 2 * PASSED_BY)
+
+    @cached_property
+    def face_reach(self) -> Int[np.ndarray, "B 2"]:
+        """The same of the faces."""
+        return _reach(self.faces.reshape(-1), 3 * PASSED_BY)
+
+    @cached_property
     def sharp_edges(self) -> Int[np.ndarray, " S"]:
         """Indices of the edges that are not interior."""
         return np.flatnonzero(self.edge_class != INTERIOR).astype(np.int32)
@@ -78,6 +89,13 @@ class MeshEdges:
             return np.zeros(0, dtype=np.int32)
         ends = self.edges[self.sharp_edges].reshape(-1)
         return np.bincount(ends, minlength=self.vertex_count).astype(np.int32)
+
+
+def _reach(vertices: Int[np.ndarray, " N"], each: int) -> Int[np.ndarray, "B 2"]:
+    """Return the smallest and the largest of each so many."""
+    starts = np.arange(0, len(vertices), each)
+    ends = np.minimum.reduceat(vertices, starts), np.maximum.reduceat(vertices, starts)
+    return np.stack(ends, axis=1)
 
 
 def in_int32(faces: Int[np.ndarray, "F 3"], blocks: Blocks) -> Int[np.ndarray, "F 3"]:

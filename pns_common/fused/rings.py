@@ -83,16 +83,18 @@ def measure_rings(
     bends, jumps, network_lengths = (np.empty(len(mesh.edges)) for _ in range(3))
     to = bends, jumps, network_lengths
 
+    reach, face_reach = mesh.edge_reach, mesh.face_reach
+
     def edges(rows: slice) -> None:
         measure_edges(points, *of_faces, *args, altitudes, rows.start, rows.stop, *to)
 
     def around(rows: slice) -> None:
-        mean_normals(mesh.faces, at_faces.areas, rows.start, rows.stop, fields)
-        mean_spokes(points, mesh.edges, *to, rows.start, rows.stop, means, valence)
+        mean_normals(mesh.faces, face_reach, at_faces.areas, rows.start, rows.stop, fields)
+        mean_spokes(points, mesh.edges, reach, *to, rows.start, rows.stop, means, valence)
         umbrella_heights(means, mesh.sharp, rows.start, rows.stop, fields)
 
     def beyond(rows: slice) -> None:
-        mean_neighbours(points, mesh.edges, fields, valence, rows.start, rows.stop, means)
+        mean_neighbours(points, mesh.edges, reach, fields, valence, rows.start, rows.stop, means)
 
     blocks.run(len(mesh.edges), edges)
     by_owner.run(count, around)

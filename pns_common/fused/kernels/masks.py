@@ -21,6 +21,7 @@ from pns_common.fused.kernels.compiled import (
     natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
+from pns_common.fused.kernels.owned import PASSED_BY, block_end, is_elsewhere
 from pns_common.masks.stencils import (
     CURVE_CENTRE,
     CURVE_NEIGHBOUR,
@@ -53,23 +54,28 @@ def place_edges(points, faces, edges, half_edges, edge_class, begin, end, placed
     return 0
 
 
-@kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
-def sum_rings(points, edges, begin, end, sums, valence):
+@kernel(SIZE, POINTS, INDICES, INDICES, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
+def sum_rings(points, edges, reach, begin, end, sums, valence):
     """Write sums of neighbours, and valences, of vertices begin … end − 1."""
     for v in range(natural(begin), end):
         valence[v] = 0
         for k in range(3):
             sums[v, k] = 0.0
-    for e in range(edges.shape[0]):
-        a, b = edges[e, 0], edges[e, 1]
-        if begin <= a < end:
-            valence[a] += 1
-            for k in range(3):
-                sums[a, k] += points[b, k]
-        if begin <= b < end:
-            valence[b] += 1
-            for k in range(3):
-                sums[b, k] += points[a, k]
+    for block in range(reach.shape[0]):
+        if is_elsewhere(reach, block, begin, end):
+            continue
+        first = natural(PASSED_BY * block)
+        for i in range(block_end(edges, block) - first):
+            e = first + i
+            a, b = edges[e, 0], edges[e, 1]
+            if begin <= a < end:
+                valence[a] += 1
+                for k in range(3):
+                    sums[a, k] += points[b, k]
+            if begin <= b < end:
+                valence[b] += 1
+                for k in range(3):
+                    sums[b, k] += points[a, k]
     return 0
 
 

@@ -25,6 +25,7 @@ from pns_common.fused.kernels.compiled import (
 )
 from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.normals import unit_normal
+from pns_common.fused.kernels.owned import PASSED_BY, block_end, is_elsewhere
 
 # Columns of a vertex's sums, which become means.
 UMBRELLA, RING_SQUARE, MEAN_JUMP, MEAN_BEND, BEND_SQUARE, LENGTH, PULL = 0, 3, 4, 5, 6, 7, 8
@@ -74,7 +75,7 @@ def row(values, i):
     return values[i, 0], values[i, 1], values[i, 2]
 
 
-@kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, POINTS_OUT)
+@kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, POINTS_OUT, by_rows=True)
 def measure_faces(points, faces, begin, end, normals, areas):
     """Write normals (F, 3), area vectors and their lengths (F, 4) of faces begin … end − 1.
 
@@ -93,18 +94,23 @@ def measure_faces(points, faces, begin, end, normals, areas):
     return 0
 
 
-@kernel(SIZE, INDICES, POINTS, SIZE, SIZE, POINTS_OUT)
-def mean_normals(faces, areas, begin, end, fields):
+@kernel(SIZE, INDICES, INDICES, POINTS, SIZE, SIZE, POINTS_OUT, by_rows=True)
+def mean_normals(faces, reach, areas, begin, end, fields):
     """Write m_v into the first three columns of ``fields`` (V, 4)."""
     for v in range(natural(begin), end):
         for k in range(4):
             fields[v, k] = 0.0
-    for f in range(faces.shape[0]):
-        for i in range(3):
-            v = faces[f, i]
-            if begin <= v < end:
-                for k in range(4):
-                    fields[v, k] += areas[f, k]
+    for block in range(reach.shape[0]):
+        if is_elsewhere(reach, block, begin, end):
+            continue
+        first = natural(PASSED_BY * block)
+        for i in range(block_end(faces, block) - first):
+            f = first + i
+            for k in range(3):
+                v = faces[f, k]
+                if begin <= v < end:
+                    for column in range(4):
+                        fields[v, column] += areas[f, column]
     for v in range(natural(begin), end):
         area = fields[v, AREA]
         for k in range(3):
@@ -164,7 +170,7 @@ def measure_edges(
     return 0
 
 
-@kernel(SIZE, INDICES, NUMBERS, REAL, REAL, SIZE, SIZE, NUMBERS_OUT)
+@kernel(SIZE, INDICES, NUMBERS, REAL, REAL, SIZE, SIZE, NUMBERS_OUT, by_rows=True)
 def face_bends(face_edges, jumps, gentle, sharp, begin, end, bends):
     """Write b of faces begin … end − 1 (``side_gate.face_bends``).
 
@@ -194,29 +200,39 @@ def _add_spoke(sums, v, spoke, square, jump, bend, length, network_square):
     sums[v, MEAN_NETWORK_SQUARE] += network_square
 
 
-@kernel(SIZE, POINTS, INDICES, NUMBERS, NUMBERS, NUMBERS, SIZE, SIZE, POINTS_OUT, INDEX_OUT)
-def mean_spokes(points, edges, bends, jumps, network_lengths, begin, end, means, valence):
+@kernel(
+    SIZE,
+    *(POINTS, INDICES, INDICES, NUMBERS, NUMBERS, NUMBERS, SIZE, SIZE),
+    *(POINTS_OUT, INDEX_OUT),
+    by_rows=True,
+)
+def mean_spokes(points, edges, reach, bends, jumps, network_lengths, begin, end, means, valence):
     """Write means over the spokes of vertices begin … end − 1, and 0 to the rest of ``means``."""
     for v in range(natural(begin), end):
         valence[v] = 0
         for k in range(VERTEX_COLUMNS):
             means[v, k] = 0.0
-    for e in range(edges.shape[0]):
-        a, b = edges[e, 0], edges[e, 1]
-        mine, theirs = begin <= a < end, begin <= b < end
-        if mine or theirs:
-            # All is read before anything is written.
-            spoke = between(points, a, b)
-            square, bend, jump, ell = dot(spoke, spoke), bends[e], jumps[e], network_lengths[e]
-            length = math.sqrt(square if square > 0 else 1e-300)
-            network_square = ell * ell if ell < length else square
-            if mine:
-                valence[a] += 1
-                _add_spoke(means, a, spoke, square, jump, bend, length, network_square)
-            if theirs:
-                valence[b] += 1
-                back = -spoke[0], -spoke[1], -spoke[2]
-                _add_spoke(means, b, back, square, jump, bend, length, network_square)
+    for block in range(reach.shape[0]):
+        if is_elsewhere(reach, block, begin, end):
+            continue
+        first = natural(PASSED_BY * block)
+        for i in range(block_end(edges, block) - first):
+            e = first + i
+            a, b = edges[e, 0], edges[e, 1]
+            mine, theirs = begin <= a < end, begin <= b < end
+            if mine or theirs:
+                # All is read before anything is written.
+                spoke = between(points, a, b)
+                square, bend, jump, ell = dot(spoke, spoke), bends[e], jumps[e], network_lengths[e]
+                length = math.sqrt(square if square > 0 else 1e-300)
+                network_square = ell * ell if ell < length else square
+                if mine:
+                    valence[a] += 1
+                    _add_spoke(means, a, spoke, square, jump, bend, length, network_square)
+                if theirs:
+                    valence[b] += 1
+                    back = -spoke[0], -spoke[1], -spoke[2]
+                    _add_spoke(means, b, back, square, jump, bend, length, network_square)
     for v in range(natural(begin), end):
         count = float(max(valence[v], 1))
         for k in range(OPENING):
@@ -258,25 +274,35 @@ def prior_pushes(means, fields, valence, smooth, ring_weight, begin, end, pushes
     return 0
 
 
-@kernel(SIZE, POINTS, INDICES, POINTS, INDEX, SIZE, SIZE, POINTS_OUT)
-def mean_neighbours(points, edges, fields, valence, begin, end, means):
+def _add_neighbour(sums, v, opening, height, jump):
+    sums[v, OPENING] += opening
+    sums[v, NEAR_HEIGHT] += height
+    sums[v, NEAR_JUMP] += jump
+
+
+@kernel(SIZE, POINTS, INDICES, INDICES, POINTS, INDEX, SIZE, SIZE, POINTS_OUT, by_rows=True)
+def mean_neighbours(points, edges, reach, fields, valence, begin, end, means):
     """Write means of what lies at the far ends of spokes: opening, umbrella heights, mean jump.
 
     Reads MEAN_JUMP of all vertices, and writes the last three columns of its own.
     """
-    for e in range(edges.shape[0]):
-        a, b = edges[e, 0], edges[e, 1]
-        mine, theirs = begin <= a < end, begin <= b < end
-        if mine or theirs:
-            opening = dot(between(fields, a, b), between(points, a, b))
-            if mine:
-                means[a, OPENING] += opening
-                means[a, NEAR_HEIGHT] += fields[b, HEIGHT]
-                means[a, NEAR_JUMP] += means[b, MEAN_JUMP]
-            if theirs:
-                means[b, OPENING] += opening
-                means[b, NEAR_HEIGHT] += fields[a, HEIGHT]
-                means[b, NEAR_JUMP] += means[a, MEAN_JUMP]
+    for block in range(reach.shape[0]):
+        if is_elsewhere(reach, block, begin, end):
+            continue
+        first = natural(PASSED_BY * block)
+        for i in range(block_end(edges, block) - first):
+            e = first + i
+            a, b = edges[e, 0], edges[e, 1]
+            mine, theirs = begin <= a < end, begin <= b < end
+            if mine or theirs:
+                # All is read before anything is written.
+                opening = dot(between(fields, a, b), between(points, a, b))
+                here, there = fields[a, HEIGHT], fields[b, HEIGHT]
+                jump_here, jump_there = means[a, MEAN_JUMP], means[b, MEAN_JUMP]
+                if mine:
+                    _add_neighbour(means, a, opening, there, jump_there)
+                if theirs:
+                    _add_neighbour(means, b, opening, here, jump_here)
     for v in range(natural(begin), end):
         count = float(max(valence[v], 1))
         for k in range(OPENING, VERTEX_COLUMNS):

@@ -1,15 +1,16 @@
 """Kernels are compiled for arrays that numpy lays out: entries read where numpy keeps things."""
 
 import ctypes
+import re
 
 import numpy as np
 import pytest
 
 pytest.importorskip("numba")
 
-from pns_common.fused.compiler import DATA, SHAPE, STRIDES, _entry, _helpers, _type
+from pns_common.fused.compiler import DATA, SHAPE, STRIDES, _compiled, _entry, _helpers, _type
 from pns_common.fused.kernels import edges, masks
-from pns_common.fused.kernels.compiled import INDICES, INTEGERS_2, POINTS, POINTS_OUT, SIZE
+from pns_common.fused.kernels.compiled import INDICES, INTEGERS_2, POINTS, POINTS_OUT, SIZE, Kernel
 from pns_common.fused.kernels.masks import largest_coordinate, sum_rings
 
 
@@ -45,6 +46,17 @@ def test_helpers_are_the_plain_functions_of_a_module_and_no_kernel_or_import():
     assert {"opposite", "_repeats", "_may_repeat"} <= names
     assert not names & {"sum_rings", "kernel"}
     assert sum_rings.function not in _helpers([masks])
+
+
+def test_statements_that_do_the_same_to_a_row_are_vectors_only_where_it_is_asked_for():
+    def divide(rows):
+        for k in range(4):
+            rows[0, k] = rows[0, k] / 3
+        return 0
+
+    for by_rows in (False, True):
+        code = str(_compiled(Kernel(divide, SIZE, (POINTS_OUT,), by_rows=by_rows)))
+        assert bool(re.search(r"fdiv <\d+ x double>", code)) == by_rows
 
 
 def test_what_is_never_negative_is_read_without_a_sign():

@@ -41,7 +41,7 @@ def test_rows_are_read_wherever_an_array_lies():
 
 
 POINTS, EDGES = np.zeros((2, 3)), np.array([[0, 1]], dtype=np.int32)
-GOOD = {"points": POINTS, "edges": EDGES, "begin": 0, "end": 2}
+GOOD = {"points": POINTS, "edges": EDGES, "reach": EDGES, "begin": 0, "end": 2}
 BAD = {
     "numbers of another precision": {"points": POINTS.astype(np.float32)},
     "indices of another width": {"edges": EDGES.astype(np.int64)},

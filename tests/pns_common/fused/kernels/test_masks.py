@@ -51,7 +51,7 @@ def test_edge_vertices(way):
 def test_old_vertices(way):
     sums, valence = np.zeros((16, 3)), np.zeros(16, dtype=np.int32)
     for begin, end in ((0, 5), (5, 16)):
-        WAYS[way](sum_rings)(POINTS, MESH.edges, begin, end, sums, valence)
+        WAYS[way](sum_rings)(POINTS, MESH.edges, MESH.edge_reach, begin, end, sums, valence)
     rings = [neighbours(v, PAIRS) for v in range(16)]
     assert valence.tolist() == list(map(len, rings))
     np.testing.assert_allclose(sums, [POINTS[ring].sum(axis=0) for ring in rings], atol=1e-14)

@@ -76,10 +76,11 @@ def test_the_tip_of_a_tent(way):
     _, areas, *of_edges = measured(way)
     fields, means = np.zeros((5, 4)), np.zeros((5, 15))
     valence = np.zeros(5, dtype=np.int32)
-    WAYS[way](mean_normals)(MESH.faces, areas, 4, 5, fields)
+    edges = MESH.edges, MESH.edge_reach
+    WAYS[way](mean_normals)(MESH.faces, MESH.face_reach, areas, 4, 5, fields)
     np.testing.assert_allclose(fields[4, :3], [0, 0, THIRD], atol=1e-16)
     assert not fields[:4].any()
-    WAYS[way](mean_spokes)(POINTS, MESH.edges, *of_edges, 4, 5, means, valence)
+    WAYS[way](mean_spokes)(POINTS, *edges, *of_edges, 4, 5, means, valence)
     assert valence.tolist() == [0, 0, 0, 0, 4]
     np.testing.assert_allclose(means[4, :5], [0, 0, -1, 2, 2 / 3], atol=1e-15)
     assert not means[:4].any()
