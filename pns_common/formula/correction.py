@@ -175,7 +175,7 @@ def checked_answer(eta: Array, like: Float[Array, "N 3"]) -> Float[Array, "N 3"]
         raise ModelError(
             "network", expected=f"corrections of shape {tuple(like.shape)}", found=f"{eta.shape}"
         )
-    if not bool(xp.isfinite(eta).all()):
+    if not bool(xp.all(xp.isfinite(eta))):
         raise ModelError("network", expected="finite corrections", found="NaN or infinity")
     return xp.astype(eta, like.dtype, copy=False)
 

@@ -56,9 +56,13 @@ def _compiled(kernel: Kernel) -> Any:
     types = tuple(_type(each) for each in kernel.arguments)
     # Nothing is to be called from Python in numba's way, which needs numba.
     alone = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-    _numba.config.SLP_VECTORIZE = int(kernel.by_rows)
-    compiled = _numba.njit(nogil=True, error_model="numpy", **alone)(kernel.function)
-    compiled.compile(getattr(_numba, kernel.result)(*types))
+    before, _numba.config.SLP_VECTORIZE = _numba.config.SLP_VECTORIZE, int(kernel.by_rows)
+    try:
+        compiled = _numba.njit(nogil=True, error_model="numpy", **alone)(kernel.function)
+        compiled.compile(getattr(_numba, kernel.result)(*types))
+    finally:
+        # It is the process's own.
+        _numba.config.SLP_VECTORIZE = before
     text = compiled.inspect_llvm(types)
     made = [f.name for f in _llvm.parse_assembly(text).functions if not f.is_declaration]
     main = compiled.overloads[types].fndesc.llvm_func_name

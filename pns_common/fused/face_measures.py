@@ -32,8 +32,15 @@ class FaceMeasures:
 
     @property
     def areas(self) -> Float[np.ndarray, "A 4"]:
-        """Twice the area vectors, and their lengths; no rows once they are forgotten."""
+        """Twice the area vectors, and their lengths; measured again once they are forgotten."""
+        if not self.holds_areas:
+            self.forget()
         return self._measured[1]
+
+    @property
+    def holds_areas(self) -> bool:
+        """Whether the areas have not been forgotten."""
+        return len(self._measured[1]) == len(self.faces)
 
     def forget_areas(self) -> None:
         """Let go of the areas."""

@@ -73,11 +73,13 @@ def _in_charts(
     if named is None or len(named) == 0:
         return None
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    count = max(vertex.max(), named.max()) + 1
-    keys, wanted = (
-        pairs.min(axis=1) * count + pairs.max(axis=1) for pairs in (vertex[sides], named)
-    )
+    count = int(max(vertex.max(), named.max())) + 1
+    keys, wanted = (_keys(pairs.astype(np.int64), count) for pairs in (vertex[sides], named))
     return sides[np.isin(keys, wanted)]
+
+
+def _keys(pairs: Int[np.ndarray, "N 2"], count: int) -> Int[np.ndarray, " N"]:
+    return pairs.min(axis=1) * count + pairs.max(axis=1)
 
 
 def _chart_vertices(

@@ -233,7 +233,7 @@ def _write(z, begin, budget, answers):
     for lane in range(LANES):
         long += not _square(z, lane) <= 1
     if long == 0:
-        # As in most: neither a root nor a division.
+        # As in most: no root, and a compiler leaves out what divides by 1.
         for lane in range(present):
             answers[at + 3 * lane] = _scaled(z[lane], 1.0, budget)
             answers[at + 3 * lane + 1] = _scaled(z[LANES + lane], 1.0, budget)

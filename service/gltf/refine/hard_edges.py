@@ -38,7 +38,8 @@ def hard_edges(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, "N 2"]
     """Return the interior edges whose two faces carry different normals at both ends."""
     labels = corner_labels(control, cleaned)
     shading = shading_of(cleaned, labels, without_one_normal(cleaned, labels))
-    return shading.edges[shading.hard]
+    # Of one type, whoever found them.
+    return shading.edges[shading.hard].astype(np.int64)
 
 
 def corner_labels(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, "F 3"]:
