@@ -90,16 +90,20 @@ def crease_classes(
     at_creases = np.zeros(vertex_count, dtype=bool)
     at_creases[named.reshape(-1)] = True
     rows = np.flatnonzero(at_creases[edges[:, 0]] & at_creases[edges[:, 1]])
-    count = np.int64(vertex_count)
-    keys = edges[rows, 0] * count + edges[rows, 1]
-    named_keys = named.min(axis=1) * count + named.max(axis=1)
+    keys, named_keys = (pair_keys(pairs, vertex_count) for pairs in (edges[rows], named))
     lost = named_keys[~np.isin(named_keys, keys)]
     if len(lost):
-        raise ParameterError("creases", divmod(int(lost[0]), int(count)), expected="edges")
+        raise ParameterError("creases", divmod(int(lost[0]), vertex_count), expected="edges")
     rows = rows[np.isin(keys, named_keys)]
     kept = edge_class.copy()
     kept[rows[kept[rows] == EdgeClass.INTERIOR]] = EdgeClass.CREASE
     return kept
+
+
+def pair_keys(pairs: Int[np.ndarray, "N 2"], vertex_count: int) -> Int[np.ndarray, " N"]:
+    """Return one number for each pair of vertices, whichever comes first."""
+    pairs = pairs.astype(np.int64)
+    return pairs.min(axis=1) * vertex_count + pairs.max(axis=1)
 
 
 def crease_children(topology: Topology) -> Int[np.ndarray, "N 2"]:

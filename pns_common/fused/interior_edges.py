@@ -24,4 +24,5 @@ def interior_edges(
 
     blocks = kernel_blocks(available_threads())
     mesh = build_edges(np.ascontiguousarray(faces, dtype=np.int32), vertex_count, blocks)
-    return mesh.edges[mesh.interior], mesh.half_edges[mesh.interior]
+    rows = mesh.interior if len(mesh.sharp_edges) else slice(None)
+    return mesh.edges[rows], mesh.half_edges[rows]

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.base.distinct import as_words, distinct_rows, number_by_first_appearance
-from pns_common.connectivity.creases import Creases
+from pns_common.connectivity.creases import Creases, pair_keys
 from pns_common.connectivity.topology import EdgeClass, Topology, split
 from pns_common.masks.linear import level_topologies
 from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
@@ -74,12 +74,7 @@ def _in_charts(
         return None
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     count = int(max(vertex.max(), named.max())) + 1
-    keys, wanted = (_keys(pairs.astype(np.int64), count) for pairs in (vertex[sides], named))
-    return sides[np.isin(keys, wanted)]
-
-
-def _keys(pairs: Int[np.ndarray, "N 2"], count: int) -> Int[np.ndarray, " N"]:
-    return pairs.min(axis=1) * count + pairs.max(axis=1)
+    return sides[np.isin(pair_keys(vertex[sides], count), pair_keys(named, count))]
 
 
 def _chart_vertices(

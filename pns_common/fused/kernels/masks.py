@@ -21,7 +21,7 @@ from pns_common.fused.kernels.compiled import (
     natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
-from pns_common.fused.kernels.owned import PASSED_BY, block_end, is_elsewhere
+from pns_common.fused.kernels.owned import owned_rows
 from pns_common.masks.stencils import (
     CURVE_CENTRE,
     CURVE_NEIGHBOUR,
@@ -62,10 +62,8 @@ def sum_rings(points, edges, reach, begin, end, sums, valence):
         for k in range(3):
             sums[v, k] = 0.0
     for block in range(reach.shape[0]):
-        if is_elsewhere(reach, block, begin, end):
-            continue
-        first = natural(PASSED_BY * block)
-        for i in range(block_end(edges, block) - first):
+        first, asked = owned_rows(edges, reach, block, begin, end)
+        for i in range(asked):
             e = first + i
             a, b = edges[e, 0], edges[e, 1]
             if begin <= a < end:

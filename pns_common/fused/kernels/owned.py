@@ -6,6 +6,8 @@ lies, a block of them is at the vertices of one thread alone, and the others nee
 
 from __future__ import annotations
 
+from pns_common.fused.kernels.compiled import natural
+
 # Rows of a block.
 PASSED_BY = 1024
 
@@ -13,6 +15,12 @@ PASSED_BY = 1024
 def block_end(rows, block):
     """Return the row after a block's last."""
     return min(PASSED_BY * (block + 1), rows.shape[0])
+
+
+def owned_rows(rows, reach, block, begin, end):
+    """Return a block's first row and how many there are to look at: none if all are elsewhere."""
+    first = natural(PASSED_BY * block)
+    return first, 0 if is_elsewhere(reach, block, begin, end) else block_end(rows, block) - first
 
 
 def is_elsewhere(reach, block, begin, end):

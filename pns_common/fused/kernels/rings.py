@@ -25,7 +25,7 @@ from pns_common.fused.kernels.compiled import (
 )
 from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.normals import unit_normal
-from pns_common.fused.kernels.owned import PASSED_BY, block_end, is_elsewhere
+from pns_common.fused.kernels.owned import owned_rows
 
 # Columns of a vertex's sums, which become means.
 UMBRELLA, RING_SQUARE, MEAN_JUMP, MEAN_BEND, BEND_SQUARE, LENGTH, PULL = 0, 3, 4, 5, 6, 7, 8
@@ -101,10 +101,8 @@ def mean_normals(faces, reach, areas, begin, end, fields):
         for k in range(4):
             fields[v, k] = 0.0
     for block in range(reach.shape[0]):
-        if is_elsewhere(reach, block, begin, end):
-            continue
-        first = natural(PASSED_BY * block)
-        for i in range(block_end(faces, block) - first):
+        first, asked = owned_rows(faces, reach, block, begin, end)
+        for i in range(asked):
             f = first + i
             for k in range(3):
                 v = faces[f, k]
@@ -213,10 +211,8 @@ def mean_spokes(points, edges, reach, bends, jumps, network_lengths, begin, end,
         for k in range(VERTEX_COLUMNS):
             means[v, k] = 0.0
     for block in range(reach.shape[0]):
-        if is_elsewhere(reach, block, begin, end):
-            continue
-        first = natural(PASSED_BY * block)
-        for i in range(block_end(edges, block) - first):
+        first, asked = owned_rows(edges, reach, block, begin, end)
+        for i in range(asked):
             e = first + i
             a, b = edges[e, 0], edges[e, 1]
             mine, theirs = begin <= a < end, begin <= b < end
@@ -287,10 +283,8 @@ def mean_neighbours(points, edges, reach, fields, valence, begin, end, means):
     Reads MEAN_JUMP of all vertices, and writes the last three columns of its own.
     """
     for block in range(reach.shape[0]):
-        if is_elsewhere(reach, block, begin, end):
-            continue
-        first = natural(PASSED_BY * block)
-        for i in range(block_end(edges, block) - first):
+        first, asked = owned_rows(edges, reach, block, begin, end)
+        for i in range(asked):
             e = first + i
             a, b = edges[e, 0], edges[e, 1]
             mine, theirs = begin <= a < end, begin <= b < end

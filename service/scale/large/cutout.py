@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.connectivity.creases import Creases
+from pns_common.connectivity.creases import Creases, pair_keys
 from pns_common.pieces import Piece
 
 from .adjacency import Adjacency, ring_of, whole_vertices
@@ -51,8 +51,5 @@ def _local_creases(
     creases = np.asarray(mesh.creases, dtype=np.int64)
     place = np.minimum(np.searchsorted(vertices, creases), len(vertices) - 1)
     local = place[(vertices[place] == creases).all(axis=1)]
-    count = len(vertices)
-    start, end = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
-    keys = np.minimum(start, end) * count + np.maximum(start, end)
-    here = np.isin(local.min(axis=1) * count + local.max(axis=1), keys)
-    return local[here]
+    count, sides = len(vertices), faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    return local[np.isin(pair_keys(local, count), pair_keys(sides, count))]

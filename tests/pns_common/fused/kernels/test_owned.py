@@ -7,7 +7,7 @@ import pytest
 
 from pns_common import Mesh
 from pns_common.fused.kernels.masks import sum_rings
-from pns_common.fused.kernels.owned import PASSED_BY, block_end, is_elsewhere
+from pns_common.fused.kernels.owned import PASSED_BY, block_end, is_elsewhere, owned_rows
 from pns_common.fused.kernels.rings import (
     VERTEX_COLUMNS,
     mean_neighbours,
@@ -44,6 +44,9 @@ def test_a_block_is_elsewhere_if_no_row_of_it_has_a_vertex_there(mesh, of):
         assert is_elsewhere(reach, block, own.max() + 1, len(POINTS))
         assert not is_elsewhere(reach, block, own.min(), own.min() + 1)
         assert not is_elsewhere(reach, block, own.max(), own.max() + 1)
+        first = PASSED_BY * block
+        assert owned_rows(rows, reach, block, 0, own.min()) == (first, 0)
+        assert owned_rows(rows, reach, block, 0, len(POINTS)) == (first, len(own))
     assert block_end(rows, len(reach) - 1) == len(rows)
 
 
