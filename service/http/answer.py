@@ -11,6 +11,7 @@ from starlette.types import Receive, Scope, Send
 
 from ..workers.memory_file import MemoryFile
 from .admission import Admission, CutOffError, DrainingError
+from .leaving import until_gone
 
 log = logging.getLogger("pns.service")
 
@@ -60,7 +61,7 @@ class FileAnswer(Response):
         )
 
     async def _send_pieces(self, send: Send, receive: Receive) -> None:
-        leaves = asyncio.create_task(_until_gone(receive))
+        leaves = asyncio.create_task(until_gone(receive))
         pieces, piece = self._content.pieces(), b"."
         try:
             while piece:
@@ -72,8 +73,3 @@ class FileAnswer(Response):
                 await send({"type": "http.response.body", "body": piece, "more_body": piece != b""})
         finally:
             leaves.cancel()
-
-
-async def _until_gone(receive: Receive) -> None:
-    while (await receive())["type"] != "http.disconnect":
-        pass

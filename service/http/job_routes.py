@@ -12,6 +12,7 @@ from tempfile import gettempdir
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from ..bodies import media
@@ -26,6 +27,7 @@ from .clients import client_of
 from .connection.crowd import LISTENS
 from .intake import Wanted, owner_of, taken_in
 from .job_book import Entry, NotDoneError
+from .leaving import unless_gone
 from .parameters import Parameters
 from .service import Service
 
@@ -106,7 +108,11 @@ def job_json(service: Service, job: Job) -> dict[str, Any]:
 
 
 async def _hand_in(service: Service, request: Request, parameters: Parameters) -> Entry:
-    """Take a file in, and its job until it stands in line. Raises ServiceError."""
+    """Take a file in, and its job until it stands in line.
+
+    Raises:
+        ServiceError: it is refused; ClientDisconnect: its client has left before that.
+    """
     settings = service.settings
     wanted = Wanted(
         answer=True,
@@ -118,7 +124,12 @@ async def _hand_in(service: Service, request: Request, parameters: Parameters) -
         job = await held.enter_async_context(taken_in(service, request, parameters, wanted))
         entry = service.book.add(job, owner_of(client_of(request, settings)))
         entry.task = asyncio.create_task(_work(service, job, held.pop_all()))
-    await job.accepted.wait()
+    try:
+        await unless_gone(request.receive, job.accepted.wait())
+    except ClientDisconnect:
+        # Nobody knows its id. Nothing else would bound how many such jobs wait to be measured.
+        service.book.forget(job.id)
+        raise
     if job.error is not None and job.waiting is None:
         # Refused before it stood in line: there is nothing to come back for.
         service.book.forget(job.id)

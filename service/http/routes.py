@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import time
-from collections.abc import Coroutine
 from contextlib import ExitStack
-from typing import Annotated, Any, TypeVar
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
-from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, Response
-from starlette.types import Receive
 
 from ..bodies import media
 from ..errors import NoModelError
@@ -23,13 +19,12 @@ from .admission import DrainingError
 from .answer import FileAnswer
 from .answer_types import answer_type
 from .intake import Wanted, taken_in
+from .leaving import unless_gone
 from .limits import LimitsEntry, limits_of
 from .parameters import Parameters
 from .service import Service
 
 log = logging.getLogger("pns.service")
-
-T = TypeVar("T")
 
 
 def router(service: Service) -> APIRouter:
@@ -85,7 +80,7 @@ async def _subdivide(
             (answer,) = job.results
             held.callback(answer.release)
             async with service.admission.working():
-                await _unless_gone(request.receive, service.desk.serve(job))
+                await unless_gone(request.receive, service.desk.serve(job))
         timing = job.seconds | {"total": job.upload_seconds + time.monotonic() - job.admitted}
         stages_text = _server_timing(timing)
         _log(job, answer.size, stages_text)
@@ -107,23 +102,3 @@ def _log(job: Job, size: int, stages: str) -> None:
 
 def _server_timing(seconds: dict[str, float]) -> str:
     return ", ".join(f"{stage};dur={1000 * value:.1f}" for stage, value in seconds.items())
-
-
-async def _unless_gone(receive: Receive, work: Coroutine[Any, Any, T]) -> T:
-    """Return the value of `work`, cancelled if the client disconnects. Raises ClientDisconnect."""
-    job = asyncio.create_task(work)
-    gone = asyncio.create_task(_disconnected(receive))
-    try:
-        await asyncio.wait({job, gone}, return_when=asyncio.FIRST_COMPLETED)
-        if not job.done():
-            raise ClientDisconnect
-        return job.result()
-    finally:
-        job.cancel()
-        gone.cancel()
-        await asyncio.gather(job, gone, return_exceptions=True)
-
-
-async def _disconnected(receive: Receive) -> None:
-    while (await receive())["type"] != "http.disconnect":
-        pass

@@ -59,6 +59,15 @@ def measure(work: Work) -> Cost:
     return Cost(4, 1, 0.01 if short else 1.0)
 
 
+def measure_in_the_end(work: Work) -> Cost:
+    """The same; of `measured FOLDER` once it may be, and a file there tells that it is begun."""
+    word, _, folder = memory_file.read(work.body).decode().partition(" ")
+    if word == "measured":
+        tell(Path(folder) / f"began-{os.getpid()}")
+        wait_for(Path(folder) / "go")
+    return measure(work)
+
+
 def obey(work: Work) -> Done:
     """`sleep 2`, `die`, `hold`, … as the body says; anything else is echoed."""
     reporter = Reporter(work.page)

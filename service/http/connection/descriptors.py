@@ -13,8 +13,8 @@ log = logging.getLogger("pns.service")
 # A worker takes pipes and a sentinel; the rest are libraries, models, logs and listening sockets.
 OF_WORKER = 16
 OF_PROCESS = 128
-# The body, the answer, the report and the page of a job.
-OF_REQUEST = 4
+# The body, the answer, the report and the page of a job, and the page's map.
+OF_REQUEST = 5
 # What is kept of one that is done: its answer and its report.
 OF_RESULT = 2
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 
 from service.http import documentation
 from tests.support.live import served
-from tests.support.stand_in_jobs import files_of_at_most
+from tests.support.stand_in_jobs import files_of_at_most, measure_in_the_end
 
 GLB = {"Content-Type": "model/gltf-binary"}
 JSON = {"Accept": "application/json"}
@@ -177,6 +178,27 @@ def test_a_disconnect_does_not_lose_a_job(tmp_path: Path) -> None:
             (tmp_path / f"go-{number}").touch()
         with opened(where) as back:
             assert ended(back, job)["state"] == "done"
+
+
+def test_who_leaves_before_a_job_stands_in_line_leaves_nothing(tmp_path: Path) -> None:
+    """Nobody was told its id; and those that wait to be measured take no slot."""
+    with served(workers=1, measure=measure_in_the_end) as where, opened(where) as client:
+        client.post("/subdivide", content=b"echo", headers=GLB)
+        before = descriptors()
+        body = f"measured {tmp_path}"
+        head = f"POST /jobs HTTP/1.1\r\nHost: test\r\nContent-Type: {GLB['Content-Type']}\r\n"
+        request = f"{head}Content-Length: {len(body)}\r\n\r\n{body}".encode()
+        clients = [socket.create_connection(where) for _ in range(3)]
+        # Two are measured, and the third waits; each has its files, and the page a second time.
+        for number, leaving in enumerate(clients, start=1):
+            leaving.sendall(request)
+            until(lambda held=before + 5 * number: descriptors() == held)
+        until(lambda: len(list(tmp_path.glob("began-*"))) == 2)
+        clients[2].close()
+        until(lambda: descriptors() == before + 10)
+        for leaving in clients:
+            leaving.close()
+        until(lambda: descriptors() == before)
 
 
 def test_unknown_ids_are_404(client: httpx2.Client) -> None:
