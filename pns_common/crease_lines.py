@@ -12,6 +12,7 @@ from pns_common.connectivity.topology import build_topology
 from pns_common.errors import ParameterError
 from pns_common.fused import fits, kernel_blocks, kernels_available, kernels_loaded
 from pns_common.geometry.crease_lines import CREASE_ANGLE, line_rows
+from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
 
 
@@ -29,16 +30,17 @@ def crease_lines(mesh: Mesh, angle: float = CREASE_ANGLE) -> Int[np.ndarray, "N 
     points, faces = mesh.vertices, mesh.faces
     if kernels_available() and kernels_loaded() and fits(len(points), len(faces), 1):
         from pns_common.fused.crease_lines import crease_line_rows
-        from pns_common.fused.face_measures import face_normals
+        from pns_common.fused.face_measures import face_normals as measured_normals
         from pns_common.fused.mesh_edges import build_edges
 
         blocks = kernel_blocks(available_threads())
         edges = build_edges(faces.astype(np.int32), len(points), blocks)
-        normals = face_normals(points, edges.faces, blocks)
+        normals = measured_normals(points, edges.faces, blocks)
         rows = crease_line_rows(points, edges, normals, float(angle), blocks)
         return edges.edges[rows].astype(np.int64)
     topology = build_topology(faces, len(points))
-    return topology.edges[line_rows(points, topology, float(angle))]
+    normals = face_normals(points, faces)
+    return topology.edges[line_rows(points, normals, topology, float(angle))]
 
 
 def named_on(mesh: Mesh, creases: Creases) -> Creases:

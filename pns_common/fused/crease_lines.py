@@ -8,9 +8,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
-from pns_common.fused.kernels.creases import mark_edges_beyond
+from pns_common.fused.kernels.creases import (
+    drop_loose_ends,
+    mark_edges_beyond,
+    mark_flat_sides,
+)
 from pns_common.fused.mesh_edges import MeshEdges
-from pns_common.geometry.crease_lines import lines_among
+from pns_common.geometry.crease_lines import at_others
 
 
 def crease_line_rows(
@@ -30,5 +34,18 @@ def crease_line_rows(
         found[blocks.number(rows, count)] = mark_edges_beyond(*around, *bounds, beyond)
 
     blocks.run(count, mark)
-    sharp = np.flatnonzero(beyond) if found.any() else np.zeros(0, dtype=np.int64)
-    return lines_among(points, mesh, sharp, angle)
+    if not found.any():
+        return np.zeros(0, dtype=np.int32)
+    sharp = np.flatnonzero(beyond).astype(np.int32)
+    is_flat = np.empty(len(sharp), dtype=bool)
+    sides = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
+
+    def look(rows: slice) -> None:
+        mark_flat_sides(*sides, rows.start, rows.stop, is_flat)
+
+    blocks.run(len(sharp), look)
+    flat = sharp[is_flat]
+    left = np.ones(len(flat), dtype=bool)
+    met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))
+    drop_loose_ends(points, mesh.edges, flat, at_others(mesh), cosine, *met, left)
+    return flat[left]

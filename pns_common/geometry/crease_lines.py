@@ -21,12 +21,11 @@ import math
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import dot, segment_sum, unit
+from pns_common.base.arrays import dot, gather, segment_sum, unit
 from pns_common.connectivity.creases import with_crease_rows
 from pns_common.connectivity.topology import EdgeClass, Topology
-from pns_common.geometry.frames import face_normals
 
 # θ in degrees, and at how many levels what is found is sharp: then it is smooth, and by then round
 # within a quarter of an edge.
@@ -72,47 +71,53 @@ class Edges(Protocol):
 
 
 def with_crease_lines(
-    topology: Topology, points: Float[np.ndarray, "V 3"], angle: float | None
+    topology: Topology,
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    angle: float | None,
 ) -> Topology:
     """Return the topology with its crease lines as creases; unchanged where no angle is given."""
     if angle is None:
         return topology
-    return with_crease_rows(topology, line_rows(points, topology, angle))
+    return with_crease_rows(topology, line_rows(points, normals, topology, angle))
 
 
 def line_rows(
-    points: Float[np.ndarray, "V 3"], mesh: Topology, angle: float
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Topology,
+    angle: float,
 ) -> Int[np.ndarray, " N"]:
-    """Return the edges of a mesh's crease lines; ``angle`` is θ in degrees."""
-    sharp = edges_beyond(points, mesh, mesh.interior, math.cos(math.radians(angle)))
-    return lines_among(points, mesh, sharp, angle)
+    """Return the edges of a mesh's crease lines.
+
+    ``normals`` are the faces' unit normals, 0 without area; ``angle`` is θ in degrees.
+    """
+    cosine = math.cos(math.radians(angle))
+    sharp = edges_beyond(normals, mesh, mesh.interior, cosine)
+    if len(sharp) == 0:
+        return sharp
+    flat = sharp[have_flat_sides(normals, mesh, sharp)]
+    return flat[go_on(points, mesh, flat, cosine)]
 
 
 def edges_beyond(
-    points: Float[np.ndarray, "V 3"], mesh: Edges, rows: Int[np.ndarray, " N"], cosine: float
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Edges,
+    rows: Int[np.ndarray, " N"],
+    cosine: float,
 ) -> Int[np.ndarray, " M"]:
     """Return those of some interior edges whose faces' normals have a smaller cosine.
 
     Faces without area have no normal, and no edge of theirs is sharp.
     """
-    n1, n2 = _normals_at(points, mesh, rows)
+    n1, n2 = _normals_at(normals, mesh, rows)
     defined = (dot(n1, n1) > 0) & (dot(n2, n2) > 0)
     return rows[defined & (dot(n1, n2) < cosine)]
 
 
-def lines_among(
-    points: Float[np.ndarray, "V 3"], mesh: Edges, sharp: Int[np.ndarray, " N"], angle: float
-) -> Int[np.ndarray, " M"]:
-    """Return those of all edges beyond ``angle`` (degrees) that are of lines: marks 2 and 3."""
-    if len(sharp) == 0:
-        return sharp
-    flat = sharp[_have_flat_sides(points, mesh, sharp)]
-    return flat[_go_on(points, mesh, flat, math.cos(math.radians(angle)))]
-
-
-def _have_flat_sides(
-    points: Float[np.ndarray, "V 3"], mesh: Edges, sharp: Int[np.ndarray, " N"]
-) -> np.ndarray:
+def have_flat_sides(
+    normals: Float[np.ndarray, "F 3"], mesh: Edges, sharp: Int[np.ndarray, " N"]
+) -> Bool[np.ndarray, " N"]:
     """Return at which sharp edges both faces have another edge that turns less than half as much.
 
     An edge that is not interior turns by nothing.
@@ -120,7 +125,7 @@ def _have_flat_sides(
     sides = mesh.face_edges[mesh.half_edges[sharp] // 3]
     interior = mesh.edge_class[sides] == EdgeClass.INTERIOR
     cosines = np.ones(sides.shape)
-    cosines[interior] = dot(*_normals_at(points, mesh, sides[interior]))
+    cosines[interior] = dot(*_normals_at(normals, mesh, sides[interior]))
     own = sides == sharp[:, None, None]
     turn = cosines[:, 0][own[:, 0]]
     cosines[own] = -1.0
@@ -129,14 +134,13 @@ def _have_flat_sides(
     return flattest > half
 
 
-def _go_on(
+def go_on(
     points: Float[np.ndarray, "V 3"], mesh: Edges, flat: Int[np.ndarray, " N"], cosine: float
-) -> np.ndarray:
+) -> Bool[np.ndarray, " N"]:
     """Return which edges are left when those are dropped that do not go on at both ends."""
     ends = mesh.edges[flat]
     along = unit(points[ends[:, 1]] - points[ends[:, 0]])
-    at_rim = np.zeros(mesh.vertex_count, dtype=bool)
-    at_rim[mesh.edges[mesh.edge_class != EdgeClass.INTERIOR].reshape(-1)] = True
+    at_rim = at_others(mesh)
     left = np.ones(len(flat), dtype=bool)
     for _ in range(ROUNDS):
         at = ends[left].T.reshape(-1)
@@ -154,10 +158,16 @@ def _go_on(
     return left
 
 
+def at_others(mesh: Edges) -> Bool[np.ndarray, " V"]:
+    """Return which vertices are on an edge that is not interior: there a line may end."""
+    at = np.zeros(mesh.vertex_count, dtype=bool)
+    at[mesh.edges[mesh.edge_class != EdgeClass.INTERIOR].reshape(-1)] = True
+    return at
+
+
 def _normals_at(
-    points: Float[np.ndarray, "V 3"], mesh: Edges, rows: Int[np.ndarray, " N"]
+    normals: Float[np.ndarray, "F 3"], mesh: Edges, rows: Int[np.ndarray, " N"]
 ) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 3"]]:
-    """Return the unit normals of the two faces of interior edges; 0 without area."""
+    """Return the unit normals of the two faces of interior edges."""
     faces = mesh.half_edges[rows] // 3
-    first, second = (face_normals(points, mesh.faces[faces[:, side]]) for side in (0, 1))
-    return first, second
+    return gather(normals, faces[:, 0]), gather(normals, faces[:, 1])

@@ -10,6 +10,7 @@ from pns_common import Creases, Mesh, ParameterError, crease_lines, load_model, 
 from pns_common.connectivity.topology import build_topology
 from pns_common.crease_lines import named_on
 from pns_common.geometry.crease_lines import line_rows
+from pns_common.geometry.frames import face_normals
 from pns_common.refine_parts import refine_parts
 from tests.support.meshes import block, bumpy_sphere
 from train.data.primitives import box, cylinder
@@ -22,7 +23,8 @@ def test_both_ways_find_the_same_lines(monkeypatch):
     front_door = import_module("pns_common.crease_lines")
     for mesh in (BLOCK, cylinder(16, rows=6), Mesh(*bumpy_sphere())):
         topology = build_topology(mesh.faces, len(mesh.vertices))
-        expected = topology.edges[line_rows(mesh.vertices, topology, 66.0)]
+        normals = face_normals(mesh.vertices, mesh.faces)
+        expected = topology.edges[line_rows(mesh.vertices, normals, topology, 66.0)]
         for loaded in (True, False):
             monkeypatch.setattr(front_door, "kernels_loaded", lambda loaded=loaded: loaded)
             np.testing.assert_array_equal(crease_lines(mesh), expected)

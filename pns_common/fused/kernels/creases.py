@@ -1,19 +1,26 @@
-"""Which edges turn by more than an angle, with the answers of geometry/crease_lines.py."""
+"""Crease lines, with the answers of geometry/crease_lines.py."""
 
 from __future__ import annotations
 
+import math
+
 from pns_common.fused.kernels.compiled import (
     CLASSES,
+    FLAGS,
     FLAGS_OUT,
+    INDEX,
+    INDEX_OUT,
     INDICES,
     POINTS,
+    POINTS_OUT,
     REAL,
     SIZE,
     kernel,
     natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
-from pns_common.fused.kernels.rings import dot, row
+from pns_common.fused.kernels.rings import between, dot, row
+from pns_common.geometry.crease_lines import CORNER, ROUNDS
 
 
 @kernel(SIZE, POINTS, INDICES, CLASSES, REAL, SIZE, SIZE, FLAGS_OUT)
@@ -32,3 +39,82 @@ def mark_edges_beyond(normals, half_edges, edge_class, cosine, begin, end, beyon
         beyond[e] = interior & defined & (dot(n, m) < cosine)
         found += beyond[e]
     return found
+
+
+def _cosine(normals, half_edges, edge_class, e):
+    """Return the cosine of the turn at an edge: 1 where it is not interior."""
+    if edge_class[e] != INTERIOR:
+        return 1.0
+    return dot(row(normals, half_edges[e, 0] // 3), row(normals, half_edges[e, 1] // 3))
+
+
+@kernel(SIZE, POINTS, INDICES, INDICES, CLASSES, INDEX, SIZE, SIZE, FLAGS_OUT)
+def mark_flat_sides(normals, face_edges, half_edges, edge_class, sharp, begin, end, flat):
+    """Mark those of the sharp edges begin … end − 1 both of whose faces are flat on another side.
+
+    That is where another edge of the face turns less than half as much.
+    """
+    for i in range(natural(begin), end):
+        e = sharp[i]
+        turn = _cosine(normals, half_edges, edge_class, e)
+        flattest = 1.0
+        for h in range(2):
+            f, flattest_of_face = half_edges[e, h] // 3, -1.0
+            for k in range(3):
+                side = face_edges[f, k]
+                if side != e:
+                    cosine = _cosine(normals, half_edges, edge_class, side)
+                    flattest_of_face = max(flattest_of_face, cosine)
+            flattest = min(flattest, flattest_of_face)
+        flat[i] = flattest > math.sqrt((1 + max(turn, -1.0)) / 2)  # cos(t / 2) of cos t
+    return 0
+
+
+@kernel(SIZE, POINTS, INDICES, INDEX, FLAGS, REAL, INDEX_OUT, POINTS_OUT, FLAGS_OUT)
+def drop_loose_ends(points, edges, flat, at_rim, cosine, count, total, left):
+    """Mark the edges ``flat`` that are left when those are dropped that do not go on at both ends.
+
+    Args:
+        at_rim: (V,) where a line may end.
+        count: (V,) 0 on entry and exit: how many lines meet at a vertex.
+        total: (V, 3) likewise: the sum of their directions away from there.
+        left: (N,) True on entry.
+    """
+    for _ in range(ROUNDS):
+        dropped = 0
+        for i in range(len(flat)):
+            if left[i]:
+                a, b = edges[flat[i], 0], edges[flat[i], 1]
+                v = between(points, a, b)
+                square = dot(v, v)
+                size = math.sqrt(square) if square > 0 else math.inf
+                count[a] += 1
+                count[b] += 1
+                for k in range(3):
+                    total[a, k] += v[k] / size
+                    total[b, k] -= v[k] / size
+        for i in range(len(flat)):
+            if left[i]:
+                a, b = edges[flat[i], 0], edges[flat[i], 1]
+                if not (
+                    _goes_on(at_rim, count, total, a, cosine)
+                    and _goes_on(at_rim, count, total, b, cosine)
+                ):
+                    left[i] = False
+                    dropped += 1
+        for i in range(len(flat)):
+            for end in range(2):
+                v = edges[flat[i], end]
+                count[v] = 0
+                for k in range(3):
+                    total[v, k] = 0.0
+        if dropped == 0:
+            break
+    return 0
+
+
+def _goes_on(at_rim, count, total, v, cosine):
+    """Return whether a line goes on at a vertex, or may end there."""
+    away = row(total, v)
+    straight = count[v] == 2 and dot(away, away) < 2 - 2 * cosine
+    return at_rim[v] or straight or count[v] >= CORNER

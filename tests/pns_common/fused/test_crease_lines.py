@@ -11,6 +11,7 @@ from pns_common.connectivity.topology import build_topology
 from pns_common.fused.crease_lines import crease_line_rows
 from pns_common.fused.face_measures import face_normals
 from pns_common.geometry.crease_lines import line_rows
+from pns_common.geometry.frames import face_normals as array_normals
 from tests.support.kernels import edges_built
 from tests.support.meshes import block, manifolds, soups
 
@@ -20,17 +21,20 @@ def found_by_kernels(mesh, angle, blocks):
     return crease_line_rows(mesh.vertices, edges_built(mesh), normals, angle, blocks)
 
 
+def expected_lines(mesh, angle):
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    return line_rows(mesh.vertices, array_normals(mesh.vertices, mesh.faces), topology, angle)
+
+
 @given(manifolds() | soups(), st.floats(1, 170), st.integers(1, 3))
 def test_kernels_find_the_lines_of_the_formulas(mesh, angle, threads):
-    topology = build_topology(mesh.faces, len(mesh.vertices))
     found = found_by_kernels(mesh, angle, Blocks(threads, 5))
-    np.testing.assert_array_equal(found, line_rows(mesh.vertices, topology, angle))
+    np.testing.assert_array_equal(found, expected_lines(mesh, angle))
 
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_they_find_those_of_a_noisy_block(closed):
     mesh = Mesh(*block(4, noise=0.03, closed=closed))
     found = found_by_kernels(mesh, 66.0, Blocks(2, 7))
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    np.testing.assert_array_equal(found, line_rows(mesh.vertices, topology, 66.0))
+    np.testing.assert_array_equal(found, expected_lines(mesh, 66.0))
     assert len(found) > 20

@@ -14,6 +14,7 @@ from pns_common.geometry.crease_lines import (
     line_rows,
     with_crease_lines,
 )
+from pns_common.geometry.frames import face_normals
 from tests.support.meshes import block, bumpy_sphere, grid, manifolds, rotation, soups
 from train.data.primitives import box, cone, cylinder, globe, icosphere, l_block, tetrahedron, torus
 
@@ -46,7 +47,12 @@ SHARP = {
 
 def lines(mesh, angle=CREASE_ANGLE):
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    return {tuple(pair) for pair in topology.edges[line_rows(mesh.vertices, topology, angle)]}
+    rows = line_rows(mesh.vertices, normals_of(mesh), topology, angle)
+    return {tuple(pair) for pair in topology.edges[rows]}
+
+
+def normals_of(mesh):
+    return face_normals(mesh.vertices, mesh.faces)
 
 
 @pytest.mark.parametrize("name", ROUND)
@@ -95,7 +101,7 @@ def folded_sheet(length, loose):
 def test_a_line_that_ends_in_a_smooth_surface_loses_as_many_edges_as_there_are_rounds(loose):
     mesh = folded_sheet(12, loose)
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    sharp = edges_beyond(mesh.vertices, topology, topology.interior, np.cos(np.radians(66)))
+    sharp = edges_beyond(normals_of(mesh), topology, topology.interior, np.cos(np.radians(66)))
     on_fold = np.abs(mesh.vertices[:, 1]) < 1e-12
     folds = sharp[on_fold[topology.edges[sharp]].all(axis=1)]
     assert len(folds) > ROUNDS
@@ -111,15 +117,15 @@ def test_an_edge_is_beyond_an_angle_where_both_faces_have_a_normal():
     topology = build_topology(cube.faces, 8)
     for degrees, count in ((89.9, 12), (90.1, 0)):
         cosine = np.cos(np.radians(degrees))
-        assert len(edges_beyond(cube.vertices, topology, topology.interior, cosine)) == count
-    flat = cube.vertices * [1, 1, 0]
+        assert len(edges_beyond(normals_of(cube), topology, topology.interior, cosine)) == count
+    flat = face_normals(cube.vertices * [1, 1, 0], cube.faces)
     assert len(edges_beyond(flat, topology, topology.interior, 2.0)) < 18
 
 
 def test_lines_become_creases_beside_those_that_are_there():
     mesh = box()
     plain = build_topology(mesh.faces, 8)
-    creased = with_crease_lines(plain, mesh.vertices, CREASE_ANGLE)
+    creased = with_crease_lines(plain, mesh.vertices, normals_of(mesh), CREASE_ANGLE)
     assert (creased.edge_class == EdgeClass.CREASE).sum() == 12
     assert len(creased.interior) == 6
-    assert with_crease_lines(plain, mesh.vertices, None) is plain
+    assert with_crease_lines(plain, mesh.vertices, normals_of(mesh), None) is plain
