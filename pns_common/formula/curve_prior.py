@@ -24,6 +24,7 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.arrays import Array, dot, gather, namespace, norm, scatter, unit
 from pns_common.connectivity.topology import EdgeClass, Topology, sharp_edge_count
 from pns_common.geometry.ring_sums import divided
+from pns_common.masks.stencils import CURVE_CENTRE, CURVE_NEIGHBOUR
 
 # f falls from 1 where a curve turns by 60 degrees to 0 at 90.
 BEND, CORNER = 1 / 2, 1.0
@@ -43,12 +44,14 @@ class Curves:
         movable: of all vertices those on exactly two such edges, and on no other that is sharp.
         edges: those that end at a movable vertex; what happens at others does not change them.
         rows: the numbers of the movable vertices.
-        a, b: from each of these to its two neighbours along the curve.
+        sides: of each of these its two neighbours along the curve.
+        a, b: from it to these.
     """
 
     movable: Bool[np.ndarray, " V"]
     edges: Int[np.ndarray, " M"]
     rows: Int[np.ndarray, " N"]
+    sides: Int[np.ndarray, "N 2"]
     a: Float[Array, "N 3"]
     b: Float[Array, "N 3"]
 
@@ -57,10 +60,11 @@ def find_curves(points: Float[Array, "V 3"], topology: Topology, kinds: Kinds) -
     """Return the curves of a level."""
     edges = np.flatnonzero(are_of(kinds, topology.edge_class))
     movable = _between_two(topology, topology.edges[edges])
-    edges, rows = edges[movable[topology.edges[edges]].any(axis=1)], np.flatnonzero(movable)
+    rows, first, second = np.flatnonzero(movable), *topology.edges[edges].T
+    edges = edges[movable[first] | movable[second]]
     sides, middle = _along(topology.edges[edges], movable), gather(points, rows)
     a, b = (gather(points, sides[:, side]) - middle for side in (0, 1))
-    return Curves(movable, edges, rows, a, b)
+    return Curves(movable, edges, rows, sides, a, b)
 
 
 def are_of(kinds: Kinds, edge_class: Int[np.ndarray, " E"]) -> Bool[np.ndarray, " E"]:
@@ -104,6 +108,12 @@ def curve_pushes(curves: Curves, gate_sharpness: float) -> Float[Array, "V 3"]:
     return scatter(pushes, curves.rows, len(curves.movable))
 
 
+def curve_mask(curves: Curves, values: Float[Array, "V K"]) -> Float[Array, "N K"]:
+    """Return what Loop's curve rule makes of vertices' values, at the movable ones."""
+    around = gather(values, curves.sides[:, 0]) + gather(values, curves.sides[:, 1])
+    return CURVE_CENTRE * gather(values, curves.rows) + CURVE_NEIGHBOUR * around
+
+
 def _between_two(topology: Topology, edges: Int[np.ndarray, "M 2"]) -> Bool[np.ndarray, " V"]:
     """Return the vertices on exactly two of some edges, and on no other edge that is sharp."""
     count = np.bincount(edges.reshape(-1), minlength=topology.vertex_count)
@@ -113,8 +123,10 @@ def _between_two(topology: Topology, edges: Int[np.ndarray, "M 2"]) -> Bool[np.n
 def _along(
     edges: Int[np.ndarray, "M 2"], movable: Bool[np.ndarray, " V"]
 ) -> Int[np.ndarray, "N 2"]:
-    """Return the two neighbours of movable vertices along the edges."""
+    """Return the two neighbours of movable vertices along the edges, the first edge's first."""
     ends, others = edges.reshape(-1), edges[:, ::-1].reshape(-1)
-    spokes = np.flatnonzero(movable[ends])
-    order = spokes[np.argsort(ends[spokes], kind="stable")]
-    return others[order].reshape(-1, 2)
+    sides = np.empty((len(movable), 2), dtype=edges.dtype)
+    # Of a vertex that is named twice the last one stays.
+    sides[ends[::-1], 0] = others[::-1]
+    sides[ends, 1] = others
+    return sides[movable]

@@ -6,21 +6,19 @@ edges: what it makes of them is what it makes of them in the whole mesh, bit for
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pns_common.base.arrays import gather
 from pns_common.connectivity.topology import Topology
+from pns_common.formula.correction import Correction, proximity_ratio
 from pns_common.formula.curve_prior import are_of, on_boundary
 from pns_common.fused.additions import Additions
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.rules.control_level import ControlLevel
 from pns_common.rules.curves import CurveRule
-from pns_common.rules.placement import Placement
-
-Move = Callable[[ControlLevel, Placement], Placement]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +46,8 @@ class SharpLevel:
         ends = mesh.edges[edges].astype(np.int64)
         at_sharp = np.zeros(len(points), dtype=bool)
         at_sharp[ends] = True
-        vertices = np.flatnonzero(at_sharp)
-        pairs = np.searchsorted(vertices, ends)
+        vertices, numbers = np.flatnonzero(at_sharp), np.cumsum(at_sharp) - 1
+        pairs = numbers[ends]
         no_faces, no_normals = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3))
         nothing = np.full((len(edges), 2), -1)
         topology = Topology(
@@ -83,13 +81,20 @@ class CurveMoves:
 
     def move_vertices(self, loop: Float[np.ndarray, "V 3"], added: Additions) -> None:
         """Add to curves' vertices, which Loop puts at ``loop``."""
-        if self.rule is not None and self.sharp is not None and len(self.pushes):
-            _move(self.rule.move_vertices, self.sharp.level, self.sharp.vertices, loop, added)
+        if self.rule is None or self.sharp is None or len(self.pushes) == 0:
+            return
+        curves = self.sharp.level.curves(self.rule.kinds)
+        rows = self.sharp.vertices[curves.rows]
+        _add(self.rule.at_vertices(self.sharp.level, gather(loop, rows)), rows, added)
+        if added.corrected is not None:
+            added.corrected[rows] = True
 
-    def move_edges(self, loop: Float[np.ndarray, "E 3"], added: Additions) -> None:
+    def move_edges(self, added: Additions) -> None:
         """Add to curves' edges likewise."""
-        if self.rule is not None and self.sharp is not None and len(self.pushes):
-            _move(self.rule.move_edges, self.sharp.level, self.sharp.edges, loop, added)
+        if self.rule is None or self.sharp is None or len(self.pushes) == 0:
+            return
+        curves = self.sharp.level.curves(self.rule.kinds)
+        _add(self.rule.at_edges(self.sharp.level), self.sharp.edges[curves.edges], added)
 
     def shared(self, vertex_count: int, edge_count: int) -> Bool[np.ndarray, " W"] | None:
         """Return what the fold guard takes for shared with other pieces; None where nothing is."""
@@ -126,21 +131,8 @@ def curves_of(
     return CurveMoves(rule, sharp, pushes, 0.0)
 
 
-def _move(
-    move: Move,
-    level: ControlLevel,
-    rows: Int[np.ndarray, " N"],
-    loop: Float[np.ndarray, "M 3"],
-    added: Additions,
-) -> None:
-    """Write what ``move`` makes of some rows."""
-    of_rows = added.rows(rows)
-    moved = move(level, Placement(loop[rows], **vars(of_rows)))
-    for into, values in (
-        (added.displacement, moved.displacement),
-        (added.ratio, moved.ratio),
-        (added.envelope, moved.envelope),
-        (added.corrected, moved.corrected),
-    ):
-        if into is not None and values is not None:
-            into[rows] = values
+def _add(made: Correction, rows: Int[np.ndarray, " N"], added: Additions) -> None:
+    """Write what is added at rows where nothing was; no 0 has a sign there."""
+    added.displacement[rows] = 0.0 + made.displacement
+    added.ratio[rows] = proximity_ratio(made)
+    added.envelope[rows] = made.envelope

@@ -92,7 +92,7 @@ def learned_points(
     # Not before: what the rules read has the most memory.
     loop = loop_points(level.points, mesh, blocks)
     curves.move_vertices(loop[:count], vertices)
-    curves.move_edges(loop[count:], edges)
+    curves.move_edges(edges)
     scale = None
     if scheme.guard is not None:
         shared = curves.shared(count, len(edges.ratio))

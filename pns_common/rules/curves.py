@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from pns_common.base.arrays import Array, dot, gather, namespace, norm, scatter
-from pns_common.formula.correction import Correction, proximity_ratio, shortened
+from pns_common.base.arrays import Array, dot, gather, namespace, norm
+from pns_common.formula.correction import Correction, shortened
 from pns_common.formula.curve_prior import (
     BOUNDARIES,
     BOUNDARIES_AND_CREASES,
     Kinds,
     across,
     curve_direction,
+    curve_mask,
 )
 from pns_common.formula.tips import CURVE_FURTHER, far_behind, kept_at_tips, left_behind
 from pns_common.geometry.rings import root
-from pns_common.masks.stencils import MIDPOINT, loop_vertex_vertices
+from pns_common.masks.stencils import MIDPOINT
 from pns_common.rules.control_level import ControlLevel
-from pns_common.rules.placement import Placement
+from pns_common.rules.placement import Placement, with_more
 from pns_common.rules.scale_free_form import ScaleFreeForm
 
 
@@ -44,55 +44,51 @@ class CurveRule:
         return self.form.boundary_strength * level.curve_pushes(self.gate_sharpness, self.kinds)
 
     def move_vertices(self, level: ControlLevel, placed: Placement) -> Placement:
-        """Move curves' vertices too: Loop's curve mask of the pushes, within ρ; less at tips."""
+        """Move curves' vertices too."""
         curves = level.curves(self.kinds)
-        rows, a, b = curves.rows, curves.a, curves.b
-        if len(rows) == 0:
+        if len(curves.rows) == 0:
             return placed
-        pushes = self.pushes(level)
-        wanted = gather(loop_vertex_vertices(pushes, level.topology), rows)
+        made = self.at_vertices(level, gather(placed.loop, curves.rows))
+        corrected = placed.corrected
+        corrected = curves.movable if corrected is None else corrected | curves.movable
+        return replace(with_more(placed, curves.rows, made), corrected=corrected)
+
+    def move_edges(self, level: ControlLevel, placed: Placement) -> Placement:
+        """Move curves' edges too."""
+        curves = level.curves(self.kinds)
+        if len(curves.rows) == 0:
+            return placed
+        return with_more(placed, curves.edges, self.at_edges(level))
+
+    def at_vertices(self, level: ControlLevel, loop: Float[Array, "N 3"]) -> Correction:
+        """Return what is added to the curves' vertices, which Loop puts at ``loop``.
+
+        Loop's curve mask of the pushes, within ρ; less at tips.
+        """
+        curves, pushes = level.curves(self.kinds), self.pushes(level)
+        rows, a, b = curves.rows, curves.a, curves.b
+        wanted = curve_mask(curves, pushes)
         square = (dot(a, a) + dot(b, b)) / 2
         if self.form.tip_strength:
-            moved = gather(placed.loop, rows) - gather(level.points, rows)
+            moved = loop - gather(level.points, rows)
             behind = left_behind(gather(pushes, rows), wanted, moved, CURVE_FURTHER)
             left = norm(across(behind, curve_direction(a, b)))[:, None]
             tip = far_behind(left, root(square[:, None]))
             wanted = kept_at_tips(wanted, moved, tip, self.form.tip_strength)
-        budget_per_length = level.budget_per_length(rows, self.form.budget)
-        changed = self._within(placed, rows, wanted, budget_per_length * square)
-        corrected = placed.corrected
-        corrected = curves.movable if corrected is None else corrected | curves.movable
-        return replace(changed, corrected=corrected)
+        return _within(wanted, level.budget_per_length(rows, self.form.budget) * square)
 
-    def move_edges(self, level: ControlLevel, placed: Placement) -> Placement:
-        """Move curves' edges too: the mean of the pushes at their ends, within ρ."""
-        curves = level.curves(self.kinds)
-        if len(curves.rows) == 0:
-            return placed
-        ends, pushes = level.topology.edges[curves.edges], self.pushes(level)
+    def at_edges(self, level: ControlLevel) -> Correction:
+        """Return what is added to the curves' edges: the mean of the pushes at their ends, in ρ."""
+        ends, pushes = level.topology.edges[level.curves(self.kinds).edges], self.pushes(level)
         wanted = MIDPOINT * (gather(pushes, ends[:, 0]) + gather(pushes, ends[:, 1]))
         edge = gather(level.points, ends[:, 1]) - gather(level.points, ends[:, 0])
         budget_per_length = level.budget_per_length(ends[:, 0], self.form.budget)
-        return self._within(placed, curves.edges, wanted, budget_per_length * dot(edge, edge))
+        return _within(wanted, budget_per_length * dot(edge, edge))
 
-    def _within(
-        self,
-        placed: Placement,
-        rows: Int[np.ndarray, " N"],
-        wanted: Float[Array, "N 3"],
-        envelope: Float[Array, " N"],
-    ) -> Placement:
-        """Add Π_ρ of what is wanted at rows where the placement had nothing; ρ is given."""
-        xp, count = namespace(wanted), placed.loop.shape[0]
-        moved = shortened(wanted, envelope)
-        nothing = xp.zeros_like(envelope)
-        made = Correction(moved, envelope, nothing, xp.zeros_like(nothing, dtype=xp.bool))
-        displacement, bound = placed.displacement, placed.envelope
-        assert displacement is not None  # a scale-free rule has placed them
-        assert bound is not None
-        return replace(
-            placed,
-            displacement=displacement + scatter(moved, rows, count),
-            ratio=placed.ratio + scatter(proximity_ratio(made), rows, count),
-            envelope=bound + scatter(envelope, rows, count),
-        )
+
+def _within(wanted: Float[Array, "N 3"], envelope: Float[Array, " N"]) -> Correction:
+    """Return Π_ρ of what is wanted, ρ given; curves have no gate."""
+    xp = namespace(wanted)
+    nothing = xp.zeros_like(envelope)
+    degenerate = xp.zeros_like(nothing, dtype=xp.bool)
+    return Correction(shortened(wanted, envelope), envelope, nothing, degenerate)

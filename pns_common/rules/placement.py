@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -105,6 +105,19 @@ def with_correction(
         gate=scatter(correction.gate, rows, count),
         degenerate=scatter(correction.degenerate, rows, count),
         envelope=scatter(correction.envelope, rows, count),
+    )
+
+
+def with_more(base: Placement, rows: Int[np.ndarray, " N"], more: Correction) -> Placement:
+    """Add a correction at rows where a placement added nothing yet."""
+    count, displacement, bound = base.loop.shape[0], base.displacement, base.envelope
+    assert displacement is not None  # a rule has placed them
+    assert bound is not None
+    return replace(
+        base,
+        displacement=displacement + scatter(more.displacement, rows, count),
+        ratio=base.ratio + scatter(proximity_ratio(more), rows, count),
+        envelope=bound + scatter(more.envelope, rows, count),
     )
 
 

@@ -12,10 +12,12 @@ from pns_common.connectivity.topology import build_topology
 from pns_common.formula.curve_prior import (
     BOUNDARIES,
     BOUNDARIES_AND_CREASES,
+    curve_mask,
     curve_pushes,
     find_curves,
 )
 from pns_common.masks.limit import limit_positions
+from pns_common.masks.stencils import loop_vertex_vertices
 from tests.support.meshes import bent, grid, manifolds, soups
 from tests.support.networks import scale_free_model
 from tests.support.prior_step import prior_step
@@ -50,6 +52,18 @@ def test_two_pieces_with_a_common_boundary_meet_again(seed):
         )
     assert len(rims[0]) == 48
     np.testing.assert_array_equal(rims[0], rims[1])
+
+
+@given(manifolds() | soups(), st.integers(0, 99))
+def test_the_curve_mask_is_what_loops_rule_makes_of_movable_vertices(mesh, seed):
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    curves = find_curves(mesh.vertices, topology, BOUNDARIES)
+    values = np.random.default_rng(seed).standard_normal((len(mesh.vertices), 3))
+    expected = loop_vertex_vertices(values, topology)[curves.rows]
+    np.testing.assert_array_equal(curve_mask(curves, values), expected)
+    np.testing.assert_array_equal(
+        mesh.vertices[curves.sides[:, 0]] - mesh.vertices[curves.rows], curves.a
+    )
 
 
 def test_straight_boundaries_and_right_angles_stay():
