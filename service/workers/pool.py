@@ -23,8 +23,10 @@ T = TypeVar("T")
 RESTART_SECONDS = 1.0
 # A warm-up imports and loads; a short limit on jobs must not keep every worker from starting.
 WARM_UP_SECONDS = 120.0
-# How long a worker may take to end a job by itself, when it is asked to, before it is killed.
-GRACE_SECONDS = 0.5
+# How long a worker may take to end a job by itself, when it is asked to, before it is killed. A
+# fresh one takes as long to warm up: to kill it earlier would only let those who leave end workers
+# faster than they start, with bodies that take long to decode.
+GRACE_SECONDS = 2.0
 # How long a worker that has died may go unnoticed while none is asked for.
 WATCH_SECONDS = 1.0
 

@@ -176,6 +176,22 @@ def test_a_job_that_looks_ends_itself_and_its_worker_lives_on(tmp_path: Path) ->
     run(scenario)
 
 
+def test_a_job_that_looks_within_a_second_ends_no_worker(tmp_path: Path) -> None:
+    """A large document is decoded in one call, and who sends such ones and leaves costs no more."""
+
+    async def scenario() -> None:
+        async with workers() as pool:
+            first = await pool.run(jobs.pid)
+            later = partial(asyncio.get_running_loop().call_later, 1.0, (tmp_path / "go").touch)
+            job = asyncio.create_task(pool.run(jobs.wait_between, tmp_path, stop=later))
+            await until((tmp_path / "begun").exists)
+            job.cancel()
+            assert await pool.run(jobs.pid) == first
+            assert pool.restarts == {}
+
+    run(scenario)
+
+
 def test_a_job_that_does_not_look_is_killed(tmp_path: Path) -> None:
     async def scenario() -> None:
         async with workers() as pool:
