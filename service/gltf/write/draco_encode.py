@@ -26,6 +26,14 @@ _NAMED = {_POSITION: "POSITION", _NORMAL: "NORMAL", _TEXCOORD: "TEXCOORD_0"}
 _FIRST_GENERIC = 1
 _TYPES = tuple(np.dtype(kind) for kind in ("f4", "u1", "u2", "u4"))
 
+# Draco hands its grid on as text of six decimals. Where cells are not wide beside that, the grid
+# has such numbers itself: a position outside of it would turn the normals that are predicted from
+# positions, or end the encoding.
+_TEXT_STEP = 1e-6
+_WIDE_CELL = 2 * _TEXT_STEP
+# A mesh that is smaller would be rounded by far more than its bits allow.
+_LEAST_SIZE = 10 * _TEXT_STEP
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
@@ -33,6 +41,11 @@ class Grid:
 
     origin: Float[np.ndarray, " 3"]
     size: float
+
+    @property
+    def cell(self) -> float:
+        """The distance of neighbouring positions along an axis."""
+        return self.size / (2**POSITION_BITS - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +64,19 @@ class Encoded:
     faces: Int[np.ndarray, "F 3"]
 
 
-def grid_of(positions: list[Float[np.ndarray, "N 3"]]) -> Grid:
-    """Return the smallest grid over all positions of a mesh."""
+def grid_of(positions: list[Float[np.ndarray, "N 3"]]) -> Grid | None:
+    """Return the smallest grid over all positions of a mesh; None where Draco cannot tell it."""
     lows, highs = zip(*(extent(points) for points in positions), strict=True)
     low, high = np.min(lows, axis=0), np.max(highs, axis=0)
     size = float((high.astype(np.float64) - low).max())
-    return Grid(low, size if size > 0 else 1.0)
+    grid = Grid(low, size if size > 0 else 1.0)
+    if grid.cell >= _WIDE_CELL:
+        return grid
+    if grid.size < _LEAST_SIZE:
+        return None
+    origin = (np.floor(low.astype(np.float64) / _TEXT_STEP - 1) * _TEXT_STEP).astype(np.float32)
+    steps = np.ceil((high.astype(np.float64) - origin).max() / _TEXT_STEP + 1)
+    return Grid(origin, float(steps * _TEXT_STEP))
 
 
 def can_encode(attributes: dict[str, Shaped[np.ndarray, "N K"]]) -> bool:

@@ -81,18 +81,61 @@ def test_draco_rounds_no_more_than_it_says():
     shape = box()
     packed = refine(files.glb([shape]), "draco", levels=1)
     plain = refine(files.glb([shape]), levels=1)
-    tree, binary = files.unpack(packed.glb)
+    stored = decoded(packed)
+    _, attributes = files.primitive_of(plain.glb)
+    extent = np.ptp(attributes["POSITION"], axis=0).max()
+    nearest = np.abs(stored["POSITION"][:, None] - attributes["POSITION"]).max(axis=2).min(axis=1)
+    assert nearest.max() <= 0.51 * extent / (2**POSITION_BITS - 1)
+    lengths = np.linalg.norm(stored["NORMAL"], axis=1)
+    np.testing.assert_allclose(lengths, 1, atol=2.0**-NORMAL_BITS)
+
+
+def ball(size, origin=0.0):
+    """An octahedron with the normals of the sphere around it."""
+    shape = octahedron()
+    return shape | {"POSITION": origin + size * shape["POSITION"], "NORMAL": shape["POSITION"]}
+
+
+def decoded(result):
+    """The values of each attribute of the first primitive, by Draco's own library."""
+    tree, binary = files.unpack(result.glb)
     extension = tree["meshes"][0]["primitives"][0]["extensions"][NAMES["draco"]]
     view = tree["bufferViews"][extension["bufferView"]]
     mesh = DracoPy.decode(bytes(binary[view["byteOffset"] :][: view["byteLength"]]))
     parts = {part["unique_id"]: part["data"] for part in mesh.attributes}
-    _, attributes = files.primitive_of(plain.glb)
-    extent = np.ptp(attributes["POSITION"], axis=0).max()
-    stored = parts[extension["attributes"]["POSITION"]]
-    nearest = np.abs(stored[:, None] - attributes["POSITION"]).max(axis=2).min(axis=1)
-    assert nearest.max() <= 0.51 * extent / (2**POSITION_BITS - 1)
-    lengths = np.linalg.norm(parts[extension["attributes"]["NORMAL"]], axis=1)
-    np.testing.assert_allclose(lengths, 1, atol=2.0**-NORMAL_BITS)
+    return {name: parts[number] for name, number in extension["attributes"].items()}
+
+
+@pytest.mark.parametrize("origin", [0.0, 5.4321, 987.6])
+def test_small_meshes_keep_positions_and_normals_under_draco(origin):
+    # Draco hands on its grid as text of six decimals: beside a part of millimetres in metres that
+    # is coarse.
+    for size in np.geomspace(2e-5, 1.0, 30) if origin == 0 else np.geomspace(0.01, 1.0, 10):
+        data = files.glb([ball(size, origin)])
+        plain, stored = (
+            files.primitive_of(refine(data).glb)[1],
+            decoded(refine(data, "draco")),
+        )
+        distance = np.abs(stored["POSITION"][:, None] - plain["POSITION"]).max(axis=2)
+        nearest = distance.argmin(axis=1)
+        extent = np.ptp(plain["POSITION"], axis=0).max()
+        limit = 0.51 * (extent + 4e-6) / (2**POSITION_BITS - 1) + np.spacing(np.float32(origin))
+        assert distance.min(axis=1).max() <= limit
+        np.testing.assert_allclose(
+            stored["NORMAL"], plain["NORMAL"][nearest], atol=4 * 2.0**-NORMAL_BITS
+        )
+
+
+def test_meshes_too_small_for_dracos_grid_stay_uncompressed():
+    data = files.glb([ball(1e-8)])
+    packed = refine(data, "draco")
+    faces, attributes = files.primitive_of(packed.glb)
+    wanted_faces, wanted = files.primitive_of(refine(data).glb)
+    np.testing.assert_array_equal(faces, wanted_faces)
+    for name, values in wanted.items():
+        np.testing.assert_array_equal(attributes[name], values)
+    whats = [change["what"] for change in packed.report["changes"]]
+    assert whats == ["not compressed: Draco cannot hold it"]
 
 
 def test_seams_between_primitives_do_not_open_on_dracos_grid():
