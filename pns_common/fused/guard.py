@@ -35,11 +35,12 @@ def guard_scale(
     for rounds in count():
         around = loop, displacement, scale, is_shared, math.cos(guard.angle)
         changed = _touched(around, mesh, changed, blocks)
-        if not changed.any():
+        rows = np.flatnonzero(changed)
+        if len(rows) == 0:
             break
         if not len(scale):
             scale = np.ones(len(loop))
-        scale[changed] = scale[changed] / 2 if rounds < ROUNDS else 0.0
+        scale[rows] = scale[rows] / 2 if rounds < ROUNDS else 0.0
     return scale if len(scale) else None
 
 

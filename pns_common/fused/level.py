@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pns_common.base.arrays import norm
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.creases import Creases, crease_classes, crease_halves
 from pns_common.connectivity.topology import EdgeClass, Topology
@@ -17,10 +18,10 @@ from pns_common.fused.child_faces import look_at_children
 from pns_common.fused.crease_lines import crease_line_rows
 from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.fans import multi_fan_vertices
-from pns_common.fused.loop_points import largest_size, loop_points
+from pns_common.fused.loop_points import largest_size, loop_points, place_vertices
 from pns_common.fused.mesh_edges import MeshEdges, build_edges, in_int32, split_mesh_edges
 from pns_common.levels.diagnostics import Displacements, LevelReport, edge_counts
-from pns_common.masks.crease_shift import CreaseShift, crease_shift
+from pns_common.masks.crease_shift import CreaseShift, shift_of_edges
 from pns_common.mesh import LARGEST_COORDINATE
 
 # Far more than the sums of Loop's masks are wrong by.
@@ -164,11 +165,23 @@ def crease_shift_of(
 
     None without creases: it keeps the level's points only where there are some.
     """
-    mesh, rows = level.mesh, crease_rows(level.mesh)
+    points, mesh, blocks = level.points, level.mesh, level.blocks.unheard()
+    rows = crease_rows(mesh)
     if len(rows) == 0:
         return lambda placed: None
-    connectivity = mesh.faces, mesh.edges, mesh.half_edges, mesh.edge_class
-    return partial(crease_shift, level.points, *connectivity, rows)
+
+    def shift(placed: Float[np.ndarray, "W 3"]) -> CreaseShift:
+        smooth = np.empty_like(points)
+        place_vertices(points, _without_creases(mesh), blocks, smooth)
+        at_creases = np.zeros(len(points), dtype=bool)
+        at_creases[mesh.edges[rows].reshape(-1)] = True
+        vertices = np.flatnonzero(at_creases)
+        of_vertices = norm(np.take(placed, vertices, axis=0) - np.take(smooth, vertices, axis=0))
+        connectivity = mesh.faces, mesh.edges, mesh.half_edges
+        of_edges = shift_of_edges(points, *connectivity, rows, placed)
+        return CreaseShift(vertices, of_vertices, rows, of_edges)
+
+    return shift
 
 
 def crease_rows(mesh: MeshEdges) -> Int[np.ndarray, " N"]:

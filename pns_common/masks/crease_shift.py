@@ -58,14 +58,9 @@ def crease_shift(
     """
     if len(rows) == 0:
         return None
-    ends = edges[rows]
-    # The vertex of a triangle that is on neither end: all three less those two.
-    three = faces[half_edges[rows] // 3].sum(axis=2, dtype=np.int64)
-    across = three - ends.sum(axis=1, dtype=np.int64)[:, None]
-    a, b, c, d = (np.take(points, column, axis=0) for column in (*ends.T, *across.T))
-    middle = norm(placed[len(points) + rows] - loop_edge_point(a, b, c, d))
+    middle = shift_of_edges(points, faces, edges, half_edges, rows, placed)
     at_creases = np.zeros(len(points), dtype=bool)
-    at_creases[ends.reshape(-1)] = True
+    at_creases[edges[rows].reshape(-1)] = True
     around = np.flatnonzero(at_creases[edges[:, 0]] | at_creases[edges[:, 1]])
     classes = edge_class[around]
     smooth_class = np.where(classes == CREASE, INTERIOR, classes)
@@ -73,6 +68,23 @@ def crease_shift(
     known = at_creases[near]
     vertices, smooth = near[known], loop_vertex_vertices(points[near], plain)[known]
     return CreaseShift(vertices, norm(placed[vertices] - smooth), rows, middle)
+
+
+def shift_of_edges(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    edges: Int[np.ndarray, "E 2"],
+    half_edges: Int[np.ndarray, "E 2"],
+    rows: Int[np.ndarray, " N"],
+    placed: Float[np.ndarray, "W 3"],
+) -> Float[np.ndarray, " N"]:
+    """Return how far from Loop's smooth rule the vertices of some edges between two faces lie."""
+    ends = edges[rows]
+    # The vertex of a triangle that is on neither end: all three less those two.
+    three = faces[half_edges[rows] // 3].sum(axis=2, dtype=np.int64)
+    across = three - ends.sum(axis=1, dtype=np.int64)[:, None]
+    a, b, c, d = (np.take(points, column, axis=0) for column in (*ends.T, *across.T))
+    return norm(placed[len(points) + rows] - loop_edge_point(a, b, c, d))
 
 
 def limit_crease_shift(

@@ -79,6 +79,15 @@ def _stays(a, b, c, clear):
     return (new[3] >= LEAST_AREA**2 * old[3]) & clearly_less(old, new, clear)
 
 
+def _any_changed(changed, faces, face_edges, middles, first, count):
+    """Return whether a corner of the children of some faces is marked."""
+    found = False
+    for f in range(first, first + count):
+        for k in range(3):
+            found |= changed[faces[f, k]] | changed[middles + face_edges[f, k]]
+    return found
+
+
 def _difference(p, q):
     return q[0] - p[0], q[1] - p[1], q[2] - p[2]
 
@@ -130,6 +139,8 @@ def find_folds(
     moves, middles = (loop, displacement, scale), natural(vertex_count)
     for first in range(natural(begin), end, TOGETHER):
         count, doubtful = min(TOGETHER, end - first), 0
+        if len(changed) and not _any_changed(changed, faces, face_edges, middles, first, count):
+            continue
         for lane in range(count):
             f = first + lane
             _hold(held, 0, lane, _corner(*moves, faces[f, 0]))

@@ -62,6 +62,19 @@ def test_corners_of_folded_children_are_marked(way, size):
 
 
 @pytest.mark.parametrize("way", WAYS)
+def test_the_children_of_whoever_changed_are_looked_at_again(way):
+    displacement = 50 * np.random.default_rng(2).standard_normal(LOOP.shape)
+    bad, unscaled = folded(LOOP + displacement), np.zeros(0)
+    for vertex in range(len(LOOP)):
+        changed = np.arange(len(LOOP)) == vertex
+        expected = np.zeros(len(LOOP), dtype=bool)
+        expected[CHILDREN[bad & changed[CHILDREN].any(axis=1)]] = True
+        np.testing.assert_array_equal(touched(way, displacement, unscaled, changed), expected)
+    nobody = np.zeros(len(LOOP), dtype=bool)
+    assert not touched(way, displacement, unscaled, nobody).any()
+
+
+@pytest.mark.parametrize("way", WAYS)
 def test_a_child_that_all_but_vanishes_is_folded(way):
     centre = LOOP[CHILDREN[3]].mean(axis=0)
     displacement = np.zeros_like(LOOP)
