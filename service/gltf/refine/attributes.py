@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,10 @@ from ..read.schema import Accessor
 from .normals import safe_unit
 from .skin_and_morph import SkinAndMorph
 from .skins import skin_attributes
+
+# EXT_mesh_features and batched 3D tiles number features, as floats where 16 bits do not suffice:
+# no accessor of vertices may hold wider integers.
+_IDENTIFIER = re.compile(r"_?FEATURE_ID_[0-9]+|_BATCHID")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +90,8 @@ def blend(
 ) -> Shaped[np.ndarray, "N K"]:
     """Blend linearly: fractions, floats, colours; identifiers, which have no mean, by nearness."""
     fraction = accessor.normalized or name.startswith("COLOR_")
-    if corners.dtype.kind != "f" and not fraction:
+    whole = corners.dtype.kind != "f" and not fraction
+    if whole or _IDENTIFIER.fullmatch(name):
         return connectivity.nearest(corners)
     return in_type_of(corners, connectivity.linear(corners))
 

@@ -161,7 +161,7 @@ def test_float_colours_and_custom_attributes_are_linear():
         np.testing.assert_allclose(centre_children, middle, atol=1e-6)
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int8, np.int16, np.uint32])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int8, np.int16, np.uint32, np.float32])
 def test_identifiers_are_copied_from_a_nearest_corner(dtype):
     ids = np.arange(10, 16).astype(dtype)[:, None]
     # Beside three bytes of padding, which must not leak into the values.
@@ -171,6 +171,17 @@ def test_identifiers_are_copied_from_a_nearest_corner(dtype):
     corner = refined[faces[:, 0]].reshape(-1, 4)[:, :3]
     np.testing.assert_array_equal(corner, ids[octahedron()["indices"], 0])
     assert set(refined[:, 0].tolist()) == set(range(10, 16))
+
+
+@pytest.mark.parametrize("levels", [1, 3])
+def test_floats_that_number_features_are_copied_too(levels):
+    # No accessor of vertices holds integers of 32 bits: these are exact up to 2**24.
+    ids = 2.0**24 - 7 * np.arange(6)[:, None]
+    shape = octahedron(_FEATURE_ID_12=ids, _BATCHID=ids, _HEAT=ids - ids.mean())
+    _, attributes = files.primitive_of(subdivide([shape], levels=levels).glb)
+    for name in ("_FEATURE_ID_12", "_BATCHID"):
+        assert set(attributes[name][:, 0].tolist()) == set(ids[:, 0].tolist())
+    assert len(np.unique(attributes["_HEAT"])) > 6
 
 
 def test_a_seam_in_any_attribute_splits_vertices_and_not_the_surface():
