@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 from ....errors import GltfError, UnsupportedFeature
 from ...constants import FLOAT, UNSIGNED_BYTE, UNSIGNED_SHORT
@@ -11,8 +12,10 @@ from ..modes import SURFACES
 from ..quantization import allowed, is_dequantised
 from ..schema import Accessor, Document, Primitive
 
-# Extensions of primitives that name vertices by number: refined vertices have other numbers.
-_BY_VERTEX = ("CESIUM_primitive_outline",)
+# Extensions of primitives that name vertices or faces by number: refined ones have other numbers.
+_BY_NUMBER = ("CESIUM_primitive_outline", "EXT_mesh_primitive_edge_visibility")
+# This one does so where a set of feature ids has no source: the vertices' numbers are the ids.
+_FEATURES, _SOURCES = "EXT_mesh_features", {"attribute", "texture"}
 # No zeros in front, no digits of other scripts: two names of one number would be two attributes.
 _SKIN_SET = re.compile(r"(JOINTS|WEIGHTS)_(0|[1-9][0-9]{0,2})")
 _SKIN_NAMES = ("JOINTS_", "WEIGHTS_")
@@ -44,7 +47,7 @@ def refuse_features(document: Document) -> None:
 
     Raises:
         UnsupportedFeature: no POSITION, weights of several types, or an extension that names
-            vertices by number.
+            vertices or faces by number.
         GltfError: an attribute of a type that glTF does not allow.
     """
     for number, mesh in enumerate(document.meshes):
@@ -54,9 +57,10 @@ def refuse_features(document: Document) -> None:
 
 
 def _refuse_primitive(document: Document, primitive: Primitive, pointer: str) -> None:
-    for name in _BY_VERTEX:
+    for name in _BY_NUMBER:
         if name in primitive.extensions:
             raise UnsupportedFeature(name, pointer=f"{pointer}/extensions/{name}")
+    _refuse_numbered_features(primitive.extensions.get(_FEATURES), f"{pointer}/extensions")
     if "POSITION" not in primitive.attributes:
         raise UnsupportedFeature("a primitive without POSITION", pointer=f"{pointer}/attributes")
     for name, index in primitive.attributes.items():
@@ -85,6 +89,16 @@ def _refuse_primitive(document: Document, primitive: Primitive, pointer: str) ->
     for target in primitive.targets:
         for name, index in target.items():
             _refuse_type(name, document.accessors[index], _DELTAS, f"/accessors/{index}")
+
+
+def _refuse_numbered_features(features: Any, pointer: str) -> None:
+    sets = features.get("featureIds") if isinstance(features, dict) else None
+    for place, entry in enumerate(sets if isinstance(sets, list) else []):
+        if isinstance(entry, dict) and _SOURCES.isdisjoint(entry):
+            raise UnsupportedFeature(
+                f"{_FEATURES} by the numbers of vertices",
+                pointer=f"{pointer}/{_FEATURES}/featureIds/{place}",
+            )
 
 
 def _refuse_type(name: str, accessor: Accessor, types: dict[str, str], pointer: str) -> None:

@@ -188,6 +188,16 @@ UNSUPPORTED = [
         {"CESIUM_primitive_outline": {"indices": 4}},
         "CESIUM_primitive_outline",
     ),
+    (
+        "/meshes/0/primitives/0/extensions",
+        {"EXT_mesh_primitive_edge_visibility": {"visibility": 4}},
+        "EXT_mesh_primitive_edge_visibility",
+    ),
+    (
+        "/meshes/0/primitives/0/extensions",
+        {"EXT_mesh_features": {"featureIds": [{"featureCount": 24}]}},
+        "EXT_mesh_features by the numbers of vertices",
+    ),
 ]
 
 
@@ -198,6 +208,14 @@ def test_what_cannot_be_refined_yet_is_refused_by_name(path, value, feature):
     assert refusal.value.feature == feature
     assert refusal.value.pointer.startswith(path)
     assert (refusal.value.status, refusal.value.code) == (422, "unsupported-feature")
+
+
+def test_features_that_do_not_go_by_the_numbers_of_vertices_are_taken():
+    sets = [{"featureCount": 3, "attribute": 0}, {"featureCount": 3, "texture": {"index": 0}}]
+    extensions = {"EXT_mesh_features": {"featureIds": sets}}
+    result = refine(edited(put("/meshes/0/primitives/0/extensions", extensions)))
+    tree, _ = files.unpack(result.glb)
+    assert tree["meshes"][0]["primitives"][0]["extensions"] == extensions
 
 
 JOINTS, SHARES = np.zeros((24, 4), dtype=np.uint8), np.full((24, 4), 0.25)
