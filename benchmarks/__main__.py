@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.contest import OURS, Case, contest, ours
+from benchmarks.generated import ORDERS
 from benchmarks.peers.available import available_peers
 from benchmarks.plot import plot_results
 from pns_common.base.whole_file import replace_file
@@ -26,7 +27,7 @@ HERE = Path(__file__).parent
 RESULTS, PICTURE = HERE / "results.json", HERE / "speed.png"
 CASES = (
     *(Case("closed", faces) for faces in (5_000, 20_000, 80_000)),
-    *(Case(order, 320_000) for order in ("closed", "open", "shuffled")),
+    *(Case(order, 320_000) for order in ORDERS),
     *(Case(order, 20_000, levels=3) for order in ("closed", "open", "shuffled")),
     *(Case(order, 1_300_000) for order in ("closed", "open", "shuffled")),
 )

@@ -50,16 +50,55 @@ def _torus_size(faces: int) -> tuple[int, int]:
     return columns, max(3, round(faces / 2 / columns))
 
 
-def patch(faces: int) -> Mesh:
-    """Make an open patch over [−1, 1]² with ridges, of about so many faces."""
+def patch(faces: int, bent: float = 1.0) -> Mesh:
+    """Make an open patch over [−1, 1]² with ridges, of about so many faces.
+
+    A share of it is ``bent``; the rest lies in one plane.
+    """
     n = round((faces / 2) ** 0.5) + 1
     x, y = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
     z = 0.2 * np.exp(-30 * (x + 0.3 * np.sin(2 * y)) ** 2) + 0.05 * np.sin(5 * y)
+    if bent < 1:
+        z = z * np.clip(10 * (2 * bent - 1 - x), 0, 1)
     i, j = np.meshgrid(np.arange(n - 1), np.arange(n - 1), indexing="ij")
     v = i * n + j
     pairs = [np.stack([v, v + n, v + n + 1], axis=-1), np.stack([v, v + n + 1, v + 1], axis=-1)]
     triangles = np.stack(pairs, axis=-2).reshape(-1, 3)
     return Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), triangles)
+
+
+def parts(faces: int) -> Mesh:
+    """Make boxes of about 768 faces each whose sides are waves, of about so many faces in all.
+
+    An edge in twelve lies on a crease line.
+    """
+    box = _wavy_box(8)
+    count = max(1, round(faces / len(box.faces)))
+    number = np.arange(count)
+    places = 3.0 * np.stack([number % 20, number // 20, 0 * number], axis=1)
+    points = (box.vertices + places[:, None]).reshape(-1, 3)
+    triangles = box.faces + len(box.vertices) * number[:, None, None]
+    return Mesh(points, triangles.reshape(-1, 3))
+
+
+def _wavy_box(cells: int) -> Mesh:
+    """Make the surface of [−1, 1]³ as so many quads a side, cut in two, and bend it."""
+    u, v = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
+    i, j = np.meshgrid(np.arange(cells), np.arange(cells), indexing="ij")
+    here = i * (cells + 1) + j
+    quads = np.stack([here, here + cells + 1, here + cells + 2, here + 1], axis=-1).reshape(-1, 4)
+    side = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    corners, triangles = [], []
+    for axis in range(3):
+        for at in (0, cells):
+            place = np.empty((cells + 1, cells + 1, 3), dtype=np.int64)
+            place[..., axis], place[..., axis - 2], place[..., axis - 1] = at, u, v
+            triangles.append((side if at else side[:, ::-1]) + len(corners) * (cells + 1) ** 2)
+            corners.append(place.reshape(-1, 3))
+    lattice, number = np.unique(np.concatenate(corners), axis=0, return_inverse=True)
+    flat = 2 * lattice / cells - 1
+    waves = 0.02 * np.sin(7 * flat[:, [1, 2, 0]]) * np.cos(5 * flat[:, [2, 0, 1]])
+    return Mesh(flat * (1 + waves), number.reshape(-1)[np.concatenate(triangles)])
 
 
 def shuffled(mesh: Mesh, seed: int = 0) -> Mesh:
@@ -75,4 +114,6 @@ ORDERS = {
     "closed": torus,
     "open": patch,
     "shuffled": lambda faces: shuffled(torus(faces)),
+    "a third bent": lambda faces: patch(faces, 1 / 3),
+    "parts": parts,
 }

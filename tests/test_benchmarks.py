@@ -11,16 +11,25 @@ from benchmarks.answers import upload
 from benchmarks.contest import ROOT, Case, as_installed, contest, ours
 from benchmarks.generated import ORDERS, unrolled_torus
 from benchmarks.peers.protocol import read_mesh, write_mesh
+from pns_common import load_model, pns, refine
 from pns_common.connectivity.topology import EdgeClass, build_topology
 
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_generated_meshes_are_manifold_and_about_as_large_as_asked(order):
-    mesh = ORDERS[order](2000)
+    mesh = ORDERS[order](4000)
     classes = np.bincount(build_topology(mesh.faces, len(mesh.vertices)).edge_class, minlength=4)
-    assert abs(len(mesh.faces) - 2000) < 200
+    assert abs(len(mesh.faces) - 4000) < 200
     assert classes[EdgeClass.IRREGULAR] == 0
-    assert (classes[EdgeClass.BOUNDARY] > 0) == (order == "open")
+    assert (classes[EdgeClass.BOUNDARY] > 0) == (order in ("open", "a third bent"))
+
+
+def test_a_third_of_the_bent_patch_has_open_gates_and_a_part_has_crease_lines():
+    scheme = pns(load_model())
+    bent, sharp = (refine(ORDERS[o](4000), scheme, 1) for o in ("a third bent", "parts"))
+    assert bent.report["levels"][0]["gate"]["active"] == pytest.approx(1 / 3, abs=0.03)
+    edges = sharp.report["levels"][0]["edges"]
+    assert edges["crease"] * 12 == edges["interior"] + edges["crease"]
 
 
 def test_an_unrolled_torus_is_the_torus_cut_open():
