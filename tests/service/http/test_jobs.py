@@ -182,23 +182,21 @@ def test_a_disconnect_does_not_lose_a_job(tmp_path: Path) -> None:
 
 def test_who_leaves_before_a_job_stands_in_line_leaves_nothing(tmp_path: Path) -> None:
     """Nobody was told its id; and those that wait to be measured take no slot."""
-    with served(workers=1, measure=measure_in_the_end) as where, opened(where) as client:
-        client.post("/subdivide", content=b"echo", headers=GLB)
-        before = descriptors()
-        body = f"measured {tmp_path}"
-        head = f"POST /jobs HTTP/1.1\r\nHost: test\r\nContent-Type: {GLB['Content-Type']}\r\n"
-        request = f"{head}Content-Length: {len(body)}\r\n\r\n{body}".encode()
+    results, told = tmp_path / "results", tmp_path / "told"
+    results.mkdir()
+    told.mkdir()
+    body = f"measured {told}"
+    head = f"POST /jobs HTTP/1.1\r\nHost: test\r\nContent-Type: {GLB['Content-Type']}\r\n"
+    request = f"{head}Content-Length: {len(body)}\r\n\r\n{body}".encode()
+    with served(workers=1, measure=measure_in_the_end, result_folder=results) as where:
         clients = [socket.create_connection(where) for _ in range(3)]
-        # Two are measured, and the third waits; each has its files, and the page a second time.
-        for number, leaving in enumerate(clients, start=1):
-            leaving.sendall(request)
-            until(lambda held=before + 5 * number: descriptors() == held)
-        until(lambda: len(list(tmp_path.glob("began-*"))) == 2)
-        clients[2].close()
-        until(lambda: descriptors() == before + 10)
-        for leaving in clients:
-            leaving.close()
-        until(lambda: descriptors() == before)
+        # Two are measured, and the third waits; each has an answer and a report.
+        for client in clients:
+            client.sendall(request)
+        until(lambda: len(list(told.glob("began-*"))) == 2 and len(kept_in(results)) == 6)
+        for client in clients:
+            client.close()
+        until(lambda: kept_in(results) == [])
 
 
 def test_unknown_ids_are_404(client: httpx2.Client) -> None:
@@ -244,10 +242,7 @@ def test_results_lie_on_disk_without_a_name(tmp_path: Path) -> None:
     with served(workers=1, result_folder=tmp_path) as where, opened(where) as client:
         job = started(client, b"large 100000")
         assert ended(client, job)["state"] == "done"
-        mine = [
-            str(link.readlink()) for link in Path("/proc/self/fd").iterdir() if link.is_symlink()
-        ]
-        kept = [path for path in mine if path.startswith(str(tmp_path))]
+        kept = kept_in(tmp_path)
         assert len(kept) == 2
         assert all(path.endswith("(deleted)") for path in kept)
         assert list(tmp_path.iterdir()) == []
@@ -344,6 +339,12 @@ def descriptors() -> int:
     """How many memory files and deleted files this process holds."""
     kept = [link.readlink() for link in Path("/proc/self/fd").iterdir() if link.is_symlink()]
     return sum("(deleted)" in str(path) for path in kept)
+
+
+def kept_in(folder: Path) -> list[str]:
+    """The files of a folder that this process holds."""
+    kept = [str(link.readlink()) for link in Path("/proc/self/fd").iterdir() if link.is_symlink()]
+    return [path for path in kept if path.startswith(str(folder))]
 
 
 def test_a_client_over_its_budget_of_faces_is_429() -> None:
