@@ -60,12 +60,16 @@ class Admission:
                 yield
 
     @asynccontextmanager
-    async def answering(self, size: int) -> AsyncIterator[None]:
+    async def answering(self, client: str, size: int) -> AsyncIterator[None]:
         """Hold an answer of so many bytes while a client takes it.
 
-        Where memory runs short, whoever has had the longest is cut off. Raises CutOffError.
+        Where memory runs short, the client whose answers hold the most loses its oldest.
+
+        Raises:
+            CutOffError: it was this one.
+            BusyError: nobody who takes an answer holds as much as this client would.
         """
-        async with self._answers.held(size):
+        async with self._answers.held(client, size):
             yield
 
     @contextmanager
@@ -106,34 +110,44 @@ class CutOffError(Exception):
 
 
 class _Answers:
-    """The answers that are being taken, the oldest first."""
+    """The answers that are being taken, the oldest first: whose, and of how many bytes."""
 
     def __init__(self, max_bytes: int) -> None:
         self._max_bytes = max_bytes
-        self._sizes: dict[asyncio.Timeout, int] = {}
+        self._taken: dict[asyncio.Timeout, tuple[str, int]] = {}
 
     @asynccontextmanager
-    async def held(self, size: int) -> AsyncIterator[None]:
-        self._make_room(size)
+    async def held(self, client: str, size: int) -> AsyncIterator[None]:
+        self._make_room(client, size)
         end = asyncio.timeout(None)
         try:
             async with end:
-                self._sizes[end] = size
+                self._taken[end] = client, size
                 try:
                     yield
                 finally:
-                    self._sizes.pop(end, None)
+                    self._taken.pop(end, None)
         except TimeoutError as error:
             if not end.expired():
                 raise
             raise CutOffError from error
 
-    def _make_room(self, size: int) -> None:
-        now = asyncio.get_running_loop().time()
-        while self._sizes and sum(self._sizes.values()) + size > self._max_bytes:
-            oldest = next(iter(self._sizes))
-            oldest.reschedule(now)
-            del self._sizes[oldest]
+    def _make_room(self, client: str, size: int) -> None:
+        held = Counter({client: size})
+        for whose, own_size in self._taken.values():
+            held[whose] += own_size
+        left = dict(self._taken)
+        while left and held.total() > self._max_bytes:
+            most = max(held.values())
+            greediest = (end for end, (whose, _) in left.items() if held[whose] == most)
+            oldest = next(greediest, None)
+            if oldest is None:
+                raise BusyError("the answers that others take leave no room for this one")
+            whose, own_size = left.pop(oldest)
+            held[whose] -= own_size
+        for end in self._taken.keys() - left.keys():
+            end.reschedule(asyncio.get_running_loop().time())
+        self._taken = left
 
 
 class _Places:

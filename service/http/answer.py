@@ -28,6 +28,7 @@ class FileAnswer(Response):
         content: MemoryFile,
         held: ExitStack,
         admission: Admission,
+        client: str,
         *,
         media_type: str,
         headers: dict[str, str],
@@ -38,12 +39,14 @@ class FileAnswer(Response):
         self._content = content
         self._held = held
         self._admission = admission
+        self._client = client
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send the answer."""
         with self._held:
+            taking = self._admission.answering(self._client, self._content.size)
             try:
-                async with self._admission.working(), self._admission.answering(self._content.size):
+                async with self._admission.working(), taking:
                     await self._send_start(send)
                     await self._send_pieces(send, receive)
             except CutOffError:

@@ -70,11 +70,11 @@ def router(service: Service) -> APIRouter:
 
     @routes.get("/jobs/{job_id}/result", response_class=Response, **documentation.RESULT)
     async def read_job_result(request: Request, job_id: str) -> Response:
-        return _result(service, _entry(service, request, job_id).job, answer_type(request))
+        return _result(service, request, job_id, answer_type(request))
 
     @routes.get("/jobs/{job_id}/report", response_class=Response, **documentation.JOB_REPORT)
     async def read_job_report(request: Request, job_id: str) -> Response:
-        return _result(service, _entry(service, request, job_id).job, media.JSON)
+        return _result(service, request, job_id, media.JSON)
 
     @routes.delete("/jobs/{job_id}", status_code=204, **documentation.DELETE_JOB)
     async def delete_job(request: Request, job_id: str) -> Response:
@@ -178,7 +178,8 @@ async def _events(service: Service, job: Job) -> AsyncIterator[str]:
             silent += LOOK_SECONDS
 
 
-def _result(service: Service, job: Job, kind: str) -> Response:
+def _result(service: Service, request: Request, job_id: str, kind: str) -> Response:
+    job = _entry(service, request, job_id).job
     if job.state is State.FAILED and job.error is not None:
         return problems.of_job(job.error)
     if job.state is not State.DONE:
@@ -193,6 +194,7 @@ def _result(service: Service, job: Job, kind: str) -> Response:
         file,
         held,
         service.admission,
+        client_of(request, service.settings).id,
         media_type=kind,
         headers={"Vary": "Accept", "Cache-Control": "no-store"},
     )

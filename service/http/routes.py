@@ -88,6 +88,7 @@ async def _subdivide(
             answer,
             held.pop_all(),
             service.admission,
+            job.client,
             media_type=kind,
             headers={"Server-Timing": stages_text, "Vary": "Accept"},
         )

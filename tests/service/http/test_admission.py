@@ -28,28 +28,48 @@ def test_uploads_and_jobs_are_counted_apart() -> None:
     run(scenario)
 
 
-def test_where_answers_leave_no_room_the_oldest_is_cut_off() -> None:
+def taken(answers: list[tuple[str, int]]) -> list[str]:
+    """What becomes of answers, of whom and how large, that are begun one after another."""
+    outcomes: list[str] = []
+
     async def scenario() -> None:
         admission = Admission(uploads=1, body_bytes=10, answer_bytes=10)
+        end = asyncio.Event()
 
-        async def taking(size: int, until: asyncio.Event) -> str:
+        async def take(client: str, size: int) -> str:
             try:
-                async with admission.answering(size):
-                    await until.wait()
+                async with admission.answering(client, size):
+                    await end.wait()
             except CutOffError:
                 return "cut off"
+            except BusyError:
+                return "refused"
             return "taken"
 
-        end = asyncio.Event()
         takers: list[asyncio.Task[str]] = []
-        for size in (4, 4, 5):
-            takers.append(asyncio.create_task(taking(size, end)))
+        for client, size in answers:
+            takers.append(asyncio.create_task(take(client, size)))
             await asyncio.sleep(0)
-        assert await takers[0] == "cut off"
         end.set()
-        assert await takers[1] == await takers[2] == "taken"
+        outcomes.extend(await asyncio.gather(*takers))
 
     run(scenario)
+    return outcomes
+
+
+def test_where_answers_leave_no_room_the_greediest_client_loses_its_oldest() -> None:
+    assert taken([("a", 4), ("a", 4), ("a", 5)]) == ["cut off", "taken", "taken"]
+    # Its own new ones count: however often it asks, nobody else is cut off.
+    assert taken([("a", 3), *[("b", 4)] * 5]) == ["taken", *["cut off"] * 4, "taken"]
+    # Of equals who has had it for longer, and an answer that is larger than all room comes alone.
+    assert taken([("a", 6), ("b", 6)]) == ["cut off", "taken"]
+    assert taken([("a", 20)]) == ["taken"]
+
+
+def test_an_answer_larger_than_what_anyone_takes_waits_for_another_time() -> None:
+    assert taken([("a", 4), ("b", 4), ("c", 5)]) == ["taken", "taken", "refused"]
+    # Nobody is cut off for one who is refused then.
+    assert taken([("a", 3), ("a", 3), ("b", 4), ("c", 5)]) == [*["taken"] * 3, "refused"]
 
 
 def test_bodies_share_their_bytes_and_give_them_back() -> None:
@@ -122,7 +142,7 @@ def test_while_draining_no_upload_begins_and_what_has_begun_goes_on() -> None:
 def test_a_timeout_of_the_work_itself_stays_one() -> None:
     async def scenario() -> None:
         admission = Admission(uploads=1, body_bytes=10, answer_bytes=10)
-        for held in (admission.upload(), admission.working(), admission.answering(1)):
+        for held in (admission.upload(), admission.working(), admission.answering("a", 1)):
             with pytest.raises(TimeoutError):
                 async with held, asyncio.timeout(0):
                     await asyncio.sleep(60)

@@ -57,7 +57,7 @@ def answered(method: str, client: Client) -> tuple[CountedFile, Admission]:
     async def scenario(file: CountedFile) -> None:
         held = ExitStack()
         held.callback(file.release)
-        answer = FileAnswer(file, held, admission, media_type="model/gltf-binary", headers={})
+        answer = FileAnswer(file, held, admission, "a", media_type="model/gltf-binary", headers={})
         await asyncio.wait_for(Head(answer)(scope, client.receive, client.send), 10)
 
     file = CountedFile()
