@@ -11,6 +11,7 @@ from jaxtyping import Float
 from pns_common.connectivity.disjoint_union import disjoint_faces
 
 from ..errors import UnrefinableError
+from ..gltf.read.index_references import INSTANCING
 from ..gltf.read.primitives import TrianglePrimitive, read_primitive
 from ..gltf.read.upload import read_upload
 from ..meshes.weld import weld
@@ -53,7 +54,7 @@ def _placed_meshes(tree: dict[str, Any]) -> Iterator[tuple[int, Float[np.ndarray
     """Yield each mesh that the default scene shows, with its node's world matrix."""
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])
-    roots = scenes[tree.get("scene", 0)].get("nodes", []) if scenes else range(len(nodes))
+    roots = scenes[tree.get("scene", 0)].get("nodes", []) if scenes else _parentless(nodes)
     pending = [(root, np.eye(4)) for root in reversed(roots)]
     while pending:
         number, above = pending.pop()
@@ -61,9 +62,13 @@ def _placed_meshes(tree: dict[str, Any]) -> Iterator[tuple[int, Float[np.ndarray
         world = above @ _local_matrix(node)
         if "mesh" in node:
             yield node["mesh"], world
-        # A file without scenes lists its nodes, children among them.
-        if scenes:
-            pending += [(child, world) for child in reversed(node.get("children", []))]
+        pending += [(child, world) for child in reversed(node.get("children", []))]
+
+
+def _parentless(nodes: list[dict[str, Any]]) -> list[int]:
+    """Return the nodes that a file without scenes shows; their children stand where they do."""
+    children = {child for node in nodes for child in node.get("children", [])}
+    return [number for number in range(len(nodes)) if number not in children]
 
 
 def _local_matrix(node: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
@@ -124,6 +129,14 @@ def _changes(
         for name in LOST
         if tree.get(name)
     ]
+    changes += [
+        Change(pointer, f"{what} dropped: the format cannot hold them", count)
+        for pointer, what, count in (
+            ("/meshes", "morph targets", _count_targets(tree)),
+            ("/nodes", f"copies by {INSTANCING}", _count_instancing(tree)),
+        )
+        if count
+    ]
     if placed > 1:
         changes.append(Change("/nodes", "nodes joined into one mesh in world space", placed))
     lost = set[str]().union(*names) - {"POSITION"}
@@ -138,3 +151,17 @@ def _changes(
         for name in sorted(lost)
     ]
     return changes
+
+
+def _count_targets(tree: dict[str, Any]) -> int:
+    return sum(
+        max(
+            (len(primitive.get("targets", [])) for primitive in mesh.get("primitives", [])),
+            default=0,
+        )
+        for mesh in tree.get("meshes", [])
+    )
+
+
+def _count_instancing(tree: dict[str, Any]) -> int:
+    return sum(INSTANCING in node.get("extensions", {}) for node in tree.get("nodes", []))

@@ -28,3 +28,26 @@ def test_a_scene_that_shows_no_triangles_is_told():
     tree["scene"] = 1
     with pytest.raises(UnrefinableError, match="shows no triangles"):
         flatten(files.pack(tree, binary), "obj", Limits())
+
+
+def test_without_scenes_children_still_stand_where_their_parents_do():
+    tree, binary = files.document([octahedron()])
+    del tree["scenes"], tree["scene"]
+    tree["nodes"] = [{"mesh": 0}, {"children": [0], "translation": [5, 0, 0]}]
+    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
+    assert len(flat.faces) == 8
+    assert flat.vertices[:, 0].min() == pytest.approx(4)
+    assert flat.vertices[:, 0].max() == pytest.approx(6)
+
+
+def test_morph_targets_and_instances_that_are_lost_are_told():
+    moved = octahedron(targets=[{"POSITION": np.ones((6, 3))}] * 2)
+    tree, binary = files.document([moved], [octahedron()])
+    shifts = files.add_accessor(tree, binary, np.ones((9, 3)))
+    tree["buffers"] = [{"byteLength": len(binary)}]
+    instances = {"attributes": {"TRANSLATION": shifts}}
+    tree["nodes"][1]["extensions"] = {"EXT_mesh_gpu_instancing": instances}
+    _, changes = flatten(files.pack(tree, binary), "stl", Limits())
+    told = {change.what: change.count for change in changes}
+    assert told["morph targets dropped: the format cannot hold them"] == 2
+    assert told["copies by EXT_mesh_gpu_instancing dropped: the format cannot hold them"] == 1
