@@ -1,10 +1,13 @@
 """The limit of a refined mesh, from the connectivity of the mesh that was split.
 
 An edge vertex is regular: six neighbours around it on an interior edge, four in each sector on any
-other. So no ring has to be found in the refined mesh, which is four times as large.
+other. So no ring has to be found in the refined mesh, which is four times as large. Only where
+faces lie on each other (connectivity/doubled_faces.py) it is not: there rings are found.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -20,10 +23,18 @@ from pns_common.base.arrays import (
     unit,
 )
 from pns_common.base.blocks import WHOLE, Blocks
-from pns_common.connectivity.topology import EdgeClass, Topology, next_corner
+from pns_common.connectivity.creases import crease_children, with_creases
+from pns_common.connectivity.doubled_faces import irregular_in_split
+from pns_common.connectivity.topology import (
+    EdgeClass,
+    Topology,
+    build_topology,
+    next_corner,
+    split,
+)
 from pns_common.masks.limit.neighbours import split_neighbours
-from pns_common.masks.limit.normals import normals_of_vertices, plane_normals
-from pns_common.masks.limit.positions import limits_of_vertices
+from pns_common.masks.limit.normals import limit_normals, normals_of_vertices, plane_normals
+from pns_common.masks.limit.positions import limit_positions, limits_of_vertices
 from pns_common.masks.stencils import CURVE_LIMIT_CENTRE, CURVE_LIMIT_NEIGHBOUR
 
 # w_6 = 1/2, shared by six.
@@ -53,7 +64,11 @@ def refined_limit_positions(
     (inside,) = blocks.gather(len(topology.interior), at_interior)
     is_interior = beside(points, topology.edge_class == EdgeClass.INTERIOR)[:, None]
     middle = xp.where(is_interior, scatter(inside, topology.interior, len(edges)), on_curve)
-    return xp.concat([limits_of_vertices(points, split_neighbours(topology)), middle])
+    limits = xp.concat([limits_of_vertices(points, split_neighbours(topology)), middle])
+    around = _cut_out(topology)
+    if around is None:
+        return limits
+    return around.put(limit_positions(gather(points, around.vertices), around.topology), limits)
 
 
 def refined_limit_normals(
@@ -79,7 +94,50 @@ def refined_limit_normals(
         one_sided = _one_sided(points, topology, beside_curves)
         owners = edge_of_corner[beside_curves]
         normals = normals + unit(segment_sum(one_sided, owners, len(topology.edges)))
-    return xp.concat([normals_of_vertices(points, split_neighbours(topology)).vertices, normals])
+    old = normals_of_vertices(points, split_neighbours(topology)).vertices
+    limits, around = xp.concat([old, normals]), _cut_out(topology)
+    if around is None:
+        return limits
+    found = limit_normals(gather(points, around.vertices), around.topology)
+    return around.put(found.vertices, limits)
+
+
+@dataclass(frozen=True, eq=False)
+class _CutOut:
+    """The part of a split around its irregular vertices, with all faces that these have there.
+
+    Attributes:
+        vertices: its vertices' numbers in the split.
+        topology: its connectivity.
+        irregular: its vertices that are the irregular ones.
+    """
+
+    vertices: Int[np.ndarray, " N"]
+    topology: Topology
+    irregular: Int[np.ndarray, " M"]
+
+    def put(self, found: Float[Array, "N K"], limits: Float[Array, "W K"]) -> Float[Array, "W K"]:
+        """Return limits with what was found of the irregular vertices in their rows."""
+        rows, count = self.vertices[self.irregular], len(limits)
+        is_irregular = np.zeros(count, dtype=bool)
+        is_irregular[rows] = True
+        spread = scatter(gather(found, self.irregular), rows, count)
+        return namespace(limits).where(beside(limits, is_irregular)[:, None], spread, limits)
+
+
+def _cut_out(topology: Topology) -> _CutOut | None:
+    """Return the part of the split where faces lie on each other; None where none do."""
+    rows = irregular_in_split(topology)
+    if len(rows) == 0:
+        return None
+    is_irregular = np.zeros(topology.vertex_count + len(topology.edges), dtype=bool)
+    is_irregular[rows] = True
+    children, creases = split(topology), crease_children(topology)
+    vertices, faces = np.unique(children[is_irregular[children].any(axis=1)], return_inverse=True)
+    plain = build_topology(faces.reshape(-1, 3), len(vertices))
+    # Of these alone every edge is here.
+    near = np.searchsorted(vertices, creases[is_irregular[creases].any(axis=1)])
+    return _CutOut(vertices, with_creases(plain, near), np.searchsorted(vertices, rows))
 
 
 def _one_sided(
