@@ -28,6 +28,8 @@ _MARKS[[ord(mark) for mark in '{["]}']] = [1, 1, _QUOTE, -1, -1]
 _NO_ITEMS, _NO_MARKS = (bytes(set(range(256)) - set(kept)) for kept in (b'{[,:"', b'{["]}'))
 # A node of two separators takes 233 bytes, with its typed view: the most of all that were measured.
 BYTES_PER_ITEM = 128
+# Of brackets and quotes, whose depth is counted at a time.
+_BLOCK = 2**18
 BOM = b"\xef\xbb\xbf"
 # Beyond every double; Python itself refuses to read 4,300 digits.
 _LONG_INTEGER = re.compile(rb"(?<=[\s:,\[-])\d{310,}")
@@ -131,7 +133,14 @@ def _depth(text: bytes) -> int:
     bare = _STRING.sub(b"", text) if b"\\" in text else text
     # Two quotes beside each other leave what stands inside of strings inside, and outside outside.
     bare = bare.translate(None, _NO_MARKS).replace(b'""', b"")
-    marks = _MARKS[np.frombuffer(bare, dtype=np.uint8)]
-    quotes = marks == _QUOTE
-    inside = np.logical_xor.accumulate(quotes)
-    return int(np.where(inside | quotes, 0, marks).cumsum(dtype=np.int64).max(initial=0))
+    deepest, depth, inside = 0, 0, False
+    # Block by block: in one go, a text of nothing but brackets would take 20 times its size.
+    for start in range(0, len(bare), _BLOCK):
+        block = bare[start : start + _BLOCK]
+        marks = _MARKS[np.frombuffer(block, dtype=np.uint8)]
+        quotes = marks == _QUOTE
+        insides = np.logical_xor.accumulate(quotes) ^ inside
+        depths = depth + np.where(insides | quotes, 0, marks).cumsum(dtype=np.int64)
+        deepest = max(deepest, int(depths.max()))
+        depth, inside = int(depths[-1]), bool(insides[-1])
+    return deepest

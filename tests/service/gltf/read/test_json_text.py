@@ -1,10 +1,13 @@
 """Strict JSON, bounded before it is decoded."""
 
+import tracemalloc
+
 import pytest
 
 from service.errors import GltfError, LimitError, UnreadableError
+from service.gltf.read import json_text
 from service.gltf.read.json_text import decode_object, encode
-from service.options import Limits
+from service.options import BYTES_PER_INPUT_BYTE, Limits
 
 LIMITS = Limits()
 
@@ -62,6 +65,31 @@ def test_depth_is_allowed_up_to_the_limit():
 def test_brackets_in_strings_do_not_nest():
     text = b'{"a":"' + b"[" * 1000 + b'\\"' + b"{" * 1000 + b'\\\\"}'
     assert decode_object(text, LIMITS) == {"a": "[" * 1000 + '"' + "{" * 1000 + "\\"}
+
+
+def test_depth_and_strings_go_on_from_block_to_block():
+    depth = LIMITS.max_json_depth - 2
+    pairs = b"[]," * (json_text._BLOCK // 2)
+    text = b'{"a":[%s"' + pairs + b"[" * 1000 + b'"]}'
+    assert decode_object(text.replace(b"%s", pairs), LIMITS)
+    assert decode_object(text.replace(b"%s", pairs + nested(depth) + b","), LIMITS)
+    with pytest.raises(LimitError):
+        decode_object(text.replace(b"%s", pairs + nested(depth + 1) + b","), LIMITS)
+
+
+def nested(depth):
+    return b"[" * depth + b"]" * depth
+
+
+def test_a_text_of_brackets_takes_no_more_than_is_predicted_of_it():
+    text = b"{" + b"]" * 2**23 + b"}"
+    tracemalloc.start()
+    try:
+        with pytest.raises(UnreadableError):
+            decode_object(text, LIMITS)
+        assert tracemalloc.get_traced_memory()[1] < BYTES_PER_INPUT_BYTE * len(text)
+    finally:
+        tracemalloc.stop()
 
 
 def test_a_byte_order_mark_is_passed_over():
