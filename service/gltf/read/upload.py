@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -82,10 +83,11 @@ def read_upload(
     if draco_views:
         document = view(tree)
         check_references(document, buffers)
-    changes = [
+    unknown = unknown_extensions(tree, container.text)
+    changes = _changes_of_buffers(tree.get("buffers", [])[:stored], files, unknown)
+    changes += [
         Change(pointer, what, count)
         for pointer, what, count in (
-            ("/buffers", "joined into one", files if files > 1 else 0),
             ("/bufferViews", "meshopt compression decoded", len(ranges)),
             ("/meshes", "Draco compression decoded", len(draco_views)),
         )
@@ -100,5 +102,21 @@ def read_upload(
     size += sum(len(buffer) for buffer in buffers[stored:])
     size += decoded_size(container.text) // BYTES_PER_INPUT_BYTE
     check_cost(document, plans, size, levels, limits, bytes_per_face)
-    leavable = spare(original, draco_views, ranges, unknown_extensions(tree, container.text))
+    leavable = spare(original, draco_views, ranges, unknown)
     return Upload(container, tree, document, buffers, plans, changes, leavable)
+
+
+def _changes_of_buffers(
+    entries: Sequence[dict[str, Any]], files: int, unknown: Sequence[str]
+) -> list[Change]:
+    """Return that so many buffers become the first, and what goes with the others."""
+    changes = [Change("/buffers", "joined into one", files)] if files > 1 else []
+    if changes and unknown:
+        names = ", ".join(unknown)
+        changes.append(Change("/buffers", f"joined: {names} may name them by number", files))
+    for number, entry in enumerate(entries[1:], 1):
+        lost = sorted(entry.keys() - {"uri", "byteLength"})
+        if lost:
+            what = f"left out, since buffers are one: {', '.join(lost)}"
+            changes.append(Change(f"/buffers/{number}", what, 1))
+    return changes

@@ -160,6 +160,31 @@ def test_everything_that_is_no_geometry_stays():
     assert after["asset"]["extras"]["pns"] == result.report
 
 
+def test_what_goes_with_buffers_that_are_joined_is_told():
+    tree, binary = files.document([octahedron()])
+    uri = "data:application/octet-stream;base64,AAAAAA=="
+    tree["buffers"][0]["name"] = "first"
+    tree["buffers"].append({"byteLength": 4, "uri": uri, "name": "second", "extras": 1})
+    result = subdivide(data=files.pack(tree, binary))
+    assert files.unpack(result.glb)[0]["buffers"][0]["name"] == "first"
+    assert result.report["changes"] == [
+        {"pointer": "/buffers", "what": "joined into one", "count": 2},
+        {
+            "pointer": "/buffers/1",
+            "what": "left out, since buffers are one: extras, name",
+            "count": 1,
+        },
+    ]
+    # Who knows the extension would look for a buffer 1.
+    tree |= {"extensionsUsed": ["EXT_x"], "extensions": {"EXT_x": {"buffer": 1}}}
+    changes = subdivide(data=files.pack(tree, binary)).report["changes"]
+    assert {
+        "pointer": "/buffers",
+        "what": "joined: EXT_x may name them by number",
+        "count": 2,
+    } in changes
+
+
 def test_extras_that_are_no_object_move_and_are_reported():
     tree, binary = files.document([octahedron()])
     tree["asset"]["extras"] = ["a", "list"]
