@@ -88,3 +88,16 @@ def test_both_run_with_nothing_that_they_do_not_need(name):
     assert service["security_opt"] == ["no-new-privileges:true"]
     assert {"mem_limit", "pids_limit"} <= set(service)
     assert "privileged" not in json.dumps(service)
+
+
+@pytest.mark.parametrize("name", ["service", "proxy"])
+def test_what_lies_in_a_file_system_of_memory_leaves_room_for_the_process(name):
+    """It is counted as the container's memory, which is killed when it has more than its limit."""
+    service = COMPOSE["services"][name]
+    (mounted,) = service["tmpfs"]
+    files = mebibytes(mounted.partition("size=")[2].partition(",")[0])
+    assert files + 256 <= mebibytes(service["mem_limit"])
+
+
+def mebibytes(size):
+    return int(size[:-1]) * {"m": 1, "g": 1024}[size[-1]]
