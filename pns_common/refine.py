@@ -28,7 +28,7 @@ from pns_common.fused import (
 from pns_common.fused.known import kernels_know
 from pns_common.levels.array_steps import array_steps
 from pns_common.levels.diagnostics import LevelReport, level_report, limit_distances
-from pns_common.levels.progress import RefinementProgress, level_costs
+from pns_common.levels.progress import level_costs, refinement_progress
 from pns_common.levels.refined_levels import (
     AfterLevel,
     LevelsReport,
@@ -138,9 +138,7 @@ def refine(
     _check_reference_length(reference_length)
     workers = _threads(threads)
     length = Deferred(lambda: _length_of(mesh, reference_length, workers))
-    work = RefinementProgress(
-        len(mesh.faces), levels, scheme.learned_levels, limit, progress or _nobody_listens
-    )
+    work = refinement_progress(len(mesh.faces), levels, scheme.learned_levels, limit, progress)
     costs = level_costs(len(mesh.faces), levels, scheme.learned_levels)
     # Loop has no use for a unit of length; its report names one when it is read.
     unit = 1.0 if scheme.learned_levels == 0 else length()
@@ -280,10 +278,6 @@ def reference_length_of(
 
         return reference_length(vertices, faces, kernel_blocks(threads))
     return measure_reference_length(vertices, faces)
-
-
-def _nobody_listens(done: int, total: int) -> None:
-    pass
 
 
 def _threads(given: int | None) -> int:

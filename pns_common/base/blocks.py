@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextvars import copy_context
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import TypeVar
 
@@ -41,7 +41,7 @@ class Blocks:
 
     def of_rows(self, rows: int) -> Blocks:
         """Return the same with blocks of another size, whatever there is to do."""
-        return replace(self, rows=rows, least=None)
+        return Blocks(self.threads, rows, self.before)
 
     def rows_of(self, count: int) -> int:
         """Return how many rows a block has where there are so many in all."""
@@ -51,10 +51,14 @@ class Blocks:
 
     def unheard(self) -> Blocks:
         """Return the same for work after the end, of which nobody is told."""
-        return replace(self, before=nobody_listens)
+        return Blocks(self.threads, self.rows, least=self.least)
 
     def run(self, count: int, work: Callable[[slice], None]) -> None:
         """Call ``work`` once for each block of range(count); each writes its own rows."""
+        if 0 < count <= self.rows_of(count):
+            # As most of a small mesh: all else takes as long as its work.
+            self._begin(work, slice(0, count))
+            return
         slices = deque(self._slices(count))
 
         def following() -> slice | None:

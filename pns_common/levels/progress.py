@@ -24,6 +24,16 @@ def level_costs(faces: int, levels: int, learned_levels: int | None) -> list[int
     ]
 
 
+class Unheard:
+    """What is told of a refinement to which nobody listens: nothing is counted."""
+
+    def rows(self, count: int) -> None:
+        """Do nothing."""
+
+    def level_ends(self) -> None:
+        """Do nothing."""
+
+
 class RefinementProgress:
     """Faces made so far, as the work goes: a level that costs more counts for more.
 
@@ -77,3 +87,16 @@ class RefinementProgress:
     def _report(self, within: float) -> None:
         share = (self._spent + within) / (self._spent + sum(self._costs))
         self._tell(round(self._total * share), self._total)
+
+
+def refinement_progress(
+    faces: int,
+    levels: int,
+    learned_levels: int | None,
+    limit: bool,
+    tell: Callable[[int, int], None] | None,
+) -> RefinementProgress | Unheard:
+    """Return what takes note of a refinement's way; ``tell`` None: nobody listens."""
+    if tell is None:
+        return Unheard()
+    return RefinementProgress(faces, levels, learned_levels, limit, tell)

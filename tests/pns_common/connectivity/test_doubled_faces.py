@@ -9,7 +9,7 @@ from tests.support.meshes import bow_tie, bumpy_sphere, grid, one_way_pair, thre
 
 
 def irregular(faces):
-    topology = build_topology(np.array(faces), np.max(faces) + 1)
+    topology = build_topology(np.array(faces), int(np.max(faces)) + 1)
     return irregular_in_split(topology).tolist()
 
 
