@@ -55,6 +55,25 @@ def test_darts_and_creases_keep_position_and_normal(k, sharp):
     same_limits(points, topology)
 
 
+def test_closed_fans_that_meet_at_a_vertex_end_in_tips():
+    """Their rings' means draw together by 5/8 a step; the rings get smaller by 1/2."""
+    points, faces = star(6, closed=True)
+    other = np.where(faces == 0, 0, faces + len(points) - 1)[:, ::-1]
+    points = np.concatenate([points, [0, 0, 0.6] - points[1:]])
+    topology = build_topology(np.concatenate([faces, other]), len(points))
+    apart, wide = [], []
+    for _ in range(6):
+        points, topology = stepped(points, topology)
+        rings = []
+        for side in np.split(np.arange(len(topology.faces)), 2):
+            around = topology.faces[side][(topology.faces[side] == 0).any(axis=1)]
+            rings.append(points[np.setdiff1d(around, [0])])
+        apart.append(np.linalg.norm(rings[0].mean(axis=0) - rings[1].mean(axis=0)))
+        wide.append(np.ptp(rings[0], axis=0).max())
+    np.testing.assert_allclose(np.divide(apart[1:], apart[:-1]), 5 / 8, rtol=1e-9)
+    np.testing.assert_allclose(wide[-1] / wide[-2], 1 / 2, rtol=0.05)
+
+
 @given(manifolds(), st.integers(0, 2**31))
 def test_any_creases_on_any_manifold(mesh, seed):
     points = mesh.vertices
