@@ -33,6 +33,8 @@ let began = 0;
 let validation = new AbortController();
 /** Whether the page, and not the user, asked for smooth normals. */
 let smoothed = false;
+/** The result whose values at vertices are on their way. */
+let awaiting: Result | null = null;
 /** Of the file that is shown. */
 let facts: { source: Source; before: Before } | null = null;
 
@@ -45,6 +47,7 @@ const session = new Session({
     element("file-name").textContent = source.upload.name;
     stage.open(source);
   },
+  stayed: ({ opened }) => fit(opened),
   refined: (ours) => {
     stage.refine(ours, session.loop);
     const milliseconds = performance.now() - began;
@@ -90,7 +93,7 @@ const form = new SettingsForm(
     remember();
     hideProblem();
     began = performance.now();
-    void session.again({ ...form.settings });
+    void session.again({ ...form.settings }, prepare);
   }),
 );
 stage.view = given.view;
@@ -98,9 +101,14 @@ stage.view = given.view;
 async function prepare(opened: Opened): Promise<Settings> {
   // Which levels are open depends on the service's limits.
   await offered;
+  fit(opened);
+  return { ...form.settings };
+}
+
+/** Make the form that of a file. */
+function fit(opened: Opened): void {
   chooseNormals(opened);
   form.start(opened.faces);
-  return { ...form.settings };
 }
 
 /** Files that bring no normals would come back faceted: nobody refines for that. */
@@ -178,7 +186,10 @@ async function validateBoth(ours: Result): Promise<void> {
 /** The values at vertices, which a plain result does not hold: the same job with all diagnostics. */
 async function fetchValues(): Promise<void> {
   const { ours } = session;
+  if (ours === awaiting) return;
+  awaiting = ours;
   const answer = await session.fetch({ ...form.settings }, "full", "none");
+  if (awaiting === ours) awaiting = null;
   if (!answer || !ours || session.ours !== ours) return;
   const { scene } = await parseGltf(answer.bytes);
   const full = modelOf(scene, []);
@@ -207,13 +218,15 @@ async function downloadGlb(): Promise<void> {
   if (!session.ours) return;
   const compress = select("compress").value as Compression;
   const full = input("attributes").checked;
+  // Another file may be there before the answer is.
+  const name = resultName("glb");
   let content = session.ours.bytes;
   if (full || compress !== "none") {
     const answer = await session.fetch({ ...form.settings }, full ? "full" : "summary", compress);
     if (!answer) return;
     content = answer.bytes;
   }
-  save(new Blob([content], { type: "model/gltf-binary" }), resultName("glb"));
+  save(new Blob([content], { type: "model/gltf-binary" }), name);
 }
 
 function bindFiles(): void {

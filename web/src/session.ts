@@ -27,10 +27,17 @@ export interface Source {
   model: Model;
 }
 
+/** What the form makes of a file before it is refined. */
+export type Prepare = (opened: Opened) => Promise<Settings>;
+
+type Task = (signal: AbortSignal) => Promise<void>;
+
 export interface Listener {
   progress(progress: Progress, what: string): void;
   /** A new file has taken the place of the old. */
   opened(source: Source): void;
+  /** One was refused or cancelled, and the one before it is still there. */
+  stayed(source: Source): void;
   refined(ours: Result): void;
   compared(loop: Result | null): void;
   idle(): void;
@@ -45,40 +52,48 @@ export class Session {
   ours: Result | null = null;
   loop: Result | null = null;
   private controller = new AbortController();
+  /** How many tasks the controller ends. */
+  private underWay = 0;
   private lastDrop: Upload | null = null;
+  /** A file that is not refined yet, beside the one that is shown. */
+  private coming: Upload | null = null;
 
   constructor(private readonly listener: Listener) {}
 
   cancel(): void {
+    this.coming = null;
     this.controller.abort();
   }
 
   /** Take a new file. What was there stays until the new one is refined. */
-  async take(upload: Upload, prepare: (opened: Opened) => Promise<Settings>): Promise<void> {
-    this.lastDrop = upload;
+  async take(upload: Upload, prepare: Prepare): Promise<void> {
+    this.lastDrop = this.coming = upload;
     await this.only(async (signal) => {
-      const opened = await open(upload);
-      const source = { upload, opened, model: modelOf(opened.scene, opened.clips) };
-      const settings = await prepare(opened);
-      // Nothing is lost by showing the first file at once.
-      const early = this.source === null && isFinite(source.model);
-      if (early) this.show(source);
+      let source: Source | null = null;
+      let settings: Settings;
       let ours: Result;
       try {
+        const opened = await open(upload);
+        source = { upload, opened, model: modelOf(opened.scene, opened.clips) };
+        signal.throwIfAborted();
+        settings = await prepare(opened);
+        // Nothing is lost by showing the first file at once.
+        if (this.source === null && isFinite(source.model)) this.show(source);
         ours = await this.run(upload, settings, signal);
       } catch (error) {
-        if (!early) this.listener.discarded(source.model);
-        else if (isTheFiles(error)) this.clear();
+        if (!signal.aborted) this.coming = null;
+        this.giveUp(source, error);
         throw error;
       }
-      if (!early) this.show(source);
+      if (this.source !== source) this.show(source);
       await this.complete(upload, ours, settings, signal);
     });
   }
 
-  /** Refine the file that is there anew. */
-  async again(settings: Settings): Promise<void> {
-    const { source } = this;
+  /** Refine anew: the file that is on its way, or else the one that is there. */
+  async again(settings: Settings, prepare: Prepare): Promise<void> {
+    const { source, coming } = this;
+    if (coming) return this.take(coming, prepare);
     if (!source) return;
     await this.only(async (signal) => {
       const ours = await this.run(source.upload, settings, signal);
@@ -87,11 +102,11 @@ export class Session {
   }
 
   /** The file that was dropped last, also when it was refused. */
-  async retry(prepare: (opened: Opened) => Promise<Settings>): Promise<void> {
+  async retry(prepare: Prepare): Promise<void> {
     if (this.lastDrop) await this.take(this.lastDrop, prepare);
   }
 
-  /** Another answer for the same settings; null when it was cancelled. */
+  /** Another answer for the same settings; null when it was cancelled. Nothing under way ends for it. */
   async fetch(
     settings: Settings,
     diagnostics: Diagnostics,
@@ -100,7 +115,7 @@ export class Session {
     const { source } = this;
     if (!source) return null;
     let answer: Answer | null = null;
-    await this.only(async (signal) => {
+    await this.beside(async (signal) => {
       const asked = query(settings, diagnostics, compress);
       answer = await refine(bodyOf(source.upload), asked, signal, (progress) =>
         this.listener.progress(progress, ""),
@@ -140,11 +155,22 @@ export class Session {
 
   private show(source: Source): void {
     const old = this.source;
+    this.coming = null;
     this.replace("ours", null);
     this.replace("loop", null);
     this.source = source;
     this.listener.opened(source);
     if (old) this.listener.discarded(old.model);
+  }
+
+  /** A new file was not refined: what was there before it stays. */
+  private giveUp(source: Source | null, error: unknown): void {
+    if (source && this.source === source) {
+      if (isTheFiles(error)) this.clear();
+      return;
+    }
+    if (source) this.listener.discarded(source.model);
+    if (this.source && !this.coming) this.listener.stayed(this.source);
   }
 
   /** Back to a page without a file. */
@@ -161,16 +187,27 @@ export class Session {
     if (old && old !== result) this.listener.discarded(old.model);
   }
 
-  /** Run a task after ending the one before. */
-  private async only(task: (signal: AbortSignal) => Promise<void>): Promise<void> {
+  /** Run a task after ending all that is under way. */
+  private async only(task: Task): Promise<void> {
     this.controller.abort();
-    const { signal } = (this.controller = new AbortController());
+    await this.beside(task);
+  }
+
+  /** Run a task beside what is under way; what ends that ends it too. */
+  private async beside(task: Task): Promise<void> {
+    if (this.controller.signal.aborted) {
+      this.controller = new AbortController();
+      this.underWay = 0;
+    }
+    const { controller } = this;
+    const { signal } = controller;
+    this.underWay++;
     try {
       await task(signal);
     } catch (error) {
       if (!signal.aborted && !isAbort(error)) this.listener.failed(error);
     } finally {
-      if (this.controller.signal === signal) this.listener.idle();
+      if (this.controller === controller && --this.underWay === 0) this.listener.idle();
     }
   }
 }

@@ -168,9 +168,10 @@ export class Stage {
   arrange(): void {
     const { source, ours, loop } = this.shown;
     const learned = ours && ours.report.scheme !== LOOP;
-    const byLoop = select("pair").value === "loop" && learned;
     select("pair").disabled = !learned;
-    const left = byLoop ? (loop?.model ?? null) : (source?.model ?? null);
+    // Until Loop's side has come the control mesh stands in its place, under its own name.
+    const byLoop = select("pair").value === "loop" && learned && loop !== null;
+    const left = (byLoop ? loop.model : source?.model) ?? null;
     const right = ours?.model ?? null;
     const paper = getComputedStyle(document.body).backgroundColor;
     this.writeLabels(byLoop ? loop : null);

@@ -1,0 +1,87 @@
+/** What the user asks for while something is under way. */
+
+import assert from "node:assert/strict";
+import { describe, test } from "node:test";
+import { choose, downloaded, noBrowser, settled } from "./support/browser.mjs";
+import { positions } from "./support/glb.mjs";
+import { example, number, part, PART_FACES, studio } from "./support/studio.mjs";
+
+const TETRAHEDRON = {
+  name: "tetrahedron.obj",
+  mimeType: "",
+  buffer: Buffer.from("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"),
+};
+
+describe("jobs of the page", { skip: noBrowser, timeout: 900_000 }, () => {
+  const { visit } = studio();
+
+  test("Loop’s side comes although a heat map asks for more", async () => {
+    const page = await visit({ hash: "#levels=1&look=ratio" });
+    await choose(page, example);
+    await settled(page);
+    await page.locator("#legend", { hasText: "Share of the budget" }).waitFor();
+    await page.selectOption("#look", "distance");
+    await page.locator("#legend", { hasText: "Distance to Loop" }).waitFor({ timeout: 5000 });
+    await page.selectOption("#pair", "loop");
+    assert.match(await page.textContent("#label-left"), /^Loop/);
+  });
+
+  test("settings that change while a second file is on its way are for that file", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    const release = await hold(page);
+    await choose(page, example);
+    await page.locator("#levels", { hasText: number(4 * PART_FACES) }).waitFor({ state: "attached" });
+    await page.selectOption("#levels", "2");
+    // Two is what a page without a word about levels takes.
+    await page.waitForFunction(() => !location.hash.includes("levels"));
+    release();
+    await page.locator("#file-name", { hasText: "part.glb" }).waitFor({ timeout: 20_000 });
+    await settled(page);
+    assert.match(await page.textContent("#label-right"), new RegExp(`· ${number(16 * PART_FACES)} faces`));
+  });
+
+  test("a download of what is shown leaves the second file on its way", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    const release = await hold(page, (body) => body?.equals(part));
+    await choose(page, example);
+    await page.locator("#levels", { hasText: number(4 * PART_FACES) }).waitFor({ state: "attached" });
+    await page.check("#attributes");
+    const { name, bytes } = await downloaded(page, "#download");
+    assert.equal(name, "tetrahedron-refined.glb");
+    assert.ok(positions(bytes)[0].length < 3 * PART_FACES);
+    release();
+    await page.locator("#file-name", { hasText: "part.glb" }).waitFor({ timeout: 20_000 });
+    await settled(page);
+  });
+
+  test("a second file that is cancelled leaves the form to the first", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    const form = () => page.$eval("#settings", (form) => [form.levels.textContent, form.normals.value]);
+    const first = await form();
+    await hold(page);
+    await choose(page, example);
+    await page.locator("#levels", { hasText: number(4 * PART_FACES) }).waitFor({ state: "attached" });
+    await page.click("#cancel");
+    await page.locator("#levels", { hasText: number(16) }).waitFor({ state: "attached", timeout: 5000 });
+    assert.deepEqual(await form(), first);
+    assert.equal(await page.textContent("#file-name"), "tetrahedron.obj");
+  });
+});
+
+/** Jobs that are handed in wait, those alone whose body is `held`, until what comes back is called. */
+async function hold(page, held = () => true) {
+  let release;
+  const released = new Promise((resolve) => (release = resolve));
+  await page.route(/\/jobs\?/, async (route) => {
+    if (held(route.request().postDataBuffer())) await released;
+    // The page may have ended it meanwhile.
+    await route.continue().catch(() => {});
+  });
+  return release;
+}
