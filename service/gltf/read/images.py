@@ -8,12 +8,15 @@ from ...bodies.sibling_files import Opened
 from ...report import Change
 from .schema import Document
 
-# What a file of each type begins with (glTF 2.0 §3.8.2, KHR_texture_basisu, EXT_texture_webp).
+# What a file of each type begins with (glTF 2.0 §3.8.2, KHR_texture_basisu, EXT_texture_webp,
+# EXT_texture_avif, MSFT_texture_dds).
 _SIGNATURES = (
     (b"\x89PNG\r\n\x1a\n", 0, "image/png"),
     (b"\xff\xd8\xff", 0, "image/jpeg"),
     (b"\xabKTX 20\xbb\r\n\x1a\n", 0, "image/ktx2"),
     (b"WEBP", 8, "image/webp"),
+    (b"ftypavif", 4, "image/avif"),
+    (b"DDS ", 0, "image/vnd-ms.dds"),
 )
 
 

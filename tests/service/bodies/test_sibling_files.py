@@ -99,6 +99,23 @@ def test_external_files_give_what_an_embedded_file_gives():
     assert ("", "not used by the document: notes.txt") in changes
 
 
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        (b"\xff\xd8\xff\xe0", "image/jpeg"),
+        (b"\xabKTX 20\xbb\r\n\x1a\n", "image/ktx2"),
+        (b"RIFF\x04\0\0\0WEBP", "image/webp"),
+        (b"\0\0\0\x1cftypavif", "image/avif"),
+        (b"DDS \x7c\0\0\0", "image/vnd-ms.dds"),
+    ],
+)
+def test_images_of_every_type_that_textures_may_have_are_embedded(content, kind):
+    text, binary = external(images=["a.image"])
+    tree, _ = files.unpack(refine(text, beside(box__bin=binary, a__image=content)).glb)
+    assert tree["images"][0]["mimeType"] == kind
+    assert "uri" not in tree["images"][0]
+
+
 @pytest.mark.parametrize("content", [None, b"no image"])
 def test_an_image_that_cannot_be_embedded_keeps_its_uri(content):
     text, binary = external(images=["a.png"])
