@@ -17,8 +17,8 @@ from pns_common.fused.kernels.masks import (
     sum_along_curves,
     sum_rings,
 )
+from pns_common.fused.loop_weights import weights_of
 from pns_common.fused.mesh_edges import MeshEdges
-from pns_common.masks.stencils import loop_beta
 
 
 def loop_points(
@@ -105,7 +105,7 @@ def place_vertices(
     sharp = mesh.sharp
     if len(sharp):
         sum_along_curves(points, mesh.edges, mesh.sharp_edges, sharp, placed)
-    beta = loop_beta(np.arange(int(valence.max(initial=0)) + 1))
+    beta = weights_of(valence).beta
 
     def blend(rows: slice) -> None:
         blend_vertices(points, valence, sharp, beta, rows.start, rows.stop, placed)

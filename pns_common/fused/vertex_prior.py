@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.formula.tips import ring_further
 from pns_common.fused.kernels.vertex_prior import add_priors, add_priors_but_at_tips
 from pns_common.fused.loop_points import place_vertices
+from pns_common.fused.loop_weights import weights_of
 from pns_common.fused.surroundings import Surroundings
-from pns_common.masks.stencils import loop_ring_weight
 from pns_common.rules.scale_free_form import ScaleFreeForm
 
 
@@ -21,9 +20,8 @@ def priors_at(
     prior = _placed(level.pushes, level)
     of_curves = _placed(curves.pushes, level) if len(curves.pushes) else curves.pushes
     parts = of_curves, curves.nothing, form.prior_strength, vertices
-    each = np.arange(int(rings.valence.max(initial=0)) + 1)
-    weights = loop_ring_weight(each), ring_further(each)
-    around = level.pushes, rings.means, rings.fields, rings.valence, *weights
+    weights, measured = weights_of(rings.valence), (rings.means, rings.fields, rings.valence)
+    around = level.pushes, *measured, weights.ring, weights.further
 
     def add(rows: slice) -> None:
         add_priors(*parts, rows.start, rows.stop, prior)
