@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import socket
 from functools import partial
 from types import FrameType
 
@@ -25,6 +26,8 @@ log = logging.getLogger("pns.service")
 
 # After draining, what is still in the sockets' buffers may go out.
 FLUSH_SECONDS = 2
+# Connections that may wait, in the system, to be taken.
+WAITING = 2048
 
 
 class DrainingServer(uvicorn.Server):
@@ -41,6 +44,14 @@ class DrainingServer(uvicorn.Server):
         self._drain_seconds = drain_seconds
         self._deadline: float | None = None
         self._signals = 0
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen, with a longer queue than what is taken of it in a turn."""
+        await super().startup(sockets)
+        for server in self.servers:
+            for listening in server.sockets:
+                with listening.dup() as same:
+                    same.listen(WAITING)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Close the admission; uvicorn calls this as the signal handler."""
@@ -116,6 +127,8 @@ def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:
         proxy_headers=False,
         server_header=False,
         timeout_keep_alive=settings.keep_alive_seconds,  # pyright: ignore[reportArgumentType]
+        # asyncio takes as many connections in one turn, before it looks at any of them.
+        backlog=descriptors.A_TURN,
         # Its loggers are configured with ours, and the journal says what an access log would.
         log_config=None,
         access_log=False,

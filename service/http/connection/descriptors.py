@@ -17,6 +17,9 @@ OF_PROCESS = 128
 OF_REQUEST = 5
 # What is kept of one that is done: its answer and its report.
 OF_RESULT = 2
+# Connections that the event loop takes in a turn, and turns until one that has no slot is closed.
+A_TURN = 32
+TURNS = 4
 
 
 def fitting(settings: Settings) -> int:
@@ -32,7 +35,7 @@ def fitting(settings: Settings) -> int:
     # Short jobs have a worker and slots of their own.
     requests = settings.slots + settings.queue + 1 + settings.uploads
     reserved = OF_PROCESS + OF_WORKER * (settings.workers + 1) + OF_REQUEST * requests
-    reserved += OF_RESULT * settings.results
+    reserved += OF_RESULT * settings.results + A_TURN * TURNS
     wanted = reserved + settings.connections
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft != resource.RLIM_INFINITY and soft < wanted:

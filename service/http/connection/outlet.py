@@ -36,11 +36,14 @@ class Outlet:
     @property
     def has_unread(self) -> bool:
         """Whether bytes of the client wait in the socket; not those of one who has only left."""
-        with self.real.get_extra_info("socket").dup() as opened:
-            try:
-                return opened.recv(1, socket.MSG_PEEK) != b""
-            except OSError:  # nothing yet, or reset
-                return False
+        # Not a copy: there may be no descriptor for one.
+        same = socket.socket(fileno=self.real.get_extra_info("socket").fileno())
+        try:
+            return same.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT) != b""
+        except OSError:  # nothing yet, or reset
+            return False
+        finally:
+            same.detach()
 
     @property
     def has_left(self) -> bool:

@@ -6,6 +6,7 @@ import http.client
 import json
 import os
 import re
+import resource
 import signal
 import socket
 import subprocess
@@ -165,6 +166,23 @@ def default_models(server: Server) -> list[str]:
     """Names of the listed models that are the default."""
     listed = json.loads(server.get("/models")[1])
     return [entry["name"] for entry in listed if entry["default"]]
+
+
+def test_hundreds_of_connections_at_once_take_no_more_descriptors_than_there_are() -> None:
+    with serving(PNS_CONNECTIONS="16") as server:
+        server.wait_until_ready()
+        process = server.process.pid
+        most = len(list(Path(f"/proc/{process}/fd").iterdir())) + 200
+        resource.prlimit(process, resource.RLIMIT_NOFILE, (most, most))
+        # While it sleeps they wait in the system, and then they are all there in one turn.
+        os.kill(process, signal.SIGSTOP)
+        burst = [socket.create_connection((server.host, server.port)) for _ in range(400)]
+        os.kill(process, signal.SIGCONT)
+        assert server.status("/healthz") == 200
+        for connection in burst:
+            connection.close()
+        server.process.terminate()
+    assert "out of system resource" not in server.whole_log()
 
 
 def test_a_request_under_way_at_sigterm_completes(drained: Drained) -> None:
