@@ -70,6 +70,8 @@ const session = new Session({
     document.body.classList.add("empty");
     document.body.classList.remove("refined");
     element("file-name").textContent = "";
+    form.start(0);
+    stage.arrange();
   },
   discarded: (model) => stage.discard(model),
 });

@@ -6,8 +6,9 @@ import { readdir, readFile } from "node:fs/promises";
 import { basename, dirname, join } from "node:path";
 import { describe, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { choose, noBrowser, picture, settled } from "./support/browser.mjs";
-import { bare, broken, moving, textured } from "./support/glb.mjs";
+import { zipSync } from "three/addons/libs/fflate.module.js";
+import { choose, columns, noBrowser, picture, settled } from "./support/browser.mjs";
+import { bare, broken, moving, read, textured, write } from "./support/glb.mjs";
 import { example, number, part, PART_FACES, studio } from "./support/studio.mjs";
 
 const FOX = fileURLToPath(new URL("../../../shared/assets/Fox.glb", import.meta.url));
@@ -172,6 +173,56 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.equal(await page.textContent("#file-name"), "part.glb");
     await choose(page, { name: "text.txt", mimeType: "", buffer: Buffer.from("hello") });
     assert.match(await page.textContent("#problem-title"), /No mesh/);
+  });
+
+  const zipped = Buffer.from(zipSync({ "a.obj": Buffer.from("v 0 0 0") }));
+  for (const [name, buffer, words] of [
+    ["empty.glb", Buffer.alloc(0), /^The file is empty/],
+    ["text.zip", Buffer.from("hello"), /^The file cannot be read.*This is no ZIP/],
+    ["mesh.zip", zipped, /^No glTF in this archive.*a\.obj/],
+    ["other.stl", part, /This is no STL: it ends too early/],
+    ["text.txt", Buffer.from("hello"), /^No mesh among these files/],
+  ]) {
+    test(`${name} gets words, and no other try`, async () => {
+      const page = await visit();
+      await choose(page, { name, mimeType: "", buffer });
+      await page.locator("#problem").waitFor();
+      assert.match((await page.textContent("#problem")).trim().replace(/\s+/g, " "), words);
+      assert.ok(await page.isHidden("#problem-again"));
+    });
+  }
+
+  test("of a first file that is refused nothing stays", async () => {
+    const page = await visit({ expected: [422] });
+    const levels = await page.textContent("#levels");
+    const { json, bin } = read(part);
+    json.accessors[json.meshes[0].primitives[0].indices].count = 2;
+    await choose(page, { name: "short.glb", mimeType: "", buffer: write({ json, bin }) });
+    await page.locator("#problem").waitFor();
+    assert.ok(await page.isVisible("#welcome"));
+    assert.ok(await page.isHidden("#label-left"));
+    assert.equal(await page.textContent("#levels"), levels);
+  });
+
+  test("a long name pushes nothing out of the window", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, { ...example, name: `${"a long name ".repeat(20)}.glb` });
+    await settled(page);
+    const { x, width } = await page.locator("#panel").boundingBox();
+    assert.ok(x + width <= page.viewportSize().width);
+  });
+
+  test("copies of an instanced mesh are measured and framed as meshes are", { skip: !existsSync(FIXTURES) && `needs ${FIXTURES}` }, async () => {
+    const page = await visit({ hash: "#levels=1&layout=single" });
+    await choose(page, join(FIXTURES, "simple-instancing.glb"));
+    await settled(page);
+    assert.doesNotMatch(await page.textContent("#statements"), /Broken|more than 0 m/);
+    const shown = await picture(page);
+    // A copy at each place of a grid: there is paper between them.
+    const row = columns(shown, 0, shown.width).subarray(4 * shown.width * Math.floor(shown.height / 3));
+    const dark = Array.from({ length: shown.width }, (_, x) => row[4 * x] < 235);
+    const shapes = dark.filter((here, x) => here && !dark[x - 1]).length;
+    assert.ok(shapes > 2, `${shapes} shapes`);
   });
 
 });

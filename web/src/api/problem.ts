@@ -24,9 +24,14 @@ export class Problem extends Error {
   }
 }
 
-/** A sentence of the page itself: a file that no viewer opens, a server that does not answer. */
+/** A sentence of the page itself, of a server that does not answer: another try may do. */
 export function localProblem(title: string, detail: string): Problem {
   return new Problem({ title, detail, status: 0 });
+}
+
+/** A sentence of the page itself, of a file that cannot be opened: it stays so however often it is tried. */
+export function fileProblem(title: string, detail: string): Problem {
+  return new Problem({ title, detail, status: 422 });
 }
 
 /** The problem that a failed answer describes; a proxy's page of HTML becomes a sentence. */

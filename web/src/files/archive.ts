@@ -1,19 +1,30 @@
 /** A .zip opened in the page: one .gltf or .glb, and the files that it names. */
 
 import { unzip as inflate, type Unzipped } from "three/addons/libs/fflate.module.js";
+import { fileProblem } from "../api/problem";
+import { kindOf } from "./kinds";
 import { uploadOf, type Upload } from "./upload";
 
 export async function unzip(upload: Upload): Promise<Upload> {
   const data = new Uint8Array(await upload.file.arrayBuffer());
   const entries = await new Promise<Unzipped>((resolve, reject) =>
-    inflate(data, (error, files) => (error ? reject(error) : resolve(files))),
+    inflate(data, (error, files) => (error ? reject(unreadable(error)) : resolve(files))),
   );
+  const paths = Object.keys(entries).filter((path) => !path.endsWith("/"));
+  if (!paths.some((path) => /^gl(b|tf)$/.test(kindOf(path) ?? ""))) {
+    const names = paths.slice(0, 5).join(", ") || "nothing";
+    throw fileProblem("No glTF in this archive", `It holds ${names}: the page takes a .gltf or .glb in a .zip.`);
+  }
   return uploadOf(
-    Object.entries(entries)
-      .filter(([path]) => !path.endsWith("/") && /\.(?!zip$)\w+$/i.test(path))
-      .map(([path, content]) => ({
+    paths
+      .filter((path) => !/\.zip$/i.test(path))
+      .map((path) => ({
         path,
-        file: new File([content as BlobPart], path.slice(path.lastIndexOf("/") + 1)),
+        file: new File([entries[path] as BlobPart], path.slice(path.lastIndexOf("/") + 1)),
       })),
   );
+}
+
+function unreadable(error: Error): Error {
+  return fileProblem("The file cannot be read", `This is no ZIP: ${error.message}`);
 }

@@ -2,12 +2,14 @@
 
 import { LoadingManager } from "three";
 import { GLTFLoader, type GLTF } from "three/addons/loaders/GLTFLoader.js";
-import { localProblem } from "../api/problem";
+import { fileProblem } from "../api/problem";
+import { spread } from "./instances";
 
 export interface GltfJson {
   asset?: { extras?: { pns?: unknown } };
   extensionsUsed?: string[];
   accessors?: { count: number }[];
+  nodes?: { mesh?: number }[];
   meshes?: {
     name?: string;
     extras?: { targetNames?: string[] };
@@ -67,7 +69,8 @@ export async function parseGltf(
     return blobUrl(new Blob());
   });
   const loader = new GLTFLoader(manager);
-  const used = jsonOf(bytes).extensionsUsed ?? [];
+  const json = jsonOf(bytes);
+  const used = json.extensionsUsed ?? [];
   if (used.includes("EXT_meshopt_compression") || used.includes("KHR_meshopt_compression")) {
     const { MeshoptDecoder } = await import("three/addons/libs/meshopt_decoder.module.js");
     await MeshoptDecoder.ready;
@@ -86,16 +89,22 @@ export async function parseGltf(
       // of its own, such as a material where the file has none, has no place in it.
       const mesh = place?.meshes;
       if ("isMesh" in object && mesh !== undefined) object.userData.meshIndex = mesh;
+      // Of copies it knows the node alone.
+      const node = place?.nodes === undefined ? undefined : json.nodes?.[place.nodes];
+      for (const part of "isObject3D" in object && node ? [object, ...object.children] : []) {
+        if ("isInstancedMesh" in part) part.userData.meshIndex = node?.mesh;
+      }
     }
+    spread(gltf.scene);
     return gltf;
   } catch (error) {
     if (missing.length) {
-      throw localProblem(
+      throw fileProblem(
         "A file is missing",
         `The document names ${missing.join(", ")}: drop it together with the .gltf, or as a .zip.`,
       );
     }
-    throw localProblem("The file cannot be shown", (error as Error).message);
+    throw fileProblem("The file cannot be shown", (error as Error).message);
   } finally {
     draco?.dispose();
     made.forEach((url) => URL.revokeObjectURL(url));

@@ -1,7 +1,7 @@
 /** A dropped file as a scene: what stands before refinement. */
 
 import { Group, Mesh, type AnimationClip, type BufferGeometry } from "three";
-import { localProblem } from "../api/problem";
+import { fileProblem } from "../api/problem";
 import { plain } from "../view/looks";
 import { hasNormals, jsonOf, parseGltf, triangles, type GltfJson } from "./gltf";
 import type { Upload } from "./upload";
@@ -20,6 +20,7 @@ export interface Opened {
 }
 
 export async function open(upload: Upload): Promise<Opened> {
+  if (!upload.file.size) throw fileProblem("The file is empty", `${upload.name} holds not one byte.`);
   if (upload.kind === "zip") {
     const { unzip } = await import("./archive");
     const inside = await unzip(upload);
@@ -46,7 +47,7 @@ async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Prom
   try {
     json = jsonOf(bytes);
   } catch {
-    throw localProblem("The file cannot be read", "It is neither a GLB nor glTF JSON.");
+    throw fileProblem("The file cannot be read", "It is neither a GLB nor glTF JSON.");
   }
   const { scene, animations } = await parseGltf(bytes, neighbours);
   return {
@@ -61,5 +62,7 @@ async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Prom
 
 function unreadable(upload: Upload, error: unknown): Error {
   const kind = upload.kind.toUpperCase();
-  return localProblem("The file cannot be read", `This is no ${kind}: ${(error as Error).message}`);
+  // What a reader of binary data says where it runs over the end means nothing to anybody.
+  const why = error instanceof RangeError ? "it ends too early" : (error as Error).message;
+  return fileProblem("The file cannot be read", `This is no ${kind}: ${why}`);
 }

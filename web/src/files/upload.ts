@@ -1,7 +1,7 @@
 /** A document and the files beside it, as they were dropped or chosen. */
 
 import type { Body } from "../api/jobs";
-import { localProblem } from "../api/problem";
+import { fileProblem } from "../api/problem";
 import { kindOf, MEDIA_TYPES, type Kind } from "./kinds";
 
 /** A file with the folder that it came in. */
@@ -31,7 +31,7 @@ export function uploadOf(files: PathedFile[]): Upload {
   const main = documents[0];
   if (!main) {
     const names = files.map(({ file }) => file.name).join(", ") || "nothing";
-    throw localProblem(
+    throw fileProblem(
       "No mesh among these files",
       `${names}: the page takes ${ORDER.map((kind) => `.${kind}`).join(", ")}.`,
     );

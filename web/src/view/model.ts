@@ -24,7 +24,8 @@ export function modelOf(root: Object3D, clips: AnimationClip[]): Model {
   const meshes: Mesh[] = [];
   root.traverse((object) => {
     const mesh = object as Mesh;
-    if (!mesh.isMesh) return;
+    // What is instanced stands there as its copies.
+    if (!mesh.isMesh || "isInstancedMesh" in mesh) return;
     meshes.push(mesh);
     mesh.userData.material = mesh.material;
     // Skins and morphs leave the box at rest; a mesh cut off at the edge is worse than one drawn.
