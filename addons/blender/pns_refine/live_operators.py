@@ -34,13 +34,18 @@ class OBJECT_OT_pns_live_add(bpy.types.Operator):  # noqa: N801 (Blender's names
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a mesh is active that is not live yet, and has no shape keys."""
+        """Return whether a mesh of this file is active, not live yet, and without shape keys."""
         obj = context.object
         if obj is None or obj.type != "MESH":
             cls.poll_message_set("Select a mesh first")
             return False
         if live.modifier_of(obj) is not None:
             cls.poll_message_set("The object is shown live already")
+            return False
+        if not (obj.is_editable and obj.data.is_editable):
+            cls.poll_message_set(
+                "Linked from another file, which alone can keep live mode: make it local first"
+            )
             return False
         if obj.data.shape_keys is not None:
             cls.poll_message_set(

@@ -10,7 +10,7 @@ from pns_common import PnsError
 from .animation import redirect_drivers
 from .run import Made, Run, Share, refine_meshes
 from .settings import Settings, choice_of
-from .words import forecast, too_many
+from .words import forecast, listed, too_many
 
 # Above so many triangles the work goes on beside the interface, and there is no redo panel.
 AT_ONCE = 60_000
@@ -66,6 +66,16 @@ class Refining(Settings):
         layout.prop(self, "keep_original")
         draw_forecast(layout, chosen_objects(context), self.levels)
 
+    def refused(self, context: bpy.types.Context) -> bool:
+        """Return whether an object would be changed that its own file alone can keep; it is said."""
+        if self.keep_original:
+            return False
+        linked = [o.name for o in chosen_objects(context) if not o.is_editable]
+        if linked:
+            text = f"Linked from another file, and not to be changed here: {listed(linked)}"
+            self.report({"ERROR"}, f"{text}. Keep Original makes new objects")
+        return bool(linked)
+
     def begin(self, context: bpy.types.Context) -> Run:
         """Begin a run for the selected meshes.
 
@@ -110,6 +120,8 @@ class OBJECT_OT_pns_refine(Refining, bpy.types.Operator):  # noqa: N801 (Blender
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Refine at once."""
+        if self.refused(context):
+            return {"CANCELLED"}
         try:
             run = self.begin(context)
             self.place(context, run.finish())
@@ -129,6 +141,8 @@ class OBJECT_OT_pns_refine_large(Refining, bpy.types.Operator):  # noqa: N801 (B
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Begin, and come back with every tick of a timer."""
+        if self.refused(context):
+            return {"CANCELLED"}
         try:
             self.run = self.begin(context)
         except PnsError as error:

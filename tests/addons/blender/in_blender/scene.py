@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 
@@ -35,6 +37,19 @@ def placed(name: str, points: list, faces: list, edges: list = ()) -> bpy.types.
     bpy.context.scene.collection.objects.link(obj)
     chosen(obj)
     return obj
+
+
+def linked(obj: bpy.types.Object, path: Path) -> bpy.types.Object:
+    """The same object in an empty file, linked from a file that is written to the path."""
+    name = obj.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True, load_ui=False)
+    with bpy.data.libraries.load(str(path), link=True) as (_, wanted):
+        wanted.objects = [name]
+    there = bpy.data.objects[name]
+    bpy.context.scene.collection.objects.link(there)
+    chosen(there)
+    return there
 
 
 def chosen(obj: bpy.types.Object) -> None:

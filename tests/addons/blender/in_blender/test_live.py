@@ -4,7 +4,7 @@ import bl_ext.user_default.pns_refine.live as live
 import bpy
 import numpy as np
 import pytest
-from scene import chosen, cube, evaluated, grid, points_of, refined
+from scene import chosen, cube, evaluated, grid, linked, points_of, refined
 
 
 def started(obj, **settings):
@@ -194,6 +194,18 @@ def test_shape_keys_are_refused_in_words():
     obj = cube()
     obj.shape_key_add(name="Basis")
     with pytest.raises(RuntimeError, match="shape keys need one each"):
+        bpy.ops.object.pns_live_add()
+
+
+def test_a_linked_object_is_refused_in_words(tmp_path):
+    obj = linked(cube(), tmp_path / "library.blend")
+    with pytest.raises(RuntimeError, match="Linked from another file"):
+        bpy.ops.object.pns_live_add()
+    # An override can be changed, and its mesh cannot, which holds the settings.
+    override = obj.override_create()
+    bpy.context.scene.collection.objects.link(override)
+    chosen(override)
+    with pytest.raises(RuntimeError, match="Linked from another file"):
         bpy.ops.object.pns_live_add()
 
 

@@ -7,6 +7,7 @@ from scene import (
     chosen,
     cube,
     grid,
+    linked,
     points_of,
     refined,
     triangles_of,
@@ -52,6 +53,16 @@ def test_without_the_original_the_object_stays_itself():
     assert refined(obj, keep_original=False, levels=1) == obj
     assert len(obj.data.polygons) == 48
     assert len(bpy.data.objects) == 1
+
+
+def test_a_linked_object_is_copied_and_never_changed(tmp_path):
+    obj = linked(cube(), tmp_path / "library.blend")
+    with pytest.raises(RuntimeError, match="Linked from another file.*Cube.*Keep Original"):
+        bpy.ops.object.pns_refine(keep_original=False)
+    assert len(obj.data.polygons) == 6
+    new = refined(obj, levels=1)
+    assert new.library is None
+    assert (len(obj.data.polygons), len(new.data.polygons)) == (6, 48)
 
 
 def test_objects_that_share_a_mesh_share_the_result():
