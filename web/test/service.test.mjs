@@ -70,6 +70,18 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     }, { hash: "#levels=5&model=full" });
   });
 
+  test("a service that goes away at work, in words, with another try", async () => {
+    await with_({}, async ({ page, server }) => {
+      await choose(page, example);
+      await page.waitForFunction(() => /Refining/.test(document.querySelector("#work-text").textContent));
+      await server.kill();
+      await page.locator("#problem").waitFor();
+      assert.equal(await page.textContent("#problem-title"), "The connection broke");
+      assert.ok(await page.isVisible("#problem-again"));
+      assert.ok(await page.isHidden("#work"));
+    }, { hash: "#levels=5&model=full", foreseen: /net::ERR_/ });
+  });
+
   test("413: a body over the limit", async () => {
     await with_({ PNS_BODY: "10kB" }, async ({ page }) => {
       await page.locator("#limits", { hasText: "up to 10 kB" }).waitFor();

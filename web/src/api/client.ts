@@ -1,6 +1,6 @@
 /** Requests to the service, relative to where the page itself came from. */
 
-import { localProblem, problemOf } from "./problem";
+import { isAbort, localProblem, problemOf } from "./problem";
 
 export interface Limits {
   body_bytes: number;
@@ -46,6 +46,17 @@ export async function request(path: string, init: RequestInit = {}): Promise<Res
   }
   if (!response.ok) throw problemOf(response.status, await response.text());
   return response;
+}
+
+/** An answer's body as it comes; `nothing` is the title of the problem that it has none. */
+export async function* pieces(response: Response, nothing: string): AsyncGenerator<Uint8Array> {
+  if (!response.body) throw localProblem(nothing, "The answer has no body.");
+  try {
+    for await (const piece of response.body) yield piece;
+  } catch (error) {
+    if (isAbort(error)) throw error;
+    throw localProblem("The connection broke", "Is the service running, and the network up?");
+  }
 }
 
 export async function json<T>(path: string, init: RequestInit = {}): Promise<T> {

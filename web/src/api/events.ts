@@ -9,11 +9,11 @@ export interface ServerEvent {
 }
 
 /** The events of a text/event-stream body, as they come. */
-export async function* events(body: ReadableStream<Uint8Array>): AsyncGenerator<ServerEvent> {
-  const reader = body.pipeThrough(new TextDecoderStream() as TransformStream<Uint8Array, string>);
+export async function* events(body: AsyncIterable<Uint8Array>): AsyncGenerator<ServerEvent> {
+  const decoder = new TextDecoder();
   let pending = "";
-  for await (const piece of reader) {
-    pending += piece;
+  for await (const piece of body) {
+    pending += decoder.decode(piece, { stream: true });
     const blocks = pending.split(/\r\n\r\n|\n\n|\r\r/);
     pending = blocks.pop() ?? "";
     for (const block of blocks) {

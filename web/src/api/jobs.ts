@@ -1,6 +1,6 @@
 /** One refinement: upload, queue, stages, download. Each may be cancelled by its signal. */
 
-import { address, headers, request } from "./client";
+import { address, headers, pieces, request } from "./client";
 import { events } from "./events";
 import { localProblem, Problem, problemOf, type ProblemDocument } from "./problem";
 
@@ -91,8 +91,7 @@ async function finished(
   tell: (progress: Progress) => void,
 ): Promise<void> {
   const response = await request(`${location}/events`, { signal });
-  if (!response.body) throw localProblem("No progress came", "The event stream has no body.");
-  for await (const { event, data } of events(response.body)) {
+  for await (const { event, data } of events(pieces(response, "No progress came"))) {
     if (event !== "progress") continue;
     const job = JSON.parse(data) as Job;
     if (job.state === "done") return;
@@ -128,15 +127,14 @@ async function download(
     headers: { Accept: "model/gltf-binary" },
   });
   const total = Number(response.headers.get("Content-Length")) || null;
-  const pieces: Uint8Array[] = [];
+  const held: Uint8Array[] = [];
   let received = 0;
-  if (!response.body) throw localProblem("No result came", "The answer has no body.");
-  for await (const piece of response.body) {
-    pieces.push(piece);
+  for await (const piece of pieces(response, "No result came")) {
+    held.push(piece);
     received += piece.length;
     tell({ step: "download", share: total ? received / total : null });
   }
-  const bytes = await new Blob(pieces as BlobPart[]).arrayBuffer();
+  const bytes = await new Blob(held as BlobPart[]).arrayBuffer();
   return { bytes, timings: timings(response.headers.get("Server-Timing") ?? "") };
 }
 

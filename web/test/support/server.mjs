@@ -50,7 +50,14 @@ export async function serve(settings = {}) {
       const line = new RegExp(`^${name} (\\S+)$`, "m").exec(await (await fetch(metrics)).text());
       return Number(line[1]);
     },
+    /** As a machine that loses its power. */
+    async kill() {
+      const ended = new Promise((resolve) => child.on("exit", resolve));
+      child.kill("SIGKILL");
+      await ended;
+    },
     async close() {
+      if (child.signalCode) return;
       const ended = new Promise((resolve) => child.on("exit", resolve));
       child.kill("SIGTERM");
       // The second ends what is under way.
