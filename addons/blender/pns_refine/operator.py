@@ -67,7 +67,7 @@ class Refining(Settings):
         draw_forecast(layout, chosen_objects(context), self.levels)
 
     def refused(self, context: bpy.types.Context) -> bool:
-        """Return whether an object would be changed that its own file alone can keep; it is said."""
+        """Return whether an object would change that its own file alone can keep; it is said."""
         if self.keep_original:
             return False
         linked = [o.name for o in chosen_objects(context) if not o.is_editable]

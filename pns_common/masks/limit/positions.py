@@ -50,14 +50,18 @@ def limits_of_vertices(points: Float[Array, "W K"], around: Neighbours) -> Float
         neighbours = xp.where(on_curve, _neighbour_sum(points, around, spokes), neighbours)
     centre, weight = (beside(points, part, points.dtype)[:, None] for part in (centre, weight))
     limits = centre * points[: topology.vertex_count] + weight * neighbours
-    for mask in dart_masks(topology):
-        columns = np.concatenate([mask.vertices[:, None], around.of_spokes[mask.spokes]], axis=1)
-        weights = beside(points, mask.weights, points.dtype)[:, :, None]
-        at_darts = xp.sum(weights * gather(points, columns), axis=1)
-        is_dart = np.zeros(topology.vertex_count, dtype=bool)
-        is_dart[mask.vertices] = True
-        placed = scatter(at_darts, mask.vertices, topology.vertex_count)
-        limits = xp.where(beside(points, is_dart)[:, None], placed, limits)
+    darts = dart_masks(topology)
+    if len(darts.vertices):
+        own, weights = (
+            beside(points, part, points.dtype)[:, None] for part in (darts.centre, darts.weights)
+        )
+        ring = weights * gather(points, around.of_spokes[darts.spokes])
+        at_darts = own * gather(points, darts.vertices) + segment_sum(
+            ring, darts.of_dart, len(darts.vertices)
+        )
+        is_dart = beside(points, sharp == 1)[:, None]
+        placed = scatter(at_darts, darts.vertices, topology.vertex_count)
+        limits = xp.where(is_dart, placed, limits)
     return limits
 
 

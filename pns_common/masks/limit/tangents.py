@@ -8,7 +8,7 @@ With q_0 … q_k the neighbours of p in a sector of k faces, anticlockwise:
                  a = (sin(π/k) − S) / (8 λ − 2), c = −S − 2 a, S = Σ sin(πj/k),
                  λ = 3/8 + cos(π/k) / 4; for k = 1 the second difference, a = 1/2, c = −1
     corner       q_0 − p  and  q_k − p
-    dart         Σ sin(2πj/k) q_j and the even eigenvector, found by solving for it
+    dart         Σ sin(2πj/k) q_j and the even eigenvector, of which one number is solved for
 
 At k = 3 the curve's are the masks of Hoppe et al. 1994 for a regular crease; elsewhere theirs
 belong to their own rules next to creases, which are not the ones used here. Beyond k = 3 the
@@ -18,15 +18,19 @@ we call its tangent plane, and likewise at corners.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from pns_common.connectivity.topology import Topology, sharp_edge_count
 from pns_common.masks.limit.sectors import Sectors
 from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE, MIDPOINT, loop_beta
+
+# From so many spokes on the even mask of a dart has one form.
+MANY = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,13 +79,20 @@ def tangent_masks(topology: Topology, around: Sectors) -> TangentMasks:
     arriving[corner & around.last, 1] = 1
 
     is_dart = ~around.closed & (sharp == 1)
-    for valence in np.unique(size[is_dart]):
-        even, odd = dart_tangents(int(valence))
-        chosen = is_dart & (size == valence)
-        rows = chosen[around.of_corner]
-        centre[chosen] = even[0], 0.0
+    for valence, rows in _by_size(np.flatnonzero(is_dart[around.of_corner]), k):
+        even, odd = dart_tangents(valence)
+        centre[around.of_corner[rows]] = even[0], 0.0
         leaving[rows, 0], leaving[rows, 1] = even[1:][rank[rows]], odd[rank[rows]]
     return TangentMasks(leaving, arriving, centre)
+
+
+def _by_size(
+    rows: Int[np.ndarray, " N"], size: Int[np.ndarray, " C"]
+) -> Iterator[tuple[int, Int[np.ndarray, " M"]]]:
+    """Yield the rows of each size that occurs among them."""
+    rows = rows[np.argsort(size[rows], kind="stable")]
+    sizes, starts = np.unique(size[rows], return_index=True)
+    yield from zip(sizes.tolist(), np.split(rows, starts)[1:], strict=True)
 
 
 def _curve_weights(
@@ -96,11 +107,16 @@ def _curve_weights(
     return end, np.where(size > 1, -total - 2 * end, -1.0)
 
 
-@lru_cache(maxsize=256)
 def dart_tangents(valence: int) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " K"]]:
     """Return the even mask (centre first) and the odd one (neighbours alone), the crease at q_0."""
-    k = valence
-    angle = 2 * np.pi * np.arange(k) / k
+    angle = 2 * np.pi * np.arange(valence) / valence
+    even = _even_of_few(valence) if valence < MANY else _even_of_many(valence)
+    return even * np.sign(even[1:] @ np.cos(angle)), np.sin(angle)
+
+
+@cache
+def _even_of_few(k: int) -> Float[np.ndarray, " N"]:
+    """Return the second left eigenvector of a dart's matrix among those that are even."""
     beta = float(loop_beta(np.array([k]))[0])
     matrix = np.zeros((k + 1, k + 1))
     matrix[0, 0], matrix[0, 1:] = 1 - k * beta, beta
@@ -117,5 +133,31 @@ def dart_tangents(valence: int) -> tuple[Float[np.ndarray, " N"], Float[np.ndarr
     fold /= np.linalg.norm(fold, axis=1, keepdims=True)
     values, vectors = np.linalg.eig(fold @ matrix.T @ fold.T)
     second = np.argsort(-np.real(values))[1]
-    even: np.ndarray = fold.T @ np.real(vectors[:, second])
-    return even * np.sign(even[1:] @ np.cos(angle)), np.sin(angle)
+    return fold.T @ np.real(vectors[:, second])
+
+
+def _even_of_many(k: int) -> Float[np.ndarray, " N"]:
+    """Return the same for ``MANY`` spokes and more: a matrix of thousands would be too large.
+
+    With weight 1 of p, λ = 3/8 + cos(θ)/4 and t = k θ/2, columns 0 < j < k say
+    w_j = c (1 − cos(θ (j − k/2)) / cos t), c = 4 β / (cos θ − 1); that of q_0 says
+    (λ − 1/2) w_0 = β + w_1 / 4; and p's own, (λ − 1 + k β) = w_0 / 2 + 3/8 Σ w_j, is left to be
+    solved for t. Its second root lies between π and 3π/2, alone.
+    """
+    low, high = np.pi, 3 * np.pi / 2
+    while low < (middle := (low + high) / 2) < high:
+        _, missing = _even_at(middle, k)
+        low, high = (middle, high) if missing > 0 else (low, middle)
+    weights, _ = _even_at(low, k)
+    return weights / np.linalg.norm(weights)
+
+
+def _even_at(t: float, k: int) -> tuple[Float[np.ndarray, " N"], float]:
+    """Return the weights at a t, and by how much p's own column is missed."""
+    beta, theta = float(loop_beta(np.array([k]))[0]), 2 * t / k
+    rate = EDGE_ENDPOINT + np.cos(theta) / 4
+    c = -2 * beta / np.sin(theta / 2) ** 2
+    inner = c * (1 - np.cos(theta * (np.arange(1, k) - k / 2)) / np.cos(t))
+    at_crease = (beta + inner[0] / 4) / (rate - MIDPOINT)
+    missing = rate - 1 + k * beta - at_crease / 2 - EDGE_ENDPOINT * inner.sum()
+    return np.concatenate([[1.0, at_crease], inner]), float(missing)

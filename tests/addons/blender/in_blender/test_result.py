@@ -57,7 +57,7 @@ def test_without_the_original_the_object_stays_itself():
 
 def test_a_linked_object_is_copied_and_never_changed(tmp_path):
     obj = linked(cube(), tmp_path / "library.blend")
-    with pytest.raises(RuntimeError, match="Linked from another file.*Cube.*Keep Original"):
+    with pytest.raises(RuntimeError, match=r"Linked from another file.*Cube.*Keep Original"):
         bpy.ops.object.pns_refine(keep_original=False)
     assert len(obj.data.polygons) == 6
     new = refined(obj, levels=1)

@@ -69,7 +69,7 @@ def test_at_a_corner_each_edge_shrinks_by_a_half():
     np.testing.assert_allclose(after, before / 2, atol=1e-14)
 
 
-@pytest.mark.parametrize("k", [3, 5, 8])
+@pytest.mark.parametrize("k", [3, 5, 8, 9, 10, 33, 200])
 def test_at_a_dart_the_odd_mask_is_a_sine_and_both_span_the_plane_of_a_step(k):
     even, odd = dart_tangents(k)
     np.testing.assert_allclose(odd, np.sin(2 * np.pi * np.arange(k) / k), atol=1e-15)
