@@ -31,13 +31,7 @@ def unrolled_torus(faces: int) -> tuple[IndexedTriangles, np.ndarray]:
     whole, (columns, rows) = torus(faces), _torus_size(faces)
     u, v = np.divmod(np.arange((columns + 1) * (rows + 1)), rows + 1)
     place = u % columns * rows + v % rows
-    i, j = np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
-    here, width = i * (rows + 1) + j, rows + 1
-    quads = [
-        np.stack([here, here + width, here + width + 1], axis=-1),
-        np.stack([here, here + width + 1, here + 1], axis=-1),
-    ]
-    triangles = np.stack(quads, axis=-2).reshape(-1, 3)
+    triangles = _cut_quads(columns, rows)
     uv = np.stack([u / columns, v / rows], axis=1)
     mesh = whole.vertices, whole.faces
     normals = angle_weighted_normals(*mesh, whole.faces, len(whole.vertices), WHOLE)
@@ -60,11 +54,18 @@ def patch(faces: int, bent: float = 1.0) -> Mesh:
     z = 0.2 * np.exp(-30 * (x + 0.3 * np.sin(2 * y)) ** 2) + 0.05 * np.sin(5 * y)
     if bent < 1:
         z = z * np.clip(10 * (2 * bent - 1 - x), 0, 1)
-    i, j = np.meshgrid(np.arange(n - 1), np.arange(n - 1), indexing="ij")
-    v = i * n + j
-    pairs = [np.stack([v, v + n, v + n + 1], axis=-1), np.stack([v, v + n + 1, v + 1], axis=-1)]
-    triangles = np.stack(pairs, axis=-2).reshape(-1, 3)
-    return Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), triangles)
+    return Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), _cut_quads(n - 1, n - 1))
+
+
+def _cut_quads(columns: int, rows: int) -> np.ndarray:
+    """Return the triangles of a sheet of so many quads, each cut in two: (2 columns rows, 3)."""
+    i, j = np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
+    here, width = i * (rows + 1) + j, rows + 1
+    pairs = [
+        np.stack([here, here + width, here + width + 1], axis=-1),
+        np.stack([here, here + width + 1, here + 1], axis=-1),
+    ]
+    return np.stack(pairs, axis=-2).reshape(-1, 3)
 
 
 def parts(faces: int) -> Mesh:
@@ -84,11 +85,7 @@ def parts(faces: int) -> Mesh:
 def _wavy_box(cells: int) -> Mesh:
     """Make the surface of [−1, 1]³ as so many quads a side, cut in two, and bend it."""
     u, v = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
-    i, j = np.meshgrid(np.arange(cells), np.arange(cells), indexing="ij")
-    here = i * (cells + 1) + j
-    quads = np.stack([here, here + cells + 1, here + cells + 2, here + 1], axis=-1).reshape(-1, 4)
-    side = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    corners, triangles = [], []
+    side, corners, triangles = _cut_quads(cells, cells), [], []
     for axis in range(3):
         for at in (0, cells):
             place = np.empty((cells + 1, cells + 1, 3), dtype=np.int64)

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from array_api_compat import array_namespace, is_torch_array
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Bool, Float, Int, Shaped
 
 # A numpy array or a torch tensor: no static type covers both.
 Array: TypeAlias = Any
@@ -78,6 +78,13 @@ def scatter(
     spread = np.zeros(shape, dtype=values.dtype)
     spread[rows] = values
     return spread
+
+
+def marked(rows: Int[np.ndarray, " N"], count: int) -> Bool[np.ndarray, " S"]:
+    """Return which of ``count`` rows are named, however often."""
+    marks = np.zeros(count, dtype=bool)
+    marks[rows] = True
+    return marks
 
 
 def detached(values: Array) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Int
 
+from pns_common.base.arrays import marked
 from pns_common.base.parameters import is_number, is_whole
 from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.errors import ParameterError
@@ -87,8 +88,7 @@ def crease_classes(
     if len(named) == 0:
         return edge_class
     # Few edges have both ends at creases: all others need no look.
-    at_creases = np.zeros(vertex_count, dtype=bool)
-    at_creases[named.reshape(-1)] = True
+    at_creases = marked(named.reshape(-1), vertex_count)
     rows = np.flatnonzero(at_creases[edges[:, 0]] & at_creases[edges[:, 1]])
     keys, named_keys = (pair_keys(pairs, vertex_count) for pairs in (edges[rows], named))
     lost = named_keys[~np.isin(named_keys, keys)]

@@ -14,6 +14,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Int
 
+from pns_common.base.arrays import marked
 from pns_common.mesh import repeated_vertex
 
 # The children of a face, by its corners a, b, c (0, 1, 2) and edge vertices ab, bc, ca (3, 4, 5).
@@ -63,8 +64,7 @@ class Topology:
     @cached_property
     def smooth_vertices(self) -> Bool[np.ndarray, " V"]:
         """Vertices with one closed ring of interior edges: those that a learned rule may move."""
-        used = np.zeros(self.vertex_count, dtype=bool)
-        used[self.edges.reshape(-1)] = True
+        used = marked(self.edges.reshape(-1), self.vertex_count)
         return used & (sharp_edge_count(self) == 0) & ~multi_fan_vertices(self)
 
     @cached_property

@@ -60,8 +60,8 @@ def find_curves(points: Float[Array, "V 3"], topology: Topology, kinds: Kinds) -
     """Return the curves of a level."""
     edges = np.flatnonzero(are_of(kinds, topology.edge_class))
     movable = _between_two(topology, topology.edges[edges])
-    rows, first, second = np.flatnonzero(movable), *topology.edges[edges].T
-    edges = edges[movable[first] | movable[second]]
+    rows, ends = np.flatnonzero(movable), topology.edges[edges]
+    edges = edges[movable[ends[:, 0]] | movable[ends[:, 1]]]
     sides, middle = _along(topology.edges[edges], movable), gather(points, rows)
     a, b = (gather(points, sides[:, side]) - middle for side in (0, 1))
     return Curves(movable, edges, rows, sides, a, b)

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.arrays import gather
-from pns_common.connectivity.topology import Topology
+from pns_common.connectivity.edges_alone import edges_alone
 from pns_common.formula.correction import Correction, proximity_ratio
 from pns_common.formula.curve_prior import are_of, on_boundary
 from pns_common.fused.additions import Additions
@@ -42,24 +42,9 @@ class SharpLevel:
         length: float | Float[np.ndarray, " V"],
     ) -> SharpLevel:
         """Take the sharp edges of a mesh; ``length`` is R, or each vertex's own."""
-        edges = mesh.sharp_edges
-        ends = mesh.edges[edges].astype(np.int64)
-        at_sharp = np.zeros(len(points), dtype=bool)
-        at_sharp[ends] = True
-        vertices, numbers = np.flatnonzero(at_sharp), np.cumsum(at_sharp) - 1
-        pairs = numbers[ends]
-        no_faces, no_normals = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3))
-        nothing = np.full((len(edges), 2), -1)
-        topology = Topology(
-            vertex_count=len(vertices),
-            faces=no_faces,
-            edges=pairs,
-            face_edges=no_faces,
-            half_edges=nothing,
-            stencil=np.concatenate([pairs, nothing], axis=1),
-            edge_class=mesh.edge_class[edges],
-            interior=np.zeros(0, dtype=np.int64),
-        )
+        edges, no_normals = mesh.sharp_edges, np.zeros((0, 3))
+        of_edges = mesh.edges[edges], mesh.edge_class[edges]
+        vertices, topology = edges_alone(*of_edges, len(points))
         own = length[vertices] if isinstance(length, np.ndarray) else length
         return cls(ControlLevel(points[vertices], topology, no_normals, own), vertices, edges)
 
@@ -81,20 +66,19 @@ class CurveMoves:
 
     def move_vertices(self, loop: Float[np.ndarray, "V 3"], added: Additions) -> None:
         """Add to curves' vertices, which Loop puts at ``loop``."""
-        if self.rule is None or self.sharp is None or len(self.pushes) == 0:
-            return
-        curves = self.sharp.level.curves(self.rule.kinds)
-        rows = self.sharp.vertices[curves.rows]
-        _add(self.rule.at_vertices(self.sharp.level, gather(loop, rows)), rows, added)
-        if added.corrected is not None:
-            added.corrected[rows] = True
+        if len(self.pushes) and self.rule is not None and self.sharp is not None:
+            level = self.sharp.level
+            rows = self.sharp.vertices[level.curves(self.rule.kinds).rows]
+            _add(self.rule.at_vertices(level, gather(loop, rows)), rows, added)
+            if added.corrected is not None:
+                added.corrected[rows] = True
 
     def move_edges(self, added: Additions) -> None:
         """Add to curves' edges likewise."""
-        if self.rule is None or self.sharp is None or len(self.pushes) == 0:
-            return
-        curves = self.sharp.level.curves(self.rule.kinds)
-        _add(self.rule.at_edges(self.sharp.level), self.sharp.edges[curves.edges], added)
+        if len(self.pushes) and self.rule is not None and self.sharp is not None:
+            level = self.sharp.level
+            rows = self.sharp.edges[level.curves(self.rule.kinds).edges]
+            _add(self.rule.at_edges(level), rows, added)
 
     def shared(self, vertex_count: int, edge_count: int) -> Bool[np.ndarray, " W"] | None:
         """Return what the fold guard takes for shared with other pieces; None where nothing is."""

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import norm
+from pns_common.base.arrays import marked, norm
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.creases import Creases, crease_classes, crease_halves
 from pns_common.connectivity.topology import EdgeClass, Topology
@@ -173,9 +173,7 @@ def crease_shift_of(
     def shift(placed: Float[np.ndarray, "W 3"]) -> CreaseShift:
         smooth = np.empty_like(points)
         place_vertices(points, _without_creases(mesh), blocks, smooth)
-        at_creases = np.zeros(len(points), dtype=bool)
-        at_creases[mesh.edges[rows].reshape(-1)] = True
-        vertices = np.flatnonzero(at_creases)
+        vertices = np.flatnonzero(marked(mesh.edges[rows].reshape(-1), len(points)))
         of_vertices = norm(np.take(placed, vertices, axis=0) - np.take(smooth, vertices, axis=0))
         connectivity = mesh.faces, mesh.edges, mesh.half_edges
         of_edges = shift_of_edges(points, *connectivity, rows, placed)

@@ -23,7 +23,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import dot, gather, segment_sum, unit
+from pns_common.base.arrays import dot, gather, marked, segment_sum, unit
 from pns_common.connectivity.creases import with_crease_rows
 from pns_common.connectivity.topology import EdgeClass, Topology
 
@@ -160,9 +160,8 @@ def go_on(
 
 def at_others(mesh: Edges) -> Bool[np.ndarray, " V"]:
     """Return which vertices are on an edge that is not interior: there a line may end."""
-    at = np.zeros(mesh.vertex_count, dtype=bool)
-    at[mesh.edges[mesh.edge_class != EdgeClass.INTERIOR].reshape(-1)] = True
-    return at
+    others = mesh.edges[mesh.edge_class != EdgeClass.INTERIOR]
+    return marked(others.reshape(-1), mesh.vertex_count)
 
 
 def _normals_at(

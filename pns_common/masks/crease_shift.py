@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.arrays import norm
+from pns_common.base.arrays import marked, norm
 from pns_common.connectivity.creases import with_creases
-from pns_common.connectivity.topology import EdgeClass, Topology, build_topology
+from pns_common.connectivity.edges_alone import edges_alone
+from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.masks.limit.positions import limit_positions
 from pns_common.masks.stencils import loop_edge_point, loop_vertex_vertices
 
@@ -59,12 +60,11 @@ def crease_shift(
     if len(rows) == 0:
         return None
     middle = shift_of_edges(points, faces, edges, half_edges, rows, placed)
-    at_creases = np.zeros(len(points), dtype=bool)
-    at_creases[edges[rows].reshape(-1)] = True
+    at_creases = marked(edges[rows].reshape(-1), len(points))
     around = np.flatnonzero(at_creases[edges[:, 0]] | at_creases[edges[:, 1]])
     classes = edge_class[around]
     smooth_class = np.where(classes == CREASE, INTERIOR, classes)
-    near, plain = _cut_out(edges[around], smooth_class, len(points))
+    near, plain = edges_alone(edges[around], smooth_class, len(points))
     known = at_creases[near]
     vertices, smooth = near[known], loop_vertex_vertices(points[near], plain)[known]
     return CreaseShift(vertices, norm(placed[vertices] - smooth), rows, middle)
@@ -95,8 +95,7 @@ def limit_crease_shift(
     """Return how far creases move a mesh's limits; None without creases."""
     if len(creases) == 0:
         return None
-    at_creases = np.zeros(len(points), dtype=bool)
-    at_creases[creases.reshape(-1)] = True
+    at_creases = marked(creases.reshape(-1), len(points))
     # There every vertex at a crease has its whole ring; of others nothing differs.
     near = np.asarray(faces[at_creases[faces].any(axis=1)], dtype=np.int64)
     vertices, local = np.unique(near, return_inverse=True)
@@ -107,23 +106,3 @@ def limit_crease_shift(
     )
     nothing = np.zeros(0, dtype=np.int64)
     return CreaseShift(vertices, moved, nothing, np.zeros(0))
-
-
-def _cut_out(
-    edges: Int[np.ndarray, "E 2"], edge_class: Int[np.ndarray, " E"], vertex_count: int
-) -> tuple[Int[np.ndarray, " N"], Topology]:
-    """Return the vertices of some edges, and as much of a topology as Loop's vertex rule reads."""
-    used = np.zeros(vertex_count, dtype=bool)
-    used[edges.reshape(-1)] = True
-    vertices, count = np.flatnonzero(used), len(edges)
-    none = np.zeros((0, 3), dtype=np.int64)
-    return vertices, Topology(
-        vertex_count=len(vertices),
-        faces=none,
-        edges=(np.cumsum(used) - 1)[edges],
-        face_edges=none,
-        half_edges=np.full((count, 2), -1),
-        stencil=np.full((count, 4), -1),
-        edge_class=edge_class,
-        interior=np.flatnonzero(edge_class == INTERIOR),
-    )

@@ -19,7 +19,7 @@ from pns_common.fused.kernels.compiled import (
     natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
-from pns_common.fused.kernels.rings import between, dot, row
+from pns_common.fused.kernels.rings import between, divisor, dot, row
 from pns_common.geometry.crease_lines import CORNER, ROUNDS
 
 
@@ -86,8 +86,7 @@ def drop_loose_ends(points, edges, flat, at_rim, cosine, count, total, left):
             if left[i]:
                 a, b = edges[flat[i], 0], edges[flat[i], 1]
                 v = between(points, a, b)
-                square = dot(v, v)
-                size = math.sqrt(square) if square > 0 else math.inf
+                size = divisor(v)
                 count[a] += 1
                 count[b] += 1
                 for k in range(3):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from pns_common.fused.kernels.compiled import (
     FLAGS_OUT,
     INDEX,
@@ -19,7 +17,7 @@ from pns_common.fused.kernels.compiled import (
     natural,
 )
 from pns_common.fused.kernels.normals import NORMAL_NUMBERS
-from pns_common.fused.kernels.rings import HEIGHT, cross, dot, norm, row
+from pns_common.fused.kernels.rings import HEIGHT, cross, divisor, dot, norm, row
 from pns_common.fused.kernels.together import TOGETHER, keep, kept
 from pns_common.geometry.frames import ANTIPARALLEL
 from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
@@ -32,12 +30,6 @@ LOGS, DIHEDRAL, ENDS, WINGS, UMBRELLAS = 1, 5, 6, 10, 14
 # h, then what is made of them in their place.
 FIRST, SECOND, SPOKE, H = 0, 3, 6, 9
 TANGENT, NORMAL, BINORMAL, X, SINE, FALLBACK, HELD = 0, 3, 6, 9, 10, 11, 12
-
-
-def _reach(v):
-    """Return the length of a vector that others are divided by; infinite where it has none."""
-    square = dot(v, v)
-    return math.sqrt(square) if square > 0 else math.inf
 
 
 def _after(half_edge):
@@ -68,7 +60,7 @@ def _turn(held, symmetric):
         cosine = dot(n, m)
         undefined = (held[H * TOGETHER + lane] == 0) | (dot(n, n) == 0) | (dot(m, m) == 0)
         fallback = undefined | (cosine <= -1 + ANTIPARALLEL)
-        size = _reach(spoke)
+        size = divisor(spoke)
         tangent = (
             1.0 if fallback else spoke[0] / size,
             0.0 if fallback else spoke[1] / size,
@@ -85,7 +77,7 @@ def _turn(held, symmetric):
             mean[1] - along * tangent[1],
             mean[2] - along * tangent[2],
         )
-        size = _reach(upwards)
+        size = divisor(upwards)
         normal = upwards[0] / size, upwards[1] / size, upwards[2] / size
         keep(held, TANGENT, lane, tangent)
         keep(held, NORMAL, lane, normal)

@@ -63,6 +63,12 @@ def norm(v):
     return math.sqrt(square) if square > 0 else 0.0
 
 
+def divisor(v):
+    """Return the length that makes a unit vector of v; infinite where it has none."""
+    square = dot(v, v)
+    return math.sqrt(square) if square > 0 else math.inf
+
+
 def clear_normal(mean):
     """Return m̂ of a mean normal, as in ``prior.clear_normals``."""
     agreement = norm(mean)

@@ -17,6 +17,7 @@ from pns_common.base.arrays import (
     beside,
     cross,
     gather,
+    marked,
     namespace,
     scatter,
     segment_sum,
@@ -119,8 +120,7 @@ class _CutOut:
     def put(self, found: Float[Array, "N K"], limits: Float[Array, "W K"]) -> Float[Array, "W K"]:
         """Return limits with what was found of the irregular vertices in their rows."""
         rows, count = self.vertices[self.irregular], len(limits)
-        is_irregular = np.zeros(count, dtype=bool)
-        is_irregular[rows] = True
+        is_irregular = marked(rows, count)
         spread = scatter(gather(found, self.irregular), rows, count)
         return namespace(limits).where(beside(limits, is_irregular)[:, None], spread, limits)
 
@@ -130,8 +130,7 @@ def _cut_out(topology: Topology) -> _CutOut | None:
     rows = irregular_in_split(topology)
     if len(rows) == 0:
         return None
-    is_irregular = np.zeros(topology.vertex_count + len(topology.edges), dtype=bool)
-    is_irregular[rows] = True
+    is_irregular = marked(rows, topology.vertex_count + len(topology.edges))
     children, creases = split(topology), crease_children(topology)
     vertices, faces = np.unique(children[is_irregular[children].any(axis=1)], return_inverse=True)
     plain = build_topology(faces.reshape(-1, 3), len(vertices))
