@@ -51,7 +51,8 @@ class Correction:
 
     Attributes:
         displacement: δ, in the mesh's coordinates.
-        envelope: ρ = C h² / R, the largest length that δ may have, in the mesh's units.
+        envelope: the largest length that δ may have, in the mesh's units: ρ = C h² / R, but 0 where
+            the gate is shut, since nothing is added there whatever the network says.
         gate: γ ∈ [0, 1].
         degenerate: edges whose frame is the fallback.
     """
@@ -101,7 +102,7 @@ def correct(
     envelope = budget_per_length * frames.length**2
     local = project_to_ball(eta)
     displacement = (envelope * gamma)[:, None] * rotate(frames, local)
-    return Correction(displacement, envelope, gamma, frames.degenerate)
+    return Correction(displacement, where_allowed(envelope, gamma), gamma, frames.degenerate)
 
 
 def shortened(vectors: Float[Array, "N 3"], longest: Float[Array, " N"]) -> Float[Array, "N 3"]:
@@ -140,7 +141,12 @@ def correct_scale_free(
     length = longest_side(stencil, frames) if wide_bound else frames.length
     envelope = budget_per_length * length**2
     displacement = gamma[:, None] * shortened(wanted, envelope)
-    return Correction(displacement, envelope, gamma, frames.degenerate)
+    return Correction(displacement, where_allowed(envelope, gamma), gamma, frames.degenerate)
+
+
+def where_allowed(envelope: Float[Array, " N"], gate: Float[Array, " N"]) -> Float[Array, " N"]:
+    """Return ρ, 0 where the gate is shut."""
+    return namespace(envelope).where(gate != 0, envelope, 0.0)
 
 
 def where_open(

@@ -28,6 +28,7 @@ from pns_common.formula.correction import (
     NetworkFunction,
     project_to_ball,
     shortened,
+    where_allowed,
     where_open,
 )
 from pns_common.formula.gate import gate_of
@@ -60,7 +61,7 @@ class VertexOperator:
         gamma, envelope, learned = self._evaluated(rings, vertices, budget_per_length)
         return Correction(
             displacement=(envelope * gamma)[:, None] * project_to_ball(learned),
-            envelope=envelope,
+            envelope=where_allowed(envelope, gamma),
             gate=gamma,
             degenerate=xp.zeros_like(gamma, dtype=xp.bool),
         )
@@ -83,7 +84,7 @@ class VertexOperator:
         wanted = prior + asked * learned
         displacement = gamma[:, None] * shortened(wanted, envelope)
         degenerate = xp.zeros_like(gamma, dtype=xp.bool)
-        return Correction(displacement, envelope, gamma, degenerate)
+        return Correction(displacement, where_allowed(envelope, gamma), gamma, degenerate)
 
     def _evaluated(
         self, rings: Rings, vertices: Int[np.ndarray, " N"], budget_per_length: BudgetPerLength

@@ -64,7 +64,8 @@ class Placement:
         gate: γ, 0 where there is no correction.
         degenerate: vertices whose frame was the fallback.
         corrected: of a vertex rule that is not Loop's, the vertices that it may move.
-        envelope: ρ = C h² / R, the longest that δ may be; None where the rule names no bound.
+        envelope: the longest that δ may be, ρ = C h² / R, or 0 where a gate is shut; None where the
+            rule names no bound.
     """
 
     loop: Float[Array, "N 3"]

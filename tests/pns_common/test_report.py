@@ -36,6 +36,25 @@ def test_the_distance_is_the_largest_displacement_where_one_level_is_learned():
     assert not {"displacement_max", "envelope_max", "guarded"} & set(second)
 
 
+def bump_in_a_plane(width):
+    """A bump of one shape in a plane, whose faces are ``width`` times as large beside it."""
+    points, faces = grid(13)
+    x, y = points[:, 0], points[:, 1]
+    z = np.where(np.hypot(x, y) < 0.3, 0.1, 0.0)
+    far = [c + (width - 1) * np.sign(c) * np.maximum(np.abs(c) - 0.6, 0) for c in (x, y)]
+    return Mesh(np.stack([*far, z], axis=1), faces)
+
+
+@pytest.mark.parametrize("model", ["full", "paper"])
+def test_what_lies_in_a_plane_is_allowed_nothing_however_large_its_faces_are(model):
+    scheme = pns(load_model(model))
+    bounds = [
+        refine(bump_in_a_plane(width), scheme, reference_length=1.0).report["limit_distance_bound"]
+        for width in (1, 30)
+    ]
+    assert bounds[0] == bounds[1] > 0
+
+
 def test_levels_add_up_where_every_level_is_learned():
     report = refine(Mesh(*bumpy_sphere()), pns(load_model("paper")), 3).report
     assert report["learned_levels"] == 3

@@ -239,11 +239,11 @@ def shortened(v, longest):
 
 
 def write(index, delta, gate, envelope, displacement, ratio, gates, envelopes):
-    """Write δ, ‖δ‖ / ρ (0 where the envelope is empty), γ and ρ into their arrays."""
+    """Write δ, ‖δ‖ / ρ (0 where the envelope is empty), γ, and ρ where the gate is not shut."""
     for k in range(3):
         displacement[index, k] = delta[k]
     ratio[index] = norm(delta) / envelope if envelope > 0 else 0.0
-    gates[index], envelopes[index] = gate, envelope
+    gates[index], envelopes[index] = gate, envelope if gate != 0 else 0.0
 
 
 @kernel(
