@@ -25,12 +25,14 @@ def guard_scale(
     displacement: Float[np.ndarray, "W 3"],
     blocks: Blocks,
     shared: Bool[np.ndarray, " W"] | None = None,
+    moved: Bool[np.ndarray, " M"] = EVERYWHERE,
 ) -> Float[np.ndarray, " W"] | None:
     """Return s for each new vertex of the split of ``mesh``; ``shared`` as the guard has it.
 
-    None where it is 1 everywhere.
+    None where it is 1 everywhere. ``moved`` are the vertices whose displacement is not 0: children
+    without one are Loop's.
     """
-    scale, changed = UNSCALED, EVERYWHERE
+    scale, changed = UNSCALED, moved
     is_shared = NONE_SHARED if shared is None else shared
     for rounds in count():
         around = loop, displacement, scale, is_shared, math.cos(guard.angle)
@@ -50,7 +52,7 @@ def _touched(
     changed: Bool[np.ndarray, " C"],
     blocks: Blocks,
 ) -> Bool[np.ndarray, " W"]:
-    """Return folded children's corners; after the first round only those that ``changed`` count."""
+    """Return folded children's corners, of children whose corners ``changed``; empty: of all."""
     touched = np.zeros(mesh.vertex_count + len(mesh.edges), dtype=bool)
     args = mesh.faces, mesh.face_edges, mesh.vertex_count, changed
 

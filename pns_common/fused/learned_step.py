@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from pns_common.base.blocks import Blocks
+from pns_common.fused.added_by_rules import added_by_rules, curve_rule
 from pns_common.fused.additions import Additions
 from pns_common.fused.child_faces import look_at_children
-from pns_common.fused.curves import CurveMoves, curves_of
-from pns_common.fused.edge_rule import add_at_edges
+from pns_common.fused.curves import curves_of
 from pns_common.fused.guard import guard_scale
 from pns_common.fused.level import FusedLevel, FusedStep, crease_shift_of
 from pns_common.fused.loop_points import add_to, loop_points
-from pns_common.fused.surroundings import Surroundings
-from pns_common.fused.vertex_rule import add_at_vertices
 from pns_common.levels.diagnostics import LevelReport, Reach, bound_of, level_report
 from pns_common.levels.step import AddedStep
-from pns_common.rules.curves import CurveRule
-from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
-from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
 from pns_common.schemes import Scheme
 
 # Far above rounding, and the cosine of more than any useful fold angle.
@@ -87,8 +82,9 @@ def learned_points(
         ModelError: a network returned something that is not finite, or of another shape.
     """
     mesh, count = level.mesh, level.mesh.vertex_count
-    curves = curves_of(_curve_rule(scheme), level.points, mesh, length)
-    vertices, edges, added = _added_by_rules(level, scheme, length, blocks, curves)
+    curves = curves_of(curve_rule(scheme), level.points, mesh, length)
+    made = added_by_rules(level, scheme, length, blocks, curves)
+    vertices, edges, added = made.vertices, made.edges, made.both
     # Not before: what the rules read has the most memory.
     loop = loop_points(level.points, mesh, blocks)
     curves.move_vertices(loop[:count], vertices)
@@ -96,7 +92,8 @@ def learned_points(
     scale = None
     if scheme.guard is not None:
         shared = curves.shared(count, len(edges.ratio))
-        scale = guard_scale(scheme.guard, mesh, loop, added.displacement, blocks, shared)
+        moved = made.moved_with(curves)
+        scale = guard_scale(scheme.guard, mesh, loop, added.displacement, blocks, shared, moved)
         if scale is None:
             scale = np.broadcast_to(1.0, len(loop))
         else:
@@ -109,42 +106,3 @@ def learned_points(
     largest, longest = add_to(points, added.displacement, first, blocks)
     counterpart = None if guarded else loop
     return LearnedPoints(points, largest, longest, counterpart, vertices, edges, added, scale)
-
-
-def _added_by_rules(
-    level: FusedLevel,
-    scheme: Scheme,
-    length: float | Float[np.ndarray, " V"],
-    blocks: Blocks,
-    curves: CurveMoves,
-) -> tuple[Additions, Additions, Additions]:
-    """Return what both rules add but on curves: to vertices, to edges, and both together."""
-    mesh, count = level.mesh, level.mesh.vertex_count
-    of_level = level.points, mesh, level.faces, level.several_fans
-    seen = Surroundings(*of_level, length, blocks, curves, _altitudes(scheme))
-    edge_rule, vertex_rule = scheme.edge_rule, scheme.vertex_rule
-    assert isinstance(edge_rule, LearnedEdgeRule | ScaleFreeEdgeRule)
-    added = Additions.unwritten(count + len(mesh.edges))
-    vertices, edges = added.rows(slice(0, count)), added.rows(slice(count, None))
-    if isinstance(vertex_rule, LearnedVertexRule | ScaleFreeVertexRule):
-        # A copy: the rule of curves moves more vertices.
-        vertices = replace(vertices, corrected=seen.rings.smooth.copy())
-        add_at_vertices(vertex_rule, seen, vertices)
-        seen.forget_rings()
-    else:
-        vertices.clear(slice(None))
-    add_at_edges(edge_rule, seen, edges)
-    level.faces.forget()
-    return vertices, edges, added
-
-
-def _curve_rule(scheme: Scheme) -> CurveRule | None:
-    rule = scheme.edge_rule
-    return rule.curves if isinstance(rule, ScaleFreeEdgeRule) else None
-
-
-def _altitudes(scheme: Scheme) -> float:
-    """Return α of the network's lengths; infinite where they are h."""
-    rule = scheme.edge_rule
-    altitudes = rule.form.network_altitudes if isinstance(rule, ScaleFreeEdgeRule) else None
-    return math.inf if altitudes is None else altitudes

@@ -11,6 +11,7 @@ from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import EdgeClass
 from pns_common.formula.side_gate import GENTLE_TO_SHARP, widest, with_neighbours
 from pns_common.fused.face_measures import FaceMeasures
+from pns_common.fused.kernels.fans import mark_used
 from pns_common.fused.kernels.rings import (
     VERTEX_COLUMNS,
     face_bends,
@@ -99,10 +100,27 @@ def measure_rings(
     blocks.run(len(mesh.edges), edges)
     by_owner.run(count, around)
     by_owner.run(count, beyond)
-    smooth = (valence > 0) & ~several_fans
+    smooth = _smooth(valence > 0, mesh, several_fans)
+    return RingMeasures(fields, means, jumps, network_lengths, valence, smooth)
+
+
+def smooth_vertices(
+    mesh: MeshEdges, several_fans: Bool[np.ndarray, " V"], blocks: Blocks
+) -> Bool[np.ndarray, " V"]:
+    """Return the vertices with one closed ring of interior edges, without a look at the rings."""
+    used = np.zeros(mesh.vertex_count, dtype=bool)
+    blocks.run(len(mesh.faces), lambda rows: mark_used(mesh.faces, rows.start, rows.stop, used))
+    return _smooth(used, mesh, several_fans)
+
+
+def _smooth(
+    used: Bool[np.ndarray, " V"], mesh: MeshEdges, several_fans: Bool[np.ndarray, " V"]
+) -> Bool[np.ndarray, " V"]:
+    """Return the same of those that have an edge."""
+    smooth = used & ~several_fans
     if len(mesh.sharp):
         smooth &= mesh.sharp == 0
-    return RingMeasures(fields, means, jumps, network_lengths, valence, smooth)
+    return smooth
 
 
 def measure_pushes(rings: RingMeasures, blocks: Blocks) -> Float[np.ndarray, "V 3"]:

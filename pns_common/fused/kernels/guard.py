@@ -130,8 +130,8 @@ def find_folds(
     Args:
         scale: s of each vertex; empty where it is 1 everywhere.
         shared: vertices that are marked only if they fold the child by themselves; empty for none.
-        changed: vertices whose s changed in the last round: other faces are as they were. Empty in
-            the first round.
+        changed: vertices whose s changed in the last round, or that move at all in the first:
+            other faces are as they were. Empty: all are looked at.
         held: (HELD TOGETHER,) overwritten.
         touched: out, False on entry; threads may write the same True at once.
     """
