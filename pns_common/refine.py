@@ -26,6 +26,7 @@ from pns_common.fused import (
     kernels_pay,
 )
 from pns_common.fused.known import kernels_know
+from pns_common.geometry.side_lengths import measure_sides
 from pns_common.levels.array_steps import array_steps
 from pns_common.levels.diagnostics import LevelReport, level_report, limit_distances
 from pns_common.levels.progress import level_costs, refinement_progress
@@ -47,6 +48,8 @@ NO_SHIFT = Deferred(lambda: 0.0)
 class Report(TypedDict):
     """What a refinement did and how near to Loop it stayed. No times: same input, same report.
 
+    ``prior_strength`` is s of the prior for this mesh (formula/prior_strength.py); None without a
+    prior.
     ``learned_levels`` are those at which the scheme's own rules acted. ``limit_distance`` is the
     sum over all levels of the largest displacement, in the mesh's units: no vertex, and no point of
     the limit surface that Loop makes of the result, is farther than that from where Loop would have
@@ -60,6 +63,7 @@ class Report(TypedDict):
     model: str | None
     model_hash: str | None
     reference_length: float
+    prior_strength: float | None
     multi_fan_vertices: int
     learned_levels: int
     limit_distance: float
@@ -142,14 +146,19 @@ def refine(
     costs = level_costs(len(mesh.faces), levels, scheme.learned_levels)
     # Loop has no use for a unit of length; its report names one when it is read.
     unit = 1.0 if scheme.learned_levels == 0 else length()
-    arguments = (mesh, scheme, levels, unit, chosen_creases(creases, scheme))
+    kept = chosen_creases(creases, scheme)
     if kernels_can_serve(mesh, scheme, levels, unit) and kernels_pay(costs):
         # Loads the compiler's runtime, which whoever only imports the package does not need.
         from pns_common.fused.refine import refine_fused
+        from pns_common.fused.side_lengths import side_lengths
 
-        made = refine_fused(*arguments, kernel_blocks(workers, work.rows), work.level_ends)
+        blocks = kernel_blocks(workers, work.rows)
+        scheme = scheme.fitted(lambda: side_lengths(mesh.vertices, mesh.faces, blocks))
+        made = refine_fused(mesh, scheme, levels, unit, kept, blocks, work.level_ends)
     else:
-        made = refine_arrays(*arguments, Blocks(workers, BLOCK_ROWS, work.rows), work.level_ends)
+        blocks = Blocks(workers, BLOCK_ROWS, work.rows)
+        scheme = scheme.fitted(lambda: measure_sides(mesh.vertices, mesh.faces))
+        made = refine_arrays(mesh, scheme, levels, unit, kept, blocks, work.level_ends)
     points, normals, kept_back = made.points, None, NO_SHIFT
     if limit:
         topology, blocks = made.split_topology(), Blocks(workers, BLOCK_ROWS, work.rows)
@@ -182,6 +191,7 @@ def report_of(
         "model": scheme.model,
         "model_hash": scheme.model_hash,
         "reference_length": reference_length,
+        "prior_strength": scheme.prior_strength,
         "multi_fan_vertices": several_fans,
         **limit_distances(levels, limit_shift),
         "levels": levels,

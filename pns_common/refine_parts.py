@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
+from pns_common.base.deferred import Deferred
 from pns_common.connectivity.creases import Creases, crease_children
 from pns_common.errors import ParameterError
 from pns_common.fused import kernel_blocks
@@ -80,11 +81,15 @@ def refine_parts(
     kept = chosen_creases(creases, scheme)
     if not kernels_can_serve(mesh, scheme, levels, float(lengths.min())):
         return None
-    from pns_common.fused.refine_parts import refine_parts_fused
+    from pns_common.fused.refine_parts import Units, refine_parts_fused
+    from pns_common.fused.side_lengths import side_lengths_of_parts
 
     workers = available_threads() if threads is None else threads
     blocks = kernel_blocks(workers)
-    made = refine_parts_fused(mesh, part_faces, scheme, levels, lengths, kept, blocks)
+    sides = Deferred(lambda: side_lengths_of_parts(mesh.vertices, mesh.faces, part_faces, blocks))
+    schemes = [scheme.fitted(lambda part=part: sides()[part]) for part in range(len(lengths))]
+    units = Units(lengths, np.array([each.prior_strength or 0.0 for each in schemes]))
+    made = refine_parts_fused(mesh, part_faces, scheme, levels, units, kept, blocks)
     points, normals = made.points, None
     kept_back = np.zeros(len(lengths))
     if limit:
@@ -100,9 +105,9 @@ def refine_parts(
     return PartsRefinement(
         mesh=Mesh.of_refined(points, made.faces),
         reports=[
-            report_of(scheme, float(length), several_fans, reports, float(back))
-            for length, several_fans, reports, back in zip(
-                lengths, made.several_fans, made.reports, kept_back, strict=True
+            report_of(fitted, float(length), several_fans, reports, float(back))
+            for fitted, length, several_fans, reports, back in zip(
+                schemes, lengths, made.several_fans, made.reports, kept_back, strict=True
             )
         ],
         ratio=made.ratio,

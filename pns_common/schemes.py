@@ -7,7 +7,8 @@ new scheme is two functions and no change here.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 from pns_common.base.arrays import Array
 from pns_common.base.parameters import is_number
@@ -20,6 +21,7 @@ from pns_common.formula.correction import curvature_gate
 from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.formula.fold_guard import FoldGuard
 from pns_common.formula.vertex_operator import VertexOperator
+from pns_common.geometry.side_lengths import SideLengths
 from pns_common.models.card import ModelCard
 from pns_common.models.protocol import Model, VertexModel
 from pns_common.rules.control_level import ControlLevel, Rule
@@ -76,6 +78,29 @@ class Scheme:
     moves_boundaries: bool = field(default=False, repr=False)
     wide_bound: bool = field(default=False, repr=False)
     creases: Creases = field(default=NO_CREASES, repr=False)
+
+    @property
+    def prior_strength(self) -> float | None:
+        """Return s of the rules' prior; None where they have none, or none of a mesh's own yet."""
+        rule = self.edge_rule
+        if not isinstance(rule, ScaleFreeEdgeRule) or rule.form.even_prior_strength is not None:
+            return None
+        return rule.form.prior_strength
+
+    def fitted(self, sides: Callable[[], SideLengths]) -> Scheme:
+        """Return the same for a mesh (formula/prior_strength.py).
+
+        ``sides`` measures its faces' sides; it is called where the rules depend on them.
+        """
+        edges, vertices = self.edge_rule, self.vertex_rule
+        if not (isinstance(edges, ScaleFreeEdgeRule) and isinstance(vertices, ScaleFreeVertexRule)):
+            return self
+        form = edges.form.fitted(sides)
+        if form is edges.form:
+            return self
+        return replace(
+            self, edge_rule=replace(edges, form=form), vertex_rule=replace(vertices, form=form)
+        )
 
 
 def loop() -> Scheme:
@@ -164,6 +189,7 @@ def scale_free_form(card: ModelCard, budget: float) -> ScaleFreeForm | None:
         wide_bound=card.wide_bound or False,
         crease_prior=card.crease_prior or False,
         tip_strength=card.tip_strength or 0.0,
+        even_prior_strength=card.even_prior_strength,
     )
 
 

@@ -19,8 +19,11 @@ def gate_of(values: Float[Array, " N"]) -> Float[Array, " N"]:
     if type(values) is not np.ndarray:
         return namespace(values).tanh(values)
     is_open = values >= SATURATED
-    if 2 * np.count_nonzero(is_open) < len(values):
+    count = np.count_nonzero(is_open)
+    if 2 * count < len(values):
         return np.tanh(values)
-    gates, asked = np.ones_like(values), ~is_open
-    gates[asked] = np.tanh(values[asked])
+    gates = np.ones_like(values)
+    if count < len(values):
+        asked = ~is_open
+        gates[asked] = np.tanh(values[asked])
     return gates

@@ -59,14 +59,18 @@ def added_by_rules(
     length: float | Float[np.ndarray, " V"],
     blocks: Blocks,
     curves: CurveMoves,
+    strength: float | Float[np.ndarray, " V"] | None = None,
 ) -> AddedByRules:
     """Evaluate a level's rules: where it bends alone, if that is less of it.
+
+    ``strength`` is s of the prior, of each vertex where parts have their own; None: the scheme's.
 
     Raises:
         ModelError: a network returned something that is not finite, or of another shape.
     """
     of_level = level.points, level.mesh, level.faces, level.several_fans
-    whole = Surroundings(*of_level, length, blocks, curves, _altitudes(scheme))
+    of_scheme = _altitudes(scheme), _prior_strength(scheme) if strength is None else strength
+    whole = Surroundings(*of_level, length, blocks, curves, *of_scheme)
     part = bent_part(whole) if _adds_nothing_in_planes(scheme) else None
     return _evaluated(scheme, whole) if part is None else _evaluated_on(part, scheme, whole)
 
@@ -118,3 +122,9 @@ def _altitudes(scheme: Scheme) -> float:
     rule = scheme.edge_rule
     altitudes = rule.form.network_altitudes if isinstance(rule, ScaleFreeEdgeRule) else None
     return math.inf if altitudes is None else altitudes
+
+
+def _prior_strength(scheme: Scheme) -> float:
+    """Return s of the rules, if they have a prior."""
+    rule = scheme.edge_rule
+    return rule.form.prior_strength if isinstance(rule, ScaleFreeEdgeRule) else 0.0

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
 from pns_common.fused.additions import Additions
@@ -170,7 +170,7 @@ def _cut(mesh: MeshEdges, faces: Rows, vertices: Rows, edges: Rows, blocks: Bloc
 def _of_part(whole: Surroundings, mesh: MeshEdges, vertices: Int[np.ndarray, " n"]) -> Surroundings:
     """Return what the rules read of the part, whose vertices are these of the whole."""
     points = np.take(whole.points, vertices, axis=0)
-    length, curves = whole.reference_length, whole.curves
+    curves = whole.curves
     if len(curves.pushes):
         curves = replace(curves, pushes=np.take(curves.pushes, vertices, axis=0))
     return replace(
@@ -179,9 +179,17 @@ def _of_part(whole: Surroundings, mesh: MeshEdges, vertices: Int[np.ndarray, " n
         mesh=mesh,
         faces=FaceMeasures(points, mesh.faces, whole.faces.blocks),
         several_fans=whole.several_fans[vertices],
-        reference_length=length[vertices] if isinstance(length, np.ndarray) else length,
+        reference_length=_at(vertices, whole.reference_length),
         curves=curves,
+        prior_strength=_at(vertices, whole.prior_strength),
     )
+
+
+def _at(
+    vertices: Int[np.ndarray, " n"], values: float | Float[np.ndarray, " V"]
+) -> float | Float[np.ndarray, " n"]:
+    """Return some of each vertex's own values, or that of the whole mesh."""
+    return values[vertices] if isinstance(values, np.ndarray) else values
 
 
 def _values(added: Additions) -> tuple[np.ndarray, ...]:

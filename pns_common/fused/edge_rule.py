@@ -80,7 +80,7 @@ def add_at_edges(
                 bounds.pushes,
                 bounds.nothing,
                 stencils,
-                form.prior_strength,
+                level.prior_strengths(stencils[:, 0]),
                 form.network_scale,
             )
             correct_scale_free(*answer, mesh.interior, rows.start, *prior, *out)

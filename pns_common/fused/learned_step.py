@@ -74,16 +74,22 @@ def learned_step(level: FusedLevel, scheme: Scheme, length: float, blocks: Block
 
 
 def learned_points(
-    level: FusedLevel, scheme: Scheme, length: float | Float[np.ndarray, " V"], blocks: Blocks
+    level: FusedLevel,
+    scheme: Scheme,
+    length: float | Float[np.ndarray, " V"],
+    blocks: Blocks,
+    strength: float | Float[np.ndarray, " V"] | None = None,
 ) -> LearnedPoints:
-    """Return the same, without a look at the children; ``length`` may be each vertex's own.
+    """Return the same, without a look at the children.
+
+    ``length`` may be each vertex's own, and so may ``strength``, s; None: it is the scheme's.
 
     Raises:
         ModelError: a network returned something that is not finite, or of another shape.
     """
     mesh, count = level.mesh, level.mesh.vertex_count
     curves = curves_of(curve_rule(scheme), level.points, mesh, length)
-    made = added_by_rules(level, scheme, length, blocks, curves)
+    made = added_by_rules(level, scheme, length, blocks, curves, strength)
     vertices, edges, added = made.vertices, made.edges, made.both
     # Not before: what the rules read has the most memory.
     loop = loop_points(level.points, mesh, blocks)

@@ -48,6 +48,20 @@ class RefinedParts:
 
 
 @dataclass(frozen=True, eq=False)
+class Units:
+    """What each of P parts is measured by: R, and s of the prior; 0 where there is none."""
+
+    lengths: Float[np.ndarray, " P"]
+    strengths: Float[np.ndarray, " P"]
+
+    def of(
+        self, part_of: Int[np.ndarray, " V"]
+    ) -> tuple[Float[np.ndarray, " V"], Float[np.ndarray, " V"]]:
+        """Return both for each vertex."""
+        return self.lengths[part_of], self.strengths[part_of]
+
+
+@dataclass(frozen=True, eq=False)
 class _Connectivity:
     """A part's own, as far as its report asks."""
 
@@ -90,7 +104,7 @@ def refine_parts_fused(
     part_faces: Int[np.ndarray, " Q"],
     scheme: Scheme,
     levels: int,
-    reference_lengths: Float[np.ndarray, " P"],
+    units: Units,
     creases: Creases,
     blocks: Blocks,
 ) -> RefinedParts:
@@ -115,7 +129,7 @@ def refine_parts_fused(
             sharp = creases.sharp_at(depth)
             level, parts = next_level(level, points, blocks, sharp=sharp), parts.next()
         parts = parts.with_edges_of(level.mesh)
-        points, counterpart, step = _placed(level, parts, scheme, reference_lengths, depth, blocks)
+        points, counterpart, step = _placed(level, parts, scheme, units, depth, blocks)
         check_coordinates(largest_size(points, blocks))
         for part, report in enumerate(_reports(level, parts, points, counterpart, step)):
             reports[part].append(report)
@@ -135,7 +149,7 @@ def _placed(
     level: FusedLevel,
     parts: _Parts,
     scheme: Scheme,
-    lengths: Float[np.ndarray, " P"],
+    units: Units,
     depth: int,
     blocks: Blocks,
 ) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 3"] | None, AddedStep]:
@@ -143,7 +157,8 @@ def _placed(
     if scheme.learned_levels is None or depth < scheme.learned_levels:
         # What overflows under an absurd budget is caught by the caller.
         with np.errstate(over="ignore", invalid="ignore"):
-            made = learned_points(level, scheme, lengths[parts.of_vertex], blocks)
+            length, strength = units.of(parts.of_vertex)
+            made = learned_points(level, scheme, length, blocks, strength)
         return made.points, made.counterpart, made.step
     level.faces.forget()
     points, count = loop_points(level.points, level.mesh, blocks), level.mesh.vertex_count

@@ -28,7 +28,8 @@ class Surroundings:
 
     ``reference_length`` is R > 0, the unit of length of the budget: of the whole mesh, or of each
     vertex, where parts that share no vertex have their own. ``altitudes`` is α of the network's
-    lengths, infinite where these are h whatever the faces.
+    lengths, infinite where these are h whatever the faces; ``prior_strength`` is s, likewise of the
+    whole mesh or of each vertex.
     """
 
     points: Float[np.ndarray, "V 3"]
@@ -39,6 +40,7 @@ class Surroundings:
     blocks: Blocks
     curves: CurveMoves = NO_RULE
     altitudes: float = math.inf
+    prior_strength: float | Float[np.ndarray, " V"] = 1.0
 
     def budget_per_length(
         self, vertices: Int[np.ndarray, " N"], budget: float
@@ -47,6 +49,12 @@ class Surroundings:
         if isinstance(self.reference_length, np.ndarray):
             return budget / self.reference_length[vertices]
         return np.full(len(vertices), budget / self.reference_length)
+
+    def prior_strengths(self, vertices: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+        """Return s at each of some vertices."""
+        if isinstance(self.prior_strength, np.ndarray):
+            return self.prior_strength[vertices]
+        return np.full(len(vertices), self.prior_strength)
 
     @cached_property
     def rings(self) -> RingMeasures:

@@ -19,7 +19,7 @@ def priors_at(
     rings, curves = level.rings, level.curves
     prior = _placed(level.pushes, level)
     of_curves = _placed(curves.pushes, level) if len(curves.pushes) else curves.pushes
-    parts = of_curves, curves.nothing, form.prior_strength, vertices
+    parts = of_curves, curves.nothing, level.prior_strengths(vertices), vertices
     weights, measured = weights_of(rings.valence), (rings.means, rings.fields, rings.valence)
     around = level.pushes, *measured, weights.ring, weights.further
 

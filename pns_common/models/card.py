@@ -28,6 +28,7 @@ OPTIONAL_FIELDS = (
     "wide_bound",
     "crease_prior",
     "tip_strength",
+    "even_prior_strength",
 )
 CREASE_FIELDS = ("crease_angle", "crease_levels")
 MOST_LEARNED_LEVELS = 16
@@ -62,6 +63,8 @@ class ModelCard:
             false.
         crease_prior: whether the boundary's prior acts at creases too; None is false.
         tip_strength: a ≥ 0, how much of Loop's own move is given back at tips; None is 0.
+        even_prior_strength: s₁ ≥ 0 of the prior where a mesh is even (formula/prior_strength.py);
+            None is ``prior_strength``.
         crease_angle: θ of the crease lines that are kept where no creases are named, degrees
             between 0 and 180; None looks for none.
         crease_levels: at how many levels they are sharp, at least 1; with ``crease_angle``.
@@ -86,6 +89,7 @@ class ModelCard:
     wide_bound: bool | None = None
     crease_prior: bool | None = None
     tip_strength: float | None = None
+    even_prior_strength: float | None = None
     crease_angle: float | None = None
     crease_levels: int | None = None
 
@@ -211,6 +215,9 @@ def _scale_free_problem(card: ModelCard) -> str | None:
     tips = card.tip_strength
     if tips is not None and not (math.isfinite(tips) and tips >= 0):
         return f"tip_strength {tips}, not a finite number ≥ 0"
+    even = card.even_prior_strength
+    if even is not None and not (math.isfinite(even) and even >= 0):
+        return f"even_prior_strength {even}, not a finite number ≥ 0"
     if card.crease_prior and not boundary:
         return "crease_prior without a boundary_strength, which is its strength"
     altitudes = card.network_altitudes

@@ -72,7 +72,7 @@ class RefinedPiece:
 def refine_piece(
     piece: Piece, scheme: Scheme, levels: int, length: float, blocks: Blocks
 ) -> RefinedPiece:
-    """Refine a piece; ``length`` is R of the whole mesh.
+    """Refine a piece; ``length`` is R of the whole mesh, and the scheme is fitted to that.
 
     Raises:
         ThinHaloError: the halo is too thin to be sure of all own faces.

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from pns_common.formula.prior_strength import prior_strength
+from pns_common.geometry.side_lengths import SideLengths
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,7 @@ class ScaleFreeForm:
         wide_bound: whether h of an edge's bound is the longest edge of its two faces.
         crease_prior: whether creases are such curves too; else boundaries alone are.
         tip_strength: a ≥ 0, how much of Loop's own move is given back at tips; 0: none.
+        even_prior_strength: s₁ ≥ 0 of even meshes; None: s is ``prior_strength`` for any mesh.
     """
 
     budget: float
@@ -35,3 +40,12 @@ class ScaleFreeForm:
     wide_bound: bool = False
     crease_prior: bool = False
     tip_strength: float = 0.0
+    even_prior_strength: float | None = None
+
+    def fitted(self, sides: Callable[[], SideLengths]) -> ScaleFreeForm:
+        """Return the same with s of a mesh; ``sides`` measures it, where that is asked for."""
+        even = self.even_prior_strength
+        if even is None:
+            return self
+        strength = prior_strength(self.prior_strength, even, sides())
+        return replace(self, prior_strength=strength, even_prior_strength=None)

@@ -64,6 +64,9 @@ class ModelEntry(BaseModel):
     tip_strength: float | None = Field(
         description="how much of Loop's own move is given back at tips; null: none"
     )
+    even_prior_strength: float | None = Field(
+        description="s of the prior where a mesh is even; null: `prior_strength` for any mesh"
+    )
     crease_angle: float | None = Field(
         description="of the crease lines that `crease=auto` keeps, in degrees; null: none"
     )

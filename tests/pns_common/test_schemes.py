@@ -28,6 +28,7 @@ NUMBERS = {
     "wide_bound": True,
     "crease_prior": True,
     "tip_strength": 0.6,
+    "even_prior_strength": 1.3,
 }
 
 

@@ -76,6 +76,7 @@ class ScaleFree:
         wide_bound: whether h of an edge's bound is the longest edge of its two faces.
         crease_prior: whether the boundary's prior acts at creases too, in use; training sees none.
         tip_strength: a, how much of Loop's own move is given back at tips; in use alone, too.
+        even_prior_strength: s of even meshes (formula/prior_strength.py), in use; training has one.
         crease_angle: θ in degrees of the crease lines that are kept in use; training sees none.
         crease_levels: at how many levels these are sharp.
     """
@@ -90,6 +91,7 @@ class ScaleFree:
     wide_bound: bool | None = None
     crease_prior: bool | None = None
     tip_strength: float | None = None
+    even_prior_strength: float | None = None
     crease_angle: float | None = None
     crease_levels: int | None = None
 
@@ -299,6 +301,7 @@ def general(seed: int = 0) -> Recipe:
             wide_bound=True,
             crease_prior=True,
             tip_strength=1.0,
+            even_prior_strength=1.1,
             crease_angle=CREASE_ANGLE,
             crease_levels=CREASE_LEVELS,
         ),

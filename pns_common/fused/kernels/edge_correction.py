@@ -290,7 +290,7 @@ def _prior(pushes, of_curves, nothing, a, b, c, d, k, strength):
 @kernel(
     SIZE,
     *(POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, INDEX, SIZE),
-    *(POINTS, POINTS, REAL, INDICES, REAL, REAL),
+    *(POINTS, POINTS, REAL, INDICES, NUMBERS, REAL),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
 )
 def correct_scale_free(
@@ -306,7 +306,7 @@ def correct_scale_free(
     of_curves,
     nothing,
     stencils,
-    strength,
+    strengths,
     scale,
     displacement,
     ratio,
@@ -315,7 +315,7 @@ def correct_scale_free(
 ):
     """Write δ = γ Π_ρ(D + τ ℓ F z) into the edges' rows (``correction.correct_scale_free``).
 
-    ``network_lengths`` are ℓ of all edges, ``bound_length`` is h of the bound.
+    ``network_lengths`` are ℓ of all edges, ``bound_length`` is h of the bound, ``strengths`` s.
     ``of_curves`` are the curves' pushes; (0, 3) where there are none. Then ``nothing`` is
     added in their place: 0, or −0 where there is no rule for boundaries, which changes no −0.
     """
@@ -324,7 +324,7 @@ def correct_scale_free(
         a, b, c, d = stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3]
         envelope = budget_per_length[i] * (bound_length[i] * bound_length[i])
         turned = _rotated(frame, i, in_ball(row(z, i)))
-        asked = scale * network_lengths[e]
+        asked, strength = scale * network_lengths[e], strengths[i]
         wanted = (
             _prior(pushes, of_curves, nothing, a, b, c, d, 0, strength) + asked * turned[0],
             _prior(pushes, of_curves, nothing, a, b, c, d, 1, strength) + asked * turned[1],

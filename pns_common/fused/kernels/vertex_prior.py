@@ -42,29 +42,29 @@ def _rise(value, by, begin, end):
     return way * way * (3 - 2 * way)
 
 
-@kernel(SIZE, POINTS, REAL, REAL, INDEX, SIZE, SIZE, POINTS_OUT)
-def add_priors(of_curves, nothing, strength, vertices, begin, end, pushed):
+@kernel(SIZE, POINTS, REAL, NUMBERS, INDEX, SIZE, SIZE, POINTS_OUT)
+def add_priors(of_curves, nothing, strengths, vertices, begin, end, pushed):
     """Write D_v over ``pushed``, Loop's vertex mask of d, in the rows vertices[begin:end].
 
     ``of_curves`` is the same of curves' pushes; (0, 3) where there are none. Then ``nothing`` is
-    added: 0 where a rule moves curves, −0 where none does.
+    added: 0 where a rule moves curves, −0 where none does. ``strengths`` is s of each of the rows.
     """
     for i in range(natural(begin), end):
         v = vertices[i]
         for k in range(3):
-            pushed[v, k] = _prior(pushed, of_curves, nothing, strength, v, k)
+            pushed[v, k] = _prior(pushed, of_curves, nothing, strengths[i], v, k)
     return 0
 
 
 @kernel(
     SIZE,
-    *(POINTS, REAL, REAL, INDEX, SIZE, SIZE),
+    *(POINTS, REAL, NUMBERS, INDEX, SIZE, SIZE),
     *(POINTS, POINTS, POINTS, INDEX, NUMBERS, NUMBERS, REAL, POINTS_OUT),
 )
 def add_priors_but_at_tips(
     of_curves,
     nothing,
-    strength,
+    strengths,
     vertices,
     begin,
     end,
@@ -103,6 +103,6 @@ def add_priors_but_at_tips(
         far = _rise(left, length, LEFT_FROM, LEFT_TO)
         tip = far * _rise(means[v, MEAN_JUMP], means[v, NEAR_JUMP], BENDS_FROM, BENDS_TO)
         for k in range(3):
-            prior = _prior(pushed, of_curves, nothing, strength, v, k)
+            prior = _prior(pushed, of_curves, nothing, strengths[i], v, k)
             pushed[v, k] = prior - tip * (tip_strength * moved[k] + prior)
     return 0

@@ -18,6 +18,7 @@ from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.errors import PnsError
 from pns_common.fused import kernel_blocks, load_kernels
 from pns_common.geometry.sharp_edges import edges_sharper_than
+from pns_common.geometry.side_lengths import SideLengths
 from pns_common.pieces import Piece, RefinedPiece, ThinHaloError, halo_rings, refine_piece
 from pns_common.schemes import Scheme
 
@@ -46,7 +47,7 @@ class PartTask:
     Attributes:
         stage: COUNT or REFINE.
         mesh, work: folders of the mesh and of what is known of it.
-        length: R.
+        length, sides: R, and the sides of all faces.
         vertices: of each level of the whole mesh; empty while it is counted.
         target: where to write; None while it is counted.
         memory: bytes that the part may take; None: any.
@@ -61,6 +62,7 @@ class PartTask:
     options: Options
     model: str | None
     length: float
+    sides: SideLengths
     vertices: tuple[int, ...] = ()
     target: Target | Tiles | None = None
     memory: int | None = None
@@ -117,7 +119,7 @@ def _refine(
     """Refine the part, write it, and say what was done."""
     load_kernels()
     levels = task.options.levels
-    scheme = scheme_of(task.options, task.model)
+    scheme = scheme_of(task.options, task.model).fitted(lambda: task.sides)
     rings, cut, made = _surely_refined(task, scheme, mesh, adjacency, own)
     box = None
     if isinstance(task.target, Tiles):

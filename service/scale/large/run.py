@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from pns_common.fused import load_kernels
+from pns_common.geometry.side_lengths import SideLengths
 from pns_common.pieces import LevelTally, reduced_report
 from pns_common.schemes import Scheme
 
@@ -101,7 +102,7 @@ def run_large(
         ) -> list[PartTask]:
             folders = str(mesh.folder.resolve()), str(work.resolve())
             memory = None if large.parts else large.memory
-            what = large.options, large.model, length, vertices, target, memory
+            what = large.options, large.model, length, about.sides, vertices, target, memory
             return [
                 PartTask(stage, part, parts, *folders, *what)
                 for part in range(parts)
@@ -119,7 +120,8 @@ def run_large(
             _do(tasks(REFINE, vertices, target), parts, engine, console, spent)
         with spent.stage("finish"):
             done = [kept(done_file(work, REFINE, part)) for part in range(parts)]
-            report = _report(scheme, length, about, done, read)
+            fitted = scheme.fitted(lambda: about.sides)
+            report = _report(fitted, length, about, done, read)
             kind.finish(target, work, large.output, report, [part["box"] for part in done])
     return report, spent
 
@@ -143,7 +145,8 @@ def _surveyed(mesh: ArrayMesh, work: Path) -> Survey:
     if known is None:
         known = asdict(survey(mesh))
         keep(file, known)
-    return Survey(**known)
+    sides = SideLengths(**known.pop("sides"))
+    return Survey(sides=sides, **known)
 
 
 def _length(large: Large, about: Survey) -> float:
@@ -235,6 +238,7 @@ def _report(
         "model": scheme.model,
         "model_hash": scheme.model_hash,
         "reference_length": length,
+        "prior_strength": scheme.prior_strength,
         "multi_fan_vertices": sum(part["several_fans"] for part in done),
         **reduced,
         "dropped": read,

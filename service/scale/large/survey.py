@@ -10,10 +10,14 @@ from jaxtyping import Float
 
 from pns_common.base.arrays import norm
 from pns_common.base.extent import extent
+from pns_common.geometry.side_lengths import BLOCK_FACES, SideLengths
 from pns_common.mesh import LARGEST_COORDINATE, SMALLEST_EXTENT
 
 from ...errors import UnrefinableError
 from .arrays import ArrayMesh, blocks_of, let_go
+
+# Faces whose sides are measured at once: whole blocks, so that sums are those of the whole mesh.
+SIDE_ROWS = 64 * BLOCK_FACES
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,7 @@ class Survey:
 
     Attributes:
         reference_length: R, as ``refine`` measures it, bit for bit.
+        sides: of the faces, as ``measure_sides`` has them, bit for bit.
         low, high: the corners of the box around the faces' vertices.
         isolated: vertices that no face uses.
     """
@@ -29,6 +34,7 @@ class Survey:
     vertices: int
     faces: int
     reference_length: float
+    sides: SideLengths
     low: tuple[float, float, float]
     high: tuple[float, float, float]
     isolated: int
@@ -65,10 +71,15 @@ def survey(mesh: ArrayMesh) -> Survey:
         points = np.asarray(mesh.positions[rows][used[rows]], dtype=np.float64)
         largest = max(largest, float(norm(points - centre).max(initial=0)))
         let_go(mesh.positions)
+    sides = SideLengths()
+    for rows in blocks_of(len(mesh.faces), SIDE_ROWS):
+        sides = sides.with_faces(mesh.positions, mesh.faces[rows])
+        let_go(mesh.faces, mesh.positions)
     return Survey(
         len(mesh.positions),
         len(mesh.faces),
         largest / math.sqrt(2),
+        sides,
         _triple(inner_low),
         _triple(inner_high),
         len(used) - count,

@@ -22,6 +22,7 @@ from tests.support.networks import CARD, SCALE_FREE_CARD, VERTEX_CARD
         ({"side_gates": 1}, "side_gates of type int"),
         ({"network_altitudes": 0.0}, "network_altitudes 0.0, not a finite number > 0"),
         ({"tip_strength": -0.1}, "tip_strength -0.1, not a finite number ≥ 0"),
+        ({"even_prior_strength": -1.0}, "even_prior_strength -1.0, not a finite number ≥ 0"),
         ({"crease_prior": 1}, "crease_prior of type int"),
         ({"crease_prior": True}, "crease_prior without a boundary_strength"),
         ({"crease_angle": 180.0}, "crease_angle 180.0, not between 0 and 180 degrees"),
@@ -44,6 +45,7 @@ def test_a_card_reads_back_as_it_was_written():
         wide_bound=True,
         crease_prior=True,
         tip_strength=0.9,
+        even_prior_strength=1.2,
         crease_angle=66.0,
         crease_levels=2,
     )

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from pns_common import Creases, Mesh, crease_lines, load_model, loop, pns, refine
 from pns_common.connectivity.creases import NO_CREASES
 from pns_common.connectivity.topology import build_topology
+from pns_common.geometry.side_lengths import measure_sides
 from pns_common.pieces import (
     reduced_report,
 )
@@ -32,7 +33,8 @@ def assert_pieces_are_the_whole(mesh, owner, scheme, levels, creases=None, lines
     length = whole.report["reference_length"]
     if length == 0:
         return
-    made = pieces_refined(mesh, owner, scheme, levels, length, creases, lines)
+    fitted = scheme.fitted(lambda: measure_sides(mesh.vertices, mesh.faces))
+    made = pieces_refined(mesh, owner, fitted, levels, length, creases, lines)
     written = np.zeros(len(whole.mesh.faces), dtype=int)
     for piece in made:
         corners = piece.refined.points[piece.refined.faces[piece.own_children]]

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, Refinement, Scheme, loop, refine
+from pns_common.geometry.side_lengths import measure_sides
 from pns_common.masks.crease_shift import limit_crease_shift
 from pns_common.masks.limit import limit_normals, limit_positions
 from pns_common.refine import measure_reference_length
@@ -59,6 +60,8 @@ def _level_by_level(
     larger of both.
     """
     length = measure_reference_length(mesh.vertices, mesh.faces)
+    control = mesh
+    scheme = scheme.fitted(lambda: measure_sides(control.vertices, control.faces))
     counter = _Counter(progress, steps)
     reports: list[Any] = []
     distances: list[_Distances] = []

@@ -109,11 +109,14 @@ def test_the_scale_free_correction(way, boundary):
     of_curves = rim if boundary else np.zeros((0, 3))
     delta, ratio, _, envelope = out = outputs()
     answer = Z, FRAMES, 0.9 * LENGTH, 1.1 * LENGTH, GATE, PER_LENGTH, MESH.interior, 0
-    WAYS[way](correct_scale_free)(*answer, pushes, of_curves, 0.0, STENCILS, 0.8, 0.4, *out)
+    strengths = RNG.uniform(0.5, 1.5, COUNT)
+    prior = pushes, of_curves, 0.0, STENCILS, strengths, 0.4
+    WAYS[way](correct_scale_free)(*answer, *prior, *out)
     for e, (a, b) in enumerate(PAIRS):
         local = plain_operator.shortened(Z[e], 1)
         asked = 0.4 * 0.9 * LENGTH[e] * FRAMES[e].reshape(3, 3).T @ local
-        prior = 0.8 * PLAIN.loop_edge(a, b, pushes) + boundary * PLAIN.loop_edge(a, b, rim)
+        of_rings = strengths[e] * PLAIN.loop_edge(a, b, pushes)
+        prior = of_rings + boundary * PLAIN.loop_edge(a, b, rim)
         bound = PER_LENGTH[e] * (1.1 * LENGTH[e]) ** 2
         expected = GATE[e] * plain_operator.shortened(prior + asked, bound)
         np.testing.assert_allclose(delta[e], expected, atol=1e-15)

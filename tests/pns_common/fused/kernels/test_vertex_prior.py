@@ -23,15 +23,18 @@ OF_CURVES = 0.1 * RNG.standard_normal((COUNT, 3))
 # In another order than they have, and not all of them.
 CHOSEN = np.array([7, 2, 11, 5, 9, 0, 3], dtype=np.int32)
 BEGIN, END = 1, 6
+# s of each of the rows.
+STRENGTHS = RNG.uniform(0.5, 1.5, len(CHOSEN))
 
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("curves", [False, True])
 def test_without_tips(way, curves):
     prior, of_curves = PUSHED.copy(), OF_CURVES if curves else np.zeros((0, 3))
-    WAYS[way](add_priors)(of_curves, 0.0, 0.9, CHOSEN, BEGIN, END, prior)
-    rows = CHOSEN[BEGIN:END]
-    np.testing.assert_allclose(prior[rows], (0.9 * PUSHED + curves * OF_CURVES)[rows], rtol=1e-15)
+    WAYS[way](add_priors)(of_curves, 0.0, STRENGTHS, CHOSEN, BEGIN, END, prior)
+    rows, strengths = CHOSEN[BEGIN:END], STRENGTHS[BEGIN:END, None]
+    expected = strengths * PUSHED[rows] + curves * OF_CURVES[rows]
+    np.testing.assert_allclose(prior[rows], expected, rtol=1e-15)
     others = np.delete(np.arange(COUNT), rows)
     np.testing.assert_array_equal(prior[others], PUSHED[others])
 
@@ -45,12 +48,13 @@ def test_at_tips(way, curves):
     each = np.arange(rings.valence.max() + 1)
     prior, of_curves = PUSHED.copy(), OF_CURVES if curves else np.zeros((0, 3))
     WAYS[way](add_priors_but_at_tips)(
-        *(of_curves, 0.0, 0.9, CHOSEN, BEGIN, END),
+        *(of_curves, 0.0, STRENGTHS, CHOSEN, BEGIN, END),
         *(PUSHES, rings.means, rings.fields, rings.valence),
         *(loop_ring_weight(each), ring_further(each), 0.8, prior),
     )
-    without = 0.9 * PUSHED + curves * OF_CURVES
-    rows = CHOSEN[BEGIN:END]
+    rows, strengths = CHOSEN[BEGIN:END], STRENGTHS[BEGIN:END, None]
+    without = curves * OF_CURVES
+    without[rows] += strengths * PUSHED[rows]
     expected = [PLAIN.kept_at_tip(v, without[v], PUSHES, 0.8) for v in rows]
     np.testing.assert_allclose(prior[rows], expected, rtol=0, atol=1e-14)
     at_tips = np.linalg.norm(prior[rows] - without[rows], axis=1) > 1e-9

@@ -41,6 +41,14 @@ def test_parts_of_the_default_model_are_the_whole(tmp_path):
     assert report["levels"][0]["guarded"] == whole.report["levels"][0]["guarded"] > 0
 
 
+def test_parts_of_an_even_mesh_have_the_prior_of_the_whole(tmp_path):
+    mesh = Mesh(*grid(14, bent))
+    report = refined(arrays(tmp_path / "in", mesh), tmp_path / "out", 5, Options(levels=1))
+    whole = refine(mesh, pns(load_model()))
+    assert_is(tmp_path / "out", whole)
+    assert report["prior_strength"] == whole.report["prior_strength"] > 1
+
+
 @settings(max_examples=10)
 @given(mesh=st.one_of(manifolds(), soups()), parts=st.integers(1, 64), levels=st.integers(1, 3))
 def test_any_mesh_in_parts_is_the_whole(tmp_path_factory, mesh, parts, levels):

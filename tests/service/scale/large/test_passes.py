@@ -3,6 +3,7 @@
 import numpy as np
 
 from pns_common import Mesh, loop, refine
+from pns_common.geometry.side_lengths import BLOCK_FACES, measure_sides
 from service.scale.large import adjacency, partition, target
 from service.scale.large.arrays import open_mesh
 from service.scale.large.survey import survey
@@ -19,6 +20,15 @@ def test_the_survey_is_that_of_the_whole_whatever_the_blocks(tmp_path, monkeypat
         monkeypatch.setattr("service.scale.large.arrays.BLOCK", rows)
         monkeypatch.setattr("service.scale.large.survey.blocks_of", _blocks(rows))
         assert survey(open_mesh(folder)).reference_length == length
+
+
+def test_sides_are_those_of_the_whole_whatever_is_read_at_once(tmp_path, monkeypatch):
+    rng = np.random.default_rng(0)
+    mesh = Mesh(rng.standard_normal((500, 3)), rng.integers(0, 500, (3 * BLOCK_FACES + 5, 3)))
+    opened = open_mesh(arrays(tmp_path / "in", mesh))
+    for blocks in (1, 2, 64):
+        monkeypatch.setattr("service.scale.large.survey.SIDE_ROWS", blocks * BLOCK_FACES)
+        assert survey(opened).sides == measure_sides(mesh.vertices, mesh.faces)
 
 
 def test_what_is_sorted_outside_memory_is_sorted(tmp_path, monkeypatch):
