@@ -13,7 +13,7 @@ from pns_common.errors import ParameterError
 from pns_common.fused import fits, kernel_blocks, kernels_available, kernels_loaded
 from pns_common.geometry.crease_lines import CREASE_ANGLE, line_rows
 from pns_common.geometry.frames import face_normals
-from pns_common.mesh import Mesh
+from pns_common.mesh import Mesh, check_is_mesh
 
 
 def crease_lines(mesh: Mesh, angle: float = CREASE_ANGLE) -> Int[np.ndarray, "N 2"]:
@@ -23,8 +23,9 @@ def crease_lines(mesh: Mesh, angle: float = CREASE_ANGLE) -> Int[np.ndarray, "N 
     beside them, and go on at both ends (geometry/crease_lines.py).
 
     Raises:
-        ParameterError: the angle is out of range.
+        ParameterError: it is no Mesh, or the angle is out of range.
     """
+    check_is_mesh(mesh)
     if not (is_number(angle) and 0 < angle < 180):
         raise ParameterError("angle", angle, expected="degrees between 0 and 180")
     points, faces = mesh.vertices, mesh.faces

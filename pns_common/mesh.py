@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.extent import extent
-from pns_common.errors import MeshError
+from pns_common.errors import MeshError, ParameterError
 
 # Fourth powers of lengths (squared cross products) must neither overflow nor vanish in float64.
 LARGEST_COORDINATE = 1e75
@@ -108,8 +108,10 @@ def clean(mesh: Mesh) -> Cleaned:
     What stays keeps its order.
 
     Raises:
+        ParameterError: it is no Mesh.
         MeshError: every face is degenerate.
     """
+    check_is_mesh(mesh)
     degenerate = repeated_vertex(mesh.faces)
     if degenerate.all():
         raise MeshError("every face is degenerate", element="faces")
@@ -137,6 +139,17 @@ def clean(mesh: Mesh) -> Cleaned:
         dropped_duplicate=int(len(proper) - is_leader.sum()),
         dropped_vertices=int(len(used) - used.sum()),
     )
+
+
+def check_is_mesh(given: object) -> None:
+    """Refuse what is no Mesh.
+
+    Raises:
+        ParameterError: it is something else.
+    """
+    if not isinstance(given, Mesh):
+        other = "Mesh(vertices, faces); subdivide takes arrays and other libraries' meshes"
+        raise ParameterError("mesh", type(given), expected=other)
 
 
 def repeated_vertex(faces: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:

@@ -38,7 +38,7 @@ from pns_common.levels.refined_levels import (
 )
 from pns_common.masks.crease_shift import limit_crease_shift
 from pns_common.masks.limit import refined_limit_normals, refined_limit_positions
-from pns_common.mesh import Mesh
+from pns_common.mesh import Mesh, check_is_mesh
 from pns_common.schemes import Scheme
 
 HIGHEST_LEVELS = 16
@@ -133,13 +133,15 @@ def refine(
 
     Raises:
         ParameterError: no Mesh or no Scheme; levels, reference_length or threads out of range; a
-            crease that is no edge.
+            limit that is no bool, a progress that cannot be called; a crease that is no edge.
         ModelError: the network returned something that is not finite, or of another shape.
         MeshError: the refined coordinates are too large.
     """
     _check_kinds(mesh, scheme)
     _check_levels(levels)
     _check_reference_length(reference_length)
+    _check_limit(limit)
+    _check_progress(progress)
     workers = _threads(threads)
     length = Deferred(lambda: _length_of(mesh, reference_length, workers))
     work = refinement_progress(len(mesh.faces), levels, scheme.learned_levels, limit, progress)
@@ -299,9 +301,7 @@ def _threads(given: int | None) -> int:
 
 
 def _check_kinds(mesh: object, scheme: object) -> None:
-    if not isinstance(mesh, Mesh):
-        other = "Mesh(vertices, faces); subdivide takes arrays and other libraries' meshes"
-        raise ParameterError("mesh", type(mesh), expected=other)
+    check_is_mesh(mesh)
     if not isinstance(scheme, Scheme):
         raise ParameterError("scheme", type(scheme), expected="loop() or pns(load_model())")
 
@@ -312,8 +312,20 @@ def _check_levels(levels: int) -> None:
 
 
 def _check_reference_length(given: float | str) -> None:
-    if given != "auto" and not (is_number(given) and float(given) > 0):
+    # An array compares with a word element by element.
+    automatic = isinstance(given, str) and given == "auto"
+    if not (automatic or (is_number(given) and float(given) > 0)):
         raise ParameterError("reference_length", given, expected='"auto" or a number > 0')
+
+
+def _check_limit(given: object) -> None:
+    if not isinstance(given, bool | np.bool_):
+        raise ParameterError("limit", given, expected="True or False")
+
+
+def _check_progress(given: object) -> None:
+    if given is not None and not callable(given):
+        raise ParameterError("progress", given, expected="a function of two whole numbers, or None")
 
 
 def _length_of(mesh: Mesh, given: float | str, threads: int) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Int
@@ -26,7 +27,8 @@ class Creases:
             limits take them as sharp for good.
 
     Raises:
-        ParameterError: the angle or the levels are out of range.
+        ParameterError: those named are no pairs of whole numbers; the angle or the levels are out
+            of range.
     """
 
     named: Int[np.ndarray, "N 2"] | None = None
@@ -35,6 +37,8 @@ class Creases:
 
     def __post_init__(self) -> None:
         angle, levels = self.line_angle, self.levels
+        if self.named is not None:
+            object.__setattr__(self, "named", as_pairs(self.named))
         if angle is not None and not (is_number(angle) and 0 < angle < 180):
             raise ParameterError("line_angle", angle, expected="degrees between 0 and 180")
         if levels is not None and not (is_whole(levels) and levels >= 1):
@@ -91,9 +95,10 @@ def crease_classes(
     at_creases = marked(named.reshape(-1), vertex_count)
     rows = np.flatnonzero(at_creases[edges[:, 0]] & at_creases[edges[:, 1]])
     keys, named_keys = (pair_keys(pairs, vertex_count) for pairs in (edges[rows], named))
-    lost = named_keys[~np.isin(named_keys, keys)]
+    lost = np.flatnonzero(~np.isin(named_keys, keys))
     if len(lost):
-        raise ParameterError("creases", divmod(int(lost[0]), vertex_count), expected="edges")
+        row = int(lost[0])
+        raise ParameterError(f"creases[{row}]", named[row].tolist(), expected="an edge of the mesh")
     rows = rows[np.isin(keys, named_keys)]
     kept = edge_class.copy()
     kept[rows[kept[rows] == EdgeClass.INTERIOR]] = EdgeClass.CREASE
@@ -120,17 +125,46 @@ def crease_halves(
     return np.stack([edges[creases], np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
 
 
+def as_pairs(creases: Any) -> Int[np.ndarray, "N 2"]:
+    """Return creases as rows of two whole numbers, whatever they number.
+
+    Raises:
+        ParameterError: they are something else.
+    """
+    try:
+        pairs = np.asarray(creases)
+    except ValueError as error:  # rows differ in length
+        row = next(row for row, pair in enumerate(creases) if not _is_pair(pair))
+        raise ParameterError(f"creases[{row}]", creases[row], expected="two vertices") from error
+    if pairs.size == 0 and pairs.ndim in (1, 2):
+        # An empty list has no integers to tell it from one of floats.
+        return np.zeros((0, 2), dtype=np.int64)
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        expected = "(N, 2): a row of two vertices for each edge"
+        raise ParameterError("creases.shape", pairs.shape, expected=expected)
+    if pairs.dtype.kind not in "iu":
+        expected = "whole numbers of an integer type"
+        raise ParameterError("creases.dtype", str(pairs.dtype), expected=expected)
+    return pairs
+
+
+def _is_pair(row: Any) -> bool:
+    try:
+        return np.shape(row) == (2,)
+    except ValueError:  # it holds rows that differ in length
+        return False
+
+
 def checked_pairs(creases: Int[np.ndarray, "N 2"], vertex_count: int) -> Int[np.ndarray, "N 2"]:
     """Return creases, refused unless they are pairs of vertices.
 
     Raises:
         ParameterError: they are not.
     """
-    pairs = np.asarray(creases)
-    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
-        raise ParameterError("creases", pairs.shape, expected="an integer array of shape (N, 2)")
-    outside = (pairs < 0) | (pairs >= vertex_count)
-    if outside.any():
-        worst = pairs[outside.any(axis=1)][0].tolist()
-        raise ParameterError("creases", worst, expected=f"vertices 0 … {vertex_count - 1}")
+    pairs = as_pairs(creases)
+    outside = np.flatnonzero(((pairs < 0) | (pairs >= vertex_count)).any(axis=1))
+    if len(outside):
+        row = int(outside[0])
+        expected = f"vertices 0 … {vertex_count - 1}"
+        raise ParameterError(f"creases[{row}]", pairs[row].tolist(), expected=expected)
     return pairs.astype(np.int64)

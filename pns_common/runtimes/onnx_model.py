@@ -9,6 +9,7 @@ answers differ by the rounding of single precision.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import resources
@@ -19,7 +20,7 @@ from typing import Any, Protocol, TypeGuard, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.errors import ModelError
+from pns_common.errors import ModelError, ParameterError
 from pns_common.models.card import ModelCard
 from pns_common.models.contract import CALL_ROWS, answer_to, feature_inputs
 from pns_common.models.manifest import check_listed
@@ -183,10 +184,13 @@ def load_model(source: str | Path | None = None) -> OnnxModel:
             file that is called the same: "./paper" and Path("paper") are files.
 
     Raises:
+        ParameterError: it is neither a name nor a path.
         ModelError: there is no such file, it breaks the contract (says which part), or it is not
             the bundled one that its name stands for.
     """
     source = DEFAULT_MODEL if source is None else source
+    if not isinstance(source, str | os.PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("source", source, expected="a bundled name, a path, or None")
     if _is_bundled(source):
         data = (BUNDLED / f"{source}.onnx").read_bytes()
         check_listed(BUNDLED, source, data)

@@ -27,7 +27,9 @@ def test_levels_out_of_range_are_refused(levels):
     assert (caught.value.name, caught.value.value) == ("levels", levels)
 
 
-@pytest.mark.parametrize("length", [0.0, -1.0, float("nan"), float("inf"), "metres", None])
+@pytest.mark.parametrize(
+    "length", [0.0, -1.0, float("nan"), float("inf"), "metres", None, np.ones(2), 10**400]
+)
 def test_reference_length_out_of_range_is_refused(length):
     with pytest.raises(ParameterError, match="reference_length"):
         refine(Mesh(*grid(3)), loop(), reference_length=length)
@@ -52,9 +54,15 @@ def test_threads_out_of_range_are_refused(threads):
         ("scheme", lambda: refine(Mesh(*grid(3)), "loop")),
         ("scheme", lambda: pns_common.subdivide(grid(3), scheme=MODEL)),
         ("model", lambda: pns("general")),
+        ("mesh", lambda: pns_common.clean(grid(3))),
+        ("mesh", lambda: pns_common.crease_lines(grid(3))),
+        ("source", lambda: pns_common.load_model(3)),
+        ("limit", lambda: refine(Mesh(*grid(3)), loop(), limit="no")),
+        ("limit", lambda: refine(Mesh(*grid(3)), loop(), limit=np.ones(2))),
+        ("progress", lambda: refine(Mesh(*grid(3)), loop(), progress="bar")),
     ],
 )
-def test_what_is_taken_for_a_mesh_a_scheme_or_a_model_is_told(name, wrong):
+def test_an_argument_of_another_kind_is_told(name, wrong):
     # Where annotations are enforced, another kind ends there first.
     with pytest.raises((ParameterError, TypeError), match=name):
         wrong()

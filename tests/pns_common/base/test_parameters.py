@@ -1,4 +1,4 @@
-"""What counts as a number: numpy's do, a bool and what is not finite do not."""
+"""What counts as a number: numpy's do; a bool, or what no finite float stands for, does not."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ def test_finite_real_numbers_are_numbers(value):
     assert is_number(value)
 
 
-@pytest.mark.parametrize("value", [True, np.True_, np.nan, np.inf, "1", None, 1j, [1]])
+@pytest.mark.parametrize("value", [True, np.True_, np.nan, np.inf, "1", None, 1j, [1], 10**400])
 def test_nothing_else_is(value):
     assert not is_number(value)
 

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from pns_common import Creases, Mesh, ParameterError, loop, pns, refine
+from pns_common import Creases, Mesh, ParameterError, loop, pns, refine, subdivide
+from pns_common.connectivity.creases import as_pairs
 from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.interop.carried import CarriedMesh, refine_carried
 from pns_common.masks.linear import level_topologies
 from tests.support.meshes import bent, bumpy_sphere, grid
 from tests.support.networks import random_model
@@ -28,6 +30,50 @@ def test_a_closed_crease_refines_each_side_as_if_it_were_cut_open(levels):
         part = refine(Mesh(vertices, faces[side]), loop(), levels).mesh
         expected = part.vertices[part.faces].reshape(side.sum(), -1, 3)
         np.testing.assert_allclose(triangles[side], expected, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name", "value"),
+    [
+        ([[0, 1], [1, 2], [3]], "creases[2]", [3]),
+        ([[0, [1, 2]], [0, 1]], "creases[0]", [0, [1, 2]]),
+        ([[0, 1], 2], "creases[1]", 2),
+        ([[0, 1, 2]], "creases.shape", (1, 3)),
+        ([0, 1], "creases.shape", (2,)),
+        (7, "creases.shape", ()),
+        ({(0, 1)}, "creases.shape", ()),
+        ([[0.0, 1.0]], "creases.dtype", "float64"),
+        ([[0, float("nan")]], "creases.dtype", "float64"),
+        ([[0, 2**70]], "creases.dtype", "object"),
+        ([["a", "b"]], "creases.dtype", "<U1"),
+        ([[True, False]], "creases.dtype", "bool"),
+        ([[0, 1], [-1, 0]], "creases[1]", [-1, 0]),
+        ([[0, 1], [0, 9]], "creases[1]", [0, 9]),
+        (np.array([[2**64 - 1, 0]], dtype=np.uint64), "creases[0]", [2**64 - 1, 0]),
+        ([[0, 1], [8, 0]], "creases[1]", [8, 0]),
+        ([[5, 5]], "creases[0]", [5, 5]),
+    ],
+)
+@pytest.mark.parametrize("front_door", ["refine", "Creases", "subdivide", "carried"])
+def test_creases_that_are_no_edges_are_told_by_row(front_door, wrong, name, value):
+    mesh, carried = Mesh(*grid(3)), CarriedMesh(*grid(3))
+    doors = {
+        "refine": lambda: refine(mesh, loop(), creases=wrong),
+        "Creases": lambda: refine(mesh, loop(), creases=Creases(wrong)),
+        "subdivide": lambda: subdivide(mesh, scheme=loop(), creases=wrong),
+        "carried": lambda: refine_carried(carried, loop(), 1, {"creases": wrong}),
+    }
+    # Where annotations are enforced, another kind ends there first.
+    with pytest.raises((ParameterError, TypeError)) as caught:
+        doors[front_door]()
+    if isinstance(caught.value, ParameterError):
+        assert (caught.value.name, caught.value.value) == (name, value)
+
+
+@pytest.mark.parametrize("none", [np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)), []])
+def test_no_pairs_are_no_creases(none):
+    assert as_pairs(none).shape == (0, 2)
+    assert as_pairs(none).dtype == np.int64
 
 
 def test_crease_edges_get_no_correction_and_are_counted():
@@ -80,19 +126,3 @@ def test_a_boundary_edge_stays_a_boundary():
     rim = topology.edges[topology.edge_class == EdgeClass.BOUNDARY]
     report = refine(Mesh(vertices, faces), loop(), creases=rim).report
     assert report["levels"][0]["edges"]["boundary"] == len(rim)
-
-
-@pytest.mark.parametrize(
-    "creases",
-    [
-        np.array([[0, 99]]),
-        np.array([[-1, 0]]),
-        np.array([[0, 3]]),
-        np.array([0, 1]),
-        np.array([[0.0, 1.0]]),
-    ],
-)
-def test_a_crease_that_is_no_edge_is_refused(creases):
-    # Where annotations are enforced, as in these tests, a wrong shape or type ends there first.
-    with pytest.raises((ParameterError, TypeError)):
-        refine(Mesh(*grid(4)), loop(), creases=creases)
