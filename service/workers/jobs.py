@@ -128,7 +128,7 @@ def measure(work: Work) -> Cost:
         levels, learned = work.options.levels, _learned_levels(work)
         if sent.kind in ("glb", "gltf"):
             return cost_of_gltf(sent.data, sent.kind, levels, work.limits, learned)
-        return cost_of_other(sent.data, levels, work.limits, learned)
+        return cost_of_other(sent.data, sent.kind, levels, work.limits, learned)
 
 
 def _learned_levels(work: Work) -> int:

@@ -12,11 +12,9 @@ from ..bodies.media import Kind
 from ..errors import ServiceError
 from ..gltf.read.container import read_glb
 from ..gltf.read.json_text import BOM, check_size, json_items
+from ..meshfiles.counted import count_triangles
 from ..options import Limits
 from .costs import Cost, cost_of
-
-# Of a format without counts: an OBJ's or PLY's face takes about as many bytes, an STL's 50.
-BYTES_PER_FACE = 30
 
 # Position, normal, tangent, texture coordinates: what a face costs was measured with them.
 USUAL_ATTRIBUTES = 4
@@ -79,9 +77,11 @@ def cost_of_gltf(
     return cost_of(refined, primitives, len(data), learned, values, json_items(text))
 
 
-def cost_of_other(data: bytes, levels: int, limits: Limits, learned_levels: int = 0) -> Cost:
-    """Return the cost of a file that does not say how many faces it has."""
-    before = min(len(data) // BYTES_PER_FACE, limits.max_faces // 4**levels)
+def cost_of_other(
+    data: bytes, kind: str, levels: int, limits: Limits, learned_levels: int = 0
+) -> Cost:
+    """Return the cost of a file of another kind, as if it were within the limits."""
+    before = min(count_triangles(data, kind), limits.max_faces // 4**levels)
     return cost_of(before * 4**levels, 1, len(data), _learned(before, levels, learned_levels))
 
 

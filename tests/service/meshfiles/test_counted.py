@@ -1,0 +1,58 @@
+"""How many triangles a file is said to give, held against the files that are read."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from service.meshfiles.counted import BYTES_PER_FACE, count_triangles
+from service.meshfiles.formats import read
+from service.options import Limits
+from service.workers.measure import cost_of_other
+
+# A thousand polygons of as many sizes, on the same vertices: five bytes a triangle.
+SIZES = range(3, 1003)
+POINTS = np.random.default_rng(0).normal(size=(1002, 3))
+
+
+def text_of(kind: str) -> bytes:
+    vertices = [" ".join(f"{value:.6f}" for value in point) for point in POINTS]
+    if kind == "obj":
+        faces = ["f " + " ".join(str(1 + corner) for corner in range(size)) for size in SIZES]
+        return "\n".join([*(f"v {vertex}" for vertex in vertices), *faces]).encode()
+    faces = [f"{size} " + " ".join(str(corner) for corner in range(size)) for size in SIZES]
+    counts = f"OFF\n# of many sizes\n{len(vertices)} {len(faces)} 0"
+    if kind == "ply":
+        counts = (
+            f"ply\nformat ascii 1.0\nelement vertex {len(vertices)}\nproperty float x\n"
+            "property float y\nproperty float z\n"
+            f"element face {len(faces)}\nproperty list int int vertex_indices\nend_header"
+        )
+    return "\n".join([counts, *vertices, *faces, ""]).encode()
+
+
+@pytest.mark.parametrize("kind", ["obj", "off", "ply"])
+def test_polygons_of_many_corners_count_as_the_triangles_that_they_become(kind: str) -> None:
+    data = text_of(kind)
+    triangles = len(read(data, kind).faces)
+    assert triangles > 5 * len(data) // BYTES_PER_FACE
+    assert count_triangles(data, kind) == triangles
+    assert count_triangles(data.replace(b"\n", b"\r\n"), kind) == triangles
+    assert cost_of_other(data, kind, 1, Limits()).faces == 4 * triangles
+
+
+def test_a_face_of_an_obj_that_goes_on_in_the_next_line_is_one() -> None:
+    data = text_of("obj")
+    torn = re.sub(rb" 7 8 ", b" 7 \\\\\n8 ", data)
+    assert torn.count(b"\n") > data.count(b"\n")
+    assert count_triangles(torn, "obj") == count_triangles(data, "obj")
+
+
+@pytest.mark.parametrize("kind", ["obj", "off", "ply", "stl"])
+@pytest.mark.parametrize(
+    "data", [b"", b"\n", b"f", b"\\", b"OFF\n", b"OFF 9 99 0", b"ply\nformat ascii"]
+)
+def test_what_is_no_mesh_counts_as_nearly_nothing(data: bytes, kind: str) -> None:
+    assert count_triangles(data, kind) <= 1
