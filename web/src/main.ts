@@ -1,19 +1,20 @@
 /** The page: what the user does goes to the session, what comes of it to the stage and the panel. */
 
-import { json, type Limits, type ModelEntry } from "./api/client";
+import { json, request, type Limits, type ModelEntry } from "./api/client";
 import { isAbort } from "./api/problem";
 import { chosen, dropped } from "./files/dropped";
 import { parseGltf } from "./files/gltf";
 import type { Opened } from "./files/open";
-import { uploadOf, type PathedFile } from "./files/upload";
+import { uploadsOf, type Dropped, type PathedFile, type Upload } from "./files/upload";
 import { dihedrals } from "./measure/dihedral";
 import { distances, largestLength } from "./measure/distance";
 import { surfaceOf } from "./measure/surface";
 import type { Lengths } from "./report/certificate";
-import { bytes } from "./report/format";
+import { bytes, listed } from "./report/format";
 import { Session, type Result, type Source } from "./session";
-import { fromHash, toHash, type Compression, type Settings } from "./settings";
+import { DEFAULTS, fromHash, toHash, type Compression, type Settings } from "./settings";
 import { debounced, element, input, save, select } from "./ui/dom";
+import { FileList } from "./ui/file-list";
 import {
   showCertificate,
   showChanges,
@@ -24,7 +25,17 @@ import {
 } from "./ui/results";
 import { SettingsForm } from "./ui/settings-form";
 import { Stage } from "./ui/stage";
-import { announce, bindProblem, hideProblem, hideProgress, showProblem, showProgress } from "./ui/status";
+import {
+  announce,
+  bindNotice,
+  bindProblem,
+  hideNotice,
+  hideProblem,
+  hideProgress,
+  showNotice,
+  showProblem,
+  showProgress,
+} from "./ui/status";
 import { compare } from "./validate/compare";
 import { validate } from "./validate/validate";
 import { dispose, modelOf } from "./view/model";
@@ -44,10 +55,14 @@ const session = new Session({
   progress: showProgress,
   opened: (source) => {
     document.body.classList.remove("empty", "refined");
-    element("file-name").textContent = source.upload.name;
+    fileList.show(source.upload);
     stage.open(source);
   },
-  stayed: ({ opened }) => fit(opened),
+  stayed: ({ upload, opened }) => {
+    fileList.show(upload);
+    fit(opened);
+  },
+  stopped: ({ name }) => showNotice(`${name}: cancelled`, true),
   refined: (ours) => {
     stage.refine(ours, session.loop);
     const milliseconds = performance.now() - began;
@@ -69,7 +84,7 @@ const session = new Session({
   cleared: () => {
     document.body.classList.add("empty");
     document.body.classList.remove("refined");
-    element("file-name").textContent = "";
+    fileList.show(null);
     form.start(0);
     stage.arrange();
   },
@@ -93,12 +108,12 @@ const form = new SettingsForm(
   given.settings,
   debounced(300, () => {
     remember();
-    hideProblem();
-    began = performance.now();
+    clear();
     void session.again({ ...form.settings }, prepare);
   }),
 );
 stage.view = given.view;
+const fileList = new FileList(takeOne);
 
 async function prepare(opened: Opened): Promise<Settings> {
   // Which levels are open depends on the service's limits.
@@ -125,14 +140,50 @@ function chooseNormals({ normals }: Opened): void {
   }
 }
 
-function take(files: PathedFile[]): void {
-  hideProblem();
-  began = performance.now();
+async function take(files: PathedFile[] | Promise<PathedFile[]>): Promise<void> {
+  clear();
   try {
-    void session.take(uploadOf(files), prepare);
+    const dropped = await uploadsOf(await files);
+    fileList.offer(dropped.uploads);
+    takeOne(dropped.uploads[0]!);
+    const others = tellOthers(dropped);
+    if (others) showNotice(others);
   } catch (error) {
     showProblem(error);
   }
+}
+
+function takeOne(upload: Upload): void {
+  clear();
+  void session.take(upload, prepare);
+}
+
+/** What came beside the file that is opened; empty where nothing did. */
+function tellOthers({ uploads: [first, ...others], unused }: Dropped): string {
+  const names = others.map(({ path }) => path);
+  const sentences = [
+    others.length ? `${first?.path} is opened; the list at the top has ${listed(names)} too.` : "",
+    unused.length ? `Not used: ${listed(unused)}.` : "",
+  ];
+  return sentences.filter(Boolean).join(" ");
+}
+
+/** Before something new: what was said of the last is over. */
+function clear(): void {
+  hideProblem();
+  hideNotice();
+  began = performance.now();
+}
+
+/** Put other settings in the form's place. */
+function restore(settings: Settings): void {
+  form.settings = settings;
+  smoothed = false;
+  if (session.source) fit(session.source.opened);
+  else form.start(0);
+  remember();
+  clear();
+  void session.again({ ...settings }, prepare);
 }
 
 /** Everything that the report and the file say, before Loop's side has come. */
@@ -237,15 +288,11 @@ function bindFiles(): void {
     element(id).addEventListener("click", () => files.click());
   }
   files.addEventListener("change", () => {
-    if (files.files?.length) take(chosen(files.files));
+    if (files.files?.length) void take(chosen(files.files));
     // The same file may be chosen again.
     files.value = "";
   });
-  element("example").addEventListener("click", async () => {
-    const response = await fetch(new URL(EXAMPLE, import.meta.url));
-    const file = new File([await response.arrayBuffer()], "example.glb");
-    take([{ path: file.name, file }]);
-  });
+  element("example").addEventListener("click", () => void take(example()));
   const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
   document.addEventListener("dragover", (event) => {
     if (!hasFiles(event)) return;
@@ -255,25 +302,48 @@ function bindFiles(): void {
   document.addEventListener("dragleave", (event) => {
     if (!event.relatedTarget) document.body.classList.remove("dragging");
   });
-  document.addEventListener("drop", async (event) => {
+  document.addEventListener("drop", (event) => {
     event.preventDefault();
     document.body.classList.remove("dragging");
-    if (event.dataTransfer) take(await dropped(event.dataTransfer));
+    if (event.dataTransfer) void take(dropped(event.dataTransfer));
   });
   document.addEventListener("paste", (event) => {
-    if (event.clipboardData?.files.length) take(chosen(event.clipboardData.files));
+    if (event.clipboardData?.files.length) void take(chosen(event.clipboardData.files));
   });
+}
+
+async function example(): Promise<PathedFile[]> {
+  const response = await request(`assets/${EXAMPLE}`);
+  const file = new File([await response.arrayBuffer()], "example.glb");
+  return [{ path: file.name, file }];
 }
 
 function bindPanel(): void {
   element("cancel").addEventListener("click", () => {
     session.cancel();
     hideProgress();
-    announce("Cancelled");
+    // Its own button is gone.
+    element(element("notice").hidden ? "panel" : "again").focus();
+  });
+  bindNotice(() => {
+    began = performance.now();
+    void session.resume({ ...form.settings }, prepare);
   });
   bindProblem(() => {
     offered = start();
     void session.retry(prepare);
+  });
+  element("reset").addEventListener("click", () => restore({ ...DEFAULTS }));
+  // A link that is followed in the page's own tab changes nothing but the part after #.
+  addEventListener("hashchange", () => {
+    const { settings, view } = fromHash(location.hash);
+    stage.view = view;
+    restore(settings);
+  });
+  document.querySelector(".skip")?.addEventListener("click", (event) => {
+    // The part after # has the settings.
+    event.preventDefault();
+    element("panel").focus();
   });
   element("fold").addEventListener("click", () => {
     const folded = document.body.classList.toggle("folded");

@@ -43,6 +43,8 @@ export interface Listener {
   idle(): void;
   failed(error: unknown): void;
   discarded(model: Model): void;
+  /** The refinement of a file was cancelled. */
+  stopped(upload: Upload): void;
   /** The file that was shown turned out to be broken. */
   cleared(): void;
 }
@@ -54,15 +56,33 @@ export class Session {
   private controller = new AbortController();
   /** How many tasks the controller ends. */
   private underWay = 0;
+  /** Whether a refinement is among them. */
+  private refining = false;
   private lastDrop: Upload | null = null;
   /** A file that is not refined yet, beside the one that is shown. */
   private coming: Upload | null = null;
+  /** Whose refinement was cancelled. */
+  private stopped: Upload | null = null;
 
   constructor(private readonly listener: Listener) {}
 
+  /** End all that is under way. */
   cancel(): void {
+    const upload = this.coming ?? this.source?.upload;
+    const { refining } = this;
     this.coming = null;
+    this.refining = false;
     this.controller.abort();
+    if (!refining || !upload) return;
+    this.stopped = upload;
+    this.listener.stopped(upload);
+  }
+
+  /** Refine what was cancelled after all. */
+  async resume(settings: Settings, prepare: Prepare): Promise<void> {
+    const { stopped } = this;
+    if (stopped && stopped !== this.source?.upload) await this.take(stopped, prepare);
+    else await this.again(settings, prepare);
   }
 
   /** Take a new file. What was there stays until the new one is refined. */
@@ -96,7 +116,9 @@ export class Session {
     if (coming) return this.take(coming, prepare);
     if (!source) return;
     await this.only(async (signal) => {
-      const ours = await this.run(source.upload, settings, signal);
+      // It is there already where Loop's side alone was cancelled.
+      const there = this.ours?.key === query(settings).toString() ? this.ours : null;
+      const ours = there ?? (await this.run(source.upload, settings, signal));
       await this.complete(source.upload, ours, settings, signal);
     });
   }
@@ -187,10 +209,18 @@ export class Session {
     if (old && old !== result) this.listener.discarded(old.model);
   }
 
-  /** Run a task after ending all that is under way. */
+  /** Run a refinement after ending all that is under way. */
   private async only(task: Task): Promise<void> {
     this.controller.abort();
-    await this.beside(task);
+    await this.beside(async (signal) => {
+      this.refining = true;
+      try {
+        await task(signal);
+      } finally {
+        // Where it was ended, another may be under way.
+        if (!signal.aborted) this.refining = false;
+      }
+    });
   }
 
   /** Run a task beside what is under way; what ends that ends it too. */

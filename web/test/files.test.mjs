@@ -16,6 +16,11 @@ const FOX = fileURLToPath(new URL("../../../shared/assets/Fox.glb", import.meta.
 const FIXTURES = fileURLToPath(new URL("../../../shared/assets/fixtures/", import.meta.url));
 // Both sides of a square that stays one: its corners are creases.
 const SQUARE = "#levels=1&layout=side&crease=angle&angle=1";
+const TRIANGLE = {
+  name: "triangle.obj",
+  mimeType: "",
+  buffer: Buffer.from("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+};
 const REFUSED = [
   ["BoxWithInfinites.glb", /NaN or infinity/],
   ["IndexOutOfRange.gltf", /index 255, but there are 24 vertices/],
@@ -181,6 +186,7 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     ["text.zip", Buffer.from("hello"), /^The file cannot be read.*This is no ZIP/],
     ["mesh.zip", zipped, /^No glTF in this archive.*a\.obj/],
     ["other.stl", part, /This is no STL: it ends too early/],
+    ["text.glb", Buffer.from("hello"), /This is no glTF: it is neither a GLB nor JSON/],
     ["text.txt", Buffer.from("hello"), /^No mesh among these files/],
   ]) {
     test(`${name} gets words, and no other try`, async () => {
@@ -191,6 +197,60 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       assert.ok(await page.isHidden("#problem-again"));
     });
   }
+
+  test("of several meshes one is opened, the others are a choice away, and what is left is named", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    const notes = { name: "notes.txt", mimeType: "", buffer: Buffer.from("hello") };
+    await choose(page, TRIANGLE, notes, example);
+    await settled(page);
+    assert.match(await page.textContent("#label-left"), new RegExp(number(PART_FACES)));
+    assert.match(await page.textContent("#notice-text"), /part\.glb is opened.* triangle\.obj too.*Not used: notes\.txt/);
+    assert.deepEqual(await namesListed(page), ["part.glb (1 of 2)", "triangle.obj (2 of 2)"]);
+    await page.selectOption("#file", "1");
+    await page.locator("#label-left", { hasText: "1 faces" }).waitFor();
+    await settled(page);
+    assert.ok(await page.isHidden("#notice"));
+    assert.equal(await page.inputValue("#file"), "1");
+    await choose(page, example);
+    await page.locator("#file-name", { hasText: "part.glb" }).waitFor();
+    assert.ok(await page.isHidden("#file"));
+  });
+
+  test("where the first of several meshes is broken the others can be chosen", async () => {
+    const page = await visit({ hash: "#levels=1", expected: [422] });
+    await choose(page, { name: "broken.glb", mimeType: "", buffer: broken(part) }, TRIANGLE);
+    await page.locator("#problem").waitFor();
+    await page.selectOption("#file", "1");
+    await settled(page);
+    assert.match(await page.textContent("#label-left"), /\D1 faces/);
+    assert.ok(await page.isHidden("#problem"));
+  });
+
+  test("of the files beside two documents each gets its own", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await page.evaluate(() => {
+      window.sent = new Set();
+      const { append } = FormData.prototype;
+      FormData.prototype.append = function (name, file, path) {
+        window.sent.add(`${name}: ${path}`);
+        append.call(this, name, file, path);
+      };
+    });
+    const files = ["a", "b"].flatMap((name) => {
+      const { buffers, ...document } = bare();
+      const [{ byteLength, uri }] = buffers;
+      const json = { ...document, buffers: [{ byteLength, uri: `./${name}.bin` }] };
+      const bin = Buffer.from(uri.slice(uri.indexOf(",") + 1), "base64");
+      return [
+        { name: `${name}.gltf`, mimeType: "", buffer: Buffer.from(JSON.stringify(json)) },
+        { name: `${name}.bin`, mimeType: "", buffer: bin },
+      ];
+    });
+    await choose(page, ...files);
+    await settled(page);
+    assert.doesNotMatch(await page.textContent("#notice-text"), /Not used/);
+    assert.deepEqual(await page.evaluate(() => [...window.sent]), ["file: a.gltf", "a.bin: a.bin"]);
+  });
 
   test("of a first file that is refused nothing stays", async () => {
     const page = await visit({ expected: [422] });
@@ -226,6 +286,11 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   });
 
 });
+
+/** The meshes that may be chosen, as they are called. */
+function namesListed(page) {
+  return page.$eval("#file", ({ options }) => [...options].map(({ text }) => text));
+}
 
 /** A square with a texture of four colours, and its texture beside it. */
 async function square(kind) {

@@ -58,6 +58,46 @@ describe("jobs of the page", { skip: noBrowser, timeout: 900_000 }, () => {
     await settled(page);
   });
 
+  test("a first file that is cancelled is refined after all, without a mouse", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    const release = await hold(page);
+    await choose(page, example);
+    await page.locator("#label-left", { hasText: number(PART_FACES) }).waitFor();
+    await page.locator("#cancel").press("Enter");
+    assert.equal(await page.textContent("#notice-text"), "part.glb: cancelled");
+    release();
+    await page.locator("#again:focus").press("Enter");
+    await settled(page);
+    assert.match(await page.textContent("#label-right"), new RegExp(`· ${number(4 * PART_FACES)} faces`));
+    assert.ok(await page.isHidden("#notice"));
+  });
+
+  test("a second file that is cancelled is refined after all", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    const release = await hold(page);
+    await choose(page, example);
+    await page.locator("#levels", { hasText: number(4 * PART_FACES) }).waitFor({ state: "attached" });
+    await page.click("#cancel");
+    release();
+    await page.click("#again");
+    await page.locator("#file-name", { hasText: "part.glb" }).waitFor();
+    await settled(page);
+  });
+
+  test("a download that is cancelled is no refinement to ask for again", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, example);
+    await settled(page);
+    await hold(page);
+    await page.check("#attributes");
+    await page.click("#download");
+    await page.click("#cancel");
+    assert.ok(await page.isHidden("#work"));
+    assert.ok(await page.isHidden("#notice"));
+  });
+
   test("a second file that is cancelled leaves the form to the first", async () => {
     const page = await visit({ hash: "#levels=1" });
     await choose(page, TETRAHEDRON);

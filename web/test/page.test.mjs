@@ -112,6 +112,8 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await page.selectOption("#levels", "1");
     await page.selectOption("#model", "loop");
     await page.selectOption("#look", "zebra");
+    await page.focus("#canvas");
+    await page.keyboard.press("n");
     await page.click("summary:has-text('More')");
     await page.selectOption("#crease", "angle");
     await page.fill("#angle", "25");
@@ -121,7 +123,23 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     for (const [id, value] of [["levels", "1"], ["look", "zebra"], ["crease", "angle"], ["angle", "25"]]) {
       assert.equal(await other.inputValue(`#${id}`), value);
     }
+    assert.ok(await other.isChecked("#normal-lines"));
     await other.waitForFunction(() => document.querySelector("#model").value === "loop");
+  });
+
+  test("a link that is followed in the page’s own tab changes the settings there", async () => {
+    const page = await visit({ hash: "#levels=1&look=zebra" });
+    await choose(page, example);
+    await settled(page);
+    await page.evaluate(() => (location.hash = "#levels=2&edges=1&layout=side"));
+    await page.locator("#label-right", { hasText: `${number(16 * PART_FACES)} faces` }).waitFor();
+    assert.ok(await page.isChecked("#edges"));
+    assert.ok(await page.isChecked('input[value="side"]'));
+    assert.equal(await page.inputValue("#look"), "material");
+    await settled(page);
+    // The way past the canvas is no setting.
+    await page.locator(".skip").press("Enter");
+    assert.ok(await page.evaluate(() => document.activeElement.id === "panel" && location.hash.includes("edges=1")));
   });
 
   test("without a mouse: the example, the view, the wipe", async () => {
@@ -155,6 +173,21 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       await choose(page, { name: "a.txt", mimeType: "", buffer: Buffer.from("") });
       await page.locator("#problem").waitFor();
       assert.deepEqual(await faultsOf(page), []);
+    });
+  }
+
+  for (const [width, lines] of [[1440, 1], [1024, 1], [800, 2], [390, 2]]) {
+    test(`tools take ${lines} lines at ${width} pixels, and none stands alone`, async () => {
+      const page = await visit({ viewport: { width, height: 700 }, hash: "#levels=1" });
+      await choose(page, example);
+      await settled(page);
+      const middles = await page.$$eval("#tools :is(#layout, select, .toggle, button)", (tools) =>
+        tools.map((tool) => tool.getBoundingClientRect()).map(({ top, height }) => Math.round((top + height / 2) / 12)),
+      );
+      const counts = [...new Set(middles)].map((line) => middles.filter((other) => other === line).length);
+      assert.deepEqual(counts, lines === 1 ? [6] : [1, 5]);
+      const [tools, view] = await Promise.all(["#tools", ".stage"].map((id) => page.locator(id).boundingBox()));
+      assert.ok(tools.x >= view.x && tools.x + tools.width <= view.x + view.width);
     });
   }
 

@@ -3,28 +3,25 @@
 import { unzip as inflate, type Unzipped } from "three/addons/libs/fflate.module.js";
 import { fileProblem } from "../api/problem";
 import { kindOf } from "./kinds";
-import { uploadOf, type Upload } from "./upload";
+import { unreadable } from "./unreadable";
+import { uploadsOf, type Upload } from "./upload";
 
 export async function unzip(upload: Upload): Promise<Upload> {
   const data = new Uint8Array(await upload.file.arrayBuffer());
   const entries = await new Promise<Unzipped>((resolve, reject) =>
-    inflate(data, (error, files) => (error ? reject(unreadable(error)) : resolve(files))),
+    inflate(data, (error, files) => (error ? reject(unreadable("ZIP", error)) : resolve(files))),
   );
   const paths = Object.keys(entries).filter((path) => !path.endsWith("/"));
   if (!paths.some((path) => /^gl(b|tf)$/.test(kindOf(path) ?? ""))) {
     const names = paths.slice(0, 5).join(", ") || "nothing";
     throw fileProblem("No glTF in this archive", `It holds ${names}: the page takes a .gltf or .glb in a .zip.`);
   }
-  return uploadOf(
-    paths
-      .filter((path) => !/\.zip$/i.test(path))
-      .map((path) => ({
-        path,
-        file: new File([entries[path] as BlobPart], path.slice(path.lastIndexOf("/") + 1)),
-      })),
+  const { uploads } = await uploadsOf(
+    paths.map((path) => ({
+      path,
+      file: new File([entries[path] as BlobPart], path.slice(path.lastIndexOf("/") + 1)),
+    })),
   );
-}
-
-function unreadable(error: Error): Error {
-  return fileProblem("The file cannot be read", `This is no ZIP: ${error.message}`);
+  // A glTF comes first, and the service refuses an archive that holds several.
+  return uploads[0]!;
 }

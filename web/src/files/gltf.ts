@@ -27,6 +27,31 @@ export function jsonOf(bytes: ArrayBuffer): GltfJson {
   return JSON.parse(new TextDecoder().decode(text)) as GltfJson;
 }
 
+/** The path that a relative address names, in its shortest form. */
+export function pathOf(address: string): string {
+  let path = address;
+  try {
+    path = decodeURIComponent(address);
+  } catch {
+    // A name with a per cent sign of its own.
+  }
+  return path.split("/").filter((step) => step !== "" && step !== ".").join("/");
+}
+
+/** The paths of the files that a document names; what is no JSON names none. */
+export function filesNamedIn(bytes: ArrayBuffer): Set<string> {
+  const paths = new Set<string>();
+  try {
+    JSON.parse(new TextDecoder().decode(bytes), (key, value: unknown) => {
+      if (key === "uri" && typeof value === "string" && !/^(data|blob):/.test(value)) paths.add(pathOf(value));
+      return value;
+    });
+  } catch {
+    // It is refused when it is opened.
+  }
+  return paths;
+}
+
 /** Triangles of all meshes, each counted once however many nodes show it. */
 export function triangles(json: GltfJson): number {
   let count = 0;
@@ -63,7 +88,7 @@ export async function parseGltf(
     if (url.startsWith("blob:")) return url;
     // The content security policy lets blobs be fetched and nothing else.
     if (url.startsWith("data:")) return blobUrl(blobOfDataUri(url));
-    const file = neighbours.get(url) ?? neighbours.get(decodeURIComponent(url));
+    const file = neighbours.get(pathOf(url));
     if (file) return blobUrl(file);
     missing.push(url);
     return blobUrl(new Blob());

@@ -4,6 +4,7 @@ import { Group, Mesh, type AnimationClip, type BufferGeometry } from "three";
 import { fileProblem } from "../api/problem";
 import { plain } from "../view/looks";
 import { hasNormals, jsonOf, parseGltf, triangles, type GltfJson } from "./gltf";
+import { unreadable } from "./unreadable";
 import type { Upload } from "./upload";
 
 export interface Opened {
@@ -33,7 +34,7 @@ export async function open(upload: Upload): Promise<Opened> {
   try {
     geometry = readMesh(bytes, upload.kind);
   } catch (error) {
-    throw unreadable(upload, error);
+    throw unreadable(upload.kind.toUpperCase(), error);
   }
   const mesh = new Mesh(geometry);
   plain([mesh]);
@@ -47,7 +48,7 @@ async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Prom
   try {
     json = jsonOf(bytes);
   } catch {
-    throw fileProblem("The file cannot be read", "It is neither a GLB nor glTF JSON.");
+    throw unreadable("glTF", new Error("it is neither a GLB nor JSON"));
   }
   const { scene, animations } = await parseGltf(bytes, neighbours);
   return {
@@ -58,11 +59,4 @@ async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Prom
     json,
     gltf: { bytes, neighbours },
   };
-}
-
-function unreadable(upload: Upload, error: unknown): Error {
-  const kind = upload.kind.toUpperCase();
-  // What a reader of binary data says where it runs over the end means nothing to anybody.
-  const why = error instanceof RangeError ? "it ends too early" : (error as Error).message;
-  return fileProblem("The file cannot be read", `This is no ${kind}: ${why}`);
 }

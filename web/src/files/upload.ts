@@ -2,6 +2,8 @@
 
 import type { Body } from "../api/jobs";
 import { fileProblem } from "../api/problem";
+import { listed } from "../report/format";
+import { filesNamedIn } from "./gltf";
 import { kindOf, MEDIA_TYPES, type Kind } from "./kinds";
 
 /** A file with the folder that it came in. */
@@ -12,6 +14,8 @@ export interface PathedFile {
 
 export interface Upload {
   name: string;
+  /** With the folder that it came in. */
+  path: string;
   kind: Kind;
   file: Blob;
   /** What a .gltf names, by path relative to it. */
@@ -19,30 +23,58 @@ export interface Upload {
   bytes: number;
 }
 
-// A document first: an archive or a mesh beside it is a neighbour.
-const ORDER: Kind[] = ["gltf", "glb", "zip", "obj", "ply", "stl", "off"];
+/** What came together. */
+export interface Dropped {
+  /** Each document by itself; at least one. */
+  uploads: Upload[];
+  /** The names of files that are no part of any. */
+  unused: string[];
+}
 
-/** The one document among the files. */
-export function uploadOf(files: PathedFile[]): Upload {
+// What is opened first: a document rather than an archive, or a mesh without materials.
+const ORDER: Kind[] = ["gltf", "glb", "zip", "obj", "ply", "stl", "off"];
+// What systems leave beside files.
+const HIDDEN = /(^|\/)(\.|__MACOSX\/|Thumbs\.db$|desktop\.ini$)/i;
+
+/** The documents among the files, each with those that it names. */
+export async function uploadsOf(given: PathedFile[]): Promise<Dropped> {
+  const files = given.filter(({ path }) => !HIDDEN.test(path));
   const documents = files
     .map((file) => ({ ...file, kind: kindOf(file.path) }))
     .filter((file): file is PathedFile & { kind: Kind } => file.kind !== null)
     .sort((a, b) => ORDER.indexOf(a.kind) - ORDER.indexOf(b.kind) || depth(a) - depth(b));
-  const main = documents[0];
-  if (!main) {
-    const names = files.map(({ file }) => file.name).join(", ") || "nothing";
+  if (!documents.length) {
+    const names = listed(given.map(({ file }) => file.name)) || "nothing";
     throw fileProblem(
       "No mesh among these files",
       `${names}: the page takes ${ORDER.map((kind) => `.${kind}`).join(", ")}.`,
     );
   }
-  const folder = main.path.slice(0, main.path.lastIndexOf("/") + 1);
-  const beside = main.kind === "gltf" ? files.filter(({ path }) => path !== main.path) : [];
-  const neighbours = new Map(
-    beside.map(({ path, file }) => [path.replace(folder, ""), file as Blob]),
-  );
-  const bytes = [main.file, ...neighbours.values()].reduce((sum, file) => sum + file.size, 0);
-  return { name: main.file.name, kind: main.kind, file: main.file, neighbours, bytes };
+  const used = new Set(documents.map(({ path }) => path));
+  const uploads: Upload[] = [];
+  for (const { path, file, kind } of documents) {
+    const neighbours = kind === "gltf" ? await namedBy(path, file, files) : [];
+    neighbours.forEach(([, beside]) => used.add(beside.path));
+    uploads.push({
+      name: file.name,
+      path,
+      kind,
+      file,
+      neighbours: new Map(neighbours.map(([name, beside]) => [name, beside.file])),
+      bytes: neighbours.reduce((sum, [, beside]) => sum + beside.file.size, file.size),
+    });
+  }
+  return { uploads, unused: files.filter(({ path }) => !used.has(path)).map(({ path }) => path) };
+}
+
+/** The files that a .gltf names, by path relative to it. */
+async function namedBy(path: string, file: File, files: PathedFile[]): Promise<[string, PathedFile][]> {
+  const named = filesNamedIn(await file.arrayBuffer());
+  const folder = path.slice(0, path.lastIndexOf("/") + 1);
+  return files
+    .filter((other) => other.path.startsWith(folder))
+    .map((other): [string, PathedFile] => [other.path.slice(folder.length), other])
+    .filter(([name]) => named.has(name));
 }
 
 /** The body of a job. */

@@ -45,3 +45,11 @@ export function bytes(value: number): string {
 export function seconds(value: number): string {
   return value < 1 ? `${Math.round(1000 * value)} ms` : `${figure(value)} s`;
 }
+
+/** Some names, and how many more there are. */
+export function listed(names: string[], most = 3): string {
+  const more = names.length - most;
+  // One more takes no more room than the word of it.
+  if (more <= 1) return names.join(", ");
+  return `${names.slice(0, most).join(", ")} and ${more} more`;
+}

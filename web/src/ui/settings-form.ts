@@ -17,11 +17,6 @@ export class SettingsForm {
     const form = element<HTMLFormElement>("settings");
     form.addEventListener("submit", (event) => event.preventDefault());
     form.addEventListener("input", () => this.read());
-    element("reset").addEventListener("click", () => {
-      this.settings = { ...DEFAULTS };
-      this.write();
-      this.changed();
-    });
     this.write();
   }
 

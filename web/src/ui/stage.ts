@@ -21,6 +21,9 @@ export interface Shown {
   loop: Result | null;
 }
 
+/** What may be drawn over both sides, by the id of its toggle. */
+const LINES = ["edges", "normal-lines"] as const;
+
 /** What stands over a side. */
 interface Label {
   title: string;
@@ -58,7 +61,7 @@ export class Stage {
         return moving;
       };
     }
-    for (const id of ["layout", "pair", "look", "edges", "normal-lines"]) {
+    for (const id of ["layout", "pair", "look", ...LINES]) {
       element(id).addEventListener("change", () => {
         this.read();
         this.changed();
@@ -80,7 +83,7 @@ export class Stage {
     if (this.layout !== "wipe") view.layout = this.layout;
     if (select("pair").value !== "control") view.pair = select("pair").value;
     if (select("look").value !== "material") view.look = select("look").value;
-    if (input("edges").checked) view.edges = "1";
+    for (const lines of LINES) if (input(lines).checked) view[lines] = "1";
     return view;
   }
 
@@ -90,12 +93,11 @@ export class Stage {
     );
     if (radio) radio.checked = true;
     for (const name of ["pair", "look"] as const) {
-      const wanted = view[name];
-      if (wanted && [...select(name).options].some(({ value }) => value === wanted)) {
-        select(name).value = wanted;
-      }
+      select(name).value = view[name] ?? "";
+      // What is not understood stays at its default.
+      if (select(name).selectedIndex < 0) select(name).selectedIndex = 0;
     }
-    input("edges").checked = view.edges === "1";
+    for (const lines of LINES) input(lines).checked = view[lines] === "1";
     this.read();
   }
 

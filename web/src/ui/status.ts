@@ -46,6 +46,32 @@ export function hideProgress(): void {
   element("work").hidden = true;
 }
 
+/** Say what is no fault; `again` offers the refinement that was cancelled. */
+export function showNotice(text: string, again = false): void {
+  element("notice-text").textContent = text;
+  element("again").hidden = !again;
+  element("notice").hidden = false;
+  announce(text);
+}
+
+export function hideNotice(): void {
+  element("notice").hidden = true;
+}
+
+/** `again` runs where the user wants what was cancelled after all. */
+export function bindNotice(again: () => void): void {
+  element("again").addEventListener("click", () => {
+    // The button goes with its notice: the focus stays near.
+    element("panel").focus();
+    hideNotice();
+    again();
+  });
+  element("notice-close").addEventListener("click", () => {
+    element("panel").focus();
+    hideNotice();
+  });
+}
+
 export function announce(text: string): void {
   element("announce").textContent = text;
 }
@@ -74,10 +100,14 @@ export function hideProblem(): void {
 /** `again` runs where the user wants another try, and once they have given a key. */
 export function bindProblem(again: () => void): void {
   element("problem-again").addEventListener("click", () => {
+    element("panel").focus();
     hideProblem();
     again();
   });
-  element("problem-close").addEventListener("click", hideProblem);
+  element("problem-close").addEventListener("click", () => {
+    element("panel").focus();
+    hideProblem();
+  });
   element("key-form").addEventListener("submit", (event) => {
     event.preventDefault();
     useKey(input("key").value);
