@@ -1,7 +1,7 @@
 /** The page: what the user does goes to the session, what comes of it to the stage and the panel. */
 
 import { json, request, type Limits, type ModelEntry } from "./api/client";
-import { isAbort } from "./api/problem";
+import { fileProblem, isAbort } from "./api/problem";
 import { chosen, dropped } from "./files/dropped";
 import { parseGltf } from "./files/gltf";
 import type { Opened } from "./files/open";
@@ -11,7 +11,7 @@ import { distances, largestLength } from "./measure/distance";
 import { surfaceOf } from "./measure/surface";
 import type { Lengths } from "./report/certificate";
 import { bytes, listed } from "./report/format";
-import { Session, type Result, type Source } from "./session";
+import { Session, type Again, type Result, type Source } from "./session";
 import { DEFAULTS, fromHash, toHash, type Compression, type Settings } from "./settings";
 import { debounced, element, input, save, select } from "./ui/dom";
 import { FileList } from "./ui/file-list";
@@ -44,6 +44,8 @@ let began = 0;
 let validation = new AbortController();
 /** Whether the page, and not the user, asked for smooth normals. */
 let smoothed = false;
+/** Another try at what failed last. */
+let retry: Again = () => {};
 /** The result whose values at vertices are on their way. */
 let awaiting: Result | null = null;
 /** Of the file that is shown. */
@@ -80,7 +82,10 @@ const session = new Session({
     announce(`Refined. ${showCertificate(ours.report, lengths(ours, loop))}`);
   },
   idle: hideProgress,
-  failed: showProblem,
+  failed: (error, again) => {
+    retry = again;
+    showProblem(error);
+  },
   cleared: () => {
     document.body.classList.add("empty");
     document.body.classList.remove("refined");
@@ -155,6 +160,14 @@ async function take(files: PathedFile[] | Promise<PathedFile[]>): Promise<void> 
 
 function takeOne(upload: Upload): void {
   clear();
+  const most = form.largestUpload;
+  if (upload.bytes > most) {
+    // It would be sent for nothing.
+    const detail = `${upload.name} has ${bytes(upload.bytes)}; this service takes up to ${bytes(most)}.`;
+    showProblem(fileProblem("The file is too large", detail));
+    fileList.show(session.source?.upload ?? null);
+    return;
+  }
   void session.take(upload, prepare);
 }
 
@@ -241,7 +254,7 @@ async function fetchValues(): Promise<void> {
   const { ours } = session;
   if (ours === awaiting) return;
   awaiting = ours;
-  const answer = await session.fetch({ ...form.settings }, "full", "none");
+  const answer = await session.fetch({ ...form.settings }, "full", "none", () => stage.arrange());
   if (awaiting === ours) awaiting = null;
   if (!answer || !ours || session.ours !== ours) return;
   const { scene } = await parseGltf(answer.bytes);
@@ -275,7 +288,8 @@ async function downloadGlb(): Promise<void> {
   const name = resultName("glb");
   let content = session.ours.bytes;
   if (full || compress !== "none") {
-    const answer = await session.fetch({ ...form.settings }, full ? "full" : "summary", compress);
+    const again = () => void downloadGlb();
+    const answer = await session.fetch({ ...form.settings }, full ? "full" : "summary", compress, again);
     if (!answer) return;
     content = answer.bytes;
   }
@@ -331,7 +345,8 @@ function bindPanel(): void {
   });
   bindProblem(() => {
     offered = start();
-    void session.retry(prepare);
+    began = performance.now();
+    retry();
   });
   element("reset").addEventListener("click", () => restore({ ...DEFAULTS }));
   // A link that is followed in the page's own tab changes nothing but the part after #.

@@ -32,6 +32,9 @@ export type Prepare = (opened: Opened) => Promise<Settings>;
 
 type Task = (signal: AbortSignal) => Promise<void>;
 
+/** Another try at what failed. */
+export type Again = () => void;
+
 export interface Listener {
   progress(progress: Progress, what: string): void;
   /** A new file has taken the place of the old. */
@@ -41,7 +44,7 @@ export interface Listener {
   refined(ours: Result): void;
   compared(loop: Result | null): void;
   idle(): void;
-  failed(error: unknown): void;
+  failed(error: unknown, again: Again): void;
   discarded(model: Model): void;
   /** The refinement of a file was cancelled. */
   stopped(upload: Upload): void;
@@ -58,7 +61,6 @@ export class Session {
   private underWay = 0;
   /** Whether a refinement is among them. */
   private refining = false;
-  private lastDrop: Upload | null = null;
   /** A file that is not refined yet, beside the one that is shown. */
   private coming: Upload | null = null;
   /** Whose refinement was cancelled. */
@@ -87,8 +89,9 @@ export class Session {
 
   /** Take a new file. What was there stays until the new one is refined. */
   async take(upload: Upload, prepare: Prepare): Promise<void> {
-    this.lastDrop = this.coming = upload;
-    await this.only(async (signal) => {
+    this.coming = upload;
+    const again = () => void this.take(upload, prepare);
+    await this.only(again, async (signal) => {
       let source: Source | null = null;
       let settings: Settings;
       let ours: Result;
@@ -115,7 +118,8 @@ export class Session {
     const { source, coming } = this;
     if (coming) return this.take(coming, prepare);
     if (!source) return;
-    await this.only(async (signal) => {
+    const anew = () => void this.again(settings, prepare);
+    await this.only(anew, async (signal) => {
       // It is there already where Loop's side alone was cancelled.
       const there = this.ours?.key === query(settings).toString() ? this.ours : null;
       const ours = there ?? (await this.run(source.upload, settings, signal));
@@ -123,21 +127,20 @@ export class Session {
     });
   }
 
-  /** The file that was dropped last, also when it was refused. */
-  async retry(prepare: Prepare): Promise<void> {
-    if (this.lastDrop) await this.take(this.lastDrop, prepare);
-  }
-
-  /** Another answer for the same settings; null when it was cancelled. Nothing under way ends for it. */
+  /**
+   * Another answer for the same settings; null when it was cancelled, or failed: `again` is what then
+   * asks for it anew. Nothing under way ends for it.
+   */
   async fetch(
     settings: Settings,
     diagnostics: Diagnostics,
     compress: Compression,
+    again: Again,
   ): Promise<Answer | null> {
     const { source } = this;
     if (!source) return null;
     let answer: Answer | null = null;
-    await this.beside(async (signal) => {
+    await this.beside(again, async (signal) => {
       const asked = query(settings, diagnostics, compress);
       answer = await refine(bodyOf(source.upload), asked, signal, (progress) =>
         this.listener.progress(progress, ""),
@@ -210,9 +213,9 @@ export class Session {
   }
 
   /** Run a refinement after ending all that is under way. */
-  private async only(task: Task): Promise<void> {
+  private async only(again: Again, task: Task): Promise<void> {
     this.controller.abort();
-    await this.beside(async (signal) => {
+    await this.beside(again, async (signal) => {
       this.refining = true;
       try {
         await task(signal);
@@ -224,7 +227,7 @@ export class Session {
   }
 
   /** Run a task beside what is under way; what ends that ends it too. */
-  private async beside(task: Task): Promise<void> {
+  private async beside(again: Again, task: Task): Promise<void> {
     if (this.controller.signal.aborted) {
       this.controller = new AbortController();
       this.underWay = 0;
@@ -235,7 +238,7 @@ export class Session {
     try {
       await task(signal);
     } catch (error) {
-      if (!signal.aborted && !isAbort(error)) this.listener.failed(error);
+      if (!signal.aborted && !isAbort(error)) this.listener.failed(error, again);
     } finally {
       if (this.controller === controller && --this.underWay === 0) this.listener.idle();
     }

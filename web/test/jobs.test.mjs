@@ -86,6 +86,19 @@ describe("jobs of the page", { skip: noBrowser, timeout: 900_000 }, () => {
     await settled(page);
   });
 
+  test("another try at a download that failed is that download", async () => {
+    const page = await visit({ hash: "#levels=1", foreseen: /ERR_FAILED/ });
+    await choose(page, example);
+    await settled(page);
+    await page.check("#attributes");
+    await page.route(/\/jobs\?/, (route) => route.abort());
+    await page.click("#download");
+    await page.locator("#problem").waitFor();
+    await page.unroute(/\/jobs\?/);
+    const { name } = await downloaded(page, "#problem-again");
+    assert.equal(name, "part-refined.glb");
+  });
+
   test("a download that is cancelled is no refinement to ask for again", async () => {
     const page = await visit({ hash: "#levels=1" });
     await choose(page, example);

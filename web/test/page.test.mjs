@@ -105,6 +105,38 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     }
   });
 
+  test("beside a heat map a wireframe keeps its lines", async () => {
+    const page = await visit({ hash: "#levels=1&layout=side" });
+    await choose(page, example);
+    await settled(page);
+    const left = async () => {
+      const shown = await picture(page);
+      return columns(shown, 0, shown.width / 2);
+    };
+    await page.selectOption("#look", "wire");
+    const wire = await left();
+    await page.selectOption("#look", "distance");
+    await page.locator("#legend").waitFor();
+    same(await left(), wire);
+  });
+
+  test("a number that cannot be is told, and asks for nothing", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, example);
+    await settled(page);
+    page.on("request", (request) => assert.notEqual(request.method(), "POST"));
+    await page.evaluate(() => {
+      document.querySelector("#budget").reportValidity = function () {
+        window.told = this.validationMessage;
+        return this.checkValidity();
+      };
+    });
+    await page.fill("#budget", "-1");
+    assert.match(await page.evaluate(() => window.told), /0/);
+    await page.waitForTimeout(500);
+    assert.ok(!(await page.evaluate(() => location.hash)).includes("budget"));
+  });
+
   test("a link restores the settings", async () => {
     const page = await visit();
     await choose(page, example);
@@ -190,6 +222,25 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       assert.ok(tools.x >= view.x && tools.x + tools.width <= view.x + view.width);
     });
   }
+
+  test("with forced colours a switch is seen, and whether it is on", async () => {
+    const page = await visit({ forcedColors: "active" });
+    const lit = async () => {
+      const shot = (await page.locator("#limit").screenshot()).toString("base64");
+      return page.evaluate(async (png) => {
+        const bytes = Uint8Array.from(atob(png), (character) => character.charCodeAt(0));
+        const bitmap = await createImageBitmap(new Blob([bytes]));
+        const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
+        context.drawImage(bitmap, 0, 0);
+        const row = context.getImageData(0, bitmap.height >> 1, bitmap.width, 1).data;
+        // Of one row of pixels each colour once.
+        return [...new Set(new Uint32Array(row.buffer))].length;
+      }, shot);
+    };
+    assert.ok((await lit()) > 1);
+    await page.check("#limit");
+    assert.ok((await lit()) > 1);
+  });
 
   test("nothing overflows a phone of 360 pixels", async () => {
     const page = await visit({ viewport: { width: 360, height: 640 }, hasTouch: true, hash: "#levels=1" });

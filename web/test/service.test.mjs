@@ -84,12 +84,23 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
 
   test("413: a body over the limit", async () => {
     await with_({ PNS_BODY: "10kB" }, async ({ page }) => {
-      await page.locator("#limits", { hasText: "up to 10 kB" }).waitFor();
+      await page.route(/\/limits$/, (route) => route.abort());
+      await page.reload();
       await choose(page, example);
-      await page.locator("#problem").waitFor();
-      assert.match(await page.textContent("#problem-title"), /over a limit/);
+      await page.locator("#problem-title", { hasText: "over a limit" }).waitFor();
       assert.match(await page.textContent("#problem-detail"), /10000/);
-    }, { expected: [413] });
+    }, { expected: [413], foreseen: /ERR_FAILED/ });
+  });
+
+  test("a body over the limit that the page knows is not sent", async () => {
+    await with_({ PNS_BODY: "10kB" }, async ({ page }) => {
+      await page.locator("#limits", { hasText: "up to 10 kB" }).waitFor();
+      page.on("request", (request) => assert.notEqual(request.method(), "POST"));
+      await choose(page, example);
+      assert.equal(await page.textContent("#problem-title"), "The file is too large");
+      assert.match(await page.textContent("#problem-detail"), /part\.glb has [\d.]+ kB; this service takes up to 10 kB/);
+      assert.ok(await page.isHidden("#problem-again"));
+    });
   });
 
   test("levels over the limit are closed, and say why", async () => {

@@ -30,6 +30,11 @@ export class SettingsForm {
     this.write();
   }
 
+  /** Bytes; without a limit where the service has named none. */
+  get largestUpload(): number {
+    return this.limits?.body_bytes ?? Infinity;
+  }
+
   /** Say how many faces refinement starts from; levels beyond the service's limits close. */
   start(faces: number): void {
     this.faces = faces;
@@ -93,7 +98,8 @@ export class SettingsForm {
     settings.model = model;
     const budget = input("budget");
     const angle = input("angle");
-    if (!budget.checkValidity() || !angle.checkValidity()) return;
+    // The browser says what is wrong with a number, in the user's language.
+    if (!budget.reportValidity() || !angle.reportValidity()) return;
     settings.budget = budget.value === "" ? null : Number(budget.value);
     settings.limit = input("limit").checked;
     settings.crease = select("crease").value as Settings["crease"];

@@ -185,8 +185,7 @@ export class Stage {
     this.viewer.sides = { left, right };
     this.viewer.over = this.overlaid;
     for (const model of this.models()) {
-      const hot = model === right && !element("legend").hidden;
-      const look = model === this.overlaid ? "hidden" : hot ? "heat" : this.surface;
+      const look = this.lookOf(model);
       model.meshes.forEach((mesh) => dress(mesh, look, paper));
     }
     this.drawLines();
@@ -194,6 +193,12 @@ export class Stage {
       this.viewer.frame(this.extent, false);
     }
     this.viewer.invalidate();
+  }
+
+  private lookOf(model: Model): Look {
+    if (model === this.overlaid) return "hidden";
+    const hot = model === this.shown.ours?.model && !element("legend").hidden;
+    return hot ? "heat" : this.surface;
   }
 
   /** The control mesh, where only its edges are shown, over the result. */
@@ -267,13 +272,14 @@ export class Stage {
     this.clearLines();
     const style = getComputedStyle(document.body);
     const accent = style.getPropertyValue("--accent");
-    const wire = this.surface === "wire" && !this.heat;
     for (const model of this.models()) {
       if (model === this.overlaid) {
         // Clear in front, faint behind.
         this.lines.push(...edgesOf(model, accent, 0.9), ...edgesOf(model, accent, 0.2, true));
         continue;
       }
+      // Whatever the other side's heat map: a wireframe without its lines is nothing at all.
+      const wire = this.lookOf(model) === "wire";
       if (input("edges").checked || wire) {
         this.lines.push(...edgesOf(model, style.color, wire ? 0.9 : 0.35));
       }
