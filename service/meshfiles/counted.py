@@ -7,41 +7,52 @@ import re
 import numpy as np
 from jaxtyping import Int
 
-# Of what is not counted a PLY's face takes about as many bytes; an STL's takes 50, more as text.
+from .ply.header import ply_header
+
+# Of what is not counted an STL's face takes 50 bytes, more as text.
 BYTES_PER_FACE = 30
 
 _CONTINUED = re.compile(rb"\\\r?\n")
 _OFF_COUNTS = re.compile(rb"\s*(?:ST)?C?N?OFF\b(?:\s|#[^\n]*\n)*\d{1,18}\s+(\d{1,18})\b")
-_PLY_FACES = re.compile(
-    rb"ply\s+format ascii\b.*?^element face (\d{1,18})\s", re.DOTALL | re.MULTILINE
-)
 _LINE_END, _SPACE, _FACE = b"\n f"
 # The letter f; a polygon's count of corners. Each corner beyond the second makes a triangle.
 _WORDS_BESIDE_TRIANGLES = 3
-# A PLY's header, which may be a whole file of comments, is looked for in so many bytes.
-_PLY_HEADER = 2**16
 
 
 def count_triangles(data: bytes, kind: str) -> int:
     """Return about how many triangles a mesh file's polygons make.
 
-    An OBJ's, an OFF's and a text PLY's are counted by the words of its lines: polygons of many
-    corners share vertices, and their triangles take a few bytes each. Others go by their size.
+    Text is counted by the words of its lines, a binary PLY by the bytes of its faces: polygons of
+    many corners share vertices, and their triangles take a few bytes each. Others go by their size.
     """
     if kind == "obj":
         text = _CONTINUED.sub(b" ", data) if b"\\" in data else data
         return _triangles(_words_by_line(text, first=_FACE))
-    counted = None
     if kind == "off":
-        counted = _OFF_COUNTS.match(data)
-    elif kind == "ply":
-        counted = _PLY_FACES.match(data[:_PLY_HEADER])
-    if counted is None:
-        return len(data) // BYTES_PER_FACE
+        counts = _OFF_COUNTS.match(data)
+        return _by_size(data) if counts is None else _in_last_lines(data, int(counts[1]))
+    header = ply_header(data) if kind == "ply" else None
+    faces = None if header is None else header.faces_at()
+    places = None if faces is None else faces[0].polygons()
+    if header is None or faces is None or places is None:
+        return _by_size(data)
+    (element, begin), (before, polygon, behind) = faces, places
+    if header.order is None:
+        return _in_last_lines(data, element.rows)
+    beside = before + np.dtype(polygon.count_kind).itemsize + behind
+    corners = (len(data) - begin - element.rows * beside) // polygon.size
+    return max(corners - 2 * element.rows, 0)
+
+
+def _by_size(data: bytes) -> int:
+    return len(data) // BYTES_PER_FACE
+
+
+def _in_last_lines(data: bytes, polygons: int) -> int:
+    """Count the triangles of so many polygons, which come last."""
     words = _words_by_line(data)
     words = words[words > 0]
-    # Polygons come last.
-    return _triangles(words[len(words) - min(int(counted[1]), len(words)) :])
+    return _triangles(words[len(words) - min(polygons, len(words)) :])
 
 
 def _triangles(words: Int[np.ndarray, " L"]) -> int:

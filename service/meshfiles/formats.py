@@ -19,6 +19,7 @@ from ..errors import UnreadableError
 from . import unsupported
 from .indexed_triangles import NUMBER, IndexedTriangles
 from .off import read_off, write_off
+from .ply.polygons import of_triangles
 
 if TYPE_CHECKING:
     import trimesh
@@ -52,14 +53,15 @@ def read(data: bytes, kind: str) -> IndexedTriangles:
     """
     if kind == "off":
         return read_off(data)
+    data, polygons = of_triangles(data) if kind == "ply" else (data, None)
     scene = _scene(data, kind)
     parts = [part for part in scene.geometry.values() if isinstance(part, load_readers().Trimesh)]
     if not parts:
         raise UnreadableError(f"the {kind.upper()} file has no faces")
     faces = disjoint_faces((np.asarray(part.faces), len(part.vertices)) for part in parts)
     uv = _uv(parts)
-    count, others = _beside_triangles(data, kind, parts, has_uv=uv is not None)
-    if kind == "ply" and count is not None and len(faces) < count:
+    count, others = _beside_triangles(data, kind, parts, polygons, has_uv=uv is not None)
+    if kind == "ply" and polygons is None and count is not None and len(faces) < count:
         # trimesh takes what is there of a text that was cut off.
         raise UnreadableError(f"the PLY file says {count} faces and ends after {len(faces)}")
     return IndexedTriangles(
@@ -130,9 +132,12 @@ def _uv(parts: list[trimesh.Trimesh]) -> Float[np.ndarray, "N 2"] | None:
 
 
 def _beside_triangles(
-    data: bytes, kind: str, parts: list[trimesh.Trimesh], *, has_uv: bool
+    data: bytes, kind: str, parts: list[trimesh.Trimesh], polygons: int | None, *, has_uv: bool
 ) -> tuple[int | None, dict[str, int]]:
-    """Count the faces that the file lists (None: triangles only), and what is beside them."""
+    """Count the faces that the file lists (None: triangles only), and what is beside them.
+
+    `polygons` are those of a PLY that were cut before it was read.
+    """
     match kind:
         case "obj":
             others = unsupported.of_obj(data)
@@ -142,6 +147,8 @@ def _beside_triangles(
             return len(_OBJ_FACE.findall(data)), others
         case "ply":
             elements = parts[0].metadata["_ply_raw"]
+            if polygons is not None:
+                elements["face"]["length"] = polygons
             return int(elements["face"]["length"]), unsupported.of_ply(elements, has_uv=has_uv)
         case _:
             return None, {}

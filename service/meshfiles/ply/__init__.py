@@ -1,0 +1,1 @@
+"""PLY: what its header says, and polygons of many sizes as triangles."""
