@@ -81,7 +81,7 @@ def _further_rows(card: ModelCard) -> dict[str, Any]:
         "wide bound": card.wide_bound,
         "crease prior": card.crease_prior,
         "tip strength a": card.tip_strength,
-        "prior strength of even meshes": card.even_prior_strength,
+        "even prior strength s₁": card.even_prior_strength,
         "crease angle θ": card.crease_angle,
         "crease levels": card.crease_levels,
     }
