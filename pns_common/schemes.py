@@ -108,15 +108,18 @@ def loop() -> Scheme:
     return Scheme("loop", loop_vertex_rule, loop_edge_rule, learned_levels=0)
 
 
-def pns(model: Model, budget: float | None = None) -> Scheme:
+def pns(model: Model, budget: float | None = None, prior_strength: float | None = None) -> Scheme:
     """Return the scheme of Proximity-Preserving Neural Subdivision with a model.
 
     Args:
         model: from ``load_model``, or anything that keeps the protocol.
         budget: C ≥ 0, dimensionless; None takes the one that the model was trained at.
+        prior_strength: s ≥ 0 of the prior, the same for all meshes, as for parts that are to go
+            together; None: what each mesh calls for (formula/prior_strength.py).
 
     Raises:
-        ParameterError: the budget is negative or not finite, or this is no model.
+        ParameterError: the budget or the strength is negative or not finite, the model has no
+            prior to be of that strength, or this is no model.
         ModelError: the card names vertex features, and the model has no network for them.
     """
     if not isinstance(model, Model):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -127,7 +130,7 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         raise ParameterError("budget", budget, expected="a finite number ≥ 0")
     budget = float(budget)
     edges, vertices = edge_operator(model), vertex_operator(model)
-    form = scale_free_form(card, budget)
+    form = _with_strength(scale_free_form(card, budget), prior_strength)
     if form is not None and vertices is not None:
         # Without a budget it is Loop, to the bit.
         kept = Creases(line_angle=card.crease_angle, levels=card.crease_levels)
@@ -141,6 +144,17 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         model=model.name,
         model_hash=model.hash,
     )
+
+
+def _with_strength(form: ScaleFreeForm | None, given: float | None) -> ScaleFreeForm | None:
+    if given is None:
+        return form
+    if form is None:
+        expected = "None: the model has no prior"
+        raise ParameterError("prior_strength", given, expected=expected)
+    if not (is_number(given) and given >= 0):
+        raise ParameterError("prior_strength", given, expected="a finite number ≥ 0")
+    return replace(form, prior_strength=float(given), even_prior_strength=None)
 
 
 def scale_free_scheme(

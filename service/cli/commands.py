@@ -27,6 +27,7 @@ from .parameters import (
     ModelOption,
     NormalsOption,
     SchemeOption,
+    StrengthOption,
     UvOption,
     WeldOption,
     WorkersOption,
@@ -81,6 +82,7 @@ def subdivide(
     budget: BudgetOption = DEFAULTS.budget,
     model: ModelOption = None,
     reference_length: LengthOption = "auto",
+    prior_strength: StrengthOption = DEFAULTS.prior_strength,
     diagnostics: DiagnosticsOption = DEFAULTS.diagnostics,
     uv: UvOption = DEFAULTS.uv,
     normals: NormalsOption = DEFAULTS.normals,
@@ -112,6 +114,7 @@ def batch(
     budget: BudgetOption = DEFAULTS.budget,
     model: ModelOption = None,
     reference_length: LengthOption = "auto",
+    prior_strength: StrengthOption = DEFAULTS.prior_strength,
     diagnostics: DiagnosticsOption = DEFAULTS.diagnostics,
     uv: UvOption = DEFAULTS.uv,
     normals: NormalsOption = DEFAULTS.normals,
@@ -176,6 +179,7 @@ def large(
     budget: BudgetOption = DEFAULTS.budget,
     model: ModelOption = None,
     reference_length: LengthOption = "auto",
+    prior_strength: StrengthOption = DEFAULTS.prior_strength,
     crease: Annotated[
         str, typer.Option(metavar="auto|lines|off|angle:DEG", help="edges to keep sharp")
     ] = DEFAULTS.crease,

@@ -41,6 +41,10 @@ def _size(text: str) -> int:
 LevelsOption = Annotated[int, typer.Option(help="depth: four faces of one at each level")]
 SchemeOption = Annotated[SchemeName, typer.Option(help="the rules")]
 BudgetOption = Annotated[float | None, typer.Option(metavar="C", help="default: the model's own")]
+StrengthOption = Annotated[
+    float | None,
+    typer.Option(metavar="S", help="of the model's prior; default: as each mesh calls for"),
+]
 ModelOption = Annotated[
     str | None,
     typer.Option(

@@ -10,7 +10,7 @@ from pns_common.schemes import Model, Scheme, loop, pns
 
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..course import Course
-from ..errors import NoModelError
+from ..errors import InvalidParameter, NoModelError
 from ..options import Limits, Options
 from ..report import Change, MeshResult, build_report
 from .read.checks.nodes import mesh_instances
@@ -111,12 +111,16 @@ def make_scheme(options: Options, model: Model | None) -> Scheme:
 
     Raises:
         NoModelError: the learned scheme without a model.
+        InvalidParameter: a strength for the prior of a model that has none.
     """
     if options.scheme == "loop":
         return loop()
     if model is None:
         raise NoModelError("no model is loaded; scheme=loop needs none")
-    return pns(model, options.budget)
+    strength = options.prior_strength
+    if strength is not None and model.card.prior_strength is None:
+        raise InvalidParameter("prior_strength", f"the model {model.name} has no prior")
+    return pns(model, options.budget, strength)
 
 
 def _changes_of_container(upload: Upload, options: Options) -> list[Change]:

@@ -64,6 +64,14 @@ class Parameters(BaseModel):
         Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,
         BeforeValidator(_empty_is_absent),
     ] = Field(default=DEFAULTS.budget, description="C, dimensionless; empty: the model's own")
+    prior_strength: Annotated[
+        Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,
+        BeforeValidator(_empty_is_absent),
+    ] = Field(
+        default=DEFAULTS.prior_strength,
+        description="s of the model's prior, the same for every mesh; empty: as each mesh calls "
+        "for. A model without a prior refuses it",
+    )
     reference_length: Annotated[
         Literal["auto"] | Annotated[float, Field(gt=0, allow_inf_nan=False)],
         BeforeValidator(_length),

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pns_common import ModelError, loop, pns
+from pns_common import ModelError, ParameterError, loop, pns
 from pns_common.schemes import edge_operator, loop_vertex_rule, scale_free_form, vertex_operator
 from tests.support.networks import (
     SCALE_FREE_CARD,
@@ -57,6 +57,25 @@ def test_loop_has_no_learned_level_and_a_model_of_edges_leaves_vertices_to_it():
     edges_alone = pns(Float64Model(random_layers(0)))
     assert edges_alone.vertex_rule is loop_vertex_rule
     assert (edges_alone.learned_levels, edges_alone.guard) == (None, None)
+
+
+def test_a_strength_that_is_given_is_that_of_every_mesh():
+    model = scale_free_model(prior_strength=0.8, even_prior_strength=1.2)
+    assert pns(model).prior_strength is None
+    scheme = pns(model, prior_strength=0)
+    assert scheme.prior_strength == 0.0
+    assert scheme.fitted(lambda: pytest.fail("it is given")) is scheme
+
+
+@pytest.mark.parametrize("wrong", [-1, math.nan, math.inf, "1", True])
+def test_a_strength_that_is_none_is_refused(wrong):
+    with pytest.raises(ParameterError, match="prior_strength"):
+        pns(scale_free_model(), prior_strength=wrong)
+
+
+def test_a_model_without_a_prior_has_no_strength_for_it():
+    with pytest.raises(ParameterError, match="no prior"):
+        pns(vertex_model(), prior_strength=1.0)
 
 
 def test_networks_are_asked_at_a_budget_of_one():

@@ -21,6 +21,8 @@ WRONG = [
     ("budget", -0.1),
     ("budget", math.nan),
     ("budget", math.inf),
+    ("prior_strength", -0.1),
+    ("prior_strength", math.nan),
     ("reference_length", 0.0),
     ("reference_length", -1.0),
     ("reference_length", math.nan),

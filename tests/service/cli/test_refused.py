@@ -29,6 +29,8 @@ NAMES = ", ".join(bundled_models())
         ("subdivide part.glb -o out.glb --levels 7", 2, "levels"),
         ("subdivide part.glb -o out.glb --budget nan", 2, "budget"),
         ("subdivide part.glb -o out.glb --budget much", 2, "budget"),
+        ("subdivide part.glb -o out.glb --prior-strength -1", 2, "prior_strength"),
+        ("subdivide part.glb -o out.glb --prior-strength 1 --model paper", 2, "no prior"),
         ("subdivide part.glb -o out.glb --scheme cubic", 2, "scheme"),
         ("subdivide part.glb -o out.glb --reference-length long", 2, "reference-length"),
         ("subdivide part.glb -o out.glb --reference-length 0", 2, "reference_length"),
