@@ -12,7 +12,7 @@ import { surfaceOf } from "./measure/surface";
 import type { Lengths } from "./report/certificate";
 import { bytes, listed } from "./report/format";
 import { Session, type Again, type Result, type Source } from "./session";
-import { DEFAULTS, fromHash, toHash, type Compression, type Settings } from "./settings";
+import { DEFAULTS, fromHash, toHash, type Asked, type Compression, type Diagnostics, type Settings } from "./settings";
 import { debounced, element, input, save, select } from "./ui/dom";
 import { FileList } from "./ui/file-list";
 import {
@@ -42,8 +42,6 @@ import { dispose, modelOf } from "./view/model";
 
 let began = 0;
 let validation = new AbortController();
-/** Whether the page, and not the user, asked for smooth normals. */
-let smoothed = false;
 /** Another try at what failed last. */
 let retry: Again = () => {};
 /** The result whose values at vertices are on their way. */
@@ -60,9 +58,20 @@ const session = new Session({
     fileList.show(source.upload);
     stage.open(source);
   },
-  stayed: ({ upload, opened }) => {
-    fileList.show(upload);
-    fit(opened);
+  stayed: () => {
+    const { source, ours } = session;
+    fileList.show(source?.upload ?? null);
+    // A setting of what is over.
+    changed.cancel();
+    if (!source) return;
+    if (ours) form.show(ours.asked, source.upload, source.opened.faces);
+    else form.fit(source);
+    remember();
+  },
+  renewed: (upload, asked) => {
+    const { source } = session;
+    form.show(asked, upload, source?.upload === upload ? source.opened.faces : 0);
+    remember();
   },
   stopped: ({ name }) => showNotice(`${name}: cancelled`, true),
   refined: (ours) => {
@@ -90,7 +99,7 @@ const session = new Session({
     document.body.classList.add("empty");
     document.body.classList.remove("refined");
     fileList.show(null);
-    form.start(0);
+    form.fit(null);
     stage.arrange();
   },
   discarded: (model) => stage.discard(model),
@@ -109,40 +118,20 @@ const STAGES: Record<string, string> = {
 };
 
 const given = fromHash(location.hash);
-const form = new SettingsForm(
-  given.settings,
-  debounced(300, () => {
-    remember();
-    clear();
-    void session.again({ ...form.settings }, prepare);
-  }),
-);
+const changed = debounced(300, () => {
+  remember();
+  clear();
+  void session.again(form.asked, prepare);
+});
+const form = new SettingsForm(given.settings, changed);
 stage.view = given.view;
 const fileList = new FileList(takeOne);
 
-async function prepare(opened: Opened): Promise<Settings> {
+async function prepare(upload: Upload, opened: Opened): Promise<Asked> {
   // Which levels are open depends on the service's limits.
   await offered;
-  fit(opened);
-  return { ...form.settings };
-}
-
-/** Make the form that of a file. */
-function fit(opened: Opened): void {
-  chooseNormals(opened);
-  form.start(opened.faces);
-}
-
-/** Files that bring no normals would come back faceted: nobody refines for that. */
-function chooseNormals({ normals }: Opened): void {
-  const { settings } = form;
-  if (!normals && settings.normals === "keep") {
-    settings.normals = "smooth";
-    smoothed = true;
-  } else if (normals && smoothed) {
-    if (settings.normals === "smooth") settings.normals = "keep";
-    smoothed = false;
-  }
+  form.fit({ upload, opened });
+  return form.asked;
 }
 
 async function take(files: PathedFile[] | Promise<PathedFile[]>): Promise<void> {
@@ -189,14 +178,12 @@ function clear(): void {
 }
 
 /** Put other settings in the form's place. */
-function restore(settings: Settings): void {
-  form.settings = settings;
-  smoothed = false;
-  if (session.source) fit(session.source.opened);
-  else form.start(0);
+function restore(wanted: Settings): void {
+  form.want(wanted);
+  if (session.source) form.fit(session.source);
   remember();
   clear();
-  void session.again({ ...settings }, prepare);
+  void session.again(form.asked, prepare);
 }
 
 /** Everything that the report and the file say, before Loop's side has come. */
@@ -252,11 +239,11 @@ async function validateBoth(ours: Result): Promise<void> {
 /** The values at vertices, which a plain result does not hold: the same job with all diagnostics. */
 async function fetchValues(): Promise<void> {
   const { ours } = session;
-  if (ours === awaiting) return;
+  if (!ours || ours === awaiting) return;
   awaiting = ours;
-  const answer = await session.fetch({ ...form.settings }, "full", "none", () => stage.arrange());
+  const answer = await session.fetch(ours, "full", "none", () => stage.arrange());
   if (awaiting === ours) awaiting = null;
-  if (!answer || !ours || session.ours !== ours) return;
+  if (!answer || session.ours !== ours) return;
   const { scene } = await parseGltf(answer.bytes);
   const full = modelOf(scene, []);
   full.meshes.forEach(({ geometry }, number) => {
@@ -271,29 +258,24 @@ async function fetchValues(): Promise<void> {
 }
 
 function remember(): void {
-  const hash = toHash(form.settings, stage.view);
+  const hash = toHash(form.asked.settings, stage.view);
   history.replaceState(null, "", hash ? `#${hash}` : location.pathname + location.search);
 }
 
-function resultName(extension: string): string {
-  const stem = session.source?.upload.name.replace(/\.\w+$/, "") ?? "result";
-  return `${stem}-refined.${extension}`;
+function resultName(upload: Upload, extension: string): string {
+  return `${upload.name.replace(/\.\w+$/, "")}-refined.${extension}`;
 }
 
-async function downloadGlb(): Promise<void> {
-  if (!session.ours) return;
-  const compress = select("compress").value as Compression;
-  const full = input("attributes").checked;
-  // Another file may be there before the answer is.
-  const name = resultName("glb");
-  let content = session.ours.bytes;
-  if (full || compress !== "none") {
-    const again = () => void downloadGlb();
-    const answer = await session.fetch({ ...form.settings }, full ? "full" : "summary", compress, again);
+/** What is downloaded is chosen now: another file may be there, or other settings, before the answer is. */
+async function downloadGlb(ours: Result, diagnostics: Diagnostics, compress: Compression): Promise<void> {
+  let content = ours.bytes;
+  if (diagnostics === "full" || compress !== "none") {
+    const again = () => void downloadGlb(ours, diagnostics, compress);
+    const answer = await session.fetch(ours, diagnostics, compress, again);
     if (!answer) return;
     content = answer.bytes;
   }
-  save(new Blob([content], { type: "model/gltf-binary" }), name);
+  save(new Blob([content], { type: "model/gltf-binary" }), resultName(ours.upload, "glb"));
 }
 
 function bindFiles(): void {
@@ -341,7 +323,7 @@ function bindPanel(): void {
   });
   bindNotice(() => {
     began = performance.now();
-    void session.resume({ ...form.settings }, prepare);
+    void session.resume(prepare);
   });
   bindProblem(() => {
     offered = start();
@@ -375,14 +357,18 @@ function bindPanel(): void {
     element("share").textContent = copied ? "Copied" : "See address bar";
     setTimeout(() => (element("share").textContent = "Copy link"), 1500);
   });
-  element("download").addEventListener("click", () => void downloadGlb());
+  element("download").addEventListener("click", () => {
+    const diagnostics = input("attributes").checked ? "full" : "summary";
+    if (session.ours) void downloadGlb(session.ours, diagnostics, select("compress").value as Compression);
+  });
   element("download-report").addEventListener("click", () => {
     if (!session.ours) return;
-    const text = JSON.stringify(session.ours.report, null, 2);
-    save(new Blob([text], { type: "application/json" }), resultName("json"));
+    const { upload, report } = session.ours;
+    save(new Blob([JSON.stringify(report, null, 2)], { type: "application/json" }), resultName(upload, "json"));
   });
   element("download-picture").addEventListener("click", async () => {
-    if (stage.viewer) save(await stage.viewer.picture(), resultName("png"));
+    const upload = session.source?.upload;
+    if (stage.viewer && upload) save(await stage.viewer.picture(), resultName(upload, "png"));
   });
   input("download-picture").disabled = !stage.viewer;
 }

@@ -6,11 +6,15 @@ import { open, type Opened } from "./files/open";
 import { jsonOf, parseGltf, type GltfJson } from "./files/gltf";
 import { bodyOf, type Upload } from "./files/upload";
 import type { Report } from "./report/report";
-import { asLoop, LOOP, query, type Compression, type Diagnostics, type Settings } from "./settings";
+import { asLoop, LOOP, query, type Asked, type Compression, type Diagnostics } from "./settings";
 import { isFinite, modelOf, type Model } from "./view/model";
 
 export interface Result {
-  /** The query that made it. */
+  /** Of which file. */
+  upload: Upload;
+  /** What made it, whatever has been asked for since. */
+  asked: Asked;
+  /** The same as a query. */
   key: string;
   bytes: ArrayBuffer;
   json: GltfJson;
@@ -28,7 +32,13 @@ export interface Source {
 }
 
 /** What the form makes of a file before it is refined. */
-export type Prepare = (opened: Opened) => Promise<Settings>;
+export type Prepare = (upload: Upload, opened: Opened) => Promise<Asked>;
+
+/** A refinement; what is asked of a new file is known once it is open. */
+interface Request {
+  upload: Upload;
+  asked: Asked | null;
+}
 
 type Task = (signal: AbortSignal) => Promise<void>;
 
@@ -39,8 +49,10 @@ export interface Listener {
   progress(progress: Progress, what: string): void;
   /** A new file has taken the place of the old. */
   opened(source: Source): void;
-  /** One was refused or cancelled, and the one before it is still there. */
-  stayed(source: Source): void;
+  /** What was asked for was refused or cancelled: what was there before it still is. */
+  stayed(): void;
+  /** What was asked for before is asked for again. */
+  renewed(upload: Upload, asked: Asked): void;
   refined(ours: Result): void;
   compared(loop: Result | null): void;
   idle(): void;
@@ -59,128 +71,127 @@ export class Session {
   private controller = new AbortController();
   /** How many tasks the controller ends. */
   private underWay = 0;
-  /** Whether a refinement is among them. */
-  private refining = false;
-  /** A file that is not refined yet, beside the one that is shown. */
-  private coming: Upload | null = null;
-  /** Whose refinement was cancelled. */
-  private stopped: Upload | null = null;
+  /** The refinement among them. */
+  private refining: Request | null = null;
+  /** The one that was cancelled last. */
+  private stopped: Request | null = null;
 
   constructor(private readonly listener: Listener) {}
 
+  /** A file that is not refined yet, beside the one that is shown. */
+  private get coming(): Upload | null {
+    const upload = this.refining?.upload ?? null;
+    return upload === this.source?.upload ? null : upload;
+  }
+
   /** End all that is under way. */
   cancel(): void {
-    const upload = this.coming ?? this.source?.upload;
     const { refining } = this;
-    this.coming = null;
-    this.refining = false;
+    this.refining = null;
     this.controller.abort();
-    if (!refining || !upload) return;
-    this.stopped = upload;
-    this.listener.stopped(upload);
+    if (!refining) return;
+    this.stopped = refining;
+    this.listener.stayed();
+    this.listener.stopped(refining.upload);
   }
 
   /** Refine what was cancelled after all. */
-  async resume(settings: Settings, prepare: Prepare): Promise<void> {
-    const { stopped } = this;
-    if (stopped && stopped !== this.source?.upload) await this.take(stopped, prepare);
-    else await this.again(settings, prepare);
+  async resume(prepare: Prepare): Promise<void> {
+    if (this.stopped) await this.renew(this.stopped, prepare);
+  }
+
+  /** Refine as it was asked for then, whatever has been asked for since. */
+  private async renew({ upload, asked }: Request, prepare: Prepare): Promise<void> {
+    if (asked) this.listener.renewed(upload, asked);
+    if (asked && this.source?.upload === upload) await this.again(asked, prepare);
+    else await this.take(upload, prepare);
   }
 
   /** Take a new file. What was there stays until the new one is refined. */
   async take(upload: Upload, prepare: Prepare): Promise<void> {
-    this.coming = upload;
-    const again = () => void this.take(upload, prepare);
-    await this.only(again, async (signal) => {
+    const request: Request = { upload, asked: null };
+    const anew = () => void this.renew(request, prepare);
+    await this.only(request, anew, async (signal) => {
       let source: Source | null = null;
-      let settings: Settings;
       let ours: Result;
       try {
         const opened = await open(upload);
         source = { upload, opened, model: modelOf(opened.scene, opened.clips) };
         signal.throwIfAborted();
-        settings = await prepare(opened);
+        const asked = (request.asked = await prepare(upload, opened));
         // Nothing is lost by showing the first file at once.
         if (this.source === null && isFinite(source.model)) this.show(source);
-        ours = await this.run(upload, settings, signal);
+        ours = await this.run(upload, asked, signal);
       } catch (error) {
-        if (!signal.aborted) this.coming = null;
-        this.giveUp(source, error);
+        this.giveUp(source, error, signal);
         throw error;
       }
       if (this.source !== source) this.show(source);
-      await this.complete(upload, ours, settings, signal);
+      await this.complete(ours, signal);
     });
   }
 
   /** Refine anew: the file that is on its way, or else the one that is there. */
-  async again(settings: Settings, prepare: Prepare): Promise<void> {
+  async again(asked: Asked, prepare: Prepare): Promise<void> {
     const { source, coming } = this;
     if (coming) return this.take(coming, prepare);
     if (!source) return;
-    const anew = () => void this.again(settings, prepare);
-    await this.only(anew, async (signal) => {
+    const request: Request = { upload: source.upload, asked };
+    const anew = () => void this.renew(request, prepare);
+    await this.only(request, anew, async (signal) => {
       // It is there already where Loop's side alone was cancelled.
-      const there = this.ours?.key === query(settings).toString() ? this.ours : null;
-      const ours = there ?? (await this.run(source.upload, settings, signal));
-      await this.complete(source.upload, ours, settings, signal);
+      const there = this.ours?.key === query(asked.settings).toString() ? this.ours : null;
+      if (there) there.asked = asked;
+      await this.complete(there ?? (await this.run(source.upload, asked, signal)), signal);
     });
   }
 
   /**
-   * Another answer for the same settings; null when it was cancelled, or failed: `again` is what then
+   * Another answer for what made a result; null when it was cancelled, or failed: `again` is what then
    * asks for it anew. Nothing under way ends for it.
    */
   async fetch(
-    settings: Settings,
+    { upload, asked: { settings } }: Result,
     diagnostics: Diagnostics,
     compress: Compression,
     again: Again,
   ): Promise<Answer | null> {
-    const { source } = this;
-    if (!source) return null;
     let answer: Answer | null = null;
     await this.beside(again, async (signal) => {
       const asked = query(settings, diagnostics, compress);
-      answer = await refine(bodyOf(source.upload), asked, signal, (progress) =>
+      answer = await refine(bodyOf(upload), asked, signal, (progress) =>
         this.listener.progress(progress, ""),
       );
     });
     return answer;
   }
 
-  private async complete(
-    upload: Upload,
-    ours: Result,
-    settings: Settings,
-    signal: AbortSignal,
-  ): Promise<void> {
+  private async complete(ours: Result, signal: AbortSignal): Promise<void> {
     this.replace("ours", ours);
-    const key = query(asLoop(settings)).toString();
+    const loops = asLoop(ours.asked);
+    const key = query(loops.settings).toString();
     if (this.loop && this.loop.key !== key) this.replace("loop", null);
     this.listener.refined(ours);
-    if (settings.model !== LOOP && !this.loop) {
-      this.replace("loop", await this.run(upload, asLoop(settings), signal, "Loop’s side"));
+    if (ours.asked.settings.model !== LOOP && !this.loop) {
+      this.replace("loop", await this.run(ours.upload, loops, signal, "Loop’s side"));
     }
     this.listener.compared(this.loop);
   }
 
   private async run(
     upload: Upload,
-    settings: Settings,
+    asked: Asked,
     signal: AbortSignal,
     what = "",
   ): Promise<Result> {
-    const asked = query(settings);
-    const answer = await refine(bodyOf(upload), asked, signal, (progress) =>
+    const answer = await refine(bodyOf(upload), query(asked.settings), signal, (progress) =>
       this.listener.progress(progress, what),
     );
-    return resultOf(asked.toString(), answer);
+    return resultOf(upload, asked, answer);
   }
 
   private show(source: Source): void {
     const old = this.source;
-    this.coming = null;
     this.replace("ours", null);
     this.replace("loop", null);
     this.source = source;
@@ -189,13 +200,14 @@ export class Session {
   }
 
   /** A new file was not refined: what was there before it stays. */
-  private giveUp(source: Source | null, error: unknown): void {
+  private giveUp(source: Source | null, error: unknown, { aborted }: AbortSignal): void {
     if (source && this.source === source) {
       if (isTheFiles(error)) this.clear();
       return;
     }
     if (source) this.listener.discarded(source.model);
-    if (this.source && !this.coming) this.listener.stayed(this.source);
+    // What was ended has given way to something else by now.
+    if (!aborted) this.listener.stayed();
   }
 
   /** Back to a page without a file. */
@@ -213,15 +225,15 @@ export class Session {
   }
 
   /** Run a refinement after ending all that is under way. */
-  private async only(again: Again, task: Task): Promise<void> {
+  private async only(request: Request, again: Again, task: Task): Promise<void> {
     this.controller.abort();
+    this.refining = request;
     await this.beside(again, async (signal) => {
-      this.refining = true;
       try {
         await task(signal);
       } finally {
         // Where it was ended, another may be under way.
-        if (!signal.aborted) this.refining = false;
+        if (this.refining === request) this.refining = null;
       }
     });
   }
@@ -250,13 +262,15 @@ function isTheFiles(error: unknown): boolean {
   return error instanceof Problem && [400, 415, 422].includes(error.status) && !error.parameter;
 }
 
-async function resultOf(key: string, answer: Answer): Promise<Result> {
+async function resultOf(upload: Upload, asked: Asked, answer: Answer): Promise<Result> {
   const began = performance.now();
   const json = jsonOf(answer.bytes);
   const { scene, animations } = await parseGltf(answer.bytes);
   const timings: [string, number][] = [...answer.timings, ["opening", performance.now() - began]];
   return {
-    key,
+    upload,
+    asked,
+    key: query(asked.settings).toString(),
     bytes: answer.bytes,
     json,
     report: json.asset?.extras?.pns as Report,

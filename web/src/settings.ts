@@ -14,6 +14,12 @@ export interface Settings {
   normals: "keep" | "smooth" | "limit";
 }
 
+/** What a file is refined with, and what the user wants of any: a file may close levels, or have no normals to keep. */
+export interface Asked {
+  settings: Settings;
+  wanted: Settings;
+}
+
 export const LOOP = "loop";
 
 export const DEFAULTS: Settings = {
@@ -53,8 +59,8 @@ export function query(
 }
 
 /** The same job by Loop's rules alone: the other side of the comparison. */
-export function asLoop(settings: Settings): Settings {
-  return { ...settings, model: LOOP, budget: null };
+export function asLoop({ settings, wanted }: Asked): Asked {
+  return { settings: { ...settings, model: LOOP, budget: null }, wanted };
 }
 
 /** The settings that differ from the defaults, as the part of an address after #. */

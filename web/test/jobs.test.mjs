@@ -2,15 +2,9 @@
 
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
-import { choose, downloaded, noBrowser, settled } from "./support/browser.mjs";
+import { choose, downloaded, hold, noBrowser, settled } from "./support/browser.mjs";
 import { positions } from "./support/glb.mjs";
-import { example, number, part, PART_FACES, studio } from "./support/studio.mjs";
-
-const TETRAHEDRON = {
-  name: "tetrahedron.obj",
-  mimeType: "",
-  buffer: Buffer.from("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"),
-};
+import { example, number, part, PART_FACES, studio, TETRAHEDRON } from "./support/studio.mjs";
 
 describe("jobs of the page", { skip: noBrowser, timeout: 900_000 }, () => {
   const { visit } = studio();
@@ -126,15 +120,3 @@ describe("jobs of the page", { skip: noBrowser, timeout: 900_000 }, () => {
     assert.equal(await page.textContent("#file-name"), "tetrahedron.obj");
   });
 });
-
-/** Jobs that are handed in wait, those alone whose body is `held`, until what comes back is called. */
-async function hold(page, held = () => true) {
-  let release;
-  const released = new Promise((resolve) => (release = resolve));
-  await page.route(/\/jobs\?/, async (route) => {
-    if (held(route.request().postDataBuffer())) await released;
-    // The page may have ended it meanwhile.
-    await route.continue().catch(() => {});
-  });
-  return release;
-}

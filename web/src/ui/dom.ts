@@ -32,11 +32,13 @@ export function save(content: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }
 
-/** The function, once no call has come for a while. */
-export function debounced(wait: number, act: () => void): () => void {
+/** The function, once no call has come for a while; `cancel` takes back the calls that wait. */
+export function debounced(wait: number, act: () => void): { (): void; cancel(): void } {
   let timer = 0;
-  return () => {
-    clearTimeout(timer);
+  const cancel = (): void => clearTimeout(timer);
+  const call = (): void => {
+    cancel();
     timer = window.setTimeout(act, wait);
   };
+  return Object.assign(call, { cancel });
 }

@@ -1,22 +1,41 @@
 /** The form of settings: what may be chosen for this file, on this service. */
 
 import type { Limits, ModelEntry } from "../api/client";
+import type { Opened } from "../files/open";
+import type { Upload } from "../files/upload";
 import { count } from "../report/format";
-import { DEFAULTS, LOOP, type Settings } from "../settings";
+import { DEFAULTS, LOOP, type Asked, type Settings } from "../settings";
 import { element, input, option, select } from "./dom";
+
+/** A file, as far as settings depend on it. */
+interface Facts {
+  upload: Upload;
+  opened: Pick<Opened, "faces" | "normals">;
+}
 
 export class SettingsForm {
   private models: ModelEntry[] = [];
   private limits: Limits | null = null;
+  /** What the user wants of any file. */
+  private wanted: Settings;
+  /** What the form says: that, as far as the file has it. */
+  private settings: Settings;
+  private file: Upload | null = null;
   private faces = 0;
 
   constructor(
-    public settings: Settings,
+    wanted: Settings,
     private readonly changed: () => void,
   ) {
+    this.wanted = { ...wanted };
+    this.settings = { ...wanted };
     const form = element<HTMLFormElement>("settings");
     form.addEventListener("submit", (event) => event.preventDefault());
-    form.addEventListener("input", () => this.read());
+    form.addEventListener("input", ({ target }) => {
+      // Each model has its own budget: a number meant for another is let go.
+      if (target === select("model")) input("budget").value = "";
+      this.read();
+    });
     this.write();
   }
 
@@ -35,8 +54,36 @@ export class SettingsForm {
     return this.limits?.body_bytes ?? Infinity;
   }
 
-  /** Say how many faces refinement starts from; levels beyond the service's limits close. */
-  start(faces: number): void {
+  get asked(): Asked {
+    return { settings: { ...this.settings }, wanted: { ...this.wanted } };
+  }
+
+  /** Say what the user wants of any file. */
+  want(wanted: Settings): void {
+    this.wanted = { ...wanted };
+    this.fit(null);
+  }
+
+  /** Make the form that of a file. What the user then chooses for it stays, however often it is fitted to the same. */
+  fit(file: Facts | null): void {
+    if (!file || this.file !== file.upload) {
+      this.settings = { ...this.wanted };
+      // It would come back faceted: nobody refines for that.
+      if (file && !file.opened.normals && this.settings.normals === "keep") this.settings.normals = "smooth";
+    }
+    this.begin(file?.upload ?? null, file?.opened.faces ?? 0);
+  }
+
+  /** Say again what was asked for a file; 0 faces where they are not known yet. */
+  show(asked: Asked, upload: Upload, faces: number): void {
+    this.wanted = { ...asked.wanted };
+    this.settings = { ...asked.settings };
+    this.begin(upload, faces);
+  }
+
+  /** Levels beyond the service's limits close. */
+  private begin(upload: Upload | null, faces: number): void {
+    this.file = upload;
     this.faces = faces;
     const deepest = this.levels().filter((level) => !this.refusal(level));
     this.settings.levels = Math.min(this.settings.levels, deepest.at(-1) ?? 1);
@@ -79,7 +126,7 @@ export class SettingsForm {
     select("model").value = settings.model;
     const unknown = select("model").value !== settings.model;
     // A model that a link names may be on a list that is still on its way.
-    if (unknown && this.models.length) select("model").value = settings.model = "";
+    if (unknown && this.models.length) select("model").value = settings.model = this.wanted.model = "";
     input("budget").value = settings.budget === null ? "" : String(settings.budget);
     input("limit").checked = settings.limit;
     select("crease").value = settings.crease;
@@ -90,26 +137,28 @@ export class SettingsForm {
   }
 
   private read(): void {
-    const { settings } = this;
-    settings.levels = Number(select("levels").value);
-    const model = select("model").value;
-    // Each model has its own budget: a number meant for another is let go.
-    if (model !== settings.model) input("budget").value = "";
-    settings.model = model;
+    const before = this.settings;
     const budget = input("budget");
     const angle = input("angle");
     // The browser says what is wrong with a number, in the user's language.
     if (!budget.reportValidity() || !angle.reportValidity()) return;
-    settings.budget = budget.value === "" ? null : Number(budget.value);
-    settings.limit = input("limit").checked;
-    settings.crease = select("crease").value as Settings["crease"];
-    settings.angle = Number(angle.value || DEFAULTS.angle);
-    settings.uv = select("uv").value as Settings["uv"];
-    settings.normals = select("normals").value as Settings["normals"];
+    const settings: Settings = {
+      levels: Number(select("levels").value),
+      model: select("model").value,
+      budget: budget.value === "" ? null : Number(budget.value),
+      limit: input("limit").checked,
+      crease: select("crease").value as Settings["crease"],
+      angle: Number(angle.value || DEFAULTS.angle),
+      uv: select("uv").value as Settings["uv"],
+      normals: select("normals").value as Settings["normals"],
+    };
     // Normals of the limit surface stand on the limit surface.
     if (settings.normals === "limit" && !settings.limit) {
       settings.limit = input("limit").checked = true;
     }
+    const isNew = ([name, value]: [string, unknown]) => value !== before[name as keyof Settings];
+    Object.assign(this.wanted, Object.fromEntries(Object.entries(settings).filter(isNew)));
+    this.settings = settings;
     this.adjust();
     this.changed();
   }

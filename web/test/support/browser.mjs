@@ -75,6 +75,18 @@ export async function settled(page) {
   await page.waitForFunction(() => !/Looking/.test(document.querySelector("#validation-text").textContent));
 }
 
+/** Jobs that are handed in wait, those alone whose body is `held`, until what comes back is called. */
+export async function hold(page, held = () => true) {
+  let release;
+  const released = new Promise((resolve) => (release = resolve));
+  await page.route(/\/jobs\?/, async (route) => {
+    if (held(route.request().postDataBuffer())) await released;
+    // The page may have ended it meanwhile.
+    await route.continue().catch(() => {});
+  });
+  return release;
+}
+
 /** What the page offers when a button is pressed, as bytes. */
 export async function downloaded(page, button) {
   const [download] = await Promise.all([page.waitForEvent("download"), page.click(button)]);

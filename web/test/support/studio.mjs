@@ -11,14 +11,21 @@ export const part = await readFile(new URL("../part.glb", import.meta.url));
 export const PART_FACES = 1920;
 export const example = { name: "part.glb", mimeType: "", buffer: part };
 
-/** Call it inside `describe`. */
-export function studio() {
+/** A file of four faces, without normals. */
+export const TETRAHEDRON = {
+  name: "tetrahedron.obj",
+  mimeType: "",
+  buffer: Buffer.from("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"),
+};
+
+/** Call it inside `describe`; `settings` are the server's. */
+export function studio(settings = {}) {
   let server;
   let browser;
   let opened = [];
 
   before(async () => {
-    [server, browser] = await Promise.all([serve(), launch()]);
+    [server, browser] = await Promise.all([serve(settings), launch()]);
     await server.warm();
   });
   after(async () => {

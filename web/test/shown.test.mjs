@@ -1,0 +1,168 @@
+/** What is shown, and what is on its way: neither is taken for the other. */
+
+import assert from "node:assert/strict";
+import { describe, test } from "node:test";
+import { choose, downloaded, hold, noBrowser, settled } from "./support/browser.mjs";
+import { positions, report } from "./support/glb.mjs";
+import { example, number, part, PART_FACES, same, studio, TETRAHEDRON } from "./support/studio.mjs";
+
+// One level of the example, five of the tetrahedron.
+const FEW = { PNS_FACES: "20000" };
+const DEEP = "#levels=4";
+/** How the page asks for the tetrahedron. */
+const SMOOTH = "uv=linear&crease=auto&normals=smooth";
+
+describe("what is shown", { skip: noBrowser, timeout: 900_000 }, () => {
+  const { visit, refined } = studio(FEW);
+
+  /** A page that shows the tetrahedron after four levels. */
+  async function deep() {
+    const page = await visit({ hash: DEEP });
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    return page;
+  }
+
+  test("has its own settings again, once a second file is cancelled", async () => {
+    const page = await deep();
+    await hold(page);
+    await choose(page, example);
+    await closed(page);
+    // Into the address of the page, too.
+    await page.check("#edges");
+    await page.click("#cancel");
+    assert.equal(await page.inputValue("#levels"), "4");
+    assert.match(await page.evaluate(() => location.hash), /levels=4/);
+  });
+
+  test("is downloaded with the settings that made it", async () => {
+    const page = await deep();
+    const release = await hold(page, (body) => body?.equals(part));
+    await choose(page, example);
+    await closed(page);
+    await page.check("#attributes");
+    const { bytes } = await downloaded(page, "#download");
+    same(bytes, await refined(`levels=4&${SMOOTH}&diagnostics=full`, TETRAHEDRON.buffer, "model/obj"));
+    release();
+    await settled(page);
+  });
+
+  test("has heat maps of its own values", async () => {
+    const page = await deep();
+    const release = await hold(page, (body) => body?.equals(part));
+    await choose(page, example);
+    await closed(page);
+    const asked = page.waitForRequest(/diagnostics=full/);
+    await page.selectOption("#look", "ratio");
+    assert.match((await asked).url(), /levels=4/);
+    await page.locator("#legend", { hasText: "Share of the budget" }).waitFor();
+    release();
+    await settled(page);
+  });
+
+  test("does not take levels from the files after it", async () => {
+    const page = await visit({ hash: DEEP });
+    await choose(page, example, TETRAHEDRON);
+    await settled(page);
+    for (const [number, levels] of [[1, "4"], [0, "1"], [1, "4"]]) {
+      await page.selectOption("#file", String(number));
+      await page.waitForFunction((levels) => document.querySelector("#levels").value === levels, levels);
+      await settled(page);
+    }
+  });
+});
+
+describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
+  const { visit, refined } = studio();
+
+  /** A page that shows the tetrahedron after one level, while the example waits with two chosen for it. */
+  async function twice(options = {}) {
+    const page = await visit({ hash: "#levels=1", ...options });
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    const release = await hold(page, (body) => body?.equals(part));
+    await choose(page, example);
+    await page.locator("#levels", { hasText: number(4 * PART_FACES) }).waitFor({ state: "attached" });
+    const sent = page.waitForRequest(/levels=2/);
+    await page.selectOption("#levels", "2");
+    await sent;
+    return { page, release };
+  }
+
+  test("is refined with its own settings, once it is asked for again", async () => {
+    const { page, release } = await twice();
+    await page.click("#cancel");
+    assert.equal(await page.inputValue("#levels"), "1");
+    release();
+    await page.click("#again");
+    await settledWith(page, 16 * PART_FACES);
+    assert.equal(await page.inputValue("#levels"), "2");
+  });
+
+  test("is tried again with its own settings", async () => {
+    const { page, release } = await twice({ foreseen: /ERR_FAILED/ });
+    await page.route(/\/jobs\/.*events/, (route) => route.abort());
+    release();
+    await page.locator("#problem").waitFor();
+    assert.equal(await page.inputValue("#levels"), "1");
+    await page.unroute(/\/jobs\/.*events/);
+    await page.click("#problem-again");
+    await settledWith(page, 16 * PART_FACES);
+    assert.equal(await page.inputValue("#levels"), "2");
+  });
+
+  test("other settings that are cancelled leave the form to what is shown, and can be asked for again", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    const release = await hold(page);
+    const sent = page.waitForRequest(/levels=3/);
+    await page.selectOption("#levels", "3");
+    await sent;
+    await page.click("#cancel");
+    assert.equal(await page.inputValue("#levels"), "1");
+    release();
+    await page.click("#again");
+    await settledWith(page, 4 * 64);
+    assert.equal(await page.inputValue("#levels"), "3");
+  });
+
+  test("normals as in the file, chosen on its way, stay", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, example);
+    await settled(page);
+    const release = await hold(page, (body) => body?.equals(TETRAHEDRON.buffer));
+    await choose(page, TETRAHEDRON);
+    await page.waitForFunction(() => document.querySelector("#normals").value === "smooth");
+    const anew = page.waitForRequest((request) => request.method() === "POST" && !/normals/.test(request.url()));
+    await page.selectOption("#normals", "keep", { force: true });
+    await anew;
+    release();
+    await settledWith(page, 16);
+    assert.equal(await page.inputValue("#normals"), "keep");
+  });
+
+  test("another try at a download is of the file that it was of", async () => {
+    const { page, release } = await twice({ foreseen: /ERR_FAILED/ });
+    await page.check("#attributes");
+    await page.route(/diagnostics=full/, (route) => route.abort());
+    await page.click("#download");
+    await page.locator("#problem").waitFor();
+    await page.unroute(/diagnostics=full/);
+    release();
+    await settledWith(page, 16 * PART_FACES);
+    const { name, bytes } = await downloaded(page, "#problem-again");
+    assert.equal(name, "tetrahedron-refined.glb");
+    same(bytes, await refined(`levels=1&${SMOOTH}&diagnostics=full`, TETRAHEDRON.buffer, "model/obj"));
+  });
+});
+
+/** The form is the example's: four levels of it are too many. */
+async function closed(page) {
+  await page.waitForFunction(() => document.querySelector("#levels").value === "1");
+}
+
+async function settledWith(page, faces) {
+  await page.locator("#label-right", { hasText: `· ${number(faces)} faces` }).waitFor({ timeout: 20_000 });
+  await settled(page);
+}
