@@ -127,9 +127,10 @@ const form = new SettingsForm(given.settings, changed);
 stage.view = given.view;
 const fileList = new FileList(takeOne);
 
-async function prepare(upload: Upload, opened: Opened): Promise<Asked> {
+async function prepare(upload: Upload, opened: Opened, signal: AbortSignal): Promise<Asked> {
   // Which levels are open depends on the service's limits.
   await offered;
+  signal.throwIfAborted();
   form.fit({ upload, opened });
   return form.asked;
 }

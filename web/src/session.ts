@@ -31,8 +31,8 @@ export interface Source {
   model: Model;
 }
 
-/** What the form makes of a file before it is refined. */
-export type Prepare = (upload: Upload, opened: Opened) => Promise<Asked>;
+/** What the form makes of a file before it is refined; nothing of one that was ended meanwhile. */
+export type Prepare = (upload: Upload, opened: Opened, signal: AbortSignal) => Promise<Asked>;
 
 /** A refinement; what is asked of a new file is known once it is open. */
 interface Request {
@@ -118,7 +118,7 @@ export class Session {
         const opened = await open(upload);
         source = { upload, opened, model: modelOf(opened.scene, opened.clips) };
         signal.throwIfAborted();
-        const asked = (request.asked = await prepare(upload, opened));
+        const asked = (request.asked = await prepare(upload, opened, signal));
         // Nothing is lost by showing the first file at once.
         if (this.source === null && isFinite(source.model)) this.show(source);
         ours = await this.run(upload, asked, signal);

@@ -142,6 +142,30 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
     assert.equal(await page.inputValue("#normals"), "keep");
   });
 
+  test("a file that is chosen before the limits are known gives way to the next", async () => {
+    const page = await visit();
+    let know;
+    const known = new Promise((resolve) => (know = resolve));
+    await page.route(/\/limits$/, async (route) => {
+      await known;
+      await route.continue();
+    });
+    await page.reload();
+    await page.evaluate(() => {
+      window.names = new Set();
+      const name = document.querySelector("#file-name");
+      new MutationObserver(() => window.names.add(name.textContent)).observe(name, { childList: true });
+    });
+    await choose(page, TETRAHEDRON);
+    await page.waitForTimeout(500);
+    await choose(page, example);
+    await page.waitForTimeout(500);
+    know();
+    await settledWith(page, 16 * PART_FACES);
+    const names = await page.evaluate(() => [...window.names]);
+    assert.deepEqual(names.filter(Boolean), [example.name]);
+  });
+
   test("another try at a download is of the file that it was of", async () => {
     const { page, release } = await twice({ foreseen: /ERR_FAILED/ });
     await page.check("#attributes");
