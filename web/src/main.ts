@@ -3,7 +3,6 @@
 import { json, request, type Limits, type ModelEntry } from "./api/client";
 import { fileProblem, isAbort } from "./api/problem";
 import { chosen, dropped } from "./files/dropped";
-import { parseGltf } from "./files/gltf";
 import type { Opened } from "./files/open";
 import { uploadsOf, type Dropped, type PathedFile, type Upload } from "./files/upload";
 import { dihedrals } from "./measure/dihedral";
@@ -38,7 +37,7 @@ import {
 } from "./ui/status";
 import { compare } from "./validate/compare";
 import { validate } from "./validate/validate";
-import { dispose, modelOf } from "./view/model";
+import { dispose, type Model } from "./view/model";
 
 let began = 0;
 let validation = new AbortController();
@@ -242,18 +241,21 @@ async function fetchValues(): Promise<void> {
   const { ours } = session;
   if (!ours || ours === awaiting) return;
   awaiting = ours;
-  const answer = await session.fetch(ours, "full", "none", () => stage.arrange());
+  const full = await session.full(ours, () => stage.arrange());
   if (awaiting === ours) awaiting = null;
-  if (!answer || session.ours !== ours) return;
-  const { scene } = await parseGltf(answer.bytes);
-  const full = modelOf(scene, []);
+  if (!full) return;
+  if (session.ours === ours) adopt(ours, full);
+  dispose(full);
+}
+
+/** Give a result the values that another has. */
+function adopt(ours: Result, full: Model): void {
   full.meshes.forEach(({ geometry }, number) => {
     const target = ours.model.meshes[number]?.geometry;
     for (const name of ["_pns_ratio", "_pns_gate"]) {
       if (geometry.hasAttribute(name)) target?.setAttribute(name, geometry.getAttribute(name));
     }
   });
-  dispose(full);
   ours.full = true;
   stage.arrange();
 }
@@ -274,7 +276,7 @@ async function downloadGlb(ours: Result, diagnostics: Diagnostics, compress: Com
     const again = () => void downloadGlb(ours, diagnostics, compress);
     const answer = await session.fetch(ours, diagnostics, compress, again);
     if (!answer) return;
-    content = answer.bytes;
+    content = answer;
   }
   save(new Blob([content], { type: "model/gltf-binary" }), resultName(ours.upload, "glb"));
 }

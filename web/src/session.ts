@@ -1,7 +1,7 @@
 /** A file, what became of it, and the jobs under way. Knows no element of the page. */
 
 import { refine, type Answer, type Progress } from "./api/jobs";
-import { isAbort, Problem } from "./api/problem";
+import { isAbort, localProblem, Problem } from "./api/problem";
 import { open, type Opened } from "./files/open";
 import { jsonOf, parseGltf, type GltfJson } from "./files/gltf";
 import { bodyOf, type Upload } from "./files/upload";
@@ -151,19 +151,27 @@ export class Session {
    * asks for it anew. Nothing under way ends for it.
    */
   async fetch(
-    { upload, asked: { settings } }: Result,
+    ours: Result,
     diagnostics: Diagnostics,
     compress: Compression,
     again: Again,
-  ): Promise<Answer | null> {
-    let answer: Answer | null = null;
+  ): Promise<ArrayBuffer | null> {
+    let bytes: ArrayBuffer | null = null;
     await this.beside(again, async (signal) => {
-      const asked = query(settings, diagnostics, compress);
-      answer = await refine(bodyOf(upload), asked, signal, (progress) =>
-        this.listener.progress(progress, ""),
-      );
+      ({ bytes } = await this.answer(ours, query(ours.asked.settings, diagnostics, compress), signal));
     });
-    return answer;
+    return bytes;
+  }
+
+  /** A result with values at vertices, which a plain one does not hold: the same job with all diagnostics. */
+  async full(ours: Result, again: Again): Promise<Model | null> {
+    let model: Model | null = null;
+    await this.beside(again, async (signal) => {
+      const { bytes } = await this.answer(ours, query(ours.asked.settings, "full"), signal);
+      const { scene } = await shownIn("The heat map", () => parseGltf(bytes));
+      model = modelOf(scene, []);
+    });
+    return model;
   }
 
   private async complete(ours: Result, signal: AbortSignal): Promise<void> {
@@ -184,10 +192,17 @@ export class Session {
     signal: AbortSignal,
     what = "",
   ): Promise<Result> {
-    const answer = await refine(bodyOf(upload), query(asked.settings), signal, (progress) =>
-      this.listener.progress(progress, what),
-    );
-    return resultOf(upload, asked, answer);
+    const answer = await this.answer({ upload }, query(asked.settings), signal, what);
+    return shownIn(what || "The result", () => resultOf(upload, asked, answer));
+  }
+
+  private answer(
+    { upload }: Pick<Result, "upload">,
+    asked: URLSearchParams,
+    signal: AbortSignal,
+    what = "",
+  ): Promise<Answer> {
+    return refine(bodyOf(upload), asked, signal, (progress) => this.listener.progress(progress, what));
   }
 
   private show(source: Source): void {
@@ -262,9 +277,20 @@ function isTheFiles(error: unknown): boolean {
   return error instanceof Problem && [400, 415, 422].includes(error.status) && !error.parameter;
 }
 
+/** What is made of an answer. Where nothing can be, that is no fault of the user's file, and another try may do. */
+async function shownIn<T>(what: string, make: () => Promise<T>): Promise<T> {
+  try {
+    return await make();
+  } catch (error) {
+    throw localProblem(`${what} cannot be shown`, (error as Error).message);
+  }
+}
+
 async function resultOf(upload: Upload, asked: Asked, answer: Answer): Promise<Result> {
   const began = performance.now();
   const json = jsonOf(answer.bytes);
+  const report = json.asset?.extras?.pns as Report | undefined;
+  if (!report) throw new Error("The answer has no report.");
   const { scene, animations } = await parseGltf(answer.bytes);
   const timings: [string, number][] = [...answer.timings, ["opening", performance.now() - began]];
   return {
@@ -273,7 +299,7 @@ async function resultOf(upload: Upload, asked: Asked, answer: Answer): Promise<R
     key: query(asked.settings).toString(),
     bytes: answer.bytes,
     json,
-    report: json.asset?.extras?.pns as Report,
+    report,
     model: modelOf(scene, animations),
     timings,
     full: false,

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
 import { choose, downloaded, hold, noBrowser, settled } from "./support/browser.mjs";
-import { positions, report } from "./support/glb.mjs";
+import { read, write } from "./support/glb.mjs";
 import { example, number, part, PART_FACES, same, studio, TETRAHEDRON } from "./support/studio.mjs";
 
 // One level of the example, five of the tetrahedron.
@@ -11,6 +11,8 @@ const FEW = { PNS_FACES: "20000" };
 const DEEP = "#levels=4";
 /** How the page asks for the tetrahedron. */
 const SMOOTH = "uv=linear&crease=auto&normals=smooth";
+
+const BROKEN = { "a cut answer": part.subarray(0, 64), "an answer": endless(part) };
 
 describe("what is shown", { skip: noBrowser, timeout: 900_000 }, () => {
   const { visit, refined } = studio(FEW);
@@ -166,6 +168,30 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
     assert.deepEqual(names.filter(Boolean), [example.name]);
   });
 
+  for (const [what, broken] of Object.entries(BROKEN)) {
+    test(`${what} that cannot be shown is no fault of the file, and can be tried again`, async () => {
+      const page = await visit({ hash: "#levels=1" });
+      await page.route(/\/result$/, (route) => route.fulfill({ contentType: "model/gltf-binary", body: broken }));
+      await choose(page, example);
+      await told(page, /^The result cannot be shown/);
+      assert.match(await page.textContent("#label-left"), new RegExp(`${number(PART_FACES)} faces`));
+      await page.unroute(/\/result$/);
+      await page.click("#problem-again");
+      await settledWith(page, 4 * PART_FACES);
+      // The second file's leaves the first.
+      await page.route(/\/result$/, (route) => route.fulfill({ contentType: "model/gltf-binary", body: broken }));
+      await choose(page, TETRAHEDRON);
+      await told(page, /^The result cannot be shown/);
+      assert.equal(await page.textContent("#file-name"), example.name);
+      assert.match(await page.textContent("#label-right"), new RegExp(`· ${number(4 * PART_FACES)} faces`));
+      await page.selectOption("#look", "gate");
+      await told(page, /^The heat map cannot be shown/);
+      await page.unroute(/\/result$/);
+      await page.click("#problem-again");
+      await page.locator("#legend", { hasText: "Gate" }).waitFor();
+    });
+  }
+
   test("another try at a download is of the file that it was of", async () => {
     const { page, release } = await twice({ foreseen: /ERR_FAILED/ });
     await page.check("#attributes");
@@ -180,6 +206,19 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
     same(bytes, await refined(`levels=1&${SMOOTH}&diagnostics=full`, TETRAHEDRON.buffer, "model/obj"));
   });
 });
+
+async function told(page, words) {
+  await page.locator("#problem-title", { hasText: words }).waitFor();
+  assert.ok(await page.isVisible("#problem-again"));
+}
+
+/** The same file, whose first accessor says more than there is. */
+function endless(bytes) {
+  const { json, bin } = read(bytes);
+  json.accessors[0].count = 10 ** 7;
+  json.asset.extras = { pns: {} };
+  return write({ json, bin });
+}
 
 /** The form is the example's: four levels of it are too many. */
 async function closed(page) {
