@@ -193,7 +193,10 @@ export class Session {
     what = "",
   ): Promise<Result> {
     const answer = await this.answer({ upload }, query(asked.settings), signal, what);
-    return shownIn(what || "The result", () => resultOf(upload, asked, answer));
+    const result = await shownIn(what || "The result", () => resultOf(upload, asked, answer));
+    if (signal.aborted) this.listener.discarded(result.model);
+    signal.throwIfAborted();
+    return result;
   }
 
   private answer(

@@ -144,6 +144,34 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
     assert.equal(await page.inputValue("#normals"), "keep");
   });
 
+  test("stays ended where it is cancelled while its answer is read", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    await page.evaluate(() => {
+      const { arrayBuffer } = Blob.prototype;
+      const released = new Promise((resolve) => (window.release = resolve));
+      Blob.prototype.arrayBuffer = async function () {
+        // An answer, and no file of the user's.
+        if (!(this instanceof File)) {
+          window.reading = true;
+          await released;
+        }
+        return arrayBuffer.call(this);
+      };
+    });
+    await choose(page, example);
+    await page.waitForFunction(() => window.reading);
+    await page.click("#cancel");
+    await page.evaluate(() => window.release());
+    await page.waitForTimeout(1000);
+    assert.equal(await page.textContent("#file-name"), TETRAHEDRON.name);
+    assert.equal(await page.textContent("#notice-text"), "part.glb: cancelled");
+    assert.match(await page.textContent("#label-left"), /\D4 faces/);
+    await page.click("#again");
+    await settledWith(page, 4 * PART_FACES);
+  });
+
   test("a file that is chosen before the limits are known gives way to the next", async () => {
     const page = await visit();
     let know;
