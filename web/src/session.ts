@@ -42,6 +42,9 @@ interface Request {
 
 type Task = (signal: AbortSignal) => Promise<void>;
 
+/** What is under way: values are for the heat map of what is shown, and end with it. */
+type Kind = "refinement" | "values" | "download";
+
 /** Another try at what failed. */
 export type Again = () => void;
 
@@ -68,9 +71,8 @@ export class Session {
   source: Source | null = null;
   ours: Result | null = null;
   loop: Result | null = null;
-  private controller = new AbortController();
-  /** How many tasks the controller ends. */
-  private underWay = 0;
+  /** Each task by what ends it. */
+  private readonly underWay = new Map<AbortController, Kind>();
   /** The refinement among them. */
   private refining: Request | null = null;
   /** The one that was cancelled last. */
@@ -88,7 +90,7 @@ export class Session {
   cancel(): void {
     const { refining } = this;
     this.refining = null;
-    this.controller.abort();
+    this.end("refinement", "values", "download");
     if (!refining) return;
     this.stopped = refining;
     this.listener.stayed();
@@ -121,7 +123,7 @@ export class Session {
         const asked = (request.asked = await prepare(upload, opened, signal));
         // Nothing is lost by showing the first file at once.
         if (this.source === null && isFinite(source.model)) this.show(source);
-        ours = await this.run(upload, asked, signal);
+        ours = await this.refine(upload, asked, signal);
       } catch (error) {
         this.giveUp(source, error, signal);
         throw error;
@@ -142,13 +144,13 @@ export class Session {
       // It is there already where Loop's side alone was cancelled.
       const there = this.ours?.key === query(asked.settings).toString() ? this.ours : null;
       if (there) there.asked = asked;
-      await this.complete(there ?? (await this.run(source.upload, asked, signal)), signal);
+      await this.complete(there ?? (await this.refine(source.upload, asked, signal)), signal);
     });
   }
 
   /**
    * Another answer for what made a result; null when it was cancelled, or failed: `again` is what then
-   * asks for it anew. Nothing under way ends for it.
+   * asks for it anew. Nothing under way ends for it, and nothing that comes later ends it.
    */
   async fetch(
     ours: Result,
@@ -157,7 +159,7 @@ export class Session {
     again: Again,
   ): Promise<ArrayBuffer | null> {
     let bytes: ArrayBuffer | null = null;
-    await this.beside(again, async (signal) => {
+    await this.run("download", again, async (signal) => {
       ({ bytes } = await this.answer(ours, query(ours.asked.settings, diagnostics, compress), signal));
     });
     return bytes;
@@ -166,7 +168,7 @@ export class Session {
   /** A result with values at vertices, which a plain one does not hold: the same job with all diagnostics. */
   async full(ours: Result, again: Again): Promise<Model | null> {
     let model: Model | null = null;
-    await this.beside(again, async (signal) => {
+    await this.run("values", again, async (signal) => {
       const { bytes } = await this.answer(ours, query(ours.asked.settings, "full"), signal);
       const { scene } = await shownIn("The heat map", () => parseGltf(bytes));
       model = modelOf(scene, []);
@@ -181,12 +183,12 @@ export class Session {
     if (this.loop && this.loop.key !== key) this.replace("loop", null);
     this.listener.refined(ours);
     if (ours.asked.settings.model !== LOOP && !this.loop) {
-      this.replace("loop", await this.run(ours.upload, loops, signal, "Loop’s side"));
+      this.replace("loop", await this.refine(ours.upload, loops, signal, "Loop’s side"));
     }
     this.listener.compared(this.loop);
   }
 
-  private async run(
+  private async refine(
     upload: Upload,
     asked: Asked,
     signal: AbortSignal,
@@ -238,15 +240,16 @@ export class Session {
 
   private replace(side: "ours" | "loop", result: Result | null): void {
     const old = this[side];
+    if (side === "ours" && old !== result) this.end("values");
     this[side] = result;
     if (old && old !== result) this.listener.discarded(old.model);
   }
 
-  /** Run a refinement after ending all that is under way. */
+  /** Run a refinement after ending the one that is under way. */
   private async only(request: Request, again: Again, task: Task): Promise<void> {
-    this.controller.abort();
+    this.end("refinement");
     this.refining = request;
-    await this.beside(again, async (signal) => {
+    await this.run("refinement", again, async (signal) => {
       try {
         await task(signal);
       } finally {
@@ -256,21 +259,25 @@ export class Session {
     });
   }
 
-  /** Run a task beside what is under way; what ends that ends it too. */
-  private async beside(again: Again, task: Task): Promise<void> {
-    if (this.controller.signal.aborted) {
-      this.controller = new AbortController();
-      this.underWay = 0;
+  private end(...kinds: Kind[]): void {
+    for (const [controller, kind] of this.underWay) {
+      if (!kinds.includes(kind)) continue;
+      this.underWay.delete(controller);
+      controller.abort();
     }
-    const { controller } = this;
+  }
+
+  /** Run a task beside what is under way. */
+  private async run(kind: Kind, again: Again, task: Task): Promise<void> {
+    const controller = new AbortController();
     const { signal } = controller;
-    this.underWay++;
+    this.underWay.set(controller, kind);
     try {
       await task(signal);
     } catch (error) {
       if (!signal.aborted && !isAbort(error)) this.listener.failed(error, again);
     } finally {
-      if (this.controller === controller && --this.underWay === 0) this.listener.idle();
+      if (this.underWay.delete(controller) && !this.underWay.size) this.listener.idle();
     }
   }
 }

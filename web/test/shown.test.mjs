@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
 import { choose, downloaded, hold, noBrowser, settled } from "./support/browser.mjs";
-import { read, write } from "./support/glb.mjs";
+import { broken, read, write } from "./support/glb.mjs";
 import { example, number, part, PART_FACES, same, studio, TETRAHEDRON } from "./support/studio.mjs";
 
 // One level of the example, five of the tetrahedron.
@@ -12,7 +12,7 @@ const DEEP = "#levels=4";
 /** How the page asks for the tetrahedron. */
 const SMOOTH = "uv=linear&crease=auto&normals=smooth";
 
-const BROKEN = { "a cut answer": part.subarray(0, 64), "an answer": endless(part) };
+const UNSHOWABLE = { "a cut answer": part.subarray(0, 64), "an answer": endless(part) };
 
 describe("what is shown", { skip: noBrowser, timeout: 900_000 }, () => {
   const { visit, refined } = studio(FEW);
@@ -59,6 +59,29 @@ describe("what is shown", { skip: noBrowser, timeout: 900_000 }, () => {
     assert.match((await asked).url(), /levels=4/);
     await page.locator("#legend", { hasText: "Share of the budget" }).waitFor();
     release();
+    await settled(page);
+  });
+
+  test("has its download and its heat map although another file comes", async () => {
+    const page = await visit({ hash: DEEP, expected: [422] });
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    const release = await hold(page, (_, url) => url.includes("diagnostics=full"));
+    await page.selectOption("#look", "gate");
+    await choose(page, { ...example, buffer: broken(part) });
+    await page.locator("#problem").waitFor();
+    release();
+    await page.locator("#legend", { hasText: "Gate" }).waitFor();
+    await page.locator("#work").waitFor({ state: "hidden" });
+    await page.selectOption("#look", "material");
+    const later = await hold(page, (_, url) => url.includes("diagnostics=full"));
+    await page.check("#attributes");
+    const coming = page.waitForEvent("download");
+    await page.click("#download");
+    await choose(page, example);
+    await page.locator("#label-right", { hasText: `${number(4 * PART_FACES)} faces` }).waitFor();
+    later();
+    assert.equal((await coming).suggestedFilename(), "tetrahedron-refined.glb");
     await settled(page);
   });
 
@@ -196,10 +219,10 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
     assert.deepEqual(names.filter(Boolean), [example.name]);
   });
 
-  for (const [what, broken] of Object.entries(BROKEN)) {
+  for (const [what, body] of Object.entries(UNSHOWABLE)) {
     test(`${what} that cannot be shown is no fault of the file, and can be tried again`, async () => {
       const page = await visit({ hash: "#levels=1" });
-      await page.route(/\/result$/, (route) => route.fulfill({ contentType: "model/gltf-binary", body: broken }));
+      await page.route(/\/result$/, (route) => route.fulfill({ contentType: "model/gltf-binary", body }));
       await choose(page, example);
       await told(page, /^The result cannot be shown/);
       assert.match(await page.textContent("#label-left"), new RegExp(`${number(PART_FACES)} faces`));
@@ -207,7 +230,7 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
       await page.click("#problem-again");
       await settledWith(page, 4 * PART_FACES);
       // The second file's leaves the first.
-      await page.route(/\/result$/, (route) => route.fulfill({ contentType: "model/gltf-binary", body: broken }));
+      await page.route(/\/result$/, (route) => route.fulfill({ contentType: "model/gltf-binary", body }));
       await choose(page, TETRAHEDRON);
       await told(page, /^The result cannot be shown/);
       assert.equal(await page.textContent("#file-name"), example.name);

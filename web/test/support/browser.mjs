@@ -75,12 +75,13 @@ export async function settled(page) {
   await page.waitForFunction(() => !/Looking/.test(document.querySelector("#validation-text").textContent));
 }
 
-/** Jobs that are handed in wait, those alone whose body is `held`, until what comes back is called. */
+/** Jobs that are handed in wait, those alone whose body and address are `held`, until what comes back is called. */
 export async function hold(page, held = () => true) {
   let release;
   const released = new Promise((resolve) => (release = resolve));
   await page.route(/\/jobs\?/, async (route) => {
-    if (held(route.request().postDataBuffer())) await released;
+    const request = route.request();
+    if (held(request.postDataBuffer(), request.url())) await released;
     // The page may have ended it meanwhile.
     await route.continue().catch(() => {});
   });
