@@ -39,10 +39,11 @@ import { compare } from "./validate/compare";
 import { validate } from "./validate/validate";
 import { dispose, type Model } from "./view/model";
 
-let began = 0;
 let validation = new AbortController();
 /** Another try at what failed last. */
 let retry: Again = () => {};
+/** Files that are chosen count up: the last of them counts, however long the others take to come. */
+let choices = 0;
 /** The result whose values at vertices are on their way. */
 let awaiting: Result | null = null;
 /** Of the file that is shown. */
@@ -75,7 +76,7 @@ const session = new Session({
   stopped: ({ name }) => showNotice(`${name}: cancelled`, true),
   refined: (ours) => {
     stage.refine(ours, session.loop);
-    const milliseconds = performance.now() - began;
+    const milliseconds = performance.now() - ours.began;
     describe(ours);
     showTimings([
       ...ours.timings.map(([name, ms]): [string, number] => [STAGES[name] ?? name, ms / 1000]),
@@ -134,37 +135,46 @@ async function prepare(upload: Upload, opened: Opened, signal: AbortSignal): Pro
   return form.asked;
 }
 
-async function take(files: PathedFile[] | Promise<PathedFile[]>): Promise<void> {
+/** `again` is another try where they do not come. */
+async function take(files: PathedFile[] | Promise<PathedFile[]>, again: Again = () => {}): Promise<void> {
   clear();
+  const choice = ++choices;
   try {
     const dropped = await uploadsOf(await files);
+    if (choice !== choices) return;
     fileList.offer(dropped.uploads);
-    takeOne(dropped.uploads[0]!);
-    const others = tellOthers(dropped);
+    const isTaken = takeOne(dropped.uploads[0]!);
+    const others = tellOthers(dropped, isTaken);
     if (others) showNotice(others);
   } catch (error) {
+    if (choice !== choices) return;
+    retry = again;
     showProblem(error);
   }
 }
 
-function takeOne(upload: Upload): void {
+/** Whether it is on its way: what is too large is not. */
+function takeOne(upload: Upload): boolean {
   clear();
+  choices++;
   const most = form.largestUpload;
   if (upload.bytes > most) {
     // It would be sent for nothing.
     const detail = `${upload.name} has ${bytes(upload.bytes)}; this service takes up to ${bytes(most)}.`;
     showProblem(fileProblem("The file is too large", detail));
-    fileList.show(session.source?.upload ?? null);
-    return;
+    fileList.show(session.source?.upload ?? null, session.coming);
+    return false;
   }
   void session.take(upload, prepare);
+  return true;
 }
 
-/** What came beside the file that is opened; empty where nothing did. */
-function tellOthers({ uploads: [first, ...others], unused }: Dropped): string {
-  const names = others.map(({ path }) => path);
+/** What came beside the first file, which may be opened; empty where nothing did. */
+function tellOthers({ uploads: [first, ...others], unused }: Dropped, isOpened: boolean): string {
+  const names = listed(others.map(({ path }) => path));
+  const rest = isOpened ? `${first?.path} is opened; the list at the top has ${names} too.` : `The list at the top has ${names}.`;
   const sentences = [
-    others.length ? `${first?.path} is opened; the list at the top has ${listed(names)} too.` : "",
+    others.length ? rest : "",
     unused.length ? `Not used: ${listed(unused)}.` : "",
   ];
   return sentences.filter(Boolean).join(" ");
@@ -174,7 +184,7 @@ function tellOthers({ uploads: [first, ...others], unused }: Dropped): string {
 function clear(): void {
   hideProblem();
   hideNotice();
-  began = performance.now();
+  retry = () => {};
 }
 
 /** Put other settings in the form's place. */
@@ -291,7 +301,8 @@ function bindFiles(): void {
     // The same file may be chosen again.
     files.value = "";
   });
-  element("example").addEventListener("click", () => void take(example()));
+  const takeExample = (): void => void take(example(), takeExample);
+  element("example").addEventListener("click", takeExample);
   const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
   document.addEventListener("dragover", (event) => {
     if (!hasFiles(event)) return;
@@ -324,13 +335,9 @@ function bindPanel(): void {
     // Its own button is gone.
     element(element("notice").hidden ? "panel" : "again").focus();
   });
-  bindNotice(() => {
-    began = performance.now();
-    void session.resume(prepare);
-  });
+  bindNotice(() => void session.resume(prepare));
   bindProblem(() => {
     offered = start();
-    began = performance.now();
     retry();
   });
   element("reset").addEventListener("click", () => restore({ ...DEFAULTS }));

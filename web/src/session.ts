@@ -9,12 +9,17 @@ import type { Report } from "./report/report";
 import { asLoop, LOOP, query, type Asked, type Compression, type Diagnostics } from "./settings";
 import { isFinite, modelOf, type Model } from "./view/model";
 
-export interface Result {
-  /** Of which file. */
+/** What is asked of the service. */
+interface Order {
   upload: Upload;
-  /** What made it, whatever has been asked for since. */
   asked: Asked;
-  /** The same as a query. */
+  /** When, by the page's clock. */
+  began: number;
+}
+
+/** What came of an order, whatever has been asked for since. */
+export interface Result extends Order {
+  /** The query that made it. */
   key: string;
   bytes: ArrayBuffer;
   json: GltfJson;
@@ -34,11 +39,8 @@ export interface Source {
 /** What the form makes of a file before it is refined; nothing of one that was ended meanwhile. */
 export type Prepare = (upload: Upload, opened: Opened, signal: AbortSignal) => Promise<Asked>;
 
-/** A refinement; what is asked of a new file is known once it is open. */
-interface Request {
-  upload: Upload;
-  asked: Asked | null;
-}
+/** A refinement; what is asked for a new file is known once it is open. */
+type Request = Omit<Order, "asked"> & { asked: Asked | null };
 
 type Task = (signal: AbortSignal) => Promise<void>;
 
@@ -81,7 +83,7 @@ export class Session {
   constructor(private readonly listener: Listener) {}
 
   /** A file that is not refined yet, beside the one that is shown. */
-  private get coming(): Upload | null {
+  get coming(): Upload | null {
     const upload = this.refining?.upload ?? null;
     return upload === this.source?.upload ? null : upload;
   }
@@ -111,7 +113,8 @@ export class Session {
 
   /** Take a new file. What was there stays until the new one is refined. */
   async take(upload: Upload, prepare: Prepare): Promise<void> {
-    const request: Request = { upload, asked: null };
+    const began = performance.now();
+    const request: Request = { upload, asked: null, began };
     const anew = () => void this.renew(request, prepare);
     await this.only(request, anew, async (signal) => {
       let source: Source | null = null;
@@ -123,7 +126,7 @@ export class Session {
         const asked = (request.asked = await prepare(upload, opened, signal));
         // Nothing is lost by showing the first file at once.
         if (this.source === null && isFinite(source.model)) this.show(source);
-        ours = await this.refine(upload, asked, signal);
+        ours = await this.refine({ upload, asked, began }, signal);
       } catch (error) {
         this.giveUp(source, error, signal);
         throw error;
@@ -138,13 +141,13 @@ export class Session {
     const { source, coming } = this;
     if (coming) return this.take(coming, prepare);
     if (!source) return;
-    const request: Request = { upload: source.upload, asked };
-    const anew = () => void this.renew(request, prepare);
-    await this.only(request, anew, async (signal) => {
+    const order = { upload: source.upload, asked, began: performance.now() };
+    const anew = () => void this.renew(order, prepare);
+    await this.only(order, anew, async (signal) => {
       // It is there already where Loop's side alone was cancelled.
       const there = this.ours?.key === query(asked.settings).toString() ? this.ours : null;
       if (there) there.asked = asked;
-      await this.complete(there ?? (await this.refine(source.upload, asked, signal)), signal);
+      await this.complete(there ?? (await this.refine(order, signal)), signal);
     });
   }
 
@@ -177,32 +180,29 @@ export class Session {
   }
 
   private async complete(ours: Result, signal: AbortSignal): Promise<void> {
-    this.replace("ours", ours);
-    const loops = asLoop(ours.asked);
-    const key = query(loops.settings).toString();
-    if (this.loop && this.loop.key !== key) this.replace("loop", null);
-    this.listener.refined(ours);
-    if (ours.asked.settings.model !== LOOP && !this.loop) {
-      this.replace("loop", await this.refine(ours.upload, loops, signal, "Loop’s side"));
+    const { upload, began, asked } = ours;
+    const loops = asLoop(asked);
+    if (this.ours !== ours) {
+      this.replace("ours", ours);
+      if (this.loop && this.loop.key !== query(loops.settings).toString()) this.replace("loop", null);
+      this.listener.refined(ours);
+    }
+    if (asked.settings.model !== LOOP && !this.loop) {
+      this.replace("loop", await this.refine({ upload, asked: loops, began }, signal, "Loop’s side"));
     }
     this.listener.compared(this.loop);
   }
 
-  private async refine(
-    upload: Upload,
-    asked: Asked,
-    signal: AbortSignal,
-    what = "",
-  ): Promise<Result> {
-    const answer = await this.answer({ upload }, query(asked.settings), signal, what);
-    const result = await shownIn(what || "The result", () => resultOf(upload, asked, answer));
+  private async refine(order: Order, signal: AbortSignal, what = ""): Promise<Result> {
+    const answer = await this.answer(order, query(order.asked.settings), signal, what);
+    const result = await shownIn(what || "The result", () => resultOf(order, answer));
     if (signal.aborted) this.listener.discarded(result.model);
     signal.throwIfAborted();
     return result;
   }
 
   private answer(
-    { upload }: Pick<Result, "upload">,
+    { upload }: Order,
     asked: URLSearchParams,
     signal: AbortSignal,
     what = "",
@@ -296,7 +296,7 @@ async function shownIn<T>(what: string, make: () => Promise<T>): Promise<T> {
   }
 }
 
-async function resultOf(upload: Upload, asked: Asked, answer: Answer): Promise<Result> {
+async function resultOf(order: Order, answer: Answer): Promise<Result> {
   const began = performance.now();
   const json = jsonOf(answer.bytes);
   const report = json.asset?.extras?.pns as Report | undefined;
@@ -304,9 +304,8 @@ async function resultOf(upload: Upload, asked: Asked, answer: Answer): Promise<R
   const { scene, animations } = await parseGltf(answer.bytes);
   const timings: [string, number][] = [...answer.timings, ["opening", performance.now() - began]];
   return {
-    upload,
-    asked,
-    key: query(asked.settings).toString(),
+    ...order,
+    key: query(order.asked.settings).toString(),
     bytes: answer.bytes,
     json,
     report,

@@ -167,6 +167,17 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
     assert.equal(await page.inputValue("#normals"), "keep");
   });
 
+  test("is timed from where it was asked for, whatever is refused meanwhile", async () => {
+    const { page, release } = await twice();
+    await page.waitForTimeout(2000);
+    await choose(page, { name: "a.txt", mimeType: "", buffer: Buffer.from("") });
+    await page.locator("#problem").waitFor();
+    release();
+    await settledWith(page, 16 * PART_FACES);
+    const time = await page.textContent("#timings tr:has-text('From request') td");
+    assert.ok(parseFloat(time) >= 2 && / s$/.test(time), time);
+  });
+
   test("stays ended where it is cancelled while its answer is read", async () => {
     const page = await visit({ hash: "#levels=1" });
     await choose(page, TETRAHEDRON);
@@ -243,6 +254,36 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
     });
   }
 
+  test("an example that comes late gives way to what was chosen after it", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    let release;
+    const released = new Promise((resolve) => (release = resolve));
+    await page.route(/example/, async (route) => {
+      await released;
+      await route.continue();
+    });
+    await page.click("#example");
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    const come = page.waitForResponse(/example/);
+    release();
+    await come;
+    await page.waitForTimeout(1000);
+    await settled(page);
+    assert.equal(await page.textContent("#file-name"), TETRAHEDRON.name);
+  });
+
+  test("an example that does not come is tried again", async () => {
+    const page = await visit({ hash: "#levels=1", foreseen: /ERR_FAILED/ });
+    await page.route(/example/, (route) => route.abort());
+    await page.click("#example");
+    await page.locator("#problem").waitFor();
+    await page.unroute(/example/);
+    await page.click("#problem-again");
+    await page.locator("#file-name", { hasText: "example.glb" }).waitFor({ timeout: 20_000 });
+    await settled(page);
+  });
+
   test("another try at a download is of the file that it was of", async () => {
     const { page, release } = await twice({ foreseen: /ERR_FAILED/ });
     await page.check("#attributes");
@@ -255,6 +296,30 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
     const { name, bytes } = await downloaded(page, "#problem-again");
     assert.equal(name, "tetrahedron-refined.glb");
     same(bytes, await refined(`levels=1&${SMOOTH}&diagnostics=full`, TETRAHEDRON.buffer, "model/obj"));
+  });
+});
+
+describe("what is too large", { skip: noBrowser, timeout: 900_000 }, () => {
+  const { visit } = studio({ PNS_BODY: "20kB" });
+
+  test("is not said to be opened, and leaves the list to what is on its way", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await page.locator("#limits", { hasText: "up to" }).waitFor();
+    const other = { ...TETRAHEDRON, name: "other.obj" };
+    await choose(page, TETRAHEDRON, example, other);
+    await page.locator("#problem", { hasText: "too large" }).waitFor();
+    assert.equal(await page.textContent("#notice-text"), "The list at the top has tetrahedron.obj, other.obj.");
+    await page.selectOption("#file", { label: "tetrahedron.obj (2 of 3)" });
+    await settled(page);
+    const release = await hold(page);
+    const sent = page.waitForRequest(/jobs/);
+    await page.selectOption("#file", { label: "other.obj (3 of 3)" });
+    await sent;
+    await page.selectOption("#file", { label: "part.glb (1 of 3)" });
+    await page.locator("#problem", { hasText: "too large" }).waitFor();
+    assert.equal(await page.inputValue("#file"), "2");
+    release();
+    await settled(page);
   });
 });
 

@@ -20,10 +20,10 @@ export class FileList {
     this.write(uploads[0] ?? null);
   }
 
-  /** Name the file on the stage; null where there is none. */
-  show(upload: Upload | null): void {
+  /** Name the file on the stage; null where there is none. `coming`: another that is chosen. */
+  show(upload: Upload | null, coming: Upload | null = null): void {
     this.shown = upload;
-    this.write(upload);
+    this.write(coming ?? upload);
   }
 
   /** All that may be chosen: what is shown may have come before the others. */
