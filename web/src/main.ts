@@ -70,6 +70,8 @@ const session = new Session({
   },
   renewed: (upload, asked) => {
     const { source } = session;
+    fileList.show(source?.upload ?? null, upload);
+    changed.cancel();
     form.show(asked, upload, source?.upload === upload ? source.opened.faces : 0);
     remember();
   },
@@ -189,6 +191,7 @@ function clear(): void {
 
 /** Put other settings in the form's place. */
 function restore(wanted: Settings): void {
+  changed.cancel();
   form.want(wanted);
   if (session.source) form.fit(session.source);
   remember();

@@ -136,6 +136,24 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
     assert.equal(await page.inputValue("#levels"), "2");
   });
 
+  test("is what the list names, once it is asked for again", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, example, TETRAHEDRON);
+    await settled(page);
+    const release = await hold(page);
+    const sent = page.waitForRequest(/jobs/);
+    await page.selectOption("#file", "1");
+    await sent;
+    await page.click("#cancel");
+    assert.equal(await page.inputValue("#file"), "0");
+    const again = page.waitForRequest(/jobs/);
+    await page.click("#again");
+    await again;
+    assert.equal(await page.inputValue("#file"), "1");
+    release();
+    await settledWith(page, 16);
+  });
+
   test("other settings that are cancelled leave the form to what is shown, and can be asked for again", async () => {
     const page = await visit({ hash: "#levels=1" });
     await choose(page, TETRAHEDRON);
