@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
-import { choose, downloaded, hold, noBrowser, settled } from "./support/browser.mjs";
+import { choose, downloaded, hold, noBrowser, picture, settled } from "./support/browser.mjs";
 import { broken, read, write } from "./support/glb.mjs";
 import { example, number, part, PART_FACES, same, studio, TETRAHEDRON } from "./support/studio.mjs";
 
@@ -60,6 +60,16 @@ describe("what is shown", { skip: noBrowser, timeout: 900_000 }, () => {
     await page.locator("#legend", { hasText: "Share of the budget" }).waitFor();
     release();
     await settled(page);
+  });
+
+  test("keeps its lines where another file is refused", async () => {
+    const page = await visit({ hash: `${DEEP}&layout=side&look=wire`, expected: [422] });
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    const { data } = await picture(page);
+    await choose(page, { ...example, buffer: broken(part) });
+    await page.locator("#problem").waitFor();
+    same((await picture(page)).data, data);
   });
 
   test("has its download and its heat map although another file comes", async () => {

@@ -126,7 +126,8 @@ export class Stage {
   }
 
   discard(model: Model): void {
-    this.clearLines();
+    // What was never shown, as of a file that was refused, has no lines.
+    if (this.models().includes(model)) this.clearLines();
     this.playback.remove(model);
     dispose(model);
     if (this.shown.ours?.model === model) this.shown.ours = null;
