@@ -16,6 +16,7 @@ from train.spectra.spectrum import (
     jacobian,
     loop_eigenvalue,
     loop_gap,
+    of_regular_mesh,
     perturbed_stars,
     refined_inner,
     without_translations,
@@ -76,7 +77,7 @@ def derivative_of_departure(scheme: Scheme, valence: int) -> float:
     mesh, count = perturbed_stars(star, step)
     refined, base = (
         refined_inner(star, refine(mesh, rule, 1, 1.0, threads=1).mesh.vertices, 2 * count)
-        for rule in (scheme, loop())
+        for rule in (of_regular_mesh(scheme), loop())
     )
     return float(np.abs(refined - base).max()) / step
 

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Complex, Float, Int
 from torch import Tensor
 
 from pns_common.errors import ParameterError
+from pns_common.geometry.side_lengths import SideLengths
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
 from pns_common.schemes import Scheme
@@ -29,6 +30,8 @@ STEP = 1e-5
 RINGS = ((2, 2), (3, 2), (4, 3), (6, 4))
 
 VALENCES = tuple(range(3, 13))
+# A million faces with sides of one length.
+REGULAR = SideLengths(faces=10**6, total=3e6, squares=3e6)
 # Loop's tangent eigenvalue is double, once for each of three coordinates.
 TANGENT_COUNT = 6
 
@@ -56,6 +59,14 @@ def loop_gap(valence: int) -> float:
     return loop_eigenvalue(valence) - loop_third(valence)
 
 
+def of_regular_mesh(scheme: Scheme) -> Scheme:
+    """Return a scheme as it is on a large regular mesh, of which a star is a spot.
+
+    What is measured of a mesh as a whole is that mesh's, as R is, however the star is lifted.
+    """
+    return scheme.fitted(lambda: REGULAR)
+
+
 def closed_star(scheme: Scheme, valence: int) -> Callable[[float], Star]:
     """Return the stars, by lift, on which a scheme maps the inner rings to themselves.
 
@@ -65,6 +76,7 @@ def closed_star(scheme: Scheme, valence: int) -> Callable[[float], Star]:
     Raises:
         ParameterError: the scheme sees further than all rings tried.
     """
+    scheme = of_regular_mesh(scheme)
     for rings, inner_rings in RINGS:
         build = partial(stars.star, valence, rings, SPOKE, inner_rings=inner_rings)
         alone = build(0.0)
@@ -122,7 +134,7 @@ def jacobian(scheme: Scheme, star: Star, step: float = STEP) -> Float[np.ndarray
     By central differences on the scheme itself, in double precision: any scheme will do, and
     nothing is assumed of how it computes. `step` is in spokes; the reference length is 1.
     """
-    step = step * SPOKE
+    step, scheme = step * SPOKE, of_regular_mesh(scheme)
     mesh, count = perturbed_stars(star, step)
     refined = refine(mesh, scheme, levels=1, reference_length=1.0, threads=1).mesh.vertices
     moved = refined_inner(star, refined, 2 * count)

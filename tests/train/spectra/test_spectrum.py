@@ -10,6 +10,7 @@ from pns_common import loop, pns, refine
 from pns_common.connectivity.topology import build_topology
 from pns_common.errors import ParameterError
 from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule
+from tests.support.networks import scale_free_model
 from train.certificates.adversary import Operator
 from train.certificates.operator_jacobian import operator_jacobian
 from train.models.networks import BoundedNet
@@ -199,6 +200,15 @@ def far_sighted(rings):
         return Placement(positions, None, base.ratio, base.gate, base.degenerate)
 
     return Scheme("far-sighted", loop_vertex_rule, edge_rule)
+
+
+def test_what_is_measured_of_the_whole_mesh_is_no_sight_of_a_rule():
+    """The prior's strength, which follows how even a mesh is, is held as R is."""
+    scheme = pns(scale_free_model(prior_strength=0.5, even_prior_strength=1.5))
+    held = pns(scale_free_model(prior_strength=0.5), prior_strength=1.5)
+    build = closed_star(scheme, 5)
+    for lift in (0.0, 0.4):
+        np.testing.assert_array_equal(jacobian(scheme, build(lift)), jacobian(held, build(lift)))
 
 
 def test_a_rule_that_sees_further_gets_more_rings():
