@@ -6,31 +6,62 @@ sides, where all their children meet. So the middle of such a side is not regula
 
 from __future__ import annotations
 
-import numpy as np
-from jaxtyping import Int
+from dataclasses import dataclass
 
-from pns_common.connectivity.topology import EdgeClass, Topology
+import numpy as np
+from jaxtyping import Bool, Int
+
+from pns_common.base.arrays import marked
+from pns_common.connectivity.topology import EdgeClass, Topology, stable_sort
 from pns_common.mesh import repeated_vertex
 
 
-def irregular_in_split(topology: Topology) -> Int[np.ndarray, " N"]:
-    """Return the vertices of a mesh's split whose rings follow from no ring or edge of the mesh.
+@dataclass(frozen=True, eq=False)
+class DoubledFaces:
+    """Where faces of a mesh lie on each other, and what their sides are.
 
-    These are the middles of such faces' sides, and the corners of those with a vertex twice.
+    In the split two edges lead from the middle of a doubled face's side to those of its other
+    sides, each with twice as many half-edges as faces lie there: they are sharp.
+
+    Attributes:
+        doubled: the faces that have three vertices, and these with another face.
+        folds: sides of theirs that are interior: both their faces have the same three vertices.
+        corners: all others of their sides, whose halves are sharp too.
+        collapsed: the faces that have a vertex twice.
     """
+
+    doubled: Bool[np.ndarray, " F"]
+    folds: Bool[np.ndarray, " E"]
+    corners: Bool[np.ndarray, " E"]
+    collapsed: Int[np.ndarray, " N"]
+
+
+def doubled_faces(topology: Topology) -> DoubledFaces | None:
+    """Return where faces lie on each other; None where none do."""
     # Two faces on one edge lie on each other where both have one vertex opposite; where more do,
     # or faces of less than three vertices, no edge of theirs is interior.
     opposite = topology.stencil[:, 2:]
     could = topology.edge_class == int(EdgeClass.IRREGULAR)
     could |= (opposite[:, 0] == opposite[:, 1]) & (opposite[:, 0] >= 0)
     if not could.any():
-        return np.zeros(0, dtype=np.int64)
+        return None
     rows = np.flatnonzero(could[topology.face_edges].all(axis=1))
-    faces = topology.faces[rows]
-    collapsed = repeated_vertex(faces)
-    _, alike, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True
+    twice = repeated_vertex(topology.faces[rows])
+    collapsed, rows = rows[twice], rows[~twice]
+    # Two sides of three tell which vertices a face has.
+    sides = np.sort(topology.face_edges[rows], axis=1)
+    key, order = stable_sort(sides[:, 0] * np.int64(len(topology.edges)) + sides[:, 1])
+    # Whether the face before lies on this one, and after the last none.
+    again = np.zeros(len(key) + 1, dtype=bool)
+    again[1:-1] = key[1:] == key[:-1]
+    doubled = rows[order[again[:-1] | again[1:]]]
+    if len(doubled) + len(collapsed) == 0:
+        return None
+    is_side = marked(topology.face_edges[doubled].reshape(-1), len(topology.edges))
+    interior = topology.edge_class == int(EdgeClass.INTERIOR)
+    return DoubledFaces(
+        doubled=marked(doubled, len(topology.faces)),
+        folds=is_side & interior,
+        corners=is_side & ~interior,
+        collapsed=collapsed,
     )
-    doubled = rows[collapsed | (count[alike.reshape(-1)] > 1)]
-    middles = topology.vertex_count + topology.face_edges[doubled]
-    return np.unique(np.concatenate([middles.reshape(-1), faces[collapsed].reshape(-1)]))
