@@ -17,6 +17,7 @@ from pns_common.base.arrays import (
     norm,
     segment_sum,
     unit,
+    unit_longer_than,
 )
 from pns_common.connectivity.topology import Topology, sharp_edge_count
 from pns_common.masks.limit.neighbours import Neighbours, own_neighbours
@@ -25,11 +26,13 @@ from pns_common.masks.limit.tangents import tangent_masks
 
 # Tangents that span less than this, of the product of their lengths, span no plane.
 NO_PLANE = 1e-9
+# A sum of unit vectors below this, of the sum of their lengths, is what rounding leaves.
+CANCELLED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class LimitNormals:
-    """Unit normals; 0 where there is no area.
+    """Unit normals; 0 where there is no area, and where those of a vertex's sectors cancel.
 
     Attributes:
         vertices: of each vertex; on a crease or where fans meet the unit mean of its sectors'.
@@ -72,10 +75,21 @@ def normals_of_vertices(points: Float[Array, "W 3"], neighbours: Neighbours) -> 
     corners = ~around.closed & (sharp_edge_count(topology)[around.vertex] > 2)
     normals = plane_normals(tangent(0), tangent(1), area, corners)
     return LimitNormals(
-        vertices=unit(segment_sum(normals, around.vertex, topology.vertex_count)),
+        vertices=means_of_units(normals, around.vertex, topology.vertex_count),
         sectors=normals,
         sector_of_corner=around.of_corner,
     )
+
+
+def means_of_units(
+    normals: Float[Array, "S 3"], owners: Int[np.ndarray, " S"], count: int
+) -> Float[Array, "V 3"]:
+    """Return the unit mean of each owner's unit normals; 0 where they cancel.
+
+    A sum that is small beside that of the lengths is rounding: it has no direction.
+    """
+    lengths = segment_sum(norm(normals)[:, None], owners, count)[:, 0]
+    return unit_longer_than(segment_sum(normals, owners, count), CANCELLED * lengths)
 
 
 def plane_normals(

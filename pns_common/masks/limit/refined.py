@@ -22,7 +22,6 @@ from pns_common.base.arrays import (
     marked,
     namespace,
     scatter,
-    segment_sum,
     unit,
 )
 from pns_common.base.blocks import WHOLE, Blocks
@@ -36,7 +35,12 @@ from pns_common.connectivity.topology import (
     split,
 )
 from pns_common.masks.limit.neighbours import split_neighbours
-from pns_common.masks.limit.normals import limit_normals, normals_of_vertices, plane_normals
+from pns_common.masks.limit.normals import (
+    limit_normals,
+    means_of_units,
+    normals_of_vertices,
+    plane_normals,
+)
 from pns_common.masks.limit.positions import limit_positions, limits_of_vertices
 from pns_common.masks.stencils import CURVE_LIMIT_CENTRE, CURVE_LIMIT_NEIGHBOUR
 
@@ -114,7 +118,7 @@ def refined_limit_normals(
     if len(beside_curves):
         one_sided = _one_sided(points, topology, beside_curves)
         owners = edge_of_corner[beside_curves]
-        normals = normals + unit(segment_sum(one_sided, owners, len(topology.edges)))
+        normals = normals + means_of_units(one_sided, owners, len(topology.edges))
     if lying is not None and at_corners.any():
         beside_corners = np.flatnonzero(at_corners)
 
@@ -123,7 +127,7 @@ def refined_limit_normals(
 
         (sides,) = blocks.gather(len(beside_corners), at_half_edges)
         owners = np.repeat(edge_of_corner[beside_corners], 3)
-        normals = normals + unit(segment_sum(sides, owners, len(topology.edges)))
+        normals = normals + means_of_units(sides, owners, len(topology.edges))
     old = normals_of_vertices(points, split_neighbours(topology)).vertices
     limits = xp.concat([old, normals])
     if lying is None or len(lying.collapsed) == 0:

@@ -60,7 +60,9 @@ def tangent_masks(topology: Topology, around: Sectors) -> TangentMasks:
 
     closed = around.closed[around.of_corner]
     angle = 2 * np.pi * rank / k
-    leaving[closed] = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[closed]
+    # Of two corners, those of a fold, sin(π) in floats would be a direction made of rounding.
+    across = np.where(k == 2, 0.0, np.sin(angle))
+    leaving[closed] = np.stack([np.cos(angle), across], axis=-1)[closed]
 
     is_curve = ~around.closed & (sharp == 2)
     curve = is_curve[around.of_corner]
@@ -111,7 +113,8 @@ def dart_tangents(valence: int) -> tuple[Float[np.ndarray, " N"], Float[np.ndarr
     """Return the even mask (centre first) and the odd one (neighbours alone), the crease at q_0."""
     angle = 2 * np.pi * np.arange(valence) / valence
     even = _even_of_few(valence) if valence < MANY else _even_of_many(valence)
-    return even * np.sign(even[1:] @ np.cos(angle)), np.sin(angle)
+    odd = np.sin(angle) if valence > 2 else np.zeros(valence)
+    return even * np.sign(even[1:] @ np.cos(angle)), odd
 
 
 @cache

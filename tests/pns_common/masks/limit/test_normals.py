@@ -8,7 +8,7 @@ from pns_common.connectivity.creases import with_creases
 from pns_common.connectivity.topology import build_topology
 from pns_common.geometry.frames import face_normals
 from pns_common.masks.limit import limit_normals
-from pns_common.masks.limit.normals import plane_normals
+from pns_common.masks.limit.normals import means_of_units, plane_normals
 from tests.support.meshes import bent, bumpy_sphere, grid, icosphere
 
 
@@ -53,3 +53,29 @@ def test_tangents_that_span_no_plane_leave_it_to_the_faces():
     assert plane_normals(first, second, area).tolist() == [[0, 0, 1], [0, -1, 0]]
     # A corner wider than half a turn: its faces say which way is out.
     assert plane_normals(first, second, area, np.array([True, False]))[0].tolist() == [0, 0, -1]
+
+
+@pytest.mark.parametrize("creased", [False, True])
+def test_normals_that_cancel_are_zero(creased):
+    """Of a sheet that is there from both sides none is left, however it lies."""
+    rng = np.random.default_rng(0)
+    points, faces = grid(5, lambda x, y: rng.uniform(-0.3, 0.3, x.shape))
+    mesh = Mesh(points, np.concatenate([faces, faces[:, ::-1]]))
+    creases = np.array([[3, 4]]) if creased else None
+    assert not refine(mesh, loop(), 1, limit=True, creases=creases).normals.any()
+    turned = Mesh(points @ np.linalg.qr(rng.normal(size=(3, 3)))[0], mesh.faces)
+    assert not refine(turned, loop(), 1, limit=True, creases=creases).normals.any()
+
+
+def test_a_fold_takes_no_part_in_the_normal_of_a_vertex_with_other_faces():
+    """Two faces there and back, at a vertex of another: the normal there is the other one's."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, -1, 1], [0.9, -1, 2.0]])
+    faces = np.array([[0, 1, 2], [0, 3, 4], [4, 3, 0]])
+    normals = limit_normals(points, build_topology(faces, len(points))).vertices
+    np.testing.assert_allclose(normals[0], [0, 0, 1], atol=1e-12)
+
+
+def test_normals_that_nearly_cancel_have_the_direction_that_is_left():
+    normals = np.array([[0.0, 0, 1], [1e-6, 0, -1], [0, 0.6, 0.8], [1e-12, -0.6, -0.8], [0, 0, 0]])
+    means = means_of_units(normals, np.array([0, 0, 1, 1, 2]), 4)
+    assert means.tolist() == [[1, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]

@@ -45,7 +45,7 @@ def test_so_do_limits_of_a_refined_soup(mesh, seed):
     np.testing.assert_allclose(positions, limit_positions(refined, after), rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("twice", [5])
+@pytest.mark.parametrize("twice", [5, 18])
 @pytest.mark.parametrize("seed", [None, 0, 1])
 def test_limits_of_a_sheet_that_is_there_from_both_sides(twice, seed):
     """Its faces are there twice, and each way round: no ring of theirs is a plain mesh's."""
