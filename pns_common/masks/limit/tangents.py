@@ -31,6 +31,8 @@ from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE, MIDPOINT, lo
 
 # From so many spokes on the even mask of a dart has one form.
 MANY = 9
+# Below so many it is kept: to find it takes milliseconds, and few meshes have darts of more.
+KEPT = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,14 +114,23 @@ def _curve_weights(
 def dart_tangents(valence: int) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " K"]]:
     """Return the even mask (centre first) and the odd one (neighbours alone), the crease at q_0."""
     angle = 2 * np.pi * np.arange(valence) / valence
-    even = _even_of_few(valence) if valence < MANY else _even_of_many(valence)
+    even = _kept_even(valence) if valence < KEPT else _even(valence)
     odd = np.sin(angle) if valence > 2 else np.zeros(valence)
     return even * np.sign(even[1:] @ np.cos(angle)), odd
 
 
 @cache
-def _even_of_few(k: int) -> Float[np.ndarray, " N"]:
+def _kept_even(k: int) -> Float[np.ndarray, " N"]:
+    return _even(k)
+
+
+def _even(k: int) -> Float[np.ndarray, " N"]:
     """Return the second left eigenvector of a dart's matrix among those that are even."""
+    return _even_of_few(k) if k < MANY else _even_of_many(k)
+
+
+def _even_of_few(k: int) -> Float[np.ndarray, " N"]:
+    """Return the same from the matrix of fewer than ``MANY`` spokes."""
     beta = float(loop_beta(np.array([k]))[0])
     matrix = np.zeros((k + 1, k + 1))
     matrix[0, 0], matrix[0, 1:] = 1 - k * beta, beta

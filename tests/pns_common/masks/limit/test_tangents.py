@@ -5,6 +5,7 @@ import pytest
 
 from pns_common.connectivity.creases import crease_children, with_creases
 from pns_common.connectivity.topology import build_topology
+from pns_common.masks.limit import tangents as masks_of_tangents
 from pns_common.masks.limit.neighbours import own_neighbours, split_neighbours
 from pns_common.masks.limit.sectors import sectors
 from pns_common.masks.limit.tangents import dart_tangents, tangent_masks
@@ -81,3 +82,13 @@ def test_at_a_dart_the_odd_mask_is_a_sine_and_both_span_the_plane_of_a_step(k):
     for before, after in ((first, first_after), (second, second_after)):
         np.testing.assert_allclose(np.cross(before, after), 0, atol=1e-12)
     assert len(crease_children(topology)) == 2
+
+
+def test_masks_of_common_darts_are_found_once(monkeypatch):
+    first = [dart_tangents(k) for k in (5, 12, 63)]
+    sought = []
+    monkeypatch.setattr(masks_of_tangents, "_even_at", lambda t, k: sought.append(k))
+    monkeypatch.setattr(np.linalg, "eig", sought.append)
+    again = [dart_tangents(k) for k in (5, 12, 63)]
+    assert sought == []
+    assert [even.tolist() for even, _ in again] == [even.tolist() for even, _ in first]
