@@ -13,7 +13,8 @@ log = logging.getLogger("pns.service")
 # A worker takes pipes and a sentinel; the rest are libraries, models, logs and listening sockets.
 OF_WORKER = 16
 OF_PROCESS = 128
-# The body, the answer, the report and the page of a job, and the page's map.
+# The body, the answer, the report and the page of a job, and the page's map. Whoever is connected
+# may hold them: while it uploads, and then until its job is measured and stands in line.
 OF_REQUEST = 5
 # What is kept of one that is done: its answer and its report.
 OF_RESULT = 2
@@ -33,20 +34,27 @@ def fitting(settings: Settings) -> int:
     except ImportError:  # Windows has no such limit.
         return settings.connections
     # Short jobs have a worker and slots of their own.
-    requests = settings.slots + settings.queue + 1 + settings.uploads
+    requests = settings.slots + settings.queue + 1
     reserved = OF_PROCESS + OF_WORKER * (settings.workers + 1) + OF_REQUEST * requests
     reserved += OF_RESULT * settings.results + A_TURN * TURNS
-    wanted = reserved + settings.connections
+    of_connection = 1 + OF_REQUEST
+    wanted = reserved + of_connection * settings.connections
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft != resource.RLIM_INFINITY and soft < wanted:
         soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
     if soft == resource.RLIM_INFINITY or soft >= wanted:
         return settings.connections
-    if soft <= reserved:
+    fit = (soft - reserved) // of_connection
+    if fit < 1:
         raise OSError(
-            f"{soft} open files are allowed and {reserved + 1} needed: raise the limit "
-            "(ulimit -n), or lower PNS_UPLOADS or PNS_QUEUE"
+            f"{soft} open files are allowed and {reserved + of_connection} needed: raise the limit "
+            "(ulimit -n), or lower PNS_QUEUE, PNS_WORKERS or PNS_RESULTS"
         )
-    log.warning("%d open files allow %d connections at most", soft, soft - reserved)
-    return soft - reserved
+    log.warning(
+        "%d open files allow %d connections at most, in place of the %d of PNS_CONNECTIONS",
+        soft,
+        fit,
+        settings.connections,
+    )
+    return fit

@@ -29,7 +29,19 @@ def test_the_limit_is_raised_as_far_as_is_needed_and_allowed(monkeypatch):
         assert allow(monkeypatch, enough, enough) == []
         assert fitting(SETTINGS) == 100
     allow(monkeypatch, 64, needed - 60)
-    assert fitting(SETTINGS) == 40
+    assert fitting(SETTINGS) == 90
+
+
+def test_every_connection_may_hold_a_request_that_waits_to_be_measured(monkeypatch):
+    """Its own descriptor and five files; uploads are connections too, and count no further."""
+    wanted = []
+    for connections, uploads in ((100, 1), (101, 1), (101, 500)):
+        asked = allow(monkeypatch, 64, 10**6)
+        settings = Settings(workers=1, queue=2, connections=connections, uploads=uploads)
+        assert fitting(settings) == connections
+        ((needed, _),) = asked
+        wanted.append(needed)
+    assert wanted == [wanted[0], wanted[0] + 6, wanted[0] + 6]
 
 
 def test_where_not_one_connection_fits_the_service_says_what_it_needs(monkeypatch):
