@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 from contextlib import ExitStack
 
 from starlette.responses import Response
@@ -20,7 +21,8 @@ class FileAnswer(Response):
     """Sends a memory file piece by piece, then lets go of what the request held.
 
     How fast a client must take it is its connection's business. One who is gone is sent nothing
-    more: the pieces that are left would be read for nobody, and hold the event loop.
+    more: the pieces that are left would be read for nobody, and hold the event loop. `sent` is
+    called once all of it was sent, and not where it is refused, cut off, or nobody is there.
     """
 
     def __init__(
@@ -32,6 +34,7 @@ class FileAnswer(Response):
         *,
         media_type: str,
         headers: dict[str, str],
+        sent: Callable[[], None] = lambda: None,
     ) -> None:
         super().__init__(
             media_type=media_type, headers=headers | {"Content-Length": str(content.size)}
@@ -40,6 +43,7 @@ class FileAnswer(Response):
         self._held = held
         self._admission = admission
         self._client = client
+        self._sent = sent
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send the answer."""
@@ -48,7 +52,8 @@ class FileAnswer(Response):
             try:
                 async with self._admission.working(), taking:
                     await self._send_start(send)
-                    await self._send_pieces(send, receive)
+                    if await self._send_pieces(send, receive):
+                        self._sent()
             except CutOffError:
                 log.warning("an answer is cut off: its memory is needed")
             except DrainingError:
@@ -63,16 +68,20 @@ class FileAnswer(Response):
             }
         )
 
-    async def _send_pieces(self, send: Send, receive: Receive) -> None:
+    async def _send_pieces(self, send: Send, receive: Receive) -> bool:
+        """Return whether the client was there for all of them."""
         leaves = asyncio.create_task(until_gone(receive))
-        pieces, piece = self._content.pieces(), b"."
+        pieces, piece, left = self._content.pieces(), b".", self._content.size
         try:
             while piece:
                 # To one who is gone `send` returns at once, and nobody else would have a turn.
                 await asyncio.sleep(0)
                 if leaves.done():
-                    return
+                    break
                 piece = next(pieces, b"")
                 await send({"type": "http.response.body", "body": piece, "more_body": piece != b""})
+                left -= len(piece)
         finally:
             leaves.cancel()
+        # Who has all may leave before it is told that nothing follows.
+        return left == 0

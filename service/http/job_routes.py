@@ -189,7 +189,6 @@ def _result(service: Service, request: Request, job_id: str, kind: str) -> Respo
     file.hold()
     held = ExitStack()
     held.callback(file.release)
-    held.callback(job.fetched.set)
     return FileAnswer(
         file,
         held,
@@ -197,6 +196,7 @@ def _result(service: Service, request: Request, job_id: str, kind: str) -> Respo
         client_of(request, service.settings).id,
         media_type=kind,
         headers={"Vary": "Accept", "Cache-Control": "no-store"},
+        sent=job.fetched.set,
     )
 
 

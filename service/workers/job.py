@@ -51,7 +51,7 @@ class Job:
         error: why it failed.
         accepted: set once it stands in line, or has ended.
         ended: set at the end.
-        fetched: set once somebody has taken the result.
+        fetched: set once the result was sent to somebody, whole.
     """
 
     client: str

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 import pytest
 from starlette.types import Message, Scope
 
+from service.errors import BusyError
 from service.http.admission import Admission
 from service.http.answer import FileAnswer
 from service.http.head import Head
@@ -49,16 +50,24 @@ class Client:
         return {"type": "http.disconnect"}
 
 
-def answered(method: str, client: Client) -> tuple[CountedFile, Admission]:
-    """Answer a request with a file of so many pieces."""
+def answered(
+    method: str,
+    client: Client,
+    sent: Callable[[], None] = lambda: None,
+    taken: int = 0,
+) -> tuple[CountedFile, Admission]:
+    """Answer a request with a file of so many pieces, while another client takes so many bytes."""
     admission = Admission(uploads=1, body_bytes=1, answer_bytes=PIECES * PIECE)
     scope: Scope = {"type": "http", "method": method, "headers": []}
 
     async def scenario(file: CountedFile) -> None:
         held = ExitStack()
         held.callback(file.release)
-        answer = FileAnswer(file, held, admission, "a", media_type="model/gltf-binary", headers={})
-        await asyncio.wait_for(Head(answer)(scope, client.receive, client.send), 10)
+        answer = FileAnswer(
+            file, held, admission, "a", media_type="model/gltf-binary", headers={}, sent=sent
+        )
+        async with admission.answering("b", taken):
+            await asyncio.wait_for(Head(answer)(scope, client.receive, client.send), 10)
 
     file = CountedFile()
     file.append(bytes(PIECES * PIECE))
@@ -82,6 +91,28 @@ def test_nothing_is_read_for_one_who_is_gone(takes: int) -> None:
     assert file.read == takes - 1
     assert file.closed
     assert admission.admitted == 0
+
+
+@pytest.mark.parametrize(
+    ("method", "takes", "whole"),
+    [
+        ("GET", float("inf"), True),
+        ("GET", PIECES + 1, True),  # it leaves with the last piece, by its Content-Length
+        ("GET", PIECES, False),
+        ("HEAD", float("inf"), False),
+    ],
+)
+def test_an_answer_was_sent_once_all_of_it_was(method: str, takes: float, whole: bool) -> None:
+    told: list[bool] = []
+    answered(method, Client(takes), lambda: told.append(True))
+    assert told == [True] * whole
+
+
+def test_an_answer_that_is_refused_was_not_sent() -> None:
+    told: list[bool] = []
+    with pytest.raises(BusyError):
+        answered("GET", Client(takes=float("inf")), lambda: told.append(True), taken=1)
+    assert told == []
 
 
 def test_a_head_alone_reads_nothing() -> None:

@@ -263,6 +263,28 @@ def test_503_while_the_service_drains(client: TestClient) -> None:
         gate.draining = False
 
 
+def test_503_for_a_result_that_finds_no_room_and_it_still_waits_to_be_fetched() -> None:
+    """Who is told to come back finds it, though the service is shutting down."""
+    settings = Settings(workers=1, answer_bytes=9)
+    app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
+    with TestClient(app, raise_server_exceptions=False) as client:
+        wait_until_ready(client)
+        gate = client.app.state.admission
+        job = client.post("/jobs", content=b"sleep 0.3", headers=GLB).json()["id"]
+        gate.draining = True
+        while client.get(f"/jobs/{job}").json()["state"] != "done" or gate.admitted != 1:
+            pass
+        with client.portal.wrap_async_context_manager(gate.answering("another client", 1)):
+            refused = client.get(f"/jobs/{job}/result")
+        assert_problem(refused, 503, "busy")
+        assert int(refused.headers["retry-after"]) >= 1
+        assert client.get("/healthz").status_code == 200
+        assert gate.admitted == 1
+        assert client.get(f"/jobs/{job}/result").content == b"sleep 0.3"
+        while gate.admitted:
+            pass
+
+
 def test_503_without_a_model() -> None:
     app = create_app(
         Settings(workers=1), job=jobs.obey, measure=jobs.measure, warm_up=jobs.fails_to_warm_up
