@@ -10,6 +10,8 @@ from typing import Any
 
 # Whether the system tells that a client has ended before all it said is read (Linux does).
 TELLS_END = hasattr(select, "POLLRDHUP")
+# Whether a look at what waits can be told not to wait itself (Windows has no such flag).
+DOES_NOT_WAIT: int | None = getattr(socket, "MSG_DONTWAIT", None)
 
 
 class Outlet:
@@ -35,11 +37,16 @@ class Outlet:
 
     @property
     def has_unread(self) -> bool:
-        """Whether bytes of the client wait in the socket; not those of one who has only left."""
+        """Whether bytes of the client wait in the socket; not those of one who has only left.
+
+        False where the system cannot look without waiting.
+        """
+        if DOES_NOT_WAIT is None:
+            return False
         # Not a copy: there may be no descriptor for one.
         same = socket.socket(fileno=self.real.get_extra_info("socket").fileno())
         try:
-            return same.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT) != b""
+            return same.recv(1, socket.MSG_PEEK | DOES_NOT_WAIT) != b""
         except OSError:  # nothing yet, or reset
             return False
         finally:

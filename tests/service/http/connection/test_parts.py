@@ -11,6 +11,7 @@ import h11
 import pytest
 
 from service.http.addresses import is_named, site
+from service.http.connection import outlet as outlet_module
 from service.http.connection.crowd import Crowd
 from service.http.connection.deadline import Deadline
 from service.http.connection.outlet import TELLS_END, Outlet
@@ -403,6 +404,16 @@ def test_who_has_left_without_a_word_has_nothing_unread(said, leaves, unread):
         assert outlet.has_unread is unread
         # It was looked at, not taken.
         assert (ours.recv(10) if said else said) == said
+
+
+def test_where_no_look_can_be_told_not_to_wait_nothing_is_unread(monkeypatch):
+    """As on Windows."""
+    monkeypatch.setattr(outlet_module, "DOES_NOT_WAIT", None)
+    monkeypatch.delattr(socket, "MSG_DONTWAIT")
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        theirs.sendall(b"GET")
+        assert Outlet(Ends(ours), lambda: None).has_unread is False
 
 
 @pytest.mark.skipif(not TELLS_END, reason="the system does not tell before all is read")
