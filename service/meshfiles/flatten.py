@@ -54,10 +54,20 @@ def _placed_meshes(tree: dict[str, Any]) -> Iterator[tuple[int, Float[np.ndarray
     """Yield each mesh that the default scene shows, with its node's world matrix."""
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])
-    roots = scenes[tree.get("scene", 0)].get("nodes", []) if scenes else _parentless(nodes)
-    pending = [(root, np.eye(4)) for root in reversed(roots)]
+    children = set(_children(nodes))
+    # A file without scenes shows the nodes without parents; their children stand where they do.
+    parentless = [number for number in range(len(nodes)) if number not in children]
+    roots = scenes[tree.get("scene", 0)].get("nodes", []) if scenes else parentless
+    # A root that is a child too stands where its parent puts it: those without parents come first.
+    ordered = sorted(roots, key=lambda root: root in children)
+    pending = [(root, np.eye(4)) for root in reversed(ordered)]
+    placed = set[int]()
     while pending:
         number, above = pending.pop()
+        # Once, whatever its parents: n nodes that are twice among the children of one are 2^n.
+        if number in placed:
+            continue
+        placed.add(number)
         node = nodes[number]
         world = above @ _local_matrix(node)
         if "mesh" in node:
@@ -65,10 +75,9 @@ def _placed_meshes(tree: dict[str, Any]) -> Iterator[tuple[int, Float[np.ndarray
         pending += [(child, world) for child in reversed(node.get("children", []))]
 
 
-def _parentless(nodes: list[dict[str, Any]]) -> list[int]:
-    """Return the nodes that a file without scenes shows; their children stand where they do."""
-    children = {child for node in nodes for child in node.get("children", [])}
-    return [number for number in range(len(nodes)) if number not in children]
+def _children(nodes: list[dict[str, Any]]) -> list[int]:
+    """Return every mention of a node among the children of one."""
+    return [child for node in nodes for child in node.get("children", [])]
 
 
 def _local_matrix(node: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
@@ -133,10 +142,13 @@ def _changes(
         Change(pointer, f"{what} dropped: the format cannot hold them", count)
         for pointer, what, count in (
             ("/meshes", "morph targets", _count_targets(tree)),
-            ("/nodes", f"copies by {INSTANCING}", _count_instancing(tree)),
+            ("/nodes", f"copies by {INSTANCING}", _count_copies(tree)),
         )
         if count
     ]
+    children = _children(tree.get("nodes", []))
+    if again := len(children) - len(set(children)):
+        changes.append(Change("/nodes", "nodes with several parents placed once, by one", again))
     if placed > 1:
         changes.append(Change("/nodes", "nodes joined into one mesh in world space", placed))
     lost = set[str]().union(*names) - {"POSITION"}
@@ -163,5 +175,15 @@ def _count_targets(tree: dict[str, Any]) -> int:
     )
 
 
-def _count_instancing(tree: dict[str, Any]) -> int:
-    return sum(INSTANCING in node.get("extensions", {}) for node in tree.get("nodes", []))
+def _count_copies(tree: dict[str, Any]) -> int:
+    """Return how many copies the nodes ask for; one of a node that does not say."""
+    accessors, copies = tree.get("accessors", []), 0
+    for node in tree.get("nodes", []):
+        instances = node.get("extensions", {}).get(INSTANCING)
+        if instances is None:
+            continue
+        attributes = instances.get("attributes") if isinstance(instances, dict) else None
+        numbers = attributes.values() if isinstance(attributes, dict) else ()
+        known = (n for n in numbers if isinstance(n, int) and 0 <= n < len(accessors))
+        copies += next((accessors[number]["count"] for number in known), 1)
+    return copies

@@ -10,6 +10,7 @@ INSTANCING = "EXT_mesh_gpu_instancing"
 KNOWN = frozenset(
     {
         INSTANCING,
+        "EXT_mesh_features",
         "EXT_meshopt_compression",
         "EXT_texture_avif",
         "EXT_texture_webp",
@@ -38,6 +39,7 @@ KNOWN = frozenset(
         "KHR_texture_basisu",
         "KHR_texture_transform",
         "KHR_xmp_json_ld",
+        "MSFT_texture_dds",
     }
 )
 

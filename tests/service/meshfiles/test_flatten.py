@@ -50,4 +50,27 @@ def test_morph_targets_and_instances_that_are_lost_are_told():
     _, changes = flatten(files.pack(tree, binary), "stl", Limits())
     told = {change.what: change.count for change in changes}
     assert told["morph targets dropped: the format cannot hold them"] == 2
-    assert told["copies by EXT_mesh_gpu_instancing dropped: the format cannot hold them"] == 1
+    assert told["copies by EXT_mesh_gpu_instancing dropped: the format cannot hold them"] == 9
+
+
+def test_a_node_with_several_parents_stands_once_and_that_is_told():
+    """Each but the last is twice the parent of the next: it stood there a million times."""
+    tree, binary = files.document([octahedron()])
+    tree["nodes"] = [{"children": [number + 1] * 2} for number in range(20)] + [{"mesh": 0}]
+    for told in (True, False):
+        tree["scenes"] = [{"nodes": [0]}] if told else []
+        if not told:
+            del tree["scene"]
+        flat, changes = flatten(files.pack(tree, binary), "obj", Limits())
+        assert len(flat.faces) == 8
+        (told_of,) = [change for change in changes if "several parents" in change.what]
+        assert told_of.count == 20
+
+
+def test_a_root_that_is_a_child_too_stands_where_its_parent_puts_it():
+    tree, binary = files.document([octahedron()])
+    tree["nodes"] = [{"mesh": 0}, {"children": [0], "translation": [5, 0, 0]}]
+    tree["scenes"][0]["nodes"] = [0, 1]
+    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
+    assert len(flat.faces) == 8
+    assert flat.vertices[:, 0].min() == pytest.approx(4)

@@ -36,7 +36,7 @@ def check_nodes(document: Document) -> list[Change]:
     refer(document.scene, document.scenes, "/scene")
     for number, scene in enumerate(document.scenes):
         for place, root in enumerate(scene.nodes):
-            # Some exporters list a child as a root too. It draws the child twice and no more.
+            # Some exporters list a child as a root too: it has a place, and that is its parent's.
             refer(root, document.nodes, f"/scenes/{number}/nodes/{place}")
     if not several:
         return []

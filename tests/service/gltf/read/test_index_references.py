@@ -31,6 +31,12 @@ def test_every_place_that_is_renumbered_is_checked(made):
             refine(files.pack(tree, bytes(binary)))
 
 
+@pytest.mark.parametrize("name", ["MSFT_texture_dds", "EXT_mesh_features"])
+def test_what_is_handled_is_known(name):
+    # They name images, textures and attributes: no accessor and no buffer view.
+    assert unknown_extensions({"extensionsUsed": [name]}, b"") == []
+
+
 def test_an_extension_for_each_of_many_parts():
     # To copy the names so far for each part takes most of a minute.
     names = [f"EXT_{number:06d}" for number in range(50_000)]
