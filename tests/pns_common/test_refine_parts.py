@@ -96,6 +96,24 @@ def test_each_part_is_put_on_its_own_limit_surface() -> None:
 
 
 @needs_kernels
+def test_zeros_of_normals_have_the_sign_that_they_have_alone() -> None:
+    """A closed part beside one with a boundary."""
+    vertices = np.concatenate([np.eye(3), -np.eye(3)])[[0, 3, 1, 4, 2, 5]]
+    upper = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4]]
+    lower = [[2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
+    alone = Mesh(vertices, np.array(upper + lower))
+    mesh, starts = joined([alone, Mesh(TETRAHEDRON[:3] + 5, np.array([[0, 1, 2]]))])
+    whole = refine_parts(mesh, starts, loop(), limit=True)
+    assert whole is not None
+    single = refine(alone, loop(), limit=True)
+    assert whole.normals is not None
+    assert single.normals is not None
+    rows = np.empty(len(single.normals), dtype=np.int64)
+    rows[single.mesh.faces] = whole.mesh.faces[: len(single.mesh.faces)]
+    np.testing.assert_array_equal(np.signbit(whole.normals[rows]), np.signbit(single.normals))
+
+
+@needs_kernels
 def test_creases_stay_with_their_parts() -> None:
     meshes = parts_of(np.random.default_rng(4), 6)
     whole, starts = joined(meshes)

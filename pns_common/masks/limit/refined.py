@@ -110,7 +110,8 @@ def refined_limit_normals(
         return (normals,)
 
     (inside,) = blocks.gather(len(topology.interior), at_interior)
-    normals = scatter(inside, topology.interior, len(topology.edges))
+    # + 0.0 also where nothing is added: beside a mesh with a boundary zeros keep their signs.
+    normals = scatter(inside, topology.interior, len(topology.edges)) + 0.0
     edge_of_corner = topology.face_edges.reshape(-1)
     sharp = topology.edge_class[edge_of_corner] != EdgeClass.INTERIOR
     at_corners = sharp & (False if lying is None else lying.corners[edge_of_corner])
