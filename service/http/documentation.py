@@ -188,7 +188,13 @@ RESULT: dict[str, Any] = {
     ),
     "responses": {
         200: {name: value for name, value in _FILE.items() if name != "headers"},
-        **_problems(_404=_UNKNOWN, _409="The job has not ended, or was cancelled"),
+        **{code: SUBDIVIDE["responses"][code] for code in (400, 413, 422, 500, 504)},
+        **_problems(
+            _404=_UNKNOWN,
+            _409="The job has not ended, or was cancelled",
+            _503="Clients that take their answers leave no room for this one, or the service shuts "
+            "down (see Retry-After); or the job failed with it",
+        ),
     },
 }
 

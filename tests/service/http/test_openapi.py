@@ -78,6 +78,12 @@ def test_there_is_one_schema_of_problems(document):
     assert json.dumps(document).count('"JSON pointer of the offending value"') == 1
 
 
+@pytest.mark.parametrize("route", ["/jobs/{job_id}/result", "/jobs/{job_id}/report"])
+def test_a_result_may_find_no_room_or_be_the_problem_that_its_job_failed_with(document, route):
+    told = set(document["paths"][route]["get"]["responses"])
+    assert {"200", "400", "404", "409", "413", "422", "500", "503", "504"} <= told
+
+
 def test_every_reference_leads_somewhere(document):
     text = json.dumps(document)
     for name in re.findall(r'"#/components/schemas/(\w+)"', text):
