@@ -7,7 +7,7 @@ eigenvalue 1. With weight 1 of p, spokes j have
     w_j = β + 3/8 w_j + 1/8 Σ w_i      smooth; i: smooth spokes on a face with p and j
     w_s = β + 1/2 w_s + 1/8 Σ w_i      sharp
 
-so w_j = (8 β + Σ w_i) / 5: each round of that takes 2/5 of what is missing, since a spoke has two
+so w_j = (8 β + Σ w_i) / 5: each round of that leaves 2/5 of what is missing, since a spoke has two
 faces at most. All terms are positive, so no weight is below 0.
 """
 
