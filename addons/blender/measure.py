@@ -64,7 +64,7 @@ def longest_pieces(obj: bpy.types.Object, scheme: str) -> float:
     thread that computes does not let go of the interpreter.
     """
     from bl_ext.user_default.pns_refine.operator import place
-    from bl_ext.user_default.pns_refine.run import Run, Share, refine_meshes
+    from bl_ext.user_default.pns_refine.run import Run, Share, key_of, refine_meshes
     from bl_ext.user_default.pns_refine.settings import choice_of
 
     from pns_common import load_model
@@ -80,7 +80,7 @@ def longest_pieces(obj: bpy.types.Object, scheme: str) -> float:
         began = time.perf_counter()
         done = run.advance()
         if done:
-            new = place(obj, run.value[obj.data.name], True)
+            new = place(obj, run.value[key_of(obj.data)], True)
             bpy.context.view_layer.update()
         longest = max(longest, time.perf_counter() - began)
         began = time.perf_counter()

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty
 from pns_common import PnsError
 
 from .animation import redirect_drivers
-from .run import Made, Run, Share, refine_meshes
+from .run import Key, Made, Run, Share, key_of, refine_meshes
 from .settings import Settings, choice_of
 from .words import forecast, listed, too_many
 
@@ -82,15 +82,16 @@ class Refining(Settings):
         Raises:
             PnsError: the model cannot be used.
         """
-        self.objects = [obj.name for obj in chosen_objects(context)]
+        objects = chosen_objects(context)
+        self.objects = [key_of(obj) for obj in objects]
         self.share = Share()
-        objects = [bpy.data.objects[name] for name in self.objects]
         return Run(refine_meshes(objects, choice_of(self), self.share))
 
-    def place(self, context: bpy.types.Context, made: dict[str, Made]) -> None:
+    def place(self, context: bpy.types.Context, made: dict[Key, Made]) -> None:
         """Give the refined meshes to objects, and say how it went."""
-        objects = [bpy.data.objects[name] for name in self.objects if name in bpy.data.objects]
-        placed = [place(obj, made[obj.data.name], self.keep_original) for obj in objects]
+        found = [bpy.data.objects.get(key) for key in self.objects]
+        objects = [obj for obj in found if obj is not None]
+        placed = [place(obj, made[key_of(obj.data)], self.keep_original) for obj in objects]
         if self.keep_original:
             for obj in context.selected_objects:
                 obj.select_set(False)

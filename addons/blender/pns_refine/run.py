@@ -22,6 +22,13 @@ from .writing import write_mesh
 SLICE = 0.02
 WAITING = object()
 Steps = Generator[object, None, Any]
+# What a block is found again by: its name, which one of another file may have too, and that file.
+Key = tuple[str, str | None]
+
+
+def key_of(block: bpy.types.ID) -> Key:
+    """Return what Blender's collections find the block by, and no other."""
+    return block.name, None if block.library is None else block.library.filepath
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,15 +87,15 @@ class Share:
 
 def refine_meshes(
     objects: Iterable[bpy.types.Object], choice: Choice, share: Share
-) -> Generator[object, None, dict[str, Made]]:
-    """Refine the meshes of these objects; return the copies by the name of the old mesh."""
-    holders = {obj.data.name: obj for obj in objects}
-    made: dict[str, Made] = {}
+) -> Generator[object, None, dict[Key, Made]]:
+    """Refine the meshes of these objects; return the copies by the key of the old mesh."""
+    holders = {key_of(obj.data): obj for obj in objects}
+    made: dict[Key, Made] = {}
     finished = False
     try:
-        for number, (name, obj) in enumerate(holders.items()):
+        for number, (key, obj) in enumerate(holders.items()):
             share.text = f"Refining {obj.name}"
-            made[name] = yield from refine_mesh(obj, choice, share, number, len(holders))
+            made[key] = yield from refine_mesh(obj, choice, share, number, len(holders))
         finished = True
     finally:
         if not finished:
@@ -117,4 +124,4 @@ def refine_mesh(
     return Made(mesh, new, refined)
 
 
-__all__ = ["Made", "Run", "Share", "StoppedError", "refine_mesh", "refine_meshes"]
+__all__ = ["Key", "Made", "Run", "Share", "StoppedError", "key_of", "refine_mesh", "refine_meshes"]

@@ -65,6 +65,21 @@ def test_a_linked_object_is_copied_and_never_changed(tmp_path):
     assert (len(obj.data.polygons), len(new.data.polygons)) == (6, 48)
 
 
+def test_a_linked_object_is_told_from_one_of_the_same_name(tmp_path):
+    """A grid here, and a cube that is linked under its name: each is refined, and no other."""
+    there = linked(cube(), tmp_path / "library.blend")
+    here = grid(2, there.name)
+    assert (here.name, here.data.name) == (there.name, there.data.name)
+    chosen(there)
+    bpy.ops.object.pns_refine(levels=1)
+    assert len(bpy.context.object.data.polygons) == 48
+    chosen(here)
+    there.select_set(True)
+    bpy.ops.object.pns_refine(levels=1)
+    made = [len(obj.data.polygons) for obj in bpy.context.selected_objects]
+    assert sorted(made) == [32, 48]
+
+
 def test_objects_that_share_a_mesh_share_the_result():
     obj = cube()
     twin = obj.copy()
