@@ -11,7 +11,7 @@ from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import EdgeClass
 from pns_common.formula.side_gate import GENTLE_TO_SHARP, widest, with_neighbours
 from pns_common.fused.face_measures import FaceMeasures
-from pns_common.fused.kernels.fans import mark_used
+from pns_common.fused.kernels.extent import mark_referenced
 from pns_common.fused.kernels.rings import (
     VERTEX_COLUMNS,
     face_bends,
@@ -109,7 +109,8 @@ def smooth_vertices(
 ) -> Bool[np.ndarray, " V"]:
     """Return the vertices with one closed ring of interior edges, without a look at the rings."""
     used = np.zeros(mesh.vertex_count, dtype=bool)
-    blocks.run(len(mesh.faces), lambda rows: mark_used(mesh.faces, rows.start, rows.stop, used))
+    faces = mesh.faces
+    blocks.run(len(faces), lambda rows: mark_referenced(faces, rows.start, rows.stop, used))
     return _smooth(used, mesh, several_fans)
 
 

@@ -20,6 +20,7 @@ from pns_common.fused.kernels.compiled import (
     kernel,
     natural,
 )
+from pns_common.fused.kernels.creases import normals_beside
 from pns_common.fused.kernels.edges import BOUNDARY, INTERIOR, IRREGULAR, NONE
 from pns_common.fused.kernels.rings import dot, row
 
@@ -29,12 +30,9 @@ def _bends(normals, half_edges, edge_class, e):
 
     Faces without a normal are not known to lie in a plane.
     """
-    interior = edge_class[e] == INTERIOR
-    first = half_edges[e, 0]
-    second = half_edges[e, 1] if interior else first
-    n, m = row(normals, first // 3), row(normals, second // 3)
+    n, m = normals_beside(normals, half_edges, edge_class, e)
     chord = n[0] - m[0], n[1] - m[1], n[2] - m[2]
-    return interior & ((dot(n, m) != 1.0) | (dot(chord, chord) != 0.0))
+    return (edge_class[e] == INTERIOR) & ((dot(n, m) != 1.0) | (dot(chord, chord) != 0.0))
 
 
 @kernel(SIZE, POINTS, INDICES, CLASSES, SIZE)

@@ -23,6 +23,16 @@ from pns_common.fused.kernels.rings import between, divisor, dot, row
 from pns_common.geometry.crease_lines import CORNER, ROUNDS
 
 
+def normals_beside(normals, half_edges, edge_class, e):
+    """Return the normals of an edge's two faces; of its first one twice where it is not interior.
+
+    It does not branch, so that loops over edges run on vectors.
+    """
+    first = half_edges[e, 0]
+    second = half_edges[e, 1] if edge_class[e] == INTERIOR else first
+    return row(normals, first // 3), row(normals, second // 3)
+
+
 @kernel(SIZE, POINTS, INDICES, CLASSES, REAL, SIZE, SIZE, FLAGS_OUT)
 def mark_edges_beyond(normals, half_edges, edge_class, cosine, begin, end, beyond):
     """Mark interior edges begin … end − 1 whose faces' normals have a smaller cosine.
@@ -31,12 +41,9 @@ def mark_edges_beyond(normals, half_edges, edge_class, cosine, begin, end, beyon
     """
     found = 0
     for e in range(natural(begin), end):
-        interior = edge_class[e] == INTERIOR
-        first = half_edges[e, 0]
-        second = half_edges[e, 1] if interior else first
-        n, m = row(normals, first // 3), row(normals, second // 3)
+        n, m = normals_beside(normals, half_edges, edge_class, e)
         defined = (dot(n, n) > 0) & (dot(m, m) > 0)
-        beyond[e] = interior & defined & (dot(n, m) < cosine)
+        beyond[e] = (edge_class[e] == INTERIOR) & defined & (dot(n, m) < cosine)
         found += beyond[e]
     return found
 

@@ -7,6 +7,7 @@ import math
 from pns_common.fused.kernels.compiled import (
     FLAGS,
     FLAGS_OUT,
+    INDICES,
     LONG_INDICES,
     NUMBERS,
     NUMBERS_OUT,
@@ -17,12 +18,23 @@ from pns_common.fused.kernels.compiled import (
 )
 
 
-@kernel(SIZE, LONG_INDICES, SIZE, SIZE, FLAGS_OUT)
-def mark_referenced(faces, begin, end, used):
-    """Mark the vertices of faces begin … end − 1; threads may write the same True at once."""
+def _mark_corners(faces, begin, end, used):
     for f in range(begin, end):
         for i in range(3):
             used[faces[f, i]] = True
+
+
+@kernel(SIZE, LONG_INDICES, SIZE, SIZE, FLAGS_OUT)
+def mark_referenced_long(faces, begin, end, used):
+    """Mark the vertices of faces begin … end − 1; threads may write the same True at once."""
+    _mark_corners(faces, begin, end, used)
+    return 0
+
+
+@kernel(SIZE, INDICES, SIZE, SIZE, FLAGS_OUT)
+def mark_referenced(faces, begin, end, used):
+    """Mark the same of faces in int32."""
+    _mark_corners(faces, begin, end, used)
     return 0
 
 

@@ -11,7 +11,6 @@ from pns_common.fused.kernels.compiled import (
     INTEGERS_2,
     SIZE,
     kernel,
-    natural,
 )
 from pns_common.fused.kernels.edges import CREASE, INTERIOR
 
@@ -36,15 +35,6 @@ def count_corners(faces, corner, count):
         for i in range(3):
             corner[faces[f, i]] = 3 * f + i
             count[faces[f, i]] += 1
-    return 0
-
-
-@kernel(SIZE, INDICES, SIZE, SIZE, FLAGS_OUT)
-def mark_used(faces, begin, end, used):
-    """Mark the vertices of faces begin … end − 1; threads may write the same True at once."""
-    for f in range(natural(begin), end):
-        for i in range(3):
-            used[faces[f, i]] = True
     return 0
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from pns_common.fused.kernels.compiled import (
     LONG_INDEX,
     LONG_INDICES,
@@ -12,11 +10,7 @@ from pns_common.fused.kernels.compiled import (
     SIZE,
     kernel,
 )
-
-
-def _length(points, a, b):
-    x, y, z = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
-    return math.sqrt(x * x + y * y + z * z)
+from pns_common.fused.kernels.rings import between, norm
 
 
 @kernel(SIZE, POINTS, LONG_INDICES, LONG_INDEX, LONG_INDEX, SIZE, SIZE, POINTS_OUT)
@@ -29,7 +23,9 @@ def sum_sides(points, faces, starts, ends, begin, end, sums):
         total, squares = 0.0, 0.0
         for f in range(starts[block], ends[block]):
             a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-            for length in (_length(points, a, b), _length(points, b, c), _length(points, c, a)):
+            sides = between(points, a, b), between(points, b, c), between(points, c, a)
+            for side in sides:
+                length = norm(side)
                 total += length
                 squares += length * length
         sums[block, 0], sums[block, 1] = total, squares
