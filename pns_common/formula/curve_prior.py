@@ -97,13 +97,17 @@ def curve_direction(a: Float[Array, "N 3"], b: Float[Array, "N 3"]) -> Float[Arr
     return divided(b - a, longer)
 
 
+def curve_gate(turning: Float[Array, " N"], gate_sharpness: float) -> Float[Array, " N"]:
+    """Return γ from x of a curve's vertices; ``gate_sharpness`` is c_v."""
+    xp = namespace(turning)
+    fade = (CORNER - turning) / (CORNER - BEND)
+    return xp.tanh(gate_sharpness * turning) * xp.clip(fade, 0.0, 1.0)
+
+
 def curve_pushes(curves: Curves, gate_sharpness: float) -> Float[Array, "V 3"]:
     """Return d of all vertices at b = 1; ``gate_sharpness`` is c_v."""
     a, b = curves.a, curves.b
-    xp = namespace(a)
-    turning = 1 + dot(unit(a), unit(b))
-    fade = (CORNER - turning) / (CORNER - BEND)
-    gate = xp.tanh(gate_sharpness * turning) * xp.clip(fade, 0.0, 1.0)
+    gate = curve_gate(1 + dot(unit(a), unit(b)), gate_sharpness)
     pushes = -(gate / 3)[:, None] * across((a + b) / 2, unit(b - a))
     return scatter(pushes, curves.rows, len(curves.movable))
 

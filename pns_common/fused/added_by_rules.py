@@ -44,12 +44,12 @@ class AddedByRules:
         return cls(vertices, edges, both, EVERYWHERE)
 
     def moved_with(self, curves: CurveMoves) -> Bool[np.ndarray, " M"]:
-        """Return ``moved`` with the vertices and edges of curves."""
-        if len(self.moved) == 0 or curves.sharp is None:
+        """Return ``moved`` with the vertices of curves, and all edges that may be of one."""
+        if len(self.moved) == 0 or curves.level is None:
             return self.moved
-        moved = self.moved.copy()
-        moved[curves.sharp.vertices] = True
-        moved[len(self.vertices.ratio) + curves.sharp.edges] = True
+        moved, mesh = self.moved.copy(), curves.level.mesh
+        moved[curves.level.rows] = True
+        moved[mesh.vertex_count + mesh.sharp_edges] = True
         return moved
 
 

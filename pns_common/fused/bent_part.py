@@ -172,7 +172,8 @@ def _of_part(whole: Surroundings, mesh: MeshEdges, vertices: Int[np.ndarray, " n
     points = np.take(whole.points, vertices, axis=0)
     curves = whole.curves
     if len(curves.pushes):
-        curves = replace(curves, pushes=np.take(curves.pushes, vertices, axis=0))
+        pushes, movable = np.take(curves.pushes, vertices, axis=0), curves.movable[vertices]
+        curves = replace(curves, pushes=pushes, movable=movable)
     return replace(
         whole,
         points=points,

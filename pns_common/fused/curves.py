@@ -1,8 +1,4 @@
-"""The prior of curves beside the kernels: its rule is the array kernels', on the few it moves.
-
-The rule knows curves alone, so it is given a level of the vertices on sharp edges, and of those
-edges: what it makes of them is what it makes of them in the whole mesh, bit for bit.
-"""
+"""The prior of curves by kernels: what rules/curves.py makes of a level's curves."""
 
 from __future__ import annotations
 
@@ -11,28 +7,50 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import gather
-from pns_common.connectivity.edges_alone import edges_alone
-from pns_common.formula.correction import Correction, proximity_ratio
-from pns_common.formula.curve_prior import are_of, on_boundary
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.topology import EdgeClass
+from pns_common.formula.curve_prior import Kinds, are_of, curve_gate
 from pns_common.fused.additions import Additions
+from pns_common.fused.budgets import budgets_per_length
+from pns_common.fused.kernels.curves import (
+    follow_curves,
+    measure_turns,
+    move_edges,
+    move_vertices,
+    move_vertices_but_at_tips,
+    push_curves,
+    sum_pushes,
+)
+from pns_common.fused.kernels.masks import blend_vertices
+from pns_common.fused.loop_points import owners
+from pns_common.fused.loop_weights import weights_of
 from pns_common.fused.mesh_edges import MeshEdges
-from pns_common.rules.control_level import ControlLevel
 from pns_common.rules.curves import CurveRule
+
+# Neighbours along a curve.
+TWO = 2
 
 
 @dataclass(frozen=True, eq=False)
-class SharpLevel:
-    """A level's sharp edges by themselves.
+class CurveLevel:
+    """A level with its curves, as ``curve_prior.Curves`` has them, in rows for all vertices.
 
     Attributes:
-        level: their vertices and themselves, numbered on their own in the same order.
-        vertices, edges: which they are in the whole mesh.
+        points, mesh: the level.
+        length: R, or each vertex's own.
+        blocks: of whose work nobody is told.
+        movable: the vertices on exactly two edges of curves, and on no other that is sharp.
+        rows: their numbers.
+        sides: of each of these its two neighbours along the curve; of others anything.
     """
 
-    level: ControlLevel
-    vertices: Int[np.ndarray, " N"]
-    edges: Int[np.ndarray, " S"]
+    points: Float[np.ndarray, "V 3"]
+    mesh: MeshEdges
+    length: float | Float[np.ndarray, " V"]
+    blocks: Blocks
+    movable: Bool[np.ndarray, " V"]
+    rows: Int[np.ndarray, " N"]
+    sides: Int[np.ndarray, "V 2"]
 
     @classmethod
     def of(
@@ -40,13 +58,37 @@ class SharpLevel:
         points: Float[np.ndarray, "V 3"],
         mesh: MeshEdges,
         length: float | Float[np.ndarray, " V"],
-    ) -> SharpLevel:
-        """Take the sharp edges of a mesh; ``length`` is R, or each vertex's own."""
-        edges, no_normals = mesh.sharp_edges, np.zeros((0, 3))
-        of_edges = mesh.edges[edges], mesh.edge_class[edges]
-        vertices, topology = edges_alone(*of_edges, len(points))
-        own = length[vertices] if isinstance(length, np.ndarray) else length
-        return cls(ControlLevel(points[vertices], topology, no_normals, own), vertices, edges)
+        kinds: Kinds,
+        blocks: Blocks,
+    ) -> CurveLevel:
+        """Find the curves of a level that edges of some kinds make."""
+        count, quiet = mesh.vertex_count, blocks.unheard()
+        sides, met = np.empty((count, 2), dtype=np.int32), np.empty(count, dtype=np.int8)
+        of_curve = are_of(kinds, mesh.edge_class[mesh.sharp_edges])
+        along = mesh.edges, mesh.sharp_edges, of_curve, mesh.sharp
+
+        def follow(rows: slice) -> None:
+            follow_curves(*along, rows.start, rows.stop, sides, met)
+
+        owners(quiet, count).run(count, follow)
+        movable = met == TWO
+        rows = np.flatnonzero(movable).astype(np.int32)
+        return cls(points, mesh, length, quiet, movable, rows, sides)
+
+    def pushes(self, rule: CurveRule) -> Float[np.ndarray, "V 3"]:
+        """Return d of all vertices, as the rule has them."""
+        pushes, strength = np.zeros(self.points.shape), rule.form.boundary_strength
+        around = self.points, self.sides, self.rows
+
+        def push(rows: slice) -> None:
+            bounds, turns = (rows.start, rows.stop), np.empty(rows.stop - rows.start)
+            measure_turns(*around, *bounds, turns)
+            # numpy's hyperbolic tangent runs on vectors, and has the array kernels' bits.
+            gates = curve_gate(turns, rule.gate_sharpness)
+            push_curves(*around, gates, strength, *bounds, pushes)
+
+        self.blocks.run(len(self.rows), push)
+        return pushes
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,46 +96,73 @@ class CurveMoves:
     """What a rule makes of a level's curves.
 
     Attributes:
-        rule, sharp: None where there is no rule, or no curve.
+        rule, level: None where there is no rule, or no edge that a curve may be made of.
         pushes: of all vertices; (0, 3) where none is of a curve, and none moves.
-        nothing: what is added in their place: 0, or −0 where there is no rule.
+        movable: vertices whose pushes may not be 0; (0,) likewise.
+        nothing: what is added in place of pushes: 0, or −0 where there is no rule.
     """
 
     rule: CurveRule | None
-    sharp: SharpLevel | None
+    level: CurveLevel | None
     pushes: Float[np.ndarray, "P 3"]
+    movable: Bool[np.ndarray, " P"]
     nothing: float
 
     def move_vertices(self, loop: Float[np.ndarray, "V 3"], added: Additions) -> None:
-        """Add to curves' vertices, which Loop puts at ``loop``."""
-        if len(self.pushes) and self.rule is not None and self.sharp is not None:
-            level = self.sharp.level
-            rows = self.sharp.vertices[level.curves(self.rule.kinds).rows]
-            _add(self.rule.at_vertices(level, gather(loop, rows)), rows, added)
-            if added.corrected is not None:
-                added.corrected[rows] = True
+        """Add to curves' vertices, where nothing was; Loop puts the level's at ``loop``."""
+        if self.rule is None or self.level is None or not len(self.pushes):
+            return
+        level, form = self.level, self.rule.form
+        around = level.points, self.pushes, level.sides, level.rows
+        to = added.displacement, added.ratio, added.envelope
+
+        def move(rows: slice) -> None:
+            budgets = budgets_per_length(form.budget, level.length, level.rows[rows])
+            which = *around, budgets, rows.start, rows.stop
+            if form.tip_strength:
+                move_vertices_but_at_tips(*which, loop, form.tip_strength, *to)
+            else:
+                move_vertices(*which, *to)
+
+        level.blocks.run(len(level.rows), move)
+        if added.corrected is not None:
+            np.logical_or(added.corrected, level.movable, out=added.corrected)
 
     def move_edges(self, added: Additions) -> None:
         """Add to curves' edges likewise."""
-        if len(self.pushes) and self.rule is not None and self.sharp is not None:
-            level = self.sharp.level
-            rows = self.sharp.edges[level.curves(self.rule.kinds).edges]
-            _add(self.rule.at_edges(level), rows, added)
+        if self.rule is None or self.level is None or not len(self.pushes):
+            return
+        level, budget, sharp_edges = self.level, self.rule.form.budget, self.level.mesh.sharp_edges
+        around = level.points, self.pushes, level.movable, level.mesh.edges, sharp_edges
+        to = added.displacement, added.ratio, added.envelope
 
-    def shared(self, vertex_count: int, edge_count: int) -> Bool[np.ndarray, " W"] | None:
-        """Return what the fold guard takes for shared with other pieces; None where nothing is."""
-        if self.sharp is None:
+        def move(rows: slice) -> None:
+            first_ends = np.take(level.mesh.edges[:, 0], sharp_edges[rows])
+            budgets = budgets_per_length(budget, level.length, first_ends)
+            move_edges(*around, budgets, rows.start, rows.stop, *to)
+
+        level.blocks.run(len(sharp_edges), move)
+
+    def shared(self) -> Bool[np.ndarray, " W"] | None:
+        """Return what the fold guard takes for shared with other pieces; None where nothing is.
+
+        That is what boundaries alone place: vertices, then edges (``curve_prior.on_boundary``).
+        """
+        if self.level is None:
             return None
-        alone = on_boundary(self.sharp.level.topology)
-        if not alone.any():
+        mesh, count = self.level.mesh, self.level.mesh.vertex_count
+        # An enumeration's member would be compared in 64 bits.
+        on_boundary = mesh.edge_class == int(EdgeClass.BOUNDARY)
+        if not on_boundary.any():
             return None
-        shared = np.zeros(vertex_count + edge_count, dtype=bool)
-        shared[self.sharp.vertices] = alone[: len(self.sharp.vertices)]
-        shared[vertex_count + self.sharp.edges] = alone[len(self.sharp.vertices) :]
+        shared = np.concatenate([self.level.movable, on_boundary])
+        creases = mesh.sharp_edges[mesh.edge_class[mesh.sharp_edges] == int(EdgeClass.CREASE)]
+        shared[:count][mesh.edges[creases]] = False
         return shared
 
 
-NO_RULE = CurveMoves(None, None, np.zeros((0, 3)), -0.0)
+NO_PUSHES, NONE_MOVABLE = np.zeros((0, 3)), np.zeros(0, dtype=bool)
+NO_RULE = CurveMoves(None, None, NO_PUSHES, NONE_MOVABLE, -0.0)
 
 
 def curves_of(
@@ -101,22 +170,35 @@ def curves_of(
     points: Float[np.ndarray, "V 3"],
     mesh: MeshEdges,
     length: float | Float[np.ndarray, " V"],
+    blocks: Blocks,
 ) -> CurveMoves:
     """Make what ``rule`` adds at a level's curves; ``length`` is R, or each vertex's own."""
     if rule is None:
         return NO_RULE
     if not are_of(rule.kinds, mesh.edge_class[mesh.sharp_edges]).any():
-        return CurveMoves(rule, None, np.zeros((0, 3)), 0.0)
-    sharp = SharpLevel.of(points, mesh, length)
-    if len(sharp.level.curves(rule.kinds).rows) == 0:
-        return CurveMoves(rule, sharp, np.zeros((0, 3)), 0.0)
-    pushes = np.zeros(points.shape)
-    pushes[sharp.vertices] = rule.pushes(sharp.level)
-    return CurveMoves(rule, sharp, pushes, 0.0)
+        return CurveMoves(rule, None, NO_PUSHES, NONE_MOVABLE, 0.0)
+    level = CurveLevel.of(points, mesh, length, rule.kinds, blocks)
+    if len(level.rows) == 0:
+        return CurveMoves(rule, level, NO_PUSHES, NONE_MOVABLE, 0.0)
+    return CurveMoves(rule, level, level.pushes(rule), level.movable, 0.0)
 
 
-def _add(made: Correction, rows: Int[np.ndarray, " N"], added: Additions) -> None:
-    """Write what is added at rows where nothing was; no 0 has a sign there."""
-    added.displacement[rows] = 0.0 + made.displacement
-    added.ratio[rows] = proximity_ratio(made)
-    added.envelope[rows] = made.envelope
+def placed_pushes(
+    curves: CurveMoves, mesh: MeshEdges, valence: Int[np.ndarray, " V"], blocks: Blocks
+) -> Float[np.ndarray, "P 3"]:
+    """Return what Loop's vertex mask makes of curves' pushes; (0, 3) where there are none.
+
+    At vertices beside curves: what stands at those on sharp edges is of no use.
+    """
+    pushes, movable, count = curves.pushes, curves.movable, mesh.vertex_count
+    if not len(pushes):
+        return pushes
+    placed, beta = np.empty_like(pushes), weights_of(valence).beta
+    pushed = pushes, movable, mesh.edges, mesh.edge_reach
+
+    def rings(rows: slice) -> None:
+        sum_pushes(*pushed, rows.start, rows.stop, placed)
+        blend_vertices(pushes, valence, mesh.sharp, beta, rows.start, rows.stop, placed)
+
+    owners(blocks.unheard(), count).run(count, rings)
+    return placed

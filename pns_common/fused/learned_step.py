@@ -88,7 +88,7 @@ def learned_points(
         ModelError: a network returned something that is not finite, or of another shape.
     """
     mesh, count = level.mesh, level.mesh.vertex_count
-    curves = curves_of(curve_rule(scheme), level.points, mesh, length)
+    curves = curves_of(curve_rule(scheme), level.points, mesh, length, blocks)
     made = added_by_rules(level, scheme, length, blocks, curves, strength)
     vertices, edges, added = made.vertices, made.edges, made.both
     # Not before: what the rules read has the most memory.
@@ -97,7 +97,7 @@ def learned_points(
     curves.move_edges(edges)
     scale = None
     if scheme.guard is not None:
-        shared = curves.shared(count, len(edges.ratio))
+        shared = curves.shared()
         moved = made.moved_with(curves)
         scale = guard_scale(scheme.guard, mesh, loop, added.displacement, blocks, shared, moved)
         if scale is None:

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
+from pns_common.fused.budgets import budgets_per_length
 from pns_common.fused.curves import NO_RULE, CurveMoves
 from pns_common.fused.edge_lengths import EdgeLengths, edge_lengths
 from pns_common.fused.face_measures import FaceMeasures
@@ -46,9 +47,7 @@ class Surroundings:
         self, vertices: Int[np.ndarray, " N"], budget: float
     ) -> Float[np.ndarray, " N"]:
         """Return C / R at each of some vertices."""
-        if isinstance(self.reference_length, np.ndarray):
-            return budget / self.reference_length[vertices]
-        return np.full(len(vertices), budget / self.reference_length)
+        return budgets_per_length(budget, self.reference_length, vertices)
 
     def prior_strengths(self, vertices: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
         """Return s at each of some vertices."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common.fused.curves import placed_pushes
 from pns_common.fused.kernels.vertex_prior import add_priors, add_priors_but_at_tips
 from pns_common.fused.loop_points import place_vertices
 from pns_common.fused.loop_weights import weights_of
@@ -17,8 +18,9 @@ def priors_at(
 ) -> Float[np.ndarray, "V 3"]:
     """Return D of some vertices, in rows for all."""
     rings, curves = level.rings, level.curves
-    prior = _placed(level.pushes, level)
-    of_curves = _placed(curves.pushes, level) if len(curves.pushes) else curves.pushes
+    prior = np.empty_like(level.pushes)
+    place_vertices(level.pushes, level.mesh, level.blocks, prior)
+    of_curves = placed_pushes(curves, level.mesh, rings.valence, level.blocks)
     parts = of_curves, curves.nothing, level.prior_strengths(vertices), vertices
     weights, measured = weights_of(rings.valence), (rings.means, rings.fields, rings.valence)
     around = level.pushes, *measured, weights.ring, weights.further
@@ -32,10 +34,3 @@ def priors_at(
 
     level.blocks.run(len(vertices), add_but_at_tips if form.tip_strength else add)
     return prior
-
-
-def _placed(pushes: Float[np.ndarray, "V 3"], level: Surroundings) -> Float[np.ndarray, "V 3"]:
-    """Return what Loop's vertex mask makes of pushes."""
-    placed = np.empty_like(pushes)
-    place_vertices(pushes, level.mesh, level.blocks, placed)
-    return placed

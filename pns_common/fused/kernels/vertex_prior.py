@@ -35,7 +35,7 @@ def _prior(pushed, of_curves, nothing, strength, v, k):
     return strength * pushed[v, k] + part
 
 
-def _rise(value, by, begin, end):
+def rise(value, by, begin, end):
     """Return the smooth step of a quotient; 0 where ``by`` is 0 (``tips.far_behind``)."""
     quotient = value / by if by > 0 else 0.0
     way = min(max((quotient - begin) / (end - begin), 0.0), 1.0)
@@ -100,8 +100,8 @@ def add_priors_but_at_tips(
         left = abs(dot(behind, clear_normal(row(fields, v))))
         square = means[v, RING_SQUARE]
         length = math.sqrt(square) if square > 0 else 0.0
-        far = _rise(left, length, LEFT_FROM, LEFT_TO)
-        tip = far * _rise(means[v, MEAN_JUMP], means[v, NEAR_JUMP], BENDS_FROM, BENDS_TO)
+        far = rise(left, length, LEFT_FROM, LEFT_TO)
+        tip = far * rise(means[v, MEAN_JUMP], means[v, NEAR_JUMP], BENDS_FROM, BENDS_TO)
         for k in range(3):
             prior = _prior(pushed, of_curves, nothing, strengths[i], v, k)
             pushed[v, k] = prior - tip * (tip_strength * moved[k] + prior)

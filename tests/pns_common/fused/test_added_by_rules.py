@@ -25,7 +25,7 @@ def pit(n=14):
 
 def added(mesh, scheme=SCHEME):
     level = control_level(mesh.vertices, mesh.faces, NO_CREASES, Blocks(1))
-    curves = curves_of(curve_rule(scheme), mesh.vertices, level.mesh, 0.7)
+    curves = curves_of(curve_rule(scheme), mesh.vertices, level.mesh, 0.7, Blocks(1))
     return added_by_rules(level, scheme, 0.7, Blocks(1), curves), curves
 
 
@@ -40,7 +40,7 @@ def test_it_is_what_the_array_kernels_add_but_on_curves(cut, monkeypatch):
     step = level_step(array_level(mesh.vertices, topology, 0.7), SCHEME)
     assert np.array_equal(step.guard, np.ones(len(step.guard)))
     inside = np.ones(count + len(topology.edges), dtype=bool)
-    inside[curves.sharp.vertices] = inside[count + curves.sharp.edges] = False
+    inside[curves.level.rows] = inside[count + curves.level.mesh.sharp_edges] = False
     expected = np.concatenate([step.vertices.displacement, step.edges.displacement])
     np.testing.assert_array_equal(made.both.displacement[inside], expected[inside])
     assert expected[inside].any()

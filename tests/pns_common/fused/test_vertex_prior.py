@@ -30,7 +30,7 @@ def test_it_is_what_the_rule_moves_a_vertex_by(tip_strength, boundary_strength, 
     strengths = {"tip_strength": tip_strength, "boundary_strength": boundary_strength}
     scheme = pns(scale_free_model(scale=0, **strengths, **OPEN))
     rule, edges, blocks = scheme.vertex_rule, edges_built(mesh), Blocks(2, rows)
-    curves = curves_of(rule.curves, points, edges, 1.0)
+    curves = curves_of(rule.curves, points, edges, 1.0, blocks)
     at_faces, fans = FaceMeasures(points, edges.faces, blocks), np.zeros(COUNT, dtype=bool)
     level = Surroundings(points, edges, at_faces, fans, 1.0, blocks, curves)
     inside = np.flatnonzero(level.rings.smooth).astype(np.int32)
