@@ -1,4 +1,4 @@
-"""Memory that a call frees stays with the process for the next one, up to 96 MiB a thread.
+"""Memory that a call frees stays with the process for the next one, up to 128 MiB a thread.
 
 glibc gives memory back to the system as soon as the free end of its heap is larger than a bound,
 128 KiB at first, and then each call's tables are new pages again, which the system clears: a third
@@ -15,9 +15,10 @@ import sys
 from collections.abc import Callable
 from functools import cache
 
-# What three levels from 20,000 faces free, and one from 320,000: less, and their pages are new ones
-# each time. Before large results all of it goes back (``make_room``).
-KEPT = 96 * 2**20
+# What three levels from 20,000 faces free, and one from 320,000, closed or open and in any order:
+# less, and their pages are new ones each time. Before large results all of it goes back
+# (``make_room``).
+KEPT = 128 * 2**20
 # glibc takes larger blocks from the system each time, whatever it has kept; it allows no more.
 LARGEST_KEPT = 32 * 2**20
 # Whoever has set one of these has had his reasons.
