@@ -14,6 +14,7 @@ from pns_common.fused.bent_part import BentPart, bent_part
 from pns_common.fused.curves import CurveMoves
 from pns_common.fused.edge_rule import add_at_edges
 from pns_common.fused.guard import EVERYWHERE
+from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.level import FusedLevel
 from pns_common.fused.rings import smooth_vertices
 from pns_common.fused.surroundings import Surroundings
@@ -47,10 +48,8 @@ class AddedByRules:
         """Return ``moved`` with the vertices of curves, and all edges that may be of one."""
         if len(self.moved) == 0 or curves.level is None:
             return self.moved
-        moved, mesh = self.moved.copy(), curves.level.mesh
-        moved[curves.level.rows] = True
-        moved[mesh.vertex_count + mesh.sharp_edges] = True
-        return moved
+        is_sharp = curves.level.mesh.edge_class != INTERIOR
+        return self.moved | np.concatenate([curves.level.movable, is_sharp])
 
 
 def added_by_rules(
@@ -100,7 +99,7 @@ def _evaluated(scheme: Scheme, seen: Surroundings) -> AddedByRules:
         add_at_vertices(vertex_rule, seen, vertices)
         seen.forget_rings()
     else:
-        vertices.clear(slice(None))
+        vertices.clear()
     add_at_edges(edge_rule, seen, made.edges)
     seen.faces.forget()
     return replace(made, vertices=vertices)

@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pns_common.base.blocks import Blocks
+from pns_common.fused.kernels.additions import clear_rows
+
 
 @dataclass(frozen=True, eq=False)
 class Additions:
@@ -45,10 +48,19 @@ class Additions:
         displacement, envelope = self.displacement[none].copy(), self.envelope[none].copy()
         return replace(self, displacement=displacement, envelope=envelope)
 
-    def clear(self, rows: slice | Int[np.ndarray, " N"]) -> None:
-        """Add nothing to some of the rows."""
+    def clear(self) -> None:
+        """Add nothing to any row."""
         for values in (self.displacement, self.ratio, self.gate, self.envelope):
-            values[rows] = 0
+            values[:] = 0
+
+    def clear_rows(self, rows: Int[np.ndarray, " N"], blocks: Blocks) -> None:
+        """Add nothing to some of the rows, int32."""
+        values = self.displacement, self.ratio, self.gate, self.envelope
+
+        def write(some: slice) -> None:
+            clear_rows(rows, some.start, some.stop, *values)
+
+        blocks.unheard().run(len(rows), write)
 
     def scale(self, by: Float[np.ndarray, " N"]) -> None:
         """Take s δ in place of δ."""

@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
-from pns_common.connectivity.topology import EdgeClass
-from pns_common.formula.curve_prior import Kinds, are_of, curve_gate
+from pns_common.formula.curve_prior import are_of, curve_gate
 from pns_common.fused.additions import Additions
 from pns_common.fused.budgets import budgets_per_length
 from pns_common.fused.kernels.curves import (
@@ -21,6 +20,7 @@ from pns_common.fused.kernels.curves import (
     push_curves,
     sum_pushes,
 )
+from pns_common.fused.kernels.edges import BOUNDARY, CREASE
 from pns_common.fused.kernels.masks import blend_vertices
 from pns_common.fused.loop_points import owners
 from pns_common.fused.loop_weights import weights_of
@@ -58,13 +58,12 @@ class CurveLevel:
         points: Float[np.ndarray, "V 3"],
         mesh: MeshEdges,
         length: float | Float[np.ndarray, " V"],
-        kinds: Kinds,
+        of_curve: Bool[np.ndarray, " E"],
         blocks: Blocks,
     ) -> CurveLevel:
-        """Find the curves of a level that edges of some kinds make."""
+        """Find the curves that some edges of a level make."""
         count, quiet = mesh.vertex_count, blocks.unheard()
         sides, met = np.empty((count, 2), dtype=np.int32), np.empty(count, dtype=np.int8)
-        of_curve = are_of(kinds, mesh.edge_class[mesh.sharp_edges])
         along = mesh.edges, mesh.sharp_edges, of_curve, mesh.sharp
 
         def follow(rows: slice) -> None:
@@ -150,14 +149,13 @@ class CurveMoves:
         """
         if self.level is None:
             return None
-        mesh, count = self.level.mesh, self.level.mesh.vertex_count
-        # An enumeration's member would be compared in 64 bits.
-        on_boundary = mesh.edge_class == int(EdgeClass.BOUNDARY)
+        mesh = self.level.mesh
+        on_boundary = mesh.edge_class == BOUNDARY
         if not on_boundary.any():
             return None
         shared = np.concatenate([self.level.movable, on_boundary])
-        creases = mesh.sharp_edges[mesh.edge_class[mesh.sharp_edges] == int(EdgeClass.CREASE)]
-        shared[:count][mesh.edges[creases]] = False
+        creases = mesh.edges[np.flatnonzero(mesh.edge_class == CREASE)]
+        shared[: mesh.vertex_count][creases] = False
         return shared
 
 
@@ -175,9 +173,10 @@ def curves_of(
     """Make what ``rule`` adds at a level's curves; ``length`` is R, or each vertex's own."""
     if rule is None:
         return NO_RULE
-    if not are_of(rule.kinds, mesh.edge_class[mesh.sharp_edges]).any():
+    of_curve = are_of(rule.kinds, mesh.edge_class)
+    if not of_curve.any():
         return CurveMoves(rule, None, NO_PUSHES, NONE_MOVABLE, 0.0)
-    level = CurveLevel.of(points, mesh, length, rule.kinds, blocks)
+    level = CurveLevel.of(points, mesh, length, of_curve, blocks)
     if len(level.rows) == 0:
         return CurveMoves(rule, level, NO_PUSHES, NONE_MOVABLE, 0.0)
     return CurveMoves(rule, level, level.pushes(rule), level.movable, 0.0)

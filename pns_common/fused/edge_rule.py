@@ -35,7 +35,7 @@ def add_at_edges(
         ModelError: the network returned something that is not finite, or of another shape.
     """
     mesh, width = level.mesh, rule.operator.features.count
-    to.clear(mesh.sharp_edges)
+    to.clear_rows(mesh.sharp_edges, level.blocks)
     connectivity = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.interior
     out = to.displacement, to.ratio, to.gate, to.envelope
     # Before the blocks: what several threads ask for is computed once.

@@ -97,14 +97,15 @@ def place_vertices(
     """Write Loop's old vertices into ``placed``."""
     count = mesh.vertex_count
     valence, reach = np.empty(count, dtype=np.int32), mesh.edge_reach
+    sharp, sharp_edges = mesh.sharp, mesh.sharp_edges
 
     def rings(rows: slice) -> None:
         sum_rings(points, mesh.edges, reach, rows.start, rows.stop, placed, valence)
+        if len(sharp):
+            bounds = rows.start, rows.stop
+            sum_along_curves(points, mesh.edges, sharp_edges, sharp, *bounds, placed)
 
     owners(blocks, count).run(count, rings)
-    sharp = mesh.sharp
-    if len(sharp):
-        sum_along_curves(points, mesh.edges, mesh.sharp_edges, sharp, placed)
     beta = weights_of(valence).beta
 
     def blend(rows: slice) -> None:

@@ -25,6 +25,7 @@ from pns_common.fused.kernels.edges import (
     TOO_LONG,
     chain_edges,
     classify,
+    count_ends,
 )
 from pns_common.fused.kernels.owned import PASSED_BY
 from pns_common.mesh import repeated_vertex
@@ -87,8 +88,9 @@ class MeshEdges:
         """How many sharp edges each vertex has; none at all is (0,)."""
         if len(self.sharp_edges) == 0:
             return np.zeros(0, dtype=np.int32)
-        ends = self.edges[self.sharp_edges].reshape(-1)
-        return np.bincount(ends, minlength=self.vertex_count).astype(np.int32)
+        counts = np.zeros(self.vertex_count, dtype=np.int32)
+        count_ends(self.edges, self.sharp_edges, counts)
+        return counts
 
 
 def _reach(vertices: Int[np.ndarray, " N"], each: int) -> Int[np.ndarray, "B 2"]:

@@ -26,7 +26,7 @@ def add_at_vertices(
     """
     rings, operator = level.rings, rule.operator
     vertices = np.flatnonzero(rings.smooth).astype(np.int32)
-    to.clear(np.flatnonzero(~rings.smooth))
+    to.clear_rows(np.flatnonzero(~rings.smooth).astype(np.int32), level.blocks)
     out = to.displacement, to.ratio, to.gate, to.envelope
     prior = np.empty((0, 3))
     if isinstance(rule, ScaleFreeVertexRule):

@@ -36,16 +36,15 @@ def follow_curves(edges, sharp_edges, of_curve, sharp, begin, end, sides, met):
 
     Args:
         sharp_edges: (S,) the edges that are not interior, ascending.
-        of_curve: (S,) which of these a curve is made of.
+        of_curve: (E,) which edges a curve is made of.
         sharp: (V,) how many sharp edges there are at each vertex.
         sides: (V, 2) out: the first edge's first.
         met: (V,) out.
     """
     for v in range(natural(begin), end):
         met[v] = 0
-    for i in range(sharp_edges.shape[0]):
-        if of_curve[i]:
-            e = sharp_edges[i]
+    for e in sharp_edges:
+        if of_curve[e]:
             a, b = edges[e, 0], edges[e, 1]
             if begin <= a < end and sharp[a] == 2:
                 sides[a, natural(met[a])] = b

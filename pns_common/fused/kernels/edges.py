@@ -104,6 +104,15 @@ def chain_edges(faces, most_steps, head, low, links, face_edges, plain):
     return count
 
 
+@kernel(SIZE, INDICES, INDEX, INDEX_OUT)
+def count_ends(edges, rows, counts):
+    """Count how many of some edges end at each vertex; ``counts`` (V,) is 0 on entry."""
+    for e in rows:
+        counts[edges[e, 0]] += 1
+        counts[edges[e, 1]] += 1
+    return 0
+
+
 @kernel(
     SIZE,
     *(INDICES, INDEX, INDEX, INTEGERS_2, SIZE, SIZE, SIZE),

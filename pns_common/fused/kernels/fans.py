@@ -11,8 +11,10 @@ from pns_common.fused.kernels.compiled import (
     INTEGERS_2,
     SIZE,
     kernel,
+    natural,
 )
 from pns_common.fused.kernels.edges import CREASE, INTERIOR
+from pns_common.fused.kernels.owned import owned_rows
 
 # The fewest faces that close around a vertex.
 SMALLEST_RING = 3
@@ -28,13 +30,26 @@ def _across(face_edges, half_edges, edge_class, half_edge):
     return half_edges[e, 1] if first == half_edge else first
 
 
-@kernel(SIZE, INDICES, INDEX_OUT, INDEX_OUT)
-def count_corners(faces, corner, count):
-    """Write one corner of each vertex, and how many it has; ``count`` is 0 on entry."""
-    for f in range(faces.shape[0]):
-        for i in range(3):
-            corner[faces[f, i]] = 3 * f + i
-            count[faces[f, i]] += 1
+@kernel(SIZE, INDICES, INDICES, SIZE, SIZE, INDEX_OUT, INDEX_OUT)
+def count_corners(faces, reach, begin, end, corner, count):
+    """Write a corner of each vertex begin … end − 1, and how many it has.
+
+    Args:
+        reach: the smallest and the largest vertex of each block of faces (owned.py).
+        corner: (V,) out: the last one; of a vertex of no face nothing is written.
+        count: (V,) out.
+    """
+    for v in range(natural(begin), end):
+        count[v] = 0
+    for block in range(reach.shape[0]):
+        first, asked = owned_rows(faces, reach, block, begin, end)
+        for k in range(asked):
+            f = first + k
+            for i in range(3):
+                v = faces[f, i]
+                if begin <= v < end:
+                    corner[v] = 3 * f + i
+                    count[v] += 1
     return 0
 
 

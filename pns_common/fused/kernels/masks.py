@@ -77,26 +77,25 @@ def sum_rings(points, edges, reach, begin, end, sums, valence):
     return 0
 
 
-@kernel(SIZE, POINTS, INDICES, INDEX, INDEX, POINTS_OUT)
-def sum_along_curves(points, edges, sharp_edges, sharp, sums):
-    """Sum over two or more sharp edges alone where a vertex has them.
+@kernel(SIZE, POINTS, INDICES, INDEX, INDEX, SIZE, SIZE, POINTS_OUT)
+def sum_along_curves(points, edges, sharp_edges, sharp, begin, end, sums):
+    """Sum over sharp edges alone at those of vertices begin … end − 1 that have two or more.
 
     Args:
         sharp_edges: (S,) the edges that are not interior, ascending.
         sharp: (V,) how many there are at each vertex.
         sums: (V, 3) in and out: sums over rings, replaced where they do not count.
     """
-    for e in sharp_edges:
-        for v in edges[e]:
-            if sharp[v] >= 2:
-                for k in range(3):
-                    sums[v, k] = 0.0
+    for v in range(natural(begin), end):
+        if sharp[v] >= 2:
+            for k in range(3):
+                sums[v, k] = 0.0
     for e in sharp_edges:
         a, b = edges[e, 0], edges[e, 1]
-        if sharp[a] >= 2:
+        if begin <= a < end and sharp[a] >= 2:
             for k in range(3):
                 sums[a, k] += points[b, k]
-        if sharp[b] >= 2:
+        if begin <= b < end and sharp[b] >= 2:
             for k in range(3):
                 sums[b, k] += points[a, k]
     return 0

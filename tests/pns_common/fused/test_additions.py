@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from pns_common.base.blocks import Blocks
 from pns_common.fused.additions import Additions
 
 
@@ -9,7 +10,7 @@ def nothing(count):
     added = Additions.unwritten(count)
     for values in (added.displacement, added.ratio, added.gate, added.envelope):
         values[:] = np.nan
-    added.clear(slice(None))
+    added.clear()
     return added
 
 
@@ -22,6 +23,18 @@ def test_some_rows_are_views_of_the_whole_and_others_copies():
     assert not added.envelope.any()
     assert added.displacement.tolist() == [[0, 0, 0]] * 3 + [[1, 2, 3]] * 2
     assert added.gate.tolist() == [0.5, 0.5, 0, 0, 0]
+
+
+def test_rows_are_cleared_by_their_numbers():
+    added = Additions.unwritten(40)
+    for values in (added.displacement, added.ratio, added.gate, added.envelope):
+        values[:] = 4.0
+    rows = np.random.default_rng(0).permutation(40)[:17].astype(np.int32)
+    added.clear_rows(rows, Blocks(2, 5))
+    for values in (added.displacement, added.ratio, added.gate, added.envelope):
+        expected = np.full_like(values, 4.0)
+        expected[rows] = 0
+        np.testing.assert_array_equal(values, expected)
 
 
 def test_a_scale_is_of_the_displacement_and_of_its_share_of_the_bound_alone():

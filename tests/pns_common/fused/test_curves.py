@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from pns_common import Mesh, pns
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.creases import with_creases
-from pns_common.connectivity.topology import build_topology
-from pns_common.formula.curve_prior import BOUNDARIES, on_boundary
+from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.formula.curve_prior import on_boundary
 from pns_common.fused.additions import Additions
 from pns_common.fused.curves import NO_RULE, CurveLevel, curves_of, placed_pushes
 from pns_common.fused.loop_points import place_vertices
@@ -53,7 +53,9 @@ def test_a_boundary_rule_has_the_same_bits_where_there_is_one():
 
 def test_a_vertex_where_three_pages_meet_is_on_no_curve():
     points, faces = three_pages()
-    level = CurveLevel.of(points, edges_built(Mesh(points, faces)), 1.0, BOUNDARIES, Blocks(1))
+    edges = edges_built(Mesh(points, faces))
+    of_curve = edges.edge_class == EdgeClass.BOUNDARY
+    level = CurveLevel.of(points, edges, 1.0, of_curve, Blocks(1))
     assert level.rows.tolist() == [2, 3, 4]
     assert np.sort(level.sides[level.rows]).tolist() == 3 * [[0, 1]]
 
@@ -71,7 +73,7 @@ def test_what_it_adds_is_what_the_rule_adds(blocks, own_lengths, mesh, seed):
     vertices, of_edges = Additions.unwritten(count), Additions.unwritten(edge_count)
     vertices = replace(vertices, corrected=np.zeros(count, dtype=bool))
     for added in (vertices, of_edges):
-        added.clear(slice(None))
+        added.clear()
     moves.move_vertices(loop, vertices)
     moves.move_edges(of_edges)
     np.testing.assert_array_equal(vertices.corrected, curves.movable)

@@ -43,7 +43,7 @@ def creased(mesh, seed):
 def followed(edges, kinds, way):
     count = edges.vertex_count
     sides, met = np.zeros((count, 2), dtype=np.int32), np.full(count, 9, dtype=np.int8)
-    of_curve = are_of(kinds, edges.edge_class[edges.sharp_edges])
+    of_curve = are_of(kinds, edges.edge_class)
     sharp = edges.sharp if len(edges.sharp) else np.zeros(count, dtype=np.int32)
     for begin, end in ((0, count // 2), (count // 2, count)):
         args = edges.edges, edges.sharp_edges, of_curve, sharp, begin, end

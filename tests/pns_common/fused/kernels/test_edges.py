@@ -12,6 +12,7 @@ from pns_common.fused.kernels.edges import (
     TOO_LONG,
     chain_edges,
     classify,
+    count_ends,
 )
 from tests.support.kernels import WAYS
 from tests.support.meshes import bow_tie, bumpy_sphere, one_way_pair, three_pages
@@ -77,3 +78,11 @@ def test_chains_that_grow_too_long_are_given_up(way):
     hub = np.stack([np.zeros(20, int), np.arange(1, 21), np.arange(2, 22)], axis=1)
     assert chained(way, hub, most_steps=10)[0] == TOO_LONG
     assert chained(way, hub)[0] == 41
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_ends_of_some_edges_are_counted_at_their_vertices(way):
+    edges = np.array([[0, 1], [1, 3], [0, 3], [2, 3]], dtype=np.int32)
+    counts = np.zeros(5, dtype=np.int32)
+    WAYS[way](count_ends)(edges, np.array([3, 1], dtype=np.int32), counts)
+    assert counts.tolist() == [0, 1, 1, 2, 0]

@@ -28,7 +28,8 @@ def told(way, points, faces, creases=None):
     if creases is not None:
         kinds = crease_classes(mesh.edges, kinds, count, creases)
     corner, corners = (np.zeros(count, dtype=np.int32) for _ in range(2))
-    WAYS[way](count_corners)(mesh.faces, corner, corners)
+    for begin, end in ((0, count // 2), (count // 2, count)):
+        WAYS[way](count_corners)(mesh.faces, mesh.face_reach, begin, end, corner, corners)
     np.testing.assert_array_equal(corners, np.bincount(faces.reshape(-1), minlength=count))
     used = np.flatnonzero(corners)
     np.testing.assert_array_equal(faces.reshape(-1)[corner[used]], used)

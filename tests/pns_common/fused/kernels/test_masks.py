@@ -55,7 +55,9 @@ def test_old_vertices(way):
     rings = [neighbours(v, PAIRS) for v in range(16)]
     assert valence.tolist() == list(map(len, rings))
     np.testing.assert_allclose(sums, [POINTS[ring].sum(axis=0) for ring in rings], atol=1e-14)
-    WAYS[way](sum_along_curves)(POINTS, MESH.edges, MESH.sharp_edges, MESH.sharp, sums)
+    along = POINTS, MESH.edges, MESH.sharp_edges, MESH.sharp
+    for begin, end in ((0, 5), (5, 16)):
+        WAYS[way](sum_along_curves)(*along, begin, end, sums)
     beta = loop_beta(np.arange(7))
     WAYS[way](blend_vertices)(POINTS, valence, MESH.sharp, beta, 0, 16, sums)
     rim = [pair for pair, kind in zip(PAIRS, TOPOLOGY.edge_class, strict=True) if kind]
