@@ -75,7 +75,7 @@ def _to_sides(points, sides, v):
     return between(points, v, sides[v, 0]), between(points, v, sides[v, 1])
 
 
-@kernel(SIZE, POINTS, INDICES, INDEX, SIZE, SIZE, NUMBERS_OUT)
+@kernel(SIZE, POINTS, INDICES, INDEX, SIZE, SIZE, NUMBERS_OUT, by_rows=True)
 def measure_turns(points, sides, vertices, begin, end, turns):
     """Write x of vertices[begin:end], which are movable: 1 − cos of the turning angle."""
     for i in range(end - begin):
@@ -84,7 +84,7 @@ def measure_turns(points, sides, vertices, begin, end, turns):
     return 0
 
 
-@kernel(SIZE, POINTS, INDICES, INDEX, NUMBERS, REAL, SIZE, SIZE, POINTS_OUT)
+@kernel(SIZE, POINTS, INDICES, INDEX, NUMBERS, REAL, SIZE, SIZE, POINTS_OUT, by_rows=True)
 def push_curves(points, sides, vertices, gates, strength, begin, end, pushes):
     """Write d of vertices[begin:end], from γ of each (``curve_prior.curve_pushes``).
 
@@ -152,6 +152,7 @@ def _mean_square(a, b):
     SIZE,
     *(POINTS, POINTS, INDICES, INDEX, NUMBERS, SIZE, SIZE),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+    by_rows=True,
 )
 def move_vertices(
     points, pushes, sides, vertices, budget_per_length, begin, end, displacement, ratio, envelopes
@@ -184,6 +185,7 @@ def _far_behind(push, pushed, moved, a, b):
     SIZE,
     *(POINTS, POINTS, INDICES, INDEX, NUMBERS, SIZE, SIZE, POINTS, REAL),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+    by_rows=True,
 )
 def move_vertices_but_at_tips(
     points,
