@@ -11,12 +11,14 @@ from pns_common.base.blocks import Blocks
 from pns_common.formula.curve_prior import are_of, curve_gate
 from pns_common.fused.additions import Additions
 from pns_common.fused.budgets import budgets_per_length
-from pns_common.fused.kernels.curves import (
-    follow_curves,
-    measure_turns,
+from pns_common.fused.kernels.curve_moves import (
     move_edges,
     move_vertices,
     move_vertices_but_at_tips,
+)
+from pns_common.fused.kernels.curves import (
+    follow_curves,
+    measure_turns,
     push_curves,
     sum_pushes,
 )

@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 
 from pns_common import Mesh, pns
 from pns_common.base.blocks import Blocks
-from pns_common.connectivity.creases import with_creases
-from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.connectivity.topology import EdgeClass
 from pns_common.formula.curve_prior import on_boundary
 from pns_common.fused.additions import Additions
 from pns_common.fused.curves import NO_RULE, CurveLevel, curves_of, placed_pushes
 from pns_common.fused.loop_points import place_vertices
 from pns_common.masks.stencils import loop_vertex_vertices
 from pns_common.rules.control_level import control_level
-from tests.support.kernels import assert_same_bits, by_arrays, by_kernels, edges_built, edges_of
-from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, soups, three_pages
+from tests.support.creased import MESHES, creased
+from tests.support.kernels import assert_same_bits, by_arrays, by_kernels, edges_built
+from tests.support.meshes import bent, bumpy_sphere, grid, three_pages
 from tests.support.networks import SCALE_FREE_CARD, scale_free_model
 from tests.support.stand_in_models import Constant
 
@@ -33,13 +33,6 @@ def with_boundary_rule(mesh):
     card = replace(SCALE_FREE_CARD, boundary_strength=1.0)
     scheme = pns(Constant(card, 0.3, 0.2))
     return by_arrays(mesh, 2, scheme=scheme), by_kernels(mesh, 2, scheme=scheme)
-
-
-def creased(mesh, seed):
-    """A mesh's connectivity with a few creases, for the array kernels and for the others."""
-    plain, edges = build_topology(mesh.faces, len(mesh.vertices)), edges_built(mesh)
-    topology = with_creases(plain, edges_of(mesh, 4, seed))
-    return topology, replace(edges, edge_class=topology.edge_class)
 
 
 def test_a_boundary_rule_changes_nothing_where_there_is_no_boundary():
@@ -62,7 +55,7 @@ def test_a_vertex_where_three_pages_meet_is_on_no_curve():
 
 @pytest.mark.parametrize("blocks", [Blocks(1), IN_BLOCKS], ids=["whole", "in blocks"])
 @pytest.mark.parametrize("own_lengths", [False, True])
-@given(mesh=manifolds() | soups() | st.just(OPEN), seed=st.integers(0, 99))
+@given(mesh=MESHES, seed=st.integers(0, 99))
 def test_what_it_adds_is_what_the_rule_adds(blocks, own_lengths, mesh, seed):
     topology, edges = creased(mesh, seed)
     count, edge_count = len(mesh.vertices), len(topology.edges)
@@ -89,7 +82,7 @@ def test_what_it_adds_is_what_the_rule_adds(blocks, own_lengths, mesh, seed):
 
 
 @pytest.mark.parametrize("blocks", [Blocks(1), IN_BLOCKS], ids=["whole", "in blocks"])
-@given(mesh=manifolds() | soups() | st.just(OPEN), seed=st.integers(0, 99))
+@given(mesh=MESHES, seed=st.integers(0, 99))
 def test_beside_curves_loops_mask_of_pushes_is_that_of_the_whole(blocks, mesh, seed):
     topology, edges = creased(mesh, seed)
     moves = curves_of(OF_CREASES, mesh.vertices, edges, 1.0, blocks)
@@ -103,7 +96,7 @@ def test_beside_curves_loops_mask_of_pushes_is_that_of_the_whole(blocks, mesh, s
         assert len(placed) == 0
 
 
-@given(mesh=manifolds() | soups() | st.just(OPEN), seed=st.integers(0, 99))
+@given(mesh=MESHES, seed=st.integers(0, 99))
 def test_what_pieces_share_is_what_boundaries_alone_place(mesh, seed):
     topology, edges = creased(mesh, seed)
     shared, expected = None, on_boundary(topology)

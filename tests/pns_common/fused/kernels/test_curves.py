@@ -1,16 +1,10 @@
 """Curves by kernels, as the formulas have them to the last bit."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Mesh, pns
-from pns_common.connectivity.creases import with_crease_rows
-from pns_common.connectivity.topology import build_topology
-from pns_common.formula.correction import proximity_ratio
 from pns_common.formula.curve_prior import (
     BOUNDARIES,
     BOUNDARIES_AND_CREASES,
@@ -20,24 +14,10 @@ from pns_common.formula.curve_prior import (
     find_curves,
 )
 from pns_common.fused.kernels import curves as kernels
-from pns_common.masks.stencils import loop_vertex_vertices
-from pns_common.rules.control_level import control_level
-from tests.support.kernels import WAYS, edges_built
-from tests.support.meshes import bent, grid, manifolds, soups
-from tests.support.networks import scale_free_model
+from tests.support.creased import MESHES, creased
+from tests.support.kernels import WAYS
 
-MESHES = manifolds() | soups() | st.sampled_from([Mesh(*grid(5, bent))])
 SHARPNESS = 3.0
-
-
-def creased(mesh, seed):
-    """A mesh's connectivity with some creases, for the formulas and for the kernels."""
-    rng, plain = np.random.default_rng(seed), build_topology(mesh.faces, len(mesh.vertices))
-    some = rng.random(len(plain.interior)) < 0.3
-    topology = with_crease_rows(plain, plain.interior[some])
-    edges = edges_built(mesh)
-    edges.edge_class[:] = topology.edge_class
-    return topology, edges
 
 
 def followed(edges, kinds, way):
@@ -93,43 +73,3 @@ def test_sums_of_pushes_are_loops_beside_curves(way, mesh, seed):
             expected[v] += pushes[b] if a == v else 0.0
             expected[v] += pushes[a] if b == v else 0.0
     assert sums.tobytes() == expected.tobytes()
-
-
-@pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("tip_strength", [None, 0.8])
-@given(mesh=MESHES, seed=st.integers(0, 99), budget=st.sampled_from([0.0, 0.3, 1e9, 1e308]))
-def test_curves_move_as_the_rule_has_it(way, tip_strength, mesh, seed, budget):
-    strengths = {"boundary_strength": 0.9, "crease_prior": True, "tip_strength": tip_strength}
-    rule = pns(scale_free_model(0, **strengths)).edge_rule.curves
-    rule = replace(rule, form=replace(rule.form, budget=budget))
-    topology, edges = creased(mesh, seed)
-    level = control_level(mesh.vertices, topology, 0.7)
-    curves, pushes = level.curves(rule.kinds), rule.pushes(level)
-    loop = loop_vertex_vertices(mesh.vertices, topology)
-    sides, movable = followed(edges, rule.kinds, WAYS[way])
-    rows, count = curves.rows.astype(np.int32), len(mesh.vertices)
-    budgets = np.full(len(rows) + len(edges.sharp_edges), budget / 0.7)
-
-    to = tuple(np.zeros(shape) for shape in ((count, 3), count, count))
-    args = mesh.vertices, pushes, sides, rows, budgets, 0, len(rows)
-    # As in a level, where what overflows is refused at its end.
-    with np.errstate(over="ignore", invalid="ignore"):
-        if tip_strength:
-            WAYS[way](kernels.move_vertices_but_at_tips)(*args, loop, tip_strength, *to)
-        else:
-            WAYS[way](kernels.move_vertices)(*args, *to)
-        expect(to, curves.rows, rule.at_vertices(level, loop[curves.rows]))
-
-        of_edges = edges.edges, edges.sharp_edges, budgets, 0, len(edges.sharp_edges)
-        to = tuple(np.zeros(shape) for shape in ((len(edges.edges), 3), *2 * [len(edges.edges)]))
-        WAYS[way](kernels.move_edges)(mesh.vertices, pushes, movable, *of_edges, *to)
-        expect(to, curves.edges, rule.at_edges(level))
-
-
-def expect(to, rows, made):
-    """Rows get what was made, all others nothing."""
-    values = made.displacement + 0.0, proximity_ratio(made), made.envelope
-    for written, value in zip(to, values, strict=True):
-        expected = np.zeros_like(written)
-        expected[rows] = value
-        assert written.tobytes() == expected.tobytes()
