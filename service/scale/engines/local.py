@@ -70,16 +70,18 @@ def local(work: Work[T, R], workers: int) -> Engine[T, R]:
                     try:
                         done = future.result()
                     except (TimeoutError, ProcessExpired) as error:
-                        lost, number = error, worker.current.value
+                        lost = error
                     except BrokenProcessPool as error:
-                        idle[-1] = worker.replaced(work.prepare)
-                        lost, number = error, NO_TASK
+                        # So it is called too where a process dies before its pool has read that it
+                        # has the chunk: which task it was at is known all the same.
+                        lost, idle[-1] = error, worker.replaced(work.prepare)
                     else:
                         results += done.results
                         if left := chunk[len(done.results) :]:
                             again.append(left)
                         size, broken = done.next_size, 0
                         continue
+                    number = worker.current.value
                     if number == NO_TASK:
                         broken += 1
                         if broken == MOST_BROKEN:

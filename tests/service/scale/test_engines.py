@@ -6,6 +6,7 @@ import sys
 from types import SimpleNamespace
 
 import pytest
+from pebble.pool.process import TaskManager
 
 from service.errors import InvalidParameter, WorkerDied
 from service.scale.engines import chunks, local, on_ray
@@ -70,6 +71,25 @@ def test_of_a_chunk_whose_worker_dies_the_task_it_was_at_is_to_blame(tmp_path, m
     assert sorted(done) == [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
     assert len(all_tasks[3].processes) == 2
     assert [len(task.processes) for task in all_tasks[4:]] == [1, 1]
+
+
+def test_a_worker_that_dies_before_its_pool_knows_what_it_has_is_to_blame_too(
+    tmp_path, monkeypatch
+):
+    """On a busy machine the pool sees the end of a process before it reads what that began."""
+    begins = TaskManager.task_start
+
+    def unread(manager, task, process):
+        if process is None:
+            begins(manager, task, process)
+
+    monkeypatch.setattr(TaskManager, "task_start", unread)
+    monkeypatch.setattr(chunks, "FIRST", 6)
+    all_tasks = tasks(tmp_path, 6)
+    work = Work(third_dies, lambda task, _: (task.number, -task.attempt), 2, None)
+    done = [result for results in local.local(work, 1)(iter(all_tasks)) for result in results]
+    assert sorted(done) == [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
+    assert len(all_tasks[3].processes) == 2
 
 
 class TaskError(RuntimeError):
