@@ -13,7 +13,10 @@ from .ply.header import ply_header
 BYTES_PER_FACE = 30
 
 _CONTINUED = re.compile(rb"\\\r?\n")
-_OFF_COUNTS = re.compile(rb"\s*(?:ST)?C?N?OFF\b(?:\s|#[^\n]*\n)*\d{1,18}\s+(\d{1,18})\b")
+_INDENTED = re.compile(rb"^[ \t]+(?=f)", re.MULTILINE)
+_OFF_COUNTS = re.compile(
+    rb"(?:\xef\xbb\xbf)?\s*(?:ST)?C?N?OFF\b(?:\s|#[^\n]*\n)*\d{1,18}\s+(\d{1,18})\b"
+)
 _LINE_END, _SPACE, _FACE = b"\n f"
 # The letter f; a polygon's count of corners. Each corner beyond the second makes a triangle.
 _WORDS_BESIDE_TRIANGLES = 3
@@ -27,7 +30,7 @@ def count_triangles(data: bytes, kind: str) -> int:
     """
     if kind == "obj":
         text = _CONTINUED.sub(b" ", data) if b"\\" in data else data
-        return _triangles(_words_by_line(text, first=_FACE))
+        return _triangles(_words_by_line(_INDENTED.sub(b"", text), first=_FACE))
     if kind == "off":
         counts = _OFF_COUNTS.match(data)
         return _by_size(data) if counts is None else _in_last_lines(data, int(counts[1]))

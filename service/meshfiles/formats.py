@@ -18,6 +18,7 @@ from ..bodies.media import GLTF_KINDS
 from ..errors import UnreadableError
 from . import unsupported
 from .indexed_triangles import NUMBER, IndexedTriangles
+from .obj_text import usual_obj, written_anew
 from .off import read_off, write_off
 from .ply.polygons import of_triangles
 
@@ -56,7 +57,8 @@ def read(data: bytes, kind: str) -> IndexedTriangles:
     data, polygons = of_triangles(data) if kind == "ply" else (data, None)
     scene = _scene(data, kind)
     parts = [part for part in scene.geometry.values() if isinstance(part, load_readers().Trimesh)]
-    if not parts:
+    # An OBJ whose polygons have two corners each has parts of none.
+    if not parts or (kind == "obj" and not any(np.size(part.faces) for part in parts)):
         raise UnreadableError(f"the {kind.upper()} file has no faces")
     faces = disjoint_faces((np.asarray(part.faces), len(part.vertices)) for part in parts)
     uv = _uv(parts)
@@ -92,8 +94,10 @@ def _scene(data: bytes, kind: str) -> trimesh.Scene:
     # Before warnings become errors: what it imports may warn.
     readers = load_readers()
     text = _as_utf8(data) if kind == "obj" or (kind == "stl" and not _is_binary_stl(data)) else data
-    if kind == "obj" and len(_OBJ_PART.findall(text)) > MOST_PARTS:
-        text = _OBJ_PART.sub(b"", text)
+    if kind == "obj":
+        text = usual_obj(text)
+        if len(_OBJ_PART.findall(text)) > MOST_PARTS:
+            text = _OBJ_PART.sub(b"", text)
     if kind == "stl" and not _is_binary_stl(data) and len(_STL_PART.findall(text)) > MOST_PARTS:
         text = b"solid\n" + _STL_PART.sub(b"", text) + b"\nendsolid\n"
     try:
@@ -101,12 +105,19 @@ def _scene(data: bytes, kind: str) -> trimesh.Scene:
             # Where a number cannot be read, numpy warns and leaves out all that follows.
             warnings.simplefilter("error")
             # Each part comes apart by material; as they are listed, they make the file's triangles.
-            return readers.load_scene(io.BytesIO(text), file_type=kind, process=False)
+            scene = readers.load_scene(io.BytesIO(text), file_type=kind, process=False)
     except MemoryError:
         raise
     except Exception as error:
+        if kind == "obj":
+            # It names the line, if that is what is wrong.
+            written_anew(text)
         # On a broken file these readers fail as it comes, with an UnboundLocalError for one.
         raise UnreadableError(f"this is not a readable {kind.upper()} file") from error
+    if kind == "obj" and any(np.shape(part.vertices)[1] < 3 for part in scene.geometry.values()):
+        # All are cut to the length of the shortest: here, too, it is the line that is told.
+        written_anew(text)
+    return scene
 
 
 def _as_utf8(data: bytes) -> bytes:

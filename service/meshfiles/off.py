@@ -16,7 +16,7 @@ from ..errors import UnreadableError
 from .indexed_triangles import NUMBER, IndexedTriangles
 
 _COMMENT = re.compile(rb"#[^\n]*")
-_HEADER = re.compile(rb"\s*((?:ST)?C?N?)OFF\b")
+_HEADER = re.compile(rb"(?:\xef\xbb\xbf)?\s*((?:ST)?C?N?)OFF\b")
 _COUNTS = re.compile(rb"\s*(\d{1,18})\s+(\d{1,18})(?:[ \t]+\d+)?[ \t]*\r?\n")
 
 _CUT_OFF = "the OFF file ends before its last face, or has none"

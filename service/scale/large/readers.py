@@ -10,6 +10,7 @@ import json
 import mmap
 import re
 import struct
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,7 @@ UNREADABLE = (
     AttributeError, LookupError, OverflowError, RecursionError, TypeError, ValueError, struct.error,
 )  # fmt: skip
 
-_OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+_OBJ_VERTEX = re.compile(rb"^[ \t]*v(?=[ \t])" + 3 * rb"(?:[ \t]+([^\s#]+))?", re.MULTILINE)
 _OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]+([^\r\n#]*)", re.MULTILINE)
 _STL_VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
 
@@ -172,6 +173,7 @@ def read_obj(path: Path, sink: Sink) -> None:
     for text in _text_blocks(path):
         before = sink.vertices
         lines = list(_OBJ_VERTEX.finditer(text))
+        # One that is missing is NaN, which is refused.
         sink.add_vertices(_numbers(path, [line.groups() for line in lines]))
         starts = np.array([line.start() for line in lines], dtype=np.int64)
         faces = list(_OBJ_FACE.finditer(text))
@@ -206,6 +208,8 @@ def _text_blocks(path: Path) -> Iterator[bytes]:
     """Yield a file's text in blocks of whole lines; a line that fills a block is no mesh's."""
     with path.open("rb") as file:
         left = b""
+        if file.read(len(BOM_UTF8)) != BOM_UTF8:
+            file.seek(0)
         while block := file.read(TEXT):
             whole, newline, rest = (left + block).rpartition(b"\n")
             if len(rest) >= TEXT:

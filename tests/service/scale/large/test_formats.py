@@ -131,6 +131,24 @@ def test_an_obj_may_count_backwards_and_name_other_things(tmp_path, monkeypatch)
     assert_same(tmp_path / "out", expected)
 
 
+def test_an_obj_may_begin_with_a_mark_of_its_encoding(tmp_path):
+    text = b"\xef\xbb\xbfv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"
+    (tmp_path / "in.obj").write_bytes(text)
+    refined(tmp_path / "in.obj", tmp_path / "out", 1)
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    expected = refine(Mesh(points, np.array([[0, 1, 2], [0, 1, 3]])), loop()).mesh
+    assert_same(tmp_path / "out", expected)
+
+
+@pytest.mark.parametrize("short", [b"v 1 0", b"v 1 # 0 0", b"v "])
+def test_an_obj_s_vertex_without_three_coordinates_is_refused(tmp_path, short):
+    """Passed over, it would leave its number to the next one."""
+    text = b"v 0 0 0\n" + short + b"\nv 0 1 0\nv 0 0 1\nv 1 1 1\nf 1 2 3\n"
+    (tmp_path / "in.obj").write_bytes(text)
+    with pytest.raises(UnrefinableError, match=r"coordinates .*nan"):
+        refined(tmp_path / "in.obj", tmp_path / "out", 1)
+
+
 def test_an_stl_may_be_text(tmp_path, monkeypatch):
     monkeypatch.setattr("service.scale.large.readers.TEXT", 40)
     mesh = trimesh.Trimesh(*grid(3), process=False)

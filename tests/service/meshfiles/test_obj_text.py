@@ -1,0 +1,95 @@
+"""OBJ files that are written in other ways than the usual one say what they say."""
+
+import numpy as np
+import pytest
+
+from service.errors import UnreadableError
+from service.meshfiles import formats
+from service.meshfiles.counted import count_triangles
+from service.meshfiles.obj_text import usual_obj
+
+POSITIONS = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 2 1\nv 3 3 3\n"
+CORNERS = [[float(word) for word in line.split()[1:]] for line in POSITIONS.splitlines()]
+
+
+def triangles(text: str | bytes) -> list[list[int]]:
+    """Return the triangles of a file, by the lines of POSITIONS that their corners are."""
+    mesh = formats.read(text if isinstance(text, bytes) else text.encode(), "obj")
+    return [
+        [CORNERS.index(corner.tolist()) for corner in mesh.vertices[face]] for face in mesh.faces
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        # Each object counts back from its own faces.
+        (POSITIONS[:24] + "f -3 -2 -1\n" + POSITIONS[24:] + "f -3 -2 -1\n", [[0, 1, 2], [3, 4, 5]]),
+        (POSITIONS + "f 1 2 3\nf -6//-1 -5//-1 -1//-1\n", [[0, 1, 2], [0, 1, 5]]),
+        (POSITIONS.replace("v 1 0 0", " v 1 0 0") + "f 1 2 3\n", [[0, 1, 2]]),
+        (POSITIONS + "  f 1 2 3\nf 1 2 5\n", [[0, 1, 2], [0, 1, 4]]),
+        (POSITIONS.replace(" ", "\t") + "f\t1\t2\t3\n", [[0, 1, 2]]),
+        ("\ufeff" + POSITIONS + "f 1 2 3\n", [[0, 1, 2]]),
+        (POSITIONS + "f 1 2 3 # the first\nf 1 2 5\n", [[0, 1, 2], [0, 1, 4]]),
+        (POSITIONS.replace("2 2 1", "2 2 1 # a tip") + "f 1 2 5\n", [[0, 1, 4]]),
+        (POSITIONS + "f 1 2\\\n3\nf 1 2 \\\r\n 5\r\n", [[0, 1, 2], [0, 1, 4]]),
+        # As many numbers as a hexagon has.
+        (
+            POSITIONS + "vt 0 0\nf 1/1 2/1 3/1\nf 1 2 3 4 5 6\n",
+            [[0, 1, 2], [0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]],
+        ),
+        (POSITIONS + "f 1 2 3\nf 1 2\nf 3 4\n", [[0, 1, 2]]),
+    ],
+)
+def test_an_obj_says_the_same_however_it_is_written(text, expected):
+    assert triangles(text) == expected
+
+
+def test_texture_coordinates_count_back_from_their_own_face_too():
+    text = "".join(
+        f"v {x} 0 0\nv {x} 1 0\nv {x} 0 1\nvt 0 {x}\nvt 1 {x}\nvt 2 {x}\nf -3/-3 -2/-2 -1/-1\n"
+        for x in (0, 5)
+    )
+    mesh = formats.read(text.encode(), "obj")
+    assert mesh.uv is not None
+    np.testing.assert_array_equal(mesh.uv[mesh.faces][:, :, 1], [[0] * 3, [5] * 3])
+    np.testing.assert_array_equal(mesh.vertices[mesh.faces][:, :, 0], [[0] * 3, [5] * 3])
+
+
+@pytest.mark.parametrize("corner", ["{0}", "{0}/1", "{0}//1", "{0}/1/1"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_the_usual_way_of_writing_is_left_alone(corner, end):
+    faces = "".join(
+        f"f {' '.join(corner.format(v) for v in face)}{end}" for face in ("123", "3456")
+    )
+    data = ("# a part #1" + end + POSITIONS.replace("\n", end) + f"vn 0 0 1{end}" + faces).encode()
+    assert usual_obj(data) is data
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (POSITIONS + "f 0 1 2\n", "line 7 of the OBJ file: a face names vertex 0"),
+        (POSITIONS + "\nf 1 2 7\n", "line 8 .* vertex 7, and there are 6"),
+        ("v 0 0 0\nf 1 -2 1\n" + POSITIONS, "line 2 .* vertex -2, and there are 1"),
+        (POSITIONS + "f 1 2 \\\n x\n", "line 7 .* a corner of a face is no number"),
+        (POSITIONS.replace("2 2 1", "2 2") + "f 1 2 3\n", "line 5 .* a vertex has 2 coordinates"),
+        (
+            POSITIONS.replace("2 2 1", "2,5 2,5 1") + "f 1 2 5\n",
+            "line 5 .* a coordinate is no number",
+        ),
+        (POSITIONS + "f 1 2\nf 2 3\n", "the OBJ file has no faces"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_line(text, words):
+    with pytest.raises(UnreadableError, match=words):
+        formats.read(text.encode(), "obj")
+
+
+def test_an_off_may_begin_with_a_mark_of_its_encoding():
+    data = b"\xef\xbb\xbfOFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    assert len(formats.read(data, "off").faces) == count_triangles(data, "off") == 1
+
+
+def test_faces_behind_blanks_are_counted():
+    assert count_triangles((POSITIONS + "f 1 2 3\n\t f 1 2 3 4\n").encode(), "obj") == 3
