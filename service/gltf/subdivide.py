@@ -119,7 +119,9 @@ def make_scheme(options: Options, model: Model | None) -> Scheme:
         raise NoModelError("no model is loaded; scheme=loop needs none")
     strength = options.prior_strength
     if strength is not None and model.card.prior_strength is None:
-        raise InvalidParameter("prior_strength", f"the model {model.name} has no prior")
+        raise InvalidParameter(
+            "prior_strength", f"the model {model.name} has no prior: leave prior_strength out"
+        )
     return pns(model, options.budget, strength)
 
 

@@ -58,7 +58,7 @@ class Parameters(BaseModel):
     model: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
         default=None,
         description="a name from `GET /models`; empty: the service's default. `scheme=loop` has no "
-        "use for it, nor for `budget`: both are checked and nothing else",
+        "use for it, for `budget` or for `prior_strength`: they are checked and nothing else",
     )
     budget: Annotated[
         Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,

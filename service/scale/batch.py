@@ -145,15 +145,24 @@ def print_summary(summary: Summary, console: Console) -> None:
 
 
 def work_hash(batch: Batch) -> str:
-    """Return what, beside its input, a result depends on, as one hash: options, model, format."""
+    """Return what, beside its input, a result depends on, as one hash: options, model, format.
+
+    Raises:
+        NoModelError: there is no such model, or it cannot be used.
+        InvalidParameter: it is of no use with these options.
+    """
     model = None
     if batch.options.scheme == "pns":
         from pns_common import ModelError, load_model
 
+        from ..gltf.subdivide import make_scheme
+
         try:
-            model = load_model(batch.model).hash
+            loaded = load_model(batch.model)
         except ModelError as error:
             raise NoModelError(str(error)) from error
+        make_scheme(batch.options, loaded)
+        model = loaded.hash
     parts = {
         "options": asdict(batch.options),
         "model": model,
