@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import islice
-from typing import Literal, TypedDict
+from typing import Literal, SupportsIndex, TypedDict
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -101,7 +101,7 @@ class Refinement:
 def refine(
     mesh: Mesh,
     scheme: Scheme,
-    levels: int = 1,
+    levels: SupportsIndex = 1,
     reference_length: float | str = "auto",
     *,
     limit: bool = False,
@@ -138,7 +138,7 @@ def refine(
         MeshError: the refined coordinates are too large.
     """
     _check_kinds(mesh, scheme)
-    _check_levels(levels)
+    levels = checked_levels(levels)
     _check_reference_length(reference_length)
     _check_limit(limit)
     _check_progress(progress)
@@ -297,7 +297,7 @@ def _threads(given: int | None) -> int:
         return available_threads()
     if not (is_whole(given) and given >= 1):
         raise ParameterError("threads", given, expected="a whole number, at least 1")
-    return given
+    return int(given)
 
 
 def _check_kinds(mesh: object, scheme: object) -> None:
@@ -306,9 +306,15 @@ def _check_kinds(mesh: object, scheme: object) -> None:
         raise ParameterError("scheme", type(scheme), expected="loop() or pns(load_model())")
 
 
-def _check_levels(levels: int) -> None:
-    if not (is_whole(levels) and 1 <= levels <= HIGHEST_LEVELS):
-        raise ParameterError("levels", levels, expected=f"a whole number, 1 … {HIGHEST_LEVELS}")
+def checked_levels(given: SupportsIndex) -> int:
+    """Return the depth as Python's own whole number: numpy's small ones cannot count faces.
+
+    Raises:
+        ParameterError: it is none, or out of range.
+    """
+    if not (is_whole(given) and 1 <= (levels := int(given)) <= HIGHEST_LEVELS):
+        raise ParameterError("levels", given, expected=f"a whole number, 1 … {HIGHEST_LEVELS}")
+    return levels
 
 
 def _check_reference_length(given: float | str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, TypeVar, cast
+from typing import Any, SupportsIndex, TypeVar, cast
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from pns_common.interop.of_open3d import read_open3d, write_open3d
 from pns_common.interop.of_pyvista import read_pyvista, write_pyvista
 from pns_common.interop.of_trimesh import read_trimesh, write_trimesh
 from pns_common.mesh import Mesh
-from pns_common.refine import refine
+from pns_common.refine import checked_levels, refine
 from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import Scheme, pns
 
@@ -43,7 +43,10 @@ ADAPTERS = MappingProxyType(
 
 
 def subdivide(
-    mesh: AnyMesh, levels: int = 1, scheme: Scheme | None = None, **options: Any
+    mesh: AnyMesh,
+    levels: SupportsIndex = 1,
+    scheme: Scheme | None = None,
+    **options: Any,
 ) -> AnyMesh:
     """Refine a mesh and return one of the same kind.
 
@@ -70,7 +73,7 @@ def subdivide(
         refined = refine(Mesh(vertices, faces), scheme, levels, **options).mesh
         return type(mesh)((np.array(refined.vertices), np.array(refined.faces)))  # pyright: ignore
     adapter = _adapter(mesh)
-    carried, _ = refine_carried(adapter.read(mesh), scheme, levels, options)
+    carried, _ = refine_carried(adapter.read(mesh), scheme, checked_levels(levels), options)
     return adapter.write(carried, mesh)
 
 

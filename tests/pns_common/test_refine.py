@@ -20,6 +20,14 @@ from tests.support.networks import random_model
 MODEL = random_model(0, scale=30.0)
 
 
+@pytest.mark.parametrize("kind", [np.int8, np.uint8, np.int64])
+def test_levels_and_threads_may_be_numpy_s_whole_numbers(kind):
+    """Small ones end where faces are counted in them."""
+    mesh = Mesh(*grid(8))
+    made = refine(mesh, loop(), kind(3), threads=kind(100)).mesh
+    assert (made.vertices == refine(mesh, loop(), 3).mesh.vertices).all()
+
+
 @pytest.mark.parametrize("levels", [0, -1, 17, 1.5, "2", True, None])
 def test_levels_out_of_range_are_refused(levels):
     with pytest.raises(ParameterError) as caught:

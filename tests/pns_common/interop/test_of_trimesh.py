@@ -20,6 +20,12 @@ class TestTrimesh:
         assert refined.metadata == given.metadata
         assert refined.metadata is not given.metadata
 
+    def test_levels_may_be_a_small_number_of_numpy_s(self):
+        refined = subdivide(self.mesh(face_attributes={"face": np.arange(len(FACES))}), np.uint8(4))
+        np.testing.assert_array_equal(
+            refined.face_attributes["face"], np.repeat(np.arange(len(FACES)), 4**4)
+        )
+
     def test_texture_coordinates_and_material(self):
         material = self.trimesh.visual.material.SimpleMaterial(diffuse=[9, 8, 7, 255])
         visual = self.trimesh.visual.TextureVisuals(uv=UV, material=material)
