@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from service.http import documentation
+from service.errors import ServiceError
+from service.http import documentation, routes  # noqa: F401  (every error's class)
+from service.http.connection.protocol import HEAD_BYTES
+from service.http.watch.journal import GONE
 from service.settings import Settings
 from service.workers.catalogue import ModelEntry
 
@@ -26,6 +29,25 @@ def test_the_list_of_models_has_the_fields_of_the_example():
 def test_the_example_of_a_job_has_the_fields_of_a_job():
     _, job = examples()
     assert set(job) == set(documentation.JOB_FIELDS)
+
+
+def errors(cls=ServiceError):
+    """Yield the statuses of the service's errors."""
+    yield cls.status
+    for kind in cls.__subclasses__():
+        yield from errors(kind)
+
+
+def test_every_status_of_an_error_is_on_the_page():
+    listed = {
+        int(status)
+        for row in re.findall(r"^\| ([\d, ]+) \|", PAGE, re.MULTILINE)
+        for status in row.split(",")
+    }
+    # Those that the protocol's parser gives, too; 499 is of those who are gone, for the log alone.
+    assert (set(errors()) | {405, 431, 501, 505}) - {GONE} <= listed
+    assert f"status {GONE}" in PAGE
+    assert f"{HEAD_BYTES // 1024} KiB" in PAGE
 
 
 def examples():
