@@ -15,12 +15,13 @@ from jaxtyping import Float
 from pns_common.connectivity.disjoint_union import disjoint_faces
 
 from ..bodies.media import GLTF_KINDS
-from ..errors import UnreadableError
+from ..errors import UnreadableError, UnrefinableError
 from . import unsupported
 from .indexed_triangles import NUMBER, IndexedTriangles
 from .obj_text import usual_obj, written_anew
 from .off import read_off, write_off
 from .ply.polygons import of_triangles
+from .single_precision import LARGEST
 
 if TYPE_CHECKING:
     import trimesh
@@ -51,15 +52,29 @@ def read(data: bytes, kind: str) -> IndexedTriangles:
 
     Raises:
         UnreadableError: not a file of this kind, or one without faces, or without all of them.
+        UnrefinableError: a face names a vertex that there is not.
     """
-    if kind == "off":
-        return read_off(data)
+    triangles = read_off(data) if kind == "off" else _read_by_trimesh(data, kind)
+    faces, count = triangles.faces, len(triangles.vertices)
+    if len(faces) == 0:
+        raise UnreadableError(f"the {kind.upper()} file has no faces of three vertices")
+    if not (faces.min() >= 0 and faces.max() < count):
+        worst = int(np.argmin(((faces >= 0) & (faces < count)).all(axis=1)))
+        raise UnrefinableError(
+            f"the {kind.upper()} file has a triangle of the vertices {faces[worst].tolist()}, "
+            f"expected 0 … {count - 1}"
+        )
+    return triangles
+
+
+def _read_by_trimesh(data: bytes, kind: str) -> IndexedTriangles:
     data, polygons = of_triangles(data) if kind == "ply" else (data, None)
     scene = _scene(data, kind)
     parts = [part for part in scene.geometry.values() if isinstance(part, load_readers().Trimesh)]
-    # An OBJ whose polygons have two corners each has parts of none.
-    if not parts or (kind == "obj" and not any(np.size(part.faces) for part in parts)):
-        raise UnreadableError(f"the {kind.upper()} file has no faces")
+    if not parts:
+        # A binary one that is cut off, or goes on, is taken for text.
+        other = " as text up to endsolid, and is no whole binary STL" if kind == "stl" else ""
+        raise UnreadableError(f"the {kind.upper()} file has no faces{other}")
     faces = disjoint_faces((np.asarray(part.faces), len(part.vertices)) for part in parts)
     uv = _uv(parts)
     count, others = _beside_triangles(data, kind, parts, polygons, has_uv=uv is not None)
@@ -135,10 +150,16 @@ def _is_binary_stl(data: bytes) -> bool:
 
 
 def _uv(parts: list[trimesh.Trimesh]) -> Float[np.ndarray, "N 2"] | None:
-    """Return all parts' texture coordinates, if all have them: half a seam is not interpolated."""
+    """Return all parts' texture coordinates, if all have them: half a seam is not interpolated.
+
+    One number is none, nor is what float32 cannot hold.
+    """
     of_parts = [getattr(part.visual, "uv", None) for part in parts]
-    if any(uv is None or len(uv) != len(p.vertices) for uv, p in zip(of_parts, parts, strict=True)):
-        return None
+    for uv, part in zip(of_parts, parts, strict=True):
+        if uv is None or len(uv) != len(part.vertices) or np.shape(uv)[1:] < (2,):
+            return None
+        if not (np.abs(uv) <= LARGEST).all():
+            return None
     return np.concatenate([uv for uv in of_parts if uv is not None])[:, :2].astype(np.float64)
 
 

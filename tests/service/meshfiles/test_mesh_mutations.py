@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
+from typing import cast
 
 import pytest
 import trimesh
 
 from pns_common.errors import PnsError
 from pns_common.schemes import loop
+from service.bodies.media import Kind
+from service.bodies.uploads import Sent
 from service.errors import ServiceError
+from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles import formats
 from service.meshfiles.refine_triangles import refine_triangles
+from service.meshfiles.to_gltf import as_gltf
 from service.options import Limits, Options
 
 LIMITS = Limits(max_faces=20_000, max_memory_bytes=64 * 2**20)
@@ -59,6 +64,18 @@ def outcome(data: bytes, kind: str) -> str:
     return refusal.code
 
 
+def status_of(data: bytes, kind: str) -> int:
+    """Return what the service would answer, which has it as glTF; other exceptions fail."""
+    try:
+        upload = as_gltf(Sent(data, cast(Kind, kind)), OPTIONS, LIMITS)
+        subdivide_gltf(upload.data, "glb", OPTIONS, None, LIMITS)
+    except ServiceError as refusal:
+        return refusal.status
+    except PnsError:
+        return 422
+    return 200
+
+
 def flipped(data: bytes, rng: random.Random) -> bytes:
     mutant = bytearray(data)
     for _ in range(rng.choice([1, 1, 2, 8, 64])):
@@ -94,5 +111,51 @@ def test_broken_files_give_results_or_named_refusals(
 ) -> None:
     kind, data = samples()[name]
     rng = random.Random(0)
-    seen = {outcome(change(data, rng), kind) for _ in range(MUTANTS)}
+    mutants = [change(data, rng) for _ in range(MUTANTS)]
+    seen = {outcome(mutant, kind) for mutant in mutants}
     assert "unreadable" in seen
+    assert {status_of(mutant, kind) for mutant in mutants} <= {200, 400, 413, 422}
+
+
+@pytest.mark.parametrize("vertex", ["-1", "3", "4294967299"])
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [
+        ("off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 {}\n"),
+        (
+            "ply",
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+            "property float z\nelement face 2\nproperty list uchar int64 vertex_indices\n"
+            "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 {}\n",
+        ),
+    ],
+)
+def test_a_face_of_a_vertex_that_there_is_not_is_named(kind: str, text: str, vertex: str) -> None:
+    data = text.format(vertex).encode()
+    if kind == "ply":
+        data = data.replace(b"int64", b"int" if int(vertex) < 2**31 else b"double")
+    with pytest.raises(ServiceError, match=rf"\[0, 1, {vertex}\]") as refusal:
+        as_gltf(Sent(data, cast(Kind, kind)), OPTIONS, LIMITS)
+    assert refusal.value.status == 422
+
+
+@pytest.mark.parametrize("vt", ["vt 0.5", "vt nan 0", "vt 1e39 0"])
+def test_texture_coordinates_that_are_none_are_left_out(vt: str) -> None:
+    text = f"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n{vt}\nf 1/1 2/2 3/1\n"
+    mesh_file = formats.read(text.encode(), "obj")
+    assert mesh_file.uv is None
+    assert mesh_file.unsupported == {"texture coordinates that not all faces have": 2}
+    assert status_of(text.encode(), "obj") == 200
+
+
+def test_a_file_of_lines_has_no_faces() -> None:
+    data = b"OFF\n0 2 0\n0 0 0\n1 0 0\n"
+    with pytest.raises(ServiceError, match="no faces of three vertices"):
+        as_gltf(Sent(data, "off"), OPTIONS, LIMITS)
+
+
+def test_a_binary_stl_that_is_cut_off_is_told() -> None:
+    data = samples()["stl"][1]
+    for other in (data[:-1], data + b"more"):
+        with pytest.raises(ServiceError, match="no whole binary STL"):
+            formats.read(other, "stl")
