@@ -32,8 +32,9 @@ HOLDS_UV = frozenset({"obj", *GLTF_KINDS})
 _OBJ_UV = re.compile(rb"^[ \t]*vt[ \t]", re.MULTILINE)
 _OBJ_PART = re.compile(rb"^[ \t]*(?:usemtl|o|g)(?:[ \t][^\n]*)?$", re.MULTILINE)
 _STL_PART = re.compile(rb"(?im)^[ \t]*(?:endsolid|solid)(?:[ \t][^\n]*)?\r?$")
-# trimesh takes time in the square of the parts that materials and names divide a file into. They
-# are lost in any case; beyond so many statements they are passed over before it reads.
+# trimesh gathers an OBJ's faces by material, the last first, and takes time in the square of the
+# parts that materials and names divide a file into. They are lost in any case: an OBJ's are passed
+# over before it reads, so that its faces stay in their order; an STL's beyond so many statements.
 MOST_PARTS = 100
 _OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]", re.MULTILINE)
 
@@ -110,16 +111,14 @@ def _scene(data: bytes, kind: str) -> trimesh.Scene:
     readers = load_readers()
     text = _as_utf8(data) if kind == "obj" or (kind == "stl" and not _is_binary_stl(data)) else data
     if kind == "obj":
-        text = usual_obj(text)
-        if len(_OBJ_PART.findall(text)) > MOST_PARTS:
-            text = _OBJ_PART.sub(b"", text)
+        text = _OBJ_PART.sub(b"", usual_obj(text))
     if kind == "stl" and not _is_binary_stl(data) and len(_STL_PART.findall(text)) > MOST_PARTS:
         text = b"solid\n" + _STL_PART.sub(b"", text) + b"\nendsolid\n"
     try:
         with warnings.catch_warnings():
             # Where a number cannot be read, numpy warns and leaves out all that follows.
             warnings.simplefilter("error")
-            # Each part comes apart by material; as they are listed, they make the file's triangles.
+            # An STL's solids come apart; as they are listed, they make the file's triangles.
             scene = readers.load_scene(io.BytesIO(text), file_type=kind, process=False)
     except MemoryError:
         raise

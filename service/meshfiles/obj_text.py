@@ -24,7 +24,6 @@ _FACE = re.compile(rb"\nf(?= )")
 _OTHER_FACES = [(re.compile(way), re.compile(rb"\nf(?= )(?!" + way + rb")")) for way in _WAYS]
 _OTHER_LINE = re.compile(rb"\n(?:[ \t]++(?:v|vt|f)[ \t]|(?:v|vt|f)\t|vt? [^\n#]*+#)")
 _CONTINUED = re.compile(rb"\\\r?\n")
-_KEPT = frozenset({b"usemtl", b"o", b"g", b"s"})
 
 
 def usual_obj(data: bytes) -> bytes:
@@ -57,7 +56,7 @@ class _Counts:
 
 
 def written_anew(text: bytes) -> bytes:
-    """Return positions, faces of three corners or more, and what divides them, line by line.
+    """Return positions, texture coordinates, and faces of three corners or more, line by line.
 
     Texture coordinates stay where all corners have them: half of them are not interpolated.
 
@@ -85,8 +84,6 @@ def written_anew(text: bytes) -> bytes:
                 textured = textured and all(vt > 0 for _, vt in corners)
                 line = b"f" + b"".join(b" %d/%d" % corner for corner in corners)
                 plain = b"f" + b"".join(b" %d" % v for v, _ in corners)
-            case name if name in _KEPT:
-                line = b" ".join(words)
             case _:
                 continue
         bare += b"%b\n" % (line if plain is None else plain)

@@ -45,6 +45,17 @@ def test_an_obj_says_the_same_however_it_is_written(text, expected):
     assert triangles(text) == expected
 
 
+@pytest.mark.parametrize("corner", ["{0}", "{0}/1", "{0}/1/1"])
+def test_faces_stay_in_their_order_whatever_divides_them(corner):
+    """Numbers of a refined mesh follow it, and what is known of faces from elsewhere."""
+    marks = ["o one", "usemtl a", "usemtl b", "usemtl a\no two", "g c"]
+    faces = [[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 5], [0, 2, 4]]
+    text = POSITIONS + "vt 0 0\nvn 0 0 1\n"
+    for mark, face in zip(marks, faces, strict=True):
+        text += f"{mark}\nf {' '.join(corner.format(v + 1) for v in face)}\n"
+    assert triangles(text) == faces
+
+
 def test_texture_coordinates_count_back_from_their_own_face_too():
     text = "".join(
         f"v {x} 0 0\nv {x} 1 0\nv {x} 0 1\nvt 0 {x}\nvt 1 {x}\nvt 2 {x}\nf -3/-3 -2/-2 -1/-1\n"
