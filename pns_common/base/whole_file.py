@@ -16,7 +16,8 @@ def replacing(path: Path) -> Generator[Path, None, None]:
     Nobody ever sees half a file; where writing fails, nothing is left of the new one.
 
     Raises:
-        OSError: the folder is missing or cannot be written; `path` is then as it was.
+        OSError: the folder is missing or cannot be written, or the disk is full; it names `path`,
+            which is then as it was.
     """
     with _new_file(path) as (temporary, descriptor):
         os.close(descriptor)
@@ -43,6 +44,9 @@ def _new_file(path: Path) -> Generator[tuple[Path, int], None, None]:
     try:
         yield temporary, descriptor
         temporary.replace(path)
-    except BaseException:
+    except BaseException as error:
         temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (None, temporary, str(temporary)):
+            # A write that fails, of a full disk for one, names no file; and nobody asked for this.
+            error.filename, error.filename2 = str(path), None
         raise

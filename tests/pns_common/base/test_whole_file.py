@@ -1,5 +1,9 @@
 """A file is written whole or not at all."""
 
+import errno
+import resource
+import signal
+
 import pytest
 
 from pns_common.base.whole_file import replace_file, replacing
@@ -44,3 +48,33 @@ def test_a_missing_folder_is_named_by_the_file_that_was_asked_for(tmp_path):
     with pytest.raises(FileNotFoundError) as refusal:
         replace_file(path, b"")
     assert refusal.value.filename == str(path)
+
+
+def test_where_a_file_cannot_be_put_it_is_named(tmp_path):
+    """Not the temporary one, which nobody asked for."""
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(IsADirectoryError) as refusal:
+        replace_file(tmp_path / "folder", b"")
+    assert refusal.value.filename == str(tmp_path / "folder")
+    assert str(tmp_path / "folder") in str(refusal.value)
+    assert ".tmp" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("write", [replace_file, lambda path, data: writes(path, data)])
+def test_a_write_that_fails_names_the_file(tmp_path, write):
+    path, before = tmp_path / "part.glb", resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        with pytest.raises(OSError, match=r"part\.glb") as refusal:
+            write(path, bytes(10_000))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert (refusal.value.errno, refusal.value.filename) == (errno.EFBIG, str(path))
+    assert list(tmp_path.iterdir()) == []
+
+
+def writes(path, data):
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)
