@@ -34,6 +34,7 @@ from pns_common.fused.kernels.bent_part import (
     take_edges,
     take_faces,
 )
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.fused.surroundings import Surroundings
 
@@ -68,12 +69,8 @@ class Rows:
     def spread(self, added: Additions, to: Additions, blocks: Blocks) -> Bool[np.ndarray, " N"]:
         """Write what rows of the part got, nothing at others; return where that is not 0."""
         moved = np.empty(len(self.flags), dtype=bool)
-        args = self.flags, self.numbers, *_values(added)
-
-        def write(rows: slice) -> None:
-            spread(*args, rows.start, rows.stop, *_values(to), moved)
-
-        blocks.run(len(moved), write)
+        args = self.flags, self.numbers, *_values(added), ROWS, *_values(to), moved
+        blocks.run(len(moved), spread.over(*args))
         return moved
 
 
@@ -117,8 +114,8 @@ def _may_pay(whole: Surroundings) -> bool:
 
 def _bent_ends(whole: Surroundings, blocks: Blocks) -> Bool[np.ndarray, " V"]:
     mesh, ends = whole.mesh, np.zeros(whole.mesh.vertex_count, dtype=bool)
-    args = whole.faces.normals, mesh.edges, mesh.half_edges, mesh.edge_class
-    blocks.run(len(mesh.edges), lambda rows: mark_bent_ends(*args, rows.start, rows.stop, ends))
+    args = whole.faces.normals, mesh.edges, mesh.half_edges, mesh.edge_class, ROWS, ends
+    blocks.run(len(mesh.edges), mark_bent_ends.over(*args))
     return ends
 
 
@@ -127,42 +124,32 @@ def _faces_around(
 ) -> tuple[Bool[np.ndarray, " F"], Bool[np.ndarray, " V"]]:
     """Return the faces that touch marked vertices, and all corners of these."""
     touched, corners = np.empty(len(mesh.faces), dtype=bool), np.zeros(len(marked), dtype=bool)
-    args = mesh.faces, marked
-
-    def mark(rows: slice) -> None:
-        mark_around(*args, rows.start, rows.stop, touched, corners)
-
-    blocks.run(len(touched), mark)
+    blocks.run(len(touched), mark_around.over(mesh.faces, marked, ROWS, touched, corners))
     return touched, corners
 
 
 def _sides(part: Bool[np.ndarray, " F"], mesh: MeshEdges, blocks: Blocks) -> Bool[np.ndarray, " E"]:
     """Return the edges of some faces."""
-    sides, args = np.zeros(len(mesh.edges), dtype=bool), (mesh.face_edges, part)
-    blocks.run(len(part), lambda rows: mark_sides(*args, rows.start, rows.stop, sides))
+    sides = np.zeros(len(mesh.edges), dtype=bool)
+    blocks.run(len(part), mark_sides.over(mesh.face_edges, part, ROWS, sides))
     return sides
 
 
 def _cut(mesh: MeshEdges, faces: Rows, vertices: Rows, edges: Rows, blocks: Blocks) -> MeshEdges:
     """Return some faces, with their vertices and edges, as a mesh."""
     corners, sides = (np.empty((len(faces.rows), 3), dtype=np.int32) for _ in range(2))
-
-    def of_faces(some: slice) -> None:
-        bounds = some.start, some.stop
-        take_faces(mesh.faces, vertices.numbers, faces.rows, *bounds, corners)
-        take_faces(mesh.face_edges, edges.numbers, faces.rows, *bounds, sides)
-
-    blocks.run(len(faces.rows), of_faces)
+    for values, numbers, taken in (
+        (mesh.faces, vertices.numbers, corners),
+        (mesh.face_edges, edges.numbers, sides),
+    ):
+        take = take_faces.over(values, numbers, faces.rows, ROWS, taken)
+        blocks.run(len(faces.rows), take)
     count = len(edges.rows)
     ends, half_edges = (np.empty((count, 2), dtype=np.int32) for _ in range(2))
     edge_class = np.empty(count, dtype=np.int8)
     of_whole = mesh.edges, mesh.half_edges, mesh.edge_class, edges.rows
     numbers = vertices.numbers, faces.numbers, faces.flags
-
-    def of_edges(some: slice) -> None:
-        take_edges(*of_whole, *numbers, some.start, some.stop, ends, half_edges, edge_class)
-
-    blocks.run(count, of_edges)
+    blocks.run(count, take_edges.over(*of_whole, *numbers, ROWS, ends, half_edges, edge_class))
     own = corners, ends, sides, half_edges, edge_class
     return MeshEdges(len(vertices.rows), *own, plain=mesh.plain)
 

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.creases import (
     drop_loose_ends,
     mark_edges_beyond,
@@ -28,10 +29,10 @@ def crease_line_rows(
     cosine, count = math.cos(math.radians(angle)), len(mesh.edges)
     beyond, found = np.empty(count, dtype=bool), np.zeros(blocks.count(count), dtype=np.int64)
     around = normals, mesh.half_edges, mesh.edge_class, cosine
+    mark_beyond = mark_edges_beyond.over(*around, ROWS, beyond)
 
     def mark(rows: slice) -> None:
-        bounds = rows.start, rows.stop
-        found[blocks.number(rows, count)] = mark_edges_beyond(*around, *bounds, beyond)
+        found[blocks.number(rows, count)] = mark_beyond(rows)
 
     blocks.run(count, mark)
     if not found.any():
@@ -39,11 +40,7 @@ def crease_line_rows(
     sharp = np.flatnonzero(beyond).astype(np.int32)
     is_flat = np.empty(len(sharp), dtype=bool)
     sides = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
-
-    def look(rows: slice) -> None:
-        mark_flat_sides(*sides, rows.start, rows.stop, is_flat)
-
-    blocks.run(len(sharp), look)
+    blocks.run(len(sharp), mark_flat_sides.over(*sides, ROWS, is_flat))
     flat = sharp[is_flat]
     left = np.ones(len(flat), dtype=bool)
     met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))

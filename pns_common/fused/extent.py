@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.extent import farthest, mark_referenced_long, sum_referenced
 
 
@@ -16,6 +17,6 @@ def reference_length(
 ) -> float:
     """Return R: the largest distance of a referenced vertex from their centroid, over √2."""
     used, total = np.zeros(len(vertices), dtype=bool), np.empty(3)
-    blocks.run(len(faces), lambda rows: mark_referenced_long(faces, rows.start, rows.stop, used))
+    blocks.run(len(faces), mark_referenced_long.over(faces, ROWS, used))
     count = sum_referenced(vertices, used, total)
     return farthest(vertices, used, total / count) / math.sqrt(2)

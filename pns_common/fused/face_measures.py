@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.rings import measure_faces
 
 UNASKED = np.zeros((0, 4))
@@ -72,9 +73,5 @@ def _measure(
 ) -> Float[np.ndarray, "F 3"]:
     """Return normals, and write areas where there are rows for them."""
     normals = np.empty((len(faces), 3))
-
-    def measure(rows: slice) -> None:
-        measure_faces(points, faces, rows.start, rows.stop, normals, areas)
-
-    blocks.run(len(faces), measure)
+    blocks.run(len(faces), measure_faces.over(points, faces, ROWS, normals, areas))
     return normals

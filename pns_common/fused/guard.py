@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 
 from pns_common.base.blocks import Blocks
 from pns_common.formula.fold_guard import ROUNDS, FoldGuard
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.guard import HELD, find_folds
 from pns_common.fused.kernels.together import TOGETHER
 from pns_common.fused.mesh_edges import MeshEdges
@@ -54,10 +55,6 @@ def _touched(
 ) -> Bool[np.ndarray, " W"]:
     """Return folded children's corners, of children whose corners ``changed``; empty: of all."""
     touched = np.zeros(mesh.vertex_count + len(mesh.edges), dtype=bool)
-    args = mesh.faces, mesh.face_edges, mesh.vertex_count, changed
-
-    def look(rows: slice) -> None:
-        find_folds(*around, *args, rows.start, rows.stop, np.empty(HELD * TOGETHER), touched)
-
-    blocks.run(len(mesh.faces), look)
+    find = find_folds.over(*around, mesh.faces, mesh.face_edges, mesh.vertex_count, changed, ROWS)
+    blocks.run(len(mesh.faces), lambda rows: find(rows, np.empty(HELD * TOGETHER), touched))
     return touched

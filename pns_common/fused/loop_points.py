@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from pns_common.base.blocks import Blocks
 from pns_common.fused.freed_memory import make_room
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.masks import (
     add_displacement,
     blend_vertices,
@@ -28,21 +29,8 @@ def loop_points(
     count, edge_count = mesh.vertex_count, len(mesh.edges)
     placed = np.empty((count + edge_count, 3))
     make_room(placed.nbytes)
-    edge_points = placed[count:]
-
-    def edges(rows: slice) -> None:
-        place_edges(
-            points,
-            mesh.faces,
-            mesh.edges,
-            mesh.half_edges,
-            mesh.edge_class,
-            rows.start,
-            rows.stop,
-            edge_points,
-        )
-
-    blocks.run(edge_count, edges)
+    args = points, mesh.faces, mesh.edges, mesh.half_edges, mesh.edge_class
+    blocks.run(edge_count, place_edges.over(*args, ROWS, placed[count:]))
     place_vertices(points, mesh, blocks, placed[:count])
     return placed
 
@@ -57,10 +45,10 @@ def owners(blocks: Blocks, count: int) -> Blocks:
 
 def largest_size(points: Float[np.ndarray, "V 3"], blocks: Blocks) -> float:
     """Return the largest absolute coordinate; NaN where one is."""
-    sizes = np.zeros(blocks.count(len(points)))
+    sizes, largest = np.zeros(blocks.count(len(points))), largest_coordinate.over(points, ROWS)
 
     def measure(rows: slice) -> None:
-        sizes[blocks.number(rows, len(points))] = largest_coordinate(points, rows.start, rows.stop)
+        sizes[blocks.number(rows, len(points))] = largest(rows)
 
     blocks.run(len(points), measure)
     return float(sizes.max(initial=0))
@@ -78,11 +66,11 @@ def add_to(
     """
     count = blocks.count(len(points))
     sizes, squares = np.zeros(count), np.zeros((count, 1))
+    add_rows = add_displacement.over(displacement, first, ROWS, points)
 
     def add(rows: slice) -> None:
         block = blocks.number(rows, len(points))
-        bounds = first, rows.start, rows.stop
-        sizes[block] = add_displacement(displacement, *bounds, points, squares[block])
+        sizes[block] = add_rows(rows, squares[block])
 
     blocks.run(len(points), add)
     return float(sizes.max(initial=0)), math.sqrt(squares.max(initial=0))
@@ -96,19 +84,16 @@ def place_vertices(
 ) -> None:
     """Write Loop's old vertices into ``placed``."""
     count = mesh.vertex_count
-    valence, reach = np.empty(count, dtype=np.int32), mesh.edge_reach
+    valence = np.empty(count, dtype=np.int32)
     sharp, sharp_edges = mesh.sharp, mesh.sharp_edges
+    add_up = sum_rings.over(points, mesh.edges, mesh.edge_reach, ROWS, placed, valence)
+    along = sum_along_curves.over(points, mesh.edges, sharp_edges, sharp, ROWS, placed)
 
     def rings(rows: slice) -> None:
-        sum_rings(points, mesh.edges, reach, rows.start, rows.stop, placed, valence)
+        add_up(rows)
         if len(sharp):
-            bounds = rows.start, rows.stop
-            sum_along_curves(points, mesh.edges, sharp_edges, sharp, *bounds, placed)
+            along(rows)
 
     owners(blocks, count).run(count, rings)
     beta = weights_of(valence).beta
-
-    def blend(rows: slice) -> None:
-        blend_vertices(points, valence, sharp, beta, rows.start, rows.stop, placed)
-
-    blocks.run(count, blend)
+    blocks.run(count, blend_vertices.over(points, valence, sharp, beta, ROWS, placed))

@@ -17,6 +17,7 @@ from pns_common.fused.kernels.children import (
     split_faces,
     split_faces_long,
 )
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.edges import (
     HIGH,
     INTERIOR,
@@ -148,11 +149,7 @@ def build_edges(faces: Int[np.ndarray, "F 3"], vertex_count: int, blocks: Blocks
     edges, half_edges = (np.empty((chains.count, 2), dtype=np.int32) for _ in range(2))
     edge_class = np.empty(chains.count, dtype=np.int8)
     chained = faces, faces.reshape(-1), chains.low, chains.links, int(chains.plain)
-
-    def run(rows: slice) -> None:
-        classify(*chained, rows.start, rows.stop, edges, half_edges, edge_class)
-
-    blocks.run(chains.count, run)
+    blocks.run(chains.count, classify.over(*chained, ROWS, edges, half_edges, edge_class))
     return MeshEdges(
         vertex_count, faces, edges, chains.face_edges, half_edges, edge_class, plain=chains.plain
     )
@@ -165,40 +162,14 @@ def split_mesh_edges(parent: MeshEdges, blocks: Blocks) -> MeshEdges:
     if not parent.plain:
         return build_edges(faces, vertices, blocks)
     halves = np.empty((len(parent.edges), 2), dtype=np.int32)
-
-    def number(rows: slice) -> None:
-        number_halves(
-            parent.faces,
-            parent.face_edges,
-            parent.edges,
-            parent.half_edges,
-            rows.start,
-            rows.stop,
-            halves,
-        )
-
-    blocks.run(count, number)
+    of_parent = parent.faces, parent.face_edges, parent.edges, parent.half_edges
+    blocks.run(count, number_halves.over(*of_parent, ROWS, halves))
     made = 2 * len(parent.edges) + 3 * count
     edges, half_edges = (np.empty((made, 2), dtype=np.int32) for _ in range(2))
     edge_class, face_edges = np.empty(made, dtype=np.int8), np.empty((4 * count, 3), dtype=np.int32)
-
-    def fill(rows: slice) -> None:
-        split_edges(
-            parent.faces,
-            parent.face_edges,
-            parent.half_edges,
-            parent.edge_class,
-            halves,
-            parent.vertex_count,
-            rows.start,
-            rows.stop,
-            face_edges,
-            edges,
-            half_edges,
-            edge_class,
-        )
-
-    blocks.run(count, fill)
+    of_parent = parent.faces, parent.face_edges, parent.half_edges, parent.edge_class
+    to = face_edges, edges, half_edges, edge_class
+    blocks.run(count, split_edges.over(*of_parent, halves, parent.vertex_count, ROWS, *to))
     return MeshEdges(vertices, faces, edges, face_edges, half_edges, edge_class, plain=True)
 
 
@@ -209,11 +180,8 @@ def split_mesh_faces(
     faces = np.empty((4 * len(parent.faces), 3), dtype=dtype)
     make_room(faces.nbytes)
     split = split_faces if dtype is np.int32 else split_faces_long
-
-    def fill(rows: slice) -> None:
-        split(parent.faces, parent.face_edges, parent.vertex_count, rows.start, rows.stop, faces)
-
-    blocks.run(len(parent.faces), fill)
+    of_parent = parent.faces, parent.face_edges, parent.vertex_count
+    blocks.run(len(parent.faces), split.over(*of_parent, ROWS, faces))
     return faces
 
 

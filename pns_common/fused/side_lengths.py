@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.side_lengths import sum_sides
 from pns_common.geometry.side_lengths import BLOCK_FACES, SideLengths
 
@@ -34,10 +35,7 @@ def side_lengths_of_parts(
     starts = np.add(np.repeat(parts[:-1], of_part), BLOCK_FACES * within)
     ends = np.minimum(starts + BLOCK_FACES, np.repeat(parts[1:], of_part))
     sums = np.empty((len(starts), 2))
-
-    def measure(rows: slice) -> None:
-        sum_sides(points, faces, starts, ends, rows.start, rows.stop, sums)
-
+    measure = sum_sides.over(points, faces, starts, ends, ROWS, sums)
     some = max(1, -(-len(starts) // (2 * blocks.threads)))
     blocks.unheard().of_rows(some).run(len(starts), measure)
     return [

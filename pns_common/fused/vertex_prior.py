@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.fused.curves import placed_pushes
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.vertex_prior import add_priors, add_priors_but_at_tips
 from pns_common.fused.loop_points import place_vertices
 from pns_common.fused.loop_weights import weights_of
@@ -21,16 +22,11 @@ def priors_at(
     prior = np.empty_like(level.pushes)
     place_vertices(level.pushes, level.mesh, level.blocks, prior)
     of_curves = placed_pushes(curves, level.mesh, rings.valence, level.blocks)
-    parts = of_curves, curves.nothing, level.prior_strengths(vertices), vertices
-    weights, measured = weights_of(rings.valence), (rings.means, rings.fields, rings.valence)
-    around = level.pushes, *measured, weights.ring, weights.further
-
-    def add(rows: slice) -> None:
-        add_priors(*parts, rows.start, rows.stop, prior)
-
-    def add_but_at_tips(rows: slice) -> None:
-        strength = form.tip_strength
-        add_priors_but_at_tips(*parts, rows.start, rows.stop, *around, strength, prior)
-
-    level.blocks.run(len(vertices), add_but_at_tips if form.tip_strength else add)
+    parts = of_curves, curves.nothing, level.prior_strengths(vertices), vertices, ROWS
+    add = add_priors.over(*parts, prior)
+    if form.tip_strength:
+        weights, measured = weights_of(rings.valence), (rings.means, rings.fields, rings.valence)
+        around = level.pushes, *measured, weights.ring, weights.further
+        add = add_priors_but_at_tips.over(*parts, *around, form.tip_strength, prior)
+    level.blocks.run(len(vertices), add)
     return prior

@@ -63,6 +63,9 @@ SINGLES = Array("float32", 1)
 SINGLES_OUT, SINGLES_2_OUT = (Array("float32", n, written=True) for n in (1, 2))
 FLAGS, FLAGS_OUT = Array("bool", 1), Array("bool", 1, written=True)
 
+# Stands for the two arguments ``begin`` and ``end`` of a kernel that is called for many blocks.
+ROWS = slice(None)
+
 # The mark of helpers that do not become part of a loop.
 SELDOM = "called_seldom"
 
@@ -103,6 +106,24 @@ class Kernel:
     def __call__(self, *values: Any) -> Any:
         """Run it. Raises TypeError where an argument is of another type."""
         return self.code(*[take(value) for take, value in zip(self._take, values, strict=True)])
+
+    def over(self, *values: Any) -> Callable[..., Any]:
+        """Return it as a function of a block's rows, for which ROWS stands among its arguments.
+
+        These are checked once, not for every block; what comes after them is given with the rows.
+        Raises TypeError where one is of another type.
+        """
+        at = next(i for i, value in enumerate(values) if value is ROWS)
+        before, after = self._take[:at], self._take[at + 2 : len(values) + 1]
+        first = [take(value) for take, value in zip(before, values[:at], strict=True)]
+        then = [take(value) for take, value in zip(after, values[at + 1 :], strict=True)]
+        left = self._take[len(values) + 1 :]
+
+        def run(rows: slice, *more: Any) -> Any:
+            last = [take(value) for take, value in zip(left, more, strict=True)]
+            return self.code(*first, rows.start, rows.stop, *then, *last)
+
+        return run
 
     @cached_property
     def code(self) -> Callable[..., Any]:

@@ -7,6 +7,7 @@ from pns_common.fused.kernels.compiled import (
     INDEX,
     NUMBERS_OUT,
     POINTS,
+    ROWS,
     SELDOM,
     SIZE,
     Array,
@@ -48,6 +49,31 @@ def test_a_kernel_has_its_functions_words_and_takes_numbers_as_they_are_declared
     assert (type(more), more) == (int, 4)
     with pytest.raises(ValueError, match="zip"):
         counted(np.zeros((1, 3)))
+
+
+def test_a_kernel_over_rows_checks_once_what_is_given_once():
+    @kernel(SIZE, POINTS, SIZE, SIZE, NUMBERS_OUT, SIZE)
+    def counted(points, begin, end, sums, more):
+        """How many."""
+
+    seen = []
+    counted.code = lambda *given: seen.append(given)  # in place of machine code
+    points, sums = np.zeros((4, 3)), np.zeros(1)
+    over = counted.over(points, ROWS, sums)
+    over(slice(0, 2), 3)
+    over(slice(2, 4), np.int8(4))
+    assert [(begin, end, more) for _, begin, end, _, more in seen] == [(0, 2, 3), (2, 4, 4)]
+    assert all(given[0] is points and given[3] is sums for given in seen)
+    with pytest.raises(ValueError, match="zip"):
+        over(slice(0, 2))
+    counted.over(points, ROWS)(slice(0, 2), sums, 5)
+    with pytest.raises(TypeError, match="a kernel takes"):
+        counted.over(points, ROWS)(slice(0, 2), points, 5)
+    for wrong in ((sums, ROWS), (points, ROWS, points)):
+        with pytest.raises(TypeError, match="a kernel takes"):
+            counted.over(*wrong)
+    with pytest.raises(ValueError, match="zip"):
+        counted.over(points, ROWS, sums, 5, 6)
 
 
 def test_a_helper_may_be_kept_out_of_loops():
