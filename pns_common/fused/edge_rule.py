@@ -45,7 +45,7 @@ def add_at_edges(
     pushes = level.pushes if isinstance(rule, ScaleFreeEdgeRule) else NO_FIELDS
     reads_sides = isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates
     bends = level.bends if reads_sides else NO_BENDS
-    measures = level.points, normals, fields, bends, level.lengths.lengths, level.lengths.logs
+    measures = level.points, normals, fields, bends, level.edges.lengths, level.logs
     read = [each.reshape(-1) for each in (*measures, *connectivity)]
     symmetric = int(rule.operator.orientation is SYMMETRIC)
 
@@ -74,7 +74,7 @@ def add_at_edges(
             form = rule.form
             bounded = longest if form.wide_bound else length
             budget_per_length = level.budget_per_length(stencils[:, 0], form.budget)
-            answer = eta, frame, level.rings.network_lengths, bounded, gate, budget_per_length
+            answer = eta, frame, level.edges.network_lengths, bounded, gate, budget_per_length
             prior = (
                 pushes,
                 bounds.pushes,

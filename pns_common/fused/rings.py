@@ -10,7 +10,9 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import EdgeClass
 from pns_common.formula.side_gate import GENTLE_TO_SHARP, widest, with_neighbours
+from pns_common.fused.edge_measures import EdgeMeasures
 from pns_common.fused.face_measures import FaceMeasures
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.extent import mark_referenced
 from pns_common.fused.kernels.rings import (
     VERTEX_COLUMNS,
@@ -18,7 +20,6 @@ from pns_common.fused.kernels.rings import (
     mean_neighbours,
     mean_normals,
     mean_spokes,
-    measure_edges,
     prior_pushes,
     umbrella_heights,
 )
@@ -34,15 +35,11 @@ class RingMeasures:
     Attributes:
         fields: mean normal and umbrella height.
         means: over the spokes of each vertex; none once forgotten.
-        jumps: x of each edge, 0 where it is not interior; none once forgotten.
-        network_lengths: ℓ of each edge.
         smooth: vertices with one closed ring of interior edges.
     """
 
     fields: Float[np.ndarray, "V 4"]
     means: Float[np.ndarray, "N M"]
-    jumps: Float[np.ndarray, " J"]
-    network_lengths: Float[np.ndarray, " E"]
     valence: Int[np.ndarray, " V"]
     smooth: Bool[np.ndarray, " V"]
 
@@ -52,11 +49,7 @@ def measure_bends(
 ) -> Float[np.ndarray, " F"]:
     """Return b of all faces, as ``side_gate.face_bends`` has it."""
     bends, (gentle, sharp) = np.empty(len(mesh.faces)), GENTLE_TO_SHARP
-
-    def measure(rows: slice) -> None:
-        face_bends(mesh.face_edges, jumps, gentle, sharp, rows.start, rows.stop, bends)
-
-    blocks.run(len(bends), measure)
+    blocks.run(len(bends), face_bends.over(mesh.face_edges, jumps, gentle, sharp, ROWS, bends))
     boundary = mesh.sharp_edges[mesh.edge_class[mesh.sharp_edges] == EdgeClass.BOUNDARY]
     # By marks: for its ``unique`` numpy loads a module, 8 ms of a first call.
     at_boundary = np.zeros(len(bends), dtype=bool)
@@ -71,37 +64,29 @@ def measure_rings(
     points: Float[np.ndarray, "V 3"],
     mesh: MeshEdges,
     at_faces: FaceMeasures,
+    at_edges: EdgeMeasures,
     several_fans: Bool[np.ndarray, " V"],
-    altitudes: float,
     blocks: Blocks,
 ) -> RingMeasures:
-    """Look around every vertex of a level; ``altitudes`` is α of the network's lengths."""
+    """Look around every vertex of a level."""
     count, by_owner = mesh.vertex_count, owners(blocks, mesh.vertex_count)
     fields, means = np.empty((count, 4)), np.empty((count, VERTEX_COLUMNS))
     valence = np.empty(count, dtype=np.int32)
-    args = mesh.starts, mesh.edges, mesh.half_edges, mesh.edge_class
-    of_faces = at_faces.normals, at_faces.areas
-    bends, jumps, network_lengths = (np.empty(len(mesh.edges)) for _ in range(3))
-    to = bends, jumps, network_lengths
-
+    spokes = at_edges.bends, at_edges.jumps, at_edges.network_lengths
     reach, face_reach = mesh.edge_reach, mesh.face_reach
-
-    def edges(rows: slice) -> None:
-        measure_edges(points, *of_faces, *args, altitudes, rows.start, rows.stop, *to)
 
     def around(rows: slice) -> None:
         mean_normals(mesh.faces, face_reach, at_faces.areas, rows.start, rows.stop, fields)
-        mean_spokes(points, mesh.edges, reach, *to, rows.start, rows.stop, means, valence)
+        mean_spokes(points, mesh.edges, reach, *spokes, rows.start, rows.stop, means, valence)
         umbrella_heights(means, mesh.sharp, rows.start, rows.stop, fields)
 
     def beyond(rows: slice) -> None:
         mean_neighbours(points, mesh.edges, reach, fields, valence, rows.start, rows.stop, means)
 
-    blocks.run(len(mesh.edges), edges)
     by_owner.run(count, around)
     by_owner.run(count, beyond)
     smooth = _smooth(valence > 0, mesh, several_fans)
-    return RingMeasures(fields, means, jumps, network_lengths, valence, smooth)
+    return RingMeasures(fields, means, valence, smooth)
 
 
 def smooth_vertices(
@@ -109,8 +94,7 @@ def smooth_vertices(
 ) -> Bool[np.ndarray, " V"]:
     """Return the vertices with one closed ring of interior edges, without a look at the rings."""
     used = np.zeros(mesh.vertex_count, dtype=bool)
-    faces = mesh.faces
-    blocks.run(len(faces), lambda rows: mark_referenced(faces, rows.start, rows.stop, used))
+    blocks.run(len(mesh.faces), mark_referenced.over(mesh.faces, ROWS, used))
     return _smooth(used, mesh, several_fans)
 
 
@@ -130,9 +114,5 @@ def measure_pushes(rings: RingMeasures, blocks: Blocks) -> Float[np.ndarray, "V 
     weight = limit_ring_weight(np.arange(int(rings.valence.max(initial=0)) + 1))
     smooth = rings.smooth.astype(np.int32)
     args = rings.means, rings.fields, rings.valence, smooth, weight
-
-    def push(rows: slice) -> None:
-        prior_pushes(*args, rows.start, rows.stop, pushes)
-
-    blocks.run(len(pushes), push)
+    blocks.run(len(pushes), prior_pushes.over(*args, ROWS, pushes))
     return pushes

@@ -10,7 +10,6 @@ import math
 
 from pns_common.formula.prior import CLEAR_NORMAL
 from pns_common.fused.kernels.compiled import (
-    CLASSES,
     INDEX,
     INDEX_OUT,
     INDICES,
@@ -23,7 +22,6 @@ from pns_common.fused.kernels.compiled import (
     kernel,
     natural,
 )
-from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.normals import unit_normal
 from pns_common.fused.kernels.owned import owned_rows
 
@@ -120,57 +118,6 @@ def mean_normals(faces, reach, areas, begin, end, fields):
         for k in range(3):
             fields[v, k] = fields[v, k] / area if area > 0 else 0.0
         fields[v, HEIGHT] = 0.0
-    return 0
-
-
-@kernel(
-    SIZE,
-    *(POINTS, POINTS, POINTS, INDEX, INDICES, INDICES, CLASSES, REAL, SIZE, SIZE),
-    *(NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
-)
-def measure_edges(
-    points,
-    normals,
-    areas,
-    starts,
-    edges,
-    half_edges,
-    edge_class,
-    altitudes,
-    begin,
-    end,
-    bends,
-    jumps,
-    network_lengths,
-):
-    """Write s, x and ℓ of edges begin … end − 1.
-
-    ``starts`` (3 F,) is where each half-edge starts; ``altitudes`` is α, infinite where the network
-    speaks in units of h whatever the faces.
-    """
-    for e in range(natural(begin), end):
-        spoke = between(points, edges[e, 0], edges[e, 1])
-        square = dot(spoke, spoke)
-        length = math.sqrt(square) if square > 0 else math.inf
-        network_lengths[e] = math.sqrt(square)
-        jumps[e] = bends[e] = 0.0
-        if edge_class[e] != INTERIOR:
-            continue
-        first, second = half_edges[e, 0], half_edges[e, 1]
-        if starts[first] != edges[e, 0]:
-            first, second = second, first
-        # To the left and to the right of a → b.
-        f, g = first // 3, second // 3
-        n, m = row(normals, f), row(normals, g)
-        if dot(n, n) > 0 and dot(m, m) > 0:
-            chord = n[0] - m[0], n[1] - m[1], n[2] - m[2]
-            jumps[e] = dot(chord, chord) / 2 + 0.0
-        direction = spoke[0] / length, spoke[1] / length, spoke[2] / length
-        wide = altitudes * min(areas[f, AREA], areas[g, AREA]) / length
-        if wide < network_lengths[e]:
-            network_lengths[e] = wide
-        # Beside 0 there is no −0 in the array kernels' sums either.
-        bends[e] = dot(cross(n, m), direction) + 0.0
     return 0
 
 

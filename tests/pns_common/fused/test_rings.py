@@ -5,6 +5,7 @@ import pytest
 
 from pns_common import Mesh
 from pns_common.base.blocks import Blocks
+from pns_common.fused.edge_measures import edge_measures
 from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.kernels import rings as columns
 from pns_common.fused.rings import measure_bends, measure_pushes, measure_rings
@@ -22,15 +23,16 @@ def blocks(request):
     return request.param
 
 
+def measured(altitudes, blocks):
+    at_faces = FaceMeasures(POINTS, EDGES.faces, blocks)
+    at_edges = edge_measures(POINTS, EDGES, at_faces, altitudes, blocks)
+    return at_edges, measure_rings(POINTS, EDGES, at_faces, at_edges, FANS, blocks)
+
+
 @pytest.mark.parametrize("altitudes", [np.inf, 0.8])
 def test_rings(blocks, altitudes):
-    at_faces = FaceMeasures(POINTS, EDGES.faces, blocks)
-    rings = measure_rings(POINTS, EDGES, at_faces, FANS, altitudes, blocks)
+    _, rings = measured(altitudes, blocks)
     named = None if altitudes == np.inf else altitudes
-    lengths = [PLAIN.length(a, b, named) for a, b in EDGES.edges.tolist()]
-    np.testing.assert_allclose(rings.network_lengths, lengths, atol=1e-14)
-    jumps = [PLAIN.jump(a, b) for a, b in EDGES.edges.tolist()]
-    np.testing.assert_allclose(rings.jumps, jumps, atol=1e-14)
     for v in range(len(POINTS)):
         np.testing.assert_allclose(
             rings.fields[v], [*PLAIN.mean_normal[v], PLAIN.height[v]], atol=1e-14
@@ -55,11 +57,10 @@ def test_rings(blocks, altitudes):
 
 
 def test_pushes_and_bends(blocks):
-    at_faces = FaceMeasures(POINTS, EDGES.faces, blocks)
-    rings = measure_rings(POINTS, EDGES, at_faces, FANS, np.inf, blocks)
+    at_edges, rings = measured(np.inf, blocks)
     pushes = [PLAIN.push(v) for v in range(len(POINTS))]
     np.testing.assert_allclose(measure_pushes(rings, blocks), pushes, atol=1e-14)
-    bends = measure_bends(rings.jumps, EDGES, blocks)
+    bends = measure_bends(at_edges.jumps, EDGES, blocks)
     for (a, b, c), bend in zip(FACES, bends, strict=True):
         jumps = [PLAIN.jump(*edge) for edge in ((a, b), (b, c), (c, a))]
         counted = [x * np.clip((0.6 - x) / 0.3, 0, 1) for x in jumps]

@@ -41,11 +41,15 @@ def test_what_edges_read_outlives_the_rings():
     assert not seen.faces.holds_areas
     seen.forget_rings()
     assert len(seen.rings.means) == 0
-    for part in ("fields", "network_lengths", "jumps", "smooth"):
+    for part in ("fields", "smooth"):
         np.testing.assert_array_equal(getattr(seen.rings, part), getattr(whole.rings, part))
+    for part in ("lengths", "network_lengths", "jumps"):
+        np.testing.assert_array_equal(getattr(seen.edges, part), getattr(whole.edges, part))
+    assert len(seen.edges.bends) == 0
     np.testing.assert_array_equal(seen.pushes, whole.pushes)
     np.testing.assert_array_equal(seen.bends, whole.bends)
-    assert len(seen.rings.jumps) == 0
+    assert len(seen.edges.jumps) == 0
+    np.testing.assert_array_equal(seen.logs, np.log(seen.edges.lengths))
     np.testing.assert_array_equal(seen.faces.normals, whole.faces.normals)
 
 

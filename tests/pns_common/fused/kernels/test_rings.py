@@ -12,7 +12,6 @@ from pns_common.fused.kernels.rings import (
     face_bends,
     mean_normals,
     mean_spokes,
-    measure_edges,
     measure_faces,
     norm,
     prior_pushes,
@@ -43,44 +42,37 @@ def test_areas_are_measured_only_where_there_is_room_for_them(way):
     np.testing.assert_array_equal(normals, measured(way)[0])
 
 
-def measured(way, altitudes=np.inf):
+def measured(way):
     normals, areas = np.empty((4, 3)), np.empty((4, 4))
     WAYS[way](measure_faces)(POINTS, MESH.faces, 0, 4, normals, areas)
-    bends, jumps, lengths = np.empty((3, 8))
-    mesh = MESH.starts, MESH.edges, MESH.half_edges, MESH.edge_class
-    out = bends, jumps, lengths
-    WAYS[way](measure_edges)(POINTS, normals, areas, *mesh, altitudes, 0, 8, *out)
-    return normals, areas, *out
+    return normals, areas
+
+
+def spokes():
+    """Sine and x at each edge's normals, and its length."""
+    inner = (MESH.edges == 4).any(axis=1)
+    return inner * np.sqrt(8) / 3, inner * 2 / 3, np.full(8, np.sqrt(2))
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_faces_and_edges_of_a_tent(way):
-    normals, areas, bends, jumps, lengths = measured(way)
+def test_faces_of_a_tent(way):
+    normals, areas = measured(way)
     np.testing.assert_allclose(areas[:, 3], np.sqrt(3))
     np.testing.assert_allclose(
         normals, THIRD * np.array([[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]])
     )
-    np.testing.assert_allclose(lengths, np.sqrt(2))
-    inner = (MESH.edges == 4).any(axis=1)
-    # Normals of neighbours have the inner product 1/3: x is 2/3, and the crest's sine √8 / 3.
-    np.testing.assert_allclose(jumps[inner], 2 / 3)
-    np.testing.assert_allclose(bends[inner], np.sqrt(8) / 3)
-    assert not bends[~inner].any()
-    assert not jumps[~inner].any()
-    # The altitude of √3 over √2, half of it.
-    np.testing.assert_allclose(measured(way, 0.5)[4][inner], 0.5 * np.sqrt(3 / 2))
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_the_tip_of_a_tent(way):
-    _, areas, *of_edges = measured(way)
+    _, areas = measured(way)
     fields, means = np.zeros((5, 4)), np.zeros((5, 15))
     valence = np.zeros(5, dtype=np.int32)
     edges = MESH.edges, MESH.edge_reach
     WAYS[way](mean_normals)(MESH.faces, MESH.face_reach, areas, 4, 5, fields)
     np.testing.assert_allclose(fields[4, :3], [0, 0, THIRD], atol=1e-16)
     assert not fields[:4].any()
-    WAYS[way](mean_spokes)(POINTS, *edges, *of_edges, 4, 5, means, valence)
+    WAYS[way](mean_spokes)(POINTS, *edges, *spokes(), 4, 5, means, valence)
     assert valence.tolist() == [0, 0, 0, 0, 4]
     np.testing.assert_allclose(means[4, :5], [0, 0, -1, 2, 2 / 3], atol=1e-15)
     assert not means[:4].any()
@@ -95,7 +87,7 @@ def test_the_tip_of_a_tent(way):
 
 @pytest.mark.parametrize("way", WAYS)
 def test_bends_count_while_they_are_gentle(way):
-    jumps, bends = measured(way)[3], np.empty(4)
+    jumps, bends = spokes()[1], np.empty(4)
     # x is 2/3 at two edges of each face: whole below `gentle`, nothing above `sharp`.
     for gentle, sharp, share in ((0.7, 0.9, 1.0), (1 / 3, 1.0, 0.5), (0.3, 0.6, 0.0)):
         WAYS[way](face_bends)(MESH.face_edges, jumps, gentle, sharp, 0, 4, bends)

@@ -7,7 +7,7 @@ from pns_common import Mesh
 from pns_common.base.blocks import Blocks
 from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.kernels.vertex_correction import correct, correct_scale_free, look_around
-from pns_common.fused.rings import measure_rings
+from pns_common.fused.surroundings import Surroundings
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bumpy_sphere
 from tests.support.plain_operator import PlainMesh, shortened
@@ -15,14 +15,8 @@ from tests.support.plain_operator import PlainMesh, shortened
 POINTS, FACES = bumpy_sphere(3, subdivisions=0, bump=0.3)
 MESH, PLAIN = edges_built(Mesh(POINTS, FACES)), PlainMesh(POINTS, FACES)
 COUNT, RNG = 12, np.random.default_rng(1)
-RINGS = measure_rings(
-    POINTS,
-    MESH,
-    FaceMeasures(POINTS, MESH.faces, Blocks(1)),
-    np.zeros(COUNT, dtype=bool),
-    0.8,
-    Blocks(1),
-)
+FACE_MEASURES, NO_FANS = FaceMeasures(POINTS, MESH.faces, Blocks(1)), np.zeros(COUNT, dtype=bool)
+RINGS = Surroundings(POINTS, MESH, FACE_MEASURES, NO_FANS, 1.0, Blocks(1), altitudes=0.8).rings
 AROUND = RINGS.means, RINGS.fields
 # In another order than they have, and not all of them.
 CHOSEN = np.array([7, 2, 11, 5], dtype=np.int32)

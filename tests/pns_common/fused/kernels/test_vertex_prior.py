@@ -8,7 +8,7 @@ from pns_common.base.blocks import Blocks
 from pns_common.formula.tips import ring_further
 from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.kernels.vertex_prior import add_priors, add_priors_but_at_tips
-from pns_common.fused.rings import measure_rings
+from pns_common.fused.surroundings import Surroundings
 from pns_common.masks.stencils import loop_ring_weight
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bumpy_sphere
@@ -43,8 +43,8 @@ def test_without_tips(way, curves):
 @pytest.mark.parametrize("curves", [False, True])
 def test_at_tips(way, curves):
     mesh = edges_built(Mesh(POINTS, FACES))
-    normals = FaceMeasures(POINTS, mesh.faces, Blocks(1))
-    rings = measure_rings(POINTS, mesh, normals, np.zeros(COUNT, dtype=bool), 0.8, Blocks(1))
+    faces, no_fans = FaceMeasures(POINTS, mesh.faces, Blocks(1)), np.zeros(COUNT, dtype=bool)
+    rings = Surroundings(POINTS, mesh, faces, no_fans, 1.0, Blocks(1), altitudes=0.8).rings
     each = np.arange(rings.valence.max() + 1)
     prior, of_curves = PUSHED.copy(), OF_CURVES if curves else np.zeros((0, 3))
     WAYS[way](add_priors_but_at_tips)(
