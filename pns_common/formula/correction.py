@@ -39,8 +39,8 @@ from pns_common.geometry.thin_faces import longest_side
 NetworkFunction = Callable[[Array], Array]
 # Points, normals and frames of N edges -> their features φ (N, K).
 Features = Callable[[EdgeStencil, EdgeFrames], Array]
-# The frames of N edges, with their curvature x -> γ (N,) ∈ [0, 1].
-Gate = Callable[[EdgeFrames], Array]
+# Curvatures x of N edges -> γ (N,) ∈ [0, 1].
+Gate = Callable[[Array], Array]
 # C / R, per unit of length: one number, or one for each row where parts have their own R.
 BudgetPerLength = float | Float[np.ndarray, " N"]
 
@@ -66,8 +66,8 @@ class Correction:
 def curvature_gate(gate_sharpness: float) -> Gate:
     """Return γ = tanh(c x²): 0, with derivative 0, where both faces are coplanar (equation 4)."""
 
-    def gate(frames: EdgeFrames) -> Array:
-        return gate_of(gate_sharpness * frames.curvature**2)
+    def gate(curvature: Array) -> Array:
+        return gate_of(gate_sharpness * curvature**2)
 
     return gate
 
@@ -97,7 +97,7 @@ def correct(
         ModelError: the network returned something that is not finite, or of another shape.
     """
     frames = frames_of(stencil)
-    gamma = gate(frames)
+    gamma = gate(frames.curvature)
     eta = where_open(network, features(stencil, frames), gamma, like=stencil.a)
     envelope = budget_per_length * frames.length**2
     local = project_to_ball(eta)
@@ -135,7 +135,7 @@ def correct_scale_free(
         ModelError: the network returned something that is not finite, or of another shape.
     """
     frames = frames_of(stencil)
-    gamma = gate(frames)
+    gamma = gate(frames.curvature)
     z = project_to_ball(where_open(network, features(stencil, frames), gamma, like=stencil.a))
     wanted = prior + asked[:, None] * rotate(frames, z)
     length = longest_side(stencil, frames) if wide_bound else frames.length

@@ -23,7 +23,6 @@ from pns_common.base.arrays import Array, beside, gather, namespace, scatter
 from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.formula.correction import Gate
 from pns_common.formula.gate import gate_of
-from pns_common.geometry.frames import EdgeFrames
 
 # x of bends of 46 and 66 degrees.
 GENTLE_TO_SHARP = (0.3, 0.6)
@@ -83,7 +82,7 @@ def opened(gate: Float[Array, " N"], by: Float[Array, " N"]) -> Float[Array, " N
 def opened_gate(gate: Gate, by: Float[Array, " N"]) -> Gate:
     """Return the gate of the two faces, opened by w."""
 
-    def both(frames: EdgeFrames) -> Array:
-        return opened(gate(frames), by)
+    def both(curvature: Array) -> Array:
+        return opened(gate(curvature), by)
 
     return both

@@ -17,7 +17,6 @@ from pns_common.fused.kernels.edge_correction import (
 )
 from pns_common.fused.kernels.together import TOGETHER
 from pns_common.fused.surroundings import Surroundings
-from pns_common.geometry.frames import EdgeFrames
 from pns_common.rules.learned import LearnedEdgeRule
 from pns_common.rules.scale_free import ScaleFreeEdgeRule
 
@@ -59,13 +58,12 @@ def add_at_edges(
         looked = stencils.reshape(-1), frame.reshape(-1), *rest, np.zeros(HELD * TOGETHER)
         look(*read, rows.start, rows.stop, symmetric, *looked)
         # numpy's hyperbolic tangent runs on vectors, and has the array kernels' bits.
-        axes = frame[:, :3], frame[:, 3:6], frame[:, 6:]
-        gate = rule.operator.gate(EdgeFrames(*axes, length, curvature, degenerate))
+        gate = rule.operator.gate(curvature)
         if isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates:
             gate = opened(gate, of_gentler(gentlest, rule.vertex_gate_sharpness))
         if degenerate.any():
             to.degenerate[mesh.interior[rows]] = degenerate
-        answers = where_open(rule.operator.network, features, gate, like=axes[0])
+        answers = where_open(rule.operator.network, features, gate, like=frame[:, :3])
         eta = np.ascontiguousarray(answers)
         if isinstance(rule, LearnedEdgeRule):
             budget_per_length = level.budget_per_length(stencils[:, 0], rule.budget)

@@ -17,7 +17,6 @@ from torch import Tensor
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.formula.correction import Correction, correct, curvature_gate, proximity_ratio
 from pns_common.geometry.frames import (
-    EdgeFrames,
     EdgeStencil,
     edge_frames,
     edge_stencil,
@@ -60,8 +59,8 @@ def without_gate(
 ) -> Correction:
     """Return δ = h² F η: planar input is no longer left alone."""
 
-    def open_gate(frames: EdgeFrames) -> Float[Tensor, " N"]:
-        return torch.ones_like(frames.curvature)
+    def open_gate(curvature: Float[Tensor, " N"]) -> Float[Tensor, " N"]:
+        return torch.ones_like(curvature)
 
     return correct(
         stencil, FEATURE_SETS[recipe.features], unit_correction(network), open_gate, budget

@@ -21,7 +21,8 @@ def curvature_adaptive(gate_sharpness: float) -> Scheme:
         topology = level.topology
         interior = topology.interior
         stencil, faces = topology.stencil[interior], topology.edge_faces[interior]
-        gamma = gate(edge_frames(edge_stencil(level.points, level.normals, stencil, faces)))
+        frames = edge_frames(edge_stencil(level.points, level.normals, stencil, faces))
+        gamma = gate(frames.curvature)
         positions = loop_edge_rule(level).loop.copy()
         butterfly = butterfly_edge_vertices(level.points, topology)[interior]
         positions[interior] += gamma[:, None] * (butterfly - positions[interior])

@@ -64,9 +64,9 @@ def oracle(surface: Surface, budget: float, gate_sharpness: float) -> Scheme:
         )
         envelope = budget / level.reference_length * frames.length**2
         centres = base.loop[interior]
-        moved = best_in_balls(surface, centres, envelope * gate(frames)) - centres
+        moved = best_in_balls(surface, centres, envelope * gate(frames.curvature)) - centres
         displacement, ratio, gamma = np.zeros_like(base.loop), base.ratio.copy(), base.gate.copy()
-        displacement[interior], gamma[interior] = moved, gate(frames)
+        displacement[interior], gamma[interior] = moved, gate(frames.curvature)
         ratio[interior] = norm(moved) / np.where(envelope > 0, envelope, 1)
         return Placement(base.loop, displacement, ratio, gamma, base.degenerate)
 

@@ -27,7 +27,7 @@ def test_gate_and_its_slope_vanish_at_coplanar_faces():
             topology.stencil[topology.interior],
             topology.edge_faces[topology.interior],
         )
-        return curvature_gate(10.0)(edge_frames(stencil))[0]
+        return curvature_gate(10.0)(edge_frames(stencil).curvature)[0]
 
     assert gamma(0.0) == 0
     # x ~ lift², γ ~ x² ~ lift⁴: halving the lift divides the gate by 16.

@@ -171,7 +171,7 @@ def kinked():
     """The rule with gates that open at once: its departure from Loop has a slope at flat stars."""
     sound = subject()
     edges, vertices = sound.scheme.edge_rule, sound.scheme.vertex_rule
-    operator = replace(edges.operator, gate=lambda frames: np.tanh(np.sqrt(frames.curvature)))
+    operator = replace(edges.operator, gate=lambda curvature: np.tanh(np.sqrt(curvature)))
     constant = replace(operator, network=lambda rows: np.tile([0.0, 1.0, 0.0], (len(rows), 1)))
     scheme = replace(sound.scheme, edge_rule=replace(edges, operator=constant))
     assert vertices is scheme.vertex_rule
