@@ -35,23 +35,21 @@ CORNERS, MIDDLES, FAR, LONE, HELD = 0, 9, 18, 36, 39
 
 def unit_normal(points, a, b, c):
     """Return a triangle's unit normal; zeros where it has no area (``frames.triangle_normals``)."""
-    u0, u1, u2 = (
-        points[b, 0] - points[a, 0],
-        points[b, 1] - points[a, 1],
-        points[b, 2] - points[a, 2],
-    )
-    v0, v1, v2 = (
-        points[c, 0] - points[a, 0],
-        points[c, 1] - points[a, 1],
-        points[c, 2] - points[a, 2],
-    )
+    normal, _, _ = normal_and_area(_row(points, a), _row(points, b), _row(points, c))
+    return normal
+
+
+def normal_and_area(p, q, r):
+    """Return the same of three points, twice the area vector, and the length of that."""
+    u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    v0, v1, v2 = r[0] - p[0], r[1] - p[1], r[2] - p[2]
     x, y, z = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
     square = x * x + y * y + z * z
+    length = math.sqrt(square) if square > 0 else 0.0
     shortest = NO_AREA * ((u0 * u0 + u1 * u1 + u2 * u2) + (v0 * v0 + v1 * v1 + v2 * v2))
     if square > shortest * shortest:
-        length = math.sqrt(square)
-        return x / length, y / length, z / length
-    return 0.0, 0.0, 0.0
+        return (x / length, y / length, z / length), (x, y, z), length
+    return (0.0, 0.0, 0.0), (x, y, z), length
 
 
 def squared_chord(n, m):

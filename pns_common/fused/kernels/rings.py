@@ -22,7 +22,7 @@ from pns_common.fused.kernels.compiled import (
     kernel,
     natural,
 )
-from pns_common.fused.kernels.normals import unit_normal
+from pns_common.fused.kernels.normals import normal_and_area
 from pns_common.fused.kernels.owned import owned_rows
 
 # Columns of a vertex's sums, which become means.
@@ -87,14 +87,14 @@ def measure_faces(points, faces, begin, end, normals, areas):
     """
     for f in range(natural(begin), end):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        normal = unit_normal(points, a, b, c)
+        corners = row(points, a), row(points, b), row(points, c)
+        normal, vector, length = normal_and_area(*corners)
         for k in range(3):
             normals[f, k] = normal[k]
         if len(areas):
-            vector = cross(between(points, a, b), between(points, a, c))
             for k in range(3):
                 areas[f, k] = vector[k]
-            areas[f, AREA] = norm(vector)
+            areas[f, AREA] = length
     return 0
 
 
