@@ -67,13 +67,21 @@ def look_around(means, fields, vertices, begin, end, features, mean_jump):
 
 
 def _component(z, means, fields, v, reach, k):
-    umbrella, pull = means[v, UMBRELLA + k], means[v, PULL + k]
-    return z[0] * fields[v, k] + z[1] * _divided(umbrella, reach) + z[2] * _divided(pull, reach)
+    umbrella, pull = means[v, UMBRELLA + k] / reach, means[v, PULL + k] / reach
+    return z[0] * fields[v, k] + z[1] * umbrella + z[2] * pull
 
 
 def _combined(z, means, fields, v):
     """Return Σ z_i e_i over the ring's three vectors."""
     reach = _reach(means, v)
+    if not reach > 0:
+        # Both means count for 0.
+        nothing = z[1] * 0.0, z[2] * 0.0
+        return (
+            z[0] * fields[v, 0] + nothing[0] + nothing[1],
+            z[0] * fields[v, 1] + nothing[0] + nothing[1],
+            z[0] * fields[v, 2] + nothing[0] + nothing[1],
+        )
     x = _component(z, means, fields, v, reach, 0)
     y = _component(z, means, fields, v, reach, 1)
     return x, y, _component(z, means, fields, v, reach, 2)
@@ -112,6 +120,7 @@ def correct(
     SIZE,
     *(POINTS, NUMBERS, POINTS, POINTS, NUMBERS, INDEX, SIZE, POINTS, REAL, REAL),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+    by_rows=True,
 )
 def correct_scale_free(
     z,

@@ -15,6 +15,7 @@ from pns_common.fused.kernels.compiled import (
     kernel,
     natural,
 )
+from pns_common.fused.kernels.normals import NORMAL_NUMBERS
 from pns_common.fused.kernels.rings import (
     MEAN_JUMP,
     NEAR_JUMP,
@@ -27,6 +28,8 @@ from pns_common.fused.kernels.rings import (
 
 # A kernel reads numbers, not pairs.
 (LEFT_FROM, LEFT_TO), (BENDS_FROM, BENDS_TO) = LEFT, BENDS_MORE
+# The square of a quotient that is less than LEFT_FROM whatever is rounded.
+CLEARLY_NEAR = (1 - 1e-9) * LEFT_FROM**2
 
 
 def _prior(pushed, of_curves, nothing, strength, v, k):
@@ -40,6 +43,18 @@ def rise(value, by, begin, end):
     quotient = value / by if by > 0 else 0.0
     way = min(max((quotient - begin) / (end - begin), 0.0), 1.0)
     return way * way * (3 - 2 * way)
+
+
+def _tip(behind, means, fields, v):
+    """Return how much of a tip a vertex is, 0 … 1, of what is left behind there (``tips``)."""
+    square = means[v, RING_SQUARE]
+    near = CLEARLY_NEAR * square
+    if near > NORMAL_NUMBERS and dot(behind, behind) < near:
+        return 0.0  # as most are: no root or quotient need be taken
+    left = abs(dot(behind, clear_normal(row(fields, v))))
+    length = math.sqrt(square) if square > 0 else 0.0
+    far = rise(left, length, LEFT_FROM, LEFT_TO)
+    return far * rise(means[v, MEAN_JUMP], means[v, NEAR_JUMP], BENDS_FROM, BENDS_TO)
 
 
 @kernel(SIZE, POINTS, REAL, NUMBERS, INDEX, SIZE, SIZE, POINTS_OUT)
@@ -97,11 +112,7 @@ def add_priors_but_at_tips(
             ahead * (pushes[v, 1] - pushed[v, 1] - moved[1]) - pushes[v, 1],
             ahead * (pushes[v, 2] - pushed[v, 2] - moved[2]) - pushes[v, 2],
         )
-        left = abs(dot(behind, clear_normal(row(fields, v))))
-        square = means[v, RING_SQUARE]
-        length = math.sqrt(square) if square > 0 else 0.0
-        far = rise(left, length, LEFT_FROM, LEFT_TO)
-        tip = far * rise(means[v, MEAN_JUMP], means[v, NEAR_JUMP], BENDS_FROM, BENDS_TO)
+        tip = _tip(behind, means, fields, v)
         for k in range(3):
             prior = _prior(pushed, of_curves, nothing, strengths[i], v, k)
             pushed[v, k] = prior - tip * (tip_strength * moved[k] + prior)
