@@ -54,7 +54,7 @@ def edge_measures(
     of_edges = mesh.edges, mesh.half_edges, mesh.edge_class, altitudes
     to = made.lengths, made.network_lengths, made.jumps, made.bends
     measure = measure_edges.over(*around, *of_edges, ROWS, *to)
-    blocks.run(len(mesh.edges), lambda rows: measure(rows, np.zeros(HELD * TOGETHER)))
+    blocks.run(len(mesh.edges), lambda rows: measure(rows, np.empty(HELD * TOGETHER)))
     return made
 
 

@@ -73,12 +73,12 @@ def measure_edges(
     Args:
         starts: (3 F,) where each half-edge starts.
         altitudes: α, infinite where the network speaks in units of h whatever the faces.
-        held: (HELD TOGETHER,) finite on entry, overwritten: of some edges, one beside the other.
+        held: (HELD TOGETHER,) overwritten: of some edges, one beside the other.
     """
     for first in range(natural(begin), end, TOGETHER):
         count = min(TOGETHER, end - first)
-        for lane in range(count):
-            e = first + lane
+        for lane in range(TOGETHER):
+            e = natural(min(first + lane, end - 1))
             there, back = half_edges[e, 0], half_edges[e, 1]
             inner = edge_class[e] == INTERIOR
             if not inner:

@@ -28,9 +28,9 @@ from pns_common.fused.kernels.rings import cross, dot, row
 from pns_common.fused.kernels.together import TOGETHER, keep, kept
 from pns_common.geometry.frames import NO_AREA
 
-# What is held of a face: where Loop puts its corners and the middles of its edges, each with where
-# it is moved to.
-HELD = 36
+# What is held of a face: where Loop puts its corners and the middles of its edges, each with its
+# displacement and s.
+HELD = 42
 
 
 def _moved(p, displacement, v, s):
@@ -53,13 +53,29 @@ def _shared_corner(loop, displacement, scale, shared, v):
     return (p, moved) if shared[v] else (p, _moved(p, displacement, v, 0.0))
 
 
-def _hold(held, k, lane, corner):
-    keep(held, 6 * k, lane, corner[0])
-    keep(held, 6 * k + 3, lane, corner[1])
+def _hold(held, k, lane, loop, displacement, scale, v):
+    """Hold where Loop puts a vertex, its displacement, and s where that is not 1 everywhere."""
+    keep(held, 7 * k, lane, row(loop, v))
+    keep(held, 7 * k + 3, lane, row(displacement, v))
+    if len(scale):
+        held[(7 * k + 6) * TOGETHER + lane] = scale[v]
+
+
+def _hold_whole(held):
+    """Hold s = 1 of all."""
+    for k in range(6):
+        for lane in range(TOGETHER):
+            held[(7 * k + 6) * TOGETHER + lane] = 1.0
 
 
 def _held(held, k, lane):
-    return kept(held, 6 * k, lane), kept(held, 6 * k + 3, lane)
+    """Return where Loop puts such a vertex, and where it is moved to."""
+    p, d, s = (
+        kept(held, 7 * k, lane),
+        kept(held, 7 * k + 3, lane),
+        held[(7 * k + 6) * TOGETHER + lane],
+    )
+    return p, (p[0] + s * d[0], p[1] + s * d[1], p[2] + s * d[2])
 
 
 def _all_stay(held, lane, clear):
@@ -137,20 +153,21 @@ def find_folds(
     """
     clear = (cosine + COSINE_MARGIN) * (cosine + COSINE_MARGIN)
     moves, middles = (loop, displacement, scale), natural(vertex_count)
+    _hold_whole(held)
     for first in range(natural(begin), end, TOGETHER):
         count, doubtful = min(TOGETHER, end - first), 0
         if len(changed) and not _any_changed(changed, faces, face_edges, middles, first, count):
             continue
-        for lane in range(count):
-            f = first + lane
-            _hold(held, 0, lane, _corner(*moves, faces[f, 0]))
-            _hold(held, 1, lane, _corner(*moves, faces[f, 1]))
-            _hold(held, 2, lane, _corner(*moves, faces[f, 2]))
-            _hold(held, 3, lane, _corner(*moves, middles + face_edges[f, 0]))
-            _hold(held, 4, lane, _corner(*moves, middles + face_edges[f, 1]))
-            _hold(held, 5, lane, _corner(*moves, middles + face_edges[f, 2]))
         for lane in range(TOGETHER):
-            doubtful += (lane < count) & (not _all_stay(held, lane, clear))
+            f = natural(min(first + lane, end - 1))
+            _hold(held, 0, lane, *moves, faces[f, 0])
+            _hold(held, 1, lane, *moves, faces[f, 1])
+            _hold(held, 2, lane, *moves, faces[f, 2])
+            _hold(held, 3, lane, *moves, middles + face_edges[f, 0])
+            _hold(held, 4, lane, *moves, middles + face_edges[f, 1])
+            _hold(held, 5, lane, *moves, middles + face_edges[f, 2])
+        for lane in range(TOGETHER):
+            doubtful += not _all_stay(held, lane, clear)
         if doubtful == 0:
             continue
         for f in range(first, first + count):

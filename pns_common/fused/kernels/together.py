@@ -2,8 +2,10 @@
 
 What is gathered from all over a mesh does not; so it is gathered first, one by one, and then all
 that is computed of it is computed at once, without a branch. A number of one stands TOGETHER after
-the one before it, so a compiler knows how far apart they are. The loop runs over all TOGETHER, also
-where fewer are held: over a count that it does not know, the compiler fetches number by number.
+the one before it, so a compiler knows how far apart they are. The loops run over all TOGETHER, also
+where there are fewer, and the last is held again in place of those that are missing: over a count
+that it does not know, the compiler fetches number by number, and asks of each place whether it
+counts from the end.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ def measured(way, altitudes=np.inf, begin=0, end=8):
     normals, areas = np.empty((4, 3)), np.empty((4, 4))
     measure_faces(POINTS, MESH.faces, 0, 4, normals, areas)
     mesh, out = (MESH.starts, MESH.edges, MESH.half_edges, MESH.edge_class), np.full((4, 8), -9.0)
-    bounds, held = (altitudes, begin, end), np.zeros(HELD * TOGETHER)
+    bounds, held = (altitudes, begin, end), np.empty(HELD * TOGETHER)
     WAYS[way](measure_edges)(POINTS, normals, areas, *mesh, *bounds, *out, held)
     return out
 
