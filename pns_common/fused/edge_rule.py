@@ -8,6 +8,7 @@ from pns_common.features.orientation import SYMMETRIC
 from pns_common.formula.correction import where_open
 from pns_common.formula.side_gate import of_gentler, opened
 from pns_common.fused.additions import Additions
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.edge_correction import (
     DIHEDRAL,
     HELD,
@@ -40,13 +41,17 @@ def add_at_edges(
     # Before the blocks: what several threads ask for is computed once.
     normals = level.faces.normals
     fields = level.rings.fields if width > DIHEDRAL else NO_FIELDS
-    bounds = level.curves
-    pushes = level.pushes if isinstance(rule, ScaleFreeEdgeRule) else NO_FIELDS
     reads_sides = isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates
     bends = level.bends if reads_sides else NO_BENDS
     measures = level.points, normals, fields, bends, level.edges.lengths, level.logs
     read = [each.reshape(-1) for each in (*measures, *connectivity)]
-    symmetric = int(rule.operator.orientation is SYMMETRIC)
+    look_at = look.over(*read, ROWS, int(rule.operator.orientation is SYMMETRIC))
+    if isinstance(rule, LearnedEdgeRule):
+        write = correct.over(mesh.interior, ROWS, *out)
+    else:
+        curves, scale = level.curves, rule.form.network_scale
+        wanted = level.edges.network_lengths, level.pushes, curves.pushes, curves.nothing, scale
+        write = correct_scale_free.over(*wanted, mesh.interior, ROWS, *out)
 
     def add(rows: slice) -> None:
         count = rows.stop - rows.start
@@ -56,7 +61,7 @@ def add_at_edges(
         gentlest = np.empty(count if reads_sides else 0)
         rest = length, longest, curvature, degenerate, features, gentlest
         looked = stencils.reshape(-1), frame.reshape(-1), *rest, np.zeros(HELD * TOGETHER)
-        look(*read, rows.start, rows.stop, symmetric, *looked)
+        look_at(rows, *looked)
         # numpy's hyperbolic tangent runs on vectors, and has the array kernels' bits.
         gate = rule.operator.gate(curvature)
         if isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates:
@@ -64,23 +69,14 @@ def add_at_edges(
         if degenerate.any():
             to.degenerate[mesh.interior[rows]] = degenerate
         answers = where_open(rule.operator.network, features, gate, like=frame[:, :3])
-        eta = np.ascontiguousarray(answers)
+        answer = np.ascontiguousarray(answers), frame
         if isinstance(rule, LearnedEdgeRule):
             budget_per_length = level.budget_per_length(stencils[:, 0], rule.budget)
-            correct(eta, frame, length, gate, budget_per_length, mesh.interior, rows.start, *out)
+            write(rows, *answer, length, gate, budget_per_length)
         else:
-            form = rule.form
-            bounded = longest if form.wide_bound else length
-            budget_per_length = level.budget_per_length(stencils[:, 0], form.budget)
-            answer = eta, frame, level.edges.network_lengths, bounded, gate, budget_per_length
-            prior = (
-                pushes,
-                bounds.pushes,
-                bounds.nothing,
-                stencils,
-                level.prior_strengths(stencils[:, 0]),
-                form.network_scale,
-            )
-            correct_scale_free(*answer, mesh.interior, rows.start, *prior, *out)
+            bounded = longest if rule.form.wide_bound else length
+            budget_per_length = level.budget_per_length(stencils[:, 0], rule.form.budget)
+            strengths = level.prior_strengths(stencils[:, 0])
+            write(rows, *answer, bounded, gate, budget_per_length, stencils, strengths)
 
     level.network_blocks.run(len(mesh.interior), add)

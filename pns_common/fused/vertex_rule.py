@@ -7,6 +7,7 @@ import numpy as np
 from pns_common.formula.correction import where_open
 from pns_common.formula.gate import gate_of
 from pns_common.fused.additions import Additions
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.vertex_correction import correct, correct_scale_free, look_around
 from pns_common.fused.surroundings import Surroundings
 from pns_common.fused.vertex_prior import priors_at
@@ -27,26 +28,23 @@ def add_at_vertices(
     rings, operator = level.rings, rule.operator
     vertices = np.flatnonzero(rings.smooth).astype(np.int32)
     to.clear_rows(np.flatnonzero(~rings.smooth).astype(np.int32), level.blocks)
-    out = to.displacement, to.ratio, to.gate, to.envelope
-    prior = np.empty((0, 3))
-    if isinstance(rule, ScaleFreeVertexRule):
-        prior = priors_at(vertices, rule.form, level)
+    around, out = (rings.means, rings.fields), (to.displacement, to.ratio, to.gate, to.envelope)
+    look = look_around.over(*around, vertices, ROWS)
+    if isinstance(rule, LearnedVertexRule):
+        budget = rule.budget
+        write = correct.over(*around, vertices, ROWS, *out)
+    else:
+        form, budget = rule.form, rule.form.budget
+        added = priors_at(vertices, form, level), level.curves.nothing, form.network_scale
+        write = correct_scale_free.over(*around, *added, vertices, ROWS, *out)
 
     def add(rows: slice) -> None:
         count = rows.stop - rows.start
         features, mean_jump = np.empty((count, operator.features.count)), np.empty(count)
-        around = rings.means, rings.fields
-        look_around(*around, vertices, rows.start, rows.stop, features, mean_jump)
+        look(rows, features, mean_jump)
         gate = gate_of(operator.gate_sharpness * mean_jump)
         like = np.empty((count, 3))
         z = np.ascontiguousarray(where_open(operator.network, features, gate, like))
-        if isinstance(rule, LearnedVertexRule):
-            budget_per_length = level.budget_per_length(vertices[rows], rule.budget)
-            correct(z, gate, *around, budget_per_length, vertices, rows.start, *out)
-        else:
-            form = rule.form
-            budget_per_length = level.budget_per_length(vertices[rows], form.budget)
-            answer = z, gate, *around, budget_per_length, vertices, rows.start
-            correct_scale_free(*answer, prior, level.curves.nothing, form.network_scale, *out)
+        write(rows, z, gate, level.budget_per_length(vertices[rows], budget))
 
     level.network_blocks.run(len(vertices), add)

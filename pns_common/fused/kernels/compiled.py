@@ -35,19 +35,22 @@ class Array:
     written: bool = False
     natural: bool = False
 
-    def checked(self, value: np.ndarray) -> np.ndarray:
-        """Return the value. Raises TypeError where a kernel would read it wrongly."""
-        dtype, needed = value.dtype, WRITTEN if self.written else READ
-        same = dtype is self._type or dtype == self._type
-        if not same or value.ndim != self.ndim or value.flags.num & needed != needed:
-            kind = f"{dtype}, {value.ndim} dimensions"
-            raise TypeError(f"a kernel takes {self}, not {kind}, {value.flags}")
-        return value
-
     @cached_property
-    def _type(self) -> np.dtype[Any]:
-        """What ``dtype`` names: a name takes as long to compare as all else together."""
-        return np.dtype(self.dtype)
+    def checked(self) -> Callable[[np.ndarray], np.ndarray]:
+        """What returns a value as it is; it raises TypeError where a kernel would read it wrongly.
+
+        It is asked thousands of times a refinement, so it knows all that it compares with.
+        """
+        dtype, ndim, needed = np.dtype(self.dtype), self.ndim, WRITTEN if self.written else READ
+
+        def checked(value: np.ndarray) -> np.ndarray:
+            same = value.dtype is dtype or value.dtype == dtype
+            if not same or value.ndim != ndim or value.flags.num & needed != needed:
+                kind = f"{value.dtype}, {value.ndim} dimensions"
+                raise TypeError(f"a kernel takes {self}, not {kind}, {value.flags}")
+            return value
+
+        return checked
 
 
 POINTS, POINTS_OUT = Array("float64", 2), Array("float64", 2, written=True)

@@ -248,24 +248,28 @@ def write(index, delta, gate, envelope, displacement, ratio, gates, envelopes):
 
 @kernel(
     SIZE,
-    *(POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS, INDEX, SIZE),
-    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+    *(INDEX, SIZE, SIZE, POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+    *(POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS),
 )
 def correct(
+    interior,
+    begin,
+    end,
+    displacement,
+    ratio,
+    gates,
+    envelopes,
     eta,
     frame,
     length,
     gate,
     budget_per_length,
-    interior,
-    begin,
-    displacement,
-    ratio,
-    gates,
-    envelopes,
 ):
-    """Write δ = h² γ F η into the rows of the edges (``correction.correct``)."""
-    for i in range(eta.shape[0]):
+    """Write δ = h² γ F η into the rows of interior[begin:end] (``correction.correct``).
+
+    Row 0 of what comes after the output is the first of these edges'.
+    """
+    for i in range(end - begin):
         e = interior[natural(begin) + i]
         envelope = budget_per_length[i] * (length[i] * length[i])
         turned = _rotated(frame, i, in_ball(row(eta, i)))
@@ -289,37 +293,38 @@ def _prior(pushes, of_curves, nothing, a, b, c, d, k, strength):
 
 @kernel(
     SIZE,
-    *(POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, INDEX, SIZE),
-    *(POINTS, POINTS, REAL, INDICES, NUMBERS, REAL),
+    *(NUMBERS, POINTS, POINTS, REAL, REAL, INDEX, SIZE, SIZE),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+    *(POINTS, POINTS, NUMBERS, NUMBERS, NUMBERS, INDICES, NUMBERS),
 )
 def correct_scale_free(
-    z,
-    frame,
     network_lengths,
-    bound_length,
-    gate,
-    budget_per_length,
-    interior,
-    begin,
     pushes,
     of_curves,
     nothing,
-    stencils,
-    strengths,
     scale,
+    interior,
+    begin,
+    end,
     displacement,
     ratio,
     gates,
     envelopes,
+    z,
+    frame,
+    bound_length,
+    gate,
+    budget_per_length,
+    stencils,
+    strengths,
 ):
-    """Write δ = γ Π_ρ(D + τ ℓ F z) into the edges' rows (``correction.correct_scale_free``).
+    """Write δ = γ Π_ρ(D + τ ℓ F z) likewise (``correction.correct_scale_free``).
 
     ``network_lengths`` are ℓ of all edges, ``bound_length`` is h of the bound, ``strengths`` s.
     ``of_curves`` are the curves' pushes; (0, 3) where there are none. Then ``nothing`` is
     added in their place: 0, or −0 where there is no rule for boundaries, which changes no −0.
     """
-    for i in range(z.shape[0]):
+    for i in range(end - begin):
         e = interior[natural(begin) + i]
         a, b, c, d = stencils[i, 0], stencils[i, 1], stencils[i, 2], stencils[i, 3]
         envelope = budget_per_length[i] * (bound_length[i] * bound_length[i])

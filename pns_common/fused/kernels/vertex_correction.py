@@ -89,24 +89,28 @@ def _combined(z, means, fields, v):
 
 @kernel(
     SIZE,
-    *(POINTS, NUMBERS, POINTS, POINTS, NUMBERS, INDEX, SIZE),
-    *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+    *(POINTS, POINTS, INDEX, SIZE, SIZE, POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+    *(POINTS, NUMBERS, NUMBERS),
 )
 def correct(
-    z,
-    gate,
     means,
     fields,
-    budget_per_length,
     vertices,
     begin,
+    end,
     displacement,
     ratio,
     gates,
     envelopes,
+    z,
+    gate,
+    budget_per_length,
 ):
-    """Write δ = h_v² γ_v (C / R) v into the vertices' rows (``VertexOperator.correct``)."""
-    for i in range(z.shape[0]):
+    """Write δ = h_v² γ_v (C / R) v into the rows of vertices[begin:end] (``VertexOperator``).
+
+    Row 0 of what comes after the output is the first of these vertices'.
+    """
+    for i in range(end - begin):
         v = vertices[natural(begin) + i]
         envelope = budget_per_length[i] * means[v, RING_SQUARE]
         vector = in_ball(_combined(in_ball(row(z, i)), means, fields, v))
@@ -118,31 +122,33 @@ def correct(
 
 @kernel(
     SIZE,
-    *(POINTS, NUMBERS, POINTS, POINTS, NUMBERS, INDEX, SIZE, POINTS, REAL, REAL),
+    *(POINTS, POINTS, POINTS, REAL, REAL, INDEX, SIZE, SIZE),
     *(POINTS_OUT, NUMBERS_OUT, NUMBERS_OUT, NUMBERS_OUT),
+    *(POINTS, NUMBERS, NUMBERS),
     by_rows=True,
 )
 def correct_scale_free(
-    z,
-    gate,
     means,
     fields,
-    budget_per_length,
-    vertices,
-    begin,
     prior,
     nothing,
     scale,
+    vertices,
+    begin,
+    end,
     displacement,
     ratio,
     gates,
     envelopes,
+    z,
+    gate,
+    budget_per_length,
 ):
     """Write δ = γ_v Π_ρ(D + τ ℓ_v Σ z_i e_i) likewise.
 
     ``prior`` is D_v, ``nothing`` as at edges.
     """
-    for i in range(z.shape[0]):
+    for i in range(end - begin):
         v = vertices[natural(begin) + i]
         envelope = budget_per_length[i] * means[v, RING_SQUARE]
         learned = _combined(in_ball(row(z, i)), means, fields, v)

@@ -91,7 +91,7 @@ def outputs():
 @pytest.mark.parametrize("way", WAYS)
 def test_the_papers_correction(way):
     delta, ratio, gate, envelope = out = outputs()
-    WAYS[way](correct)(Z, FRAMES, LENGTH, GATE, PER_LENGTH, MESH.interior, 0, *out)
+    WAYS[way](correct)(MESH.interior, 0, COUNT, *out, Z, FRAMES, LENGTH, GATE, PER_LENGTH)
     for e in range(COUNT):
         bound = PER_LENGTH[e] * LENGTH[e] ** 2
         local = plain_operator.shortened(Z[e], 1)
@@ -108,10 +108,10 @@ def test_the_scale_free_correction(way, boundary):
     pushes, rim = 0.05 * RNG.standard_normal((2, 12, 3))
     of_curves = rim if boundary else np.zeros((0, 3))
     delta, ratio, _, envelope = out = outputs()
-    answer = Z, FRAMES, 0.9 * LENGTH, 1.1 * LENGTH, GATE, PER_LENGTH, MESH.interior, 0
     strengths = RNG.uniform(0.5, 1.5, COUNT)
-    prior = pushes, of_curves, 0.0, STENCILS, strengths, 0.4
-    WAYS[way](correct_scale_free)(*answer, *prior, *out)
+    wanted = 0.9 * LENGTH, pushes, of_curves, 0.0, 0.4
+    answer = Z, FRAMES, 1.1 * LENGTH, GATE, PER_LENGTH, STENCILS, strengths
+    WAYS[way](correct_scale_free)(*wanted, MESH.interior, 0, COUNT, *out, *answer)
     for e, (a, b) in enumerate(PAIRS):
         local = plain_operator.shortened(Z[e], 1)
         asked = 0.4 * 0.9 * LENGTH[e] * FRAMES[e].reshape(3, 3).T @ local

@@ -40,7 +40,7 @@ def test_features_and_what_the_gate_reads(way):
 @pytest.mark.parametrize("way", WAYS)
 def test_the_correction_of_format_2(way):
     delta, ratio, gate, envelope = out = outputs()
-    WAYS[way](correct)(Z, GATE, *AROUND, PER_LENGTH, CHOSEN, 0, *out)
+    WAYS[way](correct)(*AROUND, CHOSEN, 0, 4, *out, Z, GATE, PER_LENGTH)
     for i, v in enumerate(CHOSEN):
         vector = shortened(shortened(Z[i], 1) @ np.array(PLAIN.ring_vectors(v)), 1)
         bound = PER_LENGTH[i] * PLAIN.spoke_length(v) ** 2
@@ -54,8 +54,8 @@ def test_the_correction_of_format_2(way):
 def test_the_scale_free_correction(way):
     prior = 0.03 * RNG.standard_normal((COUNT, 3))
     delta, _, _, envelope = out = outputs()
-    answer = Z, GATE, *AROUND, PER_LENGTH, CHOSEN, 0, prior
-    WAYS[way](correct_scale_free)(*answer, 0.0, 0.5, *out)
+    given = *AROUND, prior, 0.0, 0.5, CHOSEN, 0, 4
+    WAYS[way](correct_scale_free)(*given, *out, Z, GATE, PER_LENGTH)
     for i, v in enumerate(CHOSEN):
         combined = shortened(Z[i], 1) @ np.array(PLAIN.ring_vectors(v))
         wanted = prior[v] + 0.5 * PLAIN.length_at(v, 0.8) * combined
