@@ -79,6 +79,22 @@ def opened(gate: Float[Array, " N"], by: Float[Array, " N"]) -> Float[Array, " N
     return gate + (1 - gate) * by
 
 
+def opened_where_shut(
+    gate: Gate, curvature: Float[np.ndarray, " N"], by: Float[np.ndarray, " N"]
+) -> Float[np.ndarray, " N"]:
+    """Return the same of x; γ₂ is not asked for where few have w < 1.
+
+    Where w is 1, γ is 1 to the last bit: 1 − γ₂ is wrong by no more than half of what rounds to 1.
+    """
+    rows = np.flatnonzero(by != 1)
+    if 2 * len(rows) > len(by):
+        return opened(gate(curvature), by)
+    gates = np.ones_like(by)
+    if len(rows):
+        gates[rows] = opened(gate(curvature[rows]), by[rows])
+    return gates
+
+
 def opened_gate(gate: Gate, by: Float[Array, " N"]) -> Gate:
     """Return the gate of the two faces, opened by w."""
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from pns_common.features.orientation import SYMMETRIC
 from pns_common.formula.correction import where_open
-from pns_common.formula.side_gate import of_gentler, opened
+from pns_common.formula.side_gate import of_gentler, opened_where_shut
 from pns_common.fused.additions import Additions
 from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.edge_correction import (
@@ -63,9 +63,11 @@ def add_at_edges(
         looked = stencils.reshape(-1), frame.reshape(-1), *rest, np.zeros(HELD * TOGETHER)
         look_at(rows, *looked)
         # numpy's hyperbolic tangent runs on vectors, and has the array kernels' bits.
-        gate = rule.operator.gate(curvature)
         if isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates:
-            gate = opened(gate, of_gentler(gentlest, rule.vertex_gate_sharpness))
+            by = of_gentler(gentlest, rule.vertex_gate_sharpness)
+            gate = opened_where_shut(rule.operator.gate, curvature, by)
+        else:
+            gate = rule.operator.gate(curvature)
         if degenerate.any():
             to.degenerate[mesh.interior[rows]] = degenerate
         answers = where_open(rule.operator.network, features, gate, like=frame[:, :3])

@@ -10,8 +10,9 @@ counts from the end.
 
 from __future__ import annotations
 
-# Faces or edges that are held at once: what is held of them stays in the first-level cache.
-TOGETHER = 64
+# Faces or edges that are held at once: four vectors of the widest kind. What is held, of up to 42
+# numbers each, stays in the first-level cache beside what is gathered; of more it does not.
+TOGETHER = 32
 
 
 def keep(held, k, lane, v):

@@ -1,10 +1,11 @@
 """Gates that read the sides of an edge's faces: open on a bent wall's quads, shut on a box."""
 
 import numpy as np
+import pytest
 
 from pns_common import Mesh, pns, refine
 from pns_common.connectivity.topology import build_topology
-from pns_common.formula.side_gate import face_bends, gentle_bend, opened
+from pns_common.formula.side_gate import face_bends, gentle_bend, opened, opened_where_shut
 from pns_common.rules.control_level import control_level
 from tests.support.meshes import grid, torus_of_quads
 from tests.support.networks import scale_free_model
@@ -52,6 +53,23 @@ def test_a_side_gate_opens_where_both_faces_bend():
     first, second = np.array([0, 1e-3, 0.1, 0.1]), np.array([0.1, 0.1, 0.2, 0.0])
     np.testing.assert_allclose(gentle_bend(first, second, 1e4), [0, 1, 1, 0], atol=1e-8)
     np.testing.assert_allclose(opened(np.array([0.0, 0.5, 1.0]), np.full(3, 0.5)), [0.5, 0.75, 1])
+
+
+@pytest.mark.parametrize("wide_open", [0.0, 0.3, 0.9, 1.0])
+def test_where_w_is_1_the_gate_is_whatever_the_faces_say(wide_open):
+    rng = np.random.default_rng(2)
+    # Of all sizes: close to 0, close to 1, and between.
+    gates = np.concatenate([2.0 ** -rng.uniform(0, 60, 999), 1 - 2.0 ** -rng.uniform(0, 54, 999)])
+    by = np.where(rng.random(len(gates)) < wide_open, 1.0, rng.random(len(gates)))
+    asked = []
+
+    def gate(curvature):
+        asked.append(len(curvature))
+        return curvature
+
+    np.testing.assert_array_equal(opened_where_shut(gate, gates, by), opened(gates, by))
+    few = 2 * np.count_nonzero(by < 1) <= len(by)
+    assert sum(asked) == (np.count_nonzero(by < 1) if few else len(by))
 
 
 def test_the_last_row_of_a_sheet_moves_with_the_others():
