@@ -74,6 +74,7 @@ ORDER = (
     "seed",
     "quiet",
     "vertex",
+    "distilled",
     "machine",
 )
 
@@ -97,6 +98,7 @@ def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:
     name = recipe.pop("name")
     facts = {"recipe": RECORDED.get(name, name), **recipe, **recipe.pop("training")}
     facts["machine"] = checkpoint.machine
+    facts["distilled"] = msgspec.to_builtins(checkpoint.distilled)
     # In the order of the first models' cards; what a recipe leaves out its card does not mention.
     given = {name: facts[name] for name in ORDER if facts.get(name) is not None}
     return ModelCard(

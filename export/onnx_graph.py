@@ -128,11 +128,20 @@ def _gelu(graph: _Graph, x: str) -> str:
     return graph.apply("Mul", graph.apply("Mul", x, half), graph.apply("Add", erf, unit))
 
 
+def _smoothstep(graph: _Graph, x: str) -> str:
+    # x (½ + t (3/8 − t²/32)) with t = x within [−2, 2].
+    t = graph.apply("Clip", x, graph.constant("minus_two", -2.0), graph.constant("two", 2.0))
+    fall = graph.apply("Mul", graph.apply("Mul", t, t), graph.constant("fall", 1 / 32))
+    slope = graph.apply("Sub", graph.constant("slope", 3 / 8), fall)
+    step = graph.apply("Add", graph.apply("Mul", t, slope), graph.constant("half", 0.5))
+    return graph.apply("Mul", x, step)
+
+
 def _tanh(graph: _Graph, x: str) -> str:
     return graph.apply("Tanh", x)
 
 
-_ACTIVATIONS = {"gelu": _gelu, "tanh": _tanh}
+_ACTIVATIONS = {"gelu": _gelu, "smoothstep": _smoothstep, "tanh": _tanh}
 
 
 def _project_onto_ball(graph: _Graph, z: str, output: str) -> None:

@@ -1,6 +1,6 @@
 """The laboratory's entry: `python train/run.py` trains the default recipe.
 
-It writes a checkpoint and prints the held-out table.
+It writes a checkpoint and prints the held-out table; so does `distil`, of several trainings.
 """
 
 import time
@@ -12,19 +12,25 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from pns_common.errors import PnsError
 from pns_common.schemes import pns
 from train.certificates.command import certify_command
 from train.experiments.command import reproduce_command
 from train.fitting.determinism import machine_fingerprint
-from train.fitting.trainer import Fit, fit
+from train.fitting.distillation import distil as distilled
+from train.fitting.distillation import planned
+from train.fitting.trainer import fit
 from train.metrics.card import card_metrics
 from train.metrics.one_step import improvements_as_data
 from train.metrics.tables import improvement_table
-from train.models.checkpoint import Checkpoint, save_checkpoint
+from train.models.checkpoint import Checkpoint, Distillation, load_checkpoint, save_checkpoint
+from train.models.networks import BoundedNet
 from train.models.recipes import RECIPES, Recipe
 from train.models.torch_model import recipe_model
 
 CHECKPOINTS = Path("checkpoints")
+# Of a distillation, where nothing else is said.
+MESHES, STEPS = 1500, 10_000
 
 if TYPE_CHECKING:
     RecipeName = str
@@ -58,30 +64,73 @@ def train(
     chosen = RECIPES[recipe](seed)
     path = output or CHECKPOINTS / f"{chosen.name}.safetensors"
     began = time.perf_counter()
-    trained = _fit_with_progress(chosen, console)
-    scheme = pns(recipe_model(chosen, trained.network, trained.vertex_network), chosen.budget)
-    improvements = card_metrics(chosen, scheme)
-    metrics = {name: improvements_as_data(rows) for name, rows in improvements.items()}
-    made = Checkpoint(
-        chosen, trained.network, metrics, machine_fingerprint(), trained.vertex_network
-    )
-    save_checkpoint(path, made)
-    for name, rows in improvements.items():
-        console.print(improvement_table(f"{name}, recipe {chosen.name}", rows))
+    with _progress(console) as progress:
+        task = progress.add_task(f"training {chosen.name}", total=chosen.steps, loss=float("nan"))
+        trained = fit(chosen, lambda done, loss: progress.update(task, completed=done, loss=loss))
+    _measure_and_save(path, chosen, trained.network, trained.vertex_network, None, console)
     console.print(f"{path} written in {time.perf_counter() - began:.1f} s", soft_wrap=True)
 
 
-def _fit_with_progress(recipe: Recipe, console: Console) -> Fit:
-    columns = (
+@app.command()
+def distil(
+    checkpoints: Annotated[list[Path], typer.Argument(help="Trainings of one scale-free recipe.")],
+    meshes: Annotated[int, typer.Option(min=1, help="Pairs of the stream to ask on.")] = MESHES,
+    steps: Annotated[int, typer.Option(min=1, help="Adam steps of each network.")] = STEPS,
+    output: Annotated[
+        Path | None,
+        typer.Option(help="Checkpoint to write; checkpoints/RECIPE.safetensors if not given."),
+    ] = None,
+) -> None:
+    """Fit the networks of a recipe to what those of its trainings answer in the mean."""
+    console = Console()
+    began = time.perf_counter()
+    try:
+        members = [load_checkpoint(path) for path in checkpoints]
+        first = members[0].recipe
+        recipe = RECIPES[first.name](first.seed)
+        plan = planned(recipe, members, meshes, steps)
+    except PnsError as error:
+        console.print(str(error), style="red", soft_wrap=True)
+        raise typer.Exit(1) from error
+    path = output or CHECKPOINTS / f"{recipe.name}.safetensors"
+    with _progress(console) as progress:
+        task = progress.add_task(f"distilling {recipe.name}", total=2 * steps, loss=float("nan"))
+        networks = distilled(
+            recipe,
+            members,
+            plan,
+            lambda done, loss: progress.update(task, completed=done, loss=loss),
+        )
+    _measure_and_save(path, recipe, *networks, plan, console)
+    console.print(f"{path} written in {time.perf_counter() - began:.1f} s", soft_wrap=True)
+
+
+def _measure_and_save(
+    path: Path,
+    recipe: Recipe,
+    network: BoundedNet,
+    vertex_network: BoundedNet | None,
+    plan: Distillation | None,
+    console: Console,
+) -> None:
+    scheme = pns(recipe_model(recipe, network, vertex_network), recipe.budget)
+    improvements = card_metrics(recipe, scheme)
+    metrics = {name: improvements_as_data(rows) for name, rows in improvements.items()}
+    machine = machine_fingerprint()
+    save_checkpoint(path, Checkpoint(recipe, network, metrics, machine, vertex_network, plan))
+    for name, rows in improvements.items():
+        console.print(improvement_table(f"{name}, recipe {recipe.name}", rows))
+
+
+def _progress(console: Console) -> Progress:
+    return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("loss {task.fields[loss]:.6f}"),
         TimeRemainingColumn(),
+        console=console,
     )
-    with Progress(*columns, console=console) as progress:
-        task = progress.add_task(f"training {recipe.name}", total=recipe.steps, loss=float("nan"))
-        return fit(recipe, lambda done, loss: progress.update(task, completed=done, loss=loss))
 
 
 if __name__ == "__main__":

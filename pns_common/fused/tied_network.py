@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Float32
 
-from pns_common.fused.kernels.gelu import LIMIT
 from pns_common.fused.kernels.tied_network import LANES, answer
 from pns_common.models.tied_form import TiedForm
 
@@ -32,7 +31,6 @@ def answers_of(
         form.last_characters,
         form.last_bias,
         form.copies,
-        float(LIMIT),
         budget,
         space[: seen * LANES],
         space[seen * LANES : (seen + units) * LANES],

@@ -10,12 +10,17 @@ from export.model_file import checkpoint_card, export_model, write_model
 from export.onnx_graph import OPSET, model_bytes
 from export.parity import BUDGETS, ROWS, TOLERANCE, ParityError, check_parity, sample_features
 from pns_common.runtimes.onnx_model import load_model, model_from_bytes
+from tests.support.networks import gelu, smoothstep
 from train.models.checkpoint import Checkpoint
 from train.models.from_recipe import initial_network
 from train.models.recipes import paper, paper_text
 from train.models.torch_model import recipe_model
 
-RECIPES = [pytest.param(recipe, id=recipe.name) for recipe in (paper(), paper_text())]
+EXACT = {"gelu": gelu, "smoothstep": smoothstep, "tanh": np.tanh}
+SMOOTHSTEP = replace(paper(), name="smoothstep", activation="smoothstep")
+RECIPES = [
+    pytest.param(recipe, id=recipe.activation) for recipe in (paper(), paper_text(), SMOOTHSTEP)
+]
 
 
 def card_of(recipe):
@@ -51,16 +56,10 @@ def test_file_against_a_float64_network_in_numpy(recipe):
     for index, (weight, bias) in enumerate(layers):
         z = z @ weight.detach().numpy().T.astype(np.float64) + bias.detach().numpy()
         if index < len(layers) - 1:
-            z = np.tanh(z) if recipe.activation == "tanh" else gelu(z)
+            z = EXACT[recipe.activation](z)
     expected = 0.5 * z / np.maximum(1, np.linalg.norm(z, axis=1, keepdims=True))
     answered = model_from_bytes(model_bytes(network, card_of(recipe)), "test")(features, 0.5)
     np.testing.assert_allclose(answered, expected, rtol=0, atol=0.5e-6)
-
-
-def gelu(x):
-    from math import erf, sqrt
-
-    return 0.5 * x * (1 + np.vectorize(erf)(x / sqrt(2)))
 
 
 @pytest.mark.parametrize("recipe", RECIPES)

@@ -160,16 +160,26 @@ def published_model(weights, checkpoint):
     return model_from_bytes(perceptron_bytes(published_layers(weights, checkpoint)), checkpoint)
 
 
-def float64_network(layers):
-    """A GELU perceptron in float64 numpy, projected onto the unit ball."""
-    erf = np.vectorize(math.erf, otypes=[float])
+def gelu(z):
+    """x Φ(x), in double precision."""
+    return 0.5 * z * (1 + np.vectorize(math.erf, otypes=[float])(z / math.sqrt(2)))
+
+
+def smoothstep(z):
+    """x S(x) with the cubic S that rises from 0 at −2 to 1 at 2, in double precision."""
+    u = np.clip((z + 2) / 4, 0, 1)
+    return z * u * u * (3 - 2 * u)
+
+
+def float64_network(layers, activation=gelu):
+    """A perceptron in float64 numpy, projected onto the unit ball."""
 
     def network(features):
         z = features
         for number, (weight, bias) in enumerate(layers):
             z = z @ np.asarray(weight, dtype=float) + bias
             if number < len(layers) - 1:
-                z = 0.5 * z * (1 + erf(z / math.sqrt(2)))
+                z = activation(z)
         return z / np.maximum(1, np.linalg.norm(z, axis=1, keepdims=True))
 
     return network

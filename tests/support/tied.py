@@ -49,7 +49,14 @@ def tied_layers(group, copies, seed=0, loudness=2.5):
 
 def spelt_perceptron(layers, prefix=""):
     """Nodes and weights of a perceptron, in the operators that export writes."""
-    weights = {"root_two": np.sqrt(2.0), "half": 0.5, "one": 1.0, "least": 1.0}
+    weights = {
+        "minus_two": -2.0,
+        "two": 2.0,
+        "fall": 1 / 32,
+        "slope": 3 / 8,
+        "half": 0.5,
+        "least": 1.0,
+    }
     nodes, value = [], "features"
 
     def add(operator, inputs, output, **attributes):
@@ -61,9 +68,12 @@ def spelt_perceptron(layers, prefix=""):
         weights |= {f"w{number}": weight, f"b{number}": bias}
         value = add("Gemm", [value, f"w{number}", f"b{number}"], f"z{number}", transB=1)
         if number < len(layers) - 1:
-            erf = add("Erf", [add("Div", [value, "root_two"], f"d{number}")], f"e{number}")
-            half = add("Mul", [value, "half"], f"h{number}")
-            value = add("Mul", [half, add("Add", [erf, "one"], f"a{number}")], f"g{number}")
+            t = add("Clip", [value, "minus_two", "two"], f"t{number}")
+            square = add("Mul", [t, t], f"s{number}")
+            falling = add("Mul", [square, "fall"], f"q{number}")
+            slope = add("Sub", ["slope", falling], f"p{number}")
+            step = add("Add", [add("Mul", [t, slope], f"o{number}"), "half"], f"a{number}")
+            value = add("Mul", [value, step], f"g{number}")
     add("ReduceL2", [value], "length", axes=[1], keepdims=1)
     add("Div", [value, add("Max", ["length", "least"], "divisor")], "in_ball")
     add("Mul", ["in_ball", "budget"], "correction")

@@ -22,6 +22,22 @@ METADATA_KEY = "pns"
 VERTEX = "vertex."
 
 
+@dataclass(frozen=True, slots=True)
+class Distillation:
+    """How one training was put in place of several (train/fitting/distillation.py).
+
+    Attributes:
+        seeds, activations: of these trainings; networks start from the first one's weights.
+        meshes: pairs of the training stream on whose meshes they were asked.
+        steps: Adam steps of each network.
+    """
+
+    seeds: tuple[int, ...]
+    activations: tuple[str, ...]
+    meshes: int
+    steps: int
+
+
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
     """A trained network with what it was made from and what it reached.
@@ -32,6 +48,7 @@ class Checkpoint:
         metrics: held-out results, as on the model card.
         machine: fingerprint of the machine that trained it; elsewhere the last bits may differ.
         vertex_network: float32, where the recipe has a vertex rule.
+        distilled: where the weights stand for those of several trainings.
     """
 
     recipe: Recipe
@@ -39,6 +56,7 @@ class Checkpoint:
     metrics: dict[str, Any]
     machine: str
     vertex_network: BoundedNet | None = None
+    distilled: Distillation | None = None
 
 
 def save_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
@@ -47,6 +65,7 @@ def save_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
         "recipe": checkpoint.recipe,
         "metrics": checkpoint.metrics,
         "machine": checkpoint.machine,
+        "distilled": checkpoint.distilled,
     }
     data = safetensors.torch.save(
         joined_state(checkpoint.network, checkpoint.vertex_network),
@@ -80,7 +99,9 @@ def load_checkpoint(path: Path) -> Checkpoint:
         raise ModelError(
             str(path), expected="safetensors with a recipe and its weights", found=str(error)
         ) from error
-    return Checkpoint(facts.recipe, network, facts.metrics, facts.machine, vertex_network)
+    return Checkpoint(
+        facts.recipe, network, facts.metrics, facts.machine, vertex_network, facts.distilled
+    )
 
 
 def joined_state(network: BoundedNet, vertex_network: BoundedNet | None) -> dict[str, Tensor]:
@@ -95,3 +116,4 @@ class _Facts(msgspec.Struct, forbid_unknown_fields=True):
     recipe: Recipe
     metrics: dict[str, Any]
     machine: str
+    distilled: Distillation | None = None

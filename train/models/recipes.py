@@ -143,7 +143,7 @@ class Recipe:
     Attributes:
         features: name of the feature set, as on the model card.
         hidden: widths of the hidden layers.
-        activation: "gelu" or "tanh", between layers.
+        activation: "gelu", "smoothstep" or "tanh", between layers.
         budget: C, in the paper's units (the reference length is 1).
         gate_sharpness: c of the gate tanh(c x²).
         training: what is trained on, and how.
@@ -259,7 +259,7 @@ def general(seed: int = 0) -> Recipe:
         name="general",
         features="signed-18",
         hidden=(48, 48),
-        activation="gelu",
+        activation="smoothstep",
         budget=20.0,
         gate_sharpness=1e7,
         training=ToLimit(

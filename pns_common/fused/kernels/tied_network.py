@@ -18,7 +18,7 @@ from pns_common.fused.kernels.compiled import (
     kernel,
     natural,
 )
-from pns_common.fused.kernels.gelu import gelu
+from pns_common.fused.kernels.smoothstep import smoothstep
 
 # Rows that are computed together, one beside the other: what they take stays in the first-level
 # cache. A number of a row stands LANES after the one before it, whatever the network: so machine
@@ -137,7 +137,7 @@ def _eight(a, b, c, d, e, f, g, h):
     return a, b, c, d, e, f, g, h
 
 
-def _activate_eight(units, said, width, limit):
+def _activate_eight(units, said, width):
     for i in range(width):
         for lane in range(LANES):
             k = i * 8 * LANES + lane
@@ -151,8 +151,8 @@ def _activate_eight(units, said, width, limit):
                 units[k + 6 * LANES],
                 units[k + 7 * LANES],
             )
-            a, b, c, d = gelu(a, limit), gelu(b, limit), gelu(c, limit), gelu(d, limit)
-            e, f, g, h = gelu(e, limit), gelu(f, limit), gelu(g, limit), gelu(h, limit)
+            a, b, c, d = smoothstep(a), smoothstep(b), smoothstep(c), smoothstep(d)
+            e, f, g, h = smoothstep(e), smoothstep(f), smoothstep(g), smoothstep(h)
             a, b, c, d, e, f, g, h = _eight(a, b, c, d, e, f, g, h)
             said[k] = a
             said[k + LANES] = b
@@ -164,12 +164,12 @@ def _activate_eight(units, said, width, limit):
             said[k + 7 * LANES] = h
 
 
-def _activate_two(units, said, width, limit):
+def _activate_two(units, said, width):
     for i in range(width):
         for lane in range(LANES):
             k = i * 2 * LANES + lane
             a, b = _two(units[k], units[k + LANES])
-            a, b = _two(gelu(a, limit), gelu(b, limit))
+            a, b = _two(smoothstep(a), smoothstep(b))
             said[k] = a
             said[k + LANES] = b
 
@@ -185,16 +185,16 @@ def _transform(units, copies, width):
         step *= 2
 
 
-def _activate(units, said, copies, width, limit):
-    """Write GELU of all copies, between two transforms."""
+def _activate(units, said, copies, width):
+    """Write what all copies say, between two transforms."""
     if copies == 8:
-        _activate_eight(units, said, width, limit)
+        _activate_eight(units, said, width)
     elif copies == 2:
-        _activate_two(units, said, width, limit)
+        _activate_two(units, said, width)
     else:
         _transform(units, copies, width)
         for k in range(width * copies * LANES):
-            said[k] = gelu(units[k], limit)
+            said[k] = smoothstep(units[k])
         _transform(said, copies, width)
 
 
@@ -253,7 +253,7 @@ def _scaled(said, divisor, budget):
 @kernel(
     SIZE,
     *(POINTS, INDEX, INDICES, INDEX, INTEGERS, SINGLES, SINGLES, SINGLES),
-    *(SINGLES, INDEX, SINGLES, SIZE, REAL, REAL),
+    *(SINGLES, INDEX, SINGLES, SIZE, REAL),
     *(SINGLES_OUT, SINGLES_OUT, SINGLES_OUT, SINGLES_OUT),
 )
 def answer(
@@ -269,7 +269,6 @@ def answer(
     last_characters,
     last_bias,
     copies,
-    limit,
     budget,
     seen,
     units,
@@ -279,11 +278,10 @@ def answer(
     """Answer all rows of features; the weights are those of ``form.TiedForm``.
 
     Args:
-        limit: GELU's.
         last: (3 M,) products of one coordinate after the other.
         seen: LANES for each of the larger of K and 3, overwritten.
-        units, said: LANES for each of n M units of the widest layer, likewise: before GELU, and
-            after it.
+        units, said: LANES for each of n M units of the widest layer, likewise: before the
+            activation, and after it.
         answers: 3 N out, row by row.
     """
     for begin in range(0, len(features), LANES):
@@ -293,11 +291,11 @@ def answer(
         width, at, bias_at = widths[0], 0, widths[0]
         _first(units, seen, copies, width, characters, first, biases)
         for layer in range(1, len(widths)):
-            _activate(units, said, copies, width, np.float32(limit))
+            _activate(units, said, copies, width)
             before, width = width, widths[layer]
             at = _next(units, said, copies, before, width, hidden, at, biases, bias_at)
             bias_at += width
-        _activate(units, said, copies, width, np.float32(limit))
+        _activate(units, said, copies, width)
         for c in range(3):
             s = last_characters[c]
             _weigh(seen, c, last_bias[c], said, s, copies, width, last, c * width)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Float32
 
-from pns_common.fused.kernels.gelu import LIMIT, gelu_within
+from pns_common.fused.kernels.smoothstep import END, smoothstep_within
 from pns_common.models.tied_form import TiedForm
 
 # So many rows at a time stay in the second-level cache.
@@ -44,13 +44,13 @@ def _z(form: TiedForm, features: Float[np.ndarray, "N K"]) -> Float32[np.ndarray
     for k, character in enumerate(form.characters):
         units[character] += form.first[:, k, None] * seen[k]
     for before, width in zip(form.widths, form.widths[1:], strict=False):
-        said = _transformed(gelu(_transformed(units)))
+        said = _transformed(smoothstep(_transformed(units)))
         units = _biased(form.biases[bias_begin : bias_begin + width], size, rows)
         blocks = form.hidden[begin : begin + size * width * before].reshape(size, width, before)
         for j in range(before):
             units += blocks[:, :, j, None] * said[:, None, j]
         begin, bias_begin = begin + blocks.size, bias_begin + width
-    said = _transformed(gelu(_transformed(units)))
+    said = _transformed(smoothstep(_transformed(units)))
     z = np.repeat(form.last_bias[:, None], rows, axis=1)
     for i in range(form.widths[-1]):
         z += form.last[:, i, None] * said[form.last_characters, i]
@@ -75,9 +75,9 @@ def _transformed(units: Float32[np.ndarray, "G m N"]) -> Float32[np.ndarray, "G 
     return units
 
 
-def gelu(x: Float32[np.ndarray, "G m N"]) -> Float32[np.ndarray, "G m N"]:
-    """Return x Φ(x)."""
-    return gelu_within(x, np.clip(x, -LIMIT, LIMIT))
+def smoothstep(x: Float32[np.ndarray, "G m N"]) -> Float32[np.ndarray, "G m N"]:
+    """Return x S(x)."""
+    return smoothstep_within(x, np.clip(x, -END, END))
 
 
 def _in_ball(z: Float32[np.ndarray, "3 N"], budget: float) -> Float32[np.ndarray, "N 3"]:

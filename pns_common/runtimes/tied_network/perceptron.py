@@ -1,7 +1,8 @@
 """A graph of the form that ``export`` writes, read as the perceptron that it is.
 
-Each layer is a Gemm; GELU between them is x/2 (1 + erf(x/√2)), spelt out; at the end stands the
-projection onto the ball, budget · z / max(1, ‖z‖). A graph of any other form is no perceptron here.
+Each layer is a Gemm; between them stands x (½ + t (3/8 − t²/32)) with t = x within [−2, 2], spelt
+out; at the end the projection onto the ball, budget · z / max(1, ‖z‖). A graph of any other form is
+no perceptron here.
 """
 
 from __future__ import annotations
@@ -15,8 +16,6 @@ import numpy as np
 from pns_common.models.tied_form import Layer
 from pns_common.runtimes.numpy_network.network import NumpyNetwork
 from pns_common.runtimes.numpy_network.onnx_schema import Node
-
-ROOT_TWO = float(np.float32(np.sqrt(2)))
 
 
 def read_perceptron(network: NumpyNetwork, given: str, output: str) -> list[Layer] | None:
@@ -44,8 +43,8 @@ class _Reader:
             layers.append(self._layer(step, value))
             (z,) = step.outputs
             step = next(self.steps, None)
-            if step is not None and step.operator == "Div":
-                value = self._gelu(step, z)
+            if step is not None and step.operator == "Clip":
+                value = self._smoothstep(step, z)
                 step = next(self.steps, None)
             else:
                 self._projection(step, z, output)
@@ -59,15 +58,24 @@ class _Reader:
             raise _OtherFormError
         return Layer(weight, bias)
 
-    def _gelu(self, divided: Node, z: str) -> str:
-        """Follow x/2 (1 + erf(x/√2)) from its first node on; returns its name."""
-        _check(divided, "Div", z, None)
-        erf = self._next("Erf", *divided.outputs)
-        half = self._next("Mul", z, None)
-        raised = self._next("Add", *erf.outputs, None)
-        product = self._next("Mul", *half.outputs, *raised.outputs)
-        for step, number in ((divided, ROOT_TWO), (half, 0.5), (raised, 1.0)):
-            self._check_number(step.inputs[1], number)
+    def _smoothstep(self, limited: Node, z: str) -> str:
+        """Follow x S(x) from its first node on; returns its name."""
+        _check(limited, "Clip", z, None, None)
+        (t,) = limited.outputs
+        square = self._next("Mul", t, t)
+        fall = self._next("Mul", *square.outputs, None)
+        slope = self._next("Sub", None, *fall.outputs)
+        odd = self._next("Mul", t, *slope.outputs)
+        step = self._next("Add", *odd.outputs, None)
+        product = self._next("Mul", z, *step.outputs)
+        for name, number in (
+            (limited.inputs[1], -2.0),
+            (limited.inputs[2], 2.0),
+            (fall.inputs[1], 1 / 32),
+            (slope.inputs[0], 3 / 8),
+            (step.inputs[1], 0.5),
+        ):
+            self._check_number(name, number)
         return product.outputs[0]
 
     def _projection(self, length: Node | None, z: str, output: str) -> None:

@@ -6,6 +6,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pns_common.fused.kernels.smoothstep import smoothstep
 from train.models.networks import ACTIVATIONS, BoundedNet, unit_correction
 
 
@@ -41,6 +42,12 @@ def test_gelu_is_the_exact_one():
     x = torch.linspace(-6, 6, 101, dtype=torch.float64)
     expected = [0.5 * v * (1 + math.erf(v / math.sqrt(2))) for v in x.tolist()]
     np.testing.assert_allclose(ACTIVATIONS["gelu"]()(x), expected, rtol=0, atol=1e-15)
+
+
+def test_the_smoothstep_is_the_kernels():
+    x = torch.linspace(-3, 3, 101)
+    made = ACTIVATIONS["smoothstep"]()(x).numpy()
+    np.testing.assert_array_equal(made, [smoothstep(each) for each in x.numpy()])
 
 
 def test_weights_come_from_the_given_generator_alone():

@@ -29,7 +29,7 @@ SIZES = {"edges": 8, "unsigned edges": 4, "vertices": 2}
 
 
 def tied(name, copies=(4, 4), seed=0):
-    return TiedNet(GROUPS[name], copies, "gelu", torch.Generator().manual_seed(seed))
+    return TiedNet(GROUPS[name], copies, "smoothstep", torch.Generator().manual_seed(seed))
 
 
 def trained(network, steps=5):

@@ -1,0 +1,194 @@
+"""Networks fitted to what those of other trainings answer, in the mean.
+
+A network that learns another's answers, and not the shapes behind them, comes near to what it says
+(Bucilă, Caruana and Niculescu-Mizil 2006; Hinton, Vinyals and Dean 2015): so a rule gets another
+activation, which takes less time, and keeps what it was chosen for. Of several trainings it learns
+the mean answer, which errs less than each.
+
+The members are asked on the coarse meshes of the training stream and on what they make of some of
+them, which has the small bends of fine meshes. No answer leaves the unit ball, nor does a mean.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import islice
+
+import numpy as np
+import torch
+from jaxtyping import Float32
+
+from pns_common.errors import ParameterError
+from pns_common.mesh import Mesh
+from pns_common.models.card import ModelCard
+from pns_common.refine import refine
+from pns_common.schemes import loop, pns
+from train.data.pairs.pair_stream import pair_stream
+from train.fitting.determinism import deterministic
+from train.models.checkpoint import Checkpoint, Distillation
+from train.models.from_recipe import initial_network, initial_vertex_network
+from train.models.networks import BoundedNet
+from train.models.recipes import Recipe
+from train.models.torch_model import TorchModel, recipe_model
+
+# Rows of a mesh that are kept, of each network.
+MOST_ROWS = 1000
+# How often a mesh's refinement is asked about as well, and how often that is shaken before.
+REFINED, SHAKEN = 0.5, 0.5
+SHAKES = (1e-4, 1e-2)
+LARGEST_REFINED = 1500
+# Rows of a step, its learning rate at most, and the share of the steps in which it rises.
+BATCH_ROWS, LEARNING_RATE, WARM_UP = 8192, 2e-3, 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """Rows of features, and the mean answer to each at budget 1."""
+
+    features: Float32[np.ndarray, "N K"]
+    answers: Float32[np.ndarray, "N 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class Mean:
+    """The mean of several models as one, which keeps what it was asked and what it answered."""
+
+    members: Sequence[TorchModel]
+    heard: dict[str, list[Answers]] = field(default_factory=lambda: {"edges": [], "vertices": []})
+    name: str = "mean"
+    hash: str = ""
+
+    @property
+    def card(self) -> ModelCard:
+        """The first one's."""
+        return self.members[0].card
+
+    def __call__(
+        self, features: Float32[np.ndarray, "N K"], budget: float
+    ) -> Float32[np.ndarray, "N 3"]:
+        """Answer for edges."""
+        return self._keep("edges", features, [each(features, budget) for each in self.members])
+
+    def vertex_correction(
+        self, features: Float32[np.ndarray, "N L"], budget: float
+    ) -> Float32[np.ndarray, "N 3"]:
+        """Answer for old vertices."""
+        said = [each.vertex_correction(features, budget) for each in self.members]
+        return self._keep("vertices", features, said)
+
+    def _keep(
+        self,
+        where: str,
+        features: Float32[np.ndarray, "N K"],
+        said: Sequence[Float32[np.ndarray, "N 3"]],
+    ) -> Float32[np.ndarray, "N 3"]:
+        mean = np.mean(said, axis=0, dtype=np.float64).astype(np.float32)
+        self.heard[where].append(Answers(features.astype(np.float32), mean))
+        return mean
+
+
+def distil(
+    recipe: Recipe,
+    members: Sequence[Checkpoint],
+    plan: Distillation,
+    on_step: Callable[[int, float], None],
+) -> tuple[BoundedNet, BoundedNet]:
+    """Return networks of a recipe that answer what all members do in the mean.
+
+    Args:
+        on_step: called after each step of either network, with the number of steps and the loss.
+    """
+    seed = recipe.seed
+    taught = initial_network(recipe), initial_vertex_network(recipe)
+    with deterministic():
+        heard = asked(members, coarse_and_fine(seed, plan.meshes), seed)
+        for number, (network, start, answers) in enumerate(
+            zip(taught, (members[0].network, members[0].vertex_network), heard, strict=True)
+        ):
+            assert network is not None
+            assert start is not None
+            network.load_state_dict(start.state_dict())
+            done = number * plan.steps
+            for step, loss in enumerate(_steps(network, answers, plan.steps, seed), start=1):
+                on_step(done + step, loss)
+    network, vertex_network = taught
+    assert vertex_network is not None
+    return network, vertex_network
+
+
+def planned(recipe: Recipe, members: Sequence[Checkpoint], meshes: int, steps: int) -> Distillation:
+    """Return how these trainings are to be distilled.
+
+    Raises:
+        ParameterError: the recipe is not scale-free, a member's differs from it in more than its
+            seed and its activation, or two members are of the same training.
+    """
+    if recipe.scale_free is None or recipe.vertex is None:
+        raise ParameterError("recipe", recipe.name, expected="a scale-free one")
+    for member in members:
+        own = replace(member.recipe, seed=recipe.seed, activation=recipe.activation)
+        if own != recipe:
+            expected = f"trainings of {recipe.name} as it is now"
+            raise ParameterError("recipe", own.name, expected=expected)
+    trainings = [(member.recipe.seed, member.recipe.activation) for member in members]
+    if len(set(trainings)) < len(trainings):
+        raise ParameterError("trainings", str(trainings), expected="different ones")
+    seeds, activations = zip(*trainings, strict=True)
+    return Distillation(seeds, activations, meshes, steps)
+
+
+def asked(
+    members: Sequence[Checkpoint], meshes: Iterable[Mesh], seed: int
+) -> tuple[Answers, Answers]:
+    """Return what all answer in the mean on some meshes, at edges and at vertices."""
+    rng = np.random.default_rng(seed)
+    mean = Mean([recipe_model(each.recipe, each.network, each.vertex_network) for each in members])
+    kept: dict[str, list[Answers]] = {where: [] for where in mean.heard}
+    for mesh in meshes:
+        # One thread: its rows are the same in any order, but not those that are drawn of them.
+        refine(mesh, pns(mean), 1, threads=1)
+        for where, heard in mean.heard.items():
+            # Where no gate is open nobody asks.
+            if heard:
+                together = joined(heard)
+                rows = rng.permutation(len(together.features))[:MOST_ROWS]
+                kept[where].append(Answers(together.features[rows], together.answers[rows]))
+            heard.clear()
+    return joined(kept["edges"]), joined(kept["vertices"])
+
+
+def joined(parts: Sequence[Answers]) -> Answers:
+    """Return all rows as one."""
+    return Answers(
+        np.concatenate([part.features for part in parts]),
+        np.concatenate([part.answers for part in parts]),
+    )
+
+
+def coarse_and_fine(seed: int, count: int) -> Iterator[Mesh]:
+    """Yield the coarse meshes of so many pairs, and after some of them what Loop makes of them."""
+    rng = np.random.default_rng(seed)
+    for pair in islice(pair_stream(seed), count):
+        yield pair.coarse
+        if len(pair.coarse.faces) <= LARGEST_REFINED and rng.random() < REFINED:
+            fine = refine(pair.coarse, loop(), 1, threads=1).mesh
+            shake = rng.uniform(*SHAKES) if rng.random() < SHAKEN else 0.0
+            points = fine.vertices + shake * rng.standard_normal(fine.vertices.shape)
+            yield Mesh(points, fine.faces)
+
+
+def _steps(network: BoundedNet, answers: Answers, steps: int, seed: int) -> Iterator[float]:
+    """Take Adam steps towards the answers, in the mean of squares; yield the loss before each."""
+    features, wanted = torch.from_numpy(answers.features), torch.from_numpy(answers.answers)
+    generator = torch.Generator().manual_seed(seed)
+    optimiser = torch.optim.Adam(network.parameters(), LEARNING_RATE, betas=(0.9, 0.99))
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, LEARNING_RATE, total_steps=steps, pct_start=WARM_UP, cycle_momentum=False
+    )
+    for _ in range(steps):
+        rows = torch.randint(len(features), (BATCH_ROWS,), generator=generator)
+        loss = (network(features[rows], 1.0) - wanted[rows]).square().sum(dim=1).mean()
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        schedule.step()
+        yield loss.item()
