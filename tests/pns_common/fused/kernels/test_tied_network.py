@@ -36,7 +36,7 @@ def test_what_units_say_is_of_copies_by_characters_again(size):
     said, characters = np.zeros_like(units), character_table(size).astype(np.float32)
     copies = np.einsum("sg,igl->isl", characters, units)
     _activate(units.reshape(-1), said.reshape(-1), size, 2)
-    expected = np.einsum("sg,igl->isl", character_table(size), smoothstep(copies / 2).astype(float))
+    expected = np.einsum("sg,igl->isl", character_table(size), smoothstep(copies).astype(float))
     np.testing.assert_allclose(said, expected, rtol=0, atol=1e-5)
 
 
