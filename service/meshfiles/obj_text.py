@@ -7,10 +7,12 @@ as many numbers. None of that is told: the shape is another one. So such files a
 
 from __future__ import annotations
 
+import io
 import re
 from codecs import BOM_UTF8
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 from ..errors import UnreadableError
 
@@ -64,23 +66,23 @@ def written_anew(text: bytes) -> bytes:
         UnreadableError: a line cannot be understood; it is named by its number.
     """
     total = _Counts()
-    for _, words in _statements(text):
-        total.v += words[0] == b"v"
-        total.vt += words[0] == b"vt"
+    for _, keyword, _ in _statements(text):
+        total.v += keyword == b"v"
+        total.vt += keyword == b"vt"
     so_far, textured = _Counts(), True
     # Faces with texture coordinates, and without: which it is to be is known at the end.
     full, bare = bytearray(), bytearray()
-    for number, words in _statements(text):
+    for number, keyword, rest in _statements(text):
         plain = None
-        match words[0]:
+        match keyword:
             case b"v":
                 so_far.v += 1
-                line = _position(number, words)
+                line = b"v " + _position(number, rest)
             case b"vt":
                 so_far.vt += 1
-                line = b" ".join(words)
-            case b"f" if len(words) > 3:
-                corners = [_corner(number, word, so_far, total) for word in words[1:]]
+                line = b"vt " + _first_three(rest)
+            case b"f" if len(words := rest.split()) > 2:
+                corners = [_corner(number, word, so_far, total) for word in words]
                 textured = textured and all(vt > 0 for _, vt in corners)
                 line = b"f" + b"".join(b" %d/%d" % corner for corner in corners)
                 plain = b"f" + b"".join(b" %d" % v for v, _ in corners)
@@ -92,27 +94,37 @@ def written_anew(text: bytes) -> bytes:
     return bytes(full if textured else bare)
 
 
-def _statements(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
-    """Yield the words of each statement, without comments, and the number of its first line."""
-    first, begun = 1, b""
-    for number, line in enumerate(text.split(b"\n"), start=1):
-        if line.rstrip(b"\r").endswith(b"\\"):
-            begun += line.rstrip(b"\r")[:-1] + b" "
+def _statements(text: bytes) -> Iterator[tuple[int, bytes, bytes]]:
+    """Yield the number of each statement's first line, its keyword, and its rest but comments."""
+    begun: list[bytes] = []
+    # Line by line: of a list of all of them short ones take many times the file. One more ends a
+    # statement that the last one leaves open.
+    for number, whole in enumerate(chain(io.BytesIO(text), [b""]), start=1):
+        line = whole.rstrip(b"\r\n")
+        if line.endswith(b"\\"):
+            begun.append(line[:-1])
             continue
-        if words := (begun + line).partition(b"#")[0].split():
-            yield first, words
-        first, begun = number + 1, b""
+        words = b" ".join([*begun, line]).partition(b"#")[0].split(maxsplit=1)
+        if words:
+            yield number - len(begun), words[0], words[1] if len(words) > 1 else b""
+        begun.clear()
 
 
-def _position(number: int, words: list[bytes]) -> bytes:
+def _first_three(rest: bytes) -> bytes:
+    """Return the first three words."""
+    return b" ".join(rest.split(maxsplit=3)[:3])
+
+
+def _position(number: int, rest: bytes) -> bytes:
+    words = _first_three(rest).split()
     try:
-        for word in words[1:4]:
+        for word in words:
             float(word)
     except ValueError as error:
         raise _fault(number, "a coordinate is no number") from error
-    if len(words) < 4:
-        raise _fault(number, f"a vertex has {len(words) - 1} coordinates")
-    return b" ".join(words[:4])
+    if len(words) < 3:
+        raise _fault(number, f"a vertex has {len(words)} coordinates")
+    return b" ".join(words)
 
 
 def _corner(number: int, word: bytes, so_far: _Counts, total: _Counts) -> tuple[int, int]:

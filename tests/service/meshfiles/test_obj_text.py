@@ -33,6 +33,7 @@ def triangles(text: str | bytes) -> list[list[int]]:
         (POSITIONS + "f 1 2 3 # the first\nf 1 2 5\n", [[0, 1, 2], [0, 1, 4]]),
         (POSITIONS.replace("2 2 1", "2 2 1 # a tip") + "f 1 2 5\n", [[0, 1, 4]]),
         (POSITIONS + "f 1 2\\\n3\nf 1 2 \\\r\n 5\r\n", [[0, 1, 2], [0, 1, 4]]),
+        (POSITIONS + "f 1 2 3\nf 1 2 5\\", [[0, 1, 2], [0, 1, 4]]),
         # As many numbers as a hexagon has.
         (
             POSITIONS + "vt 0 0\nf 1/1 2/1 3/1\nf 1 2 3 4 5 6\n",
@@ -84,6 +85,7 @@ def test_the_usual_way_of_writing_is_left_alone(corner, end):
         (POSITIONS + "\nf 1 2 7\n", "line 8 .* vertex 7, and there are 6"),
         ("v 0 0 0\nf 1 -2 1\n" + POSITIONS, "line 2 .* vertex -2, and there are 1"),
         (POSITIONS + "f 1 2 \\\n x\n", "line 7 .* a corner of a face is no number"),
+        (POSITIONS + "f 1 2 \\\n x\\", "line 7 .* a corner of a face is no number"),
         (POSITIONS.replace("2 2 1", "2 2") + "f 1 2 3\n", "line 5 .* a vertex has 2 coordinates"),
         (
             POSITIONS.replace("2 2 1", "2,5 2,5 1") + "f 1 2 5\n",
