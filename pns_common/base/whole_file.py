@@ -46,7 +46,17 @@ def _new_file(path: Path) -> Generator[tuple[Path, int], None, None]:
         temporary.replace(path)
     except BaseException as error:
         temporary.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename in (None, temporary, str(temporary)):
-            # A write that fails, of a full disk for one, names no file; and nobody asked for this.
-            error.filename, error.filename2 = str(path), None
+        if isinstance(error, OSError):
+            _name(error, temporary, path)
         raise
+
+
+def _name(error: OSError, temporary: Path, path: Path) -> None:
+    """Say that it is of `path`: a write that fails names no file, or one that nobody asked for.
+
+    Not where it is of other files, or has words of its own, in whose place a name would stand.
+    """
+    if error.errno is not None and error.filename in (None, temporary, str(temporary)):
+        error.filename = str(path)
+        # None would be told as a second name.
+        del error.filename2

@@ -37,7 +37,7 @@ def explained(error: Exception) -> tuple[str, int] | None:
         case ServiceError() | PnsError() | KeysError() | TracingError():
             return str(error), FAILURE
         case OSError():
-            return f"{error.filename or 'output'}: {error.strerror}", FAILURE
+            return f"{error.filename or 'output'}: {error.strerror or error}", FAILURE
         case _:
             return None
 

@@ -115,16 +115,11 @@ class Journal:
                 self._database.close()
 
     def _write_report(self) -> None:
-        try:
-            if self.report.suffix == ".parquet":
-                self._write_parquet()
-                return
-            with replacing(self.report) as temporary, temporary.open("w") as lines:
-                lines.writelines(f"{row}\n" for row in self._rows())
-        except OSError as error:
-            # A write that fails, of a full disk for one, names no file.
-            error.filename = str(self.report)
-            raise
+        if self.report.suffix == ".parquet":
+            self._write_parquet()
+            return
+        with replacing(self.report) as temporary, temporary.open("w") as lines:
+            lines.writelines(f"{row}\n" for row in self._rows())
 
     def _rows(self) -> Iterator[str]:
         query = "SELECT row FROM rows WHERE work = ? ORDER BY path"

@@ -56,8 +56,7 @@ def test_where_a_file_cannot_be_put_it_is_named(tmp_path):
     with pytest.raises(IsADirectoryError) as refusal:
         replace_file(tmp_path / "folder", b"")
     assert refusal.value.filename == str(tmp_path / "folder")
-    assert str(tmp_path / "folder") in str(refusal.value)
-    assert ".tmp" not in str(refusal.value)
+    assert str(refusal.value).endswith(f": {str(tmp_path / 'folder')!r}")
 
 
 @pytest.mark.parametrize("write", [replace_file, lambda path, data: writes(path, data)])
@@ -72,7 +71,16 @@ def test_a_write_that_fails_names_the_file(tmp_path, write):
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
         signal.signal(signal.SIGXFSZ, handler)
     assert (refusal.value.errno, refusal.value.filename) == (errno.EFBIG, str(path))
+    assert str(refusal.value).endswith(f": {str(path)!r}")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("error", [OSError("no mode RGBA"), FileNotFoundError(2, "none", "other")])
+def test_an_error_of_its_own_words_or_of_another_file_is_told_as_it_is(tmp_path, error):
+    before = str(error)
+    with pytest.raises(OSError) as raised, replacing(tmp_path / "picture.jpg"):  # noqa: PT011
+        raise error
+    assert str(raised.value) == before
 
 
 def writes(path, data):

@@ -12,6 +12,7 @@ import pytest
 from pns_common.runtimes.onnx_model import bundled_models
 from service import cli
 from service.cli import commands
+from service.cli.errors import explained
 from service.meshfiles.example import part_glb
 from tests.service.cli.trees import FACES, tree_of, tree_of_bytes
 
@@ -132,3 +133,7 @@ def test_a_fault_of_ours_is_a_traceback(pns: Any, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(commands, "app", fault)
     with pytest.raises(ZeroDivisionError):
         cli.main()
+
+
+def test_an_error_of_the_system_without_a_number_is_told_in_its_own_words() -> None:
+    assert explained(OSError("the stream is closed")) == ("output: the stream is closed", 1)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from pns_common.base.whole_file import replacing
 from service.scale.job import Row
 from service.scale.journal import Journal, open_journal
 
@@ -65,8 +66,9 @@ def test_a_file_that_is_no_journal_is_told_by_name(tmp_path):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 def test_a_report_that_a_full_disk_cannot_take_is_named(tmp_path, monkeypatch):
     @contextmanager
-    def full(_):
-        yield Path("/dev/full")
+    def full(report):
+        with replacing(report):
+            yield Path("/dev/full")
 
     monkeypatch.setattr("service.scale.journal.replacing", full)
     with (
