@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from pns_common.errors import PnsError
+from pns_common.errors import ParameterError, PnsError
 from pns_common.schemes import pns
 from train.certificates.command import certify_command
 from train.experiments.command import reproduce_command
@@ -31,6 +32,14 @@ from train.models.torch_model import recipe_model
 CHECKPOINTS = Path("checkpoints")
 # Of a distillation, where nothing else is said.
 MESHES, STEPS = 1500, 10_000
+
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        dir_okay=False,
+        help="Checkpoint to write; checkpoints/RECIPE.safetensors if not given.",
+    ),
+]
 
 if TYPE_CHECKING:
     RecipeName = str
@@ -54,10 +63,7 @@ def main(context: typer.Context) -> None:
 def train(
     recipe: Annotated[RecipeName, typer.Option(help="What to train.")] = DEFAULT_RECIPE,
     seed: Annotated[int, typer.Option(min=0, help="Of the weights and batches.")] = 0,
-    output: Annotated[
-        Path | None,
-        typer.Option(help="Checkpoint to write; checkpoints/RECIPE.safetensors if not given."),
-    ] = None,
+    output: Output = None,
 ) -> None:
     """Train a recipe, write its checkpoint and print the held-out table."""
     console = Console()
@@ -68,7 +74,7 @@ def train(
         task = progress.add_task(f"training {chosen.name}", total=chosen.steps, loss=float("nan"))
         trained = fit(chosen, lambda done, loss: progress.update(task, completed=done, loss=loss))
     _measure_and_save(path, chosen, trained.network, trained.vertex_network, None, console)
-    console.print(f"{path} written in {time.perf_counter() - began:.1f} s", soft_wrap=True)
+    _say_written(path, began, console)
 
 
 @app.command()
@@ -76,23 +82,21 @@ def distil(
     checkpoints: Annotated[list[Path], typer.Argument(help="Trainings of one scale-free recipe.")],
     meshes: Annotated[int, typer.Option(min=1, help="Pairs of the stream to ask on.")] = MESHES,
     steps: Annotated[int, typer.Option(min=1, help="Adam steps of each network.")] = STEPS,
-    output: Annotated[
-        Path | None,
-        typer.Option(help="Checkpoint to write; checkpoints/RECIPE.safetensors if not given."),
-    ] = None,
+    output: Output = None,
 ) -> None:
     """Fit the networks of a recipe to what those of its trainings answer in the mean."""
     console = Console()
     began = time.perf_counter()
     try:
         members = [load_checkpoint(path) for path in checkpoints]
-        first = members[0].recipe
-        recipe = RECIPES[first.name](first.seed)
+        recipe = _as_it_is_now(members[0].recipe)
         plan = planned(recipe, members, meshes, steps)
+        path = output or CHECKPOINTS / f"{recipe.name}.safetensors"
+        if path.resolve() in [each.resolve() for each in checkpoints]:
+            raise ParameterError("output", str(path), expected="another file than the trainings")
     except PnsError as error:
-        console.print(str(error), style="red", soft_wrap=True)
+        console.print(escape(str(error)), style="red", soft_wrap=True)
         raise typer.Exit(1) from error
-    path = output or CHECKPOINTS / f"{recipe.name}.safetensors"
     with _progress(console) as progress:
         task = progress.add_task(f"distilling {recipe.name}", total=2 * steps, loss=float("nan"))
         networks = distilled(
@@ -102,7 +106,14 @@ def distil(
             lambda done, loss: progress.update(task, completed=done, loss=loss),
         )
     _measure_and_save(path, recipe, *networks, plan, console)
-    console.print(f"{path} written in {time.perf_counter() - began:.1f} s", soft_wrap=True)
+    _say_written(path, began, console)
+
+
+def _as_it_is_now(recipe: Recipe) -> Recipe:
+    """Return the recipe of this name and seed. Raises ParameterError where there is none."""
+    if recipe.name not in RECIPES:
+        raise ParameterError("recipe", recipe.name, expected=f"one of {', '.join(RECIPES)}")
+    return RECIPES[recipe.name](recipe.seed)
 
 
 def _measure_and_save(
@@ -120,6 +131,11 @@ def _measure_and_save(
     save_checkpoint(path, Checkpoint(recipe, network, metrics, machine, vertex_network, plan))
     for name, rows in improvements.items():
         console.print(improvement_table(f"{name}, recipe {recipe.name}", rows))
+
+
+def _say_written(path: Path, began: float, console: Console) -> None:
+    seconds = time.perf_counter() - began
+    console.print(f"{escape(str(path))} written in {seconds:.1f} s", soft_wrap=True)
 
 
 def _progress(console: Console) -> Progress:

@@ -132,6 +132,22 @@ def test_the_command_writes_a_checkpoint_that_says_what_it_was_made_of(tmp_path,
     made = load_checkpoint(out)
     assert made.recipe == small(0)
     assert made.distilled == Distillation((0, 1), ("smoothstep",) * 2, 2, 2)
-    refused = CliRunner().invoke(train.run.app, ["distil", str(paths[0]), str(paths[0])])
-    assert refused.exit_code == 1
-    assert "trainings" in refused.output
+
+
+def test_what_cannot_be_distilled_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.setattr(train.run, "RECIPES", {"general": small})
+    path, foreign = tmp_path / "a[b].safetensors", tmp_path / "foreign.safetensors"
+    save_checkpoint(path, MEMBERS[0])
+    before = path.read_bytes()
+    save_checkpoint(foreign, training(replace(small(0), name="foreign")))
+    for arguments, code, said in (
+        ([path, path], 1, "expected different ones"),
+        ([path, "--output", path], 1, "output = "),
+        ([path, "--output", tmp_path], 2, "directory"),
+        ([foreign], 1, "recipe = 'foreign': expected one of general"),
+        ([tmp_path / "c[d]"], 1, "c[d]: expected a checkpoint, found no such file"),
+    ):
+        refused = CliRunner().invoke(train.run.app, ["distil", *map(str, arguments)])
+        assert refused.exit_code == code, refused.output
+        assert said in refused.output
+    assert path.read_bytes() == before
