@@ -24,7 +24,7 @@ def model_bytes(
 
     With a vertex network also vertex_features [vertices, L] in and vertex_correction out.
     The projection onto the ball is inside, so ‖correction‖ ≤ budget whatever the weights are.
-    Only long-standing standard operators: the exact GELU is x/2 (1 + erf(x/√2)), spelt out.
+    Only long-standing standard operators: GELU and smoothstep are spelt out.
     """
     graph = _Graph()
     _add_network(graph, network, "features", "correction")
@@ -121,6 +121,7 @@ def _array(tensor: Tensor) -> np.ndarray:
 
 
 def _gelu(graph: _Graph, x: str) -> str:
+    # The exact one, x/2 (1 + erf(x/√2)).
     # In these operators onnxruntime knows it, and computes it in one of its own.
     root, unit = graph.constant("root_two", np.sqrt(2.0)), graph.constant("one", 1.0)
     half = graph.constant("half", 0.5)
