@@ -8,6 +8,18 @@ import { moving, positions, report } from "./support/glb.mjs";
 import { serve } from "./support/server.mjs";
 import { example, number, part, PART_FACES, same, studio } from "./support/studio.mjs";
 
+/** A cube around the origin, without normals. */
+const CUBE = {
+  name: "cube.obj",
+  mimeType: "",
+  buffer: Buffer.from(
+    [
+      ...[0, 1, 2, 3, 4, 5, 6, 7].map((corner) => `v ${[1, 2, 4].map((bit) => (corner & bit ? 0.5 : -0.5)).join(" ")}`),
+      ...["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"].map((corners) => `f ${corners}`),
+    ].join("\n"),
+  ),
+};
+
 describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   const { visit, refined } = studio();
 
@@ -103,6 +115,26 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       const halves = [coloured, plain].map((shown) => columns(shown, middle, 2 * middle));
       assert.ok(!halves[0].equals(halves[1]), `${heat} changes nothing`);
     }
+  });
+
+  test("a cube that keeps its edges is coloured by its distance to Loop, whose cube has fewer vertices", async () => {
+    const page = await visit({ hash: "#levels=1&look=distance" });
+    await choose(page, CUBE);
+    await settled(page);
+    const pieces = await Promise.all(
+      ["pns", "loop"].map((scheme) => refined(`levels=1&normals=smooth&scheme=${scheme}`, CUBE.buffer, "model/obj")),
+    );
+    // On each side a vertex has its octant, edge or face to itself.
+    const [ours, loop] = pieces.map((bytes) => {
+      const [places] = positions(bytes);
+      const points = Array.from({ length: places.length / 3 }, (_, i) => places.slice(3 * i, 3 * i + 3));
+      return new Map(points.map((point) => [point.map((x) => Math.sign(Math.trunc(5 * x))).join(), point]));
+    });
+    assert.deepEqual([ours.size, loop.size], [26, 26]);
+    const apart = [...ours].map(([side, point]) => Math.hypot(...point.map((x, axis) => x - loop.get(side)[axis])));
+    const shown = Number(await page.getAttribute("#legend", "data-end", { timeout: 1000 }));
+    assert.ok(Math.abs(shown - Math.max(...apart)) < 1e-6, `${shown} is not ${Math.max(...apart)}`);
+    assert.match(await page.textContent("#statements"), /Between the refined vertices/);
   });
 
   test("beside a heat map a wireframe keeps its lines", async () => {

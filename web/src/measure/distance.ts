@@ -1,7 +1,11 @@
-/** How far each refined vertex lies from its counterpart by Loop's rules; both have one numbering. */
+/**
+ * How far each refined vertex lies from its counterpart by Loop's rules. Both have the same faces in the same
+ * order; their vertices may differ, since those at a crease are one for each of its sides where normals break there.
+ */
 
 import { Matrix4, Vector3, type Mesh, type SkinnedMesh } from "three";
 import type { Model } from "../view/model";
+import { corners } from "./weld";
 
 export interface Field {
   /** One value a vertex, by mesh. */
@@ -16,13 +20,19 @@ export function distances(ours: Model, loop: Model): Field | null {
   let max = 0;
   const apart = new Vector3();
   for (const [number, mesh] of ours.meshes.entries()) {
+    const counterpart = loop.meshes[number]!.geometry;
     const a = mesh.geometry.getAttribute("position");
-    const b = loop.meshes[number]!.geometry.getAttribute("position");
-    if (a.count !== b.count) return null;
+    const b = counterpart.getAttribute("position");
+    const [of, by] = [corners(mesh.geometry), corners(counterpart)];
+    if (of.length !== by.length) return null;
     const toScene = placement(mesh);
     const lengths = new Float32Array(a.count);
-    for (let i = 0; i < a.count; i++) {
-      apart.set(a.getX(i) - b.getX(i), a.getY(i) - b.getY(i), a.getZ(i) - b.getZ(i));
+    const isMeasured = new Uint8Array(a.count);
+    for (let corner = 0; corner < of.length; corner++) {
+      const [i, j] = [of[corner]!, by[corner]!];
+      if (isMeasured[i]) continue;
+      isMeasured[i] = 1;
+      apart.set(a.getX(i) - b.getX(j), a.getY(i) - b.getY(j), a.getZ(i) - b.getZ(j));
       lengths[i] = apart.applyMatrix4(toScene).length();
       max = Math.max(max, lengths[i]!);
     }
