@@ -29,6 +29,8 @@ _OBJ_NAMES = {
 }
 _PLY_KEPT = frozenset({"x", "y", "z", "vertex_index", "vertex_indices"})
 _PLY_UV = frozenset({"u", "v", "s", "t", "texture_u", "texture_v"})
+# Of a face's corners, one after another: where there are such, those at vertices are passed over.
+_PLY_CORNER_UV = "texcoord"
 
 
 def of_obj(data: bytes) -> dict[str, int]:
@@ -55,7 +57,10 @@ def unused_in_obj(data: bytes) -> int:
 
 def of_ply(elements: dict[str, Any], *, has_uv: bool) -> dict[str, int]:
     """Count, by name, the properties and elements that are passed over."""
-    kept = _PLY_KEPT | _PLY_UV if has_uv else _PLY_KEPT
+    kept = _PLY_KEPT
+    if has_uv:
+        at_corners = _PLY_CORNER_UV in elements["face"]["properties"]
+        kept |= {_PLY_CORNER_UV} if at_corners else _PLY_UV
     counts: dict[str, int] = {}
     for element, content in elements.items():
         if element not in ("vertex", "face"):

@@ -21,6 +21,7 @@ from service.options import Limits, Options
 from tests.support.shared import shared_path
 
 KINDS = ("obj", "ply", "stl", "off")
+SQUARE = ("0 0 0", "1 0 0", "1 1 0", "0 1 0")
 
 
 def refined(mesh_file: IndexedTriangles, levels: int = 1) -> tuple[IndexedTriangles, dict]:
@@ -198,6 +199,28 @@ def test_what_is_left_out_is_named(kind: str, data: bytes, names: set[str]) -> N
     assert set(mesh_file.unsupported) == names
     _, report = refined(mesh_file)
     assert {f"{name} dropped" for name in names} <= {c["what"] for c in report["changes"]}
+
+
+@pytest.mark.parametrize("has_others", [False, True])
+def test_texture_coordinates_at_corners_of_a_ply_are_not_said_to_be_dropped(
+    has_others: bool,
+) -> None:
+    # A diagonal at which they differ, as at a seam. Beside them those at vertices are not used.
+    beside = "property float u\nproperty float v\n" if has_others else ""
+    text = (
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+        f"property float z\n{beside}element face 2\nproperty list uchar int vertex_indices\n"
+        "property list uchar float texcoord\nend_header\n"
+        + "".join(f"{xyz}{' .5 .5' if has_others else ''}\n" for xyz in SQUARE)
+        + "3 0 1 2 6 0 0 1 0 1 1\n3 0 2 3 6 .1 .1 .9 .9 .1 .9\n"
+    )
+    mesh_file = formats.read(text.encode(), "ply")
+    assert mesh_file.uv is not None
+    assert mesh_file.uv[mesh_file.faces].reshape(2, 6) == pytest.approx(
+        np.array([[0, 0, 1, 0, 1, 1], [0.1, 0.1, 0.9, 0.9, 0.1, 0.9]])
+    )
+    others = {"vertex property u": 4, "vertex property v": 4} if has_others else {}
+    assert mesh_file.unsupported == others
 
 
 def test_an_obj_of_several_materials_does_not_crack_between_them() -> None:
