@@ -63,7 +63,11 @@ const session = new Session({
     fileList.show(source?.upload ?? null);
     // A setting of what is over.
     changed.cancel();
-    if (!source) return;
+    if (!source) {
+      // What it was fitted to is gone.
+      form.fit(null);
+      return;
+    }
     if (ours) form.show(ours.asked, source.upload, source.opened.faces);
     else form.fit(source);
     remember();

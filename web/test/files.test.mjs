@@ -252,6 +252,16 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.deepEqual(await page.evaluate(() => [...window.sent]), ["file: a.gltf", "a.bin: a.bin"]);
   });
 
+  test("of a first file that cannot be drawn and is refused the form keeps no faces", async () => {
+    const page = await visit({ expected: [422] });
+    await page.locator("#limits:not(:empty)").waitFor();
+    const levels = await page.textContent("#levels");
+    await choose(page, { ...example, name: "nan.glb", buffer: broken(part) });
+    await page.locator("#problem").waitFor();
+    assert.ok(await page.isVisible("#welcome"));
+    assert.equal(await page.textContent("#levels"), levels);
+  });
+
   test("of a first file that is refused nothing stays", async () => {
     const page = await visit({ expected: [422] });
     const levels = await page.textContent("#levels");
