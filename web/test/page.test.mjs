@@ -137,6 +137,20 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.match(await page.textContent("#statements"), /Between the refined vertices/);
   });
 
+  test("of Loop’s own result heat maps are zero, and say why", async () => {
+    const page = await visit({ hash: "#levels=1&model=loop&layout=single" });
+    await choose(page, example);
+    await settled(page);
+    const plain = await picture(page);
+    for (const heat of ["distance", "ratio", "gate"]) {
+      await page.selectOption("#look", heat);
+      assert.ok(await page.isVisible("#legend"), heat);
+      assert.equal(await page.getAttribute("#legend", "data-end"), "0");
+      assert.match(await page.textContent("#legend-note"), /nothing learned/);
+      assert.ok(!(await picture(page)).data.equals(plain.data), `${heat} changes nothing`);
+    }
+  });
+
   test("beside a heat map a wireframe keeps its lines", async () => {
     const page = await visit({ hash: "#levels=1&layout=side" });
     await choose(page, example);

@@ -6,8 +6,11 @@ import { dihedrals } from "../measure/dihedral";
 import { distances, type Field } from "../measure/distance";
 import { figure, length, percent, type Unit } from "../report/format";
 import { largestGate, largestRatio, learnedLevels } from "../report/report";
+import { LOOP } from "../settings";
 import { heatRange } from "./looks";
 import type { Model } from "./model";
+
+const BY_LOOP = "This result is Loop’s: nothing learned took part.";
 
 export type Heat = "distance" | "ratio" | "gate" | "dihedral";
 
@@ -45,6 +48,7 @@ export function colour(
 }
 
 function field(heat: Heat, ours: Result, loop: Result | null): Field | null {
+  if (ours.report.scheme === LOOP && heat !== "dihedral") return zeros(ours.model);
   switch (heat) {
     case "distance":
       return loop && distances(ours.model, loop.model);
@@ -53,6 +57,12 @@ function field(heat: Heat, ours: Result, loop: Result | null): Field | null {
     default:
       return attribute(ours.model, `_pns_${heat}`);
   }
+}
+
+/** What Loop's rules alone leave of all that is learned. */
+function zeros(model: Model): Field {
+  const values = model.meshes.map(({ geometry }) => new Float32Array(geometry.getAttribute("position").count));
+  return { values, max: 0 };
 }
 
 function attribute(model: Model, name: string): Field | null {
@@ -69,10 +79,10 @@ function attribute(model: Model, name: string): Field | null {
 
 function legendOf(heat: Heat, max: number, { report }: Result, unit: Unit): Legend {
   const level = report.levels.at(-1);
-  const asleep =
-    learnedLevels(report) < report.levels.length
-      ? ` The learned rule acted at level ${learnedLevels(report)} last: this one is Loop’s.`
-      : "";
+  const isLoop = report.scheme === LOOP;
+  const last = learnedLevels(report);
+  const seen = last ? ` The learned rule acted at level ${last} last: choose ${last} to see it.` : "";
+  const asleep = last < report.levels.length ? ` This level is Loop’s.${seen}` : "";
   switch (heat) {
     case "distance":
       return {
@@ -80,26 +90,26 @@ function legendOf(heat: Heat, max: number, { report }: Result, unit: Unit): Lege
         low: length(0, unit),
         high: length(max, unit),
         end: max,
-        note: "Each vertex against its counterpart by Loop’s rules.",
+        note: isLoop ? BY_LOOP : "Each vertex against its counterpart by Loop’s rules.",
       };
     case "ratio": {
-      const end = level ? largestRatio(level) : max;
+      const end = level && !isLoop ? largestRatio(level) : max;
       return {
         title: "Share of the budget",
         low: "0 %",
         high: percent(Math.min(end, 1)),
         end,
-        note: `Of the last level’s corrections; 100 % is the bound C h² / R.${asleep}`,
+        note: isLoop ? BY_LOOP : `Of the last level’s corrections; 100 % is the bound C h² / R.${asleep}`,
       };
     }
     case "gate": {
-      const end = level ? largestGate(level) : max;
+      const end = level && !isLoop ? largestGate(level) : max;
       return {
         title: "Gate",
         low: "0, shut",
         high: `${figure(end)}${end > 0.995 ? ", open" : ""}`,
         end,
-        note: `Shut on planes, open at sharp edges; of the last level.${asleep}`,
+        note: isLoop ? BY_LOOP : `Shut on planes, open at sharp edges; of the last level.${asleep}`,
       };
     }
     case "dihedral":
