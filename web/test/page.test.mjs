@@ -8,17 +8,22 @@ import { moving, positions, report } from "./support/glb.mjs";
 import { serve } from "./support/server.mjs";
 import { example, number, part, PART_FACES, same, studio } from "./support/studio.mjs";
 
-/** A cube around the origin, without normals. */
-const CUBE = {
-  name: "cube.obj",
-  mimeType: "",
-  buffer: Buffer.from(
-    [
-      ...[0, 1, 2, 3, 4, 5, 6, 7].map((corner) => `v ${[1, 2, 4].map((bit) => (corner & bit ? 0.5 : -0.5)).join(" ")}`),
-      ...["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"].map((corners) => `f ${corners}`),
-    ].join("\n"),
-  ),
-};
+/** A cube around the origin and a pyramid on its foot, without normals. */
+const CUBE = obj(
+  "cube.obj",
+  [0, 1, 2, 3, 4, 5, 6, 7].map((corner) => [1, 2, 4].map((bit) => (corner & bit ? 0.5 : -0.5))),
+  ["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"],
+);
+const PYRAMID = obj(
+  "pyramid.obj",
+  [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1], [0, 2, 0]],
+  ["1 2 3 4", "2 1 5", "3 2 5", "4 3 5", "1 4 5"],
+);
+
+function obj(name, points, faces) {
+  const lines = [...points.map((point) => `v ${point.join(" ")}`), ...faces.map((face) => `f ${face}`)];
+  return { name, mimeType: "", buffer: Buffer.from(lines.join("\n")) };
+}
 
 describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   const { visit, refined } = studio();
@@ -149,6 +154,53 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       assert.match(await page.textContent("#legend-note"), /nothing learned/);
       assert.ok(!(await picture(page)).data.equals(plain.data), `${heat} changes nothing`);
     }
+  });
+
+  test("side by side a legend stands between the models, not on the foot of one", async () => {
+    const page = await visit({ hash: "#levels=1&layout=side&look=dihedral", viewport: { width: 1280, height: 800 } });
+    await choose(page, PYRAMID);
+    await settled(page);
+    const { width, height, data } = await picture(page);
+    const view = await page.locator("#canvas").boundingBox();
+    const legend = await page.locator("#legend").boundingBox();
+    const scale = width / view.width;
+    const paper = data.subarray(0, 4);
+    for (let y = legend.y - view.y; y < legend.y - view.y + legend.height; y += 4) {
+      for (let x = legend.x - view.x; x < legend.x - view.x + legend.width; x += 4) {
+        const at = 4 * (Math.round(y * scale) * width + Math.round(x * scale));
+        assert.ok(data.subarray(at, at + 4).equals(paper), `a model at ${x}, ${y} of ${width} × ${height}`);
+      }
+    }
+  });
+
+  test("what is compared is chosen only where two sides stand", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, CUBE);
+    await settled(page);
+    for (const [layout, open] of Object.entries({ wipe: true, side: true, overlay: false, single: false })) {
+      await page.check(`input[name="layout"][value="${layout}"]`);
+      assert.equal(await page.isEnabled("#pair"), open, layout);
+    }
+  });
+
+  test("choices are read whole, and stand under each other", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, example);
+    await settled(page);
+    await page.click(".more summary");
+    const short = await page.$$eval(".row select", (selects) => {
+      const context = document.createElement("canvas").getContext("2d");
+      const arrow = 18;
+      return selects.flatMap((select) => {
+        const { font, paddingLeft, paddingRight } = getComputedStyle(select);
+        context.font = font;
+        const room = select.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight) - arrow;
+        return [...select.options].map(({ text }) => text).filter((text) => context.measureText(text).width > room);
+      });
+    });
+    assert.deepEqual(short, []);
+    const edges = await page.$$eval(".more select", (selects) => selects.map((select) => select.getBoundingClientRect().left));
+    assert.equal(new Set(edges).size, 1, String(edges));
   });
 
   test("beside a heat map a wireframe keeps its lines", async () => {

@@ -122,7 +122,7 @@ export class SettingsForm {
       option(model.default ? "" : model.name, model.name + (model.default ? " (default)" : "")),
     );
     if (!bundled.length) bundled.push(option("", "default"));
-    select("model").replaceChildren(...bundled, option(LOOP, "Loop, nothing learned"));
+    select("model").replaceChildren(...bundled, option(LOOP, "Loop’s rules alone"));
     select("model").value = settings.model;
     const unknown = select("model").value !== settings.model;
     // A model that a link names may be on a list that is still on its way.

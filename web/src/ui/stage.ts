@@ -171,12 +171,14 @@ export class Stage {
   arrange(): void {
     const { source, ours, loop } = this.shown;
     const learned = ours && ours.report.scheme !== LOOP;
-    select("pair").disabled = !learned;
+    // One side alone is compared with nothing; over the result stand the control mesh's edges.
+    select("pair").disabled = !learned || this.layout === "overlay" || this.layout === "single";
     // Until Loop's side has come the control mesh stands in its place, under its own name.
     const byLoop = select("pair").value === "loop" && learned && loop !== null;
     const left = (byLoop ? loop.model : source?.model) ?? null;
     const right = ours?.model ?? null;
     const paper = getComputedStyle(document.body).backgroundColor;
+    element("view").dataset.layout = this.layout;
     this.writeLabels(byLoop ? loop : null);
     this.showLegend(this.colourResult());
     if (!this.viewer) return;
