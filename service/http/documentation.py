@@ -187,7 +187,7 @@ RESULT: dict[str, Any] = {
         "problem that it failed with."
     ),
     "responses": {
-        200: {name: value for name, value in _FILE.items() if name != "headers"},
+        200: _FILE,
         **{code: SUBDIVIDE["responses"][code] for code in (400, 413, 422, 500, 504)},
         **_problems(
             _404=_UNKNOWN,
@@ -200,8 +200,7 @@ RESULT: dict[str, Any] = {
 
 JOB_REPORT: dict[str, Any] = {
     "summary": "The report of a job",
-    "responses": RESULT["responses"]
-    | {200: {"description": "The report", "content": {media.JSON: {"schema": _named("Report")}}}},
+    "responses": RESULT["responses"] | {200: REPORT["responses"][200]},
 }
 
 # The schemas that the routes above name.

@@ -29,6 +29,7 @@ from .intake import Wanted, owner_of, taken_in
 from .job_book import Entry, NotDoneError
 from .leaving import unless_gone
 from .parameters import Parameters
+from .server_timing import server_timing
 from .service import Service
 
 # How often the page of a running job is looked at, and how long a stream may be silent.
@@ -195,7 +196,11 @@ def _result(service: Service, request: Request, job_id: str, kind: str) -> Respo
         service.admission,
         client_of(request, service.settings).id,
         media_type=kind,
-        headers={"Vary": "Accept", "Cache-Control": "no-store"},
+        headers={
+            "Server-Timing": server_timing(job.seconds),
+            "Vary": "Accept",
+            "Cache-Control": "no-store",
+        },
         sent=job.fetched.set,
     )
 

@@ -22,6 +22,7 @@ from .intake import Wanted, taken_in
 from .leaving import unless_gone
 from .limits import LimitsEntry, limits_of
 from .parameters import Parameters
+from .server_timing import server_timing
 from .service import Service
 
 log = logging.getLogger("pns.service")
@@ -82,7 +83,7 @@ async def _subdivide(
             async with service.admission.working():
                 await unless_gone(request.receive, service.desk.serve(job))
         timing = job.seconds | {"total": job.upload_seconds + time.monotonic() - job.admitted}
-        stages_text = _server_timing(timing)
+        stages_text = server_timing(timing)
         _log(job, answer.size, stages_text)
         return FileAnswer(
             answer,
@@ -99,7 +100,3 @@ def _log(job: Job, size: int, stages: str) -> None:
     model = None if job.done is None else job.done.model
     what = options.scheme if model is None else f"{options.scheme} ({model})"
     log.info("%s levels=%d: %d bytes; %s", what, options.levels, size, stages)
-
-
-def _server_timing(seconds: dict[str, float]) -> str:
-    return ", ".join(f"{stage};dur={1000 * value:.1f}" for stage, value in seconds.items())

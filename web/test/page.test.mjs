@@ -44,6 +44,10 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.equal(before.get("Vertices of the surface"), "960");
     assert.equal(after.get("Vertices of the surface"), number(16 * 960));
     assert.equal(before.get("Boundary edges"), "0");
+    const stages = await page.$$eval("#timings th", (names) => names.map(({ textContent }) => textContent));
+    for (const stage of ["Upload", "Queue", "Service: reading", "Service: refining", "Service: writing", "Opening the result"]) {
+      assert.ok(stages.includes(stage), `no ${stage} in ${stages}`);
+    }
   });
 
   test("what is downloaded is what the service answers, byte for byte", async () => {

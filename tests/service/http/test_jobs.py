@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -69,6 +70,10 @@ def test_a_job_is_accepted_done_and_fetched_as_often_as_wanted(client: httpx2.Cl
         result = client.get(f"/jobs/{job['id']}/result")
         assert result.content == b"echo this"
         assert result.headers["content-type"] == "model/gltf-binary"
+        assert re.fullmatch(
+            r"upload;dur=[\d.]+, queue;dur=[\d.]+(, \w+;dur=[\d.]+)*",
+            result.headers["server-timing"],
+        )
     report = client.get(f"/jobs/{job['id']}/result", headers=JSON)
     assert report.headers["content-type"] == "application/json"
 
