@@ -34,7 +34,11 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await settled(page);
     assert.match(await page.textContent("#label-right"), new RegExp(`· ${number(16 * PART_FACES)} faces`));
     assert.match(await page.textContent("#label-left"), new RegExp(`${number(PART_FACES)} faces`));
-    assert.match(await page.textContent("#statements"), /Nowhere more than .* from Loop/);
+    const statements = await page.textContent("#statements");
+    assert.match(statements, /Nowhere more than .* from Loop/);
+    // At the end of a line a unit would stand without its number.
+    assert.match(statements, /\d\u00a0c?m .*\d\u00a0%/s);
+    assert.doesNotMatch(statements, /\d (c?m|%)/);
     assert.equal(await page.textContent("#validation-badge"), "nothing new");
     // Seams apart, as the service counts: 48 columns of 20 rows, closed.
     const rows = await page.$$eval("#statistics tbody tr", (rows) =>
@@ -188,11 +192,11 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   });
 
   test("choices are read whole, and stand under each other", async () => {
-    const page = await visit({ hash: "#levels=1" });
+    const page = await visit({ hash: "#levels=1", viewport: { width: 1280, height: 800 } });
     await choose(page, example);
     await settled(page);
     await page.click(".more summary");
-    const short = await page.$$eval(".row select", (selects) => {
+    const short = await page.$$eval(".row select, .tools select", (selects) => {
       const context = document.createElement("canvas").getContext("2d");
       const arrow = 18;
       return selects.flatMap((select) => {

@@ -98,7 +98,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       page.on("request", (request) => assert.notEqual(request.method(), "POST"));
       await choose(page, example);
       assert.equal(await page.textContent("#problem-title"), "The file is too large");
-      assert.match(await page.textContent("#problem-detail"), /part\.glb has [\d.]+ kB; this service takes up to 10 kB/);
+      assert.match(await page.textContent("#problem-detail"), /part\.glb has [\d.]+\u00a0kB; this service takes up to 10\u00a0kB/);
       assert.ok(await page.isHidden("#problem-again"));
     });
   });

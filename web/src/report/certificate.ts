@@ -86,6 +86,6 @@ function planes(report: Report): Statement {
     text: "Planes untouched",
     note:
       "The gate of each correction is shut where neighbouring faces are level; " +
-      `it stood more than 1 % open on at most ${percent(active)} of the edges of a level.`,
+      `it stood more than ${percent(0.01)} open on at most ${percent(active)} of the edges of a level.`,
   };
 }

@@ -15,6 +15,11 @@ export function count(value: number): string {
   return value.toLocaleString("en-US");
 }
 
+/** A number and its unit, which no end of a line parts. */
+function measure(value: number | string, unit: string): string {
+  return `${value}\u00a0${unit}`;
+}
+
 /** Two or three digits that mean something. */
 export function figure(value: number): string {
   if (value === 0) return "0";
@@ -25,25 +30,25 @@ export function figure(value: number): string {
 
 /** A length; glTF counts in metres, other formats in whatever their author meant. */
 export function length(value: number, unit: Unit): string {
-  if (unit === "unit") return `${figure(value)} units`;
-  if (value === 0) return "0 m";
+  if (unit === "unit") return measure(figure(value), "units");
+  if (value === 0) return measure(0, "m");
   const [scale, name] = METRIC.find(([scale]) => Math.abs(value) >= scale) ?? [1e-9, "nm"];
-  return `${figure(value / scale)} ${name}`;
+  return measure(figure(value / scale), name);
 }
 
 export function percent(share: number): string {
-  if (share === 0) return "0 %";
+  if (share === 0) return measure(0, "%");
   const value = 100 * share;
-  return value < 0.01 ? "< 0.01 %" : `${figure(value)} %`;
+  return measure(value < 0.01 ? "<\u00a00.01" : figure(value), "%");
 }
 
 export function bytes(value: number): string {
-  if (value < 1000) return `${value} B`;
-  return value < 1e6 ? `${figure(value / 1e3)} kB` : `${figure(value / 1e6)} MB`;
+  if (value < 1000) return measure(value, "B");
+  return value < 1e6 ? measure(figure(value / 1e3), "kB") : measure(figure(value / 1e6), "MB");
 }
 
 export function seconds(value: number): string {
-  return value < 1 ? `${Math.round(1000 * value)} ms` : `${figure(value)} s`;
+  return value < 1 ? measure(Math.round(1000 * value), "ms") : measure(figure(value), "s");
 }
 
 /** Some names, and how many more there are. */

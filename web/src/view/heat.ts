@@ -96,10 +96,10 @@ function legendOf(heat: Heat, max: number, { report }: Result, unit: Unit): Lege
       const end = level && !isLoop ? largestRatio(level) : max;
       return {
         title: "Share of the budget",
-        low: "0 %",
+        low: percent(0),
         high: percent(Math.min(end, 1)),
         end,
-        note: isLoop ? BY_LOOP : `Of the last level’s corrections; 100 % is the bound C h² / R.${asleep}`,
+        note: isLoop ? BY_LOOP : `Of the last level’s corrections; ${percent(1)} is the bound C h² / R.${asleep}`,
       };
     }
     case "gate": {
