@@ -84,6 +84,21 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await assertQuarters(page);
   });
 
+  test("a model that its clip carries out of the picture can be framed there", async () => {
+    const page = await visit({ hash: "#levels=1&layout=single" });
+    await choose(page, { ...example, name: "far.glb", buffer: moving(part, 60) });
+    await settled(page);
+    const isThere = async () => {
+      const { data } = await picture(page);
+      return !data.every((value, at) => value === data[at % 4]);
+    };
+    await page.selectOption("#clip", { label: "There" });
+    await page.locator("#scrub").fill("1");
+    assert.ok(!(await isThere()));
+    await page.click("#frame");
+    assert.ok(await isThere());
+  });
+
   test("Fox runs at the same phase on both sides", { skip: !existsSync(FOX) && `needs ${FOX}` }, async () => {
     const page = await visit({ hash: "#levels=1&layout=side" });
     await choose(page, { name: "Fox.glb", mimeType: "", buffer: await readFile(FOX) });

@@ -67,7 +67,11 @@ export class Stage {
         this.changed();
       });
     }
-    element("frame").addEventListener("click", () => this.viewer?.frame(this.extent));
+    // Where a clip has carried it, not where the file left it.
+    element("frame").addEventListener("click", () => {
+      const { source } = this.shown;
+      if (source) this.viewer?.frame(extentOf(source.model));
+    });
     // Tools wrap into more lines where the window is narrow.
     const cover = new ResizeObserver(() => this.cover());
     for (const id of ["canvas", "tools", "timeline"]) cover.observe(element(id));
