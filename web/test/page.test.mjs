@@ -164,22 +164,24 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     }
   });
 
-  test("side by side a legend stands between the models, not on the foot of one", async () => {
-    const page = await visit({ hash: "#levels=1&layout=side&look=dihedral", viewport: { width: 1280, height: 800 } });
-    await choose(page, PYRAMID);
-    await settled(page);
-    const { width, height, data } = await picture(page);
-    const view = await page.locator("#canvas").boundingBox();
-    const legend = await page.locator("#legend").boundingBox();
-    const scale = width / view.width;
-    const paper = data.subarray(0, 4);
-    for (let y = legend.y - view.y; y < legend.y - view.y + legend.height; y += 4) {
-      for (let x = legend.x - view.x; x < legend.x - view.x + legend.width; x += 4) {
-        const at = 4 * (Math.round(y * scale) * width + Math.round(x * scale));
-        assert.ok(data.subarray(at, at + 4).equals(paper), `a model at ${x}, ${y} of ${width} × ${height}`);
+  for (const viewport of [{ width: 1280, height: 800 }, { width: 640, height: 800 }]) {
+    test(`side by side a legend stands between the models, not on the foot of one, at ${viewport.width}`, async () => {
+      const page = await visit({ hash: "#levels=1&layout=side&look=dihedral", viewport });
+      await choose(page, PYRAMID);
+      await settled(page);
+      const { width, height, data } = await picture(page);
+      const view = await page.locator("#canvas").boundingBox();
+      const legend = await page.locator("#legend").boundingBox();
+      const scale = width / view.width;
+      const paper = data.subarray(0, 4);
+      for (let y = legend.y - view.y; y < legend.y - view.y + legend.height; y += 4) {
+        for (let x = legend.x - view.x; x < legend.x - view.x + legend.width; x += 4) {
+          const at = 4 * (Math.round(y * scale) * width + Math.round(x * scale));
+          assert.ok(data.subarray(at, at + 4).equals(paper), `a model at ${x}, ${y} of ${width} × ${height}`);
+        }
       }
-    }
-  });
+    });
+  }
 
   test("what is compared is chosen only where two sides stand", async () => {
     const page = await visit({ hash: "#levels=1" });
@@ -388,11 +390,13 @@ describe("the page without WebGL", { skip: noBrowser, timeout: 900_000 }, () => 
     const [server, browser] = await Promise.all([serve(), launch("--disable-3d-apis", "--disable-gpu")]);
     try {
       await server.ready();
-      const { page, faults } = await open(browser, `${server.address}/#levels=1`);
+      const { page, faults } = await open(browser, `${server.address}/#levels=1&look=distance`);
       assert.ok(await page.isVisible("#no-webgl"));
       await choose(page, example);
       await settled(page);
       assert.match(await page.textContent("#statements"), /Nowhere more than/);
+      // Tools for a picture, and a legend of its colours, would be of nothing.
+      for (const id of ["#tools", "#legend"]) assert.ok(await page.isHidden(id), id);
       const { bytes } = await downloaded(page, "#download");
       assert.equal(report(bytes).totals.faces, 4 * PART_FACES);
       assert.deepEqual(faults.filter((fault) => !/WebGL/.test(fault)), []);
