@@ -5,8 +5,9 @@ A network that learns another's answers, and not the shapes behind them, comes n
 activation, which takes less time, and keeps what it was chosen for. Of several trainings it learns
 the mean answer, which errs less than each.
 
-The members are asked on the coarse meshes of the training stream and on what they make of some of
-them, which has the small bends of fine meshes. No answer leaves the unit ball, nor does a mean.
+The members are asked on the coarse meshes of the training stream, on what Loop makes of some of
+them, which has the small bends of fine meshes, and on regular ones: these have few rows each, and
+an error there shows as a shape that is less round. No answer leaves the unit ball, nor does a mean.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -23,6 +24,7 @@ from pns_common.models.card import ModelCard
 from pns_common.refine import refine
 from pns_common.schemes import loop, pns
 from train.data.pairs.pair_stream import pair_stream
+from train.data.primitives import box, globe, icosphere, tetrahedron, torus
 from train.fitting.determinism import deterministic
 from train.models.checkpoint import Checkpoint, Distillation
 from train.models.from_recipe import initial_network, initial_vertex_network
@@ -30,8 +32,8 @@ from train.models.networks import BoundedNet
 from train.models.recipes import Recipe
 from train.models.torch_model import TorchModel, recipe_model
 
-# Rows of a mesh that are kept, of each network.
-MOST_ROWS = 1000
+# Rows of a mesh that are kept, of each network; those of a regular one are repeated to so many.
+MOST_ROWS, REGULAR_ROWS = 1000, 20_000
 # How often a mesh's refinement is asked about as well, and how often that is shaken before.
 REFINED, SHAKEN = 0.5, 0.5
 SHAKES = (1e-4, 1e-2)
@@ -101,6 +103,8 @@ def distil(
     taught = initial_network(recipe), initial_vertex_network(recipe)
     with deterministic():
         heard = asked(members, coarse_and_fine(seed, plan.meshes), seed)
+        of_regular = asked(members, regular_meshes(), seed, REGULAR_ROWS)
+        heard = tuple(joined(both) for both in zip(heard, of_regular, strict=True))
         for number, (network, start, answers) in enumerate(
             zip(taught, (members[0].network, members[0].vertex_network), heard, strict=True)
         ):
@@ -137,9 +141,12 @@ def planned(recipe: Recipe, members: Sequence[Checkpoint], meshes: int, steps: i
 
 
 def asked(
-    members: Sequence[Checkpoint], meshes: Iterable[Mesh], seed: int
+    members: Sequence[Checkpoint], meshes: Iterable[Mesh], seed: int, repeated: int = 0
 ) -> tuple[Answers, Answers]:
-    """Return what all answer in the mean on some meshes, at edges and at vertices."""
+    """Return what all answer in the mean on some meshes, at edges and at vertices.
+
+    ``repeated``: to how many rows those of a mesh are repeated, if they are fewer.
+    """
     rng = np.random.default_rng(seed)
     mean = Mean([recipe_model(each.recipe, each.network, each.vertex_network) for each in members])
     kept: dict[str, list[Answers]] = {where: [] for where in mean.heard}
@@ -147,10 +154,11 @@ def asked(
         # One thread: its rows are the same in any order, but not those that are drawn of them.
         refine(mesh, pns(mean), 1, threads=1)
         for where, heard in mean.heard.items():
-            # Where no gate is open nobody asks.
-            if heard:
-                together = joined(heard)
+            together = joined(heard) if heard else None
+            # Where no gate is open nothing is asked.
+            if together is not None and len(together.features):
                 rows = rng.permutation(len(together.features))[:MOST_ROWS]
+                rows = np.resize(rows, max(len(rows), repeated))
                 kept[where].append(Answers(together.features[rows], together.answers[rows]))
             heard.clear()
     return joined(kept["edges"]), joined(kept["vertices"])
@@ -174,6 +182,15 @@ def coarse_and_fine(seed: int, count: int) -> Iterator[Mesh]:
             shake = rng.uniform(*SHAKES) if rng.random() < SHAKEN else 0.0
             points = fine.vertices + shake * rng.standard_normal(fine.vertices.shape)
             yield Mesh(points, fine.faces)
+
+
+def regular_meshes() -> Iterator[Mesh]:
+    """Yield spheres of many resolutions, tori and a box."""
+    yield tetrahedron()
+    yield box()
+    yield from (icosphere(splits) for splits in range(5))
+    yield from (globe(sides, sides // 2 - 1) for sides in (4, 6, 8, 12, 16, 24, 48))
+    yield from (torus(around, around // 2) for around in (12, 24, 48))
 
 
 def _steps(network: BoundedNet, answers: Answers, steps: int, seed: int) -> Iterator[float]:
