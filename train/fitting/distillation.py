@@ -16,7 +16,7 @@ from itertools import islice
 
 import numpy as np
 import torch
-from jaxtyping import Float32
+from jaxtyping import Float, Float32
 
 from pns_common.errors import ParameterError
 from pns_common.mesh import Mesh
@@ -65,13 +65,13 @@ class Mean:
         return self.members[0].card
 
     def __call__(
-        self, features: Float32[np.ndarray, "N K"], budget: float
+        self, features: Float[np.ndarray, "N K"], budget: float
     ) -> Float32[np.ndarray, "N 3"]:
         """Answer for edges."""
         return self._keep("edges", features, [each(features, budget) for each in self.members])
 
     def vertex_correction(
-        self, features: Float32[np.ndarray, "N L"], budget: float
+        self, features: Float[np.ndarray, "N L"], budget: float
     ) -> Float32[np.ndarray, "N 3"]:
         """Answer for old vertices."""
         said = [each.vertex_correction(features, budget) for each in self.members]
@@ -80,10 +80,10 @@ class Mean:
     def _keep(
         self,
         where: str,
-        features: Float32[np.ndarray, "N K"],
-        said: Sequence[Float32[np.ndarray, "N 3"]],
+        features: Float[np.ndarray, "N K"],
+        said: Sequence[Float[np.ndarray, "N 3"]],
     ) -> Float32[np.ndarray, "N 3"]:
-        mean = np.mean(said, axis=0, dtype=np.float64).astype(np.float32)
+        mean = np.stack(said).mean(axis=0, dtype=np.float64).astype(np.float32)
         self.heard[where].append(Answers(features.astype(np.float32), mean))
         return mean
 
