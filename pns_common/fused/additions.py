@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
 from pns_common.fused.kernels.additions import clear_rows
+from pns_common.fused.kernels.compiled import ROWS
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +57,7 @@ class Additions:
     def clear_rows(self, rows: Int[np.ndarray, " N"], blocks: Blocks) -> None:
         """Add nothing to some of the rows, int32."""
         values = self.displacement, self.ratio, self.gate, self.envelope
-
-        def write(some: slice) -> None:
-            clear_rows(rows, some.start, some.stop, *values)
-
-        blocks.unheard().run(len(rows), write)
+        blocks.unheard().run(len(rows), clear_rows.over(rows, ROWS, *values))
 
     def scale(self, by: Float[np.ndarray, " N"]) -> None:
         """Take s δ in place of δ."""

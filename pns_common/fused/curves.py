@@ -11,6 +11,7 @@ from pns_common.base.blocks import Blocks
 from pns_common.formula.curve_prior import are_of, curve_gate
 from pns_common.fused.additions import Additions
 from pns_common.fused.budgets import budgets_per_length
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.curve_moves import (
     move_edges,
     move_vertices,
@@ -67,11 +68,7 @@ class CurveLevel:
         count, quiet = mesh.vertex_count, blocks.unheard()
         sides, met = np.empty((count, 2), dtype=np.int32), np.empty(count, dtype=np.int8)
         along = mesh.edges, mesh.sharp_edges, of_curve, mesh.sharp
-
-        def follow(rows: slice) -> None:
-            follow_curves(*along, rows.start, rows.stop, sides, met)
-
-        owners(quiet, count).run(count, follow)
+        owners(quiet, count).run(count, follow_curves.over(*along, ROWS, sides, met))
         movable = met == TWO
         rows = np.flatnonzero(movable).astype(np.int32)
         return cls(points, mesh, length, quiet, movable, rows, sides)
@@ -195,11 +192,12 @@ def placed_pushes(
     if not len(pushes):
         return pushes
     placed, beta = np.empty_like(pushes), weights_of(valence).beta
-    pushed = pushes, movable, mesh.edges, mesh.edge_reach
+    add_up = sum_pushes.over(pushes, movable, mesh.edges, mesh.edge_reach, ROWS, placed)
+    blend = blend_vertices.over(pushes, valence, mesh.sharp, beta, ROWS, placed)
 
     def rings(rows: slice) -> None:
-        sum_pushes(*pushed, rows.start, rows.stop, placed)
-        blend_vertices(pushes, valence, mesh.sharp, beta, rows.start, rows.stop, placed)
+        add_up(rows)
+        blend(rows)
 
     owners(blocks.unheard(), count).run(count, rings)
     return placed

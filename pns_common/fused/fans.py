@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from pns_common.base.blocks import Blocks
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.fans import count_corners, several_fans
 from pns_common.fused.loop_points import owners
 from pns_common.fused.mesh_edges import MeshEdges
@@ -14,18 +15,10 @@ from pns_common.fused.mesh_edges import MeshEdges
 def multi_fan_vertices(mesh: MeshEdges, blocks: Blocks) -> Bool[np.ndarray, " V"]:
     """Return for each vertex whether its faces form more than one fan."""
     corner, count = (np.zeros(mesh.vertex_count, dtype=np.int32) for _ in range(2))
-    owned = mesh.faces, mesh.face_reach
-
-    def look(rows: slice) -> None:
-        count_corners(*owned, rows.start, rows.stop, corner, count)
-
+    look = count_corners.over(mesh.faces, mesh.face_reach, ROWS, corner, count)
     owners(blocks, mesh.vertex_count).run(mesh.vertex_count, look)
     several = np.empty(mesh.vertex_count, dtype=bool)
     args = mesh.face_edges, mesh.half_edges, mesh.edge_class, corner, count
     known = mesh.sharp, int(mesh.plain)
-
-    def walk(rows: slice) -> None:
-        several_fans(*args, *known, rows.start, rows.stop, several)
-
-    blocks.run(mesh.vertex_count, walk)
+    blocks.run(mesh.vertex_count, several_fans.over(*args, *known, ROWS, several))
     return several
