@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 from pns_common.base.blocks import Blocks
 from pns_common.base.in_order import InOrder
 from pns_common.fused import fits, kernel_blocks, kernels_loaded
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.corner_normals import (
     add_corners,
     measure_triangles,
@@ -54,7 +55,5 @@ def angle_weighted_normals(
         sums.put(blocks.number(rows, len(faces)), (rows, normals))
 
     blocks.run(len(faces), measure)
-    kernel_blocks(blocks.threads).run(
-        count, lambda rows: scale_to_unit(rows.start, rows.stop, total)
-    )
+    kernel_blocks(blocks.threads).run(count, scale_to_unit.over(ROWS, total))
     return total

@@ -14,6 +14,7 @@ from pns_common.base.blocks import Blocks
 from pns_common.connectivity import grid_points as arrays
 from pns_common.fused import LARGEST_INDEX, kernels_loaded
 from pns_common.fused.kernels import grid_points as kernels
+from pns_common.fused.kernels.compiled import ROWS
 
 _TAKE = {np.dtype(np.int32): kernels.take_columns, np.dtype(np.int64): kernels.take_columns_long}
 
@@ -26,7 +27,7 @@ def take_points(
         return arrays.take_points(rows, columns, dtype, blocks)
     kernel, rows, columns = _TAKE[rows.dtype], np.ascontiguousarray(rows), _narrow(columns)
     taken = np.empty((len(rows), len(columns)), dtype=np.int32)
-    blocks.run(len(rows), lambda share: kernel(rows, columns, share.start, share.stop, taken))
+    blocks.run(len(rows), kernel.over(rows, columns, ROWS, taken))
     return taken
 
 
@@ -45,8 +46,7 @@ def number_points(
     ids = np.empty((len(corners), len(owner)), dtype=np.int32)
     faces = _narrow(corners), _narrow(on_edges), inside, count
     grid = _narrow(owner), _narrow(place)
-    number = kernels.number_points
-    blocks.run(len(corners), lambda rows: number(*faces, *grid, rows.start, rows.stop, ids))
+    blocks.run(len(corners), kernels.number_points.over(*faces, *grid, ROWS, ids))
     return ids
 
 
@@ -58,8 +58,7 @@ def move_to_vertices(
         return arrays.move_to_vertices(ids, at_points, count, blocks)
     labels = np.empty(count, dtype=np.int32)
     points = np.ascontiguousarray(ids), np.ascontiguousarray(at_points)
-    move = kernels.move_to_vertices
-    blocks.run(len(ids), lambda rows: move(*points, rows.start, rows.stop, labels))
+    blocks.run(len(ids), kernels.move_to_vertices.over(*points, ROWS, labels))
     return labels
 
 
@@ -74,8 +73,8 @@ def blend_along(
     if not _served(len(blended)):
         arrays.blend_along(values, edges, parameters, blended, blocks)
         return
-    given, blend = (np.ascontiguousarray(values), _narrow(edges), parameters), kernels.blend_along
-    blocks.run(len(edges), lambda rows: blend(*given, rows.start, rows.stop, blended))
+    given = np.ascontiguousarray(values), _narrow(edges), parameters
+    blocks.run(len(edges), kernels.blend_along.over(*given, ROWS, blended))
 
 
 def blend_inside(
@@ -89,8 +88,8 @@ def blend_inside(
     if not _served(len(blended)):
         arrays.blend_inside(values, faces, weights, blended, blocks)
         return
-    given, blend = (np.ascontiguousarray(values), _narrow(faces), weights), kernels.blend_inside
-    blocks.run(len(faces), lambda rows: blend(*given, rows.start, rows.stop, blended))
+    given = np.ascontiguousarray(values), _narrow(faces), weights
+    blocks.run(len(faces), kernels.blend_inside.over(*given, ROWS, blended))
 
 
 def rounded_rows(
@@ -100,8 +99,8 @@ def rounded_rows(
     if not (_served(max(len(values), len(rows))) and values.dtype == np.float64):
         return arrays.rounded_rows(values, rows, blocks)
     rounded = np.empty((len(rows), values.shape[1]), dtype=np.float32)
-    given, write = (np.ascontiguousarray(values), _narrow(rows)), kernels.round_rows
-    blocks.run(len(rows), lambda share: write(*given, share.start, share.stop, rounded))
+    given = np.ascontiguousarray(values), _narrow(rows)
+    blocks.run(len(rows), kernels.round_rows.over(*given, ROWS, rounded))
     return rounded
 
 

@@ -73,18 +73,18 @@ def measure_rings(
     fields, means = np.empty((count, 4)), np.empty((count, VERTEX_COLUMNS))
     valence = np.empty(count, dtype=np.int32)
     spokes = at_edges.bends, at_edges.jumps, at_edges.network_lengths
-    reach, face_reach = mesh.edge_reach, mesh.face_reach
+    along, to = (points, mesh.edges, mesh.edge_reach), (means, valence)
+    look_at_faces = mean_normals.over(mesh.faces, mesh.face_reach, at_faces.areas, ROWS, fields)
+    look_at_spokes = mean_spokes.over(*along, *spokes, ROWS, *to)
+    tell_heights = umbrella_heights.over(means, mesh.sharp, ROWS, fields)
 
     def around(rows: slice) -> None:
-        mean_normals(mesh.faces, face_reach, at_faces.areas, rows.start, rows.stop, fields)
-        mean_spokes(points, mesh.edges, reach, *spokes, rows.start, rows.stop, means, valence)
-        umbrella_heights(means, mesh.sharp, rows.start, rows.stop, fields)
-
-    def beyond(rows: slice) -> None:
-        mean_neighbours(points, mesh.edges, reach, fields, valence, rows.start, rows.stop, means)
+        look_at_faces(rows)
+        look_at_spokes(rows)
+        tell_heights(rows)
 
     by_owner.run(count, around)
-    by_owner.run(count, beyond)
+    by_owner.run(count, mean_neighbours.over(*along, fields, valence, ROWS, means))
     smooth = _smooth(valence > 0, mesh, several_fans)
     return RingMeasures(fields, means, valence, smooth)
 

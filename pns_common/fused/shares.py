@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 from pns_common.base.blocks import Blocks
 from pns_common.fused import kernels_loaded
 from pns_common.fused.kernels import shares as kernels
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.masks import shares as arrays
 
 # Rows that numpy sums up in one go.
@@ -30,8 +31,8 @@ def keep_heaviest(
     if not (kernels_loaded() and kept_names.dtype == np.int32):
         arrays.keep_heaviest(columns, names, kept_names, kept, lost, blocks)
         return
-    given, keep = (np.ascontiguousarray(columns), names.astype(np.int32)), kernels.keep_heaviest
-    blocks.run(len(kept), lambda rows: keep(*given, rows.start, rows.stop, kept_names, kept, lost))
+    given, to = (np.ascontiguousarray(columns), names.astype(np.int32)), (kept_names, kept, lost)
+    blocks.run(len(kept), kernels.keep_heaviest.over(*given, ROWS, *to))
 
 
 def scale_rows(weights: Float[np.ndarray, "N K"], blocks: Blocks) -> None:
@@ -39,7 +40,7 @@ def scale_rows(weights: Float[np.ndarray, "N K"], blocks: Blocks) -> None:
     if not (kernels_loaded() and weights.shape[1] <= WIDEST):
         arrays.scale_rows(weights, blocks)
         return
-    blocks.run(len(weights), lambda rows: kernels.scale_rows(rows.start, rows.stop, weights))
+    blocks.run(len(weights), kernels.scale_rows.over(ROWS, weights))
 
 
 def whole_units(
@@ -51,9 +52,6 @@ def whole_units(
     weights = np.ascontiguousarray(weights)
     units = np.empty(weights.shape, dtype=np.int32)
 
-    def write(rows: slice) -> None:
-        below = np.empty(weights.shape[1])
-        kernels.whole_units(weights, total_units, rows.start, rows.stop, below, units)
-
-    blocks.run(len(weights), write)
+    write = kernels.whole_units.over(weights, total_units, ROWS, units)
+    blocks.run(len(weights), lambda rows: write(rows, np.empty(weights.shape[1])))
     return units

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from pns_common.base.blocks import Blocks
 from pns_common.fused import kernels_loaded
 from pns_common.fused.kernels import tangents as kernels
+from pns_common.fused.kernels.compiled import ROWS
 from pns_common.geometry import tangents as arrays
 
 
@@ -22,6 +23,5 @@ def perpendicular_tangents(
         return arrays.perpendicular_tangents(tangents, normals, blocks)
     made = np.empty(tangents.shape)
     given = [np.ascontiguousarray(part, dtype=np.float64) for part in (tangents, normals)]
-    turn = kernels.perpendicular_tangents
-    blocks.run(len(made), lambda rows: turn(*given, rows.start, rows.stop, made))
+    blocks.run(len(made), kernels.perpendicular_tangents.over(*given, ROWS, made))
     return made

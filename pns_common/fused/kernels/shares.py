@@ -89,13 +89,13 @@ def scale_rows(begin, end, weights):
     return 0
 
 
-@kernel(SIZE, POINTS, SIZE, SIZE, SIZE, NUMBERS_OUT, INDICES_OUT)
-def whole_units(weights, total_units, begin, end, below, units):
+@kernel(SIZE, POINTS, SIZE, SIZE, SIZE, INDICES_OUT, NUMBERS_OUT)
+def whole_units(weights, total_units, begin, end, units, below):
     """Round rows begin … end − 1 to integers that sum to ``total_units``, or to 0 without weight.
 
     Args:
-        below: (K,) for what rounding down takes from a row.
         units: (N, K), out.
+        below: (K,) for what rounding down takes from a row.
     """
     count = weights.shape[1]
     for r in range(begin, end):

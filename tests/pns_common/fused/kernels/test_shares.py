@@ -39,5 +39,5 @@ def test_long_rows_are_added_up_as_numpy_does_it(way):
 def test_weights_become_whole_units(way):
     weights = np.array([[9.0, 9, 9], [1, 1, 1], [0, 0, 0], [0.26, 0.26, 0.48]])
     units, below = np.full((4, 3), -9, dtype=np.int32), np.empty(3)
-    WAYS[way](kernels.whole_units)(weights, 10, 1, 4, below, units)
+    WAYS[way](kernels.whole_units)(weights, 10, 1, 4, units, below)
     np.testing.assert_array_equal(units, [[-9] * 3, [4, 3, 3], [0, 0, 0], [3, 2, 5]])
