@@ -20,6 +20,7 @@ from pns_common.features.ring_features import RING_FEATURE_SETS
 from pns_common.formula.correction import curvature_gate
 from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.formula.fold_guard import FoldGuard
+from pns_common.formula.prior_strength import HIGHEST_STRENGTH
 from pns_common.formula.vertex_operator import VertexOperator
 from pns_common.geometry.side_lengths import SideLengths
 from pns_common.models.card import ModelCard
@@ -114,12 +115,12 @@ def pns(model: Model, budget: float | None = None, prior_strength: float | None 
     Args:
         model: from ``load_model``, or anything that keeps the protocol.
         budget: C ≥ 0, dimensionless; None takes the one that the model was trained at.
-        prior_strength: s ≥ 0 of the prior, the same for all meshes, as for parts that are to go
-            together; None: what each mesh calls for (formula/prior_strength.py).
+        prior_strength: s of the prior, 0 … 100, the same for all meshes, as for parts that are to
+            go together; None: what each mesh calls for (formula/prior_strength.py).
 
     Raises:
-        ParameterError: the budget or the strength is negative or not finite, the model has no
-            prior to be of that strength, or this is no model.
+        ParameterError: the budget is negative or not finite, the strength is out of range, the
+            model has no prior to be of that strength, or this is no model.
         ModelError: the card names vertex features, and the model has no network for them.
     """
     if not isinstance(model, Model):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -152,8 +153,9 @@ def _with_strength(form: ScaleFreeForm | None, given: float | None) -> ScaleFree
     if form is None:
         expected = "None: the model has no prior"
         raise ParameterError("prior_strength", given, expected=expected)
-    if not (is_number(given) and given >= 0):
-        raise ParameterError("prior_strength", given, expected="a finite number ≥ 0")
+    if not (is_number(given) and 0 <= given <= HIGHEST_STRENGTH):
+        expected = f"a number, 0 … {HIGHEST_STRENGTH:g}"
+        raise ParameterError("prior_strength", given, expected=expected)
     return replace(form, prior_strength=float(given), even_prior_strength=None)
 
 

@@ -10,6 +10,8 @@ from typing import Literal, get_args
 from .errors import InvalidParameter, check_choice
 
 MAX_LEVELS = 6
+# The library's (pns_common/formula/prior_strength.py), without its import.
+MAX_PRIOR_STRENGTH = 100.0
 
 SchemeName = Literal["pns", "loop"]
 Diagnostics = Literal["summary", "full", "none"]
@@ -63,9 +65,9 @@ class Options:
         if self.budget is not None and not (math.isfinite(self.budget) and self.budget >= 0):
             raise InvalidParameter("budget", "budget must be a finite number, zero or more")
         strength = self.prior_strength
-        if strength is not None and not (math.isfinite(strength) and strength >= 0):
+        if strength is not None and not 0 <= strength <= MAX_PRIOR_STRENGTH:
             raise InvalidParameter(
-                "prior_strength", "prior_strength must be a finite number, 0 or more"
+                "prior_strength", f"prior_strength must be 0 to {MAX_PRIOR_STRENGTH:g}"
             )
         if self.reference_length != "auto" and not (
             math.isfinite(self.reference_length) and self.reference_length > 0

@@ -13,6 +13,9 @@ onto the surface), but the whole does: collapses that follow an error leave face
 of .39 and more on all validation meshes, .53 in the median), collapses of shortest edges and
 clustering even ones (.18 and more, .24 in the median), as do remeshers and regular samples. A
 handful of faces says nothing.
+
+At 1 the prior undoes the whole of it (formula/prior.py); a hundred times as much means nothing, and
+far beyond its squares leave the floats. So much is refused.
 """
 
 from __future__ import annotations
@@ -22,6 +25,8 @@ from pns_common.geometry.side_lengths import SideLengths
 # σ/μ up to which a mesh is even, and from which on it is not; faces likewise.
 EVEN = (0.28, 0.34)
 ENOUGH = (32, 128)
+# Of any prior, given or on a card.
+HIGHEST_STRENGTH = 100.0
 
 
 def prior_strength(uneven: float, even: float, sides: SideLengths) -> float:

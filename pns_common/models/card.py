@@ -15,6 +15,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.orientation import ORIENTATIONS
 from pns_common.features.ring_features import RING_FEATURE_SETS
+from pns_common.formula.prior_strength import HIGHEST_STRENGTH
 
 # The metadata key of an ONNX file that holds the card.
 CARD_KEY = "pns_card"
@@ -30,6 +31,7 @@ OPTIONAL_FIELDS = (
     "tip_strength",
     "even_prior_strength",
 )
+STRENGTHS = ("prior_strength", "even_prior_strength", "boundary_strength", "tip_strength")
 CREASE_FIELDS = ("crease_angle", "crease_levels")
 MOST_LEARNED_LEVELS = 16
 
@@ -51,7 +53,7 @@ class ModelCard:
         vertex_gate_sharpness: c of the gate γ_v = tanh(c x_v), with ``vertex_features``.
         learned_levels: K, the levels at which the model acts; after them it is Loop. Format 3, as
             all that follow.
-        prior_strength: s ≥ 0 of the prior; 1 is full quasi-interpolation.
+        prior_strength: s of the prior, 0 … 100, as all strengths; 1 is full quasi-interpolation.
         network_scale: τ > 0, the longest that the network may ask for, in edge lengths.
         fold_angle: θ of the fold guard, degrees between 0 and 90.
         boundary_strength: b ≥ 0 of the boundary's prior; None leaves boundaries to Loop.
@@ -195,7 +197,6 @@ def _vertex_problem(card: ModelCard) -> str | None:
 def _scale_free_problem(card: ModelCard) -> str | None:
     """Return what is wrong with the fields of the scale-free rule, or None."""
     values = {name: getattr(card, name) for name in SCALE_FREE_FIELDS}
-    boundary = card.boundary_strength
     names = (*SCALE_FREE_FIELDS, *OPTIONAL_FIELDS, *CREASE_FIELDS)
     given = [name for name in names if _given(card, name)]
     if card.format < SCALE_FREE_FORMAT:
@@ -203,22 +204,16 @@ def _scale_free_problem(card: ModelCard) -> str | None:
     missing = [name for name in ("vertex_features", *SCALE_FREE_FIELDS) if not _given(card, name)]
     if missing:
         return f"format {card.format} without {missing[0]}"
-    levels, strength, scale, angle = values.values()
+    levels, _, scale, angle = values.values()
     if not 1 <= levels <= MOST_LEARNED_LEVELS:
         return f"learned_levels {levels}, not 1 … {MOST_LEARNED_LEVELS}"
-    if not (math.isfinite(strength) and strength >= 0):
-        return f"prior_strength {strength}, not a finite number ≥ 0"
     if not (math.isfinite(scale) and scale > 0):
         return f"network_scale {scale}, not a finite number > 0"
-    if boundary is not None and not (math.isfinite(boundary) and boundary >= 0):
-        return f"boundary_strength {boundary}, not a finite number ≥ 0"
-    tips = card.tip_strength
-    if tips is not None and not (math.isfinite(tips) and tips >= 0):
-        return f"tip_strength {tips}, not a finite number ≥ 0"
-    even = card.even_prior_strength
-    if even is not None and not (math.isfinite(even) and even >= 0):
-        return f"even_prior_strength {even}, not a finite number ≥ 0"
-    if card.crease_prior and not boundary:
+    for name in STRENGTHS:
+        strength = getattr(card, name)
+        if strength is not None and not 0 <= strength <= HIGHEST_STRENGTH:
+            return f"{name} {strength}, not a number from 0 to {HIGHEST_STRENGTH:g}"
+    if card.crease_prior and not card.boundary_strength:
         return "crease_prior without a boundary_strength, which is its strength"
     altitudes = card.network_altitudes
     if altitudes is not None and not (math.isfinite(altitudes) and altitudes > 0):

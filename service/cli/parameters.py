@@ -43,7 +43,7 @@ SchemeOption = Annotated[SchemeName, typer.Option(help="the rules")]
 BudgetOption = Annotated[float | None, typer.Option(metavar="C", help="default: the model's own")]
 StrengthOption = Annotated[
     float | None,
-    typer.Option(metavar="S", help="of the model's prior; default: as each mesh calls for"),
+    typer.Option(metavar="S", help="0 to 100, of the model's prior; default: as meshes call for"),
 ]
 ModelOption = Annotated[
     str | None,

@@ -12,6 +12,7 @@ from ..options import (
     CREASE_PATTERN,
     DEFAULTS,
     MAX_LEVELS,
+    MAX_PRIOR_STRENGTH,
     MAX_WELD_TOLERANCE,
     Compression,
     Diagnostics,
@@ -65,7 +66,7 @@ class Parameters(BaseModel):
         BeforeValidator(_empty_is_absent),
     ] = Field(default=DEFAULTS.budget, description="C, dimensionless; empty: the model's own")
     prior_strength: Annotated[
-        Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,
+        Annotated[float, Field(ge=0, le=MAX_PRIOR_STRENGTH, allow_inf_nan=False)] | None,
         BeforeValidator(_empty_is_absent),
     ] = Field(
         default=DEFAULTS.prior_strength,

@@ -7,10 +7,11 @@ from typing import get_args, get_type_hints
 
 import pytest
 
+from pns_common.formula.prior_strength import HIGHEST_STRENGTH
 from service.cli.commands import subdivide
 from service.errors import InvalidParameter
 from service.http.parameters import Parameters
-from service.options import DEFAULTS, Options
+from service.options import DEFAULTS, MAX_PRIOR_STRENGTH, Options
 
 WRONG = [
     ("levels", 0),
@@ -22,7 +23,9 @@ WRONG = [
     ("budget", math.nan),
     ("budget", math.inf),
     ("prior_strength", -0.1),
+    ("prior_strength", 100.001),
     ("prior_strength", math.nan),
+    ("prior_strength", math.inf),
     ("reference_length", 0.0),
     ("reference_length", -1.0),
     ("reference_length", math.nan),
@@ -95,3 +98,7 @@ def test_the_command_line_and_http_offer_the_same_choices():
     for name, expected in by_name.items():
         assert get_args(Parameters.model_fields[name].annotation) == expected
         assert get_args(on_the_line[name]) == expected
+
+
+def test_the_highest_prior_strength_is_the_librarys():
+    assert MAX_PRIOR_STRENGTH == HIGHEST_STRENGTH

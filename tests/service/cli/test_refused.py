@@ -31,6 +31,7 @@ NAMES = ", ".join(bundled_models())
         ("subdivide part.glb -o out.glb --budget nan", 2, "budget"),
         ("subdivide part.glb -o out.glb --budget much", 2, "budget"),
         ("subdivide part.glb -o out.glb --prior-strength -1", 2, "prior_strength"),
+        ("subdivide part.glb -o out.glb --prior-strength 1e150", 2, "prior_strength must be"),
         ("subdivide part.glb -o out.glb --prior-strength 1 --model paper", 2, "no prior"),
         ("subdivide part.glb -o out.glb --scheme cubic", 2, "scheme"),
         ("subdivide part.glb -o out.glb --reference-length long", 2, "reference-length"),

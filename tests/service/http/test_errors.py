@@ -80,6 +80,7 @@ def test_accept_json_asks_for_the_report(client: TestClient) -> None:
         ("scheme=butterfly", "scheme"),
         ("budget=nan", "budget"),
         ("prior_strength=-1", "prior_strength"),
+        ("prior_strength=1e150", "prior_strength"),
         ("budget=inf", "budget"),
         ("budget=-1", "budget"),
         ("reference_length=0", "reference_length"),
