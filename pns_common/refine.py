@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 from pns_common.base.arrays import norm
 from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
 from pns_common.base.deferred import Deferred
+from pns_common.base.memory import memory_here
 from pns_common.base.parameters import is_number, is_whole
 from pns_common.connectivity.creases import Creases, crease_children
 from pns_common.connectivity.topology import Topology
@@ -42,6 +43,9 @@ from pns_common.mesh import Mesh, check_is_mesh
 from pns_common.schemes import Scheme
 
 HIGHEST_LEVELS = 16
+# No refinement takes less for a face that it makes: 65 were measured, by Loop and with levels of
+# Loop after learned ones.
+LEAST_BYTES_PER_FACE = 60
 NO_SHIFT = Deferred(lambda: 0.0)
 
 
@@ -114,7 +118,7 @@ def refine(
     Args:
         mesh: the control mesh.
         scheme: ``loop()``, ``pns(model)`` or any other.
-        levels: number of steps, 1 … 16.
+        levels: number of steps, 1 … 16; fewer where the result cannot fit into the memory here.
         reference_length: R, the unit of length of the budget: the largest curvature that the
             budget C can represent is 8 C / R. "auto" measures the mesh; 1 is the paper's absolute
             unit. It is fixed here for all levels: pass the first call's R when calling again.
@@ -139,6 +143,7 @@ def refine(
     """
     _check_kinds(mesh, scheme)
     levels = checked_levels(levels)
+    _check_memory(len(mesh.faces), levels)
     _check_reference_length(reference_length)
     _check_limit(limit)
     _check_progress(progress)
@@ -315,6 +320,20 @@ def checked_levels(given: SupportsIndex) -> int:
     if not (is_whole(given) and 1 <= (levels := int(given)) <= HIGHEST_LEVELS):
         raise ParameterError("levels", given, expected=f"a whole number, 1 … {HIGHEST_LEVELS}")
     return levels
+
+
+def _check_memory(faces: int, levels: int) -> None:
+    """Refuse what cannot fit into memory for certain, rather than be ended by the system for it."""
+    there = memory_here()
+    needed = faces * 4**levels * LEAST_BYTES_PER_FACE
+    if there is None or needed <= there:
+        return
+    raise ParameterError(
+        "levels",
+        levels,
+        expected=f"fewer: {faces * 4**levels:,} faces take {needed / 2**30:,.1f} GiB or more, of "
+        f"the {there / 2**30:,.1f} here",
+    )
 
 
 def _check_reference_length(given: float | str) -> None:

@@ -35,6 +35,22 @@ def test_levels_out_of_range_are_refused(levels):
     assert (caught.value.name, caught.value.value) == ("levels", levels)
 
 
+def test_levels_that_cannot_fit_into_memory_are_refused(monkeypatch):
+    mesh = Mesh(*grid(3))
+    made = refine(mesh, loop(), 3).mesh
+    kept = made.vertices.nbytes + made.faces.nbytes
+    module = sys.modules["pns_common.refine"]  # the package has a function of its name
+    monkeypatch.setattr(module, "memory_here", lambda: kept)
+    refine(mesh, loop(), 2)
+    with pytest.raises(ParameterError, match=r"512 faces take 0\.0 GiB or more") as caught:
+        refine(mesh, loop(), 3)
+    assert caught.value.name == "levels"
+    with pytest.raises(ParameterError, match="levels = 3: expected fewer"):
+        pns_common.subdivide(grid(3), np.int8(3), loop())
+    monkeypatch.setattr(module, "memory_here", lambda: None)
+    assert (refine(mesh, loop(), 3).mesh.vertices == made.vertices).all()
+
+
 @pytest.mark.parametrize(
     "length", [0.0, -1.0, float("nan"), float("inf"), "metres", None, np.ones(2), 10**400]
 )
