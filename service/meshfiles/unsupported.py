@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from .ply.textured_text import CORNER_UV
+
 _OBJ_STATEMENT = re.compile(rb"^[ \t]*(vn|usemtl|g|o|s|l|p|vp|curv|surf)[ \t]", re.MULTILINE)
 _OBJ_COLOUR = re.compile(rb"^[ \t]*v(?:[ \t]+[^\s]+){6,}[ \t]*\r?$", re.MULTILINE)
 _OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
@@ -29,8 +31,6 @@ _OBJ_NAMES = {
 }
 _PLY_KEPT = frozenset({"x", "y", "z", "vertex_index", "vertex_indices"})
 _PLY_UV = frozenset({"u", "v", "s", "t", "texture_u", "texture_v"})
-# Of a face's corners, one after another: where there are such, those at vertices are passed over.
-_PLY_CORNER_UV = "texcoord"
 
 
 def of_obj(data: bytes) -> dict[str, int]:
@@ -59,8 +59,9 @@ def of_ply(elements: dict[str, Any], *, has_uv: bool) -> dict[str, int]:
     """Count, by name, the properties and elements that are passed over."""
     kept = _PLY_KEPT
     if has_uv:
-        at_corners = _PLY_CORNER_UV in elements["face"]["properties"]
-        kept |= {_PLY_CORNER_UV} if at_corners else _PLY_UV
+        # Where there are such, those at vertices are passed over.
+        at_corners = CORNER_UV in elements["face"]["properties"]
+        kept |= {CORNER_UV} if at_corners else _PLY_UV
     counts: dict[str, int] = {}
     for element, content in elements.items():
         if element not in ("vertex", "face"):

@@ -1,4 +1,4 @@
-"""Binary PLY whose polygons differ in size, cut into triangles.
+"""PLY whose polygons differ in size, cut into triangles: binary, and text by textured_text.py.
 
 trimesh reads those of one size alone, and Blender writes a mesh's quads and triangles as they are.
 """
@@ -11,7 +11,9 @@ import numpy as np
 from jaxtyping import Int
 
 from ...errors import UnreadableError
+from .fans import fans
 from .header import Element, PlyHeader, Property, ply_header
+from .textured_text import of_textured_triangles
 
 _FACES = re.compile(rb"^element face \d+", re.MULTILINE)
 
@@ -23,10 +25,12 @@ def of_triangles(data: bytes) -> tuple[bytes, int | None]:
     in any case, and its name stays to be told.
 
     Raises:
-        UnreadableError: it ends before its last face.
+        UnreadableError: it ends before its last face, or a face is not what the header says.
     """
     header = ply_header(data)
-    found = None if header is None or header.order is None else header.faces_at()
+    if header is not None and header.order is None:
+        return of_textured_triangles(data, header)
+    found = None if header is None else header.faces_at()
     if header is None or found is None:
         return data, None
     faces, begin = found
@@ -34,7 +38,7 @@ def of_triangles(data: bytes) -> tuple[bytes, int | None]:
     if places is None or faces.rows == 0 or _of_one_size(data, header, faces, begin, places):
         return data, None
     sizes, corners, end = _corners(data, header, faces, begin, places)
-    triangles = _fans(sizes, corners)
+    triangles = fans(sizes, corners)
     before, polygon, behind = places
     row = np.dtype(
         [
@@ -91,12 +95,3 @@ def _corners(
         at = behind_corners + behind
     corners = np.frombuffer(b"".join(pieces), dtype=f"{header.order}{polygon.kind}")
     return sizes, corners, at
-
-
-def _fans(sizes: Int[np.ndarray, " F"], corners: Int[np.ndarray, " C"]) -> Int[np.ndarray, "T 3"]:
-    """Cut polygons into fans around their first corners; fewer than three corners make none."""
-    first = np.cumsum(sizes) - sizes
-    pieces = np.maximum(sizes - 2, 0)
-    number = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    first = np.repeat(first, pieces)
-    return np.stack([corners[first], corners[first + number + 1], corners[first + number + 2]], 1)
