@@ -7,12 +7,14 @@ import re
 import numpy as np
 from jaxtyping import Int
 
+from .obj_text import with_line_feeds
 from .ply.header import ply_header
 
 # Of what is not counted an STL's face takes 50 bytes, more as text.
 BYTES_PER_FACE = 30
 
 _CONTINUED = re.compile(rb"\\\r?\n")
+_COMMENT = re.compile(rb"#[^\n]*")
 _INDENTED = re.compile(rb"^[ \t]+(?=f)", re.MULTILINE)
 _OFF_COUNTS = re.compile(
     rb"(?:\xef\xbb\xbf)?\s*(?:ST)?C?N?OFF\b(?:\s|#[^\n]*\n)*\d{1,18}\s+(\d{1,18})\b"
@@ -29,7 +31,9 @@ def count_triangles(data: bytes, kind: str) -> int:
     many corners share vertices, and their triangles take a few bytes each. Others go by their size.
     """
     if kind == "obj":
-        text = _CONTINUED.sub(b" ", data) if b"\\" in data else data
+        text = with_line_feeds(data)
+        text = _CONTINUED.sub(b" ", text) if b"\\" in text else text
+        text = _COMMENT.sub(b"", text) if b"#" in text else text
         return _triangles(_words_by_line(_INDENTED.sub(b"", text), first=_FACE))
     if kind == "off":
         counts = _OFF_COUNTS.match(data)

@@ -18,7 +18,7 @@ from ..bodies.media import GLTF_KINDS
 from ..errors import UnreadableError, UnrefinableError
 from . import unsupported
 from .indexed_triangles import NUMBER, IndexedTriangles
-from .obj_text import usual_obj, written_anew
+from .obj_text import usual_obj, with_line_feeds, written_anew
 from .off import read_off, write_off
 from .ply.polygons import of_triangles
 from .single_precision import LARGEST
@@ -70,6 +70,7 @@ def read(data: bytes, kind: str) -> IndexedTriangles:
 
 def _read_by_trimesh(data: bytes, kind: str) -> IndexedTriangles:
     data, polygons = of_triangles(data) if kind == "ply" else (data, None)
+    data = with_line_feeds(data) if kind == "obj" else data
     scene = _scene(data, kind)
     parts = [part for part in scene.geometry.values() if isinstance(part, load_readers().Trimesh)]
     if not parts:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from itertools import chain
 
 from ..errors import UnreadableError
+from .text_numbers import reals, whole
 
 _N = rb"[1-9]\d*+"
 # All corners of a face in one of these ways; another face is none of the same.
@@ -26,6 +27,18 @@ _FACE = re.compile(rb"\nf(?= )")
 _OTHER_FACES = [(re.compile(way), re.compile(rb"\nf(?= )(?!" + way + rb")")) for way in _WAYS]
 _OTHER_LINE = re.compile(rb"\n(?:[ \t]++(?:v|vt|f)[ \t]|(?:v|vt|f)\t|vt? [^\n#]*+#)")
 _CONTINUED = re.compile(rb"\\\r?\n")
+# As some programs ended lines before 2001.
+_ENDED_BY_RETURN = re.compile(rb"[^\r\n]*\r(?!\n)")
+
+
+def line_end(start: bytes) -> bytes:
+    """Return what ends the first line of a text: a carriage return alone, or a line feed."""
+    return b"\r" if _ENDED_BY_RETURN.match(start) else b"\n"
+
+
+def with_line_feeds(text: bytes) -> bytes:
+    """Return a text whose lines end with line feeds; the same bytes where its first one does."""
+    return text if line_end(text) == b"\n" else text.replace(b"\r", b"\n")
 
 
 def usual_obj(data: bytes) -> bytes:
@@ -99,8 +112,8 @@ def _statements(text: bytes) -> Iterator[tuple[int, bytes, bytes]]:
     begun: list[bytes] = []
     # Line by line: of a list of all of them short ones take many times the file. One more ends a
     # statement that the last one leaves open.
-    for number, whole in enumerate(chain(io.BytesIO(text), [b""]), start=1):
-        line = whole.rstrip(b"\r\n")
+    for number, ended in enumerate(chain(io.BytesIO(text), [b""]), start=1):
+        line = ended.rstrip(b"\r\n")
         if line.endswith(b"\\"):
             begun.append(line[:-1])
             continue
@@ -118,8 +131,7 @@ def _first_three(rest: bytes) -> bytes:
 def _position(number: int, rest: bytes) -> bytes:
     words = _first_three(rest).split()
     try:
-        for word in words:
-            float(word)
+        reals([words])
     except ValueError as error:
         raise _fault(number, "a coordinate is no number") from error
     if len(words) < 3:
@@ -131,7 +143,7 @@ def _corner(number: int, word: bytes, so_far: _Counts, total: _Counts) -> tuple[
     """Return which vertex, and which texture coordinates, a corner names; 0: none there are."""
     vertex, _, others = word.partition(b"/")
     try:
-        v, vt = int(vertex), int(others.partition(b"/")[0] or 0)
+        v, vt = whole(vertex), whole(others.partition(b"/")[0] or b"0")
     except ValueError as error:
         raise _fault(number, "a corner of a face is no number") from error
     if v == 0:

@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 
 from ..errors import UnreadableError
 from .indexed_triangles import NUMBER, IndexedTriangles
+from .text_numbers import reals, whole
 
 _COMMENT = re.compile(rb"#[^\n]*")
 _HEADER = re.compile(rb"(?:\xef\xbb\xbf)?\s*((?:ST)?C?N?)OFF\b")
@@ -68,15 +69,15 @@ def write_off(mesh_file: IndexedTriangles) -> bytes:
 
 def _vertices(lines: list[list[bytes]]) -> Float[np.ndarray, "V 3"]:
     try:
-        return np.array([line[:3] for line in lines], dtype=np.float64).reshape(-1, 3)
+        return reals([line[:3] for line in lines]).reshape(-1, 3)
     except ValueError as error:
         raise UnreadableError("the OFF file has a vertex that is not three numbers") from error
 
 
 def _corners(line: list[bytes]) -> list[int]:
     try:
-        count = int(line[0])
-        corners = [int(word) for word in line[1 : 1 + max(count, 0)]]
+        count = whole(line[0])
+        corners = [whole(word) for word in line[1 : 1 + max(count, 0)]]
     except ValueError as error:
         raise UnreadableError(_NO_FACE) from error
     if len(corners) != count:

@@ -27,6 +27,8 @@ from ...gltf.constants import (
     UNSIGNED_INTEGERS,
 )
 from ...gltf.read.modes import TRIANGLES
+from ...meshfiles.obj_text import line_end
+from ...meshfiles.text_numbers import reals, whole
 from .arrays import blocks_of
 from .sink import Sink
 
@@ -170,7 +172,10 @@ def read_obj(path: Path, sink: Sink) -> None:
     Raises:
         UnreadableError: a number that is none, or a face that is no triangle.
     """
-    for text in _text_blocks(path):
+    with path.open("rb") as file:
+        end = line_end(file.read(TEXT))
+    for block in _text_blocks(path, end):
+        text = block.replace(end, b"\n")
         before = sink.vertices
         lines = list(_OBJ_VERTEX.finditer(text))
         # One that is missing is NaN, which is refused.
@@ -185,7 +190,7 @@ def read_obj(path: Path, sink: Sink) -> None:
 
 def _obj_corners(path: Path, faces: list[bytes]) -> np.ndarray:
     try:
-        rows = [[int(corner.partition(b"/")[0]) for corner in face.split()] for face in faces]
+        rows = [[whole(corner.partition(b"/")[0]) for corner in face.split()] for face in faces]
     except ValueError as error:
         raise UnreadableError(f"{path}: a corner of a face is no number") from error
     for row in rows:
@@ -199,22 +204,22 @@ def _obj_corners(path: Path, faces: list[bytes]) -> np.ndarray:
 
 def _numbers(path: Path, rows: list[Any]) -> np.ndarray:
     try:
-        return np.array(rows, dtype=np.float64).reshape(-1, 3)
+        return reals(rows).reshape(-1, 3)
     except ValueError as error:
         raise UnreadableError(f"{path}: a coordinate is no number") from error
 
 
-def _text_blocks(path: Path) -> Iterator[bytes]:
+def _text_blocks(path: Path, end: bytes = b"\n") -> Iterator[bytes]:
     """Yield a file's text in blocks of whole lines; a line that fills a block is no mesh's."""
     with path.open("rb") as file:
         left = b""
         if file.read(len(BOM_UTF8)) != BOM_UTF8:
             file.seek(0)
         while block := file.read(TEXT):
-            whole, newline, rest = (left + block).rpartition(b"\n")
+            lines, last, rest = (left + block).rpartition(end)
             if len(rest) >= TEXT:
                 raise UnreadableError(f"{path}: a line of more than {TEXT} bytes")
-            yield whole + newline
+            yield lines + last
             left = rest
         yield left
 

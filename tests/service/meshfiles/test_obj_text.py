@@ -40,6 +40,9 @@ def triangles(text: str | bytes) -> list[list[int]]:
             [[0, 1, 2], [0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]],
         ),
         (POSITIONS + "f 1 2 3\nf 1 2\nf 3 4\n", [[0, 1, 2]]),
+        # Lines that carriage returns end.
+        ((POSITIONS + "f 1 2 3\nf 1 2 5\n").replace("\n", "\r"), [[0, 1, 2], [0, 1, 4]]),
+        (("# a\n" + POSITIONS + "f -6 -5 -4 # b\n").replace("\n", "\r"), [[0, 1, 2]]),
     ],
 )
 def test_an_obj_says_the_same_however_it_is_written(text, expected):
@@ -91,6 +94,10 @@ def test_the_usual_way_of_writing_is_left_alone(corner, end):
             POSITIONS.replace("2 2 1", "2,5 2,5 1") + "f 1 2 5\n",
             "line 5 .* a coordinate is no number",
         ),
+        (POSITIONS + "f 1 1_0 2\n", "line 7 .* a corner of a face is no number"),
+        (POSITIONS + "vt 0 0\nf 1/1 2/1_0 3/1\n", "line 8 .* a corner of a face is no number"),
+        (POSITIONS.replace("2 2 1", "2_2 2 1") + "f 1 2 5\n", "line 5 .* is no number"),
+        ((POSITIONS + "f 1 2 7\n").replace("\n", "\r"), "line 7 .* vertex 7, and there are 6"),
         (POSITIONS + "f 1 2\nf 2 3\n", "the OBJ file has no faces"),
     ],
 )
@@ -106,3 +113,9 @@ def test_an_off_may_begin_with_a_mark_of_its_encoding():
 
 def test_faces_behind_blanks_are_counted():
     assert count_triangles((POSITIONS + "f 1 2 3\n\t f 1 2 3 4\n").encode(), "obj") == 3
+
+
+def test_words_of_comments_are_no_corners():
+    text = POSITIONS + "f 1 2 3 # of a lid, seen from above\n# f 1 2 3 4 5 6\nf 1 2 3 4#5 6\n"
+    assert count_triangles(text.encode(), "obj") == 3
+    assert count_triangles(text.replace("\n", "\r").encode(), "obj") == 3

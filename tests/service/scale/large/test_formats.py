@@ -140,6 +140,16 @@ def test_an_obj_may_begin_with_a_mark_of_its_encoding(tmp_path):
     assert_same(tmp_path / "out", expected)
 
 
+def test_an_obj_s_lines_may_end_with_carriage_returns(tmp_path, monkeypatch):
+    monkeypatch.setattr("service.scale.large.readers.TEXT", 32)
+    text = b"# a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1 # f 9\nv 0 0 1\nf 1 2 4\n"
+    (tmp_path / "in.obj").write_bytes(text.replace(b"\n", b"\r"))
+    refined(tmp_path / "in.obj", tmp_path / "out", 1)
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    expected = refine(Mesh(points, np.array([[0, 1, 2], [0, 1, 3]])), loop()).mesh
+    assert_same(tmp_path / "out", expected)
+
+
 @pytest.mark.parametrize("short", [b"v 1 0", b"v 1 # 0 0", b"v "])
 def test_an_obj_s_vertex_without_three_coordinates_is_refused(tmp_path, short):
     """Passed over, it would leave its number to the next one."""
@@ -274,6 +284,8 @@ XYZ = b"property float y\nproperty float z\n"
         ("a.obj", b"v 0 0 0\nf 1 2 3 4\n", "4 corners"),
         ("a.obj", b"v 0 0 zero\n", "no number"),
         ("a.obj", b"v 0 0 0\nf 1 x 3\n", "no number"),
+        ("a.obj", b"v 0 0 0\nf 1 1_0 3\n", "no number"),
+        ("a.obj", b"v 0 0 1_0\n", "no number"),
         ("a.obj", b"v 0 0 0\nf 1 1 1\n", "three different"),
         ("a.glb", b"no glb" * 9, "not a GLB"),
         ("a.glb", b"x", "not a readable GLB"),
