@@ -82,7 +82,8 @@ class Parameters(BaseModel):
     )
     diagnostics: Diagnostics = Field(
         default=DEFAULTS.diagnostics,
-        description="`full` adds the vertex attributes `_PNS_RATIO` and `_PNS_GATE`",
+        description="`full` adds the vertex attributes `_PNS_RATIO` and `_PNS_GATE` of the last "
+        "learned level",
     )
     uv: UvRule = Field(
         default=DEFAULTS.uv,

@@ -11,7 +11,7 @@ from pns_common.crease_lines import named_on
 from pns_common.errors import MeshError
 from pns_common.fused.linear import linear_refinement
 from pns_common.mesh import Cleaned
-from pns_common.refine import Refinement, refine
+from pns_common.refine import refine
 from pns_common.schemes import Scheme
 
 from ...course import Course
@@ -25,8 +25,7 @@ from .parts import Parts
 from .refined_primitives import RefinedMesh
 from .shaded_edges import creases_by_shading
 from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
-
-RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
+from .where_acted import vertex_scalars
 
 
 def creases_of(
@@ -80,10 +79,16 @@ def refine_control_mesh(
         raise UnrefinableError(str(error), pointer=pointer) from error
     if leaves_single_precision(refinement.mesh.vertices):
         raise UnrefinableError("refined positions leave the range of float32", pointer=pointer)
+    scalars = vertex_scalars(
+        refinement,
+        lambda levels: refine(mesh, scheme, levels, length, creases=creases),
+        scheme,
+        options,
+    )
     return RefinedMesh(
         refinement,
         _skin_and_morph(control, control.cleaned, options, creases),
-        _scalars(refinement, options),
+        scalars,
         refinement.normals if options.normals == "limit" else None,
     )
 
@@ -138,9 +143,3 @@ def _skin_and_morph(
     faces, count = cleaned.mesh.faces, len(cleaned.mesh.vertices)
     linear = linear_refinement(faces, count, options.levels, creases, limit=options.limit)
     return refine_skin_and_morph(at_vertices, linear)
-
-
-def _scalars(refinement: Refinement, options: Options) -> dict[str, np.ndarray]:
-    if options.diagnostics != "full":
-        return {}
-    return {RATIO: refinement.ratio, GATE: refinement.gate}

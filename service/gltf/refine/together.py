@@ -34,8 +34,6 @@ from .local_joints import local_joints
 from .parts import Parts
 from .refined_primitives import RefinedMesh, RefinedPrimitive, refined_primitives
 from .refinement import (
-    GATE,
-    RATIO,
     changes_of_primitive,
     changes_of_vertices,
     creases_of,
@@ -44,6 +42,7 @@ from .refinement import (
 from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
 from .smooth_normals import with_normal_accessor, with_smooth_normals
 from .union import divided, joined
+from .where_acted import vertex_scalars
 
 # More faces than this, refined, and a mesh's own work is more than what surrounds it.
 MOST_FACES = 2**15
@@ -192,21 +191,18 @@ def _refined(
     if cleaned is None:
         return None
     faces = parts.count_faces(cleaned.face_map >= 0)
-    made = refine_parts(
-        cleaned.mesh,
-        np.cumsum([0, *faces]),
-        scheme,
-        options.levels,
-        options.reference_length,
-        limit=options.limit,
-        creases=creases,
-    )
+    union, of_parts, length = cleaned.mesh, np.cumsum([0, *faces]), options.reference_length
+
+    def refined_to(levels: int, limit: bool = False) -> PartsRefinement | None:
+        return refine_parts(union, of_parts, scheme, levels, length, limit=limit, creases=creases)
+
+    made = refined_to(options.levels, options.limit)
     if made is None:
         return None
     if leaves_single_precision(made.mesh.vertices):
         raise MeshError("refined positions leave the range of float32", element="vertices")
     skin_and_morph, cut = _skin_and_morph(control, cleaned, parts, creases, made, options)
-    scalars = {RATIO: made.ratio, GATE: made.gate} if options.diagnostics == "full" else {}
+    scalars = vertex_scalars(made, refined_to, scheme, options)
     refinement = Refinement(made.mesh, Deferred(lambda: made.reports[0]), made.ratio, made.gate)
     normals = made.normals if options.normals == "limit" else None
     return _Refined(RefinedMesh(refinement, skin_and_morph, scalars, normals), made.reports, cut)

@@ -78,11 +78,11 @@ function attribute(model: Model, name: string): Field | null {
 }
 
 function legendOf(heat: Heat, max: number, { report }: Result, unit: Unit): Legend {
-  const level = report.levels.at(-1);
   const isLoop = report.scheme === LOOP;
-  const last = learnedLevels(report);
-  const seen = last ? ` The learned rule acted at level ${last} last: choose ${last} to see it.` : "";
-  const asleep = last < report.levels.length ? ` This level is Loop’s.${seen}` : "";
+  // Where no level is learned the last one has nothing to show, and says so.
+  const last = learnedLevels(report) || report.levels.length;
+  const level = report.levels[last - 1];
+  const carried = last < report.levels.length ? " Later vertices have the mean of their edge’s ends." : "";
   switch (heat) {
     case "distance":
       return {
@@ -99,7 +99,7 @@ function legendOf(heat: Heat, max: number, { report }: Result, unit: Unit): Lege
         low: percent(0),
         high: percent(Math.min(end, 1)),
         end,
-        note: isLoop ? BY_LOOP : `Of the last level’s corrections; ${percent(1)} is the bound C h² / R.${asleep}`,
+        note: isLoop ? BY_LOOP : `Of corrections at level ${last}; ${percent(1)} is the bound C h² / R.${carried}`,
       };
     }
     case "gate": {
@@ -109,7 +109,7 @@ function legendOf(heat: Heat, max: number, { report }: Result, unit: Unit): Lege
         low: "0, shut",
         high: `${figure(end)}${end > 0.995 ? ", open" : ""}`,
         end,
-        note: isLoop ? BY_LOOP : `Shut on planes, open at sharp edges; of the last level.${asleep}`,
+        note: isLoop ? BY_LOOP : `Shut on planes, open at sharp edges; of level ${last}.${carried}`,
       };
     }
     case "dihedral":

@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.generated import torus
 from benchmarks.memory import peak_mib, reset_peak
-from pns_common import Mesh, loop, pns, refine
+from pns_common import Mesh, load_model, loop, pns, refine
 from pns_common.base.blocks import BLOCK_ROWS
 from service.errors import LimitError
 from service.gltf.subdivide import subdivide_gltf
@@ -176,14 +176,18 @@ def test_the_result_does_not_depend_on_the_number_of_threads():
     assert (alone.vertices != by_loop)[: len(mesh.vertices)].any(axis=1).all()
 
 
-def test_memory_stays_below_what_was_predicted():
-    mesh = torus(60_000)
+@pytest.mark.parametrize(
+    ("model", "options"),
+    [(MODEL, Options()), (load_model(), Options(levels=2, diagnostics="full"))],
+)
+def test_memory_stays_below_what_was_predicted(model, options):
+    mesh = torus(240_000 // 4**options.levels)
     data = triangles_glb(IndexedTriangles(mesh.vertices, mesh.faces, None))
     small = files.glb([octahedron()])
-    subdivide_gltf(small, "glb", Options(), MODEL, Limits())  # imports, threads, the allocator
+    subdivide_gltf(small, "glb", options, model, Limits())  # imports, threads, the allocator
     with pytest.raises(LimitError) as refusal:
-        subdivide_gltf(data, "glb", Options(), MODEL, Limits(max_memory_bytes=2**20))
+        subdivide_gltf(data, "glb", options, model, Limits(max_memory_bytes=2**20))
     reset_peak()
     before = peak_mib()
-    subdivide_gltf(data, "glb", Options(), MODEL, Limits())
+    subdivide_gltf(data, "glb", options, model, Limits())
     assert (peak_mib() - before) * 2**20 < refusal.value.found
