@@ -113,22 +113,20 @@ def _transpose(inputs: Inputs, attributes: Attributes) -> list[np.ndarray]:
     return [np.transpose(inputs[0], attributes.get("perm"))]
 
 
-def _view(function: Function, attributes: tuple[str, ...], shaping: tuple[int, ...]) -> Operator:
+def _view(function: Function, shaping: tuple[int, ...]) -> Operator:
     """Make an operator that looks at its input another way: its outline is made by itself."""
-    return Operator(function, function, attributes, shaping)
+    return Operator(function, function, shaping)
 
-
-_LIMITS = ("starts", "ends", "axes", "steps")
 
 ARRANGEMENTS: Mapping[str, Operator] = MappingProxyType(
     {
-        "Concat": Operator(_concat, _concat_outline, ("axis",)),
-        "Gather": Operator(_gather, _gather_outline, ("axis",)),
-        "Reshape": Operator(_reshape, _reshape_outline, ("shape", "allowzero"), shaping=(1,)),
-        "Slice": _view(_slice, _LIMITS, shaping=(1, 2, 3, 4)),
-        "Split": _view(_split, ("axis", "split", "num_outputs"), shaping=(1,)),
-        "Squeeze": _view(_squeeze, ("axes",), shaping=(1,)),
-        "Transpose": _view(_transpose, ("perm",), shaping=()),
-        "Unsqueeze": _view(_unsqueeze, ("axes",), shaping=(1,)),
+        "Concat": Operator(_concat, _concat_outline),
+        "Gather": Operator(_gather, _gather_outline),
+        "Reshape": Operator(_reshape, _reshape_outline, shaping=(1,)),
+        "Slice": _view(_slice, shaping=(1, 2, 3, 4)),
+        "Split": _view(_split, shaping=(1,)),
+        "Squeeze": _view(_squeeze, shaping=(1,)),
+        "Transpose": _view(_transpose, shaping=()),
+        "Unsqueeze": _view(_unsqueeze, shaping=(1,)),
     }
 )

@@ -32,11 +32,10 @@ from pns_common.runtimes.numpy_network.onnx_schema import (
     text,
 )
 from pns_common.runtimes.numpy_network.operator import Operator, outline_of
+from pns_common.runtimes.numpy_network.operator_sets import FIRST_OPERATOR_SET, fault_of
 from pns_common.runtimes.numpy_network.operators import OPERATORS
 from pns_common.runtimes.numpy_network.wire import Message
 
-# Earlier operator sets broadcast by other rules.
-FIRST_OPERATOR_SET = 7
 # A call is measured as a runtime in single precision would hold it: bytes by kind of number.
 BYTES_HELD = {"f": 4, "i": 8, "b": 1}
 # What numpy raises for a node that cannot be computed; a file chooses the nodes.
@@ -141,11 +140,7 @@ def _check_messages(message: Message) -> None:
             tensors += [attribute["t"]] if "t" in attribute else []
     if any(each.get("data_location", 0) or each["external_data"] for each in tensors):
         raise _RefusedError("all weights inside the file", "external data")
-    versions = [
-        entry.get("version", 0)
-        for entry in message["opset_import"]
-        if text(entry, "domain") in ("", "ai.onnx")
-    ]
+    versions = _operator_sets(message)
     if not versions or min(versions) < FIRST_OPERATOR_SET:
         raise _RefusedError(f"operator set {FIRST_OPERATOR_SET} or later", f"{versions}")
 
@@ -155,12 +150,17 @@ def _network(message: Message) -> NumpyNetwork:
     weights = {text(each, "name"): tensor(each) for each in graph["initializer"]}
     if len(weights) < len(graph["initializer"]):
         raise ValueError("two weights of one name")
-    nodes = [node(each) for each in graph["node"]]
+    nodes, version = [node(each) for each in graph["node"]], min(_operator_sets(message))
     for step in nodes:
-        unknown = sorted(set(step.attributes) - set(OPERATORS[step.operator].attributes))
-        if unknown:
-            raise ValueError(f"{step.operator} with attribute {unknown[0]}")
+        fault = fault_of(step.operator, len(step.inputs), list(step.attributes), version)
+        if fault is not None:
+            raise ValueError(fault)
     return NumpyNetwork(nodes, weights)
+
+
+def _operator_sets(message: Message) -> list[int]:
+    sets = message["opset_import"]
+    return [each.get("version", 0) for each in sets if text(each, "domain") in ("", "ai.onnx")]
 
 
 def _signatures(

@@ -1,7 +1,7 @@
 """What an operator of the allow-list is: how it is computed, and the shape that it makes.
 
 What later operator sets take as an input and earlier ones as an attribute (axes, limits, sizes) is
-taken either way.
+taken either way: which it may be in a file is checked before (operator_sets.py).
 
 An outline is an array of one zero that is repeated without being stored: it has a shape and a type
 and takes no memory, so that a call can be measured before it is made.
@@ -29,13 +29,11 @@ class Operator:
         compute: arrays of inputs and attributes -> arrays of outputs.
         outline: the same for outlines. Operators that only look at their input in another way
             make outlines of outlines as they are.
-        attributes: the attributes that it knows.
         shaping: which inputs are sizes, axes or limits of axes: constants of the file.
     """
 
     compute: Function
     outline: Function
-    attributes: tuple[str, ...] = ()
     shaping: tuple[int, ...] = ()
 
 
@@ -70,7 +68,7 @@ def elementwise(
         numbers = {name: attributes.get(name, default) for name, default in defaults.items()}
         return [np.asarray(function(*inputs, **numbers))]
 
-    return Operator(compute, outline, tuple(defaults))
+    return Operator(compute, outline)
 
 
 def folded(function: Callable[[Any, Any], np.ndarray]) -> Operator:
@@ -98,7 +96,7 @@ def reduction(function: Callable[..., np.ndarray]) -> Operator:
         kept = [1 if axis in over else size for axis, size in sizes if keep or axis not in over]
         return [outline_of(kept, inputs[0].dtype)]
 
-    return Operator(compute, outline, ("axes", "keepdims", "noop_with_empty_axes"), shaping=(1,))
+    return Operator(compute, outline, shaping=(1,))
 
 
 def _reduced(inputs: Inputs, attributes: Attributes) -> tuple[int, ...]:

@@ -163,23 +163,21 @@ def _identity(inputs: Inputs, attributes: Attributes) -> list[np.ndarray]:
     return list(inputs)
 
 
-_CONSTANTS = ("value", "value_float", "value_floats", "value_int", "value_ints")
-
 OPERATORS: Mapping[str, Operator] = MappingProxyType(
     {
         **ARRANGEMENTS,
         "Abs": elementwise(np.abs),
         "Add": elementwise(np.add),
-        "Cast": Operator(_cast, _cast_outline, ("to", "saturate")),
-        "Clip": Operator(_clip, like_the_first, ("min", "max")),
-        "Constant": Operator(_constant, _constant, _CONSTANTS),
+        "Cast": Operator(_cast, _cast_outline),
+        "Clip": Operator(_clip, like_the_first),
+        "Constant": Operator(_constant, _constant),
         "Cos": elementwise(np.cos),
         "Div": elementwise(_divide),
         "Elu": elementwise(_elu, alpha=1.0),
         "Erf": elementwise(erf),
         "Exp": elementwise(np.exp),
-        "Gelu": Operator(_gelu, like_the_first, ("approximate",)),
-        "Gemm": Operator(_gemm, _gemm_outline, ("alpha", "beta", "transA", "transB")),
+        "Gelu": Operator(_gelu, like_the_first),
+        "Gemm": Operator(_gemm, _gemm_outline),
         "Greater": elementwise(np.greater, compared),
         "Identity": Operator(_identity, _identity),
         "LeakyRelu": elementwise(_leaky_relu, alpha=float(np.float32(0.01))),
