@@ -114,9 +114,11 @@ class Kernel:
         """Return it as a function of a block's rows, for which ROWS stands among its arguments.
 
         These are checked once, not for every block; what comes after them is given with the rows.
-        Raises TypeError where one is of another type.
+        Raises TypeError where one is of another type, or ROWS is not among them.
         """
-        at = next(i for i, value in enumerate(values) if value is ROWS)
+        at = next((i for i, value in enumerate(values) if value is ROWS), None)
+        if at is None:
+            raise TypeError(f"{self.name}.over takes ROWS in the place of begin and end")
         before, after = self._take[:at], self._take[at + 2 : len(values) + 1]
         first = [take(value) for take, value in zip(before, values[:at], strict=True)]
         then = [take(value) for take, value in zip(after, values[at + 1 :], strict=True)]

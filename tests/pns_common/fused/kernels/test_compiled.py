@@ -74,6 +74,9 @@ def test_a_kernel_over_rows_checks_once_what_is_given_once():
             counted.over(*wrong)
     with pytest.raises(ValueError, match="zip"):
         counted.over(points, ROWS, sums, 5, 6)
+    for without in ((), (points, sums), (points, slice(None), sums)):
+        with pytest.raises(TypeError, match=r"counted\.over takes ROWS"):
+            counted.over(*without)
 
 
 def test_a_helper_may_be_kept_out_of_loops():
