@@ -268,6 +268,35 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await other.waitForFunction(() => document.querySelector("#model").value === "loop");
   });
 
+  test("a link restores the camera, of a model of any size, until another file comes", async () => {
+    const page = await visit({ hash: "#levels=1&layout=single" });
+    await choose(page, CUBE);
+    await settled(page);
+    const framed = await picture(page);
+    assert.ok(!(await page.evaluate(() => location.hash)).includes("camera"));
+    for (const key of ["ArrowRight", "ArrowRight", "ArrowUp", "-"]) await page.press("#canvas", key);
+    await page.waitForFunction(() => location.hash.includes("camera"));
+    const turned = await picture(page);
+    const hash = await page.evaluate(() => location.hash);
+    const other = await visit({ hash });
+    const large = { ...CUBE, buffer: Buffer.from(CUBE.buffer.toString().replaceAll("0.5", "50")) };
+    await choose(other, large);
+    await settled(other);
+    const restored = await picture(other);
+    const share = (a, b) => a.data.filter((value, i) => Math.abs(value - b.data[i]) > 8).length / a.data.length;
+    assert.ok(share(restored, turned) < 0.003 && share(restored, framed) > 0.01);
+    await choose(other, CUBE);
+    await settled(other);
+    assert.ok(!(await other.evaluate(() => location.hash)).includes("camera"));
+    assert.ok(share(await picture(other), framed) < 0.003);
+    // Six numbers, or nothing.
+    for (const camera of ["", "1,2,3", "1,2,3,4,5,x", "1e9,0,0,0,0,0"]) {
+      await other.evaluate((camera) => (location.hash = `#levels=1&layout=single&camera=${camera}`), camera);
+      await other.waitForFunction(() => !location.hash.includes("camera"));
+      assert.ok(share(await picture(other), framed) < 0.003, camera);
+    }
+  });
+
   test("a link that is followed in the page’s own tab changes the settings there", async () => {
     const page = await visit({ hash: "#levels=1&look=zebra" });
     await choose(page, example);

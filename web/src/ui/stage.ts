@@ -11,7 +11,7 @@ import { dress, plain, type Look } from "../view/looks";
 import { dispose, extentOf, type Extent, type Model } from "../view/model";
 import { Playback } from "../view/playback";
 import { Viewer, type Layout } from "../view/viewer";
-import { element, input, make, select } from "./dom";
+import { debounced, element, input, make, select } from "./dom";
 import { copyMorphs, offerMorphs, Timeline } from "./timeline";
 import { bindWipe } from "./wipe";
 
@@ -41,6 +41,8 @@ export class Stage {
   private heat: Heat | null = null;
   private lines: Mesh[] = [];
   private extent: Extent = { box: new Box3(), points: new Float32Array() };
+  /** Where a link puts the camera, until there is a file to look at. */
+  private awaited: string | null = null;
 
   /** `wantFull` is called for values that the result does not hold yet. */
   constructor(
@@ -60,6 +62,7 @@ export class Stage {
         if (moving) this.timeline.write();
         return moving;
       };
+      this.viewer.onChosen = debounced(300, this.changed);
     }
     for (const id of ["layout", "pair", "look", ...LINES]) {
       element(id).addEventListener("change", () => {
@@ -71,6 +74,7 @@ export class Stage {
     element("frame").addEventListener("click", () => {
       const { source } = this.shown;
       if (source) this.viewer?.frame(extentOf(source.model));
+      this.changed();
     });
     // Tools wrap into more lines where the window is narrow.
     const cover = new ResizeObserver(() => this.cover());
@@ -88,6 +92,8 @@ export class Stage {
     if (select("pair").value !== "control") view.pair = select("pair").value;
     if (select("look").value !== "material") view.look = select("look").value;
     for (const lines of LINES) if (input(lines).checked) view[lines] = "1";
+    const place = this.viewer?.chosen ? this.viewer.place(this.extent) : this.awaited;
+    if (place !== null) view.camera = place;
     return view;
   }
 
@@ -102,7 +108,14 @@ export class Stage {
       if (select(name).selectedIndex < 0) select(name).selectedIndex = 0;
     }
     for (const lines of LINES) input(lines).checked = view[lines] === "1";
+    this.awaited = view.camera ?? null;
     this.read();
+    if (this.shown.source) this.lookFromLink();
+  }
+
+  private lookFromLink(): void {
+    if (this.awaited !== null) this.viewer?.goTo(this.awaited, this.extent);
+    this.awaited = null;
   }
 
   open(source: Source): void {
@@ -112,8 +125,12 @@ export class Stage {
     this.timeline.offer(source.model);
     offerMorphs(source.model, () => this.models(), () => this.viewer?.invalidate());
     this.cover();
+    const stale = this.viewer?.chosen;
     this.viewer?.frame(this.extent);
+    this.lookFromLink();
     this.arrange();
+    // The address has the last file's camera.
+    if (stale) this.changed();
   }
 
   refine(ours: Result, loop: Result | null): void {

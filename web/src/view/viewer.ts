@@ -21,6 +21,9 @@ export type Layout = "wipe" | "side" | "overlay" | "single";
 /** Milliseconds without a change after which a picture may take its time. */
 const REST = 200;
 
+/** The farthest that a link may put the camera from a model's centre, in its radii. */
+const FARTHEST = 100;
+
 /** How much farther away than need be: the air around a model. */
 const MARGIN = 1.15;
 
@@ -43,6 +46,10 @@ export class Viewer {
   wipe = 0.5;
   /** How much of the canvas tools cover at its foot, in pixels: the model stands above them. */
   covered = 0;
+  /** Whether the user has chosen where the camera stands: a link then holds it. */
+  chosen = false;
+  /** Called when the user has. */
+  onChosen: () => void = () => {};
   /** Called once a frame with the seconds since the last; returns whether it wants another. */
   onFrame: (seconds: number) => boolean = () => false;
 
@@ -67,6 +74,7 @@ export class Viewer {
     this.controls.enableDamping = false;
     this.controls.zoomToCursor = true;
     this.controls.addEventListener("change", () => this.invalidate());
+    this.controls.addEventListener("end", () => this.choose());
     canvas.addEventListener("dblclick", (event) => this.centreAt(event));
     canvas.addEventListener("webglcontextrestored", () => this.invalidate());
     new ResizeObserver(() => this.invalidate()).observe(canvas);
@@ -133,8 +141,35 @@ export class Viewer {
     this.camera.far = size * 200;
     this.controls.minDistance = size / 50;
     this.controls.maxDistance = size * 40;
+    if (turn) this.chosen = false;
     this.controls.update();
     this.invalidate();
+  }
+
+  /** Where the camera stands and where it looks, from a model's centre and in its radii: six numbers. */
+  place({ box }: Extent): string {
+    const { center, radius } = box.getBoundingSphere(this.sphere);
+    const at = [this.camera.position, this.controls.target];
+    const numbers = at.flatMap((point) => point.clone().sub(center).divideScalar(radius || 1).toArray());
+    return numbers.map((x) => Number(x.toFixed(4))).join();
+  }
+
+  /** Go to such a place; what is none changes nothing. */
+  goTo(place: string, { box }: Extent): void {
+    const numbers = place.split(",").map(Number);
+    if (numbers.length !== 6 || !numbers.every((x) => Math.abs(x) <= FARTHEST) || box.isEmpty()) return;
+    const { center, radius } = box.getBoundingSphere(this.sphere);
+    for (const [point, first] of [[this.camera.position, 0], [this.controls.target, 3]] as const) {
+      point.fromArray(numbers, first).multiplyScalar(radius || 1).add(center);
+    }
+    this.chosen = true;
+    this.controls.update();
+    this.invalidate();
+  }
+
+  private choose(): void {
+    this.chosen = true;
+    this.onChosen();
   }
 
   /** Turn around the centre, in radians. */
@@ -145,6 +180,7 @@ export class Viewer {
     offset.applyAxisAngle(side, Math.min(Math.max(up, 0.01 - polar), Math.PI - 0.01 - polar));
     offset.applyAxisAngle(this.camera.up, right);
     this.camera.position.copy(this.controls.target).add(offset);
+    this.choose();
     this.controls.update();
     this.invalidate();
   }
@@ -152,6 +188,7 @@ export class Viewer {
   zoom(factor: number): void {
     const offset = this.camera.position.clone().sub(this.controls.target);
     this.camera.position.copy(this.controls.target).addScaledVector(offset, factor);
+    this.choose();
     this.controls.update();
     this.invalidate();
   }
@@ -250,6 +287,7 @@ export class Viewer {
     const shift = hit.point.clone().sub(this.controls.target);
     this.controls.target.add(shift);
     this.camera.position.add(shift);
+    this.choose();
     this.controls.update();
     this.invalidate();
   }
