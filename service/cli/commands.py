@@ -132,7 +132,7 @@ def batch(
         Path, typer.Option(metavar="FILE", help="rows of all files: .parquet or .jsonl")
     ] = Path("pns-batch.parquet"),
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="say what would be done; write nothing")
+        bool, typer.Option("--dry-run", help="say what would be done; write no result")
     ] = False,
 ) -> None:
     """Refine a library of files; what was done is not done again when it runs again."""

@@ -141,7 +141,9 @@ def print_summary(summary: Summary, console: Console) -> None:
         for code, count in summary.failures:
             codes.add_row(f"{count:,}", code)
         console.print(codes)
-    console.print(f"a row for each file: {summary.report}", markup=False)
+    # What is only planned was said file by file, and is in no report.
+    if PLANNED not in summary.counts:
+        console.print(f"a row for each file: {summary.report}", markup=False)
 
 
 def work_hash(batch: Batch) -> str:

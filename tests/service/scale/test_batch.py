@@ -275,6 +275,10 @@ def test_the_command_says_what_failed_and_ends_with_one(tmp_path, monkeypatch):
     assert done.exit_code == 1
     assert "a row for each file: r.jsonl" in done.stderr
     assert (tmp_path / "out" / "a.obj").is_file()
+    elsewhere = [*arguments[:2], "elsewhere", *arguments[3:], "--dry-run"]
+    planned = CliRunner().invoke(app, elsewhere)
+    assert "in/a.obj -> " in planned.stderr
+    assert "a row for each file" not in planned.stderr
 
 
 def test_what_is_not_refined_is_not_collected(tmp_path):
