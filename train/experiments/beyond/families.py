@@ -43,9 +43,9 @@ def run(laboratory: Laboratory) -> Outcome:
     notes = (
         "Distances over Loop's: *inserted* is the published metric after one step, at the vertices "
         f"on edges; the others are all vertices after one level and after {levels}, with the worst "
-        "instance of each family, and the mean angle of face normals to the surface's. The column "
-        "*in the stream* is about the models trained on random surfaces; `paper` and `signed` saw "
-        "ridges alone.",
+        "instance of each family, and the mean angle of face normals to the surface's: plain "
+        "ratios of means, not the bootstrap's. The column *in the stream* is about the models "
+        "trained on random surfaces; `paper` and `signed` saw ridges alone.",
         "On saddles Loop's edge vertices are already right to 10⁻⁴ of the patch: there is nothing "
         "to gain, and a per cent is a millionth of the patch's size.",
     )

@@ -70,7 +70,9 @@ def run(laboratory: Laboratory) -> Outcome:
         "*Near*, *all*, *Hausdorff* and *normals* are the published one-step metrics: improvement "
         f"over Loop at the vertices inserted on edges. The rest is the whole mesh after {levels} "
         "levels: the distance of all vertices, *shading* the mean angle between a face's normal "
-        "and the surface's at the nearest point, the largest angle between neighbouring faces. "
+        "and the surface's at the nearest point, the largest angle between neighbouring faces; "
+        "these are plain ratios of means, not the bootstrap's, and of jumps the ratio of the "
+        "largest of all ridges. "
         f"*Allowed* is {JUMP_LIMIT:g} times Loop's jump, or the jump of Loop's own mesh once it is "
         "laid onto the surface where that is more; the column is the worst ridge's.",
         "The product's own files are measured, each with its own C and c; "

@@ -19,7 +19,8 @@ its author's repository; they stand there for comparison and are no measurement 
 Improvements are relative to Loop, in per cent: the mean over 2000 paired bootstrap resamples.
 Lengths are in the patches' own unit (they span [−1, 1]²), angles in radians. The proximity ratio is
 ‖q − q0‖ / (C h²), with C = 0.5 where a method has no budget of its own.
-Every table is a CSV file with all digits beside this page, every figure a PNG and a PDF.
+The command writes each table as a CSV file with all digits beside this page, each figure as a PNG
+and a PDF. CSV files, which long tables are in alone, and PDFs are not kept with the source.
 """
 
 
