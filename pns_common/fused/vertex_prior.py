@@ -1,4 +1,4 @@
-"""The prior of old vertices beside the kernels: of rings, of curves, and less at tips."""
+"""The prior of old vertices beside the kernels: of rings, of curves, and at tips."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class CurveRule:
     def at_vertices(self, level: ControlLevel, loop: Float[Array, "N 3"]) -> Correction:
         """Return what is added to the curves' vertices, which Loop puts at ``loop``.
 
-        Loop's curve mask of the pushes, within ρ; less at tips.
+        Loop's curve mask of the pushes, or Loop's own move taken back at tips, within ρ.
         """
         curves, pushes = level.curves(self.kinds), self.pushes(level)
         rows, a, b = curves.rows, curves.a, curves.b

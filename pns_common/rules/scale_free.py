@@ -7,7 +7,7 @@
 They act at the first K levels, are followed by the fold guard, and Loop takes over after them.
 Where the form has a boundary strength, boundary vertices and edges get Π_ρ of a prior of their own,
 made of the boundary alone, and creases too if it says so; where it has none they are Loop's. Where
-it has a tip strength, D_v is less than all at tips (formula/tips.py).
+it has a tip strength, D_v gives way to Loop's own move, taken back, at tips (formula/tips.py).
 """
 
 from __future__ import annotations

@@ -102,9 +102,9 @@ def move_vertices_but_at_tips(
     ratio,
     envelopes,
 ):
-    """Write the same, less at tips: ``loop`` is where Loop puts the vertices, ``tip_strength`` a.
+    """Write the same, at tips Loop's own move taken back.
 
-    Rows of ``loop`` are those of ``points``.
+    ``tip_strength`` is a, ``loop`` where Loop puts the vertices, in the rows of ``points``.
     """
     for i in range(end - begin):
         v = vertices[natural(begin) + i]
