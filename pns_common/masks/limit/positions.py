@@ -8,6 +8,9 @@ number of sharp edges (boundary, irregular, crease) at a vertex:
     two        (4 p + the two neighbours along the curve) / 6
     more       p, which never moves
 
+Where a face has a vertex twice an edge may lead from a vertex to itself. No later mesh has it, so
+that vertex's mask is read in the next one.
+
 All weights are ≥ 0 and sum to 1, so two control meshes that are ε apart have limits within ε.
 """
 
@@ -16,16 +19,41 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.arrays import Array, beside, gather, namespace, scatter, segment_sum
-from pns_common.connectivity.topology import EdgeClass, Topology, sharp_edge_count
+from pns_common.base.arrays import Array, beside, gather, marked, namespace, scatter, segment_sum
+from pns_common.connectivity.creases import crease_children, with_creases
+from pns_common.connectivity.topology import (
+    EdgeClass,
+    Topology,
+    build_topology,
+    sharp_edge_count,
+    split,
+)
 from pns_common.masks.limit.darts import dart_masks
 from pns_common.masks.limit.neighbours import Neighbours, own_neighbours
-from pns_common.masks.stencils import CURVE_LIMIT_CENTRE, CURVE_LIMIT_NEIGHBOUR, limit_ring_weight
+from pns_common.masks.stencils import (
+    CURVE_LIMIT_CENTRE,
+    CURVE_LIMIT_NEIGHBOUR,
+    limit_ring_weight,
+    loop_edge_vertices,
+    loop_vertex_vertices,
+)
 
 
 def limit_positions(points: Float[Array, "V K"], topology: Topology) -> Float[Array, "V K"]:
     """Return the limit of each vertex, or of any columns that Loop's masks refine."""
-    return limits_of_vertices(points, own_neighbours(topology))
+    limits = limits_of_vertices(points, own_neighbours(topology))
+    to_itself = topology.edges[:, 0] == topology.edges[:, 1]
+    if not to_itself.any():
+        return limits
+    xp, count = namespace(points), topology.vertex_count
+    refined = xp.concat(
+        [loop_vertex_vertices(points, topology), loop_edge_vertices(points, topology)]
+    )
+    plain = build_topology(split(topology), len(refined))
+    after = with_creases(plain, crease_children(topology))
+    later = limits_of_vertices(refined, own_neighbours(after))[:count]
+    own = marked(topology.edges[to_itself, 0], count)
+    return xp.where(beside(points, own)[:, None], later, limits)
 
 
 def limits_of_vertices(points: Float[Array, "W K"], around: Neighbours) -> Float[Array, "V K"]:
