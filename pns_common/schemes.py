@@ -29,7 +29,7 @@ from pns_common.rules.control_level import ControlLevel, Rule
 from pns_common.rules.curves import CurveRule
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
 from pns_common.rules.loop import loop_edge_rule, loop_vertex_rule
-from pns_common.rules.placement import Placement, without_correction
+from pns_common.rules.placement import Placement, placed_at, without_correction
 from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
 from pns_common.rules.scale_free_form import ScaleFreeForm
 
@@ -46,6 +46,7 @@ __all__ = [
     "loop",
     "loop_edge_rule",
     "loop_vertex_rule",
+    "placed_at",
     "pns",
     "scale_free_scheme",
     "vertex_operator",
@@ -56,6 +57,9 @@ __all__ = [
 @dataclass(frozen=True)
 class Scheme:
     """A refinement rule for triangle meshes.
+
+    Reports measure how far a rule puts vertices from Loop's by the ``displacement`` of its
+    placements: a rule of your own says it with ``placed_at``.
 
     Attributes:
         name: how reports call it.

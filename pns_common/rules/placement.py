@@ -88,10 +88,15 @@ class Placement:
 
 
 def without_correction(positions: Float[Array, "N 3"]) -> Placement:
-    """Make a placement that is Loop's."""
+    """Make a placement that is Loop's: reports count it as no distance to Loop."""
     xp = namespace(positions)
     nothing = xp.zeros_like(positions[:, 0])
     return Placement(positions, None, nothing, nothing, xp.zeros_like(nothing, dtype=xp.bool))
+
+
+def placed_at(loop: Placement, positions: Float[Array, "N 3"]) -> Placement:
+    """Put vertices anywhere, without a bound: reports count how far that is from Loop's."""
+    return replace(loop, displacement=positions - loop.loop)
 
 
 def with_correction(

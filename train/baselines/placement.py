@@ -10,6 +10,7 @@ from pns_common.schemes import (
     Placement,
     loop_edge_rule,
     loop_vertex_rule,
+    placed_at,
 )
 
 # The C of the envelope that methods without a budget are measured against.
@@ -30,8 +31,7 @@ def placed_edges(level: ControlLevel, positions: Float[np.ndarray, "E 3"]) -> Pl
 
 def kept_vertices(level: ControlLevel) -> Placement:
     """Leave old vertices where they are: the vertex rule of interpolating schemes."""
-    base = loop_vertex_rule(level)
-    return Placement(base.loop, level.points - base.loop, base.ratio, base.gate, base.degenerate)
+    return placed_at(loop_vertex_rule(level), level.points)
 
 
 def midpoints(level: ControlLevel) -> Float[np.ndarray, "E 3"]:

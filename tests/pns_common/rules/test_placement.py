@@ -2,9 +2,17 @@
 
 import numpy as np
 
+from pns_common import Mesh, loop, refine
 from pns_common.base.blocks import Blocks
 from pns_common.formula.correction import Correction
-from pns_common.rules.placement import correct_in_blocks, with_correction, without_correction
+from pns_common.rules.placement import (
+    correct_in_blocks,
+    placed_at,
+    with_correction,
+    without_correction,
+)
+from pns_common.schemes import Scheme, loop_edge_rule, loop_vertex_rule
+from tests.support.meshes import bumpy_sphere
 
 BASE = without_correction(np.arange(15.0).reshape(5, 3))
 ROWS = np.array([1, 3])
@@ -20,6 +28,23 @@ def test_a_placement_without_correction_is_loops():
     assert BASE.positions is BASE.loop
     assert not any(part.any() for part in (BASE.ratio, BASE.gate, BASE.degenerate))
     assert BASE.degenerate.dtype == bool
+
+
+def test_what_is_placed_elsewhere_counts_as_distance_from_loop():
+    """A scheme of two functions that keeps all vertices and takes middles."""
+
+    def kept(level):
+        return placed_at(loop_vertex_rule(level), level.points)
+
+    def middles(level):
+        return placed_at(loop_edge_rule(level), level.points[level.topology.edges].mean(axis=1))
+
+    mesh = Mesh(*bumpy_sphere(subdivisions=0))
+    flat, smooth = (refine(mesh, scheme, 2) for scheme in (Scheme("", kept, middles), loop()))
+    np.testing.assert_allclose(flat.mesh.vertices[:12], mesh.vertices, atol=1e-15)
+    apart = np.linalg.norm(flat.mesh.vertices - smooth.mesh.vertices, axis=1).max()
+    assert 0 < apart <= flat.report["limit_distance"]
+    assert flat.report["limit_distance_bound"] is None
 
 
 def test_a_correction_is_added_at_its_rows_alone():
