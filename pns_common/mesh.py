@@ -19,6 +19,9 @@ SMALLEST_EXTENT = 1e-70
 class Mesh:
     """A triangle mesh: ``vertices`` (V, 3) float64 and ``faces`` (F, 3) int64, both read-only.
 
+    Both are copies: of arrays of any real or whole type, in any order in memory, or of lists that
+    make such arrays. Faces run anticlockwise, seen from outside.
+
     No mesh is refused for its topology: boundaries, irregular edges, several components, bow-ties
     and isolated vertices are all allowed. Coordinates reach from −1e75 to 1e75, and their extent is
     at least 1e-70 or exactly 0.
