@@ -31,7 +31,7 @@ class EdgeCounts(TypedDict):
 
 
 class RatioSummary(TypedDict):
-    """Proximity ratio ‖δ‖ R / (C h²) over the level's interior edges; above 1 by rounding only."""
+    """Proximity ratio ‖δ‖ R / (C h²) of interior edges or movable vertices; above 1 by rounding."""
 
     max: float
     mean: float
@@ -39,7 +39,7 @@ class RatioSummary(TypedDict):
 
 
 class GateSummary(TypedDict):
-    """Gate γ over the level's interior edges; ``active`` is the share above 0.01."""
+    """Gate γ of interior edges, or of movable vertices; ``active`` is the share above 0.01."""
 
     mean: float
     max: float
@@ -47,7 +47,7 @@ class GateSummary(TypedDict):
 
 
 class VertexSummary(TypedDict):
-    """The vertex rule: how many old vertices it may move, ‖δ‖ R / (C h_v²) and γ_v."""
+    """The vertex rule: how many old vertices it may move, their ratio and γ_v (0 on curves)."""
 
     vertices: int
     proximity_ratio: RatioSummary
