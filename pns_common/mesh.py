@@ -79,6 +79,12 @@ class Mesh:
     def __repr__(self) -> str:
         return f"Mesh(vertices={len(self.vertices)}, faces={len(self.faces)})"
 
+    def __setstate__(self, state: dict[str, np.ndarray]) -> None:
+        """Take what a copy or a pickle holds: its arrays may be written to, a mesh's may not."""
+        for name, array in state.items():
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
     @classmethod
     def of_refined(cls, vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Mesh:
         """Make a mesh of arrays that a refinement step made and checked: not copied, not read."""

@@ -1,5 +1,8 @@
 """Mesh validates once and names the element; clean drops what it says and maps the rest."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -47,6 +50,15 @@ def test_mesh_does_not_follow_changes_of_its_input():
     np.testing.assert_array_equal(mesh.vertices, POINTS)
     with pytest.raises(ValueError, match="read-only"):
         mesh.vertices[0] = 7
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda mesh: pickle.loads(pickle.dumps(mesh))])
+def test_copies_and_pickles_cannot_be_written_to_either(again):
+    mesh = again(Mesh(np.eye(3), np.array([[0, 1, 2]])))
+    assert mesh.vertices.tolist() == np.eye(3).tolist()
+    for array in (mesh.vertices, mesh.faces):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 7
 
 
 def test_single_precision_and_small_indices_become_double_and_int64():
