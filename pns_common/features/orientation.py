@@ -4,9 +4,8 @@
 of the faces; degenerate edges take a frame of world axes.
 
 ``symmetric``: c lies in the face to the left of a → b. What is left of the ambiguity is a symmetry
-of the stencil, over which the model file averages its network; degenerate edges have x = 0, so that
-their gate is shut unless it reads more than x (formula/side_gate.py). So the result depends on no
-numbering elsewhere.
+of the stencil, over which the model file averages its network; degenerate edges are not corrected.
+So the result depends on no numbering.
 """
 
 from __future__ import annotations

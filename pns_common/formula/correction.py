@@ -41,6 +41,8 @@ NetworkFunction = Callable[[Array], Array]
 Features = Callable[[EdgeStencil, EdgeFrames], Array]
 # Curvatures x of N edges -> γ (N,) ∈ [0, 1].
 Gate = Callable[[Array], Array]
+# The same of their frames: x, and where there is none.
+FrameGate = Callable[[EdgeFrames], Array]
 # C / R, per unit of length: one number, or one for each row where parts have their own R.
 BudgetPerLength = float | Float[np.ndarray, " N"]
 
@@ -70,6 +72,15 @@ def curvature_gate(gate_sharpness: float) -> Gate:
         return gate_of(gate_sharpness * curvature**2)
 
     return gate
+
+
+def by_curvature(gate: Gate) -> FrameGate:
+    """Return a gate of x as one of frames."""
+
+    def of_frames(frames: EdgeFrames) -> Array:
+        return gate(frames.curvature)
+
+    return of_frames
 
 
 def project_to_ball(vectors: Float[Array, "N 3"], radius: float = 1.0) -> Float[Array, "N 3"]:
@@ -117,7 +128,7 @@ def correct_scale_free(
     stencil: EdgeStencil,
     features: Features,
     network: NetworkFunction,
-    gate: Gate,
+    gate: FrameGate,
     budget_per_length: BudgetPerLength,
     frames_of: Callable[[EdgeStencil], EdgeFrames],
     asked: Float[Array, " N"],
@@ -135,7 +146,7 @@ def correct_scale_free(
         ModelError: the network returned something that is not finite, or of another shape.
     """
     frames = frames_of(stencil)
-    gamma = gate(frames.curvature)
+    gamma = gate(frames)
     z = project_to_ball(where_open(network, features(stencil, frames), gamma, like=stencil.a))
     wanted = prior + asked[:, None] * rotate(frames, z)
     length = longest_side(stencil, frames) if wide_bound else frames.length

@@ -14,6 +14,7 @@ from pns_common.features.orientation import Orientation
 from pns_common.formula.correction import (
     BudgetPerLength,
     Correction,
+    FrameGate,
     Gate,
     NetworkFunction,
     correct,
@@ -64,7 +65,7 @@ class EdgeOperator:
         budget_per_length: BudgetPerLength,
         asked: Float[Array, " N"],
         prior: Float[Array, "N 3"],
-        gate: Gate,
+        gate: FrameGate,
         wide_bound: bool,
     ) -> Correction:
         """Return δ = γ Π_ρ(D + τ ℓ F z(φ)); likewise, with τ ℓ, D, and ``gate`` for its own."""

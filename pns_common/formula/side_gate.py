@@ -10,6 +10,9 @@ over GENTLE_TO_SHARP. A right angle has x = 1 and does not count: on a box all s
 prism of many sides the walls are open, however few rows they have, and its lids are not. On planes
 both b are 0, and so is γ; a bump of height ε gives O(ε²).
 
+An edge that has no frame stays as shut as its own two faces leave it: what a network says there
+would not turn with the mesh.
+
 A face at a boundary knows one side less: in the last row of a sheet that bends one way, every other
 face has no bent side at all. Such a face takes the largest b of itself and its neighbours.
 """
@@ -21,8 +24,9 @@ from jaxtyping import Float, Int
 
 from pns_common.base.arrays import Array, beside, gather, namespace, scatter
 from pns_common.connectivity.topology import EdgeClass, Topology
-from pns_common.formula.correction import Gate
+from pns_common.formula.correction import FrameGate, Gate
 from pns_common.formula.gate import gate_of
+from pns_common.geometry.frames import EdgeFrames
 
 # x of bends of 46 and 66 degrees.
 GENTLE_TO_SHARP = (0.3, 0.6)
@@ -95,10 +99,10 @@ def opened_where_shut(
     return gates
 
 
-def opened_gate(gate: Gate, by: Float[Array, " N"]) -> Gate:
-    """Return the gate of the two faces, opened by w."""
+def opened_gate(gate: Gate, by: Float[Array, " N"]) -> FrameGate:
+    """Return the gate of the two faces, opened by w where an edge has a frame."""
 
-    def both(curvature: Array) -> Array:
-        return opened(gate(curvature), by)
+    def both(frames: EdgeFrames) -> Array:
+        return opened(gate(frames.curvature), namespace(by).where(frames.degenerate, 0.0, by))
 
     return both

@@ -65,6 +65,7 @@ def add_at_edges(
         # numpy's hyperbolic tangent runs on vectors, and has the array kernels' bits.
         if isinstance(rule, ScaleFreeEdgeRule) and rule.form.side_gates:
             by = of_gentler(gentlest, rule.vertex_gate_sharpness)
+            by[degenerate] = 0.0
             gate = opened_where_shut(rule.operator.gate, curvature, by)
         else:
             gate = rule.operator.gate(curvature)

@@ -124,7 +124,7 @@ def edge_frames(stencil: EdgeStencil) -> EdgeFrames:
 
 
 def shut_where_degenerate(stencil: EdgeStencil) -> EdgeFrames:
-    """Return edge frames with x = 0 where degenerate: no gate of x opens where F would not turn.
+    """Return edge frames with x = 0 where degenerate: no gate opens where F would not turn along.
 
     Antiparallel faces are among them, where x would be 2.
     """

@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 
 from pns_common.base.arrays import Array, beside, dot, gather, namespace
 from pns_common.connectivity.topology import Topology
-from pns_common.formula.correction import Correction, Gate
+from pns_common.formula.correction import Correction, FrameGate, by_curvature
 from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.formula.prior import clear_normals
 from pns_common.formula.side_gate import face_bends, gentle_bend, opened_gate
@@ -84,10 +84,10 @@ class ScaleFreeEdgeRule:
 
     def _gate(
         self, bends: Float[Array, " F"] | None, topology: Topology, edges: Int[np.ndarray, " N"]
-    ) -> Gate:
+    ) -> FrameGate:
         """Return the gate of the two faces, opened by b of all faces where the form has them."""
         if bends is None:
-            return self.operator.gate
+            return by_curvature(self.operator.gate)
         faces = topology.edge_faces[edges]
         of_both = gather(bends, faces[:, 0]), gather(bends, faces[:, 1])
         return opened_gate(self.operator.gate, gentle_bend(*of_both, self.vertex_gate_sharpness))

@@ -103,6 +103,23 @@ def one_way_pair():
     return np.array(vertices, dtype=float), np.array([[0, 1, 2], [0, 1, 3]])
 
 
+def folded_sheet(n=4):
+    """A sheet bent as an arc and closed by a second one that lies on it, cut along other diagonals.
+
+    Both share their rim, whose edges have no frame: their faces look opposite ways.
+    """
+    flat, faces = grid(n)
+    x, y = flat[:, 0], flat[:, 1]
+    points = np.stack([np.sin(x), y, np.cos(x)], axis=1)
+    inside = np.flatnonzero(np.abs(flat[:, :2]).max(axis=1) < np.abs(flat[:, :2]).max())
+    other = np.arange(len(points))
+    other[inside] = len(points) + np.arange(len(inside))
+    first, second = np.split(faces, 2)
+    (a, b, c), d = first.T, second[:, 2]
+    below = other[np.concatenate([np.c_[d, b, a], np.c_[d, c, b]])]
+    return np.concatenate([points, points[inside]]), np.concatenate([faces, below])
+
+
 def face_lists():
     """Faces by name: closed, open, and what no surface has; one in Fortran's order."""
     return {

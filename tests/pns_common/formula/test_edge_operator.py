@@ -5,7 +5,7 @@ import numpy as np
 from pns_common.connectivity.topology import build_topology
 from pns_common.features.edge_features import paper_features
 from pns_common.features.orientation import FIRST_FACE, SYMMETRIC
-from pns_common.formula.correction import curvature_gate
+from pns_common.formula.correction import by_curvature, curvature_gate
 from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.geometry.frames import face_normals
 from tests.support.meshes import bumpy_sphere
@@ -58,7 +58,7 @@ def test_corrections_are_the_formula_of_all_its_parts():
         made.displacement, expected(np.zeros((3, 3)), square / 5, 2.0), atol=1e-15
     )
     prior, asked = 0.02 * POINTS[:3], np.array([0.3, 0.1, 2.0])
-    other = curvature_gate(0.5)
+    other = by_curvature(curvature_gate(0.5))
     made = operator().correct_scale_free(seen, 1 / 5, asked, prior, other, wide_bound=False)
     np.testing.assert_allclose(made.displacement, expected(prior, asked, 0.5), atol=1e-15)
     wide = operator().correct_scale_free(seen, 1 / 5, asked, prior, other, wide_bound=True)

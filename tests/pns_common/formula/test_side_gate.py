@@ -7,7 +7,7 @@ from pns_common import Mesh, pns, refine
 from pns_common.connectivity.topology import build_topology
 from pns_common.formula.side_gate import face_bends, gentle_bend, opened, opened_where_shut
 from pns_common.rules.control_level import control_level
-from tests.support.meshes import grid, torus_of_quads
+from tests.support.meshes import folded_sheet, grid, rotation, torus_of_quads
 from tests.support.networks import scale_free_model
 from tests.support.quasi_interpolation import OPEN_GATES, quasi_interpolated, with_card
 
@@ -85,6 +85,19 @@ def test_a_flat_sheet_stays_shut_up_to_its_boundary():
     points, faces = grid(6)
     level = control_level(points, build_topology(faces, len(points)))
     assert not face_bends(level.rings.edge_jumps, level.topology).any()
+
+
+def test_side_gates_leave_edges_without_a_frame_shut():
+    """What a network says there would turn neither with the mesh nor with its numbering."""
+    points, faces = folded_sheet()
+    level = control_level(points, build_topology(faces, len(points)))
+    scheme = pns(scale_free_model(0, side_gates=True))
+    placed = scheme.edge_rule(level)
+    assert placed.degenerate.sum() == 12
+    assert not placed.gate[placed.degenerate].any()
+    turn = rotation(np.random.default_rng(0))
+    turned = scheme.edge_rule(control_level(points @ turn.T, level.topology))
+    np.testing.assert_allclose(turned.positions, placed.positions @ turn.T, atol=1e-6)
 
 
 def sheet(rows, columns):
