@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.features.edge_features import paper_features, signed_features, tilt_features
 from pns_common.features.orientation import FIRST_FACE, SYMMETRIC
 from pns_common.features.ring_features import RING_10
 from pns_common.rules.curves import CurveRule
@@ -10,6 +10,9 @@ from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
 from pns_common.rules.loop import loop_vertex_rule
 from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
 from pns_common.schemes import Rule, Scheme
+
+# The kernels write these columns in this order, and know of no others.
+FEATURES = (paper_features, tilt_features, signed_features)
 
 
 def kernels_know(scheme: Scheme) -> bool:
@@ -24,7 +27,7 @@ def kernels_know(scheme: Scheme) -> bool:
             return False
     elif vertices is not loop_vertex_rule:
         return False
-    known = any(edges.operator.features is features for features in FEATURE_SETS.values())
+    known = any(edges.operator.features is features for features in FEATURES)
     return known and edges.operator.orientation in (FIRST_FACE, SYMMETRIC)
 
 
