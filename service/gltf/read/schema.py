@@ -86,6 +86,7 @@ class Accessor(Part, frozen=True):
     normalized: bool = False
     sparse: Sparse | None = None
     name: str | None = None
+    extensions: dict[str, Any] = {}
     extras: Any = None
 
 

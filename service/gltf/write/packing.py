@@ -109,7 +109,8 @@ class DracoWriter(Writer):
             name: self._described(before.get(name), name, values)
             for name, values in made.attributes.items()
         }
-        primitive["indices"] = self.add_accessor(made.faces.reshape(-1, 1), "SCALAR", None)
+        indices = self.add_accessor(made.faces.reshape(-1, 1), "SCALAR", None)
+        self.set_indices(primitive, indices)
         primitive.pop("mode", None)
         data = np.frombuffer(made.data, np.uint8).reshape(-1, 1)
         primitive.setdefault("extensions", {})[draco.EXTENSION] = {

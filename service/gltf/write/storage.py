@@ -1,4 +1,4 @@
-"""What is written otherwise than it was stored: sparse, quantised, strips and fans."""
+"""What is written otherwise than it was stored: sparse, quantised, strips and fans; what goes."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ...report import Change
+from ..constants import FLOAT
 from ..read.extensions import withdraw
 from ..read.modes import FAN, STRIP
 from ..read.plan import MeshPlan
-from ..read.quantization import EXTENSION, needs_extension, still_needed
+from ..read.quantization import EXTENSION, is_dequantised, still_needed
 from ..read.schema import Document, Primitive
 from ..read.spare import Spare
 from .writer import Writer
@@ -61,10 +62,12 @@ def _of_primitive(document: Document, primitive: Primitive, pointer: str) -> Ite
     if sparse:
         yield Change(pointer, "sparse accessors written dense", sparse)
     quantised = sum(
-        needs_extension(
-            name, accessors[index].component_type, normalized=accessors[index].normalized
-        )
-        for name, index in named
+        is_dequantised(name) and accessors[index].component_type != FLOAT for name, index in named
     )
     if quantised:
         yield Change(pointer, "quantised attributes written as float32", quantised)
+    # What they say may hold for the elements that were replaced alone, or name their bytes.
+    lost = sorted({name for index in stored for name in accessors[index].extensions})
+    if lost:
+        what = f"left out with the accessors that had them: {', '.join(lost)}"
+        yield Change(pointer, what, sum(bool(accessors[index].extensions) for index in stored))

@@ -23,6 +23,9 @@ from .prune import cut, moved, remove_unused
 # The largest value of an index type restarts primitives, so it may not be used as an index.
 LARGEST_UINT16_INDEX = 65534
 
+# What an accessor is called, and what applications say of it.
+KEPT = ("name", "extras")
+
 _COMPONENT_TYPE_OF = {dtype: number for number, dtype in COMPONENT_TYPES.items()}
 
 
@@ -74,7 +77,15 @@ class Writer:
             primitive["mode"] = TRIANGLES
         count = len(refined.attributes["POSITION"])
         indices = as_indices(refined.faces, count).reshape(-1, 1)
-        primitive["indices"] = self._accessor(indices, ELEMENT_ARRAY_BUFFER, "SCALAR")
+        self.set_indices(primitive, self._accessor(indices, ELEMENT_ARRAY_BUFFER, "SCALAR"))
+
+    def set_indices(self, primitive: dict[str, Any], index: int) -> None:
+        """Point a primitive at its new indices, called as those before them were."""
+        accessors, old = self.tree["accessors"], primitive.get("indices")
+        if old is not None:
+            before = accessors[old]
+            accessors[index] |= {key: before[key] for key in KEPT if key in before}
+        primitive["indices"] = index
 
     def remove(self, spare: Spare) -> None:
         """Take what refinement has left without use out of the tree, and its bytes out of BIN."""

@@ -323,3 +323,46 @@ def test_validator_accepts_every_kind_of_attribute(tmp_path):
             subdivide([shape, octahedron()], levels=levels, scheme="pns", diagnostics="full").glb
         )
         assert validator.errors([path]) == [[]]
+
+
+@pytest.mark.parametrize("compress", ["none", "draco", "meshopt"])
+def test_accessors_that_are_written_anew_keep_name_and_extras(compress):
+    tree, binary = files.document([octahedron()])
+    primitive = tree["meshes"][0]["primitives"][0]
+    said = {"name": "Ecken", "extras": {"from": ["a", 1]}}
+    for index in (primitive["indices"], primitive["attributes"]["POSITION"]):
+        tree["accessors"][index] |= said
+    compressed = subdivide(data=files.pack(tree, binary), compress=compress).glb
+    # And once more from what was compressed.
+    for glb in (compressed, subdivide(data=compressed).glb):
+        after, _ = files.unpack(glb)
+        primitive = after["meshes"][0]["primitives"][0]
+        for index in (primitive["indices"], primitive["attributes"]["POSITION"]):
+            assert after["accessors"][index].items() >= said.items()
+
+
+def test_extensions_of_accessors_that_are_written_anew_are_told():
+    tree, binary = files.document([octahedron()])
+    primitive = tree["meshes"][0]["primitives"][0]
+    for index in (primitive["indices"], primitive["attributes"]["POSITION"]):
+        tree["accessors"][index]["extensions"] = {"EXT_x": {"bufferView": 1}}
+    assert {
+        "pointer": "/meshes/0/primitives/0",
+        "what": "left out with the accessors that had them: EXT_x",
+        "count": 2,
+    } in subdivide(data=files.pack(tree, binary)).report["changes"]
+
+
+def test_texture_coordinates_that_become_floats_are_told():
+    corners = files.Normalized(np.arange(12, dtype=np.uint16).reshape(6, 2) * 5000)
+    result = subdivide([octahedron(TEXCOORD_0=corners)])
+    after, _ = files.unpack(result.glb)
+    index = after["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"]
+    assert after["accessors"][index]["componentType"] == files.COMPONENTS["f4"]
+    assert result.report["changes"] == [
+        {
+            "pointer": "/meshes/0/primitives/0",
+            "what": "quantised attributes written as float32",
+            "count": 1,
+        }
+    ]

@@ -167,15 +167,13 @@ def _store(
 ) -> None:
     """Make new accessors for one primitive: the old ones may serve another."""
     for name, values in decoded.items():
-        accessors = tree.setdefault("accessors", [])
+        accessors = tree["accessors"]
+        holder, key = (primitive, "indices") if name is None else (primitive["attributes"], name)
+        gone = ("bufferView", "byteOffset", "sparse")
+        accessor = {k: value for k, value in accessors[holder[key]].items() if k not in gone}
         if name is None:
-            accessor = {"componentType": UNSIGNED_INT, "type": "SCALAR"}
-            primitive["indices"] = len(accessors)
-        else:
-            old = accessors[primitive["attributes"][name]]
-            gone = ("bufferView", "byteOffset", "sparse")
-            accessor = {key: value for key, value in old.items() if key not in gone}
-            primitive["attributes"][name] = len(accessors)
+            accessor |= {"componentType": UNSIGNED_INT, "type": "SCALAR"}
+        holder[key] = len(accessors)
         data = values.data.cast("B")
         accessor |= {"bufferView": len(tree["bufferViews"]), "count": len(values)}
         accessors.append(accessor)
