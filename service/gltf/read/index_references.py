@@ -14,6 +14,8 @@ KNOWN = frozenset(
         "EXT_meshopt_compression",
         "EXT_texture_avif",
         "EXT_texture_webp",
+        "FB_ngon_encoding",
+        "GODOT_single_root",
         "KHR_animation_pointer",
         "KHR_draco_mesh_compression",
         "KHR_lights_punctual",
@@ -39,7 +41,13 @@ KNOWN = frozenset(
         "KHR_texture_basisu",
         "KHR_texture_transform",
         "KHR_xmp_json_ld",
+        "MSFT_lod",
         "MSFT_texture_dds",
+        "VRM",
+        "VRMC_materials_mtoon",
+        "VRMC_node_constraint",
+        "VRMC_springBone",
+        "VRMC_vrm",
     }
 )
 

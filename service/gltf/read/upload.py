@@ -23,6 +23,7 @@ from .json_text import decode_object, decoded_size
 from .plan import MeshPlan, check_cost, plan
 from .schema import Document, view
 from .spare import Spare, spare
+from .vertex_numbers import leave_out_vertex_numbers
 
 Media = Literal["glb", "gltf"]
 
@@ -83,8 +84,10 @@ def read_upload(
     if draco_views:
         document = view(tree)
         check_references(document, buffers)
+    numbered = leave_out_vertex_numbers(tree)
     unknown = unknown_extensions(tree, container.text)
     changes = _changes_of_buffers(tree.get("buffers", [])[:stored], files, unknown)
+    changes += numbered
     changes += [
         Change(pointer, what, count)
         for pointer, what, count in (

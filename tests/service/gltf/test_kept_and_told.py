@@ -366,3 +366,30 @@ def test_texture_coordinates_that_become_floats_are_told():
             "count": 1,
         }
     ]
+
+
+def test_the_numbers_of_a_manifold_s_vertices_are_left_out_and_told():
+    tree, binary = files.document([octahedron()], [{"POSITION": np.eye(3), "mode": 0}])
+    indices = tree["meshes"][0]["primitives"][0]["indices"]
+    manifold = {"EXT_mesh_manifold": {"manifoldPrimitive": {"indices": indices}}}
+    for mesh in tree["meshes"]:
+        mesh["extensions"] = manifold | {"EXT_other": {}}
+    tree["extensionsUsed"] = ["EXT_mesh_manifold", "EXT_other"]
+    result = subdivide(data=files.pack(tree, binary))
+    refined, points = files.unpack(result.glb)[0]["meshes"]
+    assert refined["extensions"] == {"EXT_other": {}}
+    assert points["extensions"] == tree["meshes"][1]["extensions"]
+    assert {
+        "pointer": "/meshes/0",
+        "what": "left out: EXT_mesh_manifold, by the numbers of vertices",
+        "count": 1,
+    } in result.report["changes"]
+
+
+def test_what_no_mesh_has_any_more_is_not_declared():
+    tree, binary = files.document([octahedron()])
+    tree["meshes"][0]["extensions"] = {"EXT_mesh_manifold": {}}
+    tree["extensionsUsed"] = ["EXT_mesh_manifold"]
+    after, _ = files.unpack(subdivide(data=files.pack(tree, binary)).glb)
+    assert "extensionsUsed" not in after
+    assert "extensions" not in after["meshes"][0]
