@@ -63,9 +63,14 @@ class Opened:
         return sorted(self.siblings.names - used)
 
 
+def has_scheme(uri: str) -> bool:
+    """Return whether a URI names a place of its own (https:…), wherever the document lies."""
+    return _SCHEME.match(uri) is not None
+
+
 def safe_name(uri: str) -> str | None:
     """Return the name of a file below the document's folder; None for any other URI."""
-    return None if _SCHEME.match(uri) else relative_name(unquote(uri))
+    return None if has_scheme(uri) else relative_name(unquote(uri))
 
 
 def relative_name(path: str) -> str | None:

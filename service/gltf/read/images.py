@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...bodies.sibling_files import Opened
+from ...bodies.sibling_files import Opened, has_scheme
 from ...report import Change
 from .schema import Document
 
@@ -35,6 +35,10 @@ def embed_images(
             continue
         file = opened.open(image.uri)
         if file is None:
+            if not has_scheme(image.uri):
+                # Where the result lies, its name may lead to nothing.
+                what = "kept by its URI: it did not come with the document"
+                changes.append(Change(pointer, what, 1))
             continue
         content = memoryview(file.content).cast("B")
         kind = mime_type(content)

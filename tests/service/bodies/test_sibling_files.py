@@ -124,6 +124,19 @@ def test_an_image_that_cannot_be_embedded_keeps_its_uri(content):
     assert tree["images"] == [{"uri": "a.png"}]
 
 
+@pytest.mark.parametrize("uri", ["a.png", "../textures/a.png", "/a.png"])
+def test_an_image_that_did_not_come_is_told(uri):
+    text, binary = external(images=[uri, "https://example.org/a.png"])
+    changes = refine(text, beside(box__bin=binary)).report["changes"]
+    assert [change for change in changes if change["pointer"].startswith("/images")] == [
+        {
+            "pointer": "/images/0",
+            "what": "kept by its URI: it did not come with the document",
+            "count": 1,
+        }
+    ]
+
+
 def test_files_on_disk_are_read_from_their_own_folder_only(tmp_path):
     own = tmp_path / "own"
     (own / "sub").mkdir(parents=True)
