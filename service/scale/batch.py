@@ -97,7 +97,7 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
     check_report(batch.report)
     if batch.to is not None and batch.to not in KINDS:
         raise InvalidParameter("to", f"{batch.to}: it must be one of {', '.join(KINDS)}")
-    listing = items_of(batch.source, KINDS)
+    listing = items_of(batch.source, KINDS, place_of(batch.destination))
     items = listing()
     if (first := next(items, None)) is None:
         text = f"{batch.source}: there is no file to refine ({', '.join(KINDS)})"
@@ -222,7 +222,11 @@ def _task(batch: Batch, item: Item, destination: Place, journal: Journal) -> Tas
         # Neither a journal nor a report can hold it.
         raise ServiceError("its name is not in UTF-8", code="unreadable-name")
     kind, target, relative = target_of(item.relative, batch.to, KINDS)
-    output = destination.below(relative).url
+    place = destination.below(relative)
+    output = place.url
+    if place.path_to(place_of(item.url)) == ".":
+        text = "its result would take its place; give results a folder of their own"
+        raise ServiceError(text, code="output-is-source")
     if not batch.dry and not journal.claim(output, item.url):
         taken = f"{output} is another file's result; give each source a folder of its own"
         raise ServiceError(taken, code="output-taken")

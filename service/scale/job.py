@@ -16,6 +16,8 @@ from ..options import Limits, Options
 if TYPE_CHECKING:
     from pns_common.schemes import Model
 
+    from ..bodies.sibling_files import SiblingFiles
+
 DONE, SKIPPED, FAILED, PLANNED = "done", "skipped", "failed", "planned"
 
 
@@ -117,8 +119,8 @@ def _refine(task: Task) -> Row:
     from .places import place_of
 
     source, output = place_of(task.url), place_of(task.output)
-    data = source.read()
-    digest = hashlib.sha256(data).hexdigest()
+    data, siblings = source.read(), source.siblings()
+    digest = input_hash(data, task.kind, siblings, task.limits)
     if task.known == digest and output.is_file():
         return Row(task.url, task.output, SKIPPED, input_sha256=digest, bytes_in=len(data))
     model = _model(task.model) if task.options.scheme == "pns" else None
@@ -131,7 +133,7 @@ def _refine(task: Task) -> Row:
                 task.options,
                 model,
                 task.limits,
-                siblings=source.siblings(),
+                siblings=siblings,
             )
     except PnsError as error:
         raise ServiceError(str(error), code="unrefinable") from error
@@ -169,9 +171,9 @@ def _plan(task: Task) -> Row:
     from .places import place_of
 
     source = place_of(task.url)
-    data = source.read()
-    digest = hashlib.sha256(data).hexdigest()
-    faces = predicted_faces(data, task.kind, task.options, task.limits, source.siblings())
+    data, siblings = source.read(), source.siblings()
+    digest = input_hash(data, task.kind, siblings, task.limits)
+    faces = predicted_faces(data, task.kind, task.options, task.limits, siblings)
     status = SKIPPED if task.known == digest and place_of(task.output).is_file() else PLANNED
     return Row(
         task.url,
@@ -182,6 +184,19 @@ def _plan(task: Task) -> Row:
         bytes_in=len(data),
         input_sha256=digest,
     )
+
+
+def input_hash(data: bytes, kind: str, siblings: SiblingFiles, limits: Limits) -> str:
+    """Return the SHA-256 of a file and then of the names and bytes of the files that it names."""
+    from ..gltf.read.named_files import named_files
+
+    digest = hashlib.sha256(data)
+    for name in named_files(data, kind, limits):
+        file = siblings.find(name)
+        if file is not None:
+            digest.update(f"\0{name}\0{len(file.content)}\0".encode())
+            digest.update(file.content)
+    return digest.hexdigest()
 
 
 @cache

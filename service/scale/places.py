@@ -8,6 +8,7 @@ import posixpath
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
@@ -51,6 +52,15 @@ class Place:
     def below(self, relative: str) -> Place:
         """Return what lies at a relative path below a folder."""
         return Place(self.system, posixpath.join(self.path, relative))
+
+    def path_to(self, other: Place) -> str | None:
+        """Return the way to what lies below a folder, "." to itself; None to anything else."""
+        if self.system != other.system:
+            return None
+        # A link is where it leads.
+        here, there = (os.path.realpath(p.path) if self.local else p.path for p in (self, other))
+        way = posixpath.relpath(there, here)
+        return None if way.split("/")[0] == ".." else way
 
     def read(self) -> bytes:
         """Read the whole file. Raises OSError."""
@@ -151,7 +161,8 @@ class Place:
                     return None
             return File(name, place.read()) if place.is_file() else None
 
-        return SiblingFiles(find)
+        # What an input's hash was made of is what is refined.
+        return SiblingFiles(cache(find))
 
 
 def place_of(text: str) -> Place:

@@ -29,15 +29,19 @@ class Item:
     relative: str
 
 
-def items_of(source: str, kinds: tuple[str, ...]) -> Callable[[], Iterator[Item]]:
+def items_of(
+    source: str, kinds: tuple[str, ...], results: Place | None = None
+) -> Callable[[], Iterator[Item]]:
     """Return a function that lists a source anew; folders and globs give files of `kinds` alone.
 
+    What lies at `results`, where these go, is theirs, and not listed by a folder around it.
+
     Raises:
-        InvalidParameter: there is nothing at `source`.
+        InvalidParameter: there is nothing at `source`, or its results would take its place.
     """
     endings = tuple(f".{kind}" for kind in kinds)
     if any(letter in source for letter in "*?["):
-        return lambda: _globbed(source, endings)
+        return lambda: _globbed(source, endings, results)
     place = place_of(source)
     name = place.path.lower()
     # Before folders: over HTTP, whatever holds links may be taken for one.
@@ -46,10 +50,15 @@ def items_of(source: str, kinds: tuple[str, ...]) -> Callable[[], Iterator[Item]
             return lambda: iter([Item(place.url, posixpath.basename(place.path))])
         return lambda: (_listed(path, place) for path in _paths(place))
     if place.is_folder():
+        inside = None if results is None else place.path_to(results)
+        if inside == ".":
+            raise InvalidParameter(
+                "DEST", f"{source} is SOURCE too: results need a folder of their own"
+            )
         return lambda: (
             Item(place.below(file).url, file)
             for file in place.files()
-            if file.lower().endswith(endings)
+            if file.lower().endswith(endings) and not _is_result(file, inside)
         )
     if place.is_file():
         raise InvalidParameter(
@@ -58,16 +67,23 @@ def items_of(source: str, kinds: tuple[str, ...]) -> Callable[[], Iterator[Item]
     raise InvalidParameter("SOURCE", f"{source}: there is no such folder, glob or manifest")
 
 
-def _globbed(pattern: str, endings: tuple[str, ...]) -> Iterator[Item]:
+def _is_result(file: str, results: str | None) -> bool:
+    """Return whether a file lies in the folder of results; both below one folder."""
+    return results is not None and file.startswith(f"{results}/")
+
+
+def _globbed(pattern: str, endings: tuple[str, ...], results: Place | None) -> Iterator[Item]:
     place = place_of(pattern)
     # The part before the first wildcard is the root that relative paths are taken from.
     fixed = place.path
     for letter in "*?[":
         fixed = fixed.partition(letter)[0]
     root = Place(place.system, posixpath.dirname(fixed))
+    inside = None if results is None else root.path_to(results)
     for path in place.matches():
-        if path.lower().endswith(endings):
-            yield Item(Place(place.system, path).url, posixpath.relpath(path, root.path))
+        file = posixpath.relpath(path, root.path)
+        if path.lower().endswith(endings) and not _is_result(file, inside):
+            yield Item(Place(place.system, path).url, file)
 
 
 def _listed(path: str, manifest: Place) -> Item:

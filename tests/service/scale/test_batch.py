@@ -1,6 +1,7 @@
 """Libraries of files: every file refined once, each fault its own file's, nothing half-written."""
 
 import hashlib
+import json
 import os
 import pickle
 import sqlite3
@@ -10,6 +11,7 @@ import threading
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from service.cli import app
@@ -30,6 +32,8 @@ from tests.service.scale.libraries import (
     refined,
     rows,
 )
+from tests.support.gltf import files
+from tests.support.gltf.shapes import octahedron
 from tests.support.networks import breaking_off_bytes
 
 
@@ -191,6 +195,39 @@ def test_two_sources_of_one_result_are_told(tmp_path):
     summary = refined(batch_of(tmp_path, to="ply"))
     assert summary.counts == {"done": 1, "failed": 1}
     assert summary.failures == [("output-taken", 1)]
+
+
+@pytest.mark.parametrize("destination", ["in", "link", "other/../in"])
+def test_a_library_is_not_replaced_by_its_results(tmp_path, destination):
+    source = library(tmp_path / "in", ["a.obj"])
+    (tmp_path / "link").symlink_to(source)
+    (tmp_path / "other").mkdir()
+    folder = str(tmp_path / destination)
+    with pytest.raises(InvalidParameter, match="results need a folder of their own"):
+        refined(batch_of(tmp_path, destination=folder))
+    for one in (source / "a.obj", source / "*.obj"):
+        summary = refined(batch_of(tmp_path, one, destination=folder))
+        assert summary.failures == [("output-is-source", 1)]
+    assert (source / "a.obj").read_bytes() == TETRAHEDRON
+
+
+def test_files_that_a_document_names_are_part_of_it(tmp_path):
+    tree, binary = files.document([octahedron()])
+    tree["buffers"][0]["uri"] = "parts/a%20b.bin"
+    tree["images"] = [{"uri": "a.png"}]
+    source, buffer = tmp_path / "in" / "a.gltf", tmp_path / "in" / "parts" / "a b.bin"
+    buffer.parent.mkdir(parents=True)
+    source.write_text(json.dumps(tree))
+    buffer.write_bytes(binary)
+    batch = batch_of(tmp_path)
+    assert refined(batch).counts == {"done": 1}
+    assert refined(batch).counts == {"skipped": 1}
+    buffer.write_bytes(bytes(binary).replace(np.float32(1).tobytes(), np.float32(2).tobytes(), 1))
+    assert refined(batch).counts == {"done": 1}
+    (tmp_path / "in" / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    assert refined(batch_of(tmp_path, dry=True)).counts == {"planned": 1}
+    assert refined(batch).counts == {"done": 1}
+    assert refined(batch).counts == {"skipped": 1}
 
 
 def test_a_source_that_is_gone_holds_its_result_no_longer(tmp_path):

@@ -54,6 +54,22 @@ def test_a_glob_takes_what_it_matches(tmp_path):
     assert [item.relative for item in listing()] == ["c.obj", "e.obj"]
 
 
+@pytest.mark.parametrize("source", ["in", "in/**/*.obj"])
+def test_results_inside_the_source_are_no_sources(tmp_path, source):
+    library(tmp_path / "in", ["a.obj", "refined2/c.obj"])
+    (tmp_path / "link").symlink_to(tmp_path / "in")
+    for destination in ("in/refined", "link/refined"):
+        batch = batch_of(tmp_path, tmp_path / source, destination=str(tmp_path / destination))
+        refined(batch)
+        assert refined(batch).counts == {"skipped": 2}
+    assert set(hashes(tmp_path / "in" / "refined")) == {"a.obj", "refined2/c.obj"}
+
+
+def test_a_folder_may_lie_inside_that_of_its_results(tmp_path):
+    library(tmp_path / "in", ["a.obj"])
+    assert refined(batch_of(tmp_path, destination=str(tmp_path))).counts == {"done": 1}
+
+
 @pytest.mark.parametrize(
     "line", ["../../up.obj", "/etc/passwd.obj", "a/../../../b.obj", "memory://x/c.obj"]
 )
