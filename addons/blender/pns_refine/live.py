@@ -24,6 +24,7 @@ from .overlay import hide
 from .reading import read_mesh
 from .run import Made, Run, Share, refine_mesh
 from .settings import Settings, choice_of
+from .writing import take_name
 
 # How long a mesh must be left alone before it is refined again, and how often that is looked at.
 QUIET, TICK = 0.3, 0.02
@@ -87,12 +88,12 @@ def apply(obj: bpy.types.Object) -> None:
     """Give the object the refined mesh for good; others that share the mesh stay as they are."""
     mesh: bpy.types.Mesh = obj.data
     result = mesh.pns_live.cache.data.copy()
-    name = mesh.name
     hide(obj)
     remove_modifier(obj)
     obj.data = result
     _forget(mesh)
-    result.name = name
+    result.name = mesh.name
+    take_name(result, mesh)
 
 
 def remove(obj: bpy.types.Object) -> None:

@@ -11,6 +11,7 @@ from .animation import redirect_drivers
 from .run import Key, Made, Run, Share, key_of, refine_meshes
 from .settings import Settings, choice_of
 from .words import forecast, listed, too_many
+from .writing import take_name
 
 # Above so many triangles the work goes on beside the interface, and there is no redo panel.
 AT_ONCE = 60_000
@@ -92,7 +93,10 @@ class Refining(Settings):
         found = [bpy.data.objects.get(key) for key in self.objects]
         objects = [obj for obj in found if obj is not None]
         placed = [place(obj, made[key_of(obj.data)], self.keep_original) for obj in objects]
-        if self.keep_original:
+        if not self.keep_original:
+            for refined in made.values():
+                take_name(refined.mesh, refined.source)
+        else:
             for obj in context.selected_objects:
                 obj.select_set(False)
             for obj in placed:

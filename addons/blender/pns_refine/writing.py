@@ -50,6 +50,16 @@ def write_mesh(
     return mesh, lost
 
 
+def take_name(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
+    """Call a refined mesh as its source was, which nothing has any more: files keep that name."""
+    if source.users:
+        return
+    name = source.name
+    # A name is given to one at a time.
+    source.name = f"{name} before"
+    mesh.name = name
+
+
 def _write_faces(mesh: bpy.types.Mesh, refined: Refined) -> Iterator[None]:
     faces = refined.faces
     mesh.vertices.add(len(refined.points))
@@ -128,6 +138,8 @@ def _write_keys(
             setattr(after, name, getattr(before, name))
         if hasattr(before, "lock_shape"):
             after.lock_shape = before.lock_shape
+    for name, value in old.items():
+        new[name] = value
     new.use_relative = old.use_relative
     new.eval_time = old.eval_time
     copy_animation(old, new)

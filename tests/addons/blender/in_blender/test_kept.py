@@ -217,6 +217,13 @@ def test_shape_keys_keep_names_values_and_ranges():
         assert after.relative_key.name == before.relative_key.name
 
 
+def test_custom_properties_of_shape_keys_are_kept():
+    obj = cube()
+    obj.shape_key_add(name="Basis")
+    obj.data.shape_keys["studio"] = {"id": 3, "é": [1.0, 2.0]}
+    assert refined(obj).data.shape_keys["studio"].to_dict() == {"id": 3, "é": [1.0, 2.0]}
+
+
 def test_a_key_that_lifts_all_by_one_goes_on_doing_so():
     _, new = _pair(keyed())
     basis, up = (numbers(b.points, "co", 3) for b in new.data.shape_keys.key_blocks[:2])

@@ -177,6 +177,7 @@ def test_apply_gives_the_result_for_good():
     assert not obj.modifiers
     np.testing.assert_allclose(points_of(obj.data), before, atol=1e-6)
     assert not obj.data.pns_live.enabled
+    assert obj.data.name == "Cube"
     assert len(bpy.data.objects) == 1
     assert not bpy.data.node_groups
 

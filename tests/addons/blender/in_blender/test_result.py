@@ -55,6 +55,23 @@ def test_without_the_original_the_object_stays_itself():
     assert len(bpy.data.objects) == 1
 
 
+def test_without_the_original_its_mesh_is_called_as_before():
+    """Exporters write the names of meshes, not of objects alone."""
+    obj = cube()
+    obj.data.name = "Held"
+    assert refined(obj, keep_original=False, levels=1).data.name == "Held"
+    # Its name stays with whoever still shows it.
+    twin = obj.copy()
+    bpy.context.scene.collection.objects.link(twin)
+    twin.select_set(False)
+    assert refined(obj, keep_original=False, levels=1).data.name != "Held"
+    assert twin.data.name == "Held"
+    kept = twin.data
+    kept.use_fake_user = True
+    refined(twin, keep_original=False, levels=1)
+    assert kept.name == "Held"
+
+
 def test_a_linked_object_is_copied_and_never_changed(tmp_path):
     obj = linked(cube(), tmp_path / "library.blend")
     with pytest.raises(RuntimeError, match=r"Linked from another file.*Cube.*Keep Original"):
