@@ -60,13 +60,12 @@ def open_archive(data: bytes, max_bytes: int) -> tuple[File, SiblingFiles]:
     main = documents[0]
     folder = main.rpartition("/")[0]
     unpacker = _Unpacker(opened, entries, len(data), max_bytes)
-    find = partial(_find, unpacker, f"{folder}/" if folder else "")
-    return unpacker.read(main), SiblingFiles(find, frozenset(entries) - {main})
+    siblings = SiblingFiles(partial(_find, unpacker), frozenset(entries) - {main}, folder)
+    return unpacker.read(main), siblings
 
 
-def _find(unpacker: _Unpacker, folder: str, name: str) -> File | None:
-    path = folder + name
-    return unpacker.read(path) if path in unpacker.entries else None
+def _find(unpacker: _Unpacker, name: str) -> File | None:
+    return unpacker.read(name) if name in unpacker.entries else None
 
 
 def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
@@ -75,7 +74,9 @@ def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     entries: dict[str, zipfile.ZipInfo] = {}
     for entry in opened.infolist():
         index_bytes += len(entry.orig_filename) + len(entry.extra) + len(entry.comment)
-        name = relative_name(entry.filename)
+        # Archives made on Windows may have its separator, against the format's rule.
+        path = entry.filename.replace("\\", "/")
+        name = relative_name(path)
         if name is None:
             raise ArchiveError("a name leads out of the archive")
         if stat.S_IFMT(entry.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
@@ -84,7 +85,7 @@ def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
             raise ArchiveError("the archive is encrypted")
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise ArchiveError("the archive uses a compression other than deflate")
-        if entry.is_dir() or name.startswith("__MACOSX/") or name.endswith(".DS_Store"):
+        if path.endswith("/") or name.startswith("__MACOSX/") or name.endswith(".DS_Store"):
             continue
         if name in entries:
             raise ArchiveError("two entries have the same name")

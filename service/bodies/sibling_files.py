@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from unicodedata import normalize
 from urllib.parse import unquote
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
@@ -25,10 +26,12 @@ class SiblingFiles:
     Attributes:
         find: the file of a safe relative name, None where there is none.
         names: all files that came, where they are known.
+        folder: the document's own among what came; "" where that is all there is.
     """
 
     find: Callable[[str], File | None]
     names: frozenset[str] = frozenset()
+    folder: str = ""
 
 
 # A document that came without any other file.
@@ -44,12 +47,17 @@ class Opened:
 
     def open(self, uri: str) -> File | None:
         """Open the file behind a URI; None where it did not come, or the URI leads elsewhere."""
-        name = safe_name(uri)
+        name = self.name_of(uri)
         if name is None:
             return None
         if name not in self.files:
-            self.files[name] = self.siblings.find(name)
+            found = (self.siblings.find(spelling) for spelling in _spellings(name))
+            self.files[name] = next((file for file in found if file is not None), None)
         return self.files[name]
+
+    def name_of(self, uri: str) -> str | None:
+        """Return the name among what came that a URI leads to; None where it leads elsewhere."""
+        return safe_name(uri, self.siblings.folder)
 
     @property
     def size(self) -> int:
@@ -68,9 +76,26 @@ def has_scheme(uri: str) -> bool:
     return _SCHEME.match(uri) is not None
 
 
-def safe_name(uri: str) -> str | None:
-    """Return the name of a file below the document's folder; None for any other URI."""
-    return None if has_scheme(uri) else relative_name(unquote(uri))
+def safe_name(uri: str, folder: str = "") -> str | None:
+    """Return the name of a file that may have come with a document; None for any other URI.
+
+    ``folder`` is the document's own among what came: so far up a URI may lead.
+    """
+    if has_scheme(uri):
+        return None
+    path, folders = unquote(uri), folder.split("/") if folder else []
+    while path.startswith("../"):
+        if not folders:
+            return None
+        folders.pop()
+        path = path.removeprefix("../")
+    name = relative_name(path)
+    return None if name is None else "/".join([*folders, name])
+
+
+def _spellings(name: str) -> Iterable[str]:
+    """Return a name with its accents as they are, composed, and apart, as macOS packs archives."""
+    return dict.fromkeys((name, *(normalize(form, name) for form in ("NFC", "NFD"))))
 
 
 def relative_name(path: str) -> str | None:

@@ -188,13 +188,14 @@ def _plan(task: Task) -> Row:
 
 def input_hash(data: bytes, kind: str, siblings: SiblingFiles, limits: Limits) -> str:
     """Return the SHA-256 of a file and then of the names and bytes of the files that it names."""
+    from ..bodies.sibling_files import Opened
     from ..gltf.read.named_files import named_files
 
-    digest = hashlib.sha256(data)
-    for name in named_files(data, kind, limits):
-        file = siblings.find(name)
+    digest, opened = hashlib.sha256(data), Opened(siblings)
+    for uri in named_files(data, kind, limits):
+        file = opened.open(uri)
         if file is not None:
-            digest.update(f"\0{name}\0{len(file.content)}\0".encode())
+            digest.update(f"\0{uri}\0{len(file.content)}\0".encode())
             digest.update(file.content)
     return digest.hexdigest()
 

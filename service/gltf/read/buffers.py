@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import re
 
-from ...bodies.sibling_files import Opened, safe_name
+from ...bodies.sibling_files import Opened
 from ...errors import GltfError
 from .compressed.meshopt import placeholders
 from .schema import Buffer, Document
@@ -60,13 +60,18 @@ def _content(buffer: Buffer, binary: memoryview | None, opened: Opened, pointer:
 
 
 def _neighbour(uri: str, opened: Opened, pointer: str) -> memoryview:
-    if safe_name(uri) is None:
+    name = opened.name_of(uri)
+    if name is None:
         raise GltfError(
-            "only files that come with the document are read", pointer=pointer, code="unsafe-uri"
+            f"{uri!r}: only files that come with the document, in its folder, are read",
+            pointer=pointer,
+            code="unsafe-uri",
         )
     file = opened.open(uri)
     if file is None:
         raise GltfError(
-            "the buffer's file did not come with the document", pointer=pointer, code="missing-file"
+            f"the buffer's file {name!r} did not come with the document",
+            pointer=pointer,
+            code="missing-file",
         )
     return memoryview(file.content).cast("B")

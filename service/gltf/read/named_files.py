@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...bodies.media import GLTF_KINDS
-from ...bodies.sibling_files import safe_name
+from ...bodies.sibling_files import has_scheme
 from ...errors import ServiceError
 from ...options import Limits
 from .container import Container, read_glb
@@ -13,7 +13,7 @@ from .json_text import decode_object
 
 
 def named_files(data: bytes, kind: str, limits: Limits) -> list[str]:
-    """Return the names of buffers' and images' files, each once; none of what cannot be read."""
+    """Return the relative URIs of buffers and images, each once; none of what cannot be read."""
     if kind not in GLTF_KINDS:
         return []
     try:
@@ -25,14 +25,14 @@ def named_files(data: bytes, kind: str, limits: Limits) -> list[str]:
     except ServiceError:
         # Refining it says why.
         return []
-    names = (_name(entry) for key in ("buffers", "images") for entry in _entries(tree.get(key)))
-    return list(dict.fromkeys(name for name in names if name is not None))
+    uris = (_uri(entry) for key in ("buffers", "images") for entry in _entries(tree.get(key)))
+    return list(dict.fromkeys(uri for uri in uris if uri is not None and not has_scheme(uri)))
 
 
 def _entries(values: Any) -> list[Any]:
     return values if isinstance(values, list) else []
 
 
-def _name(entry: Any) -> str | None:
+def _uri(entry: Any) -> str | None:
     uri = entry.get("uri") if isinstance(entry, dict) else None
-    return safe_name(uri) if isinstance(uri, str) else None
+    return uri if isinstance(uri, str) else None

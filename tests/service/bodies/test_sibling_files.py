@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import unicodedata
 import zipfile
 
 import numpy as np
@@ -78,6 +79,7 @@ def test_a_buffer_that_did_not_come_is_named():
     with pytest.raises(GltfError) as refusal:
         refine(text, beside())
     assert (refusal.value.code, refusal.value.pointer) == ("missing-file", "/buffers/0/uri")
+    assert "'box.bin'" in refusal.value.detail
 
 
 def test_external_files_give_what_an_embedded_file_gives():
@@ -181,12 +183,50 @@ def test_an_archive_holds_a_document_and_its_neighbours():
     } in result.report["changes"]
 
 
+def test_a_document_names_files_elsewhere_in_its_archive():
+    text, binary = external("../parts/box.bin", images=["../../a.png"])
+    entries = [("x/gltf/box.gltf", text), ("x/parts/box.bin", binary), ("a.png", PNG)]
+    main, siblings = open_archive(archive(entries), 2**20)
+    changes = refine(main.content, siblings).report["changes"]
+    assert {"pointer": "/images/0", "what": "embedded", "count": 1} in changes
+    assert not any(change["what"].startswith("not used") for change in changes)
+
+
+@pytest.mark.parametrize("uri", ["../../box.bin", "a/../../box.bin", "%2e%2e/%2e%2e/box.bin"])
+def test_no_uri_leads_out_of_an_archive(uri):
+    text, binary = external(uri)
+    main, siblings = open_archive(archive([("x/box.gltf", text), ("box.bin", binary)]), 2**20)
+    with pytest.raises(GltfError) as refusal:
+        refine(main.content, siblings)
+    assert refusal.value.code == "unsafe-uri"
+
+
+def test_archives_with_separators_of_windows_are_read():
+    text, binary = external("parts/box.bin")
+    entries = [("x\\", b""), ("x\\box.gltf", text), ("x\\parts\\box.bin", binary)]
+    main, siblings = open_archive(archive(entries), 2**20)
+    assert siblings.names == {"x/parts/box.bin"}
+    assert refine(main.content, siblings).report["totals"]["faces"] == 48
+
+
+@pytest.mark.parametrize("forms", [("NFC", "NFD"), ("NFD", "NFC")])
+def test_accents_are_found_in_either_form(tmp_path, forms):
+    said, stored = (unicodedata.normalize(form, "Körper.bin") for form in forms)
+    text, binary = external(said)
+    main, siblings = open_archive(archive([("a.gltf", text), (stored, binary)]), 2**20)
+    (tmp_path / stored).write_bytes(binary)
+    for beside_it in (siblings, folder_of(tmp_path / "a.gltf")):
+        assert refine(main.content, beside_it).report["totals"]["faces"] == 48
+
+
 BAD = {
     "no document": [("a.bin", b"")],
     "two documents": [("a.gltf", b"{}"), ("b.glb", b"glTF")],
     "parent folder": [("a.gltf", b"{}"), ("../x.bin", b"")],
     "absolute name": [("a.gltf", b"{}"), ("/x.bin", b"")],
     "drive": [("a.gltf", b"{}"), ("C:/x.bin", b"")],
+    "parent folder of Windows": [("a.gltf", b"{}"), ("..\\x.bin", b"")],
+    "drive of Windows": [("a.gltf", b"{}"), ("C:\\x.bin", b"")],
     "link": [("a.gltf", b"{}"), (link("x.bin"), b"/etc/passwd")],
 }
 
