@@ -12,6 +12,7 @@ from pns_common.connectivity.disjoint_union import disjoint_faces
 
 from ..errors import UnrefinableError
 from ..gltf.read.index_references import INSTANCING
+from ..gltf.read.modes import SURFACES, TRIANGLES
 from ..gltf.read.primitives import TrianglePrimitive, read_primitive
 from ..gltf.read.upload import read_upload
 from ..meshes.weld import weld
@@ -20,7 +21,7 @@ from ..report import Change
 from .formats import HOLDS_UV
 from .indexed_triangles import IndexedTriangles
 
-LOST = ("materials", "textures", "images", "animations", "cameras", "extensions")
+LOST = ("materials", "textures", "images", "animations", "skins", "cameras", "extensions")
 
 
 def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, list[Change]]:
@@ -47,7 +48,11 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, li
     names = [set(p.attributes) for shown, _ in placed for p in shown]
     keeps_uv = kind in HOLDS_UV and all("TEXCOORD_0" in name for name in names)
     mesh_file = _joined([_placed(shown, matrix, keeps_uv=keeps_uv) for shown, matrix in placed])
-    return mesh_file, _changes(upload.tree, len(placed), names, keeps_uv=keeps_uv)
+    showing = sum(node.get("mesh") in primitives for node in upload.tree["nodes"])
+    changes = _changes(upload.tree, len(placed), names, keeps_uv=keeps_uv)
+    if elsewhere := showing - len(placed):
+        changes.append(Change("/nodes", "nodes outside of the default scene left out", elsewhere))
+    return mesh_file, changes
 
 
 def _placed_meshes(tree: dict[str, Any]) -> Iterator[tuple[int, Float[np.ndarray, "4 4"]]]:
@@ -142,6 +147,7 @@ def _changes(
         Change(pointer, f"{what} dropped: the format cannot hold them", count)
         for pointer, what, count in (
             ("/meshes", "morph targets", _count_targets(tree)),
+            ("/meshes", "points and lines", _count_other_modes(tree)),
             ("/nodes", f"copies by {INSTANCING}", _count_copies(tree)),
         )
         if count
@@ -172,6 +178,15 @@ def _count_targets(tree: dict[str, Any]) -> int:
             default=0,
         )
         for mesh in tree.get("meshes", [])
+    )
+
+
+def _count_other_modes(tree: dict[str, Any]) -> int:
+    """Return how many primitives are no surfaces."""
+    return sum(
+        primitive.get("mode", TRIANGLES) not in SURFACES
+        for mesh in tree.get("meshes", [])
+        for primitive in mesh.get("primitives", [])
     )
 
 

@@ -74,3 +74,18 @@ def test_a_root_that_is_a_child_too_stands_where_its_parent_puts_it():
     flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
     assert len(flat.faces) == 8
     assert flat.vertices[:, 0].min() == pytest.approx(4)
+
+
+def test_what_the_scene_does_not_show_and_what_is_no_surface_are_told():
+    tree, binary = files.document(
+        [octahedron(), {"POSITION": np.eye(3), "mode": 0}], [{"POSITION": np.eye(3), "mode": 1}]
+    )
+    tree["nodes"] += [{"mesh": 0}, {"mesh": 0}]
+    tree["scenes"] += [{"nodes": [2]}]
+    tree["skins"] = [{"joints": [0]}]
+    _, changes = flatten(files.pack(tree, binary), "ply", Limits())
+    told = {change.what: change.count for change in changes}
+    # One of another scene, one of none.
+    assert told["nodes outside of the default scene left out"] == 2
+    assert told["points and lines dropped: the format cannot hold them"] == 2
+    assert told["skins dropped: the format cannot hold them"] == 1
