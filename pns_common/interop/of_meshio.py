@@ -1,4 +1,4 @@
-"""meshio.Mesh of triangles: blocks stay blocks; point, cell and field data are kept."""
+"""meshio.Mesh of triangles: blocks stay blocks; point, cell and field data and sets are kept."""
 
 from __future__ import annotations
 
@@ -31,13 +31,26 @@ def read_meshio(mesh: Any) -> CarriedMesh:
 
 def write_meshio(refined: CarriedMesh, given: Any) -> Any:
     """Return a mesh of the class of ``given``, in its blocks."""
-    starts = np.cumsum([len(block.data) for block in given.cells])[:-1]
-    # Every face has as many descendants.
-    starts *= len(refined.faces) // sum(len(block.data) for block in given.cells)
+    # Every face has as many descendants, one after another.
+    children = len(refined.faces) // sum(len(block.data) for block in given.cells)
+    starts = children * np.cumsum([len(block.data) for block in given.cells])[:-1]
     return type(given)(
         refined.vertices[:, : given.points.shape[1]],
         [("triangle", faces) for faces in np.split(refined.faces, starts)],
         point_data=dict(refined.points),
         cell_data={name: np.split(values, starts) for name, values in refined.cells.items()},
         field_data=given.field_data,
+        # Points keep their numbers.
+        point_sets=given.point_sets,
+        cell_sets={
+            name: [_descendants(block, children) for block in blocks]
+            for name, blocks in given.cell_sets.items()
+        },
+        info=given.info,
     )
+
+
+def _descendants(cells: Any, children: int) -> np.ndarray:
+    """Return the refined cells of some cells of a block, of which readers may give None."""
+    old = np.asarray([] if cells is None else cells, dtype=np.int64)
+    return (children * old[:, None] + np.arange(children)).reshape(-1)

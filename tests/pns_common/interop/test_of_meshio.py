@@ -24,6 +24,23 @@ class TestMeshio:
         np.testing.assert_allclose(refined.point_data["uv"], split_uv(UV), atol=1e-12)
         assert refined.field_data == given.field_data
 
+    def test_sets_of_points_and_cells_are_kept(self):
+        blocks = [("triangle", FACES[:50]), ("triangle", FACES[50:])]
+        given = self.meshio.Mesh(
+            VERTICES,
+            blocks,
+            point_sets={"pins": [0, 3]},
+            cell_sets={"wall": [np.array([1, 4]), None], "rim": [[], [0]]},
+            info={"unit": "mm"},
+        )
+        refined = subdivide(given, 1, SCHEME)
+        assert refined.point_sets == {"pins": [0, 3]}
+        assert refined.info == {"unit": "mm"}
+        wall, none = refined.cell_sets["wall"]
+        assert wall.tolist() == [4, 5, 6, 7, 16, 17, 18, 19]
+        assert len(none) == 0
+        assert [part.tolist() for part in refined.cell_sets["rim"]] == [[], [0, 1, 2, 3]]
+
     def test_a_plane_mesh_stays_plane(self):
         given = self.meshio.Mesh(np.array([[0.0, 0], [1, 0], [0, 1]]), [("triangle", [[0, 1, 2]])])
         assert subdivide(given, 2).points.shape == (15, 2)
