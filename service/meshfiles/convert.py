@@ -59,6 +59,10 @@ def convert(
     kind, target = _kind("IN", source), _kind("OUT", output)
     if report_file is not None and report_file.resolve() in (source.resolve(), output.resolve()):
         raise InvalidParameter("report", f"{report_file}: the report would replace a model")
+    # Before the work, which may be long.
+    for name, file in (("OUT", output), ("report", report_file)):
+        if file is not None and not file.parent.is_dir():
+            raise InvalidParameter(name, f"{file}: there is no folder {file.parent}")
     began = time.perf_counter()
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     data = source.read_bytes()

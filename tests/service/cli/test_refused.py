@@ -23,7 +23,8 @@ NAMES = ", ".join(bundled_models())
     ("arguments", "code", "says"),
     [
         ("subdivide missing.glb -o out.glb", 1, "missing.glb"),
-        ("subdivide part.glb -o nowhere/out.glb", 1, "nowhere"),
+        ("subdivide part.glb -o nowhere/out.glb", 2, "nowhere"),
+        ("subdivide part.glb -o out.glb --report nowhere/report.json", 2, "nowhere"),
         ("subdivide part.glb -o out.fbx", 2, "out.fbx"),
         ("subdivide part.txt -o out.glb", 2, "part.txt"),
         ("subdivide part.glb -o out.glb --levels 0", 2, "levels"),
@@ -107,6 +108,8 @@ def test_a_missing_folder_is_named_with_the_file_that_was_asked_for(
     pns: Any, part_file: Path
 ) -> None:
     outcome = pns("subdivide", "part.glb", "-o", "nowhere/out.glb")
+    assert outcome.err == "pns: nowhere/out.glb: there is no folder nowhere\n"
+    outcome = pns("example", "nowhere/out.glb")
     assert outcome.err == "pns: nowhere/out.glb: No such file or directory\n"
 
 
