@@ -33,7 +33,8 @@ def replace_file(path: Path, data: bytes) -> None:
 @contextmanager
 def _new_file(path: Path) -> Generator[tuple[Path, int], None, None]:
     """Yield the name of a new file and its descriptor, which is to be closed."""
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}.tmp")
+    # So much of the name as shows whose it is: a file may have one as long as the system allows.
+    temporary = path.with_name(f".{path.name[:40]}.{secrets.token_hex(8)}.tmp")
     try:
         # The mode of any file that a user writes: the system takes the umask off.
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)

@@ -17,6 +17,13 @@ def test_a_file_is_replaced_and_nothing_else_is_left(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.parametrize("name", ["a" * 251 + ".glb", "鋼" * 83 + ".glb"], ids=["letters", "kanji"])
+def test_a_name_may_be_as_long_as_the_system_allows(tmp_path, name):
+    replace_file(tmp_path / name, b"whole")
+    assert (tmp_path / name).read_bytes() == b"whole"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
 def test_nobody_sees_a_file_before_it_is_whole(tmp_path):
     path = tmp_path / "rows.jsonl"
     path.write_text("old")
