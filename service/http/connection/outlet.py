@@ -6,12 +6,19 @@ import asyncio
 import select
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 # Whether the system tells that a client has ended before all it said is read (Linux does).
 TELLS_END = hasattr(select, "POLLRDHUP")
 # Whether a look at what waits can be told not to wait itself (Windows has no such flag).
 DOES_NOT_WAIT: int | None = getattr(socket, "MSG_DONTWAIT", None)
+# What the system takes of an answer before it is on its way. Without a bound it takes megabytes for
+# a client that reads nothing, in memory that nobody here counts, and keeps them for minutes after
+# the connection has ended.
+UNSENT_BYTES = 64 * 1024
+_UNSENT: int | None = getattr(socket, "TCP_NOTSENT_LOWAT", None)
+_UNTAKEN: int | None = getattr(socket, "TCP_USER_TIMEOUT", None)
 
 
 class Outlet:
@@ -29,6 +36,18 @@ class Outlet:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.real, name)
+
+    def keep_little(self, seconds: float) -> None:
+        """Let the system hold little of what is written, and for so long where none is taken.
+
+        Where it knows of no such bounds it has its own.
+        """
+        connection = self.real.get_extra_info("socket")
+        for option, value in (_UNSENT, UNSENT_BYTES), (_UNTAKEN, max(1, round(1000 * seconds))):
+            if option is not None:
+                # Reset already, or no TCP.
+                with suppress(OSError):
+                    connection.setsockopt(socket.IPPROTO_TCP, option, value)
 
     @property
     def taken(self) -> int:

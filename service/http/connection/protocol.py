@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Iterator
 from math import inf
 from typing import Any
 
@@ -28,6 +29,8 @@ log = logging.getLogger("pns.connection")
 HEAD_BYTES = 16 * 1024
 # What is parsed in one go; a request of ordinary clients is two or three events.
 EVENTS_A_TURN = 32
+# What is written in one go: the transport copies what its client does not take, all of it.
+WRITE_BYTES = 64 * 1024
 # Neither an upload's rate nor an answer's is judged before.
 RATE_SECONDS = 2.0
 
@@ -42,6 +45,16 @@ class _Flow(FlowControl):
             super().resume_reading()
 
 
+def _parts(message: Message) -> Iterator[Message]:
+    """Yield a message as several of `WRITE_BYTES` each, where its body is longer."""
+    body = memoryview(message.get("body", b""))
+    while len(body) > WRITE_BYTES:
+        yield {**message, "body": body[:WRITE_BYTES], "more_body": True}
+        body = body[WRITE_BYTES:]
+        message = {**message, "body": body}
+    yield message
+
+
 class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
     """The protocol that `uvicorn.Config(http=…)` is given, bound to a `Shared`.
 
@@ -50,6 +63,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
     - a connection has a slot in the crowd or is refused with 503;
     - a head must arrive within its time, and an answer be taken at a least rate;
     - a body is parsed in short turns and may not come in countless pieces;
+    - of an answer little is written before its client takes it, neither here nor by the system;
     - an answer given before the body is whole ends the connection, after it has been heard.
     """
 
@@ -79,6 +93,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take a slot, or refuse."""
         outlet = self._outlet = Outlet(transport, self._end)
+        outlet.keep_little(self._shared.bounds.answer.idle)
         self._taking = Taking(outlet, self._shared.bounds.answer, self._abort)
         super().connection_made(outlet)  # type: ignore[arg-type]
         self.flow: _Flow = _Flow(outlet)  # type: ignore[arg-type]
@@ -241,7 +256,8 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
                 # A copy, and bytes: an application may reuse its list, and give any pairs.
                 headers = [pair for pair in message["headers"] if pair[0].lower() != b"connection"]
                 message = {**message, "headers": [*headers, CLOSE_HEADER]}
-            await send(message)
+            for part in _parts(message):
+                await send(part)
 
         # Starlette and uvicorn name the same things by types of their own.
         await self.config.loaded_app(scope, receive, send_and_close)  # pyright: ignore[reportArgumentType]

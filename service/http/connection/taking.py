@@ -54,10 +54,12 @@ class Taking:
         self._timer = self._clock.call_later(TICK_SECONDS, self._look)
 
     def catch_up(self) -> None:
-        """Stop the client's clock: the outlet has room."""
+        """Stop the client's clock: the outlet has room, though it may have come too late."""
         if self._timer is not None:
             self.forget()
-            self._waited += self._clock.time() - self._full_since
+            moved, self._waited = self._progress(self._clock.time())
+            if self._pace.patience(moved, self._waited) <= 0:
+                self._end(moved, self._waited)
 
     def forget(self) -> None:
         """Watch nobody any more."""
@@ -71,10 +73,13 @@ class Taking:
             self._moved = (taken, now)
         moved, waited = self._progress(now)
         if now - self._moved[1] >= self._pace.idle or self._pace.patience(moved, waited) <= 0:
-            log.warning("an answer is cut off: %s", self._pace.excuse(moved, waited))
-            self._late()
+            self._end(moved, waited)
         else:
             self._timer = self._clock.call_later(TICK_SECONDS, self._look)
+
+    def _end(self, moved: int, waited: float) -> None:
+        log.warning("an answer is cut off: %s", self._pace.excuse(moved, waited))
+        self._late()
 
     def _progress(self, now: float) -> tuple[int, float]:
         """Return the bytes that this client took of its answer, and the seconds of waiting."""

@@ -67,6 +67,18 @@ def problem(answer):
     return json.loads(answer.partition(b"\r\n\r\n")[2])
 
 
+def protocol_of(connection):
+    """The server's side of a connection."""
+    # By type: some objects warn where they are asked for their class.
+    (mine,) = (
+        known
+        for known in gc.get_objects()
+        if issubclass(type(known), protocol.BoundedProtocol)
+        and known.client == connection.getsockname()
+    )
+    return mine
+
+
 def trickle(connection, piece=b"x", *, most=PATIENCE / 0.05):
     """Send a piece now and then, until the server ends the connection; return what it said."""
     connection.settimeout(0.05)
@@ -213,6 +225,22 @@ def test_a_reader_below_the_least_rate_is_cut_off(hasty):
     assert taken < 48 * MIB
 
 
+def test_of_an_answer_that_is_not_read_neither_server_nor_system_holds_much(address):
+    """A file of the page's size, whole in the server's memory once, whoever else asks for it."""
+    with socket.socket() as connection:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        connection.settimeout(PATIENCE)
+        connection.connect(address)
+        connection.sendall(head("GET", "/docs/swagger-ui-bundle.js"))
+        assert connection.recv(12) == b"HTTP/1.1 200"
+        mine = protocol_of(connection)
+        while not (mine.flow.write_paused or mine.cycle.response_complete):
+            time.sleep(0.005)
+        assert mine.flow.write_paused
+        assert mine.transport.get_write_buffer_size() <= 2**18
+        assert mine.transport.taken <= 2**19
+
+
 @pytest.mark.parametrize(
     ("sent", "expected"),
     [
@@ -297,13 +325,7 @@ def test_requests_that_wait_behind_another_stay_in_the_clients_socket(address, t
         connection.sendall(head("POST", "/subdivide", f"Content-Length: {len(body)}\r\n") + body)
         while not (tmp_path / "took-1").exists():
             time.sleep(0.005)
-        # By type: some objects warn where they are asked for their class.
-        (mine,) = (
-            known
-            for known in gc.get_objects()
-            if issubclass(type(known), protocol.BoundedProtocol)
-            and known.client == connection.getsockname()
-        )
+        mine = protocol_of(connection)
         connection.setblocking(False)
         requests = head("GET", "/healthz") * 1000
         while mine.transport.is_reading():
