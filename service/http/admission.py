@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 
 from ..errors import BusyError
@@ -29,9 +29,7 @@ class Admission:
         self._uploads = _Places("uploads", uploads)
         self._jobs = _Places("jobs", None)
         self._answers = _Answers(answer_bytes)
-        self._body_bytes = body_bytes
-        # By client; who holds nothing is not there.
-        self._bodies: Counter[str] = Counter()
+        self._bodies = _Bodies(body_bytes)
 
     @property
     def admitted(self) -> int:
@@ -73,27 +71,13 @@ class Admission:
             yield
 
     @contextmanager
-    def body(self, client: str) -> Iterator[Callable[[int], None]]:
-        """Keep account of a body: call the value before each piece. It raises BusyError.
-
-        One client may hold three quarters of all bytes, so that it alone never locks out others.
-        """
-        held = 0
-
-        def grow(size: int) -> None:
-            nonlocal held
-            taken, mine = self._bodies.total(), self._bodies[client]
-            if taken + size > self._body_bytes or mine + size > self._body_bytes * 3 // 4:
-                raise BusyError("the bodies that are held leave no room for this one")
-            self._bodies[client] += size
-            held += size
-
+    def body(self, client: str) -> Iterator[Body]:
+        """Keep account of a body, from before its first piece to the end of its job."""
+        body = Body(client, self._bodies)
         try:
-            yield grow
+            yield body
         finally:
-            self._bodies[client] -= held
-            if not self._bodies[client]:
-                del self._bodies[client]
+            self._bodies.forget(body)
 
     def end_uploads(self) -> None:
         """End what still sends its body."""
@@ -103,6 +87,95 @@ class Admission:
         """End everything that is under way."""
         self._uploads.end()
         self._jobs.end()
+
+
+class Body:
+    """What is counted of one body."""
+
+    def __init__(self, client: str, bodies: _Bodies) -> None:
+        self.client = client
+        self.size = 0
+        self._bodies = bodies
+
+    def grow(self, size: int) -> None:
+        """Count a piece before it is kept.
+
+        Where memory runs short, the client whose bodies take the most loses the oldest of those
+        that are still on their way, if it has more than this one would.
+
+        Raises:
+            BusyError: nobody has; or this client would hold more than three quarters of all, so
+                that it alone never locks out others.
+        """
+        self._bodies.grow(self, size)
+
+    @asynccontextmanager
+    async def arriving(self) -> AsyncIterator[None]:
+        """Be on the way, and perhaps give way. Raises BusyError."""
+        async with self._bodies.arriving(self):
+            yield
+
+
+class _Bodies:
+    """The bodies of all clients; who still sends may have to give way, a job's body never."""
+
+    def __init__(self, max_bytes: int) -> None:
+        self._max_bytes = max_bytes
+        # By client; who holds nothing is not there.
+        self._held: Counter[str] = Counter()
+        # The oldest first.
+        self._arriving: dict[Body, asyncio.Timeout] = {}
+
+    def grow(self, body: Body, size: int) -> None:
+        mine = self._held[body.client] + size
+        leaving = self._who_leaves(mine, size)
+        if leaving is None or mine > self._max_bytes * 3 // 4:
+            raise BusyError("the bodies that are held leave no room for this one")
+        for other in leaving:
+            self._arriving.pop(other).reschedule(asyncio.get_running_loop().time())
+            self.forget(other)
+        self._held[body.client] += size
+        body.size += size
+
+    def _who_leaves(self, mine: int, size: int) -> list[Body] | None:
+        """Return who gives way to one of `mine` bytes in all; None where that is not enough."""
+        held = self._held.copy()
+        leaving: list[Body] = []
+        while held.total() + size > self._max_bytes:
+            left = (other for other in self._arriving if other.size and other not in leaving)
+            greedier = [other for other in left if held[other.client] > mine]
+            if not greedier:
+                return None
+            leaving.append(max(greedier, key=lambda other: held[other.client]))
+            held[leaving[-1].client] -= leaving[-1].size
+        return leaving
+
+    def forget(self, body: Body) -> None:
+        self._held[body.client] -= body.size
+        body.size = 0
+        if not self._held[body.client]:
+            del self._held[body.client]
+
+    @asynccontextmanager
+    async def arriving(self, body: Body) -> AsyncIterator[None]:
+        end = asyncio.timeout(None)
+        try:
+            async with end:
+                self._arriving[body] = end
+                yield
+        except TimeoutError as error:
+            if not end.expired():
+                raise
+            raise _given_way() from error
+        finally:
+            told = self._arriving.pop(body, None) is None
+        if told:
+            # It was whole in the same moment: its bytes are another's already.
+            raise _given_way()
+
+
+def _given_way() -> BusyError:
+    return BusyError("this body has given way to one of a client who holds less")
 
 
 class CutOffError(Exception):

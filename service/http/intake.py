@@ -62,12 +62,12 @@ async def taken_in(
 
     async with AsyncExitStack() as held:
         began = time.perf_counter()
-        grow = held.enter_context(service.admission.body(client.id))
+        counted = held.enter_context(service.admission.body(client.id))
         with ExitStack() as files:
             body = files.enter_context(MemoryFile())
-            async with service.admission.upload():
+            async with service.admission.upload(), counted.arriving():
                 async for piece in request.stream():
-                    grow(len(piece))
+                    counted.grow(len(piece))
                     body.append(piece)
             page = files.enter_context(ProgressPage())
             answer = files.enter_context(MemoryFile(wanted.folder)) if wanted.answer else None

@@ -75,22 +75,93 @@ def test_an_answer_larger_than_what_anyone_takes_waits_for_another_time() -> Non
 def test_bodies_share_their_bytes_and_give_them_back() -> None:
     admission = Admission(uploads=1, body_bytes=8, answer_bytes=10)
     with admission.body("a") as first, admission.body("b") as second:
-        first(5)
-        second(3)
+        first.grow(5)
+        second.grow(3)
         with pytest.raises(BusyError):
-            second(1)
+            second.grow(1)
     with admission.body("a") as third:
-        third(6)
+        third.grow(6)
 
 
 def test_one_client_never_holds_all_bytes() -> None:
     admission = Admission(uploads=1, body_bytes=8, answer_bytes=10)
     with admission.body("a") as first, admission.body("a") as second, admission.body("b") as other:
-        first(4)
-        second(2)
+        first.grow(4)
+        second.grow(2)
         with pytest.raises(BusyError):
-            second(1)
-        other(2)
+            second.grow(1)
+        other.grow(2)
+
+
+def sent(bodies: list[tuple[str, int, str]]) -> list[str]:
+    """What becomes of bodies, of whom, how large, and whole or on their way.
+
+    They come one after another, in pieces of one byte; there is room for eight bytes.
+    """
+    outcomes: list[str] = []
+
+    async def scenario() -> None:
+        admission = Admission(uploads=1, body_bytes=8, answer_bytes=10)
+        end = asyncio.Event()
+
+        async def send(client: str, size: int, state: str) -> str:
+            try:
+                with admission.body(client) as body:
+                    async with body.arriving():
+                        for _ in range(size):
+                            body.grow(1)
+                        if state == "arriving":
+                            await end.wait()
+                    await end.wait()
+            except BusyError as error:
+                return "gave way" if "given way" in error.detail else "refused"
+            return "kept"
+
+        senders: list[asyncio.Task[str]] = []
+        for body in bodies:
+            senders.append(asyncio.create_task(send(*body)))
+            await asyncio.sleep(0)
+        end.set()
+        outcomes.extend(await asyncio.gather(*senders))
+        with admission.body("z") as all_that_one_may_have:
+            all_that_one_may_have.grow(6)
+
+    run(scenario)
+    return outcomes
+
+
+def test_bodies_that_do_not_come_to_an_end_lock_nobody_out() -> None:
+    two = [("a", 4, "arriving"), ("b", 4, "arriving")]
+    assert sent([*two, ("c", 3, "whole")]) == ["gave way", "kept", "kept"]
+    # Of one client the oldest goes, of several that of who holds most, jobs' bodies included.
+    one = [("a", 2, "arriving"), ("a", 4, "arriving"), ("b", 2, "arriving")]
+    assert sent([*one, ("c", 1, "whole")]) == ["gave way", "kept", "kept", "kept"]
+    most = [("b", 3, "arriving"), ("a", 3, "whole"), ("a", 2, "arriving")]
+    assert sent([*most, ("c", 2, "whole")]) == ["kept", "kept", "gave way", "kept"]
+
+
+def test_a_body_gives_way_to_nobody_who_holds_as_much_and_that_of_a_job_to_nobody() -> None:
+    two = [("a", 4, "arriving"), ("b", 4, "arriving")]
+    assert sent([*two, ("a", 1, "whole")]) == ["kept", "kept", "refused"]
+    whole = [("a", 4, "whole"), ("b", 4, "whole")]
+    assert sent([*whole, ("c", 1, "whole")]) == ["kept", "kept", "refused"]
+
+
+def test_a_body_that_was_whole_when_it_was_told_has_given_way() -> None:
+    async def scenario() -> None:
+        admission = Admission(uploads=1, body_bytes=8, answer_bytes=10)
+        with admission.body("a") as first, admission.body("b") as second:
+            second.grow(3)
+
+            async def arrive() -> None:
+                async with first.arriving():
+                    first.grow(5)
+                    second.grow(1)
+
+            with pytest.raises(BusyError, match="given way"):
+                await arrive()
+
+    run(scenario)
 
 
 def test_who_is_told_to_leave_leaves_with_a_reason() -> None:
