@@ -28,8 +28,9 @@ RUN cd / && /opt/pns/bin/python -m pns_common.fused
 FROM ${BASE}
 COPY --from=build /opt/pns /opt/pns
 # One thread a library: the workers are the parallelism, and a pids limit counts threads.
-# For 1 GiB: at rest three workers take 146 MiB each and the server 55; two jobs of PNS_MEMORY beside
-# them fill the rest but for bodies. With a larger --memory, raise it and PNS_QUEUE.
+# For 1 GiB: at rest three workers take 146 MiB each and the server 55. Bodies and answers are memory
+# that no worker's end gives back: with all of them a job of PNS_MEMORY has room, and two that take
+# what was predicted where clients do not hold so much. With a larger --memory, raise these.
 ENV PATH=/opt/pns/bin:$PATH \
     NUMBA_CPU_NAME=generic \
     NUMBA_CPU_FEATURES= \
@@ -42,6 +43,8 @@ ENV PATH=/opt/pns/bin:$PATH \
     PNS_METRICS_HOST=0.0.0.0 \
     PNS_METRICS_PORT=9000 \
     PNS_MEMORY=256MiB \
+    PNS_UPLOAD_BYTES=128MiB \
+    PNS_ANSWER_BYTES=128MiB \
     PNS_QUEUE=2
 USER 10001:10001
 WORKDIR /tmp

@@ -54,6 +54,14 @@ class Settings(BaseSettings):
                 raise ValueError(f"there is no setting {name}{hint}")
         return values
 
+    @model_validator(mode="after")
+    def _refuse_bodies_that_never_fit(self) -> Settings:
+        if self.upload_bytes is not None and self.upload_bytes * 3 // 4 < self.body:
+            raise ValueError(
+                "upload_bytes must be a third more than body: one client may have three quarters"
+            )
+        return self
+
     host: str = "127.0.0.1"
     port: int = Field(default=8000, ge=0, le=65535)
     prefix: str = Field(
@@ -104,6 +112,12 @@ class Settings(BaseSettings):
     )
     answer_bytes: ByteSize = Field(
         default=ByteSize(1024 * MIB), gt=0, description="answers in memory that clients are taking"
+    )
+    upload_bytes: ByteSize | None = Field(
+        default=None,
+        gt=0,
+        description="what all bodies may take in memory, until the ends of their jobs; none: "
+        "`body` for each job that runs or waits",
     )
     uploads: int = Field(default=512, gt=0, description="bodies that may arrive at the same time")
 
@@ -167,6 +181,13 @@ class Settings(BaseSettings):
     def slots(self) -> int:
         """Requests that run or wait."""
         return self.workers + self.queue
+
+    @property
+    def all_bodies(self) -> int:
+        """Bytes of all bodies together."""
+        # Two at least: of which one client may hold one and a half.
+        each_slot = max(self.slots, 2) * int(self.body)
+        return each_slot if self.upload_bytes is None else int(self.upload_bytes)
 
     def job_limits(self) -> Limits:
         """Return what one job may cost, as the pipeline checks it."""

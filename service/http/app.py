@@ -21,7 +21,7 @@ from ..workers.desk import Desk
 from ..workers.jobs import Done, Work
 from ..workers.pool import Workers
 from ..workers.turns import Lane, Turns
-from . import docs_page, job_routes, layers, openapi, page, problems, routes
+from . import docs_page, job_routes, layers, openapi, page, problems, result_room, routes
 from .access.keys import read_keys
 from .admission import Admission
 from .catalogue import ReadOnce
@@ -53,7 +53,7 @@ def create_app(
     the service up: /readyz says 503, scheme=loop and the other models work. Raises
     KeysError where the file of keys cannot be used, TracingError where traces cannot be sent.
     """
-    settings = settings or Settings()
+    settings = result_room.fitting(settings or Settings())
     source = model if model is not None else settings.model
     warm = partial(warm_up, source)
     workers = {
@@ -75,8 +75,7 @@ def create_app(
     )
     admission = Admission(
         uploads=settings.uploads,
-        # Two at least: of which one client may hold one and a half.
-        body_bytes=max(settings.slots, 2) * int(settings.body),
+        body_bytes=settings.all_bodies,
         answer_bytes=int(settings.answer_bytes),
     )
 

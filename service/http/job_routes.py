@@ -7,8 +7,6 @@ import json
 import logging
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, ExitStack
-from pathlib import Path
-from tempfile import gettempdir
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
@@ -29,6 +27,7 @@ from .intake import Wanted, owner_of, taken_in
 from .job_book import Entry, NotDoneError
 from .leaving import unless_gone
 from .parameters import Parameters
+from .result_room import result_folder
 from .server_timing import server_timing
 from .service import Service
 
@@ -118,7 +117,7 @@ async def _hand_in(service: Service, request: Request, parameters: Parameters) -
     wanted = Wanted(
         answer=True,
         report=True,
-        folder=settings.result_folder or Path(gettempdir()),
+        folder=result_folder(settings),
         patience=settings.queue_seconds + settings.job_seconds,
     )
     async with AsyncExitStack() as held:

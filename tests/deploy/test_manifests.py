@@ -1,12 +1,14 @@
 """Compose and Kubernetes: valid, restricted, and in step with the service."""
 
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from service.http.result_room import KEPT_SHARE
 from service.settings import Settings
 
 yaml = pytest.importorskip("yaml")
@@ -16,6 +18,7 @@ DEPLOY = ROOT / "deploy"
 COMPOSE = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
 OBJECTS = list(yaml.safe_load_all((DEPLOY / "kubernetes" / "pns.yaml").read_text()))
 BY_KIND = {entry["kind"]: entry for entry in OBJECTS}
+DOCKERFILE = (ROOT / "Dockerfile").read_text()
 POD = BY_KIND["Deployment"]["spec"]["template"]["spec"]
 (CONTAINER,) = POD["containers"]
 
@@ -97,6 +100,39 @@ def test_what_lies_in_a_file_system_of_memory_leaves_room_for_the_process(name):
     (mounted,) = service["tmpfs"]
     files = mebibytes(mounted.partition("size=")[2].partition(",")[0])
     assert files + 256 <= mebibytes(service["mem_limit"])
+
+
+@pytest.mark.parametrize("where", ["image", "compose", "kubernetes"])
+def test_what_requests_may_hold_fits_into_the_memory_that_there_is(where):
+    """The server's bodies, answers and files are not given back where a worker is killed."""
+    image = dict(re.findall(r"^ +PNS_([A-Z_]+)=(\S+)", DOCKERFILE, re.MULTILINE))
+    service = COMPOSE["services"]["service"]
+    (mounted,) = service["tmpfs"]
+    environment, files, limit, jobs = {
+        "image": ({}, 0, 1024, 1),
+        "compose": (
+            service["environment"],
+            mebibytes(mounted.partition("size=")[2].partition(",")[0]),
+            mebibytes(service["mem_limit"]),
+            None,
+        ),
+        "kubernetes": (
+            {entry["name"]: entry["value"] for entry in CONTAINER["env"]},
+            0,
+            mebibytes(CONTAINER["resources"]["limits"]["memory"].lower().removesuffix("i")),
+            None,
+        ),
+    }[where]
+    own = {name.removeprefix("PNS_"): value for name, value in environment.items()}
+    settings = Settings(**{name.lower(): value for name, value in (image | own).items()}, workers=2)
+    of_worker, of_server = map(
+        int, re.findall(r"take (\d+) MiB each and the server (\d+)", DOCKERFILE)[0]
+    )
+    held = (settings.all_bodies + settings.answer_bytes) / 2**20 + files
+    working = (jobs or settings.workers) * settings.memory / 2**20
+    assert (settings.workers + 1) * of_worker + of_server + held + working <= limit
+    # With what is made meanwhile, as the service would say at its start.
+    assert not files or settings.result_bytes <= files * KEPT_SHARE * 2**20
 
 
 def mebibytes(size):

@@ -52,6 +52,7 @@ EXAMPLES = {
     "results": ("3", 3),
     "result_folder": ("/var/tmp", Path("/var/tmp")),
     "answer_bytes": ("2MiB", 2 * 2**20),
+    "upload_bytes": ("100MiB", 100 * 2**20),
 }
 
 
@@ -76,6 +77,12 @@ def test_the_documented_limits_are_the_defaults() -> None:
     assert settings.port == 8000
 
 
+def test_bodies_may_take_one_for_each_job_or_what_is_set() -> None:
+    assert Settings(body=10, workers=2, queue=3).all_bodies == 50
+    assert Settings(body=10, workers=1, queue=0).all_bodies == 20
+    assert Settings(body=10, workers=2, queue=3, upload_bytes=14).all_bodies == 14
+
+
 def test_job_limits_are_the_settings() -> None:
     limits = Settings(faces=10, memory=20, json_items=30).job_limits()
     assert (limits.max_faces, limits.max_memory_bytes, limits.max_json_items) == (10, 20, 30)
@@ -95,6 +102,9 @@ def test_job_limits_are_the_settings() -> None:
         ("workers", 0),
         ("queue", -1),
         ("uploads", 0),
+        ("upload_bytes", 0),
+        # Of which one client may have three quarters: its largest body would never come.
+        ("upload_bytes", 64 * 2**20),
         ("idle_seconds", 0),
         ("job_seconds", 0),
         ("upload_seconds", -1),
