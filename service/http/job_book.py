@@ -93,7 +93,8 @@ class JobBook:
                 entry.end.cancel()
             if self._sizes.pop(job_id, None) is not None and entry.job.state is State.DONE:
                 _release(entry.job)
-            if entry.task is not None and not entry.job.state.ended:
+            if entry.task is not None:
+                # Also one that only waits for somebody to fetch the result.
                 entry.task.cancel()
 
     async def close(self) -> None:

@@ -6,7 +6,7 @@ import asyncio
 import json
 import logging
 from collections.abc import AsyncIterator
-from contextlib import AsyncExitStack, ExitStack
+from contextlib import AsyncExitStack, ExitStack, suppress
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
@@ -34,7 +34,7 @@ from .service import Service
 # How often the page of a running job is looked at, and how long a stream may be silent.
 LOOK_SECONDS = 0.25
 SILENT_SECONDS = 15.0
-# While the service shuts down: how long it waits for somebody to fetch a result.
+# How long after a job's end a shutdown waits for somebody to fetch its result.
 FETCH_SECONDS = 10.0
 
 log = logging.getLogger("pns.service")
@@ -138,7 +138,7 @@ async def _hand_in(service: Service, request: Request, parameters: Parameters) -
 
 
 async def _work(service: Service, job: Job, held: AsyncExitStack) -> None:
-    """Do a job that no connection waits for, to its end; while shutting down, to its fetching."""
+    """Do a job that no connection waits for, to its end, and be under way until it is fetched."""
     async with held:
         try:
             async with service.admission.working():
@@ -152,9 +152,11 @@ async def _work(service: Service, job: Job, held: AsyncExitStack) -> None:
             log.error("a job failed in its worker:\n%s", error)  # noqa: TRY400
         finally:
             service.book.keep(job)
-    if service.admission.draining and job.state is State.DONE:
-        async with service.admission.working():
-            await asyncio.wait({asyncio.ensure_future(job.fetched.wait())}, timeout=FETCH_SECONDS)
+    if job.state is State.DONE:
+        # Who asks now and then whether it is done may not have asked since.
+        with suppress(TimeoutError, DrainingError):
+            async with service.admission.working(), asyncio.timeout(FETCH_SECONDS):
+                await job.fetched.wait()
 
 
 async def _events(service: Service, job: Job) -> AsyncIterator[str]:

@@ -231,6 +231,24 @@ def test_a_second_sigterm_and_the_deadline_end_running_jobs_in_order(drain_secon
         assert "Traceback" not in server.whole_log()
 
 
+def test_a_job_that_ended_just_before_sigterm_waits_to_be_fetched_too() -> None:
+    with serving(PNS_WORKERS="1") as server:
+        server.wait_until_ready()
+        with closing(server.connect()) as connection:
+            glb = {"Content-Type": "model/gltf-binary"}
+            connection.request("POST", "/jobs?scheme=loop", part_glb(), glb)
+            job = f"/jobs/{json.loads(connection.getresponse().read())['id']}"
+        while b'"done"' not in server.get(job)[1]:
+            time.sleep(0.01)
+        server.process.send_signal(signal.SIGTERM)
+        # Long enough that a server which waits for nobody is gone.
+        for _ in range(20):
+            assert server.status("/healthz") == 200
+            time.sleep(0.02)
+        assert server.get(f"{job}/result")[0] == 200
+        assert server.process.wait(HANGS) == 0
+
+
 def test_an_idle_server_stops_at_once() -> None:
     with serving(PNS_WORKERS="1") as server:
         server.process.send_signal(signal.SIGTERM)
