@@ -11,6 +11,8 @@ from ..settings import Settings
 from .access.bearer import Bearer
 from .access.forwarded import Forwarded
 from .access.keys import Entry
+from .access.origins import Origins
+from .as_said import AsSaid
 from .body_limits import BodyLimit
 from .connection.pace import Pace
 from .head import Head
@@ -40,6 +42,7 @@ def around(
     app = BodyLimit(app, max_bytes=int(settings.body), pace=upload_pace(settings))
     if keys is not None:
         app = Bearer(app, keys)
+    app = Origins(app, settings.cors_origins)
     if settings.cors_origins:
         app = CORSMiddleware(
             app,
@@ -48,6 +51,7 @@ def around(
             allow_headers=["Authorization", "Content-Type", "X-Request-ID"],
             expose_headers=EXPOSED,
         )
+    app = AsSaid(app)
     app = Journal(app, (metrics.request,))
     if tracer is not None:
         app = Traced(app, tracer)

@@ -19,6 +19,8 @@ EVERYWHERE = {
     "401": "A key is needed, or the one sent is not known",
     "429": "Too much was asked for, or too many wrong keys (see Retry-After)",
 }
+# And where it is asked for work.
+ASKED_FOR_WORK = {"403": "A page of another origin asks, and is not named"}
 OPEN_TAG = "probes"
 
 
@@ -46,13 +48,14 @@ def _described(document: dict[str, Any]) -> dict[str, Any]:
     schemas = components.setdefault("schemas", {})
     schemas |= documentation.SCHEMAS
     for operations in document["paths"].values():
-        for operation in operations.values():
+        for method, operation in operations.items():
             responses = operation["responses"]
             # FastAPI's own errors are never sent: ours are problems.
             if responses.get("422", {}).get("content", {}).get("application/json"):
                 responses["422"] = _problem("A bad parameter")
             if OPEN_TAG not in operation.get("tags", ()):
-                for status, text in EVERYWHERE.items():
+                also = {} if method == "get" else ASKED_FOR_WORK
+                for status, text in (EVERYWHERE | also).items():
                     responses.setdefault(status, _problem(text))
                 operation["security"] = [{}, {"key": []}]
     for name in ("HTTPValidationError", "ValidationError"):

@@ -51,7 +51,6 @@ def answer(request: Request, file: StaticFile, policy: str, caching: str = ASK_A
         "ETag": file.tag,
         "Referrer-Policy": "no-referrer",
         "Vary": "Accept-Encoding",
-        "X-Content-Type-Options": "nosniff",
     }
     known = request.headers.get("if-none-match", "")
     if file.tag in {tag.strip().removeprefix("W/") for tag in known.split(",")} or known == "*":

@@ -18,4 +18,5 @@ def refusal(status: int, code: str, detail: str, more: bytes = b"") -> bytes:
     }
     body = json.dumps(document).encode()
     head = f"HTTP/1.1 {status} {phrase}\r\ncontent-type: application/problem+json\r\n".encode()
+    head += b"x-content-type-options: nosniff\r\n"
     return head + more + b"content-length: %d\r\nconnection: close\r\n\r\n" % len(body) + body

@@ -5,6 +5,7 @@ import base64
 import hashlib
 import http.client
 import logging
+import socket
 import threading
 from contextlib import closing
 from ipaddress import ip_network
@@ -19,6 +20,7 @@ from service.http.access.bearer import MOST_WAITING, WRONG_A_MINUTE, Bearer
 from service.http.access.forwarded import Forwarded
 from service.http.access.keys import Entry, Keyring, KeysError, hash_of, matches, new_key, read_keys
 from service.http.access.keys import toml_entry as written
+from service.http.access.origins import Origins
 from service.http.app import create_app
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
@@ -322,6 +324,62 @@ def test_no_other_origin_may_ask_unless_it_is_named():
     with TestClient(create_app(Settings(workers=1), warm_up=jobs.no_warm_up)) as client:
         assert "access-control-allow-origin" not in cross(client).headers
         assert cross(client, "OPTIONS").status_code == 405
+
+
+@pytest.mark.parametrize(
+    ("sent", "origins", "status"),
+    [
+        # What a browser says of a form on another page, of another host of this site, of a file.
+        ({"Sec-Fetch-Site": "cross-site", "Origin": "https://a.example"}, "", 403),
+        ({"Sec-Fetch-Site": "same-site", "Origin": "https://a.example"}, "", 403),
+        ({"Sec-Fetch-Site": "cross-site", "Origin": "null"}, "", 403),
+        # To a host without TLS it says less.
+        ({"Origin": "http://a.example"}, "", 403),
+        ({"Origin": "null"}, "", 403),
+        ({"Origin": "http://["}, "", 403),
+        ({"Origin": "null", "Host": ""}, "", 403),
+        # Its own page, behind a proxy that passes on the host without its port, or as it is.
+        ({"Sec-Fetch-Site": "same-origin", "Origin": "https://pns.example"}, "", 200),
+        ({"Origin": "http://pns.example:8080", "Host": "pns.example"}, "", 200),
+        ({"Origin": "http://[::1]:8080", "Host": "[::1]:8000"}, "", 200),
+        # Named origins, and who is no browser.
+        ({"Sec-Fetch-Site": "cross-site", "Origin": "https://a.example"}, "https://a.example", 200),
+        ({"Sec-Fetch-Site": "cross-site", "Origin": "https://b.example"}, "https://a.example", 403),
+        ({"Sec-Fetch-Site": "cross-site", "Origin": "https://b.example"}, "*", 200),
+        ({}, "", 200),
+    ],
+)
+def test_a_form_of_another_origin_is_refused_before_its_work(sent, origins, status):
+    asked = []
+
+    async def app(scope, receive, send):
+        asked.append(scope["method"])
+        await PlainTextResponse("done")(scope, receive, send)
+
+    named = Settings(cors_origins=origins).cors_origins
+    client = TestClient(Origins(app, named), base_url="http://pns.example")
+    assert client.post("/jobs", headers=sent).status_code == status
+    assert asked == ["POST"] * (status == 200)
+    assert client.get("/models", headers=sent).status_code == 200
+
+
+def test_the_service_refuses_such_a_form():
+    with TestClient(create_app(Settings(workers=1), warm_up=jobs.no_warm_up)) as client:
+        form = {"files": {"file": ("a.glb", b"glTF")}}
+        answer = client.post("/jobs", headers={"Sec-Fetch-Site": "cross-site"}, **form)
+        assert (answer.status_code, answer.json()["code"]) == (403, "foreign-origin")
+
+
+def test_no_answer_is_for_a_browser_to_guess():
+    with served(workers=1) as address, closing(socket.create_connection(address)) as nonsense:
+        with closing(http.client.HTTPConnection(*address)) as client:
+            for method, path in (("POST", "/subdivide"), ("GET", "/"), ("GET", "/none")):
+                client.request(method, path, b"<html>", GLB)
+                answer = client.getresponse()
+                answer.read()
+                assert answer.headers.get_all("x-content-type-options") == ["nosniff"], path
+        nonsense.sendall(b"<html>\r\n\r\n")
+        assert b"\r\nx-content-type-options: nosniff\r\n" in nonsense.recv(2**16)
 
 
 def test_a_named_origin_may(keys_file):

@@ -332,7 +332,7 @@ def test_the_description_names_bodies_parameters_and_errors(client: TestClient) 
         "compress",
         "limit",
     }
-    statuses = {"200", "400", "401", "408", "413", "415", "422", "429", "500", "503", "504"}
+    statuses = {"200", "400", "401", "403", "408", "413", "415", "422", "429", "500", "503", "504"}
     assert set(operation["responses"]) == statuses
     for status in statuses - {"200"}:
         assert set(operation["responses"][status]["content"]) == {"application/problem+json"}
