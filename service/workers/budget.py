@@ -51,6 +51,12 @@ class FacesBudget:
             self._forget(per_minute)
         self._used[client] = (used + faces, self._now())
 
+    def give_back(self, client: str, faces: int, per_minute: float | None) -> None:
+        """Give back what a job was charged that no worker has begun."""
+        if per_minute is not None and client in self._used:
+            used = max(self._used_by(client, per_minute) - faces, 0.0)
+            self._used[client] = (used, self._now())
+
     def settle(self, client: str, faces: int, per_minute: float | None) -> None:
         """Take the faces that a job made beyond those that it was charged for."""
         if per_minute is not None and faces > 0:

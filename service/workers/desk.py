@@ -7,7 +7,7 @@ import time
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from ..errors import ServiceError
@@ -28,6 +28,23 @@ T = TypeVar("T")
 OVERDUE = 10.0
 # What measuring is counted as: the glance of a worker at a document.
 MEASURING_SECONDS = 0.005
+
+
+@dataclass(eq=False, slots=True)
+class _Turn:
+    """A turn on one of a lane's workers: when it took the job, and for how long it had it.
+
+    It may still be another's for a while, who has left, or be started in the place of one that
+    died: nobody pays for that.
+    """
+
+    lane: Lane
+    began: float | None = None
+    spent: float = 0.0
+
+    def end(self) -> None:
+        if self.began is not None:
+            self.spent = time.monotonic() - self.began
 
 
 class Desk:
@@ -126,16 +143,16 @@ class Desk:
 
     async def _serve(self, job: Job) -> None:
         waiting = self.turns.join(job.client, MEASURING_SECONDS, counted=False)
-        async with self._turn(waiting, job) as lane:
-            job.cost = await self._call(lane, job, self._measure)
-        self._budget.charge(job.client, job.cost.faces, job.faces_per_minute)
-        job.waiting = self.turns.join(job.client, job.cost.seconds)
-        if time.monotonic() + self._wait(job.waiting) > job.must_end:
-            self.turns.leave(job.waiting)
-            raise self.turns.busy("the jobs in front of this one will take too long")
-        job.accepted.set()
+        async with self._turn(waiting, job) as turn:
+            cost = job.cost = await self._call(turn, job, self._measure)
         try:
-            await self._run_in_turn(job, job.waiting)
+            with self._paid(job, cost):
+                job.waiting = self.turns.join(job.client, cost.seconds)
+                if time.monotonic() + self._wait(job.waiting) > job.must_end:
+                    self.turns.leave(job.waiting)
+                    raise self.turns.busy("the jobs in front of this one will take too long")
+                job.accepted.set()
+                await self._run_in_turn(job, job.waiting)
         except JobStopped:
             # Who waits for a job does not stop it: it was overdue.
             job.page.go_on()
@@ -144,48 +161,85 @@ class Desk:
             job.waiting = self.turns.join(job.client, job.cost.seconds)
             await self._run_in_turn(job, job.waiting)
 
-    async def _run_in_turn(self, job: Job, waiting: Waiting) -> None:
-        """Run a job in its turn. Raises JobStopped where a short job is overdue."""
-        cost = job.cost
-        async with self._turn(waiting, job) as lane:
-            began = job.began = time.monotonic()
-            job.state = State.RUNNING
-            with self._overdue(lane, job):
-                done = job.done = await self._call(lane, job, self._run)
-        if cost is not None:
-            self._budget.settle(job.client, done.faces - cost.faces, job.faces_per_minute)
-            self._slowness.learn(cost.seconds, time.monotonic() - began)
-
     @contextmanager
-    def _overdue(self, lane: Lane, job: Job) -> Iterator[None]:
-        """Ask a job to stop once it has been in the lane of short ones for too long."""
-        seconds = OVERDUE * self.turns.short_seconds * self._slowness.factor
-        clock = asyncio.get_running_loop()
-        timer = clock.call_later(seconds, job.page.stop) if lane is Lane.SHORT else None
+    def _paid(self, job: Job, cost: Cost) -> Iterator[None]:
+        """Charge a job to its client; one that is refused or given up before it runs is free.
+
+        Raises OverBudgetError.
+        """
+        self._budget.charge(job.client, cost.faces, job.faces_per_minute)
         try:
             yield
         finally:
-            if timer is not None:
+            if job.began is None:
+                self._budget.give_back(job.client, cost.faces, job.faces_per_minute)
+
+    async def _run_in_turn(self, job: Job, waiting: Waiting) -> None:
+        """Run a job in its turn. Raises JobStopped where a short job is overdue."""
+        cost = job.cost
+        async with self._turn(waiting, job) as turn:
+            with self._overdue(turn.lane, job) as start_clock:
+
+                def begin() -> None:
+                    job.began, job.state = turn.began, State.RUNNING
+                    start_clock()
+
+                done = job.done = await self._call(turn, job, self._run, begin)
+        if cost is not None:
+            self._budget.settle(job.client, done.faces - cost.faces, job.faces_per_minute)
+            self._slowness.learn(cost.seconds, turn.spent)
+
+    @contextmanager
+    def _overdue(self, lane: Lane, job: Job) -> Iterator[Callable[[], None]]:
+        """Yield what starts a job's clock: too long in the lane of short ones, it is stopped."""
+        seconds = OVERDUE * self.turns.short_seconds * self._slowness.factor
+        clock = asyncio.get_running_loop()
+        timers: list[asyncio.TimerHandle] = []
+
+        def start() -> None:
+            if lane is Lane.SHORT:
+                timers.append(clock.call_later(seconds, job.page.stop))
+
+        try:
+            yield start
+        finally:
+            for timer in timers:
                 timer.cancel()
 
     @asynccontextmanager
-    async def _turn(self, waiting: Waiting, job: Job) -> AsyncIterator[Lane]:
+    async def _turn(self, waiting: Waiting, job: Job) -> AsyncIterator[_Turn]:
         """Wait for a turn while the job may wait, and hold it. Raises BusyError."""
         try:
             async with asyncio.timeout(max(job.must_end - time.monotonic(), 0)):
                 await self.turns.come(waiting)
         except TimeoutError as error:
             raise self.turns.busy("the job's turn did not come in time") from error
-        began = time.monotonic()
+        turn = _Turn(waiting.lane)
         try:
-            yield waiting.lane
+            yield turn
         finally:
-            self.turns.end(waiting, (time.monotonic() - began) / self._slowness.factor)
+            turn.end()
+            self.turns.end(waiting, turn.spent / self._slowness.factor)
 
-    async def _call(self, lane: Lane, job: Job, function: Callable[[Work], T]) -> T:
+    async def _call(
+        self,
+        turn: _Turn,
+        job: Job,
+        function: Callable[[Work], T],
+        begin: Callable[[], None] = lambda: None,
+    ) -> T:
+        def taken() -> None:
+            turn.began = time.monotonic()
+            begin()
+
         must_end = min(job.must_end, time.monotonic() + self._job_seconds)
-        return await self._workers[lane].run(
-            function, job.work, files=job.files, must_end=must_end, stop=job.page.stop
+        return await self._workers[turn.lane].run(
+            function,
+            job.work,
+            files=job.files,
+            must_end=must_end,
+            stop=job.page.stop,
+            taken=taken,
         )
 
     def _wait(self, waiting: Waiting | None) -> float:

@@ -85,8 +85,11 @@ class Workers:
         files: Sequence[MemoryFile] = (),
         must_end: float | None = None,
         stop: Callable[[], None] | None = None,
+        taken: Callable[[], None] = lambda: None,
     ) -> T:
         """Return the value of `function(*arguments)`, called in a worker once one is free.
+
+        `taken` is called once a worker is free: before, another's may still be ending, or starting.
 
         `files` are those that the arguments name: they are held until the function has come back
         or its process is dead, whatever becomes of this call. It comes back before `must_end` (on
@@ -103,6 +106,7 @@ class Workers:
         if must_end is None:
             must_end = time.monotonic() + self._seconds
         pool = await self._take(must_end)
+        taken()
         for file in files:
             file.hold()
         self._known[pool] = files

@@ -170,11 +170,13 @@ class Turns:
         self._reached = {name: at for name, at in self._reached.items() if at > self._now}
 
     def leave(self, waiting: Waiting) -> None:
-        """Stand in line no longer."""
+        """Stand in line no longer; the client's other jobs stand as if this had never come."""
         if waiting in self._waiting:
             self._waiting.remove(waiting)
+            self._advance(waiting.client, -waiting.seconds, after=waiting)
         elif waiting.turn.done() and not waiting.turn.cancelled():
             # Its turn came in the same moment.
+            self._advance(waiting.client, -waiting.seconds, after=waiting)
             self.end(waiting)
 
     def end(self, waiting: Waiting, spent: float = 0.0) -> None:
@@ -184,12 +186,16 @@ class Turns:
         """
         over = max(spent - waiting.seconds, 0.0)
         if over:
-            reached = max(self._now, self._reached.get(waiting.client, 0.0))
-            self._reached[waiting.client] = reached + over
-            for job in self._waiting:
-                if job.client == waiting.client:
-                    job.tag = job.tag[0] + over, job.tag[1]
+            self._advance(waiting.client, over)
         self.running[waiting.lane] -= 1
         if waiting.lane is Lane.ANY:
             self._running_seconds = max(self._running_seconds - waiting.seconds, 0.0)
         self._grant()
+
+    def _advance(self, client: str, seconds: float, *, after: Waiting | None = None) -> None:
+        """Move a client, and its jobs that wait (behind another), back by so many seconds."""
+        reached = max(self._now, self._reached.get(client, 0.0))
+        self._reached[client] = reached + seconds
+        for job in self._waiting:
+            if job.client == client and (after is None or job.tag > after.tag):
+                job.tag = job.tag[0] + seconds, job.tag[1]

@@ -12,7 +12,7 @@ from typing import Any, cast
 import pytest
 
 from service.errors import BusyError
-from service.workers.budget import FacesBudget
+from service.workers.budget import FacesBudget, OverBudgetError
 from service.workers.desk import Desk
 from service.workers.job import State
 from service.workers.jobs import Done, Work
@@ -73,8 +73,26 @@ def test_a_killed_worker_of_the_short_lane_does_not_take_the_service_away() -> N
 class AtOnce:
     """Workers that do what they are told where they are told."""
 
-    async def run(self, function: Callable[[Work], Any], work: Work, **_: object) -> Any:
+    async def run(
+        self,
+        function: Callable[[Work], Any],
+        work: Work,
+        taken: Callable[[], None] = lambda: None,
+        **_: object,
+    ) -> Any:
+        taken()
         return function(work)
+
+
+class Restarting(AtOnce):
+    """Workers of which a job finds the only one dead: another is there after so long."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+
+    async def run(self, *arguments: Any, **named: Any) -> Any:
+        await asyncio.sleep(self._seconds)
+        return await super().run(*arguments, **named)
 
 
 def desk_with_a_line(seconds: float) -> Desk:
@@ -132,5 +150,38 @@ def test_a_short_job_that_takes_long_goes_to_the_other_line(tmp_path: Path) -> N
                 assert b"".join(answer.pieces()) == str(other).encode()
             assert job.state is State.DONE
             assert await short.run(jobs.pid) == first
+
+    run(scenario)
+
+
+def test_a_job_that_no_worker_has_begun_is_free() -> None:
+    """Refused, or given up while it waits: its client's faces are there for the next one."""
+
+    async def scenario() -> None:
+        desk = desk_with_a_line(10)
+        per_minute = 4.0
+        with MemoryFile() as answer:
+            for seconds in (5, 60, 60):
+                job = job_of(b"", answer, seconds=seconds)
+                job.faces_per_minute = per_minute
+                serving = asyncio.create_task(desk.serve(job))
+                await job.accepted.wait()
+                serving.cancel()
+                told = await asyncio.gather(serving, return_exceptions=True)
+                assert not isinstance(told[0], OverBudgetError)
+            assert job.state is State.CANCELLED
+
+    run(scenario)
+
+
+def test_nobody_pays_for_the_end_of_anothers_worker() -> None:
+    async def scenario() -> None:
+        now = Restarting(0.2)
+        desk = desk_of(cast(Workers, now), cast(Workers, now), run=lambda work: Done({}, None))
+        with MemoryFile() as answer:
+            await desk.serve(job := job_of(b"short", answer))
+        assert job.began is not None
+        # It was measured, and predicted to take a hundredth of a second; twice that long it waited.
+        assert desk.turns.join("a", 0.0).tag[0] < 0.2
 
     run(scenario)

@@ -71,6 +71,29 @@ def test_who_takes_more_than_was_predicted_stands_behind_the_others() -> None:
     run(scenario)
 
 
+def test_who_leaves_before_a_turn_has_paid_for_nothing() -> None:
+    async def scenario() -> None:
+        turns = Turns(workers=1, slots=9, short_seconds=0)
+        running = turns.join("x", 1)
+        given_up, kept = turns.join("a", 100), turns.join("a", 1)
+        other = turns.join("b", 5)
+        turns.leave(given_up)
+        turns.end(running)
+        assert granted(kept, other) == [True, False]
+        # Nor where its turn came in the same moment.
+        late = turns.join("c", 100)
+        turns.end(kept)
+        turns.end(other)
+        assert granted(late) == [True]
+        turns.leave(late)
+        running = turns.join("x", 1)
+        own, another = turns.join("c", 1), turns.join("d", 50)
+        turns.end(running)
+        assert granted(own, another) == [True, False]
+
+    run(scenario)
+
+
 def test_places_are_bounded_and_one_client_never_takes_all() -> None:
     async def scenario() -> None:
         turns = Turns(workers=1, slots=4, short_seconds=0)
