@@ -94,6 +94,26 @@ def test_both_run_with_nothing_that_they_do_not_need(name):
 
 
 @pytest.mark.parametrize("name", ["service", "proxy"])
+def test_who_asks_often_fills_no_disk_with_lines(name):
+    """Docker's own driver keeps every line that there ever was."""
+    logging = COMPOSE["services"][name]["logging"]
+    assert logging["driver"] == "json-file"
+    assert {"max-size", "max-file"} <= set(logging["options"])
+
+
+def test_each_port_of_the_pod_is_for_a_namespace_that_is_named():
+    """Whoever may speak to the pod may speak for any client, where its network is the proxies'."""
+    policy = BY_KIND["NetworkPolicy"]["spec"]
+    assert policy["policyTypes"] == ["Ingress", "Egress"]
+    assert "egress" not in policy
+    ports = [port["port"] for rule in policy["ingress"] for port in rule["ports"]]
+    assert sorted(ports) == ["http", "metrics"]
+    for rule in policy["ingress"]:
+        (peer,) = rule["from"]
+        assert peer["namespaceSelector"]["matchLabels"]["kubernetes.io/metadata.name"]
+
+
+@pytest.mark.parametrize("name", ["service", "proxy"])
 def test_what_lies_in_a_file_system_of_memory_leaves_room_for_the_process(name):
     """It is counted as the container's memory, which is killed when it has more than its limit."""
     service = COMPOSE["services"][name]

@@ -46,7 +46,9 @@ def proxy(tmp_path_factory):
             "/tmp/", f"{folder}/"
         )
         text = text.replace("/dev/stdout", str(folder / "access.log"))
-        # The times alone are shorter than what is deployed.
+        # A client may say which address it has; the times are shorter than what is deployed.
+        whose = "set_real_ip_from 127.0.0.1; real_ip_header X-Client;"
+        text = text.replace("server_tokens off;", f"server_tokens off; {whose}")
         text = re.sub(r"(client_\w+_timeout) 10s", r"\1 1s", text)
         (folder / "nginx.conf").write_text(text)
         command = [nginx, "-p", folder, "-c", folder / "nginx.conf", "-g", "daemon off;"]
@@ -99,6 +101,15 @@ def test_a_request_id_that_is_no_token_is_replaced(proxy):
     assert re.fullmatch("[0-9a-f]{32}", answer.headers["x-request-id"])
 
 
+def heard(address, lines):
+    """The service's lines of all that was asked before; they are written once answers are sent."""
+    ask(address, "GET", "/limits")
+    pause = threading.Event()
+    while "/limits" not in [line["route"] for line in list(lines)]:
+        pause.wait(0.01)
+    return list(lines)
+
+
 def test_a_body_over_the_limit_ends_at_the_proxy(proxy):
     address, lines, _ = proxy
     del lines[:]
@@ -107,30 +118,70 @@ def test_a_body_over_the_limit_ends_at_the_proxy(proxy):
         connection.putheader("Content-Length", str(65 * 2**20))
         connection.endheaders()
         assert connection.getresponse().status == 413
-    # Lines are written once answers are sent: by the next request's, one of this would be there.
-    ask(address, "GET", "/limits")
-    pause = threading.Event()
-    while "/limits" not in (told := [line["route"] for line in list(lines)]):
-        pause.wait(0.01)
+    told = [line["route"] for line in heard(address, lines)]
     assert "/subdivide" not in told
 
 
-@pytest.mark.parametrize(
-    "sent",
-    [
-        b"GET /healthz HTTP/1.1\r\nHost: a\r\nX-",
-        b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\nhalf",
-    ],
-)
-def test_slow_clients_are_the_proxys_to_end_and_the_service_never_hears_of_them(proxy, sent):
+def test_a_slow_head_is_the_proxys_to_end_and_the_service_never_hears_of_it(proxy):
     address, lines, _ = proxy
     del lines[:]
     with socket.create_connection(address, timeout=600) as connection:
-        connection.sendall(sent)
+        connection.sendall(b"GET /healthz HTTP/1.1\r\nHost: a\r\nX-")
         pieces = iter(lambda: connection.recv(4096), b"")
         with suppress(ConnectionResetError):
             assert b"200 OK" not in b"".join(pieces)
     assert lines == []
+
+
+def test_a_body_that_stops_is_the_proxys_to_end(proxy):
+    with socket.create_connection(proxy[0], timeout=600) as connection:
+        connection.sendall(
+            b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Type: model/gltf-binary\r\n"
+            b"Content-Length: 100\r\n\r\nhalf"
+        )
+        with suppress(ConnectionResetError):
+            assert b"200 OK" not in b"".join(iter(lambda: connection.recv(4096), b""))
+
+
+def test_neither_bodies_nor_answers_are_collected_at_the_proxy(proxy):
+    """Its room would be everybody's: one client could fill it."""
+    address, lines, _ = proxy
+    del lines[:]
+    half = 2**20
+    with socket.create_connection(address, timeout=600) as sender:
+        sender.sendall(
+            b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Type: model/gltf-binary\r\n"
+            b"Content-Length: %d\r\n\r\n" % (2 * half) + bytes(half)
+        )
+        with suppress(ConnectionResetError):
+            b"".join(iter(lambda: sender.recv(4096), b""))
+    # What came of it has gone on to the service.
+    told = heard(address, lines)
+    assert [line["received"] > 0 for line in told if line["route"] == "/subdivide"] == [True]
+
+    body = f"large {32 * half}".encode()
+    with socket.socket() as reader:
+        reader.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        reader.connect(address)
+        reader.sendall(
+            b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Type: model/gltf-binary\r\n"
+            b"Content-Length: %d\r\n\r\n" % len(body) + body
+        )
+        assert reader.recv(12) == b"HTTP/1.1 200"
+        del lines[:]
+        # The service still has most of it, however long the proxy could have taken it.
+        for _ in range(20):
+            assert "/subdivide" not in [line["route"] for line in heard(address, lines)]
+
+
+@pytest.mark.parametrize("query", ["levels=9", "model=none", "levels=1"])
+def test_an_answer_before_the_body_is_whole_reaches_its_client(proxy, query):
+    kind = "none/none" if query == "levels=1" else "model/gltf-binary"
+    answer, text = ask(
+        proxy[0], "POST", f"/subdivide?{query}", bytes(2**24), {"Content-Type": kind}
+    )
+    assert answer.status == (415 if kind == "none/none" else 422)
+    assert json.loads(text)["status"] == answer.status
 
 
 def beginning(connection):
@@ -152,6 +203,23 @@ def test_one_address_has_so_many_connections_and_no_more(proxy):
         for connection in held:
             connection.close()
     assert b"HTTP/1.1 429" in said
+
+
+def test_a_subscribers_ipv6_addresses_are_one(proxy):
+    """Whoever has one has as many as it likes."""
+    address, _, _ = proxy
+    upload = "POST /subdivide HTTP/1.1\r\nHost: a\r\nX-Client: {}\r\nContent-Length: 100\r\n\r\n"
+    held = [socket.create_connection(address, timeout=600) for _ in range(40)]
+    try:
+        for host, connection in enumerate(held):
+            connection.sendall(upload.format(f"2001:db8:0:1::{host:x}").encode())
+        said = [beginning(connection) for connection in reversed(held)]
+    finally:
+        for connection in held:
+            connection.close()
+    assert b"HTTP/1.1 429" in said
+    answer, _ = ask(address, "GET", "/limits", headers={"X-Client": "2001:db8:0:2::1"})
+    assert answer.status == 200
 
 
 def test_the_proxys_log_says_nothing_of_paths(proxy):
