@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Int, UInt8
 
 from .obj_text import with_line_feeds
 from .ply.header import ply_header
@@ -13,11 +15,13 @@ from .ply.header import ply_header
 # Of what is not counted an STL's face takes 50 bytes, more as text.
 BYTES_PER_FACE = 30
 
-_CONTINUED = re.compile(rb"\\\r?\n")
+# What is looked at in one go: text of nothing but short lines takes forty times its size.
+PIECE = 2**18
+
 _COMMENT = re.compile(rb"#[^\n]*")
-_INDENTED = re.compile(rb"^[ \t]+(?=f)", re.MULTILINE)
+# Nothing that was passed over is tried again: to remember it would take a hundred times its size.
 _OFF_COUNTS = re.compile(
-    rb"(?:\xef\xbb\xbf)?\s*(?:ST)?C?N?OFF\b(?:\s|#[^\n]*\n)*\d{1,18}\s+(\d{1,18})\b"
+    rb"(?:\xef\xbb\xbf)?\s*+(?:ST)?C?N?OFF\b(?:\s++|#[^\n]*+\n)*+\d{1,18}\s++(\d{1,18})\b"
 )
 _LINE_END, _SPACE, _FACE = b"\n f"
 # The letter f; a polygon's count of corners. Each corner beyond the second makes a triangle.
@@ -31,10 +35,10 @@ def count_triangles(data: bytes, kind: str) -> int:
     many corners share vertices, and their triangles take a few bytes each. Others go by their size.
     """
     if kind == "obj":
-        text = with_line_feeds(data)
-        text = _CONTINUED.sub(b" ", text) if b"\\" in text else text
-        text = _COMMENT.sub(b"", text) if b"#" in text else text
-        return _triangles(_words_by_line(_INDENTED.sub(b"", text), first=_FACE))
+        # A line that goes on in the next is one; of the same length, nothing is moved.
+        text = with_line_feeds(data).replace(b"\\\n", b"  ").replace(b"\\\r\n", b"   ")
+        pieces = (_lines(_COMMENT.sub(b"", piece)) for piece in _pieces_from_end(text))
+        return sum(_triangles(piece.words[piece.firsts == _FACE]) for piece in pieces)
     if kind == "off":
         counts = _OFF_COUNTS.match(data)
         return _by_size(data) if counts is None else _in_last_lines(data, int(counts[1]))
@@ -57,22 +61,52 @@ def _by_size(data: bytes) -> int:
 
 def _in_last_lines(data: bytes, polygons: int) -> int:
     """Count the triangles of so many polygons, which come last."""
-    words = _words_by_line(data)
-    words = words[words > 0]
-    return _triangles(words[len(words) - min(polygons, len(words)) :])
+    triangles, left = 0, polygons
+    for piece in map(_lines, _pieces_from_end(data)):
+        words = piece.words[max(len(piece.words) - left, 0) :]
+        triangles += _triangles(words)
+        left -= len(words)
+        if left == 0:
+            break
+    return triangles
 
 
 def _triangles(words: Int[np.ndarray, " L"]) -> int:
     return int(np.maximum(words - _WORDS_BESIDE_TRIANGLES, 0).sum())
 
 
-def _words_by_line(text: bytes, first: int | None = None) -> Int[np.ndarray, " L"]:
-    """Count the words of each line, or of those alone that begin with a letter."""
+class _Lines(NamedTuple):
+    """Lines with words in them: how many each has, and the letter that the first begins with."""
+
+    words: Int[np.ndarray, " L"]
+    firsts: UInt8[np.ndarray, " L"]
+
+
+def _pieces_from_end(text: bytes) -> Iterator[bytes]:
+    """Yield whole lines, the last ones first: of so many bytes at most, or one that is longer."""
+    end = len(text)
+    while end:
+        # The last letter is a line's end, or there is none: it is no other line's.
+        before = text.find(b"\n", end - 1 - PIECE, end - 1) if end > PIECE else -1
+        if before < 0 and end > PIECE:
+            before = text.rfind(b"\n", 0, end - 1)
+        begin = before + 1
+        yield text[begin:end]
+        end = begin
+
+
+def _lines(text: bytes) -> _Lines:
     letters = np.frombuffer(text, dtype=np.uint8)
     if not len(letters):
-        return np.zeros(0, dtype=np.int64)
+        return _Lines(np.zeros(0, dtype=np.int64), letters)
     begins = letters > _SPACE
     begins[1:] &= letters[:-1] <= _SPACE
     lines = np.append(0, np.flatnonzero(letters[:-1] == _LINE_END) + 1)
+    if len(lines) == 1:
+        # Long perhaps: neither a number for each letter nor one for each word.
+        words = np.array([np.count_nonzero(begins)])
+        return _Lines(words[words > 0], letters[[int(begins.argmax())]][words > 0])
     words = np.add.reduceat(begins, lines, dtype=np.int64)
-    return words if first is None else words[letters[lines] == first]
+    places = np.flatnonzero(begins)
+    firsts = letters[places[np.searchsorted(places, lines[words > 0])]]
+    return _Lines(words[words > 0], firsts)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
 
 import numpy as np
 import pytest
 
+from service.meshfiles import counted
 from service.meshfiles.counted import BYTES_PER_FACE, count_triangles
 from service.meshfiles.formats import read
 from service.options import Limits
@@ -56,3 +58,44 @@ def test_a_face_of_an_obj_that_goes_on_in_the_next_line_is_one() -> None:
 )
 def test_what_is_no_mesh_counts_as_nearly_nothing(data: bytes, kind: str) -> None:
     assert count_triangles(data, kind) <= 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "line"),
+    [
+        ("obj", b"\n"),
+        ("obj", b" f\n"),
+        ("obj", b"\\\n"),
+        ("obj", b"#\n"),
+        ("off", b"\n"),
+        ("off", b"#\n"),
+        ("off", b"9 9\n"),
+        ("off", b"1 "),
+        ("ply", b"1 \n"),
+    ],
+)
+def test_counting_takes_little_beside_the_file(kind: str, line: bytes) -> None:
+    """It is done to any file before its job has a turn, beside the worker of another."""
+    head = {
+        "obj": b"v 0 0 0\n",
+        "off": b"OFF\n",
+        "ply": b"ply\nformat ascii 1.0\nelement face 9999999\nproperty list int int vertex_index\n"
+        b"end_header\n",
+    }[kind]
+    data = head + line * (8 * 2**20 // len(line))
+    tracemalloc.start()
+    count_triangles(data, kind)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 4 * len(data) + 2**25
+
+
+def test_pieces_count_as_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever they end: lines that go on, comments, blank lines and a last one without an end."""
+    text = text_of("obj").replace(b" 7 8 ", b" 7 \\\n8 ").replace(b"\nf ", b"\n# f 1 2 3\n\n \tf ")
+    off = text_of("off").replace(b"\n3 ", b"\n\n3 ").rstrip(b"\n")
+    whole = count_triangles(text, "obj"), count_triangles(off, "off")
+    assert whole == (sum(SIZES) - 2 * len(SIZES),) * 2
+    for piece in (1, 7, 1000):
+        monkeypatch.setattr(counted, "PIECE", piece)
+        assert (count_triangles(text, "obj"), count_triangles(off, "off")) == whole
