@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Iterator
 from itertools import islice, pairwise
 
 import numpy as np
@@ -15,6 +16,9 @@ from jaxtyping import Float, Int
 from ..errors import UnreadableError
 from .indexed_triangles import NUMBER, IndexedTriangles
 from .text_numbers import reals, whole
+
+# Lines whose words are held at the same time.
+BLOCK = 2**14
 
 _COMMENT = re.compile(rb"#[^\n]*")
 _HEADER = re.compile(rb"(?:\xef\xbb\xbf)?\s*((?:ST)?C?N?)OFF\b")
@@ -40,7 +44,7 @@ def read_off(data: bytes) -> IndexedTriangles:
     if 6 * vertex_count + 2 * face_count > len(text) + 1:
         raise UnreadableError(_CUT_OFF)
     lines = (line.split() for line in text[counts.end() :].splitlines() if line.strip())
-    vertices = _vertices(list(islice(lines, vertex_count)))
+    vertices = _vertices(lines, vertex_count)
     # Faces differ in length, so they are read one by one.
     polygons = [_corners(line) for line in islice(lines, face_count)]
     if len(vertices) < vertex_count or len(polygons) < face_count or not polygons:
@@ -67,11 +71,16 @@ def write_off(mesh_file: IndexedTriangles) -> bytes:
     return text.getvalue().encode()
 
 
-def _vertices(lines: list[list[bytes]]) -> Float[np.ndarray, "V 3"]:
-    try:
-        return reals([line[:3] for line in lines]).reshape(-1, 3)
-    except ValueError as error:
-        raise UnreadableError("the OFF file has a vertex that is not three numbers") from error
+def _vertices(lines: Iterator[list[bytes]], count: int) -> Float[np.ndarray, "V 3"]:
+    """Read so many vertices, or those that there are, some at a time: words are far larger."""
+    blocks = [np.zeros((0, 3))]
+    for begin in range(0, count, BLOCK):
+        rows = [line[:3] for line in islice(lines, min(BLOCK, count - begin))]
+        try:
+            blocks.append(reals(rows).reshape(-1, 3))
+        except ValueError as error:
+            raise UnreadableError("the OFF file has a vertex that is not three numbers") from error
+    return np.concatenate(blocks)
 
 
 def _corners(line: list[bytes]) -> list[int]:

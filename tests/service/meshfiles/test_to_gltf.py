@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import pytest
 
 from service.bodies.uploads import Sent
@@ -38,3 +40,17 @@ def test_creases_by_normals_are_refused_where_there_are_none_to_hand_on() -> Non
         as_gltf(sent, Options(crease="normals"), Limits())
     assert refusal.value.name == "crease"
     assert as_gltf(sent, Options(crease="angle:30"), Limits()).kind == "glb"
+
+
+@pytest.mark.parametrize("shares", [(1.0, 0.0), (0.5, 0.5)])
+def test_an_off_takes_no_more_than_is_predicted_whatever_its_lines_are(
+    shares: tuple[float, float],
+) -> None:
+    """Of the shortest: all of vertices but one face, and as many faces as vertices."""
+    vertices, faces = (max(int(share * 2**20) // 7, 1) for share in shares)
+    data = b"OFF\n%d %d 0\n" % (vertices, faces) + b"0 0 0\n" * vertices + b"3 0 1 2\n" * faces
+    tracemalloc.start()
+    as_gltf(Sent(data, "off"), Options(), Limits())
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < BYTES_PER_BYTE["off"] * len(data)
