@@ -2,32 +2,52 @@
 
 from __future__ import annotations
 
-import numpy as np
-from jaxtyping import Int
+from dataclasses import replace
 
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.base.arrays import dot
 from pns_common.base.blocks import available_threads
 from pns_common.base.parameters import is_number
-from pns_common.connectivity.creases import Creases
+from pns_common.connectivity.creases import Creases, pair_keys
 from pns_common.connectivity.topology import build_topology
 from pns_common.errors import ParameterError
 from pns_common.fused import fits, kernel_blocks, kernels_available, kernels_loaded
-from pns_common.geometry.crease_lines import CREASE_ANGLE, line_rows
+from pns_common.fused.interior_edges import interior_edges
+from pns_common.geometry.crease_lines import (
+    CREASE_ANGLE,
+    EDGED_ANGLE,
+    cosine_of,
+    is_edged,
+    line_rows,
+)
 from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh, check_is_mesh
 
+LINES = Creases(line_angle=CREASE_ANGLE, edged_angle=EDGED_ANGLE)
 
-def crease_lines(mesh: Mesh, angle: float = CREASE_ANGLE) -> Int[np.ndarray, "N 2"]:
+
+def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2"]:
     """Return the edges that a mesh shows to be sharp, as pairs of vertices, for ``refine``.
 
     These turn by more than ``angle`` (degrees, between 0 and 180), lie between sides that are flat
-    beside them, and go on at both ends (geometry/crease_lines.py).
+    beside them, and go on at both ends. None: by more than 66 degrees, and in meshes most of whose
+    turns are so sharp by more than 20, as the default model keeps them (geometry/crease_lines.py).
 
     Raises:
         ParameterError: it is no Mesh, or the angle is out of range.
     """
     check_is_mesh(mesh)
+    if angle is None:
+        return lines_on(mesh, LINES)
     if not (is_number(angle) and 0 < angle < 180):
         raise ParameterError("angle", angle, expected="degrees between 0 and 180")
+    return lines_on(mesh, Creases(line_angle=float(angle)))
+
+
+def lines_on(mesh: Mesh, creases: Creases) -> Int[np.ndarray, "N 2"]:
+    """Return the lines that creases say to look for."""
     points, faces = mesh.vertices, mesh.faces
     if kernels_available() and kernels_loaded() and fits(len(points), len(faces), 1):
         from pns_common.fused.crease_lines import crease_line_rows
@@ -37,15 +57,78 @@ def crease_lines(mesh: Mesh, angle: float = CREASE_ANGLE) -> Int[np.ndarray, "N 
         blocks = kernel_blocks(available_threads())
         edges = build_edges(faces.astype(np.int32), len(points), blocks)
         normals = measured_normals(points, edges.faces, blocks)
-        rows = crease_line_rows(points, edges, normals, float(angle), blocks)
+        rows = crease_line_rows(points, edges, normals, creases, blocks)
         return edges.edges[rows].astype(np.int64)
     topology = build_topology(faces, len(points))
     normals = face_normals(points, faces)
-    return topology.edges[line_rows(points, normals, topology, float(angle))]
+    return topology.edges[line_rows(points, normals, topology, creases)]
 
 
 def named_on(mesh: Mesh, creases: Creases) -> Creases:
     """Return creases with the lines that they look for found on a mesh, by name."""
     if creases.line_angle is None:
         return creases
-    return Creases(crease_lines(mesh, creases.line_angle), levels=creases.levels)
+    return Creases(lines_on(mesh, creases), levels=creases.levels)
+
+
+def named_on_parts(
+    mesh: Mesh, creases: Creases, part_of_face: Int[np.ndarray, " F"], count: int
+) -> Creases:
+    """Return the same of a mesh of so many parts that share no vertex, each edged or not."""
+    if creases.line_angle is None or creases.edged_angle is None:
+        return named_on(mesh, creases)
+    edged = edged_parts(mesh, creases, part_of_face, count)
+    lines = lines_on(mesh, replace(creases, edged=False))
+    if edged.any():
+        part_of_vertex = np.zeros(len(mesh.vertices), dtype=np.int64)
+        part_of_vertex[mesh.faces] = part_of_face[:, None]
+        gentle = lines_on(mesh, replace(creases, edged=True))
+        in_edged = [edged[part_of_vertex[pairs[:, 0]]] for pairs in (lines, gentle)]
+        lines = np.concatenate([lines[~in_edged[0]], gentle[in_edged[1]]])
+    return Creases(lines, levels=creases.levels)
+
+
+def without_gentle(
+    creases: Creases, mesh: Mesh, asked: Creases, smooth: Int[np.ndarray, "N 2"]
+) -> Creases:
+    """Return named lines without those that are in ``smooth`` too, and in no mesh but edged ones.
+
+    ``asked`` is what they were looked for by.
+    """
+    assert creases.named is not None
+    count = len(mesh.vertices)
+    sharp = lines_on(mesh, replace(asked, edged=False))
+    keys = [pair_keys(pairs, count) for pairs in (creases.named, sharp, smooth)]
+    gone = np.isin(keys[0], keys[2]) & ~np.isin(keys[0], keys[1])
+    return replace(creases, named=creases.named[~gone])
+
+
+def edged_parts(
+    mesh: Mesh, creases: Creases, part_of_face: Int[np.ndarray, " F"], count: int
+) -> Bool[np.ndarray, " P"]:
+    """Return which parts are edged."""
+    assert creases.line_angle is not None
+    assert creases.edged_angle is not None
+    angles = creases.line_angle, creases.edged_angle
+    turns = turns_of_parts(mesh.vertices, mesh.faces, angles, part_of_face, count)
+    return np.array([is_edged(sharp, bent) for sharp, bent in turns.tolist()], dtype=bool)
+
+
+def turns_of_parts(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    angles: tuple[float, float],
+    part_of_face: Int[np.ndarray, " F"],
+    count: int,
+) -> Int[np.ndarray, "P 2"]:
+    """Count each part's interior edges that turn by more than both angles, in degrees.
+
+    An edge is of the part of the first face on it.
+    """
+    _, half_edges = interior_edges(faces, len(points))
+    normals, beside = face_normals(points, faces), half_edges // 3
+    n, m = normals[beside[:, 0]], normals[beside[:, 1]]
+    cosines, defined = dot(n, m), (dot(n, n) > 0) & (dot(m, m) > 0)
+    beyond = (beside[defined & (cosines < cosine_of(angle)), 0] for angle in angles)
+    parts = [np.bincount(part_of_face[first], minlength=count) for first in beyond]
+    return np.stack(parts, axis=1)

@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.base.deferred import Deferred
 from pns_common.connectivity.creases import Creases, crease_children
+from pns_common.crease_lines import named_on_parts
 from pns_common.errors import ParameterError
 from pns_common.fused import kernel_blocks
 from pns_common.masks.crease_shift import limit_crease_shift
@@ -78,9 +79,10 @@ def refine_parts(
         )
     else:
         lengths = np.full(len(part_faces) - 1, float(reference_length))
-    kept = chosen_creases(creases, scheme)
     if not kernels_can_serve(mesh, scheme, levels, float(lengths.min())):
         return None
+    part_of_face = np.repeat(np.arange(len(lengths)), np.diff(part_faces))
+    kept = named_on_parts(mesh, chosen_creases(creases, scheme), part_of_face, len(lengths))
     from pns_common.fused.refine_parts import Units, refine_parts_fused
     from pns_common.fused.side_lengths import side_lengths_of_parts
 

@@ -138,7 +138,11 @@ def pns(model: Model, budget: float | None = None, prior_strength: float | None 
     form = _with_strength(scale_free_form(card, budget), prior_strength)
     if form is not None and vertices is not None:
         # Without a budget it is Loop, to the bit.
-        kept = Creases(line_angle=card.crease_angle, levels=card.crease_levels)
+        kept = Creases(
+            line_angle=card.crease_angle,
+            levels=card.crease_levels,
+            edged_angle=card.edged_crease_angle,
+        )
         creases = kept if budget > 0 else NO_CREASES
         return scale_free_scheme(edges, vertices, form, model.name, model.hash, creases)
     return Scheme(

@@ -83,6 +83,7 @@ def _further_rows(card: ModelCard) -> dict[str, Any]:
         "tip strength a": card.tip_strength,
         "even prior strength s₁": card.even_prior_strength,
         "crease angle θ": card.crease_angle,
+        "edged crease angle θ'": card.edged_crease_angle,
         "crease levels": card.crease_levels,
     }
     return {name: value for name, value in rows.items() if value is not None}

@@ -22,6 +22,8 @@ class Creases:
         named: pairs of vertices.
         line_angle: θ in degrees of the crease lines that the mesh shows
             (geometry/crease_lines.py); None: none are looked for.
+        edged_angle: θ' of gentler lines of edged meshes, in degrees below θ; None: there are none.
+        edged: whether it is an edged mesh, where that is known of the whole; None: that is seen.
         levels: at how many levels they are sharp, and smooth from then on (semi-sharp creases,
             DeRose, Kass and Truong 1998); None: for good. Where they are sharp at the last level,
             limits take them as sharp for good.
@@ -34,6 +36,8 @@ class Creases:
     named: Int[np.ndarray, "N 2"] | None = None
     line_angle: float | None = None
     levels: int | None = None
+    edged_angle: float | None = None
+    edged: bool | None = None
 
     def __post_init__(self) -> None:
         angle, levels = self.line_angle, self.levels
@@ -41,6 +45,9 @@ class Creases:
             object.__setattr__(self, "named", as_pairs(self.named))
         if angle is not None and not (is_number(angle) and 0 < angle < 180):
             raise ParameterError("line_angle", angle, expected="degrees between 0 and 180")
+        gentle = self.edged_angle
+        if gentle is not None and not (is_number(gentle) and 0 < gentle < (angle or 0)):
+            raise ParameterError("edged_angle", gentle, expected="degrees between 0 and line_angle")
         if levels is not None and not (is_whole(levels) and levels >= 1):
             raise ParameterError("levels", levels, expected="a whole number, at least 1")
 

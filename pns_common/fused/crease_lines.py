@@ -2,31 +2,69 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import Creases
 from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.creases import (
     drop_loose_ends,
+    mark_alone,
     mark_edges_beyond,
     mark_flat_sides,
 )
 from pns_common.fused.mesh_edges import MeshEdges
-from pns_common.geometry.crease_lines import at_others
+from pns_common.geometry.crease_lines import (
+    PARALLEL,
+    ROW_ANGLE,
+    at_others,
+    cosine_of,
+    is_edged,
+)
 
 
 def crease_line_rows(
     points: Float[np.ndarray, "V 3"],
     mesh: MeshEdges,
     normals: Float[np.ndarray, "F 3"],
-    angle: float,
+    creases: Creases,
     blocks: Blocks,
 ) -> Int[np.ndarray, " N"]:
-    """Return the edges of the crease lines; ``normals`` are the faces', ``angle`` θ in degrees."""
-    cosine, count = math.cos(math.radians(angle)), len(mesh.edges)
+    """Return the edges of the lines to look for; ``normals`` are the faces'."""
+    assert creases.line_angle is not None
+    cosine, known, gentle = cosine_of(creases.line_angle), creases.edged, False
+    beyond, found = edges_beyond(mesh, normals, cosine, blocks)
+    # Without an edge beyond θ no mesh is edged.
+    if creases.edged_angle is not None and (found if known is None else known):
+        bent, more = edges_beyond(mesh, normals, cosine_of(creases.edged_angle), blocks)
+        gentle = is_edged(found, more) if known is None else known
+        beyond, found = (bent, more) if gentle else (beyond, found)
+    if not found:
+        return np.zeros(0, dtype=np.int32)
+    sharp = np.flatnonzero(beyond).astype(np.int32)
+    is_flat = np.empty(len(sharp), dtype=bool)
+    sides = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
+    blocks.run(len(sharp), mark_flat_sides.over(*sides, ROWS, is_flat))
+    flat = sharp[is_flat]
+    if gentle:
+        alone = np.empty(len(flat), dtype=bool)
+        around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
+        least = PARALLEL**2, cosine_of(ROW_ANGLE)
+        look = mark_alone.over(points, normals, *around, *least, flat, ROWS, alone)
+        blocks.run(len(flat), look)
+        flat = flat[alone]
+    left = np.ones(len(flat), dtype=bool)
+    met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))
+    drop_loose_ends(points, mesh.edges, flat, at_others(mesh), cosine, *met, left)
+    return flat[left]
+
+
+def edges_beyond(
+    mesh: MeshEdges, normals: Float[np.ndarray, "F 3"], cosine: float, blocks: Blocks
+) -> tuple[Bool[np.ndarray, " E"], int]:
+    """Return which interior edges' normals have a smaller cosine, and how many."""
+    count = len(mesh.edges)
     beyond, found = np.empty(count, dtype=bool), np.zeros(blocks.count(count), dtype=np.int64)
     around = normals, mesh.half_edges, mesh.edge_class, cosine
     mark_beyond = mark_edges_beyond.over(*around, ROWS, beyond)
@@ -35,14 +73,4 @@ def crease_line_rows(
         found[blocks.number(rows, count)] = mark_beyond(rows)
 
     blocks.run(count, mark)
-    if not found.any():
-        return np.zeros(0, dtype=np.int32)
-    sharp = np.flatnonzero(beyond).astype(np.int32)
-    is_flat = np.empty(len(sharp), dtype=bool)
-    sides = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
-    blocks.run(len(sharp), mark_flat_sides.over(*sides, ROWS, is_flat))
-    flat = sharp[is_flat]
-    left = np.ones(len(flat), dtype=bool)
-    met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))
-    drop_loose_ends(points, mesh.edges, flat, at_others(mesh), cosine, *met, left)
-    return flat[left]
+    return beyond, int(found.sum())

@@ -81,7 +81,7 @@ def control_level(
     mesh = control_edges(faces, len(points), creases.named, blocks)
     level = FusedLevel.of(points, mesh, blocks)
     if creases.line_angle is not None:
-        of_lines = level.faces.normals, creases.line_angle, blocks.unheard()
+        of_lines = level.faces.normals, creases, blocks.unheard()
         rows = crease_line_rows(points, mesh, *of_lines)
         if len(rows):
             classes = mesh.edge_class.copy()

@@ -1,4 +1,4 @@
-"""Crease lines: edges that the mesh itself shows to be sharp, found by three marks.
+"""Crease lines: edges that the mesh itself shows to be sharp, found by four marks.
 
 A coarse mesh does not say which of its turns are sharp and which are round: an edge of a cube turns
 by 90 degrees, and one of an octahedron, which may stand for a sphere, by 71. What tells them apart
@@ -11,8 +11,19 @@ is what lies around:
    so that a line that ends in a smooth surface loses as many edges there.
 
 θ of 66 degrees lies between the turns of a hexagon and a pentagon: tubes of six sides stay round,
-and a rim of six corners is a circle. Turning, moving, scaling, mirroring or renumbering a mesh does
-not change the answer.
+and a rim of six corners is a circle.
+
+A part that is made of plane faces has gentler edges too, chamfers and the plates of a hull. It is
+known by its edges: a mesh is *edged* if at least half of those that turn by more than θ' = 20
+degrees turn by more than θ. (Where sharp rims go round something most edges that turn are on the
+round.) There, edges beyond θ' are sharp with the marks 2 and 3, but from θ' to 55 degrees only if
+
+4. *it stands alone*: not on both of its sides is there another edge like it, which runs within 20
+   degrees of parallel and turns the same way, with a third to three times its 1 − cos t. A row of
+   such edges is a tube or an arc: one of seven sides or more stays round, as a barrel does.
+
+Both numbers are counts: a mesh in pieces has the same. Turning, moving, scaling, mirroring or
+renumbering a mesh does not change the answer.
 """
 
 from __future__ import annotations
@@ -23,14 +34,24 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import dot, gather, marked, segment_sum, unit
-from pns_common.connectivity.creases import with_crease_rows
+from pns_common.base.arrays import dot, marked, segment_sum, unit
+from pns_common.connectivity.creases import Creases, with_crease_rows
 from pns_common.connectivity.topology import EdgeClass, Topology
 
 # θ in degrees, and at how many levels what is found is sharp: then it is smooth, and by then round
 # within a quarter of an edge.
 CREASE_ANGLE, CREASE_LEVELS = 66.0, 2
+# θ' in degrees, of edged meshes; and of how many edges beyond it one turns by more than θ there.
+EDGED_ANGLE, EDGED_ONE_IN = 20.0, 2
+# Degrees beyond which an edge of an edged mesh need not stand alone: between the turns of a hexagon
+# and a heptagon.
+ROW_ANGLE = 55.0
+# Edges are like one another within 20 degrees of parallel, and where 1 − cos t is at most so many
+# times the other's: of 45 degrees 30 and 60 are like, and 90 is not.
+PARALLEL, ALIKE = math.cos(math.radians(20)), 3.0
 ROUNDS = 5
+# Edges whose surroundings are looked at together.
+AT_ONCE = 8192
 # So many lines that meet are a corner.
 CORNER = 3
 
@@ -74,30 +95,49 @@ def with_crease_lines(
     topology: Topology,
     points: Float[np.ndarray, "V 3"],
     normals: Float[np.ndarray, "F 3"],
-    angle: float | None,
+    creases: Creases,
 ) -> Topology:
-    """Return the topology with its crease lines as creases; unchanged where no angle is given."""
-    if angle is None:
+    """Return the topology with its crease lines as creases; unchanged where none are looked for."""
+    if creases.line_angle is None:
         return topology
-    return with_crease_rows(topology, line_rows(points, normals, topology, angle))
+    return with_crease_rows(topology, line_rows(points, normals, topology, creases))
 
 
 def line_rows(
     points: Float[np.ndarray, "V 3"],
     normals: Float[np.ndarray, "F 3"],
     mesh: Topology,
-    angle: float,
+    creases: Creases,
 ) -> Int[np.ndarray, " N"]:
-    """Return the edges of a mesh's crease lines.
+    """Return the edges of a mesh's crease lines, which ``creases`` say to look for.
 
-    ``normals`` are the faces' unit normals, 0 without area; ``angle`` is θ in degrees.
+    ``normals`` are the faces' unit normals, 0 without area.
     """
-    cosine = math.cos(math.radians(angle))
+    assert creases.line_angle is not None
+    cosine = cosine_of(creases.line_angle)
     sharp = edges_beyond(normals, mesh, mesh.interior, cosine)
+    gentle = False
+    if creases.edged_angle is not None:
+        bent = edges_beyond(normals, mesh, mesh.interior, cosine_of(creases.edged_angle))
+        known = creases.edged
+        gentle = is_edged(len(sharp), len(bent)) if known is None else known
+        sharp = bent if gentle else sharp
     if len(sharp) == 0:
         return sharp
     flat = sharp[have_flat_sides(normals, mesh, sharp)]
+    if gentle:
+        flat = flat[stand_alone(points, normals, mesh, flat)]
     return flat[go_on(points, mesh, flat, cosine)]
+
+
+def cosine_of(degrees: float) -> float:
+    """Return the cosine of an angle."""
+    return math.cos(math.radians(degrees))
+
+
+def is_edged(sharp: int, bent: int) -> bool:
+    """Return whether a mesh with so many edges beyond θ, and beyond θ', is edged."""
+    return sharp > 0 and EDGED_ONE_IN * sharp >= bent
 
 
 def edges_beyond(
@@ -123,15 +163,65 @@ def have_flat_sides(
     An edge that is not interior turns by nothing.
     """
     sides = mesh.face_edges[mesh.half_edges[sharp] // 3]
-    interior = mesh.edge_class[sides] == EdgeClass.INTERIOR
-    cosines = np.ones(sides.shape)
-    cosines[interior] = dot(*_normals_at(normals, mesh, sides[interior]))
+    cosines = _cosines(normals, mesh, sides)
     own = sides == sharp[:, None, None]
     turn = cosines[:, 0][own[:, 0]]
     cosines[own] = -1.0
     flattest = cosines.max(axis=-1).min(axis=-1)
-    half = np.sqrt((1 + np.maximum(turn, -1.0)) / 2)  # cos(t / 2) of cos t
-    return flattest > half
+    return flattest > _half(turn)
+
+
+def stand_alone(
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Edges,
+    flat: Int[np.ndarray, " N"],
+) -> Bool[np.ndarray, " N"]:
+    """Return which edges, beside flat sides, turn far or have no like on one of their sides."""
+    alone = np.empty(len(flat), dtype=bool)
+    # A dozen others are looked at for each: not for all at once.
+    for start in range(0, len(flat), AT_ONCE):
+        rows = slice(start, start + AT_ONCE)
+        alone[rows] = _stand_alone(points, normals, mesh, flat[rows])
+    return alone
+
+
+def _stand_alone(
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Edges,
+    flat: Int[np.ndarray, " N"],
+) -> Bool[np.ndarray, " N"]:
+    turn = _cosines(normals, mesh, flat)
+    has_like = np.ones(len(flat), dtype=bool)
+    for face in (mesh.half_edges[flat] // 3).T:
+        sides = mesh.face_edges[face]
+        is_flat = (sides != flat[:, None]) & (_cosines(normals, mesh, sides) > _half(turn)[:, None])
+        beyond = _across(mesh, sides, face[:, None])
+        # What lies across a side that is not flat, or is none, is the edge itself: no other.
+        others = np.where(is_flat[:, :, None], mesh.face_edges[beyond], flat[:, None, None])
+        seen = np.concatenate([sides, others.reshape(len(flat), -1)], axis=1)
+        has_like &= _like(points, normals, mesh, flat, turn, seen).any(axis=1)
+    return (turn < cosine_of(ROW_ANGLE)) | ~has_like
+
+
+def _like(
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Edges,
+    flat: Int[np.ndarray, " N"],
+    turn: Float[np.ndarray, " N"],
+    seen: Int[np.ndarray, "N K"],
+) -> Bool[np.ndarray, "N K"]:
+    """Return which other edges run and turn as each one does; ``turn`` is its cosine."""
+    cosines = _cosines(normals, mesh, seen)
+    own, other = _along(points, mesh, flat), _along(points, mesh, seen)
+    along = _inner(other, own[:, None])
+    parallel = along * along >= PARALLEL**2 * (_inner(other, other) * _inner(own, own)[:, None])
+    bend, bends = (1 - turn)[:, None], 1 - cosines
+    as_far = (bends <= ALIKE * bend) & (bend <= ALIKE * bends)
+    same_way = _rises(points, normals, mesh, seen) == _rises(points, normals, mesh, flat)[:, None]
+    return (seen != flat[:, None]) & parallel & as_far & same_way
 
 
 def go_on(
@@ -165,8 +255,63 @@ def at_others(mesh: Edges) -> Bool[np.ndarray, " V"]:
 
 
 def _normals_at(
-    normals: Float[np.ndarray, "F 3"], mesh: Edges, rows: Int[np.ndarray, " N"]
-) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 3"]]:
+    normals: Float[np.ndarray, "F 3"], mesh: Edges, rows: Int[np.ndarray, "..."]
+) -> tuple[Float[np.ndarray, "... 3"], Float[np.ndarray, "... 3"]]:
     """Return the unit normals of the two faces of interior edges."""
     faces = mesh.half_edges[rows] // 3
-    return gather(normals, faces[:, 0]), gather(normals, faces[:, 1])
+    return normals[faces[..., 0]], normals[faces[..., 1]]
+
+
+def _cosines(
+    normals: Float[np.ndarray, "F 3"], mesh: Edges, rows: Int[np.ndarray, "..."]
+) -> Float[np.ndarray, "..."]:
+    """Return the cosines of edges' turns: 1 where they are not interior."""
+    cosines = np.ones(rows.shape)
+    interior = mesh.edge_class[rows] == EdgeClass.INTERIOR
+    cosines[interior] = dot(*_normals_at(normals, mesh, rows[interior]))
+    return cosines
+
+
+def _half(cosine: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """Return cos(t / 2) of cos t."""
+    return np.sqrt((1 + np.maximum(cosine, -1.0)) / 2)
+
+
+def _across(
+    mesh: Edges, edges: Int[np.ndarray, "N K"], faces: Int[np.ndarray, "N 1"]
+) -> Int[np.ndarray, "N K"]:
+    """Return the other face of each interior edge; the face itself where there is none."""
+    both = mesh.half_edges[edges] // 3
+    other = np.where(both[..., 0] == faces, both[..., 1], both[..., 0])
+    return np.where(mesh.edge_class[edges] == EdgeClass.INTERIOR, other, faces)
+
+
+def _along(
+    points: Float[np.ndarray, "V 3"], mesh: Edges, rows: Int[np.ndarray, "..."]
+) -> Float[np.ndarray, "... 3"]:
+    """Return the vectors along edges."""
+    ends = mesh.edges[rows]
+    return points[ends[..., 1]] - points[ends[..., 0]]
+
+
+def _rises(
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Edges,
+    rows: Int[np.ndarray, "..."],
+) -> Bool[np.ndarray, "..."]:
+    """Return whether an edge's second face rises above its first: the edge is in a hollow."""
+    ends, faces = mesh.edges[rows], mesh.half_edges[rows] // 3
+    corners = mesh.faces[faces[..., 1]]
+    is_end = (corners == ends[..., :1]) | (corners == ends[..., 1:])
+    # The corner of a triangle that is on neither end.
+    place = np.where(~is_end[..., 0], 0, np.where(~is_end[..., 1], 1, 2))
+    apart = np.take_along_axis(corners, place[..., None], axis=-1)[..., 0]
+    return _inner(normals[faces[..., 0]], points[apart] - points[ends[..., 0]]) > 0
+
+
+def _inner(
+    u: Float[np.ndarray, "... 3"], v: Float[np.ndarray, "... 3"]
+) -> Float[np.ndarray, "..."]:
+    """Return inner products, summed in the order of ``arrays.dot``."""
+    return u[..., 0] * v[..., 0] + u[..., 1] * v[..., 1] + u[..., 2] * v[..., 2]

@@ -88,7 +88,7 @@ def array_steps(
     (normals,) = blocks.gather(len(faces), lambda rows: (face_normals(points, faces[rows]),))
     depth = 0
     topology = with_creases(build_topology(faces, len(points)), creases.named)
-    topology = with_crease_lines(topology, points, normals, creases.line_angle)
+    topology = with_crease_lines(topology, points, normals, creases)
     while True:
         several_fans = multi_fan_vertices(topology) if depth == 0 else None
         control = ControlLevel(points, topology, normals, reference_length, blocks, depth)

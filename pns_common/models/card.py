@@ -32,7 +32,7 @@ OPTIONAL_FIELDS = (
     "even_prior_strength",
 )
 STRENGTHS = ("prior_strength", "even_prior_strength", "boundary_strength", "tip_strength")
-CREASE_FIELDS = ("crease_angle", "crease_levels")
+CREASE_FIELDS = ("crease_angle", "crease_levels", "edged_crease_angle")
 MOST_LEARNED_LEVELS = 16
 
 
@@ -70,6 +70,8 @@ class ModelCard:
         crease_angle: θ of the crease lines that are kept where no creases are named, degrees
             between 0 and 180; None looks for none.
         crease_levels: at how many levels they are sharp, at least 1; with ``crease_angle``.
+        edged_crease_angle: θ' < θ of those of edged meshes, degrees (geometry/crease_lines.py);
+            None keeps none between the two.
     """
 
     format: int
@@ -94,6 +96,7 @@ class ModelCard:
     even_prior_strength: float | None = None
     crease_angle: float | None = None
     crease_levels: int | None = None
+    edged_crease_angle: float | None = None
 
     def to_json(self) -> str:
         """Return the card as JSON, keys in the order of the attributes; none that is None."""
@@ -224,6 +227,9 @@ def _scale_free_problem(card: ModelCard) -> str | None:
         return f"crease_angle {card.crease_angle}, not between 0 and 180 degrees"
     if (card.crease_angle is None) != (card.crease_levels is None):
         return "one of crease_angle and crease_levels without the other"
+    gentle = card.edged_crease_angle
+    if gentle is not None and not 0 < gentle < (card.crease_angle or 0):
+        return f"edged_crease_angle {gentle}, not between 0 and crease_angle"
     if card.crease_levels is not None and card.crease_levels < 1:
         return f"crease_levels {card.crease_levels}, not at least 1"
     return None

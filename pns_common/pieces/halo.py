@@ -39,8 +39,9 @@ from pns_common.schemes import Scheme
 LOOP_REACH, FIELDS_REACH = 1, 2
 # Rings for the fold guard, where nothing is known yet of how far it goes.
 GUARD_RINGS = 1
-# A ring for each round, one for the sides of the farthest edge, and one for the faces beside those.
-LINES_REACH = ROUNDS + 2
+# A ring for each round, one for the sides of the farthest edge, one for the faces beside those, and
+# one for the faces across their other edges, which may be like it.
+LINES_REACH = ROUNDS + 3
 
 
 class ThinHaloError(PnsError):

@@ -8,7 +8,7 @@ import pytest
 
 from pns_common import Creases, Mesh, ParameterError, crease_lines, load_model, loop, pns, refine
 from pns_common.connectivity.topology import build_topology
-from pns_common.crease_lines import named_on
+from pns_common.crease_lines import LINES, named_on
 from pns_common.geometry.crease_lines import line_rows
 from pns_common.geometry.frames import face_normals
 from pns_common.refine_parts import refine_parts
@@ -21,13 +21,14 @@ BLOCK = Mesh(*block(3, noise=0.02))
 
 def test_both_ways_find_the_same_lines(monkeypatch):
     front_door = import_module("pns_common.crease_lines")
-    for mesh in (BLOCK, cylinder(16, rows=6), Mesh(*bumpy_sphere())):
+    for mesh in (BLOCK, cylinder(6), cylinder(16, rows=6), Mesh(*bumpy_sphere())):
         topology = build_topology(mesh.faces, len(mesh.vertices))
         normals = face_normals(mesh.vertices, mesh.faces)
-        expected = topology.edges[line_rows(mesh.vertices, normals, topology, 66.0)]
-        for loaded in (True, False):
-            monkeypatch.setattr(front_door, "kernels_loaded", lambda loaded=loaded: loaded)
-            np.testing.assert_array_equal(crease_lines(mesh), expected)
+        for angle, asked in ((None, LINES), (66.0, Creases(line_angle=66.0))):
+            expected = topology.edges[line_rows(mesh.vertices, normals, topology, asked)]
+            for loaded in (True, False):
+                monkeypatch.setattr(front_door, "kernels_loaded", lambda loaded=loaded: loaded)
+                np.testing.assert_array_equal(crease_lines(mesh, angle), expected)
 
 
 @pytest.mark.parametrize("angle", [0, 180, -1, np.nan])
@@ -40,6 +41,12 @@ def test_an_angle_that_is_none_is_refused(angle):
 def test_creases_of_such_an_angle_are_refused_too(angle):
     with pytest.raises(ParameterError, match="line_angle"):
         Creases(line_angle=angle)
+
+
+@pytest.mark.parametrize("angle", [0, 66, 80, -1, np.nan])
+def test_gentler_lines_are_below_the_others(angle):
+    with pytest.raises(ParameterError, match="edged_angle"):
+        Creases(line_angle=66.0, edged_angle=angle)
 
 
 @pytest.mark.parametrize("levels", [0, -1, True])
@@ -104,7 +111,8 @@ def test_another_word_is_refused():
 
 @pytest.mark.parametrize("limit", [False, True])
 def test_parts_keep_their_lines_as_they_do_alone(limit):
-    parts = [box(), Mesh(*bumpy_sphere(subdivisions=0)), cylinder(8)]
+    # The third alone is edged with edges that are gentler: all together are not.
+    parts = [box(), Mesh(*bumpy_sphere(subdivisions=0)), cylinder(6), cylinder(8)]
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     both = Mesh(
         np.concatenate([part.vertices for part in parts]),

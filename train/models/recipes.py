@@ -7,7 +7,7 @@ from types import MappingProxyType
 import msgspec
 
 from pns_common.errors import ParameterError
-from pns_common.geometry.crease_lines import CREASE_ANGLE, CREASE_LEVELS
+from pns_common.geometry.crease_lines import CREASE_ANGLE, CREASE_LEVELS, EDGED_ANGLE
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +79,7 @@ class ScaleFree:
         even_prior_strength: s of even meshes (formula/prior_strength.py), in use; training has one.
         crease_angle: θ in degrees of the crease lines that are kept in use; training sees none.
         crease_levels: at how many levels these are sharp.
+        edged_crease_angle: θ' of those of edged meshes.
     """
 
     prior_strength: float
@@ -94,6 +95,7 @@ class ScaleFree:
     even_prior_strength: float | None = None
     crease_angle: float | None = None
     crease_levels: int | None = None
+    edged_crease_angle: float | None = None
 
 
 class OneStep(msgspec.Struct, frozen=True, tag=True):
@@ -251,7 +253,7 @@ def general(seed: int = 0) -> Recipe:
 
     It starts from quasi-interpolation along the normal (s = 1), which a network of zeros leaves as
     it is; in use s is 0.85: vertices of simplified meshes lie outside a little already.
-    C = 20 leaves room for all that is right on meshes as coarse as a cube; what must not happen
+    C = 10 leaves room for all that is right on meshes as coarse as a cube; what must not happen
     there, the fold guard prevents. The gates open where faces are bent by two hundredths of a
     radian, so that fine meshes gain as well.
     """
@@ -260,7 +262,7 @@ def general(seed: int = 0) -> Recipe:
         features="signed-18",
         hidden=(48, 48),
         activation="smoothstep",
-        budget=20.0,
+        budget=10.0,
         gate_sharpness=1e7,
         training=ToLimit(
             weights=LimitWeights(
@@ -304,6 +306,7 @@ def general(seed: int = 0) -> Recipe:
             even_prior_strength=1.1,
             crease_angle=CREASE_ANGLE,
             crease_levels=CREASE_LEVELS,
+            edged_crease_angle=EDGED_ANGLE,
         ),
     )
 

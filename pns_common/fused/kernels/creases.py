@@ -20,7 +20,7 @@ from pns_common.fused.kernels.compiled import (
 )
 from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.rings import between, divisor, dot, row
-from pns_common.geometry.crease_lines import CORNER, ROUNDS
+from pns_common.geometry.crease_lines import ALIKE, CORNER, ROUNDS
 
 
 def normals_beside(normals, half_edges, edge_class, e):
@@ -55,6 +55,11 @@ def _cosine(normals, half_edges, edge_class, e):
     return dot(row(normals, half_edges[e, 0] // 3), row(normals, half_edges[e, 1] // 3))
 
 
+def _half(cosine):
+    """Return cos(t / 2) of cos t."""
+    return math.sqrt((1 + max(cosine, -1.0)) / 2)
+
+
 @kernel(SIZE, POINTS, INDICES, INDICES, CLASSES, INDEX, SIZE, SIZE, FLAGS_OUT)
 def mark_flat_sides(normals, face_edges, half_edges, edge_class, sharp, begin, end, flat):
     """Mark those of the sharp edges begin … end − 1 both of whose faces are flat on another side.
@@ -73,7 +78,82 @@ def mark_flat_sides(normals, face_edges, half_edges, edge_class, sharp, begin, e
                     cosine = _cosine(normals, half_edges, edge_class, side)
                     flattest_of_face = max(flattest_of_face, cosine)
             flattest = min(flattest, flattest_of_face)
-        flat[i] = flattest > math.sqrt((1 + max(turn, -1.0)) / 2)  # cos(t / 2) of cos t
+        flat[i] = flattest > _half(turn)
+    return 0
+
+
+def _rises(points, normals, faces, edges, half_edges, e):
+    """Return whether an edge's second face rises above its first."""
+    a, b, f, g = edges[e, 0], edges[e, 1], half_edges[e, 0] // 3, half_edges[e, 1] // 3
+    apart = faces[g, 2]
+    for k in range(2):
+        corner = faces[g, 1 - k]
+        if corner != a and corner != b:
+            apart = corner
+    return dot(row(normals, f), between(points, a, apart)) > 0
+
+
+def _is_like(points, normals, faces, edges, half_edges, edge_class, parallel, e, turn, other):
+    """Return whether another edge runs and turns as an edge does whose turn has this cosine."""
+    if other == e or edge_class[other] != INTERIOR:
+        return False
+    bend, its_bend = 1 - turn, 1 - _cosine(normals, half_edges, edge_class, other)
+    if not (its_bend <= ALIKE * bend and bend <= ALIKE * its_bend):
+        return False
+    own = between(points, edges[e, 0], edges[e, 1])
+    its = between(points, edges[other, 0], edges[other, 1])
+    along = dot(its, own)
+    if not along * along >= parallel * (dot(its, its) * dot(own, own)):
+        return False
+    rises = _rises(points, normals, faces, edges, half_edges, e)
+    return _rises(points, normals, faces, edges, half_edges, other) == rises
+
+
+@kernel(
+    SIZE,
+    *(POINTS, POINTS, INDICES, INDICES, INDICES, INDICES, CLASSES, REAL, REAL),
+    *(INDEX, SIZE, SIZE, FLAGS_OUT),
+)
+def mark_alone(
+    points,
+    normals,
+    faces,
+    edges,
+    face_edges,
+    half_edges,
+    edge_class,
+    parallel,
+    row_cosine,
+    flat,
+    begin,
+    end,
+    alone,
+):
+    """Mark those of the edges begin … end − 1 that turn far, or have no like on one side.
+
+    On a side are the edges of its face, and of the faces across those of them that turn less than
+    half as much. ``parallel`` is the square of the least cosine between edges.
+    """
+    shape = points, normals, faces, edges, half_edges, edge_class, parallel
+    for i in range(natural(begin), end):
+        e = flat[i]
+        turn = _cosine(normals, half_edges, edge_class, e)
+        sides_with_like = 0
+        for h in range(2):
+            f, found = half_edges[e, h] // 3, False
+            for k in range(3):
+                side = face_edges[f, k]
+                found |= _is_like(*shape, e, turn, side)
+                if side == e or edge_class[side] != INTERIOR:
+                    continue
+                if not _cosine(normals, half_edges, edge_class, side) > _half(turn):
+                    continue
+                first = half_edges[side, 0] // 3
+                beyond = half_edges[side, 1] // 3 if first == f else first
+                for m in range(3):
+                    found |= _is_like(*shape, e, turn, face_edges[beyond, m])
+            sides_with_like += found
+        alone[i] = turn < row_cosine or sides_with_like < 2
     return 0
 
 

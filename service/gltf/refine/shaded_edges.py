@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Int
 
 from pns_common.connectivity.creases import Creases
-from pns_common.crease_lines import crease_lines
+from pns_common.crease_lines import named_on_parts, without_gentle
 from pns_common.geometry.shaded_smooth import shaded_smooth
 from pns_common.mesh import Cleaned
 
@@ -35,11 +37,16 @@ def creases_by_shading(
     is_smooth = shaded_smooth(
         mesh.vertices, mesh.faces, shading.faces, shading.smooth, part_of_edge, count
     )
-    hard = shading.edges[shading.hard & is_smooth[part_of_edge]]
-    if len(hard) == 0:
+    hard = shading.hard & is_smooth[part_of_edge]
+    # Who said of some edges that they are hard meant others to be round.
+    told = np.bincount(part_of_edge[shading.hard], minlength=count) > 0
+    smooth = shading.smooth & told[part_of_edge]
+    if not (hard | smooth).any():
         return lines
-    shown = crease_lines(mesh, lines.line_angle)
-    return Creases(np.concatenate([hard, shown]), levels=lines.levels)
+    shown = named_on_parts(mesh, lines, part, count)
+    shown = without_gentle(shown, mesh, lines, shading.edges[smooth])
+    assert shown.named is not None
+    return replace(shown, named=np.concatenate([shading.edges[hard], shown.named]))
 
 
 def _have_normals(control: ControlMesh) -> bool:

@@ -15,6 +15,7 @@ from jaxtyping import Int
 
 from pns_common.base.whole_file import replace_file, replacing
 from pns_common.connectivity.creases import NO_CREASES, Creases
+from pns_common.crease_lines import turns_of_parts
 from pns_common.errors import PnsError
 from pns_common.fused import kernel_blocks, load_kernels
 from pns_common.geometry.sharp_edges import edges_sharper_than
@@ -34,7 +35,9 @@ from .partition import Parts
 from .target import Target
 from .tiles import Tiles, write_tile
 
-COUNT, REFINE = "count", "refine"
+COUNT, TURNS, REFINE = "count", "turns", "refine"
+# Names of what they leave behind.
+_DONE = {COUNT: "count-{:05}.npy", TURNS: "turns-{:05}.json", REFINE: "part-{:05}.json"}
 
 # No part takes less for a face that it makes, beside what any worker takes (docs/scale.md).
 LEAST_BYTES_PER_FACE = 150
@@ -45,11 +48,12 @@ class PartTask:
     """What a worker is told of a part.
 
     Attributes:
-        stage: COUNT or REFINE.
+        stage: COUNT, TURNS or REFINE.
         mesh, work: folders of the mesh and of what is known of it.
         length, sides: R, and the sides of all faces.
         vertices: of each level of the whole mesh; empty while it is counted.
         target: where to write; None while it is counted.
+        edged: whether the whole is an edged mesh, where lines ask for that.
         memory: bytes that the part may take; None: any.
         threads: of the worker.
     """
@@ -66,6 +70,7 @@ class PartTask:
     vertices: tuple[int, ...] = ()
     target: Target | Tiles | None = None
     memory: int | None = None
+    edged: bool | None = None
     threads: int = 1
     attempt: int = 1
 
@@ -82,7 +87,7 @@ class PartDone:
 
 def done_file(work: Path, stage: str, part: int) -> Path:
     """Return what is there as soon as a part is done."""
-    return work / (f"count-{part:05}.npy" if stage == COUNT else f"part-{part:05}.json")
+    return work / _DONE[stage].format(part)
 
 
 def run_part(task: PartTask) -> PartDone:
@@ -102,6 +107,10 @@ def run_part(task: PartTask) -> PartDone:
         shown = shown_first(cutout(mesh, adjacency, own, 1).piece, task.options.levels)
         with replacing(file) as temporary, temporary.open("wb") as stream:
             np.save(stream, shown.astype(np.uint32))
+    elif task.stage == TURNS:
+        scheme = scheme_of(task.options, task.model)
+        turns = _turns(cutout(mesh, adjacency, own, 1).piece, lines_of(task.options, scheme))
+        replace_file(file, json.dumps(turns).encode())
     else:
         try:
             report = _refine(task, mesh, adjacency, own)
@@ -137,6 +146,16 @@ def _refine(
     }
 
 
+def _turns(piece: Piece, lines: Creases) -> tuple[int, int]:
+    """Count the piece's own edges that turn by more than θ, and than θ'."""
+    load_kernels()
+    assert lines.line_angle is not None
+    assert lines.edged_angle is not None
+    angles, of_own = (lines.line_angle, lines.edged_angle), piece.own.astype(np.int64)
+    _, (sharp, bent) = turns_of_parts(piece.points, piece.faces, angles, of_own, 2).tolist()
+    return sharp, bent
+
+
 def _surely_refined(
     task: PartTask,
     scheme: Scheme,
@@ -160,7 +179,7 @@ def _surely_refined(
         cut = cutout(mesh, adjacency, own, rings)
         _check_memory(task, cut, adjacency)
         piece = with_angle_creases(cut.piece, task.options.crease_angle)
-        piece = replace(piece, creases=lines) if looks else piece
+        piece = replace(piece, creases=replace(lines, edged=task.edged)) if looks else piece
         blocks = kernel_blocks(task.threads)
         try:
             return rings, cut, refine_piece(piece, scheme, levels, task.length, blocks)

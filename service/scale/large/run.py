@@ -15,17 +15,19 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from pns_common.fused import load_kernels
+from pns_common.geometry.crease_lines import is_edged
 from pns_common.geometry.side_lengths import SideLengths
 from pns_common.pieces import LevelTally, reduced_report
 from pns_common.schemes import Scheme
 
 from ...errors import InvalidParameter, ServiceError, WorkerDied
+from ...meshes.shape_creases import lines_of
 from ..engines.work import Engine, Work
 from . import adjacency, partition
 from .arrays import ArrayMesh, blocks_of
 from .formats import OutputKind, input_mesh, output_kind
 from .numbering import BASES, write_bases
-from .part import COUNT, REFINE, PartDone, PartTask, done_file, run_part, scheme_of
+from .part import COUNT, REFINE, TURNS, PartDone, PartTask, done_file, run_part, scheme_of
 from .plan import Large, keep, kept, work_folder
 from .room import check_room
 from .survey import Survey, survey, used_vertices
@@ -98,11 +100,14 @@ def run_large(
             load_kernels()
 
         def tasks(
-            stage: str, vertices: tuple[int, ...], target: Target | Tiles | None
+            stage: str,
+            vertices: tuple[int, ...] = (),
+            target: Target | Tiles | None = None,
+            edged: bool | None = None,
         ) -> list[PartTask]:
             folders = str(mesh.folder.resolve()), str(work.resolve())
             memory = None if large.parts else large.memory
-            what = large.options, large.model, length, about.sides, vertices, target, memory
+            what = large.options, large.model, length, about.sides, vertices, target, memory, edged
             return [
                 PartTask(stage, part, parts, *folders, *what)
                 for part in range(parts)
@@ -113,11 +118,17 @@ def run_large(
         if kind.numbered:
             with spent.stage("count"):
                 if not (work / BASES).exists():
-                    _do(tasks(COUNT, (), None), parts, engine, console, Spent())
+                    _do(tasks(COUNT), parts, engine, console, Spent())
                 vertices = _numbered(about, parts, large.options.levels, work)
         target = _target(kind, mesh, about, vertices, large.options.levels, work)
+        edged = None
+        if mesh.creases is None and lines_of(large.options, scheme).edged_angle is not None:
+            with spent.stage("turns"):
+                _do(tasks(TURNS), parts, engine, console, Spent())
+                turns = [kept(done_file(work, TURNS, part)) for part in range(parts)]
+                edged = is_edged(*(sum(counts) for counts in zip(*turns, strict=True)))
         with spent.stage("refine"):
-            _do(tasks(REFINE, vertices, target), parts, engine, console, spent)
+            _do(tasks(REFINE, vertices, target, edged), parts, engine, console, spent)
         with spent.stage("finish"):
             done = [kept(done_file(work, REFINE, part)) for part in range(parts)]
             fitted = scheme.fitted(lambda: about.sides)

@@ -1,16 +1,20 @@
 """Crease lines: what is sharp stays, what is round does not, whatever stands for it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Mesh
+from pns_common import Creases, Mesh
 from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.geometry.crease_lines import (
     CREASE_ANGLE,
+    EDGED_ANGLE,
     ROUNDS,
     edges_beyond,
+    is_edged,
     line_rows,
     with_crease_lines,
 )
@@ -18,6 +22,8 @@ from pns_common.geometry.frames import face_normals
 from tests.support.meshes import block, bumpy_sphere, grid, manifolds, rotation, soups
 from train.data.primitives import box, cone, cylinder, globe, icosphere, l_block, tetrahedron, torus
 
+SHARP_ALONE = Creases(line_angle=CREASE_ANGLE)
+WITH_GENTLE = Creases(line_angle=CREASE_ANGLE, edged_angle=EDGED_ANGLE)
 ROUND = {
     "tetrahedron": tetrahedron(),
     "octahedron": globe(4, 1),
@@ -45,9 +51,9 @@ SHARP = {
 }
 
 
-def lines(mesh, angle=CREASE_ANGLE):
+def lines(mesh, creases=SHARP_ALONE):
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    rows = line_rows(mesh.vertices, normals_of(mesh), topology, angle)
+    rows = line_rows(mesh.vertices, normals_of(mesh), topology, creases)
     return {tuple(pair) for pair in topology.edges[rows]}
 
 
@@ -55,9 +61,10 @@ def normals_of(mesh):
     return face_normals(mesh.vertices, mesh.faces)
 
 
+@pytest.mark.parametrize("creases", [SHARP_ALONE, WITH_GENTLE])
 @pytest.mark.parametrize("name", ROUND)
-def test_what_may_stand_for_a_round_shape_has_no_lines(name):
-    assert lines(ROUND[name]) == set()
+def test_what_may_stand_for_a_round_shape_has_no_lines(name, creases):
+    assert lines(ROUND[name], creases) == set()
 
 
 @pytest.mark.parametrize("name", SHARP)
@@ -66,8 +73,60 @@ def test_edges_between_flat_sides_are_lines(name):
     assert len(lines(mesh)) == count
 
 
+def prism(profile):
+    """A convex profile, drawn along z."""
+    n = len(profile)
+    points = np.concatenate([np.c_[profile, np.zeros(n)], np.c_[profile, np.full(n, 3.0)]])
+    k, after = np.arange(n), (np.arange(n) + 1) % n
+    fan = np.stack([0 * k[2:], k[1:-1], k[2:]], axis=1)
+    walls = [np.c_[k, after, n + after], np.c_[k, n + after, n + k]]
+    return Mesh(points, np.concatenate([*walls, fan[:, ::-1], fan + n]))
+
+
+# All turns beyond 66 degrees but at the two edges of the chamfer, which turn by 45.
+CHAMFERED = prism([[0, 0], [2, 0], [2, 1.5], [1.5, 2], [0, 2]])
+# Plates of a hull: turns of 20 to 50 degrees between plane faces of any width.
+HULL = prism([[0, 0], [3, 0], [4.5, 0.9], [4.9, 2], [3, 3.1], [1.2, 3.3], [0, 2]])
+
+
+@pytest.mark.parametrize(
+    ("mesh", "sharp", "all_of_them"),
+    [
+        (CHAMFERED, 13, 15),
+        (HULL, 16, 21),
+        (cylinder(6), 12, 18),
+        *((cylinder(sides), 2 * sides, 2 * sides) for sides in (7, 8, 12, 16)),
+        (cylinder(8, rows=3), 16, 16),
+        (cone(16), 16, 16),
+        (l_block(), 22, 22),
+    ],
+)
+def test_edged_meshes_keep_gentler_edges_that_stand_alone(mesh, sharp, all_of_them):
+    assert len(lines(mesh)) == sharp
+    assert len(lines(mesh, WITH_GENTLE)) == all_of_them
+
+
+def test_a_mesh_is_edged_where_half_of_its_turns_are_sharp():
+    assert is_edged(1, 2)
+    assert not is_edged(1, 3)
+    assert not is_edged(0, 0)
+    # What is known of the whole is not asked of a piece of it.
+    for edged, count in ((True, 15), (False, 13)):
+        assert len(lines(CHAMFERED, replace(WITH_GENTLE, edged=edged))) == count
+    for edged, count in ((True, 4), (None, 0), (False, 0)):
+        assert len(lines(pleat(30), replace(WITH_GENTLE, edged=edged))) == count
+
+
+def pleat(degrees):
+    """A sheet of four by four cells, folded once along its middle row."""
+    points, faces = grid(5)
+    half, y = np.radians(degrees) / 2, points[:, 1]
+    folded = np.stack([points[:, 0], y * np.cos(half), -np.abs(y) * np.sin(half)], axis=1)
+    return Mesh(folded, faces)
+
+
 @given(
-    manifolds() | soups() | st.sampled_from([mesh for mesh, _ in SHARP.values()]),
+    manifolds() | soups() | st.sampled_from([mesh for mesh, _ in SHARP.values()] + [CHAMFERED]),
     st.integers(0, 99),
     st.floats(0.01, 100),
     st.booleans(),
@@ -82,8 +141,9 @@ def test_lines_do_not_depend_on_where_a_mesh_lies_nor_on_its_numbers(mesh, seed,
     moved = np.empty_like(turned)
     moved[order] = turned
     renumbered = Mesh(moved, np.roll(order[faces][rng.permutation(len(faces))], seed % 3, axis=1))
-    expected = {tuple(sorted(order[list(pair)])) for pair in lines(mesh)}
-    assert lines(renumbered) == expected
+    for creases in (SHARP_ALONE, WITH_GENTLE):
+        expected = {tuple(sorted(order[list(pair)])) for pair in lines(mesh, creases)}
+        assert lines(renumbered, creases) == expected
 
 
 def folded_sheet(length, loose):
@@ -125,7 +185,7 @@ def test_an_edge_is_beyond_an_angle_where_both_faces_have_a_normal():
 def test_lines_become_creases_beside_those_that_are_there():
     mesh = box()
     plain = build_topology(mesh.faces, 8)
-    creased = with_crease_lines(plain, mesh.vertices, normals_of(mesh), CREASE_ANGLE)
+    creased = with_crease_lines(plain, mesh.vertices, normals_of(mesh), SHARP_ALONE)
     assert (creased.edge_class == EdgeClass.CREASE).sum() == 12
     assert len(creased.interior) == 6
-    assert with_crease_lines(plain, mesh.vertices, normals_of(mesh), None) is plain
+    assert with_crease_lines(plain, mesh.vertices, normals_of(mesh), Creases()) is plain

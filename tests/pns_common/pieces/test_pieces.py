@@ -1,5 +1,7 @@
 """Pieces: a mesh cut anyhow, each part refined alone, is the mesh refined, in bits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 from pns_common import Creases, Mesh, crease_lines, load_model, loop, pns, refine
 from pns_common.connectivity.creases import NO_CREASES
 from pns_common.connectivity.topology import build_topology
+from pns_common.crease_lines import edged_parts
 from pns_common.geometry.side_lengths import measure_sides
 from pns_common.pieces import (
     reduced_report,
@@ -34,6 +37,8 @@ def assert_pieces_are_the_whole(mesh, owner, scheme, levels, creases=None, lines
     if length == 0:
         return
     fitted = scheme.fitted(lambda: measure_sides(mesh.vertices, mesh.faces))
+    if lines.edged_angle is not None:
+        lines = replace(lines, edged=is_edged_mesh(mesh, lines))
     made = pieces_refined(mesh, owner, fitted, levels, length, creases, lines)
     written = np.zeros(len(whole.mesh.faces), dtype=int)
     for piece in made:
@@ -45,6 +50,11 @@ def assert_pieces_are_the_whole(mesh, owner, scheme, levels, creases=None, lines
     assert_report_is_the_whole(reduced_report([p.refined.tallies for p in made]), whole.report)
     fans = sum(piece.refined.several_fans for piece in made)
     assert fans == whole.report["multi_fan_vertices"]
+
+
+def is_edged_mesh(mesh, lines):
+    whole = np.zeros(len(mesh.faces), dtype=np.int64)
+    return bool(edged_parts(mesh, lines, whole, 1)[0])
 
 
 def assert_report_is_the_whole(reduced, report):
@@ -88,12 +98,17 @@ def test_pieces_with_boundaries_and_creases_are_the_whole(name):
     assert_pieces_are_the_whole(mesh, owner, SCHEMES[name], 2, creases)
 
 
-def pleats(n, seed):
-    """A sheet of pleats, each smoothed out from somewhere on: lines with loose ends everywhere."""
+def pleats(n, seed, gentle=0.0):
+    """A sheet of pleats, each smoothed out from somewhere on: lines with loose ends everywhere.
+
+    ``gentle`` is the share of those that are a third as high.
+    """
     points, faces = grid(n)
     row, column = np.divmod(np.arange(n * n), n)
-    ends = np.random.default_rng(seed).integers(6, n + 6, n)
-    points[:, 2] = np.where((row % 2 == 1) & (column < ends[row]), 2 / (n - 1), 0)
+    rng = np.random.default_rng(seed)
+    ends = rng.integers(6, n + 6, n)
+    height = np.where(rng.random(n) < gentle, 1 / 3, 1.0) * 2 / (n - 1)
+    points[:, 2] = np.where((row % 2 == 1) & (column < ends[row]), height[row], 0)
     return Mesh(points, faces)
 
 
@@ -103,6 +118,17 @@ def test_pieces_find_the_lines_of_the_whole():
     owner = (mesh.vertices[mesh.faces].mean(axis=1)[:, :2] // 0.3) @ [1, 20]
     assert_pieces_are_the_whole(mesh, owner, loop(), 3, lines=lines)
     assert len(crease_lines(mesh)) > 100
+
+
+def test_pieces_of_an_edged_mesh_find_its_gentler_lines():
+    """Of a piece that has no sharp edge, too; and whether an edge stands alone is seen there."""
+    mesh = pleats(24, 0, gentle=0.2)
+    lines = Creases(line_angle=66.0, levels=2, edged_angle=20.0)
+    assert is_edged_mesh(mesh, lines)
+    assert len(crease_lines(mesh)) > len(crease_lines(mesh, 66.0)) + 50
+    for side in (0.3, 0.17):
+        owner = (mesh.vertices[mesh.faces].mean(axis=1)[:, :2] // side) @ [1, 40]
+        assert_pieces_are_the_whole(mesh, owner, loop(), 2, lines=lines)
 
 
 @pytest.mark.parametrize("name", SMALL)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool, Int
 
 from pns_common import Creases, Mesh
-from pns_common.crease_lines import named_on
+from pns_common.crease_lines import named_on, without_gentle
 from pns_common.fused.interior_edges import interior_edges
 from pns_common.geometry.shaded_smooth import shaded_smooth
 
@@ -15,15 +17,25 @@ from .snapshot import Domain, Snapshot, edge_keys
 
 def shown_creases(snapshot: Snapshot, asked: Creases) -> Creases:
     """Return what is asked for, by name; with lines also the hard edges of a smooth mesh."""
-    lines = named_on(Mesh(snapshot.points, snapshot.triangles), asked)
-    if asked.line_angle is None or lines.named is None:
+    if asked.line_angle is None:
+        return asked
+    mesh = Mesh(snapshot.points, snapshot.triangles)
+    lines = named_on(mesh, asked)
+    edges, faces, hard = shaded_edges(snapshot)
+    if not hard.any():
         return lines
-    named = np.concatenate([hard_edges_of_smooth(snapshot), lines.named])
-    return Creases(named, levels=lines.levels)
+    # Who said of some edges that they are hard meant others to be round.
+    lines = without_gentle(lines, mesh, asked, edges[~hard])
+    if not shaded_smooth(snapshot.points, snapshot.triangles, faces, ~hard)[0]:
+        return lines
+    assert lines.named is not None
+    return replace(lines, named=np.concatenate([edges[hard], lines.named]))
 
 
-def hard_edges_of_smooth(snapshot: Snapshot) -> Int[np.ndarray, "N 2"]:
-    """Return the edges that are marked sharp or lie at flat faces, if the mesh is shaded smooth."""
+def shaded_edges(
+    snapshot: Snapshot,
+) -> tuple[Int[np.ndarray, "I 2"], Int[np.ndarray, "I 2"], Bool[np.ndarray, " I"]]:
+    """Return the interior edges, their faces, and which are marked sharp or lie at flat faces."""
     triangles, points = snapshot.triangles, snapshot.points
     edges, half_edges = interior_edges(triangles, len(points))
     faces = half_edges // 3
@@ -33,9 +45,7 @@ def hard_edges_of_smooth(snapshot: Snapshot) -> Int[np.ndarray, "N 2"]:
     hard = flat[polygons].any(axis=1) | np.isin(edge_keys(edges), edge_keys(marked))
     # A polygon's own diagonals have one normal on both sides.
     hard &= polygons[:, 0] != polygons[:, 1]
-    if not hard.any() or not shaded_smooth(points, triangles, faces, ~hard)[0]:
-        return np.empty((0, 2), dtype=np.int64)
-    return edges[hard].astype(np.int64)
+    return edges.astype(np.int64), faces, hard
 
 
 def _marked(snapshot: Snapshot, name: str, domain: Domain, count: int) -> Bool[np.ndarray, " N"]:

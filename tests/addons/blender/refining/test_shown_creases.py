@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from addons.blender.pns_refine.refining.compute import Choice, compute
-from addons.blender.pns_refine.refining.shown_creases import hard_edges_of_smooth, shown_creases
+from addons.blender.pns_refine.refining.shown_creases import shown_creases
 from addons.blender.pns_refine.refining.snapshot import Domain, Layer, Rule
 from pns_common import Creases, load_model
 from pns_common.connectivity.creases import NO_CREASES
@@ -12,6 +12,11 @@ from tests.addons.blender.quads import cube, grid
 
 CELLS = 6
 LINES = Creases(line_angle=66.0, levels=2)
+
+
+def hard_edges_alone(shape):
+    """What is kept where nothing turns so much that it is a line."""
+    return shown_creases(shape, Creases(line_angle=179.0)).named
 
 
 def marks(name, domain, values):
@@ -28,21 +33,21 @@ def with_sharp_middle(**layers):
 
 def test_edges_marked_sharp_are_the_hard_ones_of_a_smooth_mesh():
     shape, middle = with_sharp_middle()
-    found = hard_edges_of_smooth(shape)
+    found = hard_edges_alone(shape)
     assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, middle.tolist()))
 
 
 def test_a_mesh_that_is_shaded_flat_has_none():
     flat = marks("sharp_face", Domain.FACE, np.ones(CELLS**2))
     shape, _ = with_sharp_middle(flat=flat)
-    assert len(hard_edges_of_smooth(shape)) == 0
-    assert len(hard_edges_of_smooth(grid(CELLS))) == 0
+    assert len(hard_edges_alone(shape)) == 0
+    assert len(hard_edges_alone(grid(CELLS))) == 0
 
 
 def test_the_edges_of_a_flat_face_are_hard_and_its_diagonal_is_not():
     one = np.arange(CELLS**2) == CELLS * 3 + 3
     shape = grid(CELLS, (marks("sharp_face", Domain.FACE, one),))
-    assert len(hard_edges_of_smooth(shape)) == 4
+    assert len(hard_edges_alone(shape)) == 4
 
 
 def test_they_are_kept_beside_lines_for_as_many_levels_and_only_where_lines_are_asked_for():

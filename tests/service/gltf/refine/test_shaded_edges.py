@@ -1,16 +1,18 @@
 """Hard edges of what is shaded smooth are kept, and lines however they are shaded."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from pns_common import load_model, loop
+from pns_common import load_model
 from pns_common.crease_lines import named_on
 from service.gltf.read.primitives import read_primitive
 from service.gltf.read.upload import read_upload
 from service.gltf.refine.control_mesh import control_mesh
 from service.gltf.refine.hard_edges import hard_edges
-from service.gltf.refine.refinement import creases_of
 from service.gltf.subdivide import subdivide_gltf
+from service.meshes.shape_creases import LINES
 from service.options import Limits, Options
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box
@@ -137,12 +139,45 @@ def test_a_smooth_mesh_stays_so_whose_faces_carry_normals_of_other_lengths_or_of
 
 def test_artists_shade_hard_what_the_shape_shows_to_be_a_line():
     """Lines know positions alone, and artists' normals are another's word on the same edges."""
-    lines = hard = 0
+    lines, hard = np.zeros(2), np.zeros(2)
     for control in control_meshes(shared_path("assets")):
-        shown = creases_of(control, Options(crease="lines"), loop())
-        named = named_on(control.cleaned.mesh, shown).named
         meant = {tuple(edge) for edge in hard_edges(control, control.cleaned).tolist()}
-        lines += len(named)
-        hard += sum(tuple(edge) in meant for edge in named.tolist())
-    assert lines > 1000
-    assert hard > 0.99 * lines
+        for gentle, edged in ((0, False), (1, None)):
+            named = named_on(control.cleaned.mesh, replace(LINES, edged=edged)).named
+            lines[gentle] += len(named)
+            hard[gentle] += sum(tuple(edge) in meant for edge in named.tolist())
+    assert lines[0] > 1000
+    assert hard[0] > 0.99 * lines[0]
+    # The gentler edges of edged meshes are few, and four in five were meant, too.
+    assert lines[1] > lines[0] + 50
+    assert hard[1] - hard[0] > 0.75 * (lines[1] - lines[0])
+
+
+def nut(shading):
+    """A prism of six sides, whose walls turn by 60 degrees, and its rims by 90."""
+    angle = 2 * np.pi * np.arange(6) / 6
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    corners = np.concatenate([np.c_[ring, -np.ones(6)], np.c_[ring, np.ones(6)]])
+    k, after = np.arange(6), (np.arange(6) + 1) % 6
+    walls = np.concatenate([np.c_[k, after, 6 + after], np.c_[k, 6 + after, 6 + k]])
+    fan = np.stack([0 * k[2:], k[1:-1], k[2:]], axis=1)
+    faces = np.concatenate([walls, fan[:, ::-1], fan + 6])
+    a, b, c = corners[faces].transpose(1, 0, 2)
+    normals = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+    points = corners[faces].reshape(-1, 3)
+    if shading == "hard rims":
+        on_walls = np.arange(len(points)) < 3 * len(walls)
+        normals[on_walls] = points[on_walls] * [1, 1, 0]
+    elif shading == "smooth":
+        normals = points
+    normals = normals / np.linalg.norm(normals, axis=1)[:, None]
+    indices = np.arange(len(points))
+    return {"POSITION": np.float32(points), "NORMAL": np.float32(normals), "indices": indices}
+
+
+@pytest.mark.parametrize(("shading", "kept"), [("flat", 18), ("smooth", 18), ("hard rims", 12)])
+def test_who_shades_a_wall_smooth_between_hard_rims_means_it_round(shading, kept):
+    assert creases(refined([nut(shading)]))[0] == kept
+    # Beside others, each mesh by itself.
+    both = refined([nut(shading)], [smooth_box()], [nut("flat")])
+    assert [creases(both, mesh)[0] for mesh in range(3)] == [kept, 12, 18]

@@ -14,6 +14,7 @@ from service.cli import app
 from service.options import Options
 from tests.service.scale.large.parts import arrays, assert_is, contents, many_kinds, refined
 from tests.support.meshes import bent, block, grid, manifolds, soups
+from train.data.primitives import cylinder
 
 
 @pytest.mark.parametrize("parts", [1, 2, 7, 64])
@@ -83,6 +84,15 @@ def test_creases_by_angle_cross_parts(tmp_path):
     one = refined(tmp_path / "in", tmp_path / "one", 1, options)
     assert one == report
     assert contents(tmp_path / "one") == contents(tmp_path / "out")
+
+
+@pytest.mark.parametrize("sides", [6, 12])
+def test_parts_know_whether_the_whole_is_edged(tmp_path, sides):
+    """By their own turns some would say otherwise: the walls of a cylinder, without its rims."""
+    mesh = cylinder(sides, rows=4)
+    source = arrays(tmp_path / "in", mesh)
+    refined(source, tmp_path / "out", 9, Options(levels=2))
+    assert_is(tmp_path / "out", refine(mesh, pns(load_model()), 2))
 
 
 @pytest.mark.parametrize("named", [False, True])
