@@ -79,6 +79,12 @@ def protocol_of(connection):
     return mine
 
 
+def until_it_runs(folder):
+    """Wait until a worker has taken the job that tells its steps in a folder."""
+    while not (folder / "took-1").exists():
+        time.sleep(0.005)
+
+
 def trickle(connection, piece=b"x", *, most=PATIENCE / 0.05):
     """Send a piece now and then, until the server ends the connection; return what it said."""
     connection.settimeout(0.05)
@@ -323,8 +329,7 @@ def test_requests_that_wait_behind_another_stay_in_the_clients_socket(address, t
     body = f"steps {tmp_path}".encode()
     with connect(address) as connection:
         connection.sendall(head("POST", "/subdivide", f"Content-Length: {len(body)}\r\n") + body)
-        while not (tmp_path / "took-1").exists():
-            time.sleep(0.005)
+        until_it_runs(tmp_path)
         mine = protocol_of(connection)
         connection.setblocking(False)
         requests = head("GET", "/healthz") * 1000
@@ -382,6 +387,7 @@ def test_streams_of_events_give_way_as_if_they_had_ended(tmp_path):
         kind = {"Content-Type": "model/gltf-binary"}
         client.request("POST", "/jobs", f"steps {tmp_path}", kind)
         job = json.loads(client.getresponse().read())["id"]
+        until_it_runs(tmp_path)
         followers = [client.sock, *(opened.enter_context(connect(where)) for _ in range(3))]
         for connection in followers:
             connection.sendall(head("GET", f"/jobs/{job}/events"))
