@@ -8,12 +8,13 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterator
-from itertools import islice, pairwise
+from itertools import chain, islice
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from ..errors import UnreadableError
+from .fans import fans
 from .indexed_triangles import NUMBER, IndexedTriangles
 from .text_numbers import reals, whole
 
@@ -49,15 +50,20 @@ def read_off(data: bytes) -> IndexedTriangles:
     polygons = [_corners(line) for line in islice(lines, face_count)]
     if len(vertices) < vertex_count or len(polygons) < face_count or not polygons:
         raise UnreadableError(_CUT_OFF)
+    sizes = np.array([len(polygon) for polygon in polygons])
+    try:
+        corners = np.array(list(chain.from_iterable(polygons)), dtype=np.int64)
+    except OverflowError as error:
+        raise UnreadableError(_NO_FACE) from error
     extras = header[1].decode()
     unsupported = {
         f"values that {extras}OFF adds to vertices": vertex_count if extras else 0,
-        "faces of fewer than three vertices": sum(len(polygon) < 3 for polygon in polygons),
+        "faces of fewer than three vertices": int((sizes < 3).sum()),
     }
     return IndexedTriangles(
         vertices,
-        _fans(polygons),
-        split=sum(max(0, len(polygon) - 3) for polygon in polygons),
+        fans(sizes, corners),
+        split=int(np.maximum(sizes - 3, 0).sum()),
         unsupported={name: count for name, count in unsupported.items() if count},
     )
 
@@ -92,15 +98,3 @@ def _corners(line: list[bytes]) -> list[int]:
     if len(corners) != count:
         raise UnreadableError(_NO_FACE)
     return corners
-
-
-def _fans(polygons: list[list[int]]) -> Int[np.ndarray, "F 3"]:
-    triangles = [
-        (polygon[0], second, third)
-        for polygon in polygons
-        for second, third in pairwise(polygon[1:])
-    ]
-    try:
-        return np.array(triangles, dtype=np.int64).reshape(-1, 3)
-    except OverflowError as error:
-        raise UnreadableError(_NO_FACE) from error

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Int
 
 from ...errors import UnreadableError
-from .fans import fans
+from ..fans import fans
 from .header import Element, PlyHeader, Property, ply_header
 from .textured_text import of_textured_triangles
 

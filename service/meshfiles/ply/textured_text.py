@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ...errors import UnreadableError
-from .fans import fans
+from ..fans import fans
 from .header import POLYGON, Element, PlyHeader
 
 # Two numbers for each of a face's corners.
