@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 
 from ...errors import UnreadableError
 from ..fans import fans
+from ..text_numbers import reals, whole
 from .header import POLYGON, Element, PlyHeader
 
 # Two numbers for each of a face's corners.
@@ -58,7 +59,7 @@ def _polygons(
 ) -> tuple[Int[np.ndarray, " F"], Int[np.ndarray, " C"], Float[np.ndarray, "C 2"]]:
     """Return how many corners each polygon has, and all corners and their coordinates in a row."""
     sizes: list[int] = []
-    corners: list[bytes] = []
+    corners: list[int] = []
     uv: list[bytes] = []
     # One by one: where a number stands hangs on the lists before it.
     for face, row in enumerate(rows):
@@ -67,18 +68,21 @@ def _polygons(
             for one in faces.properties:
                 at += 1
                 if one.count_kind is not None:
-                    count = counts[one.name] = int(words[at - 1])
-                    (uv if one.name == CORNER_UV else corners).extend(words[at : at + count])
+                    count = counts[one.name] = whole(words[at - 1])
+                    listed = words[at : at + count]
                     at += count
+                    if one.name == CORNER_UV:
+                        uv.extend(listed)
+                    else:
+                        corners.extend(map(whole, listed))
         except (IndexError, ValueError) as error:
             raise _fault(face) from error
         size = next(counts[name] for name in counts if name != CORNER_UV)
-        # Python takes 1_0 for a number.
-        if at > len(words) or size < 0 or b"_" in row or counts[CORNER_UV] != 2 * size:
+        if at > len(words) or size < 0 or counts[CORNER_UV] != 2 * size:
             raise _fault(face)
         sizes.append(size)
     try:
-        numbers = np.array(corners, dtype=np.int64), np.array(uv, dtype=np.float64)
+        numbers = np.array(corners, dtype=np.int64), reals([uv])
     except (OverflowError, ValueError) as error:
         raise UnreadableError("the PLY file has a face with what is no number") from error
     return np.array(sizes, dtype=np.int64), numbers[0], numbers[1].reshape(-1, 2)

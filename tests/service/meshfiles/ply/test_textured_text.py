@@ -66,7 +66,7 @@ def test_triangles_stay_as_they_are() -> None:
         ("4 0 1 2 3 8", "4 0 1 2 3 9", "face 0 of the PLY file"),
         ("4 0 1 2 3 8", "-4 0 1 2 3 8", "face 0 of the PLY file"),
         ("4 0 1 2 3 8", "4 0 1_0 2 3 8", "face 0 of the PLY file"),
-        ("4 0 1 2 3 8", "4 0 one 2 3 8", "what is no number"),
+        ("4 0 1 2 3 8", "4 0 one 2 3 8", "face 0 of the PLY file"),
         ("4 0 1 2 3 8", "4 0 9999999999999999999 2 3 8", "what is no number"),
         ("element face 3", "element face 4", "4 faces and ends after 3"),
     ],
