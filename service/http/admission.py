@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 
 from ..errors import BusyError
@@ -132,7 +132,7 @@ class _Bodies:
         if leaving is None or mine > self._max_bytes * 3 // 4:
             raise BusyError("the bodies that are held leave no room for this one")
         for other in leaving:
-            self._arriving.pop(other).reschedule(asyncio.get_running_loop().time())
+            _tell(self._arriving.pop(other))
             self.forget(other)
         self._held[body.client] += size
         body.size += size
@@ -158,15 +158,10 @@ class _Bodies:
 
     @asynccontextmanager
     async def arriving(self, body: Body) -> AsyncIterator[None]:
-        end = asyncio.timeout(None)
         try:
-            async with end:
+            async with _until_told(_given_way) as end:
                 self._arriving[body] = end
                 yield
-        except TimeoutError as error:
-            if not end.expired():
-                raise
-            raise _given_way() from error
         finally:
             told = self._arriving.pop(body, None) is None
         if told:
@@ -192,18 +187,12 @@ class _Answers:
     @asynccontextmanager
     async def held(self, client: str, size: int) -> AsyncIterator[None]:
         self._make_room(client, size)
-        end = asyncio.timeout(None)
-        try:
-            async with end:
-                self._taken[end] = client, size
-                try:
-                    yield
-                finally:
-                    self._taken.pop(end, None)
-        except TimeoutError as error:
-            if not end.expired():
-                raise
-            raise CutOffError from error
+        async with _until_told(CutOffError) as end:
+            self._taken[end] = client, size
+            try:
+                yield
+            finally:
+                self._taken.pop(end, None)
 
     def _make_room(self, client: str, size: int) -> None:
         held = Counter({client: size})
@@ -219,7 +208,7 @@ class _Answers:
             whose, own_size = left.pop(oldest)
             held[whose] -= own_size
         for end in self._taken.keys() - left.keys():
-            end.reschedule(asyncio.get_running_loop().time())
+            _tell(end)
         self._taken = left
 
 
@@ -247,20 +236,34 @@ class _Places:
 
     @asynccontextmanager
     async def until_ended(self) -> AsyncIterator[None]:
-        end = asyncio.timeout(None)
-        try:
-            async with end:
-                self._ends.add(end)
-                try:
-                    yield
-                finally:
-                    self._ends.discard(end)
-        except TimeoutError as error:
-            if not end.expired():
-                raise
-            raise DrainingError("the request was ended", retry_after=5) from error
+        async with _until_told(_ended) as end:
+            self._ends.add(end)
+            try:
+                yield
+            finally:
+                self._ends.discard(end)
 
     def end(self) -> None:
-        now = asyncio.get_running_loop().time()
         while self._ends:
-            self._ends.pop().reschedule(now)
+            _tell(self._ends.pop())
+
+
+def _ended() -> DrainingError:
+    return DrainingError("the request was ended", retry_after=5)
+
+
+@asynccontextmanager
+async def _until_told(error: Callable[[], Exception]) -> AsyncIterator[asyncio.Timeout]:
+    """Yield what `_tell` ends this by, with an error of its own."""
+    end = asyncio.timeout(None)
+    try:
+        async with end:
+            yield end
+    except TimeoutError as ended:
+        if not end.expired():
+            raise
+        raise error() from ended
+
+
+def _tell(end: asyncio.Timeout) -> None:
+    end.reschedule(asyncio.get_running_loop().time())
