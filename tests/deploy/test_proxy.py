@@ -34,7 +34,7 @@ def proxy(tmp_path_factory):
     folder, port = tmp_path_factory.mktemp("proxy"), free_port()
     lines = []
     handler = logging.Handler()
-    handler.emit = lambda record: lines.append(getattr(record, "fields", {}))
+    handler.emit = lambda record: lines.append(record.fields | {"request_id": record.request_id})
     journal = logging.getLogger("pns.request")
     level = journal.level
     journal.addHandler(handler)
@@ -151,13 +151,16 @@ def test_neither_bodies_nor_answers_are_collected_at_the_proxy(proxy):
     with socket.create_connection(address, timeout=600) as sender:
         sender.sendall(
             b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Type: model/gltf-binary\r\n"
-            b"Content-Length: %d\r\n\r\n" % (2 * half) + bytes(half)
+            b"X-Request-ID: half\r\nContent-Length: %d\r\n\r\n" % (2 * half) + bytes(half)
         )
         with suppress(ConnectionResetError):
             b"".join(iter(lambda: sender.recv(4096), b""))
-    # What came of it has gone on to the service.
-    told = heard(address, lines)
-    assert [line["received"] > 0 for line in told if line["route"] == "/subdivide"] == [True]
+    # What came of it has gone on to the service, which sees its end a moment after its client.
+    pause, told = threading.Event(), []
+    while not told:
+        pause.wait(0.1)
+        told = [line for line in heard(address, lines) if line["request_id"] == "half"]
+    assert [line["received"] > 0 for line in told] == [True]
 
     body = f"large {32 * half}".encode()
     with socket.socket() as reader:
