@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 
 from pns_common.base.extent import extent
 from pns_common.connectivity.creases import NO_CREASES, Creases
-from pns_common.crease_lines import named_on
+from pns_common.crease_lines import named_on_parts
 from pns_common.errors import MeshError
 from pns_common.fused.linear import linear_refinement
 from pns_common.mesh import Cleaned
@@ -23,7 +23,7 @@ from .control_mesh import ControlMesh, vertex_rows
 from .hard_edges import hard_edges
 from .parts import Parts
 from .refined_primitives import RefinedMesh
-from .shaded_edges import creases_by_shading
+from .shaded_edges import creases_by_shading, part_of_face
 from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
 from .where_acted import vertex_scalars
 
@@ -44,7 +44,9 @@ def creases_of(
     if options.crease == "auto":
         creases = creases_by_shading(control, control.cleaned, creases, parts)
     known = control.skin_and_morph.any or options.normals != "keep" or options.uv == "smooth"
-    return named_on(mesh, creases) if known else creases
+    if not known:
+        return creases
+    return named_on_parts(mesh, creases, *part_of_face(control, control.cleaned, parts))
 
 
 def refine_control_mesh(

@@ -32,7 +32,7 @@ def creases_by_shading(
     if not parted.any():
         return lines
     shading = shading_of(cleaned, labels, parted)
-    part, count = _part_of_face(control, cleaned, parts), 1 if parts is None else parts.count
+    part, count = part_of_face(control, cleaned, parts)
     part_of_edge = part[shading.faces[:, 0]]
     is_smooth = shaded_smooth(
         mesh.vertices, mesh.faces, shading.faces, shading.smooth, part_of_edge, count
@@ -53,10 +53,11 @@ def _have_normals(control: ControlMesh) -> bool:
     return any("NORMAL" in primitive.attributes for primitive in control.primitives)
 
 
-def _part_of_face(
+def part_of_face(
     control: ControlMesh, cleaned: Cleaned, parts: Parts | None
-) -> Int[np.ndarray, " F"]:
-    """Return the part of each face of the mesh to refine."""
+) -> tuple[Int[np.ndarray, " F"], int]:
+    """Return the part of each face of the mesh to refine, and how many there are."""
     if parts is None:
-        return np.zeros(len(cleaned.mesh.faces), dtype=np.int64)
-    return control.of_cleaned(cleaned, parts.of_face[np.concatenate(control.kept)])
+        return np.zeros(len(cleaned.mesh.faces), dtype=np.int64), 1
+    of_face = control.of_cleaned(cleaned, parts.of_face[np.concatenate(control.kept)])
+    return of_face, parts.count

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pns_common import load_model
+from pns_common import Mesh, load_model
 from pns_common.fused.linear import FusedLinearRefinement
 from pns_common.masks.linear import LinearRefinement
 from service.course import Course
@@ -19,6 +19,8 @@ from service.gltf.subdivide import Subdivided, subdivide_gltf
 from service.options import Limits, Options
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box, octahedron
+from tests.support.meshes import icosphere
+from train.data.primitives import cylinder
 
 MODEL = load_model("paper")
 OPTIONS = [
@@ -76,6 +78,29 @@ def test_together_is_as_alone_to_the_last_byte(
     alone = refine(data, **options)
     assert made.report == alone.report
     assert made.glb == alone.glb
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"normals": "smooth"}, {"normals": "smooth", "crease": "lines"}], ids=str
+)
+def test_each_is_edged_or_not_by_itself(
+    options: dict[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A cylinder of six sides is edged, and with a few spheres beside it all together are not."""
+    shapes = [cylinder(6), *(Mesh(*icosphere(0)) for _ in range(4))]
+    data = files.glb(*([{"POSITION": m.vertices, "indices": m.faces}] for m in shapes))
+    asked = Options(levels=2, **options)
+
+    def made() -> Subdivided:
+        return subdivide_gltf(data, "glb", asked, load_model(), Limits())
+
+    together = made()
+    edges = [mesh["levels"][0]["edges"] for mesh in together.report["meshes"]]
+    assert [counts.get("crease", 0) for counts in edges] == [18, 0, 0, 0, 0]
+    monkeypatch.setattr(meshes, "MOST_FACES", -1)
+    alone = made()
+    assert together.report == alone.report
+    assert together.glb == alone.glb
 
 
 def random_mesh(rng: np.random.Generator, kind: int) -> list[dict[str, object]]:
