@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.arrays import dot
 from pns_common.base.blocks import available_threads
 from pns_common.base.parameters import is_number
-from pns_common.connectivity.creases import Creases, pair_keys
+from pns_common.connectivity.creases import Creases, pair_keys, with_creases
 from pns_common.connectivity.topology import build_topology
 from pns_common.errors import ParameterError
 from pns_common.fused import fits, kernel_blocks, kernels_available, kernels_loaded
@@ -32,8 +32,9 @@ def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2
     """Return the edges that a mesh shows to be sharp, as pairs of vertices, for ``refine``.
 
     These turn by more than ``angle`` (degrees, between 0 and 180), lie between sides that are flat
-    beside them, and go on at both ends. None: by more than 66 degrees, and in meshes most of whose
-    turns are so sharp by more than 20, as the default model keeps them (geometry/crease_lines.py).
+    beside them, and go on at both ends. None: by more than 66 degrees, and where at least half of
+    the edges beyond 20 degrees are beyond 66, by more than 20, but for rows of like ones; so the
+    default model keeps them (geometry/crease_lines.py).
 
     Raises:
         ParameterError: it is no Mesh, or the angle is out of range.
@@ -47,19 +48,23 @@ def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2
 
 
 def lines_on(mesh: Mesh, creases: Creases) -> Int[np.ndarray, "N 2"]:
-    """Return the lines that creases say to look for."""
+    """Return the lines that creases say to look for, beside those that they name.
+
+    Raises:
+        ParameterError: one that is named is no edge of the mesh.
+    """
     points, faces = mesh.vertices, mesh.faces
     if kernels_available() and kernels_loaded() and fits(len(points), len(faces), 1):
         from pns_common.fused.crease_lines import crease_line_rows
         from pns_common.fused.face_measures import face_normals as measured_normals
-        from pns_common.fused.mesh_edges import build_edges
+        from pns_common.fused.level import control_edges
 
         blocks = kernel_blocks(available_threads())
-        edges = build_edges(faces.astype(np.int32), len(points), blocks)
+        edges = control_edges(faces, len(points), creases.named, blocks)
         normals = measured_normals(points, edges.faces, blocks)
         rows = crease_line_rows(points, edges, normals, creases, blocks)
         return edges.edges[rows].astype(np.int64)
-    topology = build_topology(faces, len(points))
+    topology = with_creases(build_topology(faces, len(points)), creases.named)
     normals = face_normals(points, faces)
     return topology.edges[line_rows(points, normals, topology, creases)]
 
@@ -68,14 +73,15 @@ def named_on(mesh: Mesh, creases: Creases) -> Creases:
     """Return creases with the lines that they look for found on a mesh, by name."""
     if creases.line_angle is None:
         return creases
-    return Creases(lines_on(mesh, creases), levels=creases.levels)
+    return _with_names(creases, lines_on(mesh, creases))
 
 
 def named_on_parts(
     mesh: Mesh, creases: Creases, part_of_face: Int[np.ndarray, " F"], count: int
 ) -> Creases:
     """Return the same of a mesh of so many parts that share no vertex, each edged or not."""
-    if creases.line_angle is None or creases.edged_angle is None:
+    is_known = creases.edged_angle is None or creases.edged is not None
+    if creases.line_angle is None or is_known or count == 1:
         return named_on(mesh, creases)
     edged = edged_parts(mesh, creases, part_of_face, count)
     lines = lines_on(mesh, replace(creases, edged=False))
@@ -85,7 +91,13 @@ def named_on_parts(
         gentle = lines_on(mesh, replace(creases, edged=True))
         in_edged = [edged[part_of_vertex[pairs[:, 0]]] for pairs in (lines, gentle)]
         lines = np.concatenate([lines[~in_edged[0]], gentle[in_edged[1]]])
-    return Creases(lines, levels=creases.levels)
+    return _with_names(creases, lines)
+
+
+def _with_names(creases: Creases, lines: Int[np.ndarray, "N 2"]) -> Creases:
+    """Return the creases that are named, and the lines, as creases by name."""
+    named = lines if creases.named is None else np.concatenate([creases.named, lines])
+    return Creases(named, levels=creases.levels)
 
 
 def without_gentle(
@@ -93,12 +105,13 @@ def without_gentle(
 ) -> Creases:
     """Return named lines without those that are in ``smooth`` too, and in no mesh but edged ones.
 
-    ``asked`` is what they were looked for by.
+    ``asked`` is what they were looked for by; what that names stays.
     """
+    kept = named_on(mesh, replace(asked, edged=False))
     assert creases.named is not None
+    assert kept.named is not None
     count = len(mesh.vertices)
-    sharp = lines_on(mesh, replace(asked, edged=False))
-    keys = [pair_keys(pairs, count) for pairs in (creases.named, sharp, smooth)]
+    keys = [pair_keys(pairs, count) for pairs in (creases.named, kept.named, smooth)]
     gone = np.isin(keys[0], keys[2]) & ~np.isin(keys[0], keys[1])
     return replace(creases, named=creases.named[~gone])
 
@@ -106,11 +119,11 @@ def without_gentle(
 def edged_parts(
     mesh: Mesh, creases: Creases, part_of_face: Int[np.ndarray, " F"], count: int
 ) -> Bool[np.ndarray, " P"]:
-    """Return which parts are edged."""
+    """Return which parts are edged, by their edges that are not named."""
     assert creases.line_angle is not None
     assert creases.edged_angle is not None
-    angles = creases.line_angle, creases.edged_angle
-    turns = turns_of_parts(mesh.vertices, mesh.faces, angles, part_of_face, count)
+    angles, named = (creases.line_angle, creases.edged_angle), creases.named
+    turns = turns_of_parts(mesh.vertices, mesh.faces, angles, part_of_face, count, named)
     return np.array([is_edged(sharp, bent) for sharp, bent in turns.tolist()], dtype=bool)
 
 
@@ -120,12 +133,16 @@ def turns_of_parts(
     angles: tuple[float, float],
     part_of_face: Int[np.ndarray, " F"],
     count: int,
+    named: Int[np.ndarray, "N 2"] | None = None,
 ) -> Int[np.ndarray, "P 2"]:
-    """Count each part's interior edges that turn by more than both angles, in degrees.
+    """Count each part's interior edges that turn by more than each of the angles, in degrees.
 
-    An edge is of the part of the first face on it.
+    An edge is of the part of the first face on it. Those that are named are creases, not interior.
     """
-    _, half_edges = interior_edges(faces, len(points))
+    edges, half_edges = interior_edges(faces, len(points))
+    if named is not None:
+        keys, named_keys = (pair_keys(pairs, len(points)) for pairs in (edges, named))
+        half_edges = half_edges[~np.isin(keys, named_keys)]
     normals, beside = face_normals(points, faces), half_edges // 3
     n, m = normals[beside[:, 0]], normals[beside[:, 1]]
     cosines, defined = dot(n, m), (dot(n, n) > 0) & (dot(m, m) > 0)

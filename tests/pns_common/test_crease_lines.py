@@ -109,16 +109,21 @@ def test_another_word_is_refused():
         refine(box(), GENERAL, creases="lines")
 
 
+def joined(parts):
+    """All as one mesh, and where the faces of each begin."""
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    union = Mesh(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)]),
+    )
+    return union, np.cumsum([0, *(len(part.faces) for part in parts)])
+
+
 @pytest.mark.parametrize("limit", [False, True])
 def test_parts_keep_their_lines_as_they_do_alone(limit):
     # The third alone is edged with edges that are gentler: all together are not.
     parts = [box(), Mesh(*bumpy_sphere(subdivisions=0)), cylinder(6), cylinder(8)]
-    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    both = Mesh(
-        np.concatenate([part.vertices for part in parts]),
-        np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)]),
-    )
-    ends = np.cumsum([0, *(len(part.faces) for part in parts)])
+    both, ends = joined(parts)
     made = refine_parts(both, ends, GENERAL, 2, limit=limit)
     assert made is not None
     alone = [refine(part, GENERAL, 2, limit=limit) for part in parts]
@@ -133,3 +138,35 @@ def test_lines_that_are_looked_for_can_be_named():
     assert (named.line_angle, named.levels) == (None, 2)
     given = Creases(np.array([[0, 1]]))
     assert named_on(BLOCK, given) is given
+
+
+@pytest.mark.parametrize("edged", [None, True, False])
+@pytest.mark.parametrize("gentle", [None, 20.0])
+def test_parts_keep_what_is_named_beside_their_lines(gentle, edged):
+    parts = [cylinder(6), box(), cylinder(8), Mesh(*bumpy_sphere(subdivisions=0))]
+    union, ends = joined(parts)
+    asked = Creases(line_angle=66.0, levels=2, edged_angle=gentle, edged=edged)
+    # A diagonal, and of the rims so many edges that the cylinder is not edged by the others.
+    named = np.concatenate([parts[0].faces[:1, :2], crease_lines(parts[0], 66)[:7]])
+    made = refine_parts(union, ends, GENERAL, 2, creases=replace(asked, named=named))
+    assert made is not None
+    alone = [
+        refine(part, GENERAL, 2, creases=asked if number else replace(asked, named=named))
+        for number, part in enumerate(parts)
+    ]
+    assert made.reports == [part.report for part in alone]
+    corners = np.concatenate([part.mesh.vertices[part.mesh.faces] for part in alone])
+    np.testing.assert_array_equal(made.mesh.vertices[made.mesh.faces], corners)
+
+
+@pytest.mark.parametrize("loaded", [True, False])
+def test_lines_are_named_beside_what_is_named_already(loaded, monkeypatch):
+    front_door = import_module("pns_common.crease_lines")
+    monkeypatch.setattr(front_door, "kernels_loaded", lambda: loaded)
+    given = BLOCK.faces[:1, :2]
+    asked = Creases(given, line_angle=66.0, levels=2)
+    named = named_on(BLOCK, asked)
+    np.testing.assert_array_equal(named.named[:1], given)
+    by_name, found = (refine(BLOCK, GENERAL, 2, creases=each) for each in (named, asked))
+    assert by_name.report == found.report
+    np.testing.assert_array_equal(by_name.mesh.vertices, found.mesh.vertices)
