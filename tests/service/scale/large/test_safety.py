@@ -22,6 +22,7 @@ from service.errors import (
     WorkerDied,
 )
 from service.options import Options
+from service.scale.large import plan
 from service.scale.large.arrays import let_go, new_array, open_mesh, reserve
 from service.scale.large.plan import Large, work_folder
 from service.scale.large.run import run_large
@@ -110,6 +111,23 @@ def test_a_worker_that_outlived_another_plan_writes_nothing_into_this_one(tmp_pa
     assert folders[0] != folders[1]
     assert folders[1] == folders[2]
     assert not folders[0].exists()
+
+
+def test_parts_that_kept_other_lines_are_not_gone_on_from(tmp_path, source, monkeypatch):
+    """Those of version 1 knew no edged meshes; that shows neither in options nor in a model."""
+    large = Large(source, tmp_path / "out", Options(scheme="loop", crease="lines"), 2**31, 2)
+
+    def stopped():
+        with work_folder(large, None) as work:
+            folders.append(work)
+            raise KeyboardInterrupt
+
+    folders = []
+    for version in (1, plan.VERSION):
+        monkeypatch.setattr(plan, "VERSION", version)
+        with pytest.raises(KeyboardInterrupt):
+            stopped()
+    assert folders[0] != folders[1]
 
 
 @pytest.mark.parametrize("crease", [(0, 24), (0, 25), (-1, 0), (3, 3)])
