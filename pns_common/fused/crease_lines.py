@@ -21,6 +21,7 @@ from pns_common.geometry.crease_lines import (
     at_others,
     cosine_of,
     is_edged,
+    with_gentler,
 )
 
 
@@ -46,18 +47,21 @@ def crease_line_rows(
     is_flat = np.empty(len(sharp), dtype=bool)
     sides = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
     blocks.run(len(sharp), mark_flat_sides.over(*sides, ROWS, is_flat))
-    flat = sharp[is_flat]
-    if gentle:
-        alone = np.empty(len(flat), dtype=bool)
-        around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
-        least = PARALLEL**2, cosine_of(ROW_ANGLE)
-        look = mark_alone.over(points, normals, *around, *least, flat, ROWS, alone)
-        blocks.run(len(flat), look)
-        flat = flat[alone]
-    left = np.ones(len(flat), dtype=bool)
-    met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))
-    drop_loose_ends(points, mesh.edges, flat, at_others(mesh), cosine, *met, left)
-    return flat[left]
+    flat, at_rim = sharp[is_flat], at_others(mesh)
+
+    def going_on(rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
+        left = np.ones(len(rows), dtype=bool)
+        met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))
+        drop_loose_ends(points, mesh.edges, rows, at_rim, cosine, *met, left)
+        return rows[left]
+
+    if not gentle:
+        return going_on(flat)
+    alone = np.empty(len(flat), dtype=bool)
+    around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
+    least = PARALLEL**2, cosine_of(ROW_ANGLE)
+    blocks.run(len(flat), mark_alone.over(points, normals, *around, *least, flat, ROWS, alone))
+    return with_gentler(points, normals, mesh, flat[alone], cosine, going_on)
 
 
 def edges_beyond(

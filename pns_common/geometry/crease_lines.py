@@ -16,7 +16,9 @@ and a rim of six corners is a circle.
 A part that is made of plane faces has gentler edges too, chamfers and the plates of a hull. It is
 known by its edges: a mesh is *edged* if at least half of those that turn by more than θ' = 20
 degrees turn by more than θ. (Where sharp rims go round something most edges that turn are on the
-round.) There, edges beyond θ' are sharp with the marks 2 and 3, but from θ' to 55 degrees only if
+round.) There, edges beyond θ' are lines too with the marks 2 and 3. But those beyond θ in a hollow
+have to go on without gentler ones, as elsewhere (an armpit is round), and those up to 55 degrees
+are lines only if
 
 4. *it stands alone*: not on both of its sides is there another edge like it, which runs within 20
    degrees of parallel and turns the same way, with a third to three times its 1 − cos t. A row of
@@ -29,6 +31,7 @@ renumbering a mesh does not change the answer.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -125,9 +128,32 @@ def line_rows(
     if len(sharp) == 0:
         return sharp
     flat = sharp[have_flat_sides(normals, mesh, sharp)]
-    if gentle:
-        flat = flat[stand_alone(points, normals, mesh, flat)]
-    return flat[go_on(points, mesh, flat, cosine)]
+
+    def going_on(rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
+        return rows[go_on(points, mesh, rows, cosine)]
+
+    if not gentle:
+        return going_on(flat)
+    alone = flat[stand_alone(points, normals, mesh, flat)]
+    return with_gentler(points, normals, mesh, alone, cosine, going_on)
+
+
+def with_gentler(
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Edges,
+    alone: Int[np.ndarray, " N"],
+    cosine: float,
+    going_on: Callable[[Int[np.ndarray, " N"]], Int[np.ndarray, " M"]],
+) -> Int[np.ndarray, " M"]:
+    """Return the lines of an edged mesh: of edges with marks 1, 2 and 4 those that go on.
+
+    ``going_on`` returns them of some edges.
+    """
+    is_sharp = _cosines(normals, mesh, alone) < cosine
+    in_hollow = is_sharp & _rises(points, normals, mesh, alone)
+    by_themselves = going_on(alone[is_sharp])
+    return going_on(alone[~in_hollow | np.isin(alone, by_themselves)])
 
 
 def cosine_of(degrees: float) -> float:

@@ -28,6 +28,7 @@ rings at any depth.
 
 from __future__ import annotations
 
+from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.errors import ParameterError, PnsError
 from pns_common.features.edge_features import paper_features
 from pns_common.geometry.crease_lines import ROUNDS
@@ -39,9 +40,11 @@ from pns_common.schemes import Scheme
 LOOP_REACH, FIELDS_REACH = 1, 2
 # Rings for the fold guard, where nothing is known yet of how far it goes.
 GUARD_RINGS = 1
-# A ring for each round, one for the sides of the farthest edge, one for the faces beside those, and
-# one for the faces across their other edges, which may be like it.
-LINES_REACH = ROUNDS + 3
+# A ring for each round, one for the sides of the farthest edge, and one for the faces beside those.
+LINES_REACH = ROUNDS + 2
+# With gentler lines the rounds are gone through twice, and faces are read across the edges of those
+# beside, which may be like.
+GENTLE_REACH = 2 * ROUNDS + 3
 
 
 class ThinHaloError(PnsError):
@@ -53,11 +56,11 @@ class ThinHaloError(PnsError):
 
 
 def halo_rings(
-    scheme: Scheme, levels: int, guard_rings: int = GUARD_RINGS, lines: bool = False
+    scheme: Scheme, levels: int, guard_rings: int = GUARD_RINGS, lines: Creases = NO_CREASES
 ) -> int:
     """Return the rings of control faces that a piece needs for so many levels.
 
-    ``lines`` says whether crease lines are looked for.
+    ``lines`` says which crease lines are looked for.
 
     The guard may go further than ``guard_rings``; refining the piece then says so (ThinHaloError).
     """
@@ -66,7 +69,15 @@ def halo_rings(
         guarded = scheme.guard is not None and is_learned(scheme, level)
         own = reach(scheme, level) + guarded * guard_rings
         needed = own + (1 if level == levels - 1 else -(-needed // 2))
-    return needed + lines * LINES_REACH
+    return needed + lines_reach(lines)
+
+
+def lines_reach(lines: Creases) -> int:
+    """Return how many rings tell which edges are of lines."""
+    if lines.line_angle is None:
+        return 0
+    gentle = lines.edged_angle is not None and lines.edged is not False
+    return GENTLE_REACH if gentle else LINES_REACH
 
 
 def reach(scheme: Scheme, level: int) -> int:

@@ -21,7 +21,7 @@ from pns_common.fused.known import kernels_know
 from pns_common.levels.refined_levels import check_coordinates
 from pns_common.levels.step import AddedStep
 from pns_common.pieces.exact import guarded_exact, shrunk
-from pns_common.pieces.halo import LINES_REACH, ThinHaloError, is_learned, reach
+from pns_common.pieces.halo import ThinHaloError, is_learned, lines_reach, reach
 from pns_common.pieces.steps import Links, Step, steps_by_arrays, steps_by_kernels
 from pns_common.pieces.tally import LevelTally
 from pns_common.pieces.tally_of_step import tally_of
@@ -93,9 +93,8 @@ def refine_piece(
         links = step.links
         if level == 0:
             own_vertices = first_at_own(links, own)
-            if piece.creases.line_angle is not None:
-                for _ in range(LINES_REACH):
-                    exact = shrunk(exact, links.faces, rim)
+            for _ in range(lines_reach(piece.creases)):
+                exact = shrunk(exact, links.faces, rim)
             assert links.several_fans is not None
             several_fans = int((links.several_fans & own_vertices).sum())
         own_edges = own[links.first // 3]

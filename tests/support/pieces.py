@@ -58,7 +58,7 @@ def pieces_refined(mesh, owner, scheme, levels, length, creases=None, lines=NO_C
 def _refined(mesh, own, scheme, levels, length, creases, lines):
     guard_rings = 1
     while True:
-        rings = halo_rings(scheme, levels, guard_rings, lines=lines.line_angle is not None)
+        rings = halo_rings(scheme, levels, guard_rings, lines=lines)
         cut = piece_of(mesh, own, rings, creases, lines)
         try:
             refined = refine_piece(cut.piece, scheme, levels, length, Blocks(1))

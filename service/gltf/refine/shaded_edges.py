@@ -45,8 +45,8 @@ def creases_by_shading(
         return lines
     shown = named_on_parts(mesh, lines, part, count)
     shown = without_gentle(shown, mesh, lines, shading.edges[smooth])
-    assert shown.named is not None
-    return replace(shown, named=np.concatenate([shading.edges[hard], shown.named]))
+    named = [shading.edges[hard]] if shown.named is None else [shading.edges[hard], shown.named]
+    return replace(shown, named=np.concatenate(named))
 
 
 def _have_normals(control: ControlMesh) -> bool:

@@ -109,7 +109,9 @@ def run_part(task: PartTask) -> PartDone:
             np.save(stream, shown.astype(np.uint32))
     elif task.stage == TURNS:
         scheme = scheme_of(task.options, task.model)
-        turns = _turns(cutout(mesh, adjacency, own, 1).piece, lines_of(task.options, scheme))
+        lines = lines_of(task.options, scheme)
+        angles = lines.line_angle or 0.0, lines.edged_angle or 0.0
+        turns = _turns(cutout(mesh, adjacency, own, 1).piece, angles)
         replace_file(file, json.dumps(turns).encode())
     else:
         try:
@@ -146,14 +148,11 @@ def _refine(
     }
 
 
-def _turns(piece: Piece, lines: Creases) -> tuple[int, int]:
-    """Count the piece's own edges that turn by more than θ, and than θ'."""
+def _turns(piece: Piece, angles: tuple[float, float]) -> list[int]:
+    """Count the piece's own edges that turn by more than each of the angles."""
     load_kernels()
-    assert lines.line_angle is not None
-    assert lines.edged_angle is not None
-    angles, of_own = (lines.line_angle, lines.edged_angle), piece.own.astype(np.int64)
-    _, (sharp, bent) = turns_of_parts(piece.points, piece.faces, angles, of_own, 2).tolist()
-    return sharp, bent
+    of_own = piece.own.astype(np.int64)
+    return turns_of_parts(piece.points, piece.faces, angles, of_own, 2)[1].tolist()
 
 
 def _surely_refined(
@@ -173,20 +172,20 @@ def _surely_refined(
     lines = lines_of(task.options, scheme)
     if mesh.creases is not None:
         lines = NO_CREASES  # as in Python: who names creases gets those
-    looks = lines.line_angle is not None
+    looks, lines = lines.line_angle is not None, replace(lines, edged=task.edged)
     while True:
-        rings = halo_rings(scheme, levels, guard_rings, looks)
+        rings = halo_rings(scheme, levels, guard_rings, lines)
         cut = cutout(mesh, adjacency, own, rings)
         _check_memory(task, cut, adjacency)
         piece = with_angle_creases(cut.piece, task.options.crease_angle)
-        piece = replace(piece, creases=replace(lines, edged=task.edged)) if looks else piece
+        piece = replace(piece, creases=lines) if looks else piece
         blocks = kernel_blocks(task.threads)
         try:
             return rings, cut, refine_piece(piece, scheme, levels, task.length, blocks)
         except ThinHaloError:
             # Only the guard goes farther than is known beforehand, and in all of the mesh no more.
             guard_rings *= 2
-            if cut.is_all or halo_rings(scheme, levels, guard_rings, looks) == rings:
+            if cut.is_all or halo_rings(scheme, levels, guard_rings, lines) == rings:
                 raise
 
 

@@ -117,6 +117,25 @@ def test_a_mesh_is_edged_where_half_of_its_turns_are_sharp():
         assert len(lines(pleat(30), replace(WITH_GENTLE, edged=edged))) == count
 
 
+def fold(sign):
+    """A narrow sheet, folded along its middle: by 80 degrees half way, by 30 at its ends."""
+    points, faces = grid(17)
+    x, y = points[:, 0], points[:, 1] / 20
+    half = np.radians(np.clip(75 - 100 * np.abs(x), 15, 40))
+    folded = np.stack([x, y * np.cos(half), -sign * np.abs(y) * np.sin(half)], axis=1)
+    return Mesh(folded, faces)
+
+
+def test_sharp_hollows_of_edged_meshes_go_on_among_sharp_edges_alone():
+    """Where a limb meets a body they do not, and the rim there would fold into it."""
+    edged = replace(WITH_GENTLE, edged=True)
+    assert len(lines(fold(1.0), edged)) == 16
+    assert len(lines(fold(-1.0), edged)) < 8
+    assert len(lines(fold(-1.0))) == len(lines(fold(1.0))) == 0
+    # Hollows that do are lines as ever.
+    assert len(lines(l_block(), edged)) == 22
+
+
 def pleat(degrees):
     """A sheet of four by four cells, folded once along its middle row."""
     points, faces = grid(5)

@@ -35,13 +35,13 @@ def test_who_asks_for_lines(crease, scheme, lines):
 
 
 def test_an_angle_takes_every_edge_beyond_it_for_good_and_lines_are_fewer_and_wear_off():
-    mesh = cylinder(6)  # its walls meet at 60 degrees
-    by_angle = creases_by_shape(mesh, Options(crease="angle:59"), ASKING)
+    mesh = cylinder(8)  # its walls meet at 45 degrees
+    by_angle = creases_by_shape(mesh, Options(crease="angle:44"), ASKING)
     np.testing.assert_array_equal(
-        by_angle.named, edges_sharper_than(mesh.vertices, mesh.faces, np.radians(59))
+        by_angle.named, edges_sharper_than(mesh.vertices, mesh.faces, np.radians(44))
     )
     of_lines = named_on(mesh, creases_by_shape(mesh, Options(crease="lines"), ASKING))
     np.testing.assert_array_equal(of_lines.named, crease_lines(mesh))
-    assert (len(by_angle.named), len(of_lines.named)) == (18, 12)
+    assert (len(by_angle.named), len(of_lines.named)) == (24, 16)
     assert (by_angle.levels, of_lines.levels) == (None, 2)
     assert creases_by_shape(box(), Options(crease="off"), ASKING).named is None
