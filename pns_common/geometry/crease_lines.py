@@ -21,8 +21,9 @@ have to go on without gentler ones, as elsewhere (an armpit is round), and those
 are lines only if
 
 4. *it stands alone*: not on both of its sides is there another edge like it, which runs within 20
-   degrees of parallel and turns the same way, with a third to three times its 1 − cos t. A row of
-   such edges is a tube or an arc: one of seven sides or more stays round, as a barrel does.
+   degrees of parallel and turns the same way, with a third to three times its 1 − cos t; one that
+   goes on from its end is not beside it. A row of such edges is a tube or an arc: one of seven
+   sides or more stays round, as a barrel does.
 
 Both numbers are counts: a mesh in pieces has the same. Turning, moving, scaling, mirroring or
 renumbering a mesh does not change the answer.
@@ -239,7 +240,7 @@ def _like(
     turn: Float[np.ndarray, " N"],
     seen: Int[np.ndarray, "N K"],
 ) -> Bool[np.ndarray, "N K"]:
-    """Return which other edges run and turn as each one does; ``turn`` is its cosine."""
+    """Return which other edges run beside each one and turn as it does; ``turn`` is its cosine."""
     cosines = _cosines(normals, mesh, seen)
     own, other = _along(points, mesh, flat), _along(points, mesh, seen)
     along = _inner(other, own[:, None])
@@ -247,7 +248,10 @@ def _like(
     bend, bends = (1 - turn)[:, None], 1 - cosines
     as_far = (bends <= ALIKE * bend) & (bend <= ALIKE * bends)
     same_way = _rises(points, normals, mesh, seen) == _rises(points, normals, mesh, flat)[:, None]
-    return (seen != flat[:, None]) & parallel & as_far & same_way
+    ends, own_ends = mesh.edges[seen], mesh.edges[flat][:, None]
+    starts, stops = (ends == own_ends).any(axis=-1), (ends == own_ends[..., ::-1]).any(axis=-1)
+    goes_on = (starts & (along < 0)) | (stops & (along > 0))
+    return (seen != flat[:, None]) & parallel & as_far & same_way & ~goes_on
 
 
 def go_on(

@@ -105,6 +105,9 @@ def _is_like(points, normals, faces, edges, half_edges, edge_class, parallel, e,
     along = dot(its, own)
     if not along * along >= parallel * (dot(its, its) * dot(own, own)):
         return False
+    a, b, c, d = edges[e, 0], edges[e, 1], edges[other, 0], edges[other, 1]
+    if ((a == c or b == d) and along < 0) or ((a == d or b == c) and along > 0):
+        return False  # it goes on from this one's end
     rises = _rises(points, normals, faces, edges, half_edges, e)
     return _rises(points, normals, faces, edges, half_edges, other) == rises
 

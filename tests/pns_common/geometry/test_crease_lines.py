@@ -106,6 +106,23 @@ def test_edged_meshes_keep_gentler_edges_that_stand_alone(mesh, sharp, all_of_th
     assert len(lines(mesh, WITH_GENTLE)) == all_of_them
 
 
+@pytest.mark.parametrize("rows", [1, 2, 5])
+def test_an_edge_is_not_beside_one_that_goes_on_from_it(rows):
+    """However a chamfer's walls are cut: some have the next edge of the line in the next face."""
+    profile = np.array([[0, 0], [2, 0], [2, 1.5], [1.5, 2], [0, 2]])
+    n, k, after = 5, np.arange(5), (np.arange(5) + 1) % 5
+    points = np.concatenate([np.c_[profile, np.full(n, height)] for height in range(rows + 1)])
+    walls = []
+    for row in range(rows):
+        a, b, c, d = k, after, n + after, n + k
+        cut = [np.c_[a, b, c], np.c_[a, c, d]] if row % 2 else [np.c_[a, b, d], np.c_[b, c, d]]
+        walls += [faces + n * row for faces in cut]
+    fan = np.stack([0 * k[2:], k[1:-1], k[2:]], axis=1)
+    mesh = Mesh(points, np.concatenate([*walls, fan[:, ::-1], fan + n * rows]))
+    assert len(lines(mesh)) == 2 * n + 3 * rows
+    assert len(lines(mesh, WITH_GENTLE)) == 2 * n + 5 * rows
+
+
 def test_a_mesh_is_edged_where_half_of_its_turns_are_sharp():
     assert is_edged(1, 2)
     assert not is_edged(1, 3)
