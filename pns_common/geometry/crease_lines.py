@@ -11,7 +11,7 @@ is what lies around:
    so that a line that ends in a smooth surface loses as many edges there.
 
 θ of 66 degrees lies between the turns of a hexagon and a pentagon: tubes of six sides stay round,
-and a rim of six corners is a circle.
+and a rim of six corners is a circle, but in edged meshes (below) six sides are edges.
 
 A part that is made of plane faces has gentler edges too, chamfers and the plates of a hull. It is
 known by its edges: a mesh is *edged* if at least half of those that turn by more than θ' = 20
@@ -23,7 +23,7 @@ are lines only if
 4. *it stands alone*: not on both of its sides is there another edge like it, which runs within 20
    degrees of parallel and turns the same way, with a third to three times its 1 − cos t; one that
    goes on from its end is not beside it. A row of such edges is a tube or an arc: one of seven
-   sides or more stays round, as a barrel does.
+   sides or more stays round, as a barrel does, where its walls are quads cut in two.
 
 Both numbers are counts: a mesh in pieces has the same. Turning, moving, scaling, mirroring or
 renumbering a mesh does not change the answer.
