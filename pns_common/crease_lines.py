@@ -17,6 +17,7 @@ from pns_common.fused import fits, kernel_blocks, kernels_available, kernels_loa
 from pns_common.fused.interior_edges import interior_edges
 from pns_common.geometry.crease_lines import (
     CREASE_ANGLE,
+    CREASE_LEVELS,
     EDGED_ANGLE,
     cosine_of,
     is_edged,
@@ -25,7 +26,7 @@ from pns_common.geometry.crease_lines import (
 from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh, check_is_mesh
 
-LINES = Creases(line_angle=CREASE_ANGLE, edged_angle=EDGED_ANGLE)
+LINES = Creases(line_angle=CREASE_ANGLE, levels=CREASE_LEVELS, edged_angle=EDGED_ANGLE)
 
 
 def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2"]:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pns_common.connectivity.creases import NO_CREASES, Creases
-from pns_common.geometry.crease_lines import CREASE_ANGLE, CREASE_LEVELS, EDGED_ANGLE
+from pns_common.crease_lines import LINES
 from pns_common.geometry.sharp_edges import edges_sharper_than
 from pns_common.mesh import Mesh
 from pns_common.schemes import Scheme
 
 from ..options import Options
-
-LINES = Creases(line_angle=CREASE_ANGLE, levels=CREASE_LEVELS, edged_angle=EDGED_ANGLE)
 
 
 def lines_of(options: Options, scheme: Scheme) -> Creases:

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from pns_common import load_model
-from pns_common.crease_lines import named_on
+from pns_common.crease_lines import LINES, named_on
 from service.gltf.read.primitives import read_primitive
 from service.gltf.read.upload import read_upload
 from service.gltf.refine.control_mesh import control_mesh
 from service.gltf.refine.hard_edges import hard_edges
 from service.gltf.subdivide import subdivide_gltf
-from service.meshes.shape_creases import LINES
 from service.options import Limits, Options
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box
