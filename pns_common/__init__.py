@@ -21,7 +21,8 @@ Where to read, each room seeing only those above it:
     levels/         step.py one level in formulas, array_steps.py one after the other; the report
     fused/          the same compiled: each module names the one whose bits it has
     runtimes/       what runs a model file: onnx_model.py loads it, and finds who does
-    refine.py       all levels; refine_parts.py many meshes at once, pieces/ one mesh in pieces
+    arguments.py    what may be asked; refine.py all levels, refine_parts.py many meshes at once,
+                    pieces/ one mesh in pieces
     interop/        meshes of other libraries
 """
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import islice
@@ -11,14 +10,20 @@ from typing import Literal, SupportsIndex, TypedDict
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.arrays import norm
-from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
+from pns_common.arguments import (
+    check_limit,
+    check_memory,
+    check_progress,
+    check_reference_length,
+    check_scheme,
+    checked_levels,
+    checked_threads,
+    chosen_creases,
+)
+from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.base.deferred import Deferred
-from pns_common.base.memory import memory_here
-from pns_common.base.parameters import is_number, is_whole
 from pns_common.connectivity.creases import Creases, crease_children
 from pns_common.connectivity.topology import Topology
-from pns_common.errors import ParameterError
 from pns_common.fused import (
     fits,
     kernel_blocks,
@@ -27,6 +32,7 @@ from pns_common.fused import (
     kernels_pay,
 )
 from pns_common.fused.known import kernels_know
+from pns_common.geometry.reference_length import measure_reference_length
 from pns_common.geometry.side_lengths import measure_sides
 from pns_common.levels.array_steps import array_steps
 from pns_common.levels.diagnostics import LevelReport, level_report, limit_distances
@@ -42,10 +48,6 @@ from pns_common.masks.limit import refined_limit_normals, refined_limit_position
 from pns_common.mesh import Mesh, check_is_mesh
 from pns_common.schemes import Scheme
 
-HIGHEST_LEVELS = 16
-# No refinement takes less for a face that it makes: 65 were measured, by Loop and with levels of
-# Loop after learned ones.
-LEAST_BYTES_PER_FACE = 60
 NO_SHIFT = Deferred(lambda: 0.0)
 
 
@@ -141,13 +143,14 @@ def refine(
         ModelError: the network returned something that is not finite, or of another shape.
         MeshError: the refined coordinates are too large.
     """
-    _check_kinds(mesh, scheme)
+    check_is_mesh(mesh)
+    check_scheme(scheme)
     levels = checked_levels(levels)
-    _check_memory(len(mesh.faces), levels)
-    _check_reference_length(reference_length)
-    _check_limit(limit)
-    _check_progress(progress)
-    workers = _threads(threads)
+    check_memory(len(mesh.faces), levels)
+    check_reference_length(reference_length)
+    check_limit(limit)
+    check_progress(progress)
+    workers = checked_threads(threads)
     length = Deferred(lambda: _length_of(mesh, reference_length, workers))
     work = refinement_progress(len(mesh.faces), levels, scheme.learned_levels, limit, progress)
     costs = level_costs(len(mesh.faces), levels, scheme.learned_levels)
@@ -258,99 +261,15 @@ def limit_shift(
     return 0.0 if shift is None else shift.largest
 
 
-def chosen_creases(
-    given: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None, scheme: Scheme
-) -> Creases:
-    """Return which edges are kept sharp.
-
-    Raises:
-        ParameterError: a word that is not "auto".
-    """
-    if isinstance(given, str):
-        if given != "auto":
-            raise ParameterError("creases", given, expected='"auto", None or pairs of vertices')
-        return scheme.creases
-    return given if isinstance(given, Creases) else Creases(given)
-
-
-def measure_reference_length(
-    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
-) -> float:
-    """Return R, the largest distance of a referenced vertex from their centroid, over √2.
-
-    About 1 on the paper's patches over [−1, 1]²; unchanged by rotation, proportional to scale.
-    """
-    used = np.zeros(len(vertices), dtype=bool)
-    used[faces.reshape(-1)] = True
-    referenced = vertices[used]
-    return float(norm(referenced - referenced.mean(axis=0)).max()) / math.sqrt(2)
-
-
 def reference_length_of(
     vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"], threads: int = 1
 ) -> float:
-    """Return the same, by kernels where they are loaded."""
+    """Return R of a mesh, by kernels where they are loaded."""
     if kernels_available() and kernels_loaded():
         from pns_common.fused.extent import reference_length
 
         return reference_length(vertices, faces, kernel_blocks(threads))
     return measure_reference_length(vertices, faces)
-
-
-def _threads(given: int | None) -> int:
-    if given is None:
-        return available_threads()
-    if not (is_whole(given) and given >= 1):
-        raise ParameterError("threads", given, expected="a whole number, at least 1")
-    return int(given)
-
-
-def _check_kinds(mesh: object, scheme: object) -> None:
-    check_is_mesh(mesh)
-    if not isinstance(scheme, Scheme):
-        raise ParameterError("scheme", type(scheme), expected="loop() or pns(load_model())")
-
-
-def checked_levels(given: SupportsIndex) -> int:
-    """Return the depth as Python's own whole number: numpy's small ones cannot count faces.
-
-    Raises:
-        ParameterError: it is none, or out of range.
-    """
-    if not (is_whole(given) and 1 <= (levels := int(given)) <= HIGHEST_LEVELS):
-        raise ParameterError("levels", given, expected=f"a whole number, 1 … {HIGHEST_LEVELS}")
-    return levels
-
-
-def _check_memory(faces: int, levels: int) -> None:
-    """Refuse what cannot fit into memory for certain, rather than be ended by the system for it."""
-    there = memory_here()
-    needed = faces * 4**levels * LEAST_BYTES_PER_FACE
-    if there is None or needed <= there:
-        return
-    raise ParameterError(
-        "levels",
-        levels,
-        expected=f"fewer: {faces * 4**levels:,} faces take {needed / 2**30:,.1f} GiB or more, of "
-        f"the {there / 2**30:,.1f} here",
-    )
-
-
-def _check_reference_length(given: float | str) -> None:
-    # An array compares with a word element by element.
-    automatic = isinstance(given, str) and given == "auto"
-    if not (automatic or (is_number(given) and float(given) > 0)):
-        raise ParameterError("reference_length", given, expected='"auto" or a number > 0')
-
-
-def _check_limit(given: object) -> None:
-    if not isinstance(given, bool | np.bool_):
-        raise ParameterError("limit", given, expected="True or False")
-
-
-def _check_progress(given: object) -> None:
-    if given is not None and not callable(given):
-        raise ParameterError("progress", given, expected="a function of two whole numbers, or None")
 
 
 def _length_of(mesh: Mesh, given: float | str, threads: int) -> float:

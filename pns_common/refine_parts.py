@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.blocks import BLOCK_ROWS, Blocks
+from pns_common.arguments import chosen_creases
+from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
 from pns_common.base.deferred import Deferred
 from pns_common.connectivity.creases import Creases, crease_children
 from pns_common.crease_lines import named_on_parts
@@ -17,14 +18,7 @@ from pns_common.fused import kernel_blocks
 from pns_common.masks.crease_shift import limit_crease_shift
 from pns_common.masks.limit import refined_limit_normals, refined_limit_positions
 from pns_common.mesh import Mesh
-from pns_common.refine import (
-    Report,
-    available_threads,
-    chosen_creases,
-    kernels_can_serve,
-    reference_length_of,
-    report_of,
-)
+from pns_common.refine import Report, kernels_can_serve, reference_length_of, report_of
 from pns_common.schemes import Scheme
 
 

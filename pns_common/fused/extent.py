@@ -1,4 +1,4 @@
-"""The reference length of a mesh, with the bits of ``refine.measure_reference_length``."""
+"""The reference length of a mesh, with the bits of ``geometry.reference_length``."""
 
 from __future__ import annotations
 

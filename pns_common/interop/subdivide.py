@@ -9,6 +9,7 @@ from typing import Any, SupportsIndex, TypeVar, cast
 
 import numpy as np
 
+from pns_common.arguments import checked_levels
 from pns_common.errors import ParameterError
 from pns_common.interop.carried import CarriedMesh, refine_carried
 from pns_common.interop.of_meshio import read_meshio, write_meshio
@@ -16,7 +17,7 @@ from pns_common.interop.of_open3d import read_open3d, write_open3d
 from pns_common.interop.of_pyvista import read_pyvista, write_pyvista
 from pns_common.interop.of_trimesh import read_trimesh, write_trimesh
 from pns_common.mesh import Mesh
-from pns_common.refine import checked_levels, refine
+from pns_common.refine import refine
 from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import Scheme, pns
 

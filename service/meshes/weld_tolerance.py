@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.distinct import distinct_rows
-from pns_common.refine import measure_reference_length
+from pns_common.geometry.reference_length import measure_reference_length
 
 from .weld import Weld, weld_by_label
 

@@ -1,4 +1,4 @@
-"""refine: parameters, the report, determinism, and levels that compose."""
+"""refine: the report, determinism, and levels that compose."""
 
 import json
 import sys
@@ -9,87 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pns_common
-from pns_common import Mesh, MeshError, ParameterError, loop, pns, refine
+from pns_common import Mesh, MeshError, loop, pns, refine
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology
-from pns_common.refine import measure_reference_length
 from pns_common.schemes import Model
 from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid, soups, three_pages
 from tests.support.networks import random_model
 
 MODEL = random_model(0, scale=30.0)
-
-
-@pytest.mark.parametrize("kind", [np.int8, np.uint8, np.int64])
-def test_levels_and_threads_may_be_numpy_s_whole_numbers(kind):
-    """Small ones end where faces are counted in them."""
-    mesh = Mesh(*grid(8))
-    made = refine(mesh, loop(), kind(3), threads=kind(100)).mesh
-    assert (made.vertices == refine(mesh, loop(), 3).mesh.vertices).all()
-
-
-@pytest.mark.parametrize("levels", [0, -1, 17, 1.5, "2", True, None])
-def test_levels_out_of_range_are_refused(levels):
-    with pytest.raises(ParameterError) as caught:
-        refine(Mesh(*grid(3)), loop(), levels)
-    assert (caught.value.name, caught.value.value) == ("levels", levels)
-
-
-def test_levels_that_cannot_fit_into_memory_are_refused(monkeypatch):
-    mesh = Mesh(*grid(3))
-    made = refine(mesh, loop(), 3).mesh
-    kept = made.vertices.nbytes + made.faces.nbytes
-    module = sys.modules["pns_common.refine"]  # the package has a function of its name
-    monkeypatch.setattr(module, "memory_here", lambda: kept)
-    refine(mesh, loop(), 2)
-    with pytest.raises(ParameterError, match=r"512 faces take 0\.0 GiB or more") as caught:
-        refine(mesh, loop(), 3)
-    assert caught.value.name == "levels"
-    with pytest.raises(ParameterError, match="levels = 3: expected fewer"):
-        pns_common.subdivide(grid(3), np.int8(3), loop())
-    monkeypatch.setattr(module, "memory_here", lambda: None)
-    assert (refine(mesh, loop(), 3).mesh.vertices == made.vertices).all()
-
-
-@pytest.mark.parametrize(
-    "length", [0.0, -1.0, float("nan"), float("inf"), "metres", None, np.ones(2), 10**400]
-)
-def test_reference_length_out_of_range_is_refused(length):
-    with pytest.raises(ParameterError, match="reference_length"):
-        refine(Mesh(*grid(3)), loop(), reference_length=length)
-
-
-@pytest.mark.parametrize("budget", [-0.1, float("nan"), float("inf")])
-def test_budget_out_of_range_is_refused(budget):
-    with pytest.raises(ParameterError, match="budget"):
-        pns(MODEL, budget)
-
-
-@pytest.mark.parametrize("threads", [0, -1, 1.5])
-def test_threads_out_of_range_are_refused(threads):
-    with pytest.raises(ParameterError, match="threads"):
-        refine(Mesh(*grid(3)), loop(), threads=threads)
-
-
-@pytest.mark.parametrize(
-    ("name", "wrong"),
-    [
-        ("mesh", lambda: refine(grid(3), loop())),
-        ("scheme", lambda: refine(Mesh(*grid(3)), "loop")),
-        ("scheme", lambda: pns_common.subdivide(grid(3), scheme=MODEL)),
-        ("model", lambda: pns("general")),
-        ("mesh", lambda: pns_common.clean(grid(3))),
-        ("mesh", lambda: pns_common.crease_lines(grid(3))),
-        ("source", lambda: pns_common.load_model(3)),
-        ("limit", lambda: refine(Mesh(*grid(3)), loop(), limit="no")),
-        ("limit", lambda: refine(Mesh(*grid(3)), loop(), limit=np.ones(2))),
-        ("progress", lambda: refine(Mesh(*grid(3)), loop(), progress="bar")),
-    ],
-)
-def test_an_argument_of_another_kind_is_told(name, wrong):
-    # Where annotations are enforced, another kind ends there first.
-    with pytest.raises((ParameterError, TypeError), match=name):
-        wrong()
 
 
 def test_a_model_file_keeps_the_model_protocol():
@@ -175,14 +102,6 @@ def test_two_calls_with_the_first_ones_length_are_two_levels():
     again = refine(once.mesh, pns(MODEL), reference_length=length)
     both = refine(mesh, pns(MODEL), 2)
     np.testing.assert_array_equal(again.mesh.vertices, both.mesh.vertices)
-
-
-def test_reference_length_is_one_on_the_papers_patch_and_follows_scale_only():
-    vertices, faces = grid(9)
-    assert measure_reference_length(vertices, faces) == pytest.approx(1, rel=1e-12)
-    assert measure_reference_length(3 * vertices + 5, faces) == pytest.approx(3, rel=1e-12)
-    unused = np.concatenate([vertices, [[100.0, 0, 0]]])
-    assert measure_reference_length(unused, faces) == pytest.approx(1, rel=1e-12)
 
 
 def test_public_names_exist():

@@ -10,8 +10,8 @@ from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
 from pns_common.errors import MeshError
+from pns_common.geometry.reference_length import measure_reference_length
 from pns_common.mesh import Mesh, clean
-from pns_common.refine import measure_reference_length
 from train.data.datasets import draw_ridges
 from train.data.grid import grid_faces, jittered_grid
 from train.spectra.stars import star

@@ -5,7 +5,7 @@ from hypothesis import given
 
 from pns_common.base.blocks import Blocks
 from pns_common.fused.extent import reference_length
-from pns_common.refine import measure_reference_length
+from pns_common.geometry.reference_length import measure_reference_length
 from tests.support.meshes import manifolds, soups
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, Refinement, Scheme, loop, refine
+from pns_common.geometry.reference_length import measure_reference_length
 from pns_common.geometry.side_lengths import measure_sides
 from pns_common.masks.crease_shift import limit_crease_shift
 from pns_common.masks.limit import limit_normals, limit_positions
-from pns_common.refine import measure_reference_length
 
 from .steps import Steps
 
