@@ -92,6 +92,10 @@ class Scheme:
             return None
         return rule.form.prior_strength
 
+    def acts_at(self, depth: int) -> bool:
+        """Return whether the rules act at a level, 0 the control mesh's; else Loop does."""
+        return self.learned_levels is None or depth < self.learned_levels
+
     def fitted(self, sides: Callable[[], SideLengths]) -> Scheme:
         """Return the same for a mesh (formula/prior_strength.py).
 

@@ -70,7 +70,7 @@ def _checked_step(
     level: FusedLevel, scheme: Scheme, length: float, depth: int, blocks: Blocks
 ) -> FusedStep:
     """Make the step of one level, as ``step.level_step`` chooses it."""
-    if scheme.learned_levels is not None and depth >= scheme.learned_levels:
+    if not scheme.acts_at(depth):
         step = loop_step(level, blocks)
     else:
         # Loop has no use for its kernels.

@@ -154,7 +154,7 @@ def _placed(
     blocks: Blocks,
 ) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 3"] | None, AddedStep]:
     """Return the next level's points, Loop's (None: no child can be flipped), and the step."""
-    if scheme.learned_levels is None or depth < scheme.learned_levels:
+    if scheme.acts_at(depth):
         # What overflows under an absurd budget is caught by the caller.
         with np.errstate(over="ignore", invalid="ignore"):
             length, strength = units.of(parts.of_vertex)

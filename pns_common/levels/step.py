@@ -62,7 +62,7 @@ def level_step(level: ControlLevel, scheme: Scheme) -> LevelStep:
     Raises:
         ModelError: the network returned something that is not finite, or of another shape.
     """
-    if scheme.learned_levels is not None and level.depth >= scheme.learned_levels:
+    if not scheme.acts_at(level.depth):
         return LevelStep(loop_vertex_rule(level), loop_edge_rule(level), False, None)
     step = LevelStep(scheme.vertex_rule(level), scheme.edge_rule(level), True, None)
     loop_points = step.loop_points

@@ -66,7 +66,7 @@ def halo_rings(
     """
     needed = 0
     for level in reversed(range(levels)):
-        guarded = scheme.guard is not None and is_learned(scheme, level)
+        guarded = scheme.guard is not None and scheme.acts_at(level)
         own = reach(scheme, level) + guarded * guard_rings
         needed = own + (1 if level == levels - 1 else -(-needed // 2))
     return needed + lines_reach(lines)
@@ -86,7 +86,7 @@ def reach(scheme: Scheme, level: int) -> int:
     Raises:
         ParameterError: a scheme of other rules than Loop's and a model's.
     """
-    if not is_learned(scheme, level):
+    if not scheme.acts_at(level):
         return LOOP_REACH
     edges, vertices = scheme.edge_rule, scheme.vertex_rule
     if isinstance(edges, ScaleFreeEdgeRule) and isinstance(vertices, ScaleFreeVertexRule):
@@ -98,8 +98,3 @@ def reach(scheme: Scheme, level: int) -> int:
             plain = edges.operator.features is paper_features
             return LOOP_REACH if plain else FIELDS_REACH
     raise ParameterError("scheme", scheme.name, expected="loop() or pns(model)")
-
-
-def is_learned(scheme: Scheme, level: int) -> bool:
-    """Return whether the scheme's own rules act at a level."""
-    return scheme.learned_levels is None or level < scheme.learned_levels

@@ -21,7 +21,7 @@ from pns_common.fused.known import kernels_know
 from pns_common.levels.refined_levels import check_coordinates
 from pns_common.levels.step import AddedStep
 from pns_common.pieces.exact import guarded_exact, shrunk
-from pns_common.pieces.halo import ThinHaloError, is_learned, lines_reach, reach
+from pns_common.pieces.halo import ThinHaloError, lines_reach, reach
 from pns_common.pieces.steps import Links, Step, steps_by_arrays, steps_by_kernels
 from pns_common.pieces.tally import LevelTally
 from pns_common.pieces.tally_of_step import tally_of
@@ -101,7 +101,7 @@ def refine_piece(
         for _ in range(reach(scheme, level)):
             exact = shrunk(exact, links.faces, rim)
         exact = np.repeat(exact, 4)
-        if scheme.guard is not None and is_learned(scheme, level) and not exact.all():
+        if scheme.guard is not None and scheme.acts_at(level) and not exact.all():
             asked = _asked(step.placed)
             if asked is not None and step.loop is not None:
                 angle = scheme.guard.angle

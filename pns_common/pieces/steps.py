@@ -90,7 +90,7 @@ def steps_by_kernels(
     while True:
         mesh = level.mesh
         placed, loop, may_flip = None, None, False
-        if scheme.learned_levels is not None and depth >= scheme.learned_levels:
+        if not scheme.acts_at(depth):
             level.faces.forget()
             made = loop_points(level.points, mesh, blocks)
         else:

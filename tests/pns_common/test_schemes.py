@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pns_common import ModelError, ParameterError, loop, pns
+from pns_common import ModelError, ParameterError, load_model, loop, pns
 from pns_common.schemes import edge_operator, loop_vertex_rule, scale_free_form, vertex_operator
 from tests.support.networks import (
     SCALE_FREE_CARD,
@@ -112,3 +112,10 @@ def test_a_card_of_format_3_needs_a_vertex_network():
 
     with pytest.raises(ModelError, match="vertex network"):
         pns(Without())
+
+
+def test_rules_act_at_as_many_levels_as_the_scheme_says():
+    two = pns(scale_free_model(0, learned_levels=2))
+    assert [two.acts_at(level) for level in range(4)] == [True, True, False, False]
+    assert not loop().acts_at(0)
+    assert pns(load_model("paper")).acts_at(15)

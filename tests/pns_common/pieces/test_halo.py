@@ -3,10 +3,9 @@
 import pytest
 
 from pns_common import Mesh, ParameterError, load_model, loop, pns, refine
-from pns_common.pieces.halo import halo_rings, is_learned, reach
+from pns_common.pieces.halo import halo_rings, reach
 from pns_common.runtimes.onnx_model import bundled_models
 from tests.support.meshes import bumpy_sphere
-from tests.support.networks import scale_free_model
 from tests.support.pieces import adjacent
 from tests.support.schemes import along_normal
 
@@ -44,10 +43,3 @@ def test_a_level_reads_as_far_as_its_reach_and_no_farther(name):
 def test_a_scheme_of_unknown_rules_has_no_known_reach():
     with pytest.raises(ParameterError, match="scheme"):
         halo_rings(along_normal(0.1), 1)
-
-
-def test_a_level_is_learned_while_the_scheme_says_so():
-    two = pns(scale_free_model(0, learned_levels=2))
-    assert [is_learned(two, level) for level in range(4)] == [True, True, False, False]
-    assert not is_learned(loop(), 0)
-    assert is_learned(SCHEMES["paper"], 15)

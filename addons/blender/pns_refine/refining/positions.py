@@ -66,7 +66,7 @@ def _level_by_level(
     reports: list[Any] = []
     distances: list[_Distances] = []
     for depth, step in enumerate(steps.steps):
-        rule = scheme if _is_learned(scheme, depth) else loop()
+        rule = scheme if scheme.acts_at(depth) else loop()
         smooth = made = counter.reading(mesh, rule, length, step.creases)
         points, readings = made.mesh.vertices, [_distances(made.report)]
         if step.mixture is not None:
@@ -132,10 +132,6 @@ class _Counter:
 
     def _tell(self, done: int, total: int) -> None:
         self._progress(self._done + done, self._total)
-
-
-def _is_learned(scheme: Scheme, depth: int) -> bool:
-    return scheme.learned_levels is None or depth < scheme.learned_levels
 
 
 def _or_none(creases: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, "N 2"] | None:
