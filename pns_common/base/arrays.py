@@ -97,9 +97,9 @@ def as_numpy(values: Array) -> np.ndarray:
     return values.detach().cpu().numpy() if is_torch_array(values) else values
 
 
-def dot(u: Float[Array, "N 3"], v: Float[Array, "N 3"]) -> Float[Array, " N"]:
-    """Return the row-wise inner product, summed in a fixed order."""
-    return u[:, 0] * v[:, 0] + u[:, 1] * v[:, 1] + u[:, 2] * v[:, 2]
+def dot(u: Float[Array, "*#N 3"], v: Float[Array, "*#N 3"]) -> Float[Array, "*#N"]:
+    """Return the inner products of vectors, summed in a fixed order."""
+    return u[..., 0] * v[..., 0] + u[..., 1] * v[..., 1] + u[..., 2] * v[..., 2]
 
 
 def cross(u: Float[Array, "N 3"], v: Float[Array, "N 3"]) -> Float[Array, "N 3"]:

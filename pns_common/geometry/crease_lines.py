@@ -243,8 +243,8 @@ def _like(
     """Return which other edges run beside each one and turn as it does; ``turn`` is its cosine."""
     cosines = _cosines(normals, mesh, seen)
     own, other = _along(points, mesh, flat), _along(points, mesh, seen)
-    along = _inner(other, own[:, None])
-    parallel = along * along >= PARALLEL**2 * (_inner(other, other) * _inner(own, own)[:, None])
+    along = dot(other, own[:, None])
+    parallel = along * along >= PARALLEL**2 * (dot(other, other) * dot(own, own)[:, None])
     bend, bends = (1 - turn)[:, None], 1 - cosines
     as_far = (bends <= ALIKE * bend) & (bend <= ALIKE * bends)
     same_way = _rises(points, normals, mesh, seen) == _rises(points, normals, mesh, flat)[:, None]
@@ -337,11 +337,4 @@ def _rises(
     # The corner of a triangle that is on neither end.
     place = np.where(~is_end[..., 0], 0, np.where(~is_end[..., 1], 1, 2))
     apart = np.take_along_axis(corners, place[..., None], axis=-1)[..., 0]
-    return _inner(normals[faces[..., 0]], points[apart] - points[ends[..., 0]]) > 0
-
-
-def _inner(
-    u: Float[np.ndarray, "... 3"], v: Float[np.ndarray, "... 3"]
-) -> Float[np.ndarray, "..."]:
-    """Return inner products, summed in the order of ``arrays.dot``."""
-    return u[..., 0] * v[..., 0] + u[..., 1] * v[..., 1] + u[..., 2] * v[..., 2]
+    return dot(normals[faces[..., 0]], points[apart] - points[ends[..., 0]]) > 0

@@ -44,6 +44,8 @@ def test_scattered_rows_stand_where_they_are_sent_and_all_others_are_0(kind):
 def test_products_and_lengths_are_numpys(kind):
     u, v = kind(ROWS), kind(OTHERS)
     np.testing.assert_allclose(arrays.dot(u, v), np.sum(ROWS * OTHERS, axis=1), rtol=1e-14)
+    every = arrays.as_numpy(arrays.dot(u[:, None], v[None]))
+    np.testing.assert_allclose(every, ROWS @ OTHERS.T, rtol=1e-13, atol=1e-15)
     np.testing.assert_allclose(arrays.cross(u, v), np.cross(ROWS, OTHERS), rtol=1e-14, atol=1e-15)
     np.testing.assert_allclose(arrays.norm(u), np.linalg.norm(ROWS, axis=1), rtol=1e-15)
 
