@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import dot
 from pns_common.base.blocks import available_threads
 from pns_common.base.parameters import is_number
 from pns_common.connectivity.creases import Creases, pair_keys, with_creases
 from pns_common.connectivity.topology import build_topology
 from pns_common.errors import ParameterError
 from pns_common.fused import fits, kernel_blocks, kernels_available, kernels_loaded
-from pns_common.fused.interior_edges import interior_edges
 from pns_common.geometry.crease_lines import (
     CREASE_ANGLE,
     CREASE_LEVELS,
     EDGED_ANGLE,
+    Edges,
     cosine_of,
+    edges_beyond,
     is_edged,
     line_rows,
 )
@@ -54,20 +55,71 @@ def lines_on(mesh: Mesh, creases: Creases) -> Int[np.ndarray, "N 2"]:
     Raises:
         ParameterError: one that is named is no edge of the mesh.
     """
-    points, faces = mesh.vertices, mesh.faces
+    return _look(mesh.vertices, mesh.faces, creases.named).lines(creases)
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """A mesh's edges, those that are named as creases, and what finds some of them.
+
+    Attributes:
+        line_rows: returns the edges of the lines that creases say to look for.
+        rows_beyond: returns the interior edges that turn by more than an angle in degrees.
+    """
+
+    edges: Edges
+    line_rows: Callable[[Creases], Int[np.ndarray, " N"]]
+    rows_beyond: Callable[[float], Int[np.ndarray, " N"]]
+
+    def lines(self, creases: Creases) -> Int[np.ndarray, "N 2"]:
+        """Return the same lines as pairs of vertices."""
+        return self.edges.edges[self.line_rows(creases)].astype(np.int64)
+
+    def turns(
+        self, creases: Creases, part_of_face: Int[np.ndarray, " F"], count: int
+    ) -> Int[np.ndarray, "P 2"]:
+        """Count as ``turns_of_parts``."""
+        assert creases.line_angle is not None
+        assert creases.edged_angle is not None
+        beyond = map(self.rows_beyond, (creases.line_angle, creases.edged_angle))
+        first = (self.edges.half_edges[rows, 0] // 3 for rows in beyond)
+        return np.stack([np.bincount(part_of_face[f], minlength=count) for f in first], axis=1)
+
+
+def _look(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    named: Int[np.ndarray, "N 2"] | None,
+) -> _Look:
+    """Look at a mesh, by kernels where they are loaded.
+
+    Raises:
+        ParameterError: one that is named is no edge.
+    """
     if kernels_available() and kernels_loaded() and fits(len(points), len(faces), 1):
-        from pns_common.fused.crease_lines import crease_line_rows
+        from pns_common.fused import crease_lines as fused
         from pns_common.fused.face_measures import face_normals as measured_normals
         from pns_common.fused.level import control_edges
 
         blocks = kernel_blocks(available_threads())
-        edges = control_edges(faces, len(points), creases.named, blocks)
-        normals = measured_normals(points, edges.faces, blocks)
-        rows = crease_line_rows(points, edges, normals, creases, blocks)
-        return edges.edges[rows].astype(np.int64)
-    topology = with_creases(build_topology(faces, len(points)), creases.named)
+        edges = control_edges(faces, len(points), named, blocks)
+        measured = measured_normals(points, edges.faces, blocks)
+
+        def rows_beyond(angle: float) -> Int[np.ndarray, " N"]:
+            return np.flatnonzero(fused.edges_beyond(edges, measured, cosine_of(angle), blocks)[0])
+
+        return _Look(
+            edges,
+            lambda creases: fused.crease_line_rows(points, edges, measured, creases, blocks),
+            rows_beyond,
+        )
+    topology = with_creases(build_topology(faces, len(points)), named)
     normals = face_normals(points, faces)
-    return topology.edges[line_rows(points, normals, topology, creases)]
+    return _Look(
+        topology,
+        lambda creases: line_rows(points, normals, topology, creases),
+        lambda angle: edges_beyond(normals, topology, topology.interior, cosine_of(angle)),
+    )
 
 
 def named_on(mesh: Mesh, creases: Creases) -> Creases:
@@ -84,12 +136,13 @@ def named_on_parts(
     is_known = creases.edged_angle is None or creases.edged is not None
     if creases.line_angle is None or is_known or count == 1:
         return named_on(mesh, creases)
-    edged = edged_parts(mesh, creases, part_of_face, count)
-    lines = lines_on(mesh, replace(creases, edged=False))
+    look = _look(mesh.vertices, mesh.faces, creases.named)
+    edged = _edged(look.turns(creases, part_of_face, count))
+    lines = look.lines(replace(creases, edged=False))
     if edged.any():
         part_of_vertex = np.zeros(len(mesh.vertices), dtype=np.int64)
         part_of_vertex[mesh.faces] = part_of_face[:, None]
-        gentle = lines_on(mesh, replace(creases, edged=True))
+        gentle = look.lines(replace(creases, edged=True))
         in_edged = [edged[part_of_vertex[pairs[:, 0]]] for pairs in (lines, gentle)]
         lines = np.concatenate([lines[~in_edged[0]], gentle[in_edged[1]]])
     return _with_names(creases, lines)
@@ -117,36 +170,19 @@ def without_gentle(
     return replace(creases, named=creases.named[~gone])
 
 
-def edged_parts(
-    mesh: Mesh, creases: Creases, part_of_face: Int[np.ndarray, " F"], count: int
-) -> Bool[np.ndarray, " P"]:
-    """Return which parts are edged, by their edges that are not named."""
-    assert creases.line_angle is not None
-    assert creases.edged_angle is not None
-    angles, named = (creases.line_angle, creases.edged_angle), creases.named
-    turns = turns_of_parts(mesh.vertices, mesh.faces, angles, part_of_face, count, named)
-    return np.array([is_edged(sharp, bent) for sharp, bent in turns.tolist()], dtype=bool)
-
-
 def turns_of_parts(
     points: Float[np.ndarray, "V 3"],
     faces: Int[np.ndarray, "F 3"],
-    angles: tuple[float, float],
+    creases: Creases,
     part_of_face: Int[np.ndarray, " F"],
     count: int,
-    named: Int[np.ndarray, "N 2"] | None = None,
 ) -> Int[np.ndarray, "P 2"]:
-    """Count each part's interior edges that turn by more than each of the angles, in degrees.
+    """Count each part's interior edges that turn by more than θ, and by more than θ'.
 
     An edge is of the part of the first face on it. Those that are named are creases, not interior.
     """
-    edges, half_edges = interior_edges(faces, len(points))
-    if named is not None:
-        keys, named_keys = (pair_keys(pairs, len(points)) for pairs in (edges, named))
-        half_edges = half_edges[~np.isin(keys, named_keys)]
-    normals, beside = face_normals(points, faces), half_edges // 3
-    n, m = normals[beside[:, 0]], normals[beside[:, 1]]
-    cosines, defined = dot(n, m), (dot(n, n) > 0) & (dot(m, m) > 0)
-    beyond = (beside[defined & (cosines < cosine_of(angle)), 0] for angle in angles)
-    parts = [np.bincount(part_of_face[first], minlength=count) for first in beyond]
-    return np.stack(parts, axis=1)
+    return _look(points, faces, creases.named).turns(creases, part_of_face, count)
+
+
+def _edged(turns: Int[np.ndarray, "P 2"]) -> Bool[np.ndarray, " P"]:
+    return np.array([is_edged(sharp, bent) for sharp, bent in turns.tolist()], dtype=bool)

@@ -110,8 +110,7 @@ def run_part(task: PartTask) -> PartDone:
     elif task.stage == TURNS:
         scheme = scheme_of(task.options, task.model)
         lines = lines_of(task.options, scheme)
-        angles = lines.line_angle or 0.0, lines.edged_angle or 0.0
-        turns = _turns(cutout(mesh, adjacency, own, 1).piece, angles)
+        turns = _turns(cutout(mesh, adjacency, own, 1).piece, lines)
         replace_file(file, json.dumps(turns).encode())
     else:
         try:
@@ -148,11 +147,11 @@ def _refine(
     }
 
 
-def _turns(piece: Piece, angles: tuple[float, float]) -> list[int]:
-    """Count the piece's own edges that turn by more than each of the angles."""
+def _turns(piece: Piece, lines: Creases) -> list[int]:
+    """Count the piece's own edges that turn by more than each of the angles of ``lines``."""
     load_kernels()
     of_own = piece.own.astype(np.int64)
-    return turns_of_parts(piece.points, piece.faces, angles, of_own, 2)[1].tolist()
+    return turns_of_parts(piece.points, piece.faces, lines, of_own, 2)[1].tolist()
 
 
 def _surely_refined(

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from pns_common import Creases, Mesh, crease_lines, load_model, loop, pns, refine
 from pns_common.connectivity.creases import NO_CREASES
 from pns_common.connectivity.topology import build_topology
-from pns_common.crease_lines import edged_parts
+from pns_common.crease_lines import turns_of_parts
+from pns_common.geometry.crease_lines import is_edged
 from pns_common.geometry.side_lengths import measure_sides
 from pns_common.pieces import (
     reduced_report,
@@ -54,7 +55,7 @@ def assert_pieces_are_the_whole(mesh, owner, scheme, levels, creases=None, lines
 
 def is_edged_mesh(mesh, lines):
     whole = np.zeros(len(mesh.faces), dtype=np.int64)
-    return bool(edged_parts(mesh, lines, whole, 1)[0])
+    return is_edged(*turns_of_parts(mesh.vertices, mesh.faces, lines, whole, 1)[0])
 
 
 def assert_report_is_the_whole(reduced, report):
