@@ -35,9 +35,12 @@ from .partition import Parts
 from .target import Target
 from .tiles import Tiles, write_tile
 
-COUNT, TURNS, REFINE = "count", "turns", "refine"
+COUNT, REFINE = "count", "refine"
 # Names of what they leave behind.
-_DONE = {COUNT: "count-{:05}.npy", TURNS: "turns-{:05}.json", REFINE: "part-{:05}.json"}
+_DONE = {COUNT: "count-{:05}.npz", REFINE: "part-{:05}.json"}
+# What may be counted of a part with the faces around it: edges that own faces are first to show,
+# and own edges that turn by more than each of the angles of lines.
+EDGES, TURNS = "edges", "turns"
 
 # No part takes less for a face that it makes, beside what any worker takes (docs/scale.md).
 LEAST_BYTES_PER_FACE = 150
@@ -48,9 +51,10 @@ class PartTask:
     """What a worker is told of a part.
 
     Attributes:
-        stage: COUNT, TURNS or REFINE.
+        stage: COUNT or REFINE.
         mesh, work: folders of the mesh and of what is known of it.
         length, sides: R, and the sides of all faces.
+        counts: what COUNT counts: EDGES, TURNS, or both.
         vertices: of each level of the whole mesh; empty while it is counted.
         target: where to write; None while it is counted.
         edged: whether the whole is an edged mesh, where lines ask for that.
@@ -67,6 +71,7 @@ class PartTask:
     model: str | None
     length: float
     sides: SideLengths
+    counts: tuple[str, ...] = ()
     vertices: tuple[int, ...] = ()
     target: Target | Tiles | None = None
     memory: int | None = None
@@ -104,14 +109,10 @@ def run_part(task: PartTask) -> PartDone:
     mesh, adjacency = open_mesh(Path(task.mesh)), Adjacency.open(work)
     own = Parts.open(work, task.parts).own(task.part)
     if task.stage == COUNT:
-        shown = shown_first(cutout(mesh, adjacency, own, 1).piece, task.options.levels)
+        piece = cutout(mesh, adjacency, own, 1).piece
+        counted: dict[str, Any] = {name: _COUNTS[name](task, piece) for name in task.counts}
         with replacing(file) as temporary, temporary.open("wb") as stream:
-            np.save(stream, shown.astype(np.uint32))
-    elif task.stage == TURNS:
-        scheme = scheme_of(task.options, task.model)
-        lines = lines_of(task.options, scheme)
-        turns = _turns(cutout(mesh, adjacency, own, 1).piece, lines)
-        replace_file(file, json.dumps(turns).encode())
+            np.savez(stream, **counted)
     else:
         try:
             report = _refine(task, mesh, adjacency, own)
@@ -147,11 +148,18 @@ def _refine(
     }
 
 
-def _turns(piece: Piece, lines: Creases) -> list[int]:
-    """Count the piece's own edges that turn by more than each of the angles of ``lines``."""
+def _edges(task: PartTask, piece: Piece) -> Int[np.ndarray, "N L"]:
+    return shown_first(piece, task.options.levels).astype(np.uint32)
+
+
+def _turns(task: PartTask, piece: Piece) -> Int[np.ndarray, " 2"]:
     load_kernels()
+    lines = lines_of(task.options, scheme_of(task.options, task.model))
     of_own = piece.own.astype(np.int64)
-    return turns_of_parts(piece.points, piece.faces, lines, of_own, 2)[1].tolist()
+    return turns_of_parts(piece.points, piece.faces, lines, of_own, 2)[1]
+
+
+_COUNTS = {EDGES: _edges, TURNS: _turns}
 
 
 def _surely_refined(

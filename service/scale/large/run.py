@@ -26,8 +26,18 @@ from ..engines.work import Engine, Work
 from . import adjacency, partition
 from .arrays import ArrayMesh, blocks_of
 from .formats import OutputKind, input_mesh, output_kind
-from .numbering import BASES, write_bases
-from .part import COUNT, REFINE, TURNS, PartDone, PartTask, done_file, run_part, scheme_of
+from .numbering import write_bases
+from .part import (
+    COUNT,
+    EDGES,
+    REFINE,
+    TURNS,
+    PartDone,
+    PartTask,
+    done_file,
+    run_part,
+    scheme_of,
+)
 from .plan import Large, keep, kept, work_folder
 from .room import check_room
 from .survey import Survey, survey, used_vertices
@@ -101,34 +111,31 @@ def run_large(
 
         def tasks(
             stage: str,
+            counts: tuple[str, ...] = (),
             vertices: tuple[int, ...] = (),
             target: Target | Tiles | None = None,
             edged: bool | None = None,
         ) -> list[PartTask]:
             folders = str(mesh.folder.resolve()), str(work.resolve())
             memory = None if large.parts else large.memory
-            what = large.options, large.model, length, about.sides, vertices, target, memory, edged
+            what = large.options, large.model, length, about.sides
+            known = counts, vertices, target, memory, edged
             return [
-                PartTask(stage, part, parts, *folders, *what)
+                PartTask(stage, part, parts, *folders, *what, *known)
                 for part in range(parts)
                 if not done_file(work, stage, part).exists()
             ]
 
-        vertices: tuple[int, ...] = ()
-        if kind.numbered:
-            with spent.stage("count"):
-                if not (work / BASES).exists():
-                    _do(tasks(COUNT), parts, engine, console, Spent())
-                vertices = _numbered(about, parts, large.options.levels, work)
+        gentle = mesh.creases is None and lines_of(large.options, scheme).edged_angle is not None
+        counts = (EDGES,) * kind.numbered + (TURNS,) * gentle
+        with spent.stage("count"):
+            if counts:
+                _do(tasks(COUNT, counts), parts, engine, console, Spent())
+            vertices = _numbered(about, parts, large.options.levels, work) if kind.numbered else ()
+            edged = is_edged(*_turns(parts, work)) if gentle else None
         target = _target(kind, mesh, about, vertices, large.options.levels, work)
-        edged = None
-        if mesh.creases is None and lines_of(large.options, scheme).edged_angle is not None:
-            with spent.stage("turns"):
-                _do(tasks(TURNS), parts, engine, console, Spent())
-                turns = [kept(done_file(work, TURNS, part)) for part in range(parts)]
-                edged = is_edged(*(sum(counts) for counts in zip(*turns, strict=True)))
         with spent.stage("refine"):
-            _do(tasks(REFINE, vertices, target, edged), parts, engine, console, spent)
+            _do(tasks(REFINE, (), vertices, target, edged), parts, engine, console, spent)
         with spent.stage("finish"):
             done = [kept(done_file(work, REFINE, part)) for part in range(parts)]
             fitted = scheme.fitted(lambda: about.sides)
@@ -178,9 +185,19 @@ def _numbered(about: Survey, parts: int, levels: int, work: Path) -> tuple[int, 
     file = work / "numbered.json"
     if not file.exists():
         own = partition.Parts.open(work, parts).own
-        counted = ((own(part), np.load(done_file(work, COUNT, part))) for part in range(parts))
+        counted = ((own(part), _counted(work, part, EDGES)) for part in range(parts))
         keep(file, write_bases(counted, about.vertices, about.faces, levels, work))
     return tuple(kept(file))
+
+
+def _turns(parts: int, work: Path) -> list[int]:
+    """Return how many edges of the whole turn by more than each of the angles."""
+    return np.sum([_counted(work, part, TURNS) for part in range(parts)], axis=0).tolist()
+
+
+def _counted(work: Path, part: int, what: str) -> np.ndarray:
+    with np.load(done_file(work, COUNT, part)) as counted:
+        return counted[what]
 
 
 def _target(
