@@ -11,7 +11,7 @@ from jaxtyping import Int, Shaped
 
 from ...errors import GltfError
 from ..constants import COLUMNS, COMPONENT_COUNTS, COMPONENT_TYPES
-from .schema import Accessor, BufferView, Document, Sparse
+from .schema import Accessor, Document, Sparse
 
 
 def element_size(accessor: Accessor) -> int:
@@ -27,13 +27,6 @@ def _element_size(component_type: int, kind: str) -> int:
         return component * COMPONENT_COUNTS[kind]
     column = rows * component
     return rows * (column + -column % 4)
-
-
-def extent(accessor: Accessor, buffer_view: BufferView) -> int:
-    """Return the bytes from the view's start to the end of the accessor's last element."""
-    size = element_size(accessor)
-    stride = buffer_view.byte_stride or size
-    return accessor.byte_offset + stride * (accessor.count - 1) + size
 
 
 def is_padded(accessor: Accessor) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 INSTANCING = "EXT_mesh_gpu_instancing"
@@ -52,8 +52,9 @@ KNOWN = frozenset(
 )
 
 
-# A number at `holder[key]`. There are many: an object of its own for each takes as long again.
-Reference = tuple[dict[str, Any], str]
+# Numbers at `holder[key]`, of each holder that has this key. One such list has all samplers of an
+# animation: an object for each number takes three times as long.
+References = tuple[Sequence[dict[str, Any]], str]
 
 
 def unknown_extensions(tree: dict[str, Any], text: bytes) -> list[str]:
@@ -77,44 +78,35 @@ def unknown_extensions(tree: dict[str, Any], text: bytes) -> list[str]:
     return sorted(names - KNOWN)
 
 
-def accessor_references(tree: dict[str, Any]) -> Iterator[Reference]:
+def accessor_references(tree: dict[str, Any]) -> Iterator[References]:
     """Yield every place that names an accessor."""
     for mesh in tree.get("meshes", []):
-        for primitive in mesh.get("primitives", []):
+        primitives = mesh.get("primitives", [])
+        yield primitives, "indices"
+        for primitive in primitives:
             for attributes in (primitive["attributes"], *primitive.get("targets", [])):
-                yield from ((attributes, name) for name in attributes)
-            yield from _at(primitive, "indices")
-    for skin in tree.get("skins", []):
-        yield from _at(skin, "inverseBindMatrices")
+                yield from (([attributes], name) for name in attributes)
+    yield tree.get("skins", []), "inverseBindMatrices"
     for animation in tree.get("animations", []):
-        for sampler in animation["samplers"]:
-            yield sampler, "input"
-            yield sampler, "output"
+        yield animation["samplers"], "input"
+        yield animation["samplers"], "output"
     for node in tree.get("nodes", []):
         instances = node.get("extensions", {}).get(INSTANCING, {})
         if isinstance(instances, dict) and isinstance(instances.get("attributes"), dict):
             attributes = instances["attributes"]
             yield from (
-                (attributes, name) for name, index in attributes.items() if isinstance(index, int)
+                ([attributes], name) for name, index in attributes.items() if isinstance(index, int)
             )
 
 
-def view_references(tree: dict[str, Any], accessors: list[dict[str, Any]]) -> Iterator[Reference]:
+def view_references(tree: dict[str, Any], accessors: list[dict[str, Any]]) -> Iterator[References]:
     """Yield every place that names a buffer view: images, and those of the given accessors."""
-    for image in tree.get("images", []):
-        yield from _at(image, "bufferView")
-    for accessor in accessors:
-        if "bufferView" in accessor:
-            yield accessor, "bufferView"
-        if "sparse" in accessor:
-            yield from ((accessor["sparse"][part], "bufferView") for part in ("indices", "values"))
+    yield tree.get("images", []), "bufferView"
+    yield accessors, "bufferView"
+    sparse = [accessor["sparse"] for accessor in accessors if "sparse" in accessor]
+    yield [each[part] for each in sparse for part in ("indices", "values")], "bufferView"
     for mesh in tree.get("meshes", []):
         for primitive in mesh.get("primitives", []):
             draco = primitive.get("extensions", {}).get("KHR_draco_mesh_compression")
             if draco is not None:
-                yield draco, "bufferView"
-
-
-def _at(holder: dict[str, Any], key: str) -> Iterator[Reference]:
-    if key in holder:
-        yield holder, key
+                yield [draco], "bufferView"

@@ -11,8 +11,9 @@ from collections.abc import Iterable, Sequence, Set
 from typing import Any
 
 import numpy as np
+from jaxtyping import Int
 
-from ..read.index_references import Reference, accessor_references, view_references
+from ..read.index_references import References, accessor_references, view_references
 from ..read.spare import Spare
 
 # Where no cut starts.
@@ -43,17 +44,16 @@ def remove_unused(tree: dict[str, Any], spare: Spare) -> list[tuple[int, int]]:
     ]
 
 
-def _unused(references: Iterable[Reference], count: int, spare: Set[int], old: int) -> list[int]:
-    """Return which of ``count`` entries nothing names, of spare ones and those that are not old.
-
-    References are not kept: of many objects, the garbage collector would look at all others too.
-    """
-    candidates = {*spare, *range(old, count)}
-    return sorted(candidates.difference(holder[key] for holder, key in references))
+def _unused(references: Iterable[References], count: int, spare: Set[int], old: int) -> list[int]:
+    """Return which of ``count`` entries nothing names, of spare ones and those that are not old."""
+    unused = {*spare, *range(old, count)}
+    for holders, key in references:
+        unused.difference_update([holder.get(key) for holder in holders])
+    return sorted(unused)
 
 
 def _renumbered(
-    entries: list[dict[str, Any]], unused: list[int], references: Iterable[Reference]
+    entries: list[dict[str, Any]], unused: list[int], references: Iterable[References]
 ) -> list[dict[str, Any]]:
     """Leave entries out: the last ones move into the places of those that went."""
     count, gone = len(entries) - len(unused), set(unused)
@@ -63,21 +63,22 @@ def _renumbered(
     result = entries[:count]
     for old, new in place.items():
         result[new] = entries[old]
-    for holder, key in references:
-        if holder[key] in place:
-            holder[key] = place[holder[key]]
+    for holders, key in references:
+        for holder in holders:
+            if holder.get(key) in place:
+                holder[key] = place[holder[key]]
     return result
 
 
 def cut(
     pieces: Sequence[bytes | memoryview],
-    gone: Iterable[tuple[int, int]],
-    needed: Iterable[tuple[int, int]],
+    gone: Int[np.ndarray, "N 2"],
+    needed: Int[np.ndarray, "M 2"],
 ) -> tuple[list[bytes | memoryview], list[tuple[int, int]]]:
     """Cut from the pieces the bytes of `gone` that nothing in `needed` covers.
 
-    Whole words go, so that what follows stays aligned. Also the (position, bytes before it that
-    went) of each cut, ascending, for `moved`.
+    Both are starts and ends. Whole words go, so that what follows stays aligned. Also the
+    (position, bytes before it that went) of each cut, ascending, for `moved`.
     """
     cuts = [
         (start + -start % 4, end - end % 4)
@@ -114,9 +115,9 @@ def moved(offsets: Sequence[int], shifts: Sequence[tuple[int, int]]) -> list[int
     return after
 
 
-def _merged(ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+def _merged(ranges: Int[np.ndarray, "N 2"]) -> list[tuple[int, int]]:
     """Return ascending ranges that do not touch, which cover the same."""
-    starts, ends = np.array(list(ranges), dtype=np.int64).reshape(-1, 2).T
+    starts, ends = ranges.T
     order = np.argsort(starts)
     starts, ends = starts[order], np.maximum.accumulate(ends[order])
     opens, closes = (np.ones(len(starts), dtype=bool) for _ in range(2))

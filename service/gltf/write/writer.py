@@ -98,7 +98,9 @@ class Writer:
         stored = [self.bytes_of(view) for view in views]
         starts = [place.get("byteOffset", 0) for place in stored]
         ends = [start + place["byteLength"] for start, place in zip(starts, stored, strict=True)]
-        self.pieces, shifts = cut(self.pieces, gone, zip(starts, ends, strict=True))
+        went = np.array(gone, dtype=np.int64).reshape(-1, 2)
+        needed = np.array([starts, ends], dtype=np.int64).T
+        self.pieces, shifts = cut(self.pieces, went, needed)
         for place, start in zip(stored, moved(starts, shifts), strict=True):
             if "byteOffset" in place:
                 place["byteOffset"] = start

@@ -10,7 +10,7 @@ from typing import Any
 
 from ....errors import GltfError
 from ...constants import COMPONENT_TYPES, UNSIGNED_INTEGERS
-from ..accessors import element_size, extent
+from ..accessors import element_size
 from ..json_text import escaped
 from ..schema import Accessor, Document, Material, Primitive, Sparse, TextureInfo
 
@@ -75,13 +75,16 @@ def _check_accessors(document: Document) -> None:
     refer_each([each.buffer_view for each in accessors], views, "/accessors", "/bufferView")
     for number, accessor in enumerate(accessors):
         if accessor.buffer_view is not None:
-            view = views[accessor.buffer_view]
-            if view.byte_stride and view.byte_stride < element_size(accessor):
+            view, size = views[accessor.buffer_view], element_size(accessor)
+            stride = view.byte_stride or size
+            if stride < size:
                 raise GltfError(
-                    f"elements of {element_size(accessor)} bytes at a stride of {view.byte_stride}",
+                    f"elements of {size} bytes at a stride of {stride}",
                     pointer=f"/accessors/{number}",
                 )
-            _check_end(extent(accessor, view), view.byte_length, f"/accessors/{number}")
+            end = accessor.byte_offset + stride * (accessor.count - 1) + size
+            if end > view.byte_length:
+                _check_end(end, view.byte_length, f"/accessors/{number}")
         if accessor.sparse is not None:
             _check_sparse(document, accessor, accessor.sparse, f"/accessors/{number}/sparse")
 

@@ -76,6 +76,7 @@ def decode_views(
     packed = [
         _Packed(number, name, _checked_view(view.extensions[name], view.byte_length, number, name))
         for number, view in enumerate(document.buffer_views)
+        if view.extensions
         for name in EXTENSIONS
         if name in view.extensions
     ]
