@@ -37,12 +37,16 @@ def checked_levels(given: SupportsIndex) -> int:
     return levels
 
 
-def check_memory(faces: int, levels: int) -> None:
-    """Refuse what cannot fit into memory for certain, rather than be ended by the system for it."""
-    there = memory_here()
+def levels_that_fit(given: SupportsIndex, faces: int) -> int:
+    """Return the same of so many faces; what cannot fit into memory for certain is not begun.
+
+    Raises:
+        ParameterError: as above, or so many refined faces would take more than the memory here.
+    """
+    levels, there = checked_levels(given), memory_here()
     needed = faces * 4**levels * LEAST_BYTES_PER_FACE
     if there is None or needed <= there:
-        return
+        return levels
     raise ParameterError(
         "levels",
         levels,

@@ -12,13 +12,12 @@ from jaxtyping import Float, Int
 
 from pns_common.arguments import (
     check_limit,
-    check_memory,
     check_progress,
     check_reference_length,
     check_scheme,
-    checked_levels,
     checked_threads,
     chosen_creases,
+    levels_that_fit,
 )
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.base.deferred import Deferred
@@ -145,8 +144,7 @@ def refine(
     """
     check_is_mesh(mesh)
     check_scheme(scheme)
-    levels = checked_levels(levels)
-    check_memory(len(mesh.faces), levels)
+    levels = levels_that_fit(levels, len(mesh.faces))
     check_reference_length(reference_length)
     check_limit(limit)
     check_progress(progress)

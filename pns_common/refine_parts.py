@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.arguments import chosen_creases
-from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
+from pns_common.arguments import (
+    check_limit,
+    check_reference_length,
+    check_scheme,
+    checked_threads,
+    chosen_creases,
+    levels_that_fit,
+)
+from pns_common.base.blocks import BLOCK_ROWS, Blocks
 from pns_common.base.deferred import Deferred
 from pns_common.connectivity.creases import Creases, crease_children
 from pns_common.crease_lines import named_on_parts
@@ -17,7 +24,7 @@ from pns_common.errors import ParameterError
 from pns_common.fused import kernel_blocks
 from pns_common.masks.crease_shift import limit_crease_shift
 from pns_common.masks.limit import refined_limit_normals, refined_limit_positions
-from pns_common.mesh import Mesh
+from pns_common.mesh import Mesh, check_is_mesh
 from pns_common.refine import Report, kernels_can_serve, reference_length_of, report_of
 from pns_common.schemes import Scheme
 
@@ -37,7 +44,7 @@ def refine_parts(
     mesh: Mesh,
     part_faces: Int[np.ndarray, " Q"],
     scheme: Scheme,
-    levels: int = 1,
+    levels: SupportsIndex = 1,
     reference_length: float | str = "auto",
     *,
     limit: bool = False,
@@ -60,6 +67,12 @@ def refine_parts(
         ModelError: as for ``refine``.
         MeshError: the refined coordinates of any part are too large.
     """
+    check_is_mesh(mesh)
+    check_scheme(scheme)
+    levels = levels_that_fit(levels, len(mesh.faces))
+    check_reference_length(reference_length)
+    check_limit(limit)
+    workers = checked_threads(threads)
     first = _first_vertices(mesh, part_faces)
     if reference_length == "auto":
         lengths = np.array(
@@ -80,7 +93,6 @@ def refine_parts(
     from pns_common.fused.refine_parts import Units, refine_parts_fused
     from pns_common.fused.side_lengths import side_lengths_of_parts
 
-    workers = available_threads() if threads is None else threads
     blocks = kernel_blocks(workers)
     sides = Deferred(lambda: side_lengths_of_parts(mesh.vertices, mesh.faces, part_faces, blocks))
     schemes = [scheme.fitted(lambda part=part: sides()[part]) for part in range(len(lengths))]
