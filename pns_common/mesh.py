@@ -27,8 +27,9 @@ class Mesh:
     at least 1e-70 or exactly 0.
 
     Raises:
-        MeshError: wrong shapes or types, no faces, a NaN, infinite or huge coordinate, an extent
-            too small to compute with, or an index out of range; the error names the element.
+        MeshError: wrong shapes or types, no faces, a masked number, a NaN, infinite or huge
+            coordinate, an extent too small to compute with, or an index out of range; the error
+            names the element.
     """
 
     vertices: Float[np.ndarray, "V 3"]
@@ -184,7 +185,10 @@ def _first_alike(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Int[np.nda
 
 
 def _array(values: object, element: str) -> np.ndarray:
-    """Return what numpy makes of the input, refused where its rows differ in length."""
+    """Return what numpy makes of the input, refused where rows differ in length or have holes."""
+    if np.ma.is_masked(values):
+        # numpy would read what lies under the mask.
+        raise MeshError("masked numbers, expected three in each row", element=element)
     try:
         return np.asarray(values)
     except ValueError as error:

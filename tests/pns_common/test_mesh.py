@@ -33,6 +33,8 @@ FACE = np.array([[0, 1, 2]])
         ([[0, 0, 0], [1, 0], [0, 1, 0]], FACE, "vertices", None),
         (POINTS, [[0, 1, 2], [0, 1]], "faces", None),
         (POINTS, np.array([[0, 1, 2**64 - 1]], dtype=np.uint64), "face", 0),
+        (np.ma.array(POINTS, mask=np.eye(3)), FACE, "vertices", None),
+        (POINTS, np.ma.array(FACE, mask=[[0, 1, 0]]), "faces", None),
     ],
 )
 def test_invalid_input_names_the_element(vertices, faces, element, index):
