@@ -133,7 +133,7 @@ def crease_halves(
 
 
 def as_pairs(creases: Any) -> Int[np.ndarray, "N 2"]:
-    """Return creases as rows of two whole numbers, whatever they number.
+    """Return a copy of creases as rows of two whole numbers, whatever they number.
 
     Raises:
         ParameterError: they are something else.
@@ -152,7 +152,12 @@ def as_pairs(creases: Any) -> Int[np.ndarray, "N 2"]:
     if pairs.dtype.kind not in "iu":
         expected = "whole numbers of an integer type"
         raise ParameterError("creases.dtype", str(pairs.dtype), expected=expected)
-    return pairs
+    # Before the cast: 2⁶⁴ − 1 would become −1.
+    huge = np.flatnonzero((pairs > np.iinfo(np.int64).max).any(axis=1))
+    if len(huge):
+        row = int(huge[0])
+        raise ParameterError(f"creases[{row}]", pairs[row].tolist(), expected="two vertices")
+    return pairs.astype(np.int64)
 
 
 def _is_pair(row: Any) -> bool:
@@ -174,4 +179,4 @@ def checked_pairs(creases: Int[np.ndarray, "N 2"], vertex_count: int) -> Int[np.
         row = int(outside[0])
         expected = f"vertices 0 … {vertex_count - 1}"
         raise ParameterError(f"creases[{row}]", pairs[row].tolist(), expected=expected)
-    return pairs.astype(np.int64)
+    return pairs

@@ -76,6 +76,20 @@ def test_no_pairs_are_no_creases(none):
     assert as_pairs(none).dtype == np.int64
 
 
+@pytest.mark.parametrize("kind", ["u8", ">i4", "i1", "i8"])
+def test_pairs_are_a_signed_copy_of_any_whole_numbers(kind):
+    given = np.array([[3, 1], [0, 2]], dtype=kind)
+    creases = Creases(as_pairs(given))
+    given[:] = 7  # nobody changes them afterwards
+    assert creases.named.dtype == np.int64
+    assert creases.named.tolist() == [[3, 1], [0, 2]]
+
+
+def test_pairs_beyond_signed_numbers_are_refused():
+    with pytest.raises(ParameterError, match=r"creases\[1\] = \[18446744073709551615, 0\]"):
+        as_pairs(np.array([[0, 1], [2**64 - 1, 0]], dtype=np.uint64))
+
+
 def test_crease_edges_get_no_correction_and_are_counted():
     vertices, faces, rim, _ = halves()
     refined = refine(Mesh(vertices, faces), pns(random_model(0)), 2, creases=rim)
