@@ -7,8 +7,9 @@ is what lies around:
 1. *it is sharp*: its two faces' normals differ by more than θ;
 2. *its sides are flat*: in each of the two faces another edge turns by less than half as much;
 3. *it goes on*: at both ends it meets another such edge that runs on within θ of straight, or a
-   corner of three or more, or the mesh's boundary; what does not is dropped, ``ROUNDS`` times over,
-   so that a line that ends in a smooth surface loses as many edges there.
+   corner of three or more, or a boundary, a crease that is named or another edge that is not
+   interior; what does not is dropped, ``ROUNDS`` times over, so that a line that ends in a smooth
+   surface loses as many edges there.
 
 θ of 66 degrees lies between the turns of a hexagon and a pentagon: tubes of six sides stay round,
 and a rim of six corners is a circle, but in edged meshes (below) six sides are edges.
@@ -25,8 +26,10 @@ are lines only if
    goes on from its end is not beside it. A row of such edges is a tube or an arc: one of seven
    sides or more stays round, as a barrel does, where its walls are quads cut in two.
 
-Both numbers are counts: a mesh in pieces has the same. Turning, moving, scaling, mirroring or
-renumbering a mesh does not change the answer.
+Both numbers are counts: a mesh in pieces has the same. Turning, moving, scaling or renumbering a
+mesh does not change the answer, nor does mirroring it with its faces turned, but where rounding
+decides: walls of 18 sides turn by θ' exactly. A mesh whose faces are turned over has ridges for
+hollows, and if it is edged it may have other lines.
 """
 
 from __future__ import annotations
