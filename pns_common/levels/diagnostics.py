@@ -66,13 +66,14 @@ class LevelReport(Displacements):
     """One level: counts of the mesh it made and diagnostics of the step that made it.
 
     ``vertex_rule`` stands only where the model has one; ``proximity_ratio`` and ``gate`` are the
-    interior edges'. Of learned levels alone: ``displacement_max``, the longest δ, and
-    ``envelope_max``, the longest that the budget allows where a gate is open (None where the rules
-    name no bound), both in the mesh's units; ``shut``, at how many interior edges and movable
-    vertices the gate is 0, so that the network was not run for them; and ``guarded``, how many
-    vertices the fold guard scaled, where there is one. Where there are creases,
-    ``crease_shift_max`` is the longest way from where Loop's smooth rules would have had a vertex
-    at them to where it is.
+    interior edges', and so is ``normal_jump_max``, the largest angle in radians between the faces
+    beside one: a crease turns as it should, and is none of them. Of learned levels alone:
+    ``displacement_max``, the longest δ, and ``envelope_max``, the longest that the budget allows
+    where a gate is open (None where the rules name no bound), both in the mesh's units; ``shut``,
+    at how many interior edges and movable vertices the gate is 0, so that the network was not run
+    for them; and ``guarded``, how many vertices the fold guard scaled, where there is one. Where
+    there are creases, ``crease_shift_max`` is the longest way from where Loop's smooth rules would
+    have had a vertex at them to where it is.
     """
 
     vertices: int
