@@ -138,9 +138,10 @@ def refine(
 
     Raises:
         ParameterError: no Mesh or no Scheme; levels, reference_length or threads out of range; a
-            limit that is no bool, a progress that cannot be called; a crease that is no edge.
+            limit that is no bool, a progress that cannot be called; a crease that is no edge; a
+            rule that returns no placement, or one of other vertices.
         ModelError: the network returned something that is not finite, or of another shape.
-        MeshError: the refined coordinates are too large.
+        MeshError: the refined coordinates are too large, or not numbers.
     """
     check_is_mesh(mesh)
     check_scheme(scheme)
@@ -218,9 +219,9 @@ def refine_arrays(
     """Go through the levels with the array kernels, which serve every scheme.
 
     Raises:
-        ParameterError: a crease is no edge.
+        ParameterError: a crease is no edge; a rule returned no placement, or one of other vertices.
         ModelError: the network returned something that is not finite, or of another shape.
-        MeshError: the refined coordinates are too large.
+        MeshError: the refined coordinates are too large, or not numbers.
     """
     steps = array_steps(mesh.vertices, mesh.faces, creases, scheme, reference_length, blocks)
     reports: list[LevelReport] = []

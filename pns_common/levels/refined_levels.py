@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -59,5 +60,6 @@ def check_coordinates(largest: float) -> None:
     Raises:
         MeshError: the largest absolute value is above 1e75, or NaN.
     """
-    if not largest <= LARGEST_COORDINATE:  # also where it is NaN
-        raise MeshError("refined coordinates are too large", element="vertices")
+    if not largest <= LARGEST_COORDINATE:  # also where it is NaN, as a rule may give it
+        found = "not numbers" if math.isnan(largest) else "too large"
+        raise MeshError(f"refined coordinates are {found}", element="vertices")

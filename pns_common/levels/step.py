@@ -12,8 +12,9 @@ from jaxtyping import Float
 
 from pns_common.base.arrays import Array, beside, namespace
 from pns_common.connectivity.topology import split
+from pns_common.errors import ParameterError
 from pns_common.formula.curve_prior import on_boundary
-from pns_common.rules.control_level import ControlLevel
+from pns_common.rules.control_level import ControlLevel, Rule
 from pns_common.rules.loop import loop_edge_rule, loop_vertex_rule
 from pns_common.rules.placement import Added, Placement
 from pns_common.schemes import Scheme
@@ -61,10 +62,13 @@ def level_step(level: ControlLevel, scheme: Scheme) -> LevelStep:
 
     Raises:
         ModelError: the network returned something that is not finite, or of another shape.
+        ParameterError: a rule returned no placement, or one of other vertices.
     """
     if not scheme.acts_at(level.depth):
         return LevelStep(loop_vertex_rule(level), loop_edge_rule(level), False, None)
-    step = LevelStep(scheme.vertex_rule(level), scheme.edge_rule(level), True, None)
+    vertices = _placed("vertex_rule", scheme.vertex_rule, level, level.topology.vertex_count)
+    edges = _placed("edge_rule", scheme.edge_rule, level, len(level.topology.edges))
+    step = LevelStep(vertices, edges, True, None)
     loop_points = step.loop_points
     if scheme.guard is None or loop_points is None:
         return step
@@ -78,6 +82,18 @@ def level_step(level: ControlLevel, scheme: Scheme) -> LevelStep:
         edges=_scaled(step.edges, scale[count:]),
         guard=scale,
     )
+
+
+def _placed(name: str, rule: Rule, level: ControlLevel, count: int) -> Placement:
+    """Return what a rule placed: anyone may write one."""
+    placed = rule(level)
+    if not isinstance(placed, Placement):  # pyright: ignore[reportUnnecessaryIsInstance]
+        expected = "a rule that returns a Placement, as placed_at makes it"
+        raise ParameterError(name, type(placed), expected=expected)
+    if placed.loop.shape != (count, 3):
+        expected = f"a rule that places the {count} vertices that are its own"
+        raise ParameterError(name, tuple(placed.loop.shape), expected=expected)
+    return placed
 
 
 def _scaled(placement: Placement, scale: Float[np.ndarray, " N"]) -> Placement:

@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.base.arrays import Array, namespace, scatter
 from pns_common.base.blocks import Blocks
+from pns_common.errors import ParameterError
 from pns_common.formula.correction import Correction, proximity_ratio
 
 
@@ -95,7 +96,14 @@ def without_correction(positions: Float[Array, "N 3"]) -> Placement:
 
 
 def placed_at(loop: Placement, positions: Float[Array, "N 3"]) -> Placement:
-    """Put vertices anywhere, without a bound: reports count how far that is from Loop's."""
+    """Put vertices anywhere, without a bound: reports count how far that is from Loop's.
+
+    Raises:
+        ParameterError: there is not one position for each of Loop's.
+    """
+    if np.shape(positions) != tuple(loop.loop.shape):
+        expected = f"an array of shape {tuple(loop.loop.shape)}, a row for each vertex"
+        raise ParameterError("positions", np.shape(positions), expected=expected)
     return replace(loop, displacement=positions - loop.loop)
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from pns_common.base.blocks import WHOLE
 from pns_common.connectivity.topology import build_topology
+from pns_common.errors import ParameterError
 from pns_common.formula.fold_guard import FoldGuard
 from pns_common.levels.step import level_step
 from pns_common.rules.control_level import control_level
@@ -48,6 +49,21 @@ def test_after_the_learned_levels_it_is_loop(depth, learned):
     step = level_step(level, replace(SCHEME, learned_levels=2))
     assert step.learned is learned
     assert (step.loop_points is not None) is learned
+
+
+@pytest.mark.parametrize(
+    ("rules", "name", "found"),
+    [
+        ((loop_vertex_rule, lambda level: level.points), "edge_rule", "ndarray"),
+        ((loop_edge_rule, loop_vertex_rule), "vertex_rule", "(30, 3)"),
+        ((loop_vertex_rule, loop_vertex_rule), "edge_rule", "(12, 3)"),
+    ],
+    ids=["positions alone", "swapped", "of the other kind"],
+)
+def test_a_rule_that_places_no_vertices_or_others_is_refused_by_its_name(rules, name, found):
+    with pytest.raises(ParameterError, match=name) as refusal:
+        level_step(control_level(POINTS, TOPOLOGY), Scheme("by hand", *rules))
+    assert found in str(refusal.value)
 
 
 class Told(FoldGuard):

@@ -1,8 +1,9 @@
 """Placements: rows of them, Loop's own, and a correction scattered into them."""
 
 import numpy as np
+import pytest
 
-from pns_common import Mesh, loop, refine
+from pns_common import Mesh, ParameterError, loop, refine
 from pns_common.base.blocks import Blocks
 from pns_common.formula.correction import Correction
 from pns_common.rules.placement import (
@@ -45,6 +46,13 @@ def test_what_is_placed_elsewhere_counts_as_distance_from_loop():
     apart = np.linalg.norm(flat.mesh.vertices - smooth.mesh.vertices, axis=1).max()
     assert 0 < apart <= flat.report["limit_distance"]
     assert flat.report["limit_distance_bound"] is None
+
+
+def test_positions_of_another_number_of_vertices_are_refused():
+    """One row was taken for all: every vertex lay in one point."""
+    for count in (1, 4):
+        with pytest.raises(ParameterError, match=rf"\({count}, 3\).*\(5, 3\)"):
+            placed_at(BASE, BASE.loop[:count])
 
 
 def test_a_correction_is_added_at_its_rows_alone():
