@@ -28,8 +28,8 @@ class Feature:
 
     Attributes:
         kind: what is measured.
-        vertices: the vertices of the stencil that it belongs to, such as "a" or "bc"; none where it
-            belongs to all.
+        vertices: the vertices of the stencil that it belongs to, such as "a" or "bc", in any order;
+            none where it belongs to all.
         half_turn, mirror, turn_over: 1 or −1, beside the renaming.
         limit: the largest absolute value.
     """
@@ -91,7 +91,7 @@ def _signed_permutation(
     features: Sequence[Feature], generator: Generator
 ) -> tuple[Int[np.ndarray, " K"], Float[np.ndarray, " K"]]:
     renaming = str.maketrans(generator.vertices, generator.renamed)
-    place = {(feature.kind, feature.vertices): k for k, feature in enumerate(features)}
-    order = [place[feature.kind, feature.vertices.translate(renaming)] for feature in features]
+    place = {(each.kind, frozenset(each.vertices)): k for k, each in enumerate(features)}
+    order = [place[each.kind, frozenset(each.vertices.translate(renaming))] for each in features]
     signs = [getattr(feature, generator.name) for feature in features]
     return np.array(order), np.array(signs, dtype=float)
