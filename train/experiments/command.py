@@ -20,15 +20,27 @@ from train.experiments.registry import EXPERIMENTS
 def reproduce_command(
     name: Annotated[str | None, typer.Argument(help="One experiment; all if not given.")] = None,
     checkpoints: Annotated[
-        Path | None, typer.Option(help="Networks to take by recipe name instead of training.")
+        Path | None,
+        typer.Option(
+            help="Networks to take by recipe name instead of training.",
+            exists=True,
+            file_okay=False,
+        ),
     ] = None,
     published: Annotated[
-        Path | None, typer.Option(help="The author's published data, or a clone with .pt files.")
+        Path | None,
+        typer.Option(
+            help="The author's published data, or a clone with .pt files.",
+            exists=True,
+            file_okay=False,
+        ),
     ] = None,
     assets: Annotated[
         Path | None,
         typer.Option(
-            help="Folder of dense meshes for the decimation test.", exists=True, file_okay=False
+            help="Folder of meshes for the experiments that read files.",
+            exists=True,
+            file_okay=False,
         ),
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder to write.")] = Path("results"),
@@ -81,7 +93,8 @@ def run_all(
             progress.advance(overall, ended.seconds)
             console.print(f"{ended.name}: {seconds:.1f} s")
     page = output / "README.md"
-    page.write_text(markdown_page(EXPERIMENTS, _records(output)), encoding="utf-8")
+    before = page.read_text(encoding="utf-8") if page.is_file() else ""
+    page.write_text(markdown_page(EXPERIMENTS, _records(output), before), encoding="utf-8")
     console.print(f"{page} written", soft_wrap=True)
 
 

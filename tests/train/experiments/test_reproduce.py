@@ -118,9 +118,27 @@ def test_tables_keep_every_digit_and_the_page_rounds(tmp_path, experiment):
     assert lines == ["name,value,paper", f"third | column,{1 / 3!r},", "negative,-2.0,≈ π"]
     page = markdown_page({"counting": experiment}, {"counting": record})
     assert "| third \\| column | +0.33 | – " in page
-    assert "| negative        | -2.00 | ≈ π |".replace("     ", "") or page
+    assert "| negative        | -2.00 | ≈ π   |" in page
     assert "![line](figures/line.png)" in page
     assert "A note [with brackets]." in page
+
+
+def test_an_experiment_without_a_record_keeps_its_section_of_the_page(tmp_path, experiment):
+    """A checkout has the page and no records: running one experiment lost all other sections."""
+    record = reproduce(experiment, laboratory(tmp_path), tmp_path)
+    others = [replace(experiment, name=name, title=name) for name in ("before", "after", "never")]
+    ordered = [others[0], experiment, *others[1:]]
+    known = {each.name: each for each in ordered}
+    whole = markdown_page(known, {"before": record, "counting": record, "after": record})
+    old = whole.replace("-2.00", "-1.00")
+    page = markdown_page(known, {"counting": record}, old)
+    assert [line for line in page.splitlines() if line.startswith("## ")] == [
+        "## before",
+        "## Counting runs",
+        "## after",
+    ]
+    assert (page.count("-1.00"), page.count("-2.00")) == (2, 1)
+    assert markdown_page(known, {}, whole) == whole
 
 
 def test_figures_are_the_same_bytes_every_time(tmp_path, experiment):
@@ -183,6 +201,11 @@ def test_the_command_refuses_what_it_cannot_do(tmp_path, monkeypatch, counting, 
     assert lacking.exit_code == 2
     assert "--published" in lacking.output
     assert counting.runs == 0
+    for folder in ("--checkpoints", "--published", "--assets"):
+        missing = [folder, str(tmp_path / "nowhere")]
+        misspelt = runner.invoke(train.run.app, ["reproduce", "counting", *output, *missing])
+        assert (misspelt.exit_code, counting.runs) == (2, 0)
+        assert folder in misspelt.output
     everything = runner.invoke(train.run.app, ["reproduce", *output])
     assert everything.exit_code == 0
     assert counting.runs == 1

@@ -13,9 +13,11 @@ from train.experiments.harness.reproduce import Record, formatted
 INTRODUCTION = """\
 # Results
 
-Made by `python train/run.py reproduce`; every number under our own headings was computed by that
-command. Columns headed *Paper* are printed in the paper, columns headed *Published* in the files of
-its author's repository; they stand there for comparison and are no measurement of ours.
+Made by `python train/run.py reproduce --published DIR --assets DIR`; every number under our own
+headings was computed by that command. The author's published data and the folder of meshes are not
+kept with the source; without them some sections have fewer meshes, and others are left out.
+Columns headed *Paper* are printed in the paper, columns headed *Published* in the files of its
+author's repository; they stand there for comparison and are no measurement of ours.
 Improvements are relative to Loop, in per cent: the mean over 2000 paired bootstrap resamples.
 Lengths are in the patches' own unit (they span [−1, 1]²), angles in radians. The proximity ratio is
 ‖q − q0‖ / (C h²), with C = 0.5 where a method has no budget of its own.
@@ -28,13 +30,28 @@ and a PDF. CSV files, which long tables are in alone, and PDFs are not kept with
 LONGEST = 90
 
 
-def markdown_page(experiments: Mapping[str, Experiment], records: Mapping[str, Record]) -> str:
-    """Return the page of all experiments that have a record, in their order."""
+def markdown_page(
+    experiments: Mapping[str, Experiment], records: Mapping[str, Record], before: str = ""
+) -> str:
+    """Return the page of all experiments, in their order.
+
+    One without a record keeps its section of the page as it was before: a checkout has the page and
+    no records, and running one experiment there is not to lose the others.
+    """
+    kept = _sections(before)
     parts = [INTRODUCTION]
     for name, experiment in experiments.items():
         if name in records:
             parts.append(_section(experiment, records[name]))
+        elif experiment.title in kept:
+            parts.append(kept[experiment.title])
     return "\n".join(parts)
+
+
+def _sections(page: str) -> dict[str, str]:
+    """Return the sections of a page by their titles."""
+    _, *sections = page.split("\n## ")
+    return {text.partition("\n")[0]: f"## {text.rstrip()}\n" for text in sections}
 
 
 def _section(experiment: Experiment, record: Record) -> str:
