@@ -69,10 +69,17 @@ def _keeping_symmetry(
     hidden: tuple[int, ...],
     generator: torch.Generator,
 ) -> BoundedNet:
-    """Return a tied network for a scale-free rule, an averaged one for the paper's."""
+    """Return a tied network for a scale-free rule, an averaged one for the paper's.
+
+    Raises:
+        ParameterError: a layer of a tied network is no whole number of copies of the group.
+    """
     group = seen.symmetries
     if recipe.scale_free is None:
         return SymmetricNet(group, hidden, recipe.activation, generator)
+    if any(width < 1 or width % len(group.order) for width in hidden):
+        expected = f"multiples of {len(group.order)}, the symmetries of {seen.name}"
+        raise ParameterError("hidden", hidden, expected=expected)
     sizes = np.array([FEATURE_SIZES.get(feature.kind, 1.0) for feature in seen.features])
     copies = tuple(width // len(group.order) for width in hidden)
     return TiedNet(group, copies, recipe.activation, generator, sizes)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -16,6 +18,13 @@ def test_a_scale_free_recipe_has_tied_networks_that_are_silent_before_training()
         assert isinstance(network, TiedNet)
         rows = torch.from_numpy(np.random.default_rng(0).normal(size=(7, features))).float()
         assert not network(rows, 1.0).any()
+
+
+@pytest.mark.parametrize("hidden", [(50, 48), (4,), (0,)])
+def test_widths_that_symmetries_do_not_divide_are_refused(hidden):
+    """50 came out as 48, and the card said 50."""
+    with pytest.raises(ParameterError, match=r"hidden.*multiples of 8.*signed-18"):
+        initial_network(replace(general(), hidden=hidden))
 
 
 def test_only_a_scale_free_recipe_with_a_vertex_rule_makes_a_scale_free_scheme():
