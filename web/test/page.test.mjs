@@ -86,8 +86,8 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.ok(!left.data.equals(right.data));
   });
 
-  test("on a graphics card a room lights the model, and metal mirrors it", async () => {
-    const page = await visit({ hash: "#levels=1&layout=single", card: true, viewport: { width: 560, height: 400 } });
+  test("on a graphics card a room lights the model, metal mirrors it, and a lost card comes back so", async () => {
+    const page = await visit({ hash: "#levels=1&layout=side", card: true, viewport: { width: 560, height: 400 } });
     await choose(page, example);
     await settled(page);
     const shades = new Map();
@@ -100,6 +100,17 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     const often = [...shades].filter(([, times]) => times > 20).map(([shade]) => shade);
     const [least, most] = [Math.min(...often), Math.max(...often)];
     assert.ok(least > 12 && most > 40 && most - least > 18, `from ${least} to ${most} of 47`);
+    // Lost and given back it shows the same, on either side.
+    await page.evaluate(() => {
+      window.card = document.querySelector("#canvas").getContext("webgl2").getExtension("WEBGL_lose_context");
+      window.card.loseContext();
+    });
+    await page.locator("#no-webgl").waitFor();
+    await page.evaluate(() => window.card.restoreContext());
+    await page.locator("#no-webgl").waitFor({ state: "hidden" });
+    const again = await picture(page);
+    const other = again.data.filter((value, i) => Math.abs(value - data[i]) > 8).length / again.data.length;
+    assert.ok(other < 0.003, `${other} of the picture is another`);
   });
 
   test("a heat map colours the result alone, and its legend ends at the report's number", async () => {

@@ -349,12 +349,17 @@ export class Stage {
 }
 
 function startViewer(): Viewer | null {
+  const canvas = element<HTMLCanvasElement>("canvas");
+  const tell = (isMissing: boolean): void => void (element("no-webgl").hidden = !isMissing);
   try {
-    return new Viewer(element<HTMLCanvasElement>("canvas"));
+    const viewer = new Viewer(canvas);
+    canvas.addEventListener("webglcontextlost", () => tell(true));
+    canvas.addEventListener("webglcontextrestored", () => tell(false));
+    return viewer;
   } catch {
     document.body.classList.add("no-webgl-here");
-    element("no-webgl").hidden = false;
-    element("canvas").hidden = true;
+    tell(true);
+    canvas.hidden = true;
     return null;
   }
 }

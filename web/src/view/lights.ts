@@ -41,6 +41,11 @@ export function light(
     scene.add(new HemisphereLight(new Color(0xf4f7ff), new Color(0x8d8479), 1.7));
     return;
   }
+  surround(renderer, scene);
+}
+
+/** Let metal mirror a room. The card holds it alone: one that lost what it held is to be given it anew. */
+export function surround(renderer: WebGLRenderer, scene: Scene): void {
   const generator = new PMREMGenerator(renderer);
   const room = new RoomEnvironment();
   scene.environment = generator.fromScene(room, 0.03).texture;

@@ -12,7 +12,7 @@ import {
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { light, paint } from "./lights";
+import { light, paint, surround } from "./lights";
 import { drawnBySoftware } from "./software";
 import type { Extent, Model } from "./model";
 
@@ -66,7 +66,6 @@ export class Viewer {
   /** Throws where the browser has no WebGL. */
   constructor(readonly canvas: HTMLCanvasElement) {
     this.renderer = new WebGLRenderer({ canvas, antialias: !this.software });
-    this.renderer.setScissorTest(true);
     this.renderer.autoClear = false;
     this.renderer.toneMapping = NeutralToneMapping;
     light(this.renderer, this.scene, this.camera, this.software);
@@ -76,7 +75,10 @@ export class Viewer {
     this.controls.addEventListener("change", () => this.invalidate());
     this.controls.addEventListener("end", () => this.choose());
     canvas.addEventListener("dblclick", (event) => this.centreAt(event));
-    canvas.addEventListener("webglcontextrestored", () => this.invalidate());
+    canvas.addEventListener("webglcontextrestored", () => {
+      if (!this.software) surround(this.renderer, this.scene);
+      this.invalidate();
+    });
     new ResizeObserver(() => this.invalidate()).observe(canvas);
   }
 
@@ -219,6 +221,8 @@ export class Viewer {
       this.renderer.setPixelRatio(ratio);
       this.renderer.setSize(width, height, false);
     }
+    // A card that was lost comes back without it.
+    this.renderer.setScissorTest(true);
     const { left, right } = this.sides;
     const split = Math.round(this.wipe * width);
     if (!left || !right || this.layout === "overlay" || this.layout === "single") {
