@@ -21,6 +21,24 @@ const TRIANGLE = {
   mimeType: "",
   buffer: Buffer.from("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
 };
+/** Each an open corner of three faces or a tetrahedron. */
+const AMISS = {
+  "doubles.ply": [
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z",
+    "element face 3\nproperty list uchar int vertex_indices\nend_header",
+    "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n",
+  ].join("\n"),
+  "lines.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nl 1 2 \\\n3 4\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
+  "no-scene.gltf": JSON.stringify({ ...bare(), scene: undefined, scenes: undefined }),
+  "no-node.gltf": JSON.stringify({ ...bare(), scene: undefined, scenes: undefined, nodes: undefined }),
+  "two-scenes.gltf": JSON.stringify({
+    ...bare(),
+    scene: 1,
+    scenes: [{ nodes: [0] }, { nodes: [1] }],
+    nodes: [{ mesh: 0 }, { mesh: 1 }],
+    meshes: [bare().meshes[0], bare().meshes[0]],
+  }),
+};
 const REFUSED = [
   ["BoxWithInfinites.glb", /NaN or infinity/],
   ["IndexOutOfRange.gltf", /index 255, but there are 24 vertices/],
@@ -202,6 +220,8 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     ["mesh.zip", zipped, /^No glTF in this archive.*a\.obj/],
     ["other.stl", part, /This is no STL: it ends too early/],
     ["text.glb", Buffer.from("hello"), /This is no glTF: it is neither a GLB nor JSON/],
+    ["null.gltf", Buffer.from("null"), /This is no glTF: it is neither a GLB nor JSON with an asset/],
+    ["half.gltf", Buffer.from('{"asset":{"version":"2.0"},"meshes":[{}]}'), /cannot be shown.*Something that glTF requires/],
     ["text.txt", Buffer.from("hello"), /^No mesh among these files/],
   ]) {
     test(`${name} gets words, and no other try`, async () => {
@@ -295,6 +315,18 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await settled(page);
     const { x, width } = await page.locator("#panel").boundingBox();
     assert.ok(x + width <= page.viewportSize().width);
+  });
+
+  test("what readers of their own kind take amiss is drawn on both sides, and certified", async () => {
+    const page = await visit({ hash: "#levels=1&layout=side" });
+    for (const [name, content] of Object.entries(AMISS)) {
+      await choose(page, { name, mimeType: "", buffer: Buffer.from(content) });
+      await page.locator("#file-name", { hasText: name }).waitFor();
+      await settled(page);
+      const shown = await picture(page);
+      for (const from of [0, shown.width / 2]) assert.ok(middleOfShape(shown, from) > 0, `${name} from ${from}`);
+      assert.doesNotMatch(await page.textContent("#statements"), /Broken|more than 0\u00a0/, name);
+    }
   });
 
   test("copies of an instanced mesh are measured and framed as meshes are", { skip: !existsSync(FIXTURES) && `needs ${FIXTURES}` }, async () => {

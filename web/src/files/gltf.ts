@@ -4,12 +4,14 @@ import { LoadingManager } from "three";
 import { GLTFLoader, type GLTF } from "three/addons/loaders/GLTFLoader.js";
 import { fileProblem } from "../api/problem";
 import { spread } from "./instances";
+import { numbered } from "./numbered";
+import { whole } from "./whole";
 
 export interface GltfJson {
   asset?: { extras?: { pns?: unknown } };
   extensionsUsed?: string[];
   accessors?: { count: number }[];
-  nodes?: { mesh?: number }[];
+  nodes?: { children?: number[] }[];
   meshes?: {
     name?: string;
     extras?: { targetNames?: string[] };
@@ -19,12 +21,14 @@ export interface GltfJson {
 
 const MAGIC = 0x46546c67;
 
-/** The JSON of a .glb or a .gltf. */
+/** The JSON of a .glb or a .gltf. Throws where it is none. */
 export function jsonOf(bytes: ArrayBuffer): GltfJson {
   const view = new DataView(bytes);
   const isBinary = bytes.byteLength >= 20 && view.getUint32(0, true) === MAGIC;
   const text = isBinary ? new Uint8Array(bytes, 20, view.getUint32(12, true)) : bytes;
-  return JSON.parse(new TextDecoder().decode(text)) as GltfJson;
+  const json = JSON.parse(new TextDecoder().decode(text)) as GltfJson | null;
+  if (!json?.asset) throw new Error("it names no version");
+  return json;
 }
 
 /** The path that a relative address names, in its shortest form. */
@@ -93,7 +97,7 @@ export async function parseGltf(
     missing.push(url);
     return blobUrl(new Blob());
   });
-  const loader = new GLTFLoader(manager);
+  const loader = new GLTFLoader(manager).register(numbered).register(whole);
   const json = jsonOf(bytes);
   const used = json.extensionsUsed ?? [];
   if (used.includes("EXT_meshopt_compression") || used.includes("KHR_meshopt_compression")) {
@@ -109,17 +113,6 @@ export async function parseGltf(
   }
   try {
     const gltf = await loader.parseAsync(bytes, "");
-    for (const [object, place] of gltf.parser.associations) {
-      // Which of the file's meshes this is a part of: reports speak of those. What the loader adds
-      // of its own, such as a material where the file has none, has no place in it.
-      const mesh = place?.meshes;
-      if ("isMesh" in object && mesh !== undefined) object.userData.meshIndex = mesh;
-      // Of copies it knows the node alone.
-      const node = place?.nodes === undefined ? undefined : json.nodes?.[place.nodes];
-      for (const part of "isObject3D" in object && node ? [object, ...object.children] : []) {
-        if ("isInstancedMesh" in part) part.userData.meshIndex = node?.mesh;
-      }
-    }
     spread(gltf.scene);
     return gltf;
   } catch (error) {
@@ -129,7 +122,9 @@ export async function parseGltf(
         `The document names ${missing.join(", ")}: drop it together with the .gltf, or as a .zip.`,
       );
     }
-    throw fileProblem("The file cannot be shown", (error as Error).message);
+    // What a program says where something is not there means nothing to anybody.
+    const why = error instanceof TypeError ? "Something that glTF requires is not in it." : (error as Error).message;
+    throw fileProblem("The file cannot be shown", why);
   } finally {
     draco?.dispose();
     made.forEach((url) => URL.revokeObjectURL(url));

@@ -15,7 +15,7 @@ export function spread(scene: Object3D): void {
       const copy = new Mesh(mesh.geometry, mesh.material);
       mesh.getMatrixAt(number, copy.matrix);
       copy.matrix.decompose(copy.position, copy.quaternion, copy.scale);
-      copy.userData.meshIndex = mesh.userData.meshIndex;
+      copy.userData.pnsMesh = mesh.userData.pnsMesh;
       mesh.add(copy);
     }
   }

@@ -9,16 +9,17 @@ import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 export function readMesh(bytes: ArrayBuffer, kind: string): BufferGeometry {
   const geometry = READERS[kind]?.(bytes);
   if (!geometry?.getAttribute("position")?.count) throw new Error("it has no faces");
-  for (const name of Object.keys(geometry.attributes)) {
-    if (name !== "position") geometry.deleteAttribute(name);
-  }
-  return geometry;
+  // A PLY may have doubles, which no graphics card takes.
+  const { array } = geometry.getAttribute("position");
+  return new BufferGeometry()
+    .setAttribute("position", new BufferAttribute(Float32Array.from(array), 3))
+    .setIndex(geometry.index);
 }
 
 const READERS: Record<string, (bytes: ArrayBuffer) => BufferGeometry> = {
   obj: (bytes) => {
     const parts: BufferGeometry[] = [];
-    new OBJLoader().parse(text(bytes)).traverse((object) => {
+    new OBJLoader().parse(facesAlone(text(bytes))).traverse((object) => {
       if ((object as Mesh).isMesh) parts.push(positions((object as Mesh).geometry));
     });
     const merged = parts.length ? mergeGeometries(parts) : null;
@@ -29,6 +30,11 @@ const READERS: Record<string, (bytes: ArrayBuffer) => BufferGeometry> = {
   stl: (bytes) => new STLLoader().parse(bytes),
   off: (bytes) => readOff(text(bytes)),
 };
+
+/** The text of an OBJ without its points and lines: of an object that has some the loader drops the faces. */
+function facesAlone(source: string): string {
+  return source.replace(/\\\r?\n/g, " ").replace(/^[ \t]*[lp][ \t].*$/gm, "");
+}
 
 function positions(geometry: BufferGeometry): BufferGeometry {
   return new BufferGeometry().setAttribute("position", geometry.getAttribute("position"));

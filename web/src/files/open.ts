@@ -48,7 +48,7 @@ async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Prom
   try {
     json = jsonOf(bytes);
   } catch {
-    throw unreadable("glTF", new Error("it is neither a GLB nor JSON"));
+    throw unreadable("glTF", new Error("it is neither a GLB nor JSON with an asset"));
   }
   const { scene, animations } = await parseGltf(bytes, neighbours);
   return {

@@ -60,7 +60,7 @@ export function largestLength(
 ): number | null {
   let largest = 0;
   for (const mesh of model.meshes) {
-    const value = ofMesh(mesh.userData.meshIndex as number);
+    const value = ofMesh(mesh.userData.pnsMesh as number);
     if (value === null || value === undefined) return null;
     largest = Math.max(largest, value * placement(mesh).getMaxScaleOnAxis());
   }

@@ -15,7 +15,7 @@ export interface Surface {
 export function surfaceOf(meshes: Mesh[]): Surface {
   const parts = new Map<unknown, Set<BufferGeometry>>();
   for (const { geometry, userData } of meshes) {
-    const part = (userData.meshIndex as number | undefined) ?? geometry;
+    const part = (userData.pnsMesh as number | undefined) ?? geometry;
     parts.set(part, (parts.get(part) ?? new Set()).add(geometry));
   }
   const sum = { vertices: 0, boundary: 0, irregular: 0 };
