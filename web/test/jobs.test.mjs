@@ -93,6 +93,36 @@ describe("jobs of the page", { skip: noBrowser, timeout: 900_000 }, () => {
     assert.equal(name, "part-refined.glb");
   });
 
+  test("a job that the service ends is told of, and one that it no longer knows: either can be tried again", async () => {
+    const page = await visit({ hash: "#levels=5&model=full", expected: [404] });
+    const job = page.waitForResponse((answer) => answer.request().method() === "POST");
+    await choose(page, example);
+    const answer = await job;
+    const { id } = await answer.json();
+    // As a shutdown does, or another tab.
+    await fetch(new URL(`/jobs/${id}`, answer.url()), { method: "DELETE" });
+    await page.locator("#problem-title", { hasText: "The service ended the job" }).waitFor();
+    assert.ok(await page.isVisible("#problem-again"));
+    await page.route(/\/events$/, (route) =>
+      route.fulfill({ status: 404, json: { title: "There is no such job", detail: "It is gone." } }),
+    );
+    await page.selectOption("#levels", "1");
+    await page.locator("#problem-title", { hasText: "no such job" }).waitFor();
+    await page.unroute(/\/events$/);
+    await page.click("#problem-again");
+    await settled(page);
+  });
+
+  test("a reader that did not come is told of, and asked for again", async () => {
+    const page = await visit({ hash: "#levels=1", foreseen: /ERR_FAILED/ });
+    await page.route(/assets\/part-/, (route) => route.abort());
+    await choose(page, TETRAHEDRON);
+    await page.locator("#problem-title", { hasText: "A part of the page did not come" }).waitFor();
+    await page.unroute(/assets\/part-/);
+    await page.click("#problem-again");
+    await settled(page);
+  });
+
   test("a download that is cancelled is no refinement to ask for again", async () => {
     const page = await visit({ hash: "#levels=1" });
     await choose(page, example);

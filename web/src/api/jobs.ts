@@ -71,8 +71,12 @@ function upload(
       tell({ step: "upload", share: event.lengthComputable ? event.loaded / event.total : null });
     sent.onload = () => {
       if (sent.status !== 202) return reject(problemOf(sent.status, sent.responseText));
-      const job = JSON.parse(sent.responseText) as Job;
-      resolve(`jobs/${job.id}`);
+      try {
+        resolve(`jobs/${(JSON.parse(sent.responseText) as Job).id}`);
+      } catch {
+        // Some proxy's words.
+        reject(problemOf(sent.status, sent.responseText));
+      }
     };
     sent.onerror = () =>
       reject(localProblem("The upload did not arrive", "The connection to the service broke."));
@@ -95,8 +99,7 @@ async function finished(
     if (event !== "progress") continue;
     const job = JSON.parse(data) as Job;
     if (job.state === "done") return;
-    if (job.state === "failed") throw failure(job);
-    if (job.state === "cancelled") throw new DOMException("cancelled", "AbortError");
+    if (hasEnded(job)) throw failure(job);
     tell({
       step: job.state === "queued" ? "queue" : "refine",
       share: job.state === "queued" ? null : job.share,
@@ -107,13 +110,19 @@ async function finished(
   }
   // A proxy may cut a long stream: the job itself tells what became of it.
   const job = (await (await request(location, { signal })).json()) as Job;
-  if (job.state === "failed") throw failure(job);
+  if (hasEnded(job)) throw failure(job);
   if (job.state !== "done") return finished(location, signal, tell);
 }
 
-function failure(job: Job): Problem {
-  return job.problem
-    ? new Problem(job.problem)
+function hasEnded({ state }: Job): boolean {
+  return state === "failed" || state === "cancelled";
+}
+
+/** Why a job ended without a result. One that was cancelled, and not by its user, is told of as well. */
+function failure({ state, problem }: Job): Problem {
+  if (problem) return new Problem(problem);
+  return state === "cancelled"
+    ? localProblem("The service ended the job", "It may be stopping, or starting anew.")
     : localProblem("The job failed", "The service gave no reason.");
 }
 

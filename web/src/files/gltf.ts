@@ -2,6 +2,7 @@
 
 import { LoadingManager } from "three";
 import { GLTFLoader, type GLTF } from "three/addons/loaders/GLTFLoader.js";
+import { part } from "../api/part";
 import { fileProblem } from "../api/problem";
 import { spread } from "./instances";
 import { numbered } from "./numbered";
@@ -101,14 +102,14 @@ export async function parseGltf(
   const json = jsonOf(bytes);
   const used = json.extensionsUsed ?? [];
   if (used.includes("EXT_meshopt_compression") || used.includes("KHR_meshopt_compression")) {
-    const { MeshoptDecoder } = await import("three/addons/libs/meshopt_decoder.module.js");
+    const { MeshoptDecoder } = await part(import("three/addons/libs/meshopt_decoder.module.js"));
     await MeshoptDecoder.ready;
     loader.setMeshoptDecoder(MeshoptDecoder);
   }
   const draco = used.includes("KHR_draco_mesh_compression") ? await dracoLoader() : null;
   if (draco) loader.setDRACOLoader(draco);
   if (used.includes("KHR_texture_basisu")) {
-    const { ktx2Loader } = await import("./ktx2");
+    const { ktx2Loader } = await part(import("./ktx2"));
     loader.setKTX2Loader(await ktx2Loader((url) => manager.resolveURL(url)));
   }
   try {
@@ -132,7 +133,7 @@ export async function parseGltf(
 }
 
 async function dracoLoader() {
-  const { DRACOLoader } = await import("three/addons/loaders/DRACOLoader.js");
+  const { DRACOLoader } = await part(import("three/addons/loaders/DRACOLoader.js"));
   const at = (path: string): string => new URL(path, import.meta.url).href;
   const loader = new DRACOLoader();
   // The types know a folder alone; a pair of addresses is taken too, and ours carry hashes.

@@ -1,6 +1,7 @@
 /** A dropped file as a scene: what stands before refinement. */
 
 import { Group, Mesh, type AnimationClip, type BufferGeometry } from "three";
+import { part } from "../api/part";
 import { fileProblem } from "../api/problem";
 import { plain } from "../view/looks";
 import { hasNormals, jsonOf, parseGltf, triangles, type GltfJson } from "./gltf";
@@ -23,13 +24,13 @@ export interface Opened {
 export async function open(upload: Upload): Promise<Opened> {
   if (!upload.file.size) throw fileProblem("The file is empty", `${upload.name} holds not one byte.`);
   if (upload.kind === "zip") {
-    const { unzip } = await import("./archive");
+    const { unzip } = await part(import("./archive"));
     const inside = await unzip(upload);
     return openGltf(await inside.file.arrayBuffer(), inside.neighbours);
   }
   const bytes = await upload.file.arrayBuffer();
   if (upload.kind === "glb" || upload.kind === "gltf") return openGltf(bytes, upload.neighbours);
-  const { readMesh } = await import("./meshes");
+  const { readMesh } = await part(import("./meshes"));
   let geometry: BufferGeometry;
   try {
     geometry = readMesh(bytes, upload.kind);

@@ -85,8 +85,8 @@ export function showProblem(error: unknown): void {
   element("problem-pointer").textContent = pointer ? `at ${pointer}` : "";
   element("problem-pointer").hidden = !pointer;
   element("key-form").hidden = problem?.status !== 401;
-  // Busy, slow, or gone: the same may work in a moment.
-  element("problem-again").hidden = !problem || (problem.status < 500 && ![0, 408, 429].includes(problem.status));
+  // Busy, slow, or gone, it or the job alone: the same may work in a moment.
+  element("problem-again").hidden = !problem || (problem.status < 500 && ![0, 404, 408, 409, 429].includes(problem.status));
   element("problem").hidden = false;
   document.body.classList.remove("folded");
   element("problem").scrollIntoView({ block: "nearest" });
