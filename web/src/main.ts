@@ -6,7 +6,7 @@ import { chosen, dropped } from "./files/dropped";
 import type { Opened } from "./files/open";
 import { uploadsOf, type Dropped, type PathedFile, type Upload } from "./files/upload";
 import { dihedrals } from "./measure/dihedral";
-import { distances, largestLength } from "./measure/distance";
+import { distances, largestLength, rounding } from "./measure/distance";
 import { surfaceOf } from "./measure/surface";
 import type { Lengths } from "./report/certificate";
 import { bytes, listed } from "./report/format";
@@ -221,6 +221,7 @@ function lengths({ model, report }: Result, loop: Result | null): Lengths {
     proved: largestLength(model, (index) => ofMesh.get(index)?.limit_distance ?? 0) ?? 0,
     allowed: largestLength(model, (index) => ofMesh.get(index)?.limit_distance_bound),
     measured: measured && measured.max,
+    rounding: rounding(model),
     size: stage.size,
     unit: stage.unit,
   };

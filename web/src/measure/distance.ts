@@ -3,7 +3,7 @@
  * order; their vertices may differ, since those at a crease are one for each of its sides where normals break there.
  */
 
-import { Matrix4, Vector3, type Mesh, type SkinnedMesh } from "three";
+import { Box3, Matrix4, Vector3, type BufferAttribute, type Mesh, type SkinnedMesh } from "three";
 import type { Model } from "../view/model";
 import { corners } from "./weld";
 
@@ -39,6 +39,18 @@ export function distances(ours: Model, loop: Model): Field | null {
     values.push(lengths);
   }
   return { values, max };
+}
+
+/** By how much such distances may be wrong, in the scene's units: a file has its positions in float32. */
+export function rounding({ meshes }: Model): number {
+  const box = new Box3();
+  const reaches = meshes.map((mesh) => {
+    const { min, max } = box.setFromBufferAttribute(mesh.geometry.getAttribute("position") as BufferAttribute);
+    const reach = Math.max(...[...min, ...max].map(Math.abs));
+    return reach * placement(mesh).getMaxScaleOnAxis();
+  });
+  // Half a step along each axis, at either end.
+  return Math.sqrt(3) * 2 ** -23 * reaches.reduce((a, b) => Math.max(a, b), 0);
 }
 
 /** The linear part of what places a mesh at rest; a skin is placed by its joints, not its node. */

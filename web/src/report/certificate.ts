@@ -18,6 +18,8 @@ export interface Lengths {
   allowed: number | null;
   /** Largest distance of a vertex from its counterpart by Loop; null until that has come. */
   measured: number | null;
+  /** By how much that may be wrong. */
+  rounding: number;
   /** The model's own size: the diagonal of its box. */
   size: number;
   unit: Unit;
@@ -44,13 +46,14 @@ function loopAlone({ proved, unit }: Lengths): Statement {
 }
 
 function nearness(report: Report, lengths: Lengths): Statement[] {
-  const { proved, allowed, measured, size, unit } = lengths;
+  const { proved, allowed, measured, rounding, size, unit } = lengths;
   const used = Math.max(...report.levels.map(largestRatio));
   const bound = allowed === null ? "" : ` Its budget and creases allow ${length(allowed, unit)}.`;
-  const apart = measured === null ? "" : ` Between the refined vertices: ${length(measured, unit)}.`;
+  const rounded = rounding > proved / 100 ? `, to ${length(rounding, unit)} by the file’s own rounding` : "";
+  const apart = measured === null ? "" : ` Between the refined vertices: ${length(measured, unit)}${rounded}.`;
   return [
     {
-      holds: measured === null || measured <= proved * 1.001 + 1e-6 * size,
+      holds: measured === null || measured <= proved * 1.001 + 1e-6 * size + rounding,
       text: `Nowhere more than ${length(proved, unit)} from Loop`,
       note: `That is ${percent(proved / size)} of the model’s size, for every point of the limit surface.${bound}${apart}`,
     },
