@@ -119,6 +119,7 @@ export class Session {
     await this.only(request, anew, async (signal) => {
       let source: Source | null = null;
       let ours: Result;
+      this.listener.progress({ step: "open", share: null }, "");
       try {
         const opened = await open(upload);
         source = { upload, opened, model: modelOf(opened.scene, opened.clips) };

@@ -188,12 +188,13 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
 
   test("an OBJ is converted, shown and told of", async () => {
     const page = await visit({ hash: "#levels=1" });
-    const text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nusemtl red\nf 1 2 3 4\nf 1 2 5\n";
+    const text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nusemtl red\nf 1/1 2//1 3 4 # a square\nf -5 \\\n-4 5\n";
     await choose(page, { name: "a.obj", mimeType: "", buffer: Buffer.from(text) });
     await settled(page);
     assert.match(await page.textContent("#label-left"), /\D3 faces/);
     assert.match(await page.textContent("#label-right"), /· 12 faces/);
     assert.match(await page.textContent("#changes"), /materials dropped/);
+    assert.equal(await page.textContent("#statistics tr:has-text('Vertices in the file') td"), "5");
     // It came back smooth, though the file has no normals.
     assert.equal(await page.inputValue("#normals"), "smooth");
   });

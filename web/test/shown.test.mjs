@@ -249,6 +249,7 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
       new MutationObserver(() => window.names.add(name.textContent)).observe(name, { childList: true });
     });
     await choose(page, TETRAHEDRON);
+    await page.locator("#work-text", { hasText: "Opening the file" }).waitFor({ timeout: 20_000 });
     await page.waitForTimeout(500);
     await choose(page, example);
     await page.waitForTimeout(500);

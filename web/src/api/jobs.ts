@@ -10,7 +10,7 @@ export interface Body {
   type: string;
 }
 
-export type Step = "upload" | "queue" | "refine" | "download";
+export type Step = "open" | "upload" | "queue" | "refine" | "download";
 
 export interface Progress {
   step: Step;

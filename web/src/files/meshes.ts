@@ -1,10 +1,9 @@
 /** OBJ, PLY, STL and OFF as geometry: positions alone, since nothing else is refined. */
 
-import { BufferAttribute, BufferGeometry, type Mesh } from "three";
-import { OBJLoader } from "three/addons/loaders/OBJLoader.js";
+import { BufferAttribute, BufferGeometry } from "three";
 import { PLYLoader } from "three/addons/loaders/PLYLoader.js";
 import { STLLoader } from "three/addons/loaders/STLLoader.js";
-import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
+import { readObj } from "./obj";
 
 export function readMesh(bytes: ArrayBuffer, kind: string): BufferGeometry {
   const geometry = READERS[kind]?.(bytes);
@@ -17,28 +16,11 @@ export function readMesh(bytes: ArrayBuffer, kind: string): BufferGeometry {
 }
 
 const READERS: Record<string, (bytes: ArrayBuffer) => BufferGeometry> = {
-  obj: (bytes) => {
-    const parts: BufferGeometry[] = [];
-    new OBJLoader().parse(facesAlone(text(bytes))).traverse((object) => {
-      if ((object as Mesh).isMesh) parts.push(positions((object as Mesh).geometry));
-    });
-    const merged = parts.length ? mergeGeometries(parts) : null;
-    if (!merged) throw new Error("it has no faces");
-    return merged;
-  },
+  obj: (bytes) => readObj(text(bytes)),
   ply: (bytes) => new PLYLoader().parse(bytes),
   stl: (bytes) => new STLLoader().parse(bytes),
   off: (bytes) => readOff(text(bytes)),
 };
-
-/** The text of an OBJ without its points and lines: of an object that has some the loader drops the faces. */
-function facesAlone(source: string): string {
-  return source.replace(/\\\r?\n/g, " ").replace(/^[ \t]*[lp][ \t].*$/gm, "");
-}
-
-function positions(geometry: BufferGeometry): BufferGeometry {
-  return new BufferGeometry().setAttribute("position", geometry.getAttribute("position"));
-}
 
 /** OFF: counts, a vertex a line, a polygon a line; what follows a polygon's corners is its colour. */
 function readOff(source: string): BufferGeometry {

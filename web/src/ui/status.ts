@@ -17,6 +17,8 @@ const STAGES: Record<string, string> = {
 export function sentence({ step, share, place, stage, estimate }: Progress): string {
   const done = share === null ? "" : ` ${Math.round(100 * share)} %`;
   switch (step) {
+    case "open":
+      return "Opening the file";
     case "upload":
       return `Uploading${done}`;
     case "queue":

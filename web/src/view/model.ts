@@ -11,6 +11,7 @@ import {
   type Object3D,
   type SkinnedMesh,
 } from "three";
+import { corners } from "../measure/weld";
 
 export interface Model {
   root: Object3D;
@@ -52,16 +53,17 @@ export interface Extent {
   points: Float32Array;
 }
 
-/** Vertex by vertex, as skins and morph targets place them now: a target at rest takes no room. */
+/** Vertex by vertex, as skins and morph targets place them now: a target at rest takes no room, nor does what no face has. */
 export function extentOf(model: Model): Extent {
   const box = new Box3();
-  const count = model.meshes.reduce((sum, mesh) => sum + vertices(mesh), 0);
+  const used = model.meshes.map(({ geometry }) => verticesOf(geometry));
+  const count = used.reduce((sum, { length }) => sum + length, 0);
   const points = new Float32Array(3 * count);
   const place = new Vector3();
   let at = 0;
-  for (const mesh of model.meshes) {
+  for (const [number, mesh] of model.meshes.entries()) {
     mesh.updateWorldMatrix(true, false);
-    for (let vertex = 0; vertex < vertices(mesh); vertex++) {
+    for (const vertex of used[number]!) {
       mesh.getVertexPosition(vertex, place).applyMatrix4(mesh.matrixWorld).toArray(points, at);
       box.expandByPoint(place);
       at += 3;
@@ -70,8 +72,12 @@ export function extentOf(model: Model): Extent {
   return { box, points };
 }
 
-function vertices(mesh: Mesh): number {
-  return mesh.geometry.getAttribute("position").count;
+/** The vertices of a geometry's faces, each once. */
+function verticesOf(geometry: BufferGeometry): Uint32Array {
+  const isUsed = new Uint8Array(geometry.getAttribute("position").count);
+  const at = corners(geometry);
+  for (let corner = 0; corner < at.length; corner++) isUsed[at[corner]!] = 1;
+  return Uint32Array.from(isUsed.keys()).filter((vertex) => isUsed[vertex]);
 }
 
 /** Give back all that the graphics card holds for a model. */
