@@ -313,7 +313,14 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
 
   test("a long name pushes nothing out of the window", async () => {
     const page = await visit({ hash: "#levels=1" });
-    await choose(page, { ...example, name: `${"a long name ".repeat(20)}.glb` });
+    const long = { ...example, name: `${"a long name ".repeat(20)}.glb` };
+    await choose(page, long);
+    await settled(page);
+    const height = () => page.$eval(".bar", (bar) => bar.clientHeight);
+    const alone = await height();
+    await choose(page, long, TRIANGLE);
+    await page.locator("#file").waitFor();
+    assert.equal(await height(), alone);
     await settled(page);
     const { x, width } = await page.locator("#panel").boundingBox();
     assert.ok(x + width <= page.viewportSize().width);

@@ -346,6 +346,8 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     test(`axe finds no serious fault (${colorScheme})`, async () => {
       const page = await visit({ colorScheme, hash: "#levels=1" });
       assert.deepEqual(await faultsOf(page), []);
+      // It leaves out what stands in an empty field.
+      assert.ok((await contrastOfPlaceholder(page)) >= 4.5);
       await choose(page, { ...example, buffer: moving(part, 1) });
       await settled(page);
       await unfold(page);
@@ -474,6 +476,18 @@ async function faultsOf(page) {
   return violations
     .filter(({ impact }) => impact === "serious" || impact === "critical")
     .map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html.slice(0, 120)).join(" | ")}`);
+}
+
+/** WCAG's contrast of what stands in the field of the budget. */
+function contrastOfPlaceholder(page) {
+  return page.$eval("#budget", (field) => {
+    const luminance = (colour) => {
+      const [r, g, b] = colour.match(/\d+/g).map((part) => part / 255).map((x) => (x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4));
+      return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    const [text, sheet] = [getComputedStyle(field, "::placeholder").color, getComputedStyle(field).backgroundColor].map(luminance);
+    return (Math.max(text, sheet) + 0.05) / (Math.min(text, sheet) + 0.05);
+  });
 }
 
 function largestDistance(ours, loop) {
