@@ -335,6 +335,7 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       const shown = await picture(page);
       for (const from of [0, shown.width / 2]) assert.ok(middleOfShape(shown, from) > 0, `${name} from ${from}`);
       assert.doesNotMatch(await page.textContent("#statements"), /Broken|more than 0\u00a0/, name);
+      assert.equal(/own rounding/.test(await page.textContent("#statements")), name === "far.obj");
     }
   });
 

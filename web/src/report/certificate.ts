@@ -49,11 +49,13 @@ function nearness(report: Report, lengths: Lengths): Statement[] {
   const { proved, allowed, measured, rounding, size, unit } = lengths;
   const used = Math.max(...report.levels.map(largestRatio));
   const bound = allowed === null ? "" : ` Its budget and creases allow ${length(allowed, unit)}.`;
-  const rounded = rounding > proved / 100 ? `, to ${length(rounding, unit)} by the file’s own rounding` : "";
+  const most = proved * 1.001 + 1e-6 * size;
+  // Else the two numbers would seem to disagree.
+  const rounded = measured !== null && measured > most ? `, to ${length(rounding, unit)} by the file’s own rounding` : "";
   const apart = measured === null ? "" : ` Between the refined vertices: ${length(measured, unit)}${rounded}.`;
   return [
     {
-      holds: measured === null || measured <= proved * 1.001 + 1e-6 * size + rounding,
+      holds: measured === null || measured <= most + rounding,
       text: `Nowhere more than ${length(proved, unit)} from Loop`,
       note: `That is ${percent(proved / size)} of the model’s size, for every point of the limit surface.${bound}${apart}`,
     },
