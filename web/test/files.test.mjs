@@ -223,7 +223,8 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     ["other.stl", part, /This is no STL: it ends too early/],
     ["text.glb", Buffer.from("hello"), /This is no glTF: it is neither a GLB nor JSON/],
     ["null.gltf", Buffer.from("null"), /This is no glTF: it is neither a GLB nor JSON with an asset/],
-    ["half.gltf", Buffer.from('{"asset":{"version":"2.0"},"meshes":[{}]}'), /cannot be shown.*Something that glTF requires/],
+    ["half.gltf", Buffer.from('{"asset":{"version":"2.0"},"meshes":[{}]}'), /cannot be shown.*cannot be read: something that has to be in it is not/],
+    ["cut.glb", part.subarray(0, 9000), /cannot be shown.*cannot be read: it ends too early/],
     ["text.txt", Buffer.from("hello"), /^No mesh among these files/],
   ]) {
     test(`${name} gets words, and no other try`, async () => {

@@ -6,6 +6,7 @@ import { part } from "../api/part";
 import { fileProblem } from "../api/problem";
 import { spread } from "./instances";
 import { numbered } from "./numbered";
+import { why } from "./unreadable";
 import { whole } from "./whole";
 
 export interface GltfJson {
@@ -123,9 +124,7 @@ export async function parseGltf(
         `The document names ${missing.join(", ")}: drop it together with the .gltf, or as a .zip.`,
       );
     }
-    // What a program says where something is not there means nothing to anybody.
-    const why = error instanceof TypeError ? "Something that glTF requires is not in it." : (error as Error).message;
-    throw fileProblem("The file cannot be shown", why);
+    throw fileProblem("The file cannot be shown", `Its glTF cannot be read: ${why(error)}.`);
   } finally {
     draco?.dispose();
     made.forEach((url) => URL.revokeObjectURL(url));

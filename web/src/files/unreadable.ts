@@ -4,7 +4,12 @@ import { fileProblem, type Problem } from "../api/problem";
 
 /** `what` it should be; `error`: what its reader stopped at. */
 export function unreadable(what: string, error: unknown): Problem {
-  // What a reader of binary data says where it runs over the end means nothing to anybody.
-  const why = error instanceof RangeError ? "it ends too early" : (error as Error).message;
-  return fileProblem("The file cannot be read", `This is no ${what}: ${why}`);
+  return fileProblem("The file cannot be read", `This is no ${what}: ${why(error)}`);
+}
+
+/** What a reader stopped at. What programs say where something is not there means nothing to anybody. */
+export function why(error: unknown): string {
+  if (error instanceof RangeError) return "it ends too early";
+  if (error instanceof TypeError) return "something that has to be in it is not";
+  return (error as Error).message;
 }
