@@ -10,7 +10,7 @@ from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.crease_lines import named_on_parts
 from pns_common.errors import MeshError
 from pns_common.fused.linear import linear_refinement
-from pns_common.mesh import Cleaned
+from pns_common.mesh import Cleaned, Mesh
 from pns_common.refine import refine
 from pns_common.schemes import Scheme
 
@@ -19,6 +19,7 @@ from ...errors import UnrefinableError
 from ...meshes.shape_creases import creases_by_shape
 from ...options import Options
 from ...report import Change
+from .common_slots import common_slots
 from .control_mesh import ControlMesh, vertex_rows
 from .hard_edges import hard_edges
 from .parts import Parts
@@ -89,7 +90,7 @@ def refine_control_mesh(
     )
     return RefinedMesh(
         refinement,
-        _skin_and_morph(control, control.cleaned, options, creases),
+        _skin_and_morph(control, control.cleaned, refinement.mesh, options, creases),
         scalars,
         refinement.normals if options.normals == "limit" else None,
     )
@@ -136,6 +137,7 @@ def changes_of_primitive(number: int, kept: Bool[np.ndarray, " F"], pointer: str
 def _skin_and_morph(
     control: ControlMesh,
     cleaned: Cleaned,
+    refined: Mesh,
     options: Options,
     creases: Creases,
 ) -> SkinAndMorph:
@@ -144,4 +146,5 @@ def _skin_and_morph(
     at_vertices = control.skin_and_morph.take(vertex_rows(control, cleaned))
     faces, count = cleaned.mesh.faces, len(cleaned.mesh.vertices)
     linear = linear_refinement(faces, count, options.levels, creases, limit=options.limit)
-    return refine_skin_and_morph(at_vertices, linear)
+    slots = common_slots(control, cleaned, refined.faces, len(refined.vertices))
+    return refine_skin_and_morph(at_vertices, linear, slots)

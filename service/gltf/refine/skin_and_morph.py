@@ -65,11 +65,13 @@ def read_skin_and_morph(primitives: Sequence[TrianglePrimitive]) -> SkinAndMorph
     return SkinAndMorph(read_binding(primitives), tuple(deltas), _NONE)
 
 
-def refine_skin_and_morph(control: SkinAndMorph, linear: ColumnRefinement) -> SkinAndMorph:
-    """Refine skin and morph; deltas in float32, as they will be written."""
+def refine_skin_and_morph(
+    control: SkinAndMorph, linear: ColumnRefinement, slots: Int[np.ndarray, " V"] | None
+) -> SkinAndMorph:
+    """Refine skin and morph; deltas in float32, as they will be written; `slots` as for skins."""
     binding, cut = None, _NONE
     if control.binding is not None:
-        binding, cut = refine_binding(control.binding, linear)
+        binding, cut = refine_binding(control.binding, linear, slots)
     deltas = tuple(linear(delta.astype(np.float64)).astype(np.float32) for delta in control.deltas)
     return SkinAndMorph(binding, deltas, cut)
 

@@ -77,9 +77,12 @@ def read_binding(primitives: Sequence[TrianglePrimitive]) -> Binding | None:
 
 
 def refine_binding(
-    binding: Binding, linear: ColumnRefinement
+    binding: Binding, linear: ColumnRefinement, slots: Int[np.ndarray, " V"] | None
 ) -> tuple[Binding, Int[np.ndarray, " V"]]:
-    """Refine the binding; return also which vertices lost a joint for want of slots."""
+    """Refine the binding; return also which vertices lost a joint for want of slots.
+
+    `slots` are those of each refined vertex; None: all have the binding's.
+    """
     width, blocks = binding.weights.shape[1], kernel_blocks(available_threads())
     bound = binding.weights > 0
     used, column = np.unique(binding.joints[bound], return_inverse=True)
@@ -94,6 +97,10 @@ def refine_binding(
         dense = np.zeros((len(bound), len(names)))
         dense[row[here], column[here] - first] = value[here]
         keep_heaviest(linear(dense), names, joints, weights, lost, blocks)
+    if slots is not None:
+        beyond = np.arange(width) >= slots[:, None]
+        lost += np.where(beyond, weights, 0).sum(axis=1)
+        joints[beyond], weights[beyond] = 0, 0
     scale_rows(weights, blocks)
     return Binding(joints, weights), np.flatnonzero(lost > NOTHING)
 

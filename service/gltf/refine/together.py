@@ -29,6 +29,7 @@ from ...options import Options
 from ...report import Change
 from ..read.primitives import TrianglePrimitive
 from ..stage_shares import StageShares
+from .common_slots import common_slots
 from .control_mesh import ControlMesh, control_mesh, slices, vertex_rows
 from .local_joints import local_joints
 from .parts import Parts
@@ -228,7 +229,8 @@ def _skin_and_morph(
     mesh = cleaned.mesh
     count = len(mesh.vertices)
     linear = linear_refinement(mesh.faces, count, options.levels, creases, limit=options.limit)
-    after = refine_skin_and_morph(own, linear)
+    slots = common_slots(control, cleaned, made.mesh.faces, len(made.mesh.vertices))
+    after = refine_skin_and_morph(own, linear, slots)
     part_of = np.empty(len(made.mesh.vertices), dtype=np.int64)
     # Descendants lie as their faces do.
     part_of[made.mesh.faces] = np.repeat(
