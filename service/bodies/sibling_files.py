@@ -83,7 +83,8 @@ def safe_name(uri: str, folder: str = "") -> str | None:
     """
     if has_scheme(uri):
         return None
-    path, folders = unquote(uri), folder.split("/") if folder else []
+    # Exporters on Windows write its separators, and browsers take them for slashes too.
+    path, folders = unquote(uri).replace("\\", "/"), folder.split("/") if folder else []
     while path.startswith("../"):
         if not folders:
             return None

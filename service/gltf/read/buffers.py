@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import base64
-import re
-
 from ...bodies.sibling_files import Opened
 from ...errors import GltfError
 from .compressed.meshopt import placeholders
+from .data_uri import data_of, is_data
 from .schema import Buffer, Document
-
-_DATA_URI = re.compile(r"data:[^,]*;base64,", re.IGNORECASE)
 
 
 def resolve_buffers(
@@ -47,14 +43,10 @@ def _content(buffer: Buffer, binary: memoryview | None, opened: Opened, pointer:
         if binary is None:
             raise GltfError("the buffer has neither a URI nor a BIN chunk", pointer=pointer)
         return binary
-    if buffer.uri[:5].lower() != "data:":
+    if not is_data(buffer.uri):
         return _neighbour(buffer.uri, opened, f"{pointer}/uri")
-    scheme = _DATA_URI.match(buffer.uri)
-    if scheme is None:
-        raise GltfError("the data URI is not base64", pointer=f"{pointer}/uri")
-    encoded = buffer.uri[scheme.end() :]
     try:
-        return memoryview(base64.b64decode(encoded + "=" * (-len(encoded) % 4), validate=True))
+        return data_of(buffer.uri)
     except ValueError as error:
         raise GltfError(f"the data URI: {error}", pointer=f"{pointer}/uri") from error
 

@@ -1,4 +1,4 @@
-"""Images in other files become part of the GLB, byte for byte: none is ever decoded."""
+"""Images in other files or in the JSON become part of the GLB, byte for byte: none is decoded."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any
 
 from ...bodies.sibling_files import Opened, has_scheme
 from ...report import Change
+from .data_uri import data_of, is_data
 from .schema import Document
 
 # What a file of each type begins with (glTF 2.0 §3.8.2, KHR_texture_basisu, EXT_texture_webp,
@@ -23,7 +24,7 @@ _SIGNATURES = (
 def embed_images(
     tree: dict[str, Any], document: Document, buffers: list[memoryview], opened: Opened
 ) -> list[Change]:
-    """Move the images that came with the document into buffers; what was done to each.
+    """Move the images that came with the document or in it into buffers; what was done to each.
 
     An image that did not come, or whose type is not known, keeps its URI. Edits the tree and
     appends to `buffers`.
@@ -31,19 +32,19 @@ def embed_images(
     changes: list[Change] = []
     for number, image in enumerate(document.images):
         pointer = f"/images/{number}"
-        if image.uri is None or image.uri[:5].lower() == "data:":
+        if image.uri is None:
             continue
-        file = opened.open(image.uri)
-        if file is None:
+        content = _content(image.uri, opened)
+        if content is None:
             if not has_scheme(image.uri):
                 # Where the result lies, its name may lead to nothing.
-                what = "kept by its URI: it did not come with the document"
-                changes.append(Change(pointer, what, 1))
+                changes.append(Change(pointer, _why_not(image.uri, opened), 1))
             continue
-        content = memoryview(file.content).cast("B")
         kind = mime_type(content)
         if kind is None:
-            changes.append(Change(pointer, "kept by its URI: no known type of image", 1))
+            if not is_data(image.uri):
+                what = f"kept by its URI: {image.uri} is no known type of image"
+                changes.append(Change(pointer, what, 1))
             continue
         entry = tree["images"][number]
         del entry["uri"]
@@ -55,6 +56,23 @@ def embed_images(
         buffers.append(content)
         changes.append(Change(pointer, "embedded", 1))
     return changes
+
+
+def _content(uri: str, opened: Opened) -> memoryview | None:
+    """Return the bytes behind an image's URI; None where they did not come."""
+    if is_data(uri):
+        try:
+            return data_of(uri)
+        except ValueError:
+            return None
+    file = opened.open(uri)
+    return None if file is None else memoryview(file.content).cast("B")
+
+
+def _why_not(uri: str, opened: Opened) -> str:
+    if opened.name_of(uri) is None:
+        return f"kept by its URI: {uri} leads out of the document's folder"
+    return f"kept by its URI: {uri} did not come with the document"
 
 
 def mime_type(content: memoryview) -> str | None:

@@ -1,5 +1,6 @@
 """Files beside a document: found by relative names, and nothing else is ever opened."""
 
+import base64
 import io
 import json
 import os
@@ -19,7 +20,13 @@ from tests.support.gltf import files
 from tests.support.gltf.shapes import box
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(30)
-SAFE = [("box.bin", "box.bin"), ("./a/b%20c.bin", "a/b c.bin"), ("a//b.bin", "a/b.bin")]
+SAFE = [
+    ("box.bin", "box.bin"),
+    ("./a/b%20c.bin", "a/b c.bin"),
+    ("a//b.bin", "a/b.bin"),
+    ("a\\b.bin", "a/b.bin"),
+    ("a%5Cb.bin", "a/b.bin"),
+]
 UNSAFE = [
     "file:///etc/passwd",
     "https://example.com/box.bin",
@@ -29,6 +36,8 @@ UNSAFE = [
     "%2e%2e/box.bin",
     "a%2f..%2f..%2fbox.bin",
     "..\\box.bin",
+    "a\\..\\..\\box.bin",
+    "\\\\server\\box.bin",
     "C:\\box.bin",
     "C%3A/box.bin",
     "box%00.bin",
@@ -126,17 +135,34 @@ def test_an_image_that_cannot_be_embedded_keeps_its_uri(content):
     assert tree["images"] == [{"uri": "a.png"}]
 
 
-@pytest.mark.parametrize("uri", ["a.png", "../textures/a.png", "/a.png"])
-def test_an_image_that_did_not_come_is_told(uri):
+@pytest.mark.parametrize(
+    ("uri", "why"),
+    [
+        ("a.png", "did not come with the document"),
+        ("../textures/a.png", "leads out of the document's folder"),
+        ("/a.png", "leads out of the document's folder"),
+    ],
+)
+def test_an_image_that_did_not_come_is_told_by_its_name(uri, why):
     text, binary = external(images=[uri, "https://example.org/a.png"])
     changes = refine(text, beside(box__bin=binary)).report["changes"]
     assert [change for change in changes if change["pointer"].startswith("/images")] == [
-        {
-            "pointer": "/images/0",
-            "what": "kept by its URI: it did not come with the document",
-            "count": 1,
-        }
+        {"pointer": "/images/0", "what": f"kept by its URI: {uri} {why}", "count": 1}
     ]
+
+
+def test_an_image_in_the_json_comes_into_the_gltf_s_buffer():
+    encoded = "data:image/png;base64," + base64.b64encode(PNG).decode()
+    text, binary = external(images=[encoded, "data:image/png;base64,AAAA", "data:image/png,?"])
+    result = refine(text, beside(box__bin=binary))
+    tree, content = files.unpack(result.glb)
+    view = tree["bufferViews"][tree["images"][0].pop("bufferView")]
+    assert content[view["byteOffset"] :][: view["byteLength"]] == PNG
+    # What is no image, or no data, stays as it is.
+    others = [{"uri": "data:image/png;base64,AAAA"}, {"uri": "data:image/png,?"}]
+    assert tree["images"] == [{"mimeType": "image/png"}, *others]
+    changes = [c for c in result.report["changes"] if c["pointer"].startswith("/images")]
+    assert changes == [{"pointer": "/images/0", "what": "embedded", "count": 1}]
 
 
 def test_files_on_disk_are_read_from_their_own_folder_only(tmp_path):
