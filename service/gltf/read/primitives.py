@@ -11,10 +11,10 @@ from jaxtyping import Int, Shaped
 
 from pns_common.base.distinct import as_words, distinct_rows, number_by_first_appearance
 
-from ...errors import GltfError
+from ...errors import GltfError, UnsupportedFeature
 from ..constants import FLOAT
 from .accessors import read, read_rows
-from .modes import triangles
+from .modes import TRIANGLES, triangles
 from .quantization import dequantised
 from .schema import Accessor, Document
 
@@ -52,18 +52,21 @@ def read_primitive(
 
     Raises:
         GltfError: an index beyond the vertices, or a NaN or infinity, with the accessor's pointer.
+        UnsupportedFeature: a strip or fan of which an index restarts it.
     """
     primitive = document.meshes[mesh].primitives[number]
     count = document.accessors[primitive.attributes["POSITION"]].count
     if primitive.indices is None:
         flat = np.arange(count, dtype=np.int64)
     else:
-        flat = read(document, buffers, primitive.indices)[:, 0].astype(np.int64)
+        stored = read(document, buffers, primitive.indices)[:, 0]
+        flat = stored.astype(np.int64)
         if flat.max() >= count:
-            raise GltfError(
-                f"index {flat.max()}, but there are {count} vertices",
-                pointer=f"/accessors/{primitive.indices}",
-            )
+            pointer = f"/accessors/{primitive.indices}"
+            if primitive.mode != TRIANGLES and flat.max() == np.iinfo(stored.dtype).max:
+                # As KHR_mesh_primitive_restart lets it, and nothing else does.
+                raise UnsupportedFeature("a strip or fan with restarts", pointer=pointer)
+            raise GltfError(f"index {flat.max()}, but there are {count} vertices", pointer=pointer)
     used, corners = compact(flat, count)
     attributes, accessors = _read_attributes(document, buffers, primitive.attributes, used)
     targets = [_read_attributes(document, buffers, t, used) for t in primitive.targets]

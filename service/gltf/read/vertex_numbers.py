@@ -1,8 +1,9 @@
-"""EXT_mesh_manifold: which vertices of a mesh are one, by their numbers.
+"""Extensions of meshes that list their vertices by number, and that a mesh can do without.
 
 Refined vertices have other numbers, and a reader that believes the old ones makes another mesh of
-them. Refinement joins vertices by position, and positions still say which are one: they are equal
-in bits. So the mesh is refined without the extension, and that is told.
+them. EXT_mesh_manifold says which vertices are one: positions still do, they are equal in bits.
+EXT_mesh_primitive_restart, BENTLEY_primitive_restart before, draws several strips as one, and they
+are written as triangles. So the mesh is refined without them, and that is told.
 """
 
 from __future__ import annotations
@@ -13,25 +14,29 @@ from ...report import Change
 from .extensions import withdraw
 from .modes import SURFACES, TRIANGLES
 
-MANIFOLD = "EXT_mesh_manifold"
+BY_NUMBER = ("EXT_mesh_manifold", "EXT_mesh_primitive_restart", "BENTLEY_primitive_restart")
 
 
 def leave_out_vertex_numbers(tree: dict[str, Any]) -> list[Change]:
-    """Take the extension out of the meshes that will be refined; where it was."""
+    """Take such extensions out of the meshes that will be refined; where they were."""
+    return [change for name in BY_NUMBER for change in _leave_out(tree, name)]
+
+
+def _leave_out(tree: dict[str, Any], name: str) -> list[Change]:
     changes: list[Change] = []
     stays = False
     for number, mesh in enumerate(tree.get("meshes", [])):
         extensions = mesh.get("extensions")
-        if not isinstance(extensions, dict) or MANIFOLD not in extensions:
+        if not isinstance(extensions, dict) or name not in extensions:
             continue
         if not any(p.get("mode", TRIANGLES) in SURFACES for p in mesh.get("primitives", [])):
             stays = True
             continue
-        del extensions[MANIFOLD]
+        del extensions[name]
         if not extensions:
             del mesh["extensions"]
-        what = f"left out: {MANIFOLD}, by the numbers of vertices"
+        what = f"left out: {name}, by the numbers of vertices"
         changes.append(Change(f"/meshes/{number}", what, 1))
     if changes and not stays:
-        withdraw(tree, MANIFOLD)
+        withdraw(tree, name)
     return changes

@@ -368,20 +368,23 @@ def test_texture_coordinates_that_become_floats_are_told():
     ]
 
 
-def test_the_numbers_of_a_manifold_s_vertices_are_left_out_and_told():
+@pytest.mark.parametrize(
+    "name", ["EXT_mesh_manifold", "EXT_mesh_primitive_restart", "BENTLEY_primitive_restart"]
+)
+def test_extensions_that_list_vertices_by_number_are_left_out_and_told(name):
     tree, binary = files.document([octahedron()], [{"POSITION": np.eye(3), "mode": 0}])
     indices = tree["meshes"][0]["primitives"][0]["indices"]
-    manifold = {"EXT_mesh_manifold": {"manifoldPrimitive": {"indices": indices}}}
+    listed = {name: {"primitiveGroups": [{"primitives": [0], "indices": indices}]}}
     for mesh in tree["meshes"]:
-        mesh["extensions"] = manifold | {"EXT_other": {}}
-    tree["extensionsUsed"] = ["EXT_mesh_manifold", "EXT_other"]
+        mesh["extensions"] = listed | {"EXT_other": {}}
+    tree["extensionsUsed"] = [name, "EXT_other"]
     result = subdivide(data=files.pack(tree, binary))
     refined, points = files.unpack(result.glb)[0]["meshes"]
     assert refined["extensions"] == {"EXT_other": {}}
     assert points["extensions"] == tree["meshes"][1]["extensions"]
     assert {
         "pointer": "/meshes/0",
-        "what": "left out: EXT_mesh_manifold, by the numbers of vertices",
+        "what": f"left out: {name}, by the numbers of vertices",
         "count": 1,
     } in result.report["changes"]
 

@@ -166,6 +166,15 @@ def test_an_index_beyond_the_vertices_is_refused():
     assert refusal.value.pointer == "/accessors/1"
 
 
+@pytest.mark.parametrize(("kind", "restart"), [(np.uint8, 255), (np.uint16, 65535)])
+def test_strips_and_fans_with_restarts_are_refused_by_name(kind, restart):
+    for mode in (5, 6):
+        indices = np.array([0, 2, 4, restart, 1, 3, 5], dtype=kind)
+        with pytest.raises(UnsupportedFeature, match="a strip or fan with restarts") as refusal:
+            refine(files.glb([octahedron(indices=indices, mode=mode)]))
+        assert refusal.value.pointer == "/accessors/1"
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize(("place", "name"), [(0, "POSITION"), (1, "NORMAL"), (2, "TANGENT")])
 def test_values_that_are_not_finite_are_refused(place, name, value):
