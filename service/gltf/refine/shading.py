@@ -74,6 +74,7 @@ def shade(
     poses = 1 + len(skin_and_morph.deltas)
     with course.part(GROUPING, GROUPING + (1 - GROUPING) / poses):
         rest = groups.normals(points, groups.before, course)
+        rest = groups.with_own(rest, None)
         if limit_normals is not None:
             rest = groups.with_limit(rest, limit_normals)
     morphed: list[Float[np.ndarray, "G 3"] | None] = []
@@ -83,7 +84,7 @@ def shade(
                 normals = None
                 if _bends(control, target):
                     posed = groups.normals(points + delta, lambda: rest, course)
-                    normals = posed.astype(np.float32)
+                    normals = groups.with_own(posed, target).astype(np.float32)
                 morphed.append(normals)
     return Shading(groups, rest, tuple(morphed))
 

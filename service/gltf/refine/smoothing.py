@@ -1,6 +1,7 @@
 """Which corners share a normal: those that shared a position and a normal before refinement.
 
-Normals are recomputed from the refined faces; over these groups a hard edge stays hard.
+Normals are recomputed from the refined faces; over these groups a hard edge stays hard. Those that
+are their author's own go on.
 
 The groups run over all primitives of a mesh, so that a change of material in a smooth surface does
 not become an edge in its shading.
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.arrays import dot
+from pns_common.base.arrays import dot, unit
 from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
 from pns_common.base.distinct import number_by_first_appearance
 from pns_common.fused.corner_normals import angle_weighted_normals
@@ -24,6 +25,7 @@ from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import SplitConnectivity, split_connectivity
 from .control_mesh import ControlMesh, slices
 from .normals import safe_unit
+from .own_normals import own_shares
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +36,20 @@ class NormalGroups:
         vertices: (F, T) the refined vertices at the grid points of the faces that have normals.
         connectivity: that of the groups before they were split; their corners are its vertices.
         ids: by primitive the groups of its faces' grid points.
-        before: makes the old normals (G, 3), blended linearly: what is left where faces have no
-            area.
+        given: makes the old normals (C, 3) of the groups before they were split: at rest, for None,
+            and under a morph target.
+        own: how much of these is their author's; None where nothing is.
     """
 
     vertices: Int[np.ndarray, "F T"]
     connectivity: SplitConnectivity
     ids: dict[int, Int[np.ndarray, "F T"]]
-    before: Callable[[], Float[np.ndarray, "G 3"]]
+    given: Callable[[int | None], Float[np.ndarray, "C 3"]]
+    own: Float[np.ndarray, " C"] | None
+
+    def before(self) -> Float[np.ndarray, "G 3"]:
+        """Return the old normals, blended linearly: what is left where faces have no area."""
+        return safe_unit(self.connectivity.linear(self.given(None)))
 
     def normals(
         self,
@@ -65,6 +73,18 @@ class NormalGroups:
         undefined = undefined[~values[undefined].any(axis=1)]
         if len(undefined):
             values[undefined] = otherwise()[undefined]
+        return values
+
+    def with_own(
+        self, values: Float[np.ndarray, "G 3"], target: int | None
+    ) -> Float[np.ndarray, "G 3"]:
+        """Put what is their author's own into normals, at rest (None) or under a morph target."""
+        if self.own is None:
+            return values
+        share = self.connectivity.linear(self.own[:, None])
+        rows = np.flatnonzero(share)
+        own = self.connectivity.linear(unit(self.given(target)))[rows]
+        values[rows] = safe_unit((1 - share[rows]) * values[rows] + share[rows] * own)
         return values
 
     def with_limit(
@@ -96,33 +116,66 @@ def normal_groups(
     ]
     if not chosen:
         return None
-    groups, before = _split_groups(control, chosen, grid)
+    corners, given = _corners(control, chosen)
+    groups = split_connectivity(corners, int(corners.max()) + 1, grid)
     shares = slices([len(ids[number]) for number in chosen])
     return NormalGroups(
         vertices=np.concatenate([ids[number] for number in chosen]),
         connectivity=groups,
         ids={number: groups.ids[part] for number, part in zip(chosen, shares, strict=True)},
-        before=lambda: safe_unit(groups.linear(before())),
+        given=given,
+        own=_own(control, chosen, corners, given(None)),
     )
 
 
-def _split_groups(
-    control: ControlMesh, chosen: Sequence[int], grid: BarycentricGrid
-) -> tuple[SplitConnectivity, Callable[[], Float[np.ndarray, "C 3"]]]:
-    """Split the connectivity of (welded vertex, old normal) pairs; what tells their normals."""
+def _corners(
+    control: ControlMesh, chosen: Sequence[int]
+) -> tuple[Int[np.ndarray, "F 3"], Callable[[int | None], Float[np.ndarray, "C 3"]]]:
+    """Return the faces over (welded vertex, old normal) pairs, and what tells their normals."""
     old = [control.primitives[number].attributes["NORMAL"] for number in chosen]
     starts = slices([len(normals) for normals in old])
     rows = [
         control.primitives[number].corners[control.kept[number]] + part.start
         for number, part in zip(chosen, starts, strict=True)
     ]
-    normals, flat = np.concatenate(old), np.concatenate(rows).reshape(-1)
+    flat = np.concatenate(rows).reshape(-1)
     labels = np.concatenate([control.normal_labels[control.rows[number]] for number in chosen])
     corners, first = number_by_first_appearance(labels[flat])
 
-    def before() -> Float[np.ndarray, "C 3"]:
+    def given(target: int | None) -> Float[np.ndarray, "C 3"]:
         values = np.empty((len(first), 3))
-        values[corners] = normals[flat]
+        values[corners] = _normals_under(control, chosen, target)[flat]
         return values
 
-    return split_connectivity(corners.reshape(-1, 3), len(first), grid), before
+    return corners.reshape(-1, 3), given
+
+
+def _normals_under(
+    control: ControlMesh, chosen: Sequence[int], target: int | None
+) -> Float[np.ndarray, "N 3"]:
+    """Return the old normals of all rows, at rest or with a morph target at weight 1."""
+    parts: list[Float[np.ndarray, "n 3"]] = []
+    for number in chosen:
+        primitive = control.primitives[number]
+        normals = primitive.attributes["NORMAL"]
+        # None where nothing moves them.
+        moved = None
+        if target is not None and target < len(primitive.targets):
+            moved = primitive.targets[target].get("NORMAL")
+        parts.append(normals if moved is None else normals + moved)
+    return np.concatenate(parts)
+
+
+def _own(
+    control: ControlMesh,
+    chosen: Sequence[int],
+    corners: Int[np.ndarray, "F 3"],
+    given: Float[np.ndarray, "C 3"],
+) -> Float[np.ndarray, " C"] | None:
+    """Return how much of the given normals is their author's own; None where nothing is."""
+    ends = slices([len(keep) for keep in control.kept])
+    faces = np.concatenate([control.weld.faces[ends[n]][control.kept[n]] for n in chosen])
+    blocks = Blocks(available_threads())
+    computed = angle_weighted_normals(control.weld.points, faces, corners, len(given), blocks)
+    shares = own_shares(given, computed)
+    return shares if shares.any() else None
