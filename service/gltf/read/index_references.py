@@ -10,6 +10,8 @@ INSTANCING = "EXT_mesh_gpu_instancing"
 KNOWN = frozenset(
     {
         INSTANCING,
+        "EXT_instance_features",
+        "EXT_lights_image_based",
         "EXT_mesh_features",
         "EXT_meshopt_compression",
         "EXT_texture_avif",
@@ -18,6 +20,8 @@ KNOWN = frozenset(
         "GODOT_single_root",
         "KHR_animation_pointer",
         "KHR_draco_mesh_compression",
+        "KHR_gaussian_splatting",
+        "KHR_implicit_shapes",
         "KHR_lights_punctual",
         "KHR_materials_anisotropy",
         "KHR_materials_clearcoat",
@@ -38,16 +42,22 @@ KNOWN = frozenset(
         "KHR_node_hoverability",
         "KHR_node_selectability",
         "KHR_node_visibility",
+        "KHR_physics_rigid_bodies",
         "KHR_texture_basisu",
         "KHR_texture_transform",
         "KHR_xmp_json_ld",
         "MSFT_lod",
+        "MSFT_packing_normalRoughnessMetallic",
+        "MSFT_packing_occlusionRoughnessMetallic",
         "MSFT_texture_dds",
         "VRM",
+        "VRMC_materials_hdr_emissiveMultiplier",
         "VRMC_materials_mtoon",
         "VRMC_node_constraint",
         "VRMC_springBone",
+        "VRMC_springBone_extended_collider",
         "VRMC_vrm",
+        "VRMC_vrm_animation",
     }
 )
 

@@ -23,6 +23,10 @@ from .prune import cut, moved, remove_unused
 # The largest value of an index type restarts primitives, so it may not be used as an index.
 LARGEST_UINT16_INDEX = 65534
 
+# Bytes of the widest numbers in buffers, which EXT_structural_metadata has: they begin at multiples
+# of as many, and so do buffers that are joined.
+WIDEST = 8
+
 # What an accessor is called, and what applications say of it.
 KEPT = ("name", "extras")
 
@@ -42,7 +46,7 @@ class Writer:
     def start(cls, tree: dict[str, Any], buffers: Sequence[memoryview]) -> Self:
         """Take over the tree, with all its buffers one after the other as the first."""
         writer = cls(tree)
-        writer.starts = [writer.append(buffer) for buffer in buffers]
+        writer.starts = [writer.append(buffer, WIDEST) for buffer in buffers]
         for view in tree.get("bufferViews", []):
             if view["buffer"]:
                 view["byteOffset"] = view.get("byteOffset", 0) + writer.starts[view["buffer"]]
@@ -164,9 +168,9 @@ class Writer:
         )
         return len(accessors) - 1
 
-    def append(self, data: memoryview) -> int:
-        """Add bytes at the next multiple of four; where they begin."""
-        padding = -self.length % 4
+    def append(self, data: memoryview, alignment: int = 4) -> int:
+        """Add bytes at the next multiple of so many; where they begin."""
+        padding = -self.length % alignment
         if padding:
             self.pieces.append(b"\0" * padding)
         start = self.length + padding

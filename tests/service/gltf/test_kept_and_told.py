@@ -185,6 +185,20 @@ def test_what_goes_with_buffers_that_are_joined_is_told():
     } in changes
 
 
+def test_buffers_are_joined_where_numbers_of_eight_bytes_may_begin():
+    # As in tables of EXT_structural_metadata, which readers take for arrays of doubles as they lie.
+    tree, binary = files.document([octahedron()])
+    binary += bytes(4 + -len(binary) % 8)
+    uri = "data:application/octet-stream;base64,AAAAAAAA+D8="
+    tree["buffers"] = [{"byteLength": len(binary)}, {"byteLength": 8, "uri": uri}]
+    tree["bufferViews"].append({"buffer": 1, "byteLength": 8})
+    tree["extensionsUsed"] = ["EXT_structural_metadata"]
+    after, content = files.unpack(subdivide(data=files.pack(tree, binary)).glb)
+    view = after["bufferViews"][len(tree["bufferViews"]) - 1]
+    assert view["byteOffset"] % 8 == 0
+    assert np.frombuffer(content, "<f8", 1, view["byteOffset"]).tolist() == [1.5]
+
+
 def test_extras_that_are_no_object_move_and_are_reported():
     tree, binary = files.document([octahedron()])
     tree["asset"]["extras"] = ["a", "list"]

@@ -32,9 +32,19 @@ def test_every_place_that_is_renumbered_is_checked(made):
             refine(files.pack(tree, bytes(binary)))
 
 
-@pytest.mark.parametrize("name", ["MSFT_texture_dds", "EXT_mesh_features"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "EXT_mesh_features",
+        "KHR_gaussian_splatting",
+        "KHR_physics_rigid_bodies",
+        "MSFT_texture_dds",
+        "VRMC_materials_hdr_emissiveMultiplier",
+        "VRMC_springBone_extended_collider",
+    ],
+)
 def test_what_is_handled_is_known(name):
-    # They name images, textures and attributes: no accessor and no buffer view.
+    # They name images, textures, nodes and attributes: no accessor and no buffer view.
     assert unknown_extensions({"extensionsUsed": [name]}, b"") == []
 
 
