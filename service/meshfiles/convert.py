@@ -179,11 +179,12 @@ def _of_triangles(
 ) -> Written:
     changes = [] if target in formats.HOLDS_DOUBLE else rounding_changes(refined)
     if refined.uv is not None and target not in formats.HOLDS_UV:
-        changes.append(Change("", "texture coordinates dropped: the format cannot hold them", 1))
+        what = f"texture coordinates dropped: not written to {target.upper()} files"
+        changes.append(Change("", what, 1))
     if options.diagnostics == "full":
         changes.append(Change("", "values at vertices dropped: only a glTF's are kept", 1))
     if options.normals != "keep":
-        changes.append(Change("", "normals not written: the format cannot hold them", 1))
+        changes.append(Change("", "normals not written: only a glTF that came as one has them", 1))
     if options.compress != "none":
         changes.append(Change("", "not compressed: only a glTF that came as one is", 1))
     report = _with_changes(report, changes)

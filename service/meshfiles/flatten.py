@@ -25,7 +25,7 @@ LOST = ("materials", "textures", "images", "animations", "skins", "cameras", "ex
 
 
 def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, list[Change]]:
-    """Return the default scene's triangles in the world, and what a file of `kind` cannot hold.
+    """Return the default scene's triangles in the world, and what a file of `kind` is not given.
 
     Raises:
         ServiceError: the file cannot be read, or its scene shows no triangles.
@@ -49,7 +49,7 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, li
     keeps_uv = kind in HOLDS_UV and all("TEXCOORD_0" in name for name in names)
     mesh_file = _joined([_placed(shown, matrix, keeps_uv=keeps_uv) for shown, matrix in placed])
     showing = sum(node.get("mesh") in primitives for node in upload.tree["nodes"])
-    changes = _changes(upload.tree, len(placed), names, keeps_uv=keeps_uv)
+    changes = _changes(upload.tree, len(placed), names, kind, keeps_uv=keeps_uv)
     if elsewhere := showing - len(placed):
         changes.append(Change("/nodes", "nodes outside of the default scene left out", elsewhere))
     return mesh_file, changes
@@ -136,15 +136,17 @@ def _uv(primitive: TrianglePrimitive) -> Float[np.ndarray, "N 2"]:
 
 
 def _changes(
-    tree: dict[str, Any], placed: int, names: list[set[str]], *, keeps_uv: bool
+    tree: dict[str, Any], placed: int, names: list[set[str]], kind: str, *, keeps_uv: bool
 ) -> list[Change]:
+    # Some of them know more: what they are given is positions, faces and, an OBJ, one set of UVs.
+    why = f": not written to {kind.upper()} files"
     changes = [
-        Change(f"/{name}", f"{name} dropped: the format cannot hold them", len(tree[name]))
+        Change(f"/{name}", f"{name} dropped{why}", len(tree[name]))
         for name in LOST
         if tree.get(name)
     ]
     changes += [
-        Change(pointer, f"{what} dropped: the format cannot hold them", count)
+        Change(pointer, f"{what} dropped{why}", count)
         for pointer, what, count in (
             ("/meshes", "morph targets", _count_targets(tree)),
             ("/meshes", "points and lines", _count_other_modes(tree)),
@@ -163,7 +165,7 @@ def _changes(
     changes += [
         Change(
             "/meshes",
-            f"attribute {name} dropped: the format cannot hold it",
+            f"attribute {name} dropped{why}",
             sum(name in own for own in names),
         )
         for name in sorted(lost)

@@ -49,8 +49,8 @@ def test_morph_targets_and_instances_that_are_lost_are_told():
     tree["nodes"][1]["extensions"] = {"EXT_mesh_gpu_instancing": instances}
     _, changes = flatten(files.pack(tree, binary), "stl", Limits())
     told = {change.what: change.count for change in changes}
-    assert told["morph targets dropped: the format cannot hold them"] == 2
-    assert told["copies by EXT_mesh_gpu_instancing dropped: the format cannot hold them"] == 9
+    assert told["morph targets dropped: not written to STL files"] == 2
+    assert told["copies by EXT_mesh_gpu_instancing dropped: not written to STL files"] == 9
 
 
 def test_a_node_with_several_parents_stands_once_and_that_is_told():
@@ -87,5 +87,5 @@ def test_what_the_scene_does_not_show_and_what_is_no_surface_are_told():
     told = {change.what: change.count for change in changes}
     # One of another scene, one of none.
     assert told["nodes outside of the default scene left out"] == 2
-    assert told["points and lines dropped: the format cannot hold them"] == 2
-    assert told["skins dropped: the format cannot hold them"] == 1
+    assert told["points and lines dropped: not written to PLY files"] == 2
+    assert told["skins dropped: not written to PLY files"] == 1
