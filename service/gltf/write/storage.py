@@ -11,7 +11,7 @@ from ..read.extensions import withdraw
 from ..read.modes import FAN, STRIP
 from ..read.plan import MeshPlan
 from ..read.quantization import EXTENSION, is_dequantised, still_needed
-from ..read.schema import Document, Primitive
+from ..read.schema import Document, Mesh, Primitive
 from ..read.spare import Spare
 from .writer import Writer
 
@@ -19,16 +19,12 @@ _MODES = {STRIP: "triangle strip written as triangles", FAN: "triangle fan writt
 
 
 def storage_changes(document: Document, plans: Sequence[MeshPlan]) -> list[Change]:
-    """Return one change for each primitive and way of storing that refinement gives up."""
+    """Return one change for each primitive and way of storing that refinement gives up.
+
+    Points and lines of a mesh that is refined stay where its surface was: that is told too.
+    """
     return [
-        change
-        for plan in plans
-        for number in plan.primitives
-        for change in _of_primitive(
-            document,
-            document.meshes[plan.mesh].primitives[number],
-            f"/meshes/{plan.mesh}/primitives/{number}",
-        )
+        change for plan in plans for change in _of_mesh(document.meshes[plan.mesh], plan, document)
     ]
 
 
@@ -45,6 +41,18 @@ def withdraw_unused(tree: dict[str, Any]) -> None:
     """Take KHR_mesh_quantization off the lists where no primitive of the new file needs it."""
     if not still_needed(tree):
         withdraw(tree, EXTENSION)
+
+
+def _of_mesh(mesh: Mesh, plan: MeshPlan, document: Document) -> Iterator[Change]:
+    pointer = f"/meshes/{plan.mesh}"
+    for number in plan.primitives:
+        yield from _of_primitive(
+            document, mesh.primitives[number], f"{pointer}/primitives/{number}"
+        )
+    if others := len(mesh.primitives) - len(plan.primitives):
+        yield Change(
+            pointer, "points and lines left where they were, beside what is refined", others
+        )
 
 
 def _of_primitive(document: Document, primitive: Primitive, pointer: str) -> Iterator[Change]:

@@ -118,14 +118,18 @@ def areas(triangles):
     return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 
-def test_points_and_lines_stay_untouched():
+def test_points_and_lines_stay_untouched_and_that_is_told():
     lines = {"POSITION": np.eye(3), "mode": 3}
-    before = files.glb([lines, octahedron(), {"POSITION": np.eye(3), "mode": 0}])
-    tree, _ = files.unpack(subdivide(data=before).glb)
+    before = files.glb([lines, octahedron(), {"POSITION": np.eye(3), "mode": 0}], [lines])
+    result = subdivide(data=before)
+    tree, _ = files.unpack(result.glb)
     old, _ = files.unpack(before)
     for number in (0, 2):
         primitive = tree["meshes"][0]["primitives"][number]
         assert primitive == old["meshes"][0]["primitives"][number]
+    # Edges drawn over a surface no longer lie on it. Beside none, nothing has moved.
+    what = "points and lines left where they were, beside what is refined"
+    assert result.report["changes"] == [{"pointer": "/meshes/0", "what": what, "count": 2}]
 
 
 def test_instances_of_a_mesh_are_refined_once():
