@@ -19,6 +19,8 @@ DOES_NOT_WAIT: int | None = getattr(socket, "MSG_DONTWAIT", None)
 UNSENT_BYTES = 64 * 1024
 _UNSENT: int | None = getattr(socket, "TCP_NOTSENT_LOWAT", None)
 _UNTAKEN: int | None = getattr(socket, "TCP_USER_TIMEOUT", None)
+# The most milliseconds that the system counts: three weeks and a half.
+_MOST = 2**31 - 1
 
 
 class Outlet:
@@ -43,7 +45,8 @@ class Outlet:
         Where it knows of no such bounds it has its own.
         """
         connection = self.real.get_extra_info("socket")
-        for option, value in (_UNSENT, UNSENT_BYTES), (_UNTAKEN, max(1, round(1000 * seconds))):
+        untaken = min(max(1, round(1000 * seconds)), _MOST)
+        for option, value in (_UNSENT, UNSENT_BYTES), (_UNTAKEN, untaken):
             if option is not None:
                 # Reset already, or no TCP.
                 with suppress(OSError):
