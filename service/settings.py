@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import os
 from difflib import get_close_matches
-from ipaddress import IPv4Network, IPv6Network
-from pathlib import Path
-from typing import Annotated
 
-from pydantic import BeforeValidator, ByteSize, Field, model_validator
-from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+from pydantic import ByteSize, Field, model_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from .options import MAX_LEVELS, Limits
+from .setting_types import Name, Networks, Origins, Place, Seconds, Size
 
 MIB = 1024**2
 PREFIX = "PNS_"
-# Scheme, host and perhaps port, as browsers send it: no path, no slash at the end.
-ORIGIN = r"^(\*|https?://[a-z0-9.-]+(:[0-9]{1,5})?|https?://\[[0-9a-f:]+\](:[0-9]{1,5})?)$"
-Network = IPv4Network | IPv6Network
 
 
 def _worker_default() -> int:
@@ -25,11 +20,8 @@ def _worker_default() -> int:
     return min(2, os.cpu_count() or 1)
 
 
-def _comma_separated(value: object) -> object:
-    """Read a list as an environment variable holds it; blanks around names are no part."""
-    if isinstance(value, str):
-        return [name.strip() for name in value.split(",") if name.strip()]
-    return value
+class StartError(Exception):
+    """What is set cannot be had on this machine."""
 
 
 class Settings(BaseSettings):
@@ -62,22 +54,22 @@ class Settings(BaseSettings):
             )
         return self
 
-    host: str = "127.0.0.1"
+    host: Name = "127.0.0.1"
     port: int = Field(default=8000, ge=0, le=65535)
     prefix: str = Field(
         default="",
         pattern=r"^(/[A-Za-z0-9._~-]+)*$",
         description="path under which a proxy shows the service, and which it takes away",
     )
-    model: str | None = Field(
+    model: Name | None = Field(
         default=None, description="bundled name or model file; none: the default bundled one"
     )
 
-    body: ByteSize = Field(default=ByteSize(64 * MIB), gt=0, description="largest request body")
+    body: Size = Field(default=ByteSize(64 * MIB), description="largest request body")
     faces: int = Field(default=5_000_000, gt=0, description="most faces predicted in an answer")
     levels: int = Field(default=MAX_LEVELS, ge=1, le=MAX_LEVELS, description="deepest level")
-    memory: ByteSize = Field(
-        default=ByteSize(4096 * MIB), gt=0, description="most memory predicted for one job"
+    memory: Size = Field(
+        default=ByteSize(4096 * MIB), description="most memory predicted for one job"
     )
     json_items: int = Field(
         default=2_000_000, gt=0, description="most structural characters in a glTF's JSON"
@@ -85,12 +77,11 @@ class Settings(BaseSettings):
 
     workers: int = Field(default_factory=_worker_default, ge=1, description="worker processes")
     queue: int = Field(default=8, ge=0, description="requests that may wait beside those that run")
-    queue_seconds: float = Field(
-        default=600, gt=0, description="longest wait of a job that nobody holds a connection for"
+    queue_seconds: Seconds = Field(
+        default=600, description="longest wait of a job that nobody holds a connection for"
     )
-    short_seconds: float = Field(
+    short_seconds: Seconds = Field(
         default=0.5,
-        gt=0,
         description="jobs predicted to take no longer have a worker to themselves",
     )
     faces_per_minute: float | None = Field(
@@ -98,24 +89,21 @@ class Settings(BaseSettings):
         gt=0,
         description="refined faces that one client may ask for in a minute",
     )
-    result_seconds: float = Field(
-        default=900, gt=0, description="how long the result of a job is kept"
-    )
-    result_bytes: ByteSize = Field(
-        default=ByteSize(1024 * MIB), gt=0, description="what the results that are kept may take"
+    result_seconds: Seconds = Field(default=900, description="how long the result of a job is kept")
+    result_bytes: Size = Field(
+        default=ByteSize(1024 * MIB), description="what the results that are kept may take"
     )
     results: int = Field(
         default=64, gt=0, description="jobs that are kept after their end, with or without a result"
     )
-    result_folder: Path | None = Field(
+    result_folder: Place | None = Field(
         default=None, description="where results are kept; none: the system's temporary folder"
     )
-    answer_bytes: ByteSize = Field(
-        default=ByteSize(1024 * MIB), gt=0, description="answers in memory that clients are taking"
+    answer_bytes: Size = Field(
+        default=ByteSize(1024 * MIB), description="answers in memory that clients are taking"
     )
-    upload_bytes: ByteSize | None = Field(
+    upload_bytes: Size | None = Field(
         default=None,
-        gt=0,
         description="what all bodies may take in memory, until the ends of their jobs; none: "
         "`body` for each job that runs or waits",
     )
@@ -125,56 +113,52 @@ class Settings(BaseSettings):
     connections_of_address: int = Field(
         default=48, gt=0, description="open connections of one address (IPv6: of one /64)"
     )
-    proxies: Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_comma_separated)] = Field(
+    proxies: Networks = Field(
         default=(),
         description="addresses and networks whose Forwarded headers are believed, with commas",
     )
 
-    keys_file: Path | None = Field(
+    keys_file: Place | None = Field(
         default=None, description="who may ask: a file of keys' hashes; none: everybody"
     )
-    cors_origins: Annotated[
-        tuple[Annotated[str, Field(pattern=ORIGIN)], ...],
-        NoDecode,
-        BeforeValidator(_comma_separated),
-    ] = Field(default=(), description="origins whose pages may ask, with commas; `*`: any")
-    metrics_host: str = "127.0.0.1"
+    cors_origins: Origins = Field(
+        default=(), description="origins whose pages may ask, with commas; `*`: any"
+    )
+    metrics_host: Name = "127.0.0.1"
     metrics_port: int | None = Field(
         default=None, ge=0, le=65535, description="where /metrics is served; none: nowhere"
     )
 
-    job_seconds: float = Field(default=60, gt=0, description="longest job")
-    upload_seconds: float = Field(default=120, gt=0, description="longest upload of one body")
-    idle_seconds: float = Field(
-        default=10, gt=0, description="longest wait for the next piece of a body"
+    job_seconds: Seconds = Field(default=60, description="longest job")
+    upload_seconds: Seconds = Field(default=120, description="longest upload of one body")
+    idle_seconds: Seconds = Field(
+        default=10, description="longest wait for the next piece of a body"
     )
-    head_seconds: float = Field(
-        default=10, gt=0, description="longest wait for a request line and its headers"
+    head_seconds: Seconds = Field(
+        default=10, description="longest wait for a request line and its headers"
     )
-    keep_alive_seconds: float = Field(
-        default=5, gt=0, description="how long a connection may rest between requests"
+    keep_alive_seconds: Seconds = Field(
+        default=5, description="how long a connection may rest between requests"
     )
-    linger_seconds: float = Field(
+    linger_seconds: Seconds = Field(
         default=5,
-        gt=0,
         description="how long a client is listened to that is answered before its body is whole",
     )
-    answer_seconds: float = Field(
-        default=600, gt=0, description="longest wait in all for a client to take its answer"
+    answer_seconds: Seconds = Field(
+        default=600, description="longest wait in all for a client to take its answer"
     )
-    stall_seconds: float = Field(
-        default=30, gt=0, description="longest wait for a client to take more of its answer"
+    stall_seconds: Seconds = Field(
+        default=30, description="longest wait for a client to take more of its answer"
     )
-    grace_seconds: float = Field(
-        default=10, gt=0, description="how far a client may fall behind `rate`"
+    grace_seconds: Seconds = Field(
+        default=10, description="how far a client may fall behind `rate`"
     )
-    rate: ByteSize = Field(
+    rate: Size = Field(
         default=ByteSize(8 * 1024),
-        gt=0,
         description="bytes a second that a body, and an answer, must move on average",
     )
-    drain_seconds: float = Field(
-        default=75, gt=0, description="longest wait for running requests after SIGTERM"
+    drain_seconds: Seconds = Field(
+        default=75, description="longest wait for running requests after SIGTERM"
     )
 
     @property

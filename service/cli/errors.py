@@ -23,6 +23,7 @@ def explained(error: Exception) -> tuple[str, int] | None:
     from ..errors import InvalidParameter, LimitError, ServiceError
     from ..http.access.keys import KeysError
     from ..http.watch.tracing import TracingError
+    from ..settings import StartError
 
     match error:
         case InvalidParameter() | ParameterError():
@@ -34,7 +35,7 @@ def explained(error: Exception) -> tuple[str, int] | None:
             return f"setting {name}: {text}" if name else text, USAGE_ERROR
         case LimitError(limit=limit) if limit in _SETTING_OF_LIMIT:
             return f"{error}; {_SETTING_OF_LIMIT[limit]} allows more", FAILURE
-        case ServiceError() | PnsError() | KeysError() | TracingError():
+        case ServiceError() | PnsError() | KeysError() | TracingError() | StartError():
             return str(error), FAILURE
         case OSError():
             return f"{error.filename or 'output'}: {error.strerror or error}", FAILURE

@@ -30,10 +30,12 @@ def _reference_length(text: str) -> float | Literal["auto"]:
 
 
 def _size(text: str) -> int:
-    from pydantic import ByteSize, TypeAdapter, ValidationError
+    from pydantic import TypeAdapter, ValidationError
+
+    from ..setting_types import Size
 
     try:
-        return int(TypeAdapter(ByteSize).validate_python(text))
+        return int(TypeAdapter(Size).validate_python(text))
     except ValidationError as error:
         raise typer.BadParameter("it must be a size, as 4GiB") from error
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
+import os
 import shutil
 from pathlib import Path
 from tempfile import gettempdir
 
-from ..settings import Settings
+from ..settings import Settings, StartError
 
 log = logging.getLogger("pns.service")
 
@@ -25,9 +26,15 @@ def fitting(settings: Settings) -> Settings:
     """Return the settings, with as many bytes of results as there is room for.
 
     With more the disk would be full before the oldest result had to go, and every job would fail
-    until its time is over. Where nothing can be said of the folder, its jobs will say it.
+    until its time is over. Where nothing can be said of a disk, its jobs will say it. Raises
+    StartError where there is no such folder, or none that may be written to.
     """
-    folder = result_folder(settings)
+    try:
+        folder = result_folder(settings)
+    except OSError as error:
+        raise StartError(f"results can be kept nowhere: {error.strerror}") from error
+    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+        raise StartError(f"results: {folder} is no folder that may be written to")
     try:
         free = shutil.disk_usage(folder).free
     except OSError:

@@ -12,7 +12,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from .. import log_lines
-from ..settings import Settings
+from ..settings import Settings, StartError
 from .admission import Admission
 from .app import create_app
 from .connection import descriptors
@@ -75,7 +75,7 @@ class DrainingServer(uvicorn.Server):
 
 
 def serve(settings: Settings) -> None:
-    """Serve until a signal comes."""
+    """Serve until a signal comes. Raises StartError."""
     log_lines.configure()
     app = create_app(settings)
     server = DrainingServer(
@@ -85,7 +85,11 @@ def serve(settings: Settings) -> None:
         server.run()
         return
     metrics: Metrics = app.state.metrics
-    port, stop = metrics.serve(settings.metrics_host, settings.metrics_port)
+    try:
+        port, stop = metrics.serve(settings.metrics_host, settings.metrics_port)
+    except OSError as error:
+        where = f"{settings.metrics_host}:{settings.metrics_port}"
+        raise StartError(f"metrics on {where}: {error.strerror}") from error
     log.info("metrics on http://%s:%d/metrics", settings.metrics_host, port)
     try:
         server.run()

@@ -124,12 +124,41 @@ def test_job_limits_are_the_settings() -> None:
         ("cors_origins", "https://a.example/page"),
         ("cors_origins", "a.example"),
         ("metrics_port", 65536),
+        # As an unset variable of a shell leaves them: as a host it would be every address.
+        ("host", ""),
+        ("metrics_host", ""),
+        ("model", ""),
+        ("keys_file", ""),
+        ("result_folder", ""),
+        # Of which a beginning reads.
+        ("body", "1,5GiB"),
+        ("body", "1e-3"),
+        ("rate", "8KiB/s"),
+        # More than the kernel counts.
+        ("memory", "16EiB"),
         ("bodies", 1),
     ],
 )
 def test_out_of_range_is_refused(name: str, value: object) -> None:
     with pytest.raises(ValidationError, match=name):
         Settings(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("proxies", "localhost", "'localhost' does not appear to be an IPv4 or IPv6 network"),
+        ("proxies", "10.0.0.1/8", "10.0.0.1/8 has host bits set"),
+        ("cors_origins", "a.example", "'a.example' is no origin, such as https://a.example:8443"),
+        ("memory", "4,5GiB", "'4,5GiB' is no size, such as 1.5GiB"),
+        ("host", "", "it is empty: leave it out, or name something"),
+    ],
+)
+def test_what_is_refused_is_told_in_plain_words(name: str, value: str, says: str) -> None:
+    with pytest.raises(ValidationError) as refused:
+        Settings(**{name: value})
+    (error,) = refused.value.errors()
+    assert (error["loc"][0], says in error["msg"]) == (name, True)
 
 
 def test_settings_do_not_change() -> None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from ...settings import Settings
+from ...settings import Settings, StartError
 
 log = logging.getLogger("pns.service")
 
@@ -27,7 +25,7 @@ def fitting(settings: Settings) -> int:
     """Return `settings.connections`, or what descriptors are there for; raises the limit first.
 
     Raises:
-        OSError: there are not descriptors enough for a single connection.
+        StartError: there are not descriptors enough for a single connection.
     """
     try:
         import resource
@@ -47,7 +45,7 @@ def fitting(settings: Settings) -> int:
         return settings.connections
     fit = (soft - reserved) // of_connection
     if fit < 1:
-        raise OSError(
+        raise StartError(
             f"{soft} open files are allowed and {reserved + of_connection} needed: raise the limit "
             "(ulimit -n), or lower PNS_QUEUE, PNS_WORKERS or PNS_RESULTS"
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -148,6 +149,17 @@ def test_a_file_of_keys_that_cannot_be_used_ends_it(
     assert code == 1
     assert err.splitlines()[-1].startswith("pns: ")
     assert "none.toml" in err
+
+
+def test_a_place_for_metrics_that_cannot_be_had_ends_it_by_name(
+    pns: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        monkeypatch.setenv("PNS_METRICS_PORT", str(port))
+        code, _, err = pns("serve", "--port", "0")
+    last = err.splitlines()[-1]
+    assert (code, last) == (1, f"pns: metrics on 127.0.0.1:{port}: Address already in use")
 
 
 def test_a_key_and_its_entry(pns: Any, tmp_path: Path) -> None:

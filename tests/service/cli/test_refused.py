@@ -53,6 +53,7 @@ NAMES = ", ".join(bundled_models())
         ("subdivide part.glb", 2, "--output"),
         ("large part.glb out.ply --report nowhere/report.json", 2, "nowhere"),
         ("large part.glb out.ply --memory much", 2, "as 4GiB"),
+        ("large part.glb out.ply --memory 1,5GiB", 2, "as 4GiB"),
     ],
 )
 def test_errors_are_one_line_and_leave_no_file(

@@ -253,8 +253,11 @@ def test_results_lie_on_disk_without_a_name(tmp_path: Path) -> None:
         assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_written_is_503(tmp_path: Path) -> None:
-    with served(workers=1, result_folder=tmp_path / "missing") as where, opened(where) as client:
+def test_a_folder_that_can_be_written_no_more_is_503(tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    folder.mkdir()
+    with served(workers=1, result_folder=folder) as where, opened(where) as client:
+        folder.rmdir()
         refused = hand_in(client, b"echo")
         assert refused.status_code == 503
         assert refused.json()["code"] == "no-storage"

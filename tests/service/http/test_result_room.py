@@ -1,5 +1,6 @@
 """Results are as many as their disk has room for."""
 
+import os
 import shutil
 from collections import namedtuple
 from pathlib import Path
@@ -8,7 +9,7 @@ import pytest
 
 from service.http import result_room
 from service.http.limits import limits_of
-from service.settings import Settings
+from service.settings import Settings, StartError
 
 Usage = namedtuple("Usage", "total used free")
 
@@ -20,6 +21,10 @@ def on_a_disk(monkeypatch: pytest.MonkeyPatch, free: int) -> list[Path]:
         shutil, "disk_usage", lambda folder: (asked.append(folder), Usage(2 * free, free, free))[1]
     )
     return asked
+
+
+def none(*_: object) -> None:
+    raise OSError(2, "there is none")
 
 
 def test_results_take_no_more_than_leaves_room_for_those_that_are_made(
@@ -38,7 +43,23 @@ def test_where_there_is_room_or_no_word_of_it_nothing_changes(
     on_a_disk(monkeypatch, 1000)
     settings = Settings(result_bytes=750)
     assert result_room.fitting(settings) is settings
-    monkeypatch.undo()
-    missing = Settings(result_folder=tmp_path / "missing")
-    assert result_room.fitting(missing) is missing
+    monkeypatch.setattr(shutil, "disk_usage", none)
+    assert result_room.fitting(settings) is settings
     assert caplog.messages == []
+
+
+def test_a_folder_that_cannot_be_written_is_refused_at_start(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    closed = tmp_path / "closed"
+    closed.mkdir()
+    # Whoever runs this may be somebody whom no mode of a folder keeps out.
+    monkeypatch.setattr(os, "access", lambda path, _: path != closed)
+    for folder in (tmp_path / "missing", file, closed):
+        with pytest.raises(StartError, match=str(folder)):
+            result_room.fitting(Settings(result_folder=folder))
+    monkeypatch.setattr(result_room, "gettempdir", none)
+    with pytest.raises(StartError, match="nowhere: there is none"):
+        result_room.fitting(Settings())

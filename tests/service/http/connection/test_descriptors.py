@@ -6,7 +6,7 @@ import resource
 import pytest
 
 from service.http.connection.descriptors import fitting
-from service.settings import Settings
+from service.settings import Settings, StartError
 
 SETTINGS = Settings(workers=1, queue=2, connections=100)
 
@@ -46,7 +46,7 @@ def test_every_connection_may_hold_a_request_that_waits_to_be_measured(monkeypat
 
 def test_where_not_one_connection_fits_the_service_says_what_it_needs(monkeypatch):
     allow(monkeypatch, 64, 64)
-    with pytest.raises(OSError, match="64 open files are allowed") as refusal:
+    with pytest.raises(StartError, match="64 open files are allowed") as refusal:
         fitting(SETTINGS)
     (needed,) = map(int, re.findall(r"(\d+) needed", str(refusal.value)))
     allow(monkeypatch, needed, needed)
