@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import mmap
 import os
+from contextlib import ExitStack
 from types import TracebackType
 
-from ..errors import ServiceError
+from ..errors import NoStorageError, ServiceError
 from . import memory_file
 from .memory_file import FileName, MemoryFile
 
@@ -32,13 +33,18 @@ class JobStopped(ServiceError):  # noqa: N818
 
 
 class ProgressPage:
-    """The server's side of the page."""
+    """The server's side of the page. Raises NoStorageError where there is no room for one."""
 
     def __init__(self) -> None:
-        self.file = MemoryFile()
-        self.file.append(bytes(_SIZE))
+        with ExitStack() as held:
+            self.file = held.enter_context(MemoryFile())
+            self.file.append(bytes(_SIZE))
+            try:
+                self._map = mmap.mmap(self.file.descriptor, _SIZE)
+            except OSError as error:
+                raise NoStorageError(f"no page can be mapped: {error.strerror}") from error
+            held.pop_all()
         # None once nobody writes any more; the last that was read stays.
-        self._map = mmap.mmap(self.file.descriptor, _SIZE)
         self._words: memoryview[int] | None = memoryview(self._map).cast("q")
         self._last: tuple[str | None, float] = (None, 0.0)
 
