@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
+from starlette.routing import Match
 from starlette.types import Receive, Scope, Send
 
 from ..errors import BusyError, InvalidParameter, LimitError, ServiceError, UnauthorizedError
@@ -113,11 +114,26 @@ def _of_validation_error(error: RequestValidationError) -> JSONResponse:
     return of_service_error(kind)
 
 
-def _of_http_exception(error: HTTPException) -> JSONResponse:
+def _of_http_exception(request: Request, error: HTTPException) -> JSONResponse:
     title = HTTPStatus(error.status_code).phrase
     code = title.lower().replace(" ", "-")
     headers = dict(error.headers or {})
+    if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+        headers["Allow"] = ", ".join(_allowed(request))
     return problem(error.status_code, code, title, str(error.detail), headers=headers)
+
+
+def _allowed(request: Request) -> list[str]:
+    """Return the methods of all routes that share a path: the error knows those of one."""
+    allowed = [
+        method
+        for method in ("GET", "POST", "DELETE")
+        if any(
+            route.matches({**request.scope, "method": method})[0] is Match.FULL
+            for route in request.app.routes
+        )
+    ]
+    return ["HEAD", *allowed] if "GET" in allowed else allowed
 
 
 def internal_error() -> JSONResponse:
@@ -140,7 +156,7 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(HTTPException)
     async def http_exception(request: Request, error: HTTPException) -> JSONResponse:
-        return _of_http_exception(error)
+        return _of_http_exception(request, error)
 
     @app.exception_handler(JobFaultError)
     async def job_fault(request: Request, error: JobFaultError) -> JSONResponse:

@@ -198,9 +198,17 @@ def test_a_slash_too_many_leads_nowhere(client: TestClient, path: str) -> None:
 
 def test_404_and_405_are_problems_too(client: TestClient) -> None:
     assert_problem(client.get("/nothing"), 404, "not-found")
-    wrong = client.get("/subdivide")
-    assert_problem(wrong, 405, "method-not-allowed")
-    assert wrong.headers["allow"] == "POST"
+    for path, allowed in {
+        "/subdivide": "POST",
+        "/jobs": "POST",
+        "/jobs/one": "HEAD, GET, DELETE",
+        "/jobs/one/result": "HEAD, GET",
+        "/": "HEAD, GET",
+    }.items():
+        wrong = client.put(path)
+        assert_problem(wrong, 405, "method-not-allowed")
+        assert wrong.headers["allow"] == allowed
+    assert_problem(client.get("/subdivide"), 405, "method-not-allowed")
 
 
 @pytest.mark.parametrize("body", [b"fault", b"unpicklable"])
