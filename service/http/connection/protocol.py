@@ -97,13 +97,16 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         self._taking = Taking(outlet, self._shared.bounds.answer, self._abort)
         super().connection_made(outlet)  # type: ignore[arg-type]
         self.flow: _Flow = _Flow(outlet)  # type: ignore[arg-type]
-        refusal = self._shared.crowd.enter(self, self.client[0] if self.client else "")
+        refusal = self._shared.crowd.enter(self, self._address)
         if refusal is not None:
-            log.warning("a connection is refused: %s", refusal)
             self._say(503, "too-many-connections", refusal, b"retry-after: 5\r\n")
             return
         self._has_slot = True
         self._await_head()
+
+    @property
+    def _address(self) -> str:
+        return self.client[0] if self.client else ""
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Give back whatever it held."""
@@ -236,7 +239,9 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
             self.transport.close()
 
     def _say(self, status: int, code: str, detail: str, more: bytes = b"") -> None:
-        """Answer what never became a request, and end the connection."""
+        """Answer what never became a request, write that down, and end the connection."""
+        fields = {"status": status, "code": code, "client": self._address}
+        log.warning("no request: %s", detail, extra={"fields": fields})
         self.transport.write(refusal(status, code, detail, more))
         self.transport.close()
 

@@ -256,12 +256,16 @@ def test_of_an_answer_that_is_not_read_neither_server_nor_system_holds_much(addr
         (b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: gzip\r\n\r\n", 501),
     ],
 )
-def test_what_is_no_http_is_answered_with_a_problem(address, sent, expected):
+def test_what_is_no_http_is_answered_with_a_problem_and_written_down(
+    address, sent, expected, caplog
+):
     with connect(address) as connection:
         connection.sendall(sent)
         answer = received(connection)
     assert status(answer) == expected
     assert problem(answer)["status"] == expected
+    (line,) = [record for record in caplog.records if record.name == "pns.connection"]
+    assert line.fields == {"status": expected, "code": "invalid-http", "client": "127.0.0.1"}
 
 
 def test_a_body_that_stops_being_http_is_a_problem_too(address):
@@ -271,7 +275,7 @@ def test_a_body_that_stops_being_http_is_a_problem_too(address):
     assert (status(answer), problem(answer)["code"]) == (400, "invalid-http")
 
 
-def test_an_address_that_has_its_share_is_refused_and_others_are_not():
+def test_an_address_that_has_its_share_is_refused_and_others_are_not(caplog):
     with served(workers=1, connections_of_address=3) as where, ExitStack() as opened:
         for _ in range(3):
             connection = opened.enter_context(connect(where))
@@ -279,6 +283,7 @@ def test_an_address_that_has_its_share_is_refused_and_others_are_not():
             assert connection.recv(2**16).startswith(b"HTTP/1.1 200 ")
         answer = received(opened.enter_context(connect(where)))
         assert (status(answer), problem(answer)["code"]) == (503, "too-many-connections")
+        assert caplog.records[-1].fields["client"] == "127.0.0.1"
         other = opened.enter_context(connect(where, source=("127.0.0.2", 0)))
         other.sendall(head("GET", "/healthz"))
         assert other.recv(2**16).startswith(b"HTTP/1.1 200 ")
