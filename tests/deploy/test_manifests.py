@@ -73,6 +73,16 @@ def test_a_drain_has_its_time():
     assert int(grace.removesuffix("s")) >= Settings().drain_seconds
 
 
+def test_proxies_end_connections_that_rest_before_the_service_does():
+    """Else a request meets one that just ends: 502, for nobody may send it again unasked."""
+    (seconds,) = re.findall(
+        r"^    keepalive_timeout (\d+)s;", (DEPLOY / "proxy" / "nginx.conf").read_text(), re.M
+    )
+    assert int(seconds) < Settings().keep_alive_seconds
+    behind_ingress = {entry["name"]: entry["value"] for entry in CONTAINER["env"]}
+    assert float(behind_ingress["PNS_KEEP_ALIVE_SECONDS"]) > 60
+
+
 def test_only_the_proxy_is_reached_from_outside():
     services = COMPOSE["services"]
     assert "ports" not in services["service"]
