@@ -67,6 +67,12 @@ def test_the_environment_is_made_of_settings(where):
     assert Settings(**settings).proxies
 
 
+def test_the_cluster_adds_nothing_to_the_environment():
+    """Of a service's name it makes variables: those of pns would be settings, or look like some."""
+    assert BY_KIND["Service"]["metadata"]["name"] == "pns"
+    assert POD["enableServiceLinks"] is False
+
+
 def test_a_drain_has_its_time():
     assert POD["terminationGracePeriodSeconds"] >= Settings().drain_seconds
     grace = COMPOSE["services"]["service"]["stop_grace_period"]
