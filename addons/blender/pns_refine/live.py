@@ -1,33 +1,36 @@
 """Live mode: the base mesh stays editable, and a modifier shows its refined copy.
 
 Settings and the copy belong to the mesh, so objects that share a mesh share them. The copy is an
-object in no scene. A duplicate of the mesh shows the same copy until it is refreshed, and then gets
+object in no scene. A duplicate of the mesh shows the same copy until it changes, and then gets
 its own.
+
+A refresh comes when nobody has pressed anything, so no step of undo knows of it. Undo keeps blocks
+that are the same in two steps as they are now, and they must not refer to younger blocks, which it
+frees. So a copy has two meshes from the start, which it shows in turn: one is written while the
+other is shown. Each says itself what it was made from (``digest``).
 """
 
 from __future__ import annotations
 
 import hashlib
-import time
-from collections.abc import Generator
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import astuple
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 from bpy.props import BoolProperty, PointerProperty, StringProperty
 
 from pns_common import PnsError
 
 from .live_nodes import add_modifier, modifier_of, point_at, remove_modifier
-from .overlay import hide
+from .overlay import hide, rescale
 from .reading import read_mesh
-from .run import Made, Run, Share, refine_mesh
+from .run import Made, Share, refine_mesh
 from .settings import Settings, choice_of
-from .writing import take_name
+from .writing import copied, take_name
 
-# How long a mesh must be left alone before it is refined again, and how often that is looked at.
-QUIET, TICK = 0.3, 0.02
+CACHE = ("cache", "spare", "first", "second")
 
 
 class PNS_PG_live(Settings, bpy.types.PropertyGroup):  # noqa: N801 (Blender's names)
@@ -38,13 +41,24 @@ class PNS_PG_live(Settings, bpy.types.PropertyGroup):  # noqa: N801 (Blender's n
         name="Automatic", description="Refresh after each edit of the mesh", default=True
     )
     cache: PointerProperty(type=bpy.types.Object)
-    digest: StringProperty()
+    spare: PointerProperty(type=bpy.types.Object)
+    first: PointerProperty(type=bpy.types.Mesh)
+    second: PointerProperty(type=bpy.types.Mesh)
     problem: StringProperty()
+
+
+class LiveError(PnsError):
+    """The mesh has what live mode cannot show."""
 
 
 def users_of(mesh: bpy.types.Mesh) -> list[bpy.types.Object]:
     """Return the objects that show a mesh live."""
     return [o for o in bpy.data.objects if o.data == mesh and modifier_of(o) is not None]
+
+
+def live_meshes() -> list[bpy.types.Mesh]:
+    """Return the meshes of this file that are shown live."""
+    return [mesh for mesh in bpy.data.meshes if mesh.pns_live.enabled and mesh.is_editable]
 
 
 def enable(obj: bpy.types.Object) -> None:
@@ -60,40 +74,71 @@ def refreshed(obj: bpy.types.Object, share: Share) -> Generator[object, None, bo
         PnsError: the mesh cannot be refined.
     """
     mesh: bpy.types.Mesh = obj.data
+    _refuse_shape_keys(mesh)
+    if mesh.is_editmode:
+        _read_edits(obj)
+    with _as_it_is(obj) as still:
+        return (yield from _refreshed(mesh, still, share))
+
+
+def _refreshed(
+    mesh: bpy.types.Mesh, still: bpy.types.Object, share: Share
+) -> Generator[object, None, bool]:
     live = mesh.pns_live
-    if obj.mode == "EDIT":
-        obj.update_from_editmode()
-    digest = yield from _digest(mesh)
-    if digest == live.digest and live.cache is not None and not _borrowed(mesh):
-        _point(mesh, live.cache)
-        return False
-    made: Made = yield from refine_mesh(obj, choice_of(live), share)
-    new = made.mesh
-    new.name = f".{mesh.name} refined"
-    for name in ("enabled", "cache", "digest"):
-        new.pns_live.property_unset(name)
-    old, cache = None, live.cache
-    if cache is None or _borrowed(mesh):
-        cache = bpy.data.objects.new(f".{mesh.name} live", new)
-    else:
-        old, cache.data = cache.data, new
-    live.cache, live.digest, live.problem = cache, digest, ""
-    if old is not None and old.users == 0:
-        bpy.data.meshes.remove(old)
-    _point(mesh, cache)
-    return True
+    digest = yield from _digest(still.data, live)
+    whole = all(getattr(live, name) is not None for name in CACHE)
+    if not whole or (_borrowed(mesh) and shown_of(live).pns_result.digest != digest):
+        _make_cache(mesh)
+    _keep_out_of_scenes(live)
+    changed = shown_of(live).pns_result.digest != digest
+    if changed:
+        before = shown_of(live)
+        spare = live.second if before == live.first else live.first
+        made: Made = yield from refine_mesh(still, choice_of(live), share, into=spare)
+        made.mesh.pns_result.digest = digest
+        live.cache.data, live.spare.data = made.mesh, before
+        empty(before)
+    live.problem = ""
+    point(mesh)
+    return changed
 
 
-def apply(obj: bpy.types.Object) -> None:
-    """Give the object the refined mesh for good; others that share the mesh stay as they are."""
+def apply(obj: bpy.types.Object) -> Generator[object, None, None]:
+    """Give the object a refined mesh for good; others that share the mesh stay as they are.
+
+    Raises:
+        PnsError: the mesh cannot be refined.
+    """
     mesh: bpy.types.Mesh = obj.data
-    result = mesh.pns_live.cache.data.copy()
-    hide(obj)
-    remove_modifier(obj)
-    obj.data = result
-    _forget(mesh)
-    result.name = mesh.name
-    take_name(result, mesh)
+    _refuse_shape_keys(mesh)
+    made: Made = yield from refine_mesh(obj, choice_of(mesh.pns_live), Share())
+    remove(obj)
+    obj.data = made.mesh
+    take_name(made.mesh, mesh)
+
+
+def shown_of(live: PNS_PG_live) -> bpy.types.Mesh:
+    """Return the refined mesh that is shown."""
+    return live.cache.data
+
+
+def empty(result: bpy.types.Mesh) -> None:
+    """Drop what a refined mesh holds, and what it says of it."""
+    result.clear_geometry()
+    result.pns_result.digest = ""
+
+
+def paint(result: bpy.types.Mesh, materials: Sequence[bpy.types.Material | None]) -> None:
+    """Put materials into a refined mesh's slots; those that are too few are none."""
+    for slot in range(len(result.materials)):
+        result.materials[slot] = materials[slot] if slot < len(materials) else None
+
+
+def point(mesh: bpy.types.Mesh) -> None:
+    """Let all that show the mesh live show its copy."""
+    for obj in users_of(mesh):
+        point_at(obj, mesh.pns_live.cache)
+        rescale(obj)
 
 
 def remove(obj: bpy.types.Object) -> None:
@@ -103,18 +148,74 @@ def remove(obj: bpy.types.Object) -> None:
     _forget(obj.data)
 
 
+def take_away_cache(mesh: bpy.types.Mesh) -> None:
+    """Remove a mesh's copy from the file, if no other mesh has it too."""
+    live = mesh.pns_live
+    holders, results = (live.cache, live.spare), (live.first, live.second)
+    borrowed = _borrowed(mesh)
+    for name in CACHE:
+        live.property_unset(name)
+    if borrowed:
+        return
+    for holder in holders:
+        if holder is not None:
+            bpy.data.objects.remove(holder)
+    for result in results:
+        if result is not None and result.users == 0:
+            bpy.data.meshes.remove(result)
+
+
 def _forget(mesh: bpy.types.Mesh) -> None:
     """Drop a mesh's live result when no object shows it any more."""
     if users_of(mesh):
         return
-    cache, borrowed = mesh.pns_live.cache, _borrowed(mesh)
-    for name in ("enabled", "cache", "digest", "problem"):
+    take_away_cache(mesh)
+    for name in ("enabled", "problem"):
         mesh.pns_live.property_unset(name)
-    if cache is not None and not borrowed:
-        result = cache.data
-        bpy.data.objects.remove(cache)
-        if result.users == 0:
-            bpy.data.meshes.remove(result)
+
+
+def _make_cache(mesh: bpy.types.Mesh) -> None:
+    """Give a mesh a copy of its own, with nothing in it yet."""
+    live = mesh.pns_live
+    live.first, live.second = (bpy.data.meshes.new(f".{mesh.name} refined") for _ in range(2))
+    live.cache = bpy.data.objects.new(f".{mesh.name} live", live.first)
+    # A mesh that is appended or linked without an object is given one, in the scene.
+    live.spare = bpy.data.objects.new(f".{mesh.name} spare", live.second)
+
+
+def _read_edits(obj: bpy.types.Object) -> None:
+    """Bring what is edited into the mesh, and let that be told of now, as no edit of anybody's."""
+    obj.update_from_editmode()
+    windows = bpy.context.window_manager.windows
+    for layer in [window.view_layer for window in windows] or [bpy.context.view_layer]:
+        layer.update()
+
+
+@contextmanager
+def _as_it_is(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
+    """Copy an object and its mesh for a while, as what is edited can neither be read nor waits."""
+    still = obj.copy()
+    still.name, still.data = ".pns still", copied(obj.data)
+    mesh = still.data
+    try:
+        yield still
+    finally:
+        bpy.data.objects.remove(still)
+        bpy.data.meshes.remove(mesh)
+
+
+def _keep_out_of_scenes(live: PNS_PG_live) -> None:
+    """Take back what Blender does when it appends or pastes: the copy comes into view."""
+    for hidden in (live.cache, live.spare):
+        for collection in hidden.users_collection:
+            collection.objects.unlink(hidden)
+
+
+def _refuse_shape_keys(mesh: bpy.types.Mesh) -> None:
+    if mesh.shape_keys is not None:
+        raise LiveError(
+            "Live mode shows one mesh, and shape keys need one each: remove them, or live mode"
+        )
 
 
 def _borrowed(mesh: bpy.types.Mesh) -> bool:
@@ -125,16 +226,11 @@ def _borrowed(mesh: bpy.types.Mesh) -> bool:
     )
 
 
-def _point(mesh: bpy.types.Mesh, cache: bpy.types.Object) -> None:
-    for obj in users_of(mesh):
-        point_at(obj, cache)
-
-
-def _digest(mesh: bpy.types.Mesh) -> Generator[None, None, str]:
+def _digest(mesh: bpy.types.Mesh, live: PNS_PG_live) -> Generator[None, None, str]:
     """Return a text that changes when the mesh changes, or what is asked for."""
     reading = yield from read_mesh(mesh)
     digest = hashlib.blake2b(digest_size=16)
-    snapshot, live = reading.snapshot, mesh.pns_live
+    snapshot = reading.snapshot
     for layer in snapshot.layers:
         digest.update(repr((layer.name, layer.kind, layer.domain, layer.names)).encode())
         digest.update(np.ascontiguousarray(layer.values))
@@ -151,89 +247,3 @@ def _digest(mesh: bpy.types.Mesh) -> Generator[None, None, str]:
     asked = [getattr(live, name) for name in Settings.__annotations__]
     digest.update(repr((materials, groups, asked)).encode())
     return digest.hexdigest()
-
-
-class Watch:
-    """Meshes that changed, and the run that refreshes one of them; kept while Blender runs."""
-
-    def __init__(self) -> None:
-        self.changed: dict[int, float] = {}
-        self.run: Run | None = None
-        self.at: int | None = None
-
-    def note(self, mesh: bpy.types.Mesh) -> None:
-        """Note that a mesh has changed, now."""
-        self.changed[mesh.session_uid] = time.monotonic()
-        if not bpy.app.timers.is_registered(tick):
-            bpy.app.timers.register(tick, first_interval=QUIET)
-
-    def clear(self) -> None:
-        """Forget everything: another file is open, or the extension goes."""
-        if self.run is not None:
-            self.run.cancel()
-        self.changed, self.run, self.at = {}, None, None
-        if bpy.app.timers.is_registered(tick):
-            bpy.app.timers.unregister(tick)
-
-    def advance(self, quiet: float = QUIET) -> float | None:
-        """Go on with the refreshing; seconds until it wants to be called again, None if never."""
-        if self.run is not None:
-            self._go_on()
-            return TICK
-        now = time.monotonic()
-        due = [uid for uid, since in self.changed.items() if now - since >= quiet]
-        if not due:
-            return TICK if self.changed else None
-        del self.changed[due[0]]
-        obj = _object_of(due[0])
-        # It may have been switched off since.
-        if obj is not None and obj.data.pns_live.automatic:
-            self.run, self.at = Run(refreshed(obj, Share())), due[0]
-        return TICK
-
-    def _go_on(self) -> None:
-        obj = _object_of(self.at)
-        if obj is None:
-            self.run.cancel()
-            self.run = None
-            return
-        try:
-            if self.run.advance():
-                self.run = None
-        except PnsError as error:
-            obj.data.pns_live.problem = str(error)
-            self.run = None
-
-
-WATCH = Watch()
-
-
-def _object_of(uid: int | None) -> bpy.types.Object | None:
-    """Return some object that shows the mesh of this number live; None where it is gone."""
-    for mesh in bpy.data.meshes:
-        if mesh.session_uid == uid and mesh.pns_live.enabled:
-            return next(iter(users_of(mesh)), None)
-    return None
-
-
-def tick() -> float | None:
-    """Advance the watch, as Blender's timer asks."""
-    return WATCH.advance()
-
-
-@persistent
-def after_update(scene: bpy.types.Scene, graph: bpy.types.Depsgraph) -> None:
-    """Note the meshes that an edit has changed."""
-    for update in graph.updates:
-        if not update.is_updated_geometry:
-            continue
-        changed = update.id.original
-        mesh = changed.data if isinstance(changed, bpy.types.Object) else changed
-        if isinstance(mesh, bpy.types.Mesh) and mesh.pns_live.enabled and mesh.pns_live.automatic:
-            WATCH.note(mesh)
-
-
-@persistent
-def after_load(*_: object) -> None:
-    """Forget the file that was open before."""
-    WATCH.clear()

@@ -32,14 +32,13 @@ def remove_modifier(obj: bpy.types.Object) -> None:
     _drop(group)
 
 
-def point_at(obj: bpy.types.Object, cache: bpy.types.Object) -> None:
-    """Show this result; objects that showed the same one before go on doing so."""
+def point_at(obj: bpy.types.Object, cache: bpy.types.Object | None) -> None:
+    """Show this result, or none; objects that showed the same one before go on doing so."""
     modifier = modifier_of(obj)
-    if modifier is None or result_of(modifier.node_group) == cache:
-        obj.update_tag()
+    if modifier is None or (cache is not None and result_of(modifier.node_group) == cache):
         return
     before = modifier.node_group
-    modifier.node_group = _group(cache)
+    modifier.node_group = None if cache is None else _group(cache)
     _drop(before)
 
 

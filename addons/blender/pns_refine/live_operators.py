@@ -7,7 +7,9 @@ import bpy
 from pns_common import PnsError
 
 from . import live
-from .run import Run, Share
+from .run import Run, Share, Steps
+
+LINKED = "Linked from another file, which alone can keep live mode: make it local first"
 
 
 class _OfLive:
@@ -21,6 +23,9 @@ class _OfLive:
         obj = context.object
         if obj is None or obj.type != "MESH" or live.modifier_of(obj) is None:
             cls.poll_message_set("Start live mode first")
+            return False
+        if not (obj.is_editable and obj.data.is_editable):
+            cls.poll_message_set(LINKED)
             return False
         return True
 
@@ -43,9 +48,7 @@ class OBJECT_OT_pns_live_add(bpy.types.Operator):  # noqa: N801 (Blender's names
             cls.poll_message_set("The object is shown live already")
             return False
         if not (obj.is_editable and obj.data.is_editable):
-            cls.poll_message_set(
-                "Linked from another file, which alone can keep live mode: make it local first"
-            )
+            cls.poll_message_set(LINKED)
             return False
         if obj.data.shape_keys is not None:
             cls.poll_message_set(
@@ -80,12 +83,19 @@ class OBJECT_OT_pns_live_apply(_OfLive, bpy.types.Operator):  # noqa: N801 (Blen
     bl_idname = "object.pns_live_apply"
     bl_label = "Apply"
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the object is live, and its mesh is one that it can part with."""
+        if not super().poll(context):
+            return False
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Leave the present mode for Object Mode first")
+            return False
+        return True
+
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Refresh a last time, and apply."""
-        result = refresh(self, context.object)
-        if result == {"FINISHED"}:
-            live.apply(context.object)
-        return result
+        """Refine a last time, and apply."""
+        return finished(self, live.apply(context.object))
 
 
 class OBJECT_OT_pns_live_remove(_OfLive, bpy.types.Operator):  # noqa: N801 (Blender's names)
@@ -102,8 +112,13 @@ class OBJECT_OT_pns_live_remove(_OfLive, bpy.types.Operator):  # noqa: N801 (Ble
 
 def refresh(operator: bpy.types.Operator, obj: bpy.types.Object) -> set[str]:
     """Refresh an object at once, and report what is wrong."""
+    return finished(operator, live.refreshed(obj, Share()))
+
+
+def finished(operator: bpy.types.Operator, steps: Steps) -> set[str]:
+    """Take steps to their end at once, and report what is wrong."""
     try:
-        Run(live.refreshed(obj, Share())).finish()
+        Run(steps).finish()
     except PnsError as error:
         operator.report({"ERROR"}, str(error))
         return {"CANCELLED"}

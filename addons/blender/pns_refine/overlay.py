@@ -11,7 +11,7 @@ from bpy.props import EnumProperty
 MODIFIER = "PNS Overlay"
 GROUP = ".PNS Overlay"
 MATERIAL = ".PNS Overlay"
-RAMP, ATTRIBUTE, PAINT = "Ramp", "Attribute", "Paint"
+RAMP, ATTRIBUTE, PAINT, SCALE = "Ramp", "Attribute", "Paint", "Scale"
 TITLES = {
     "pns_ratio": "Proximity ratio",
     "pns_gate": "Gate",
@@ -45,6 +45,9 @@ class OBJECT_OT_pns_overlay(bpy.types.Operator):  # noqa: N801 (Blender's names)
         """Return whether the active object was refined."""
         if shown_mesh(context.object) is None:
             cls.poll_message_set("Refine the object first")
+            return False
+        if not context.object.is_editable:
+            cls.poll_message_set("Linked from another file, and not to be changed here")
             return False
         return True
 
@@ -83,6 +86,14 @@ def show(obj: bpy.types.Object, name: str, highest: float) -> None:
     obj.modifiers.new(MODIFIER, "NODES").node_group = _group(ramp_material(name, highest))
 
 
+def rescale(obj: bpy.types.Object) -> None:
+    """Let the ramp of an overlay go to the largest value of the mesh that is shown now."""
+    material, mesh = _material(obj), shown_mesh(obj)
+    if material is not None and mesh is not None:
+        highest = getattr(mesh.pns_result, current(obj))
+        _scale_to(material.node_tree.nodes[SCALE], highest)
+
+
 def hide(obj: bpy.types.Object) -> None:
     """Take the overlay away, and its nodes and material when nothing has them any more."""
     modifier, material = obj.modifiers.get(MODIFIER), _material(obj)
@@ -99,14 +110,17 @@ def hide(obj: bpy.types.Object) -> None:
 def ramp_material(name: str, highest: float) -> bpy.types.Material:
     """Make a material that colours by an attribute, from 0 to ``highest``."""
     material = bpy.data.materials.new(MATERIAL)
-    material.use_nodes = True
+    if material.node_tree is None:
+        # Before 5.0; since then all materials have nodes.
+        material.use_nodes = True
     tree = material.node_tree
     shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Roughness"].default_value = 0.7
     attribute = tree.nodes.new("ShaderNodeAttribute")
     attribute.name, attribute.attribute_name = ATTRIBUTE, name
     scale = tree.nodes.new("ShaderNodeMapRange")
-    scale.inputs["From Max"].default_value = highest if highest > 0 else 1.0
+    scale.name = SCALE
+    _scale_to(scale, highest)
     ramp = tree.nodes.new("ShaderNodeValToRGB")
     ramp.name = RAMP
     elements = ramp.color_ramp.elements
@@ -119,6 +133,10 @@ def ramp_material(name: str, highest: float) -> bpy.types.Material:
     tree.links.new(scale.outputs["Result"], ramp.inputs["Fac"])
     tree.links.new(ramp.outputs["Color"], shader.inputs["Base Color"])
     return material
+
+
+def _scale_to(scale: bpy.types.Node, highest: float) -> None:
+    scale.inputs["From Max"].default_value = highest if highest > 0 else 1.0
 
 
 def _linear(channel: float) -> float:

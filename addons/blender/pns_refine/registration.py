@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import PointerProperty
 
-from . import live, live_operators, operator, overlay, panel, result
+from . import live, live_operators, live_watch, operator, overlay, panel, result
 
 CLASSES = (
     result.PNS_PG_result,
@@ -24,6 +24,17 @@ CLASSES = (
 )
 
 
+HANDLERS = (
+    ("depsgraph_update_post", live_watch.after_update),
+    ("undo_pre", live_watch.before_undo),
+    ("redo_pre", live_watch.before_undo),
+    ("undo_post", live_watch.after_undo),
+    ("redo_post", live_watch.after_undo),
+    ("save_pre", live_watch.before_save),
+    ("load_pre", live_watch.before_load),
+)
+
+
 def register() -> None:
     """Register everything."""
     for cls in CLASSES:
@@ -31,15 +42,15 @@ def register() -> None:
     bpy.types.Mesh.pns_result = PointerProperty(type=result.PNS_PG_result)
     bpy.types.Mesh.pns_live = PointerProperty(type=live.PNS_PG_live)
     bpy.types.VIEW3D_MT_object.append(panel.draw_menu)
-    bpy.app.handlers.depsgraph_update_post.append(live.after_update)
-    bpy.app.handlers.load_pre.append(live.after_load)
+    for name, handler in HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
 
 
 def unregister() -> None:
     """Take everything back, in the opposite order."""
-    live.WATCH.clear()
-    bpy.app.handlers.load_pre.remove(live.after_load)
-    bpy.app.handlers.depsgraph_update_post.remove(live.after_update)
+    live_watch.WATCH.clear()
+    for name, handler in HANDLERS:
+        getattr(bpy.app.handlers, name).remove(handler)
     bpy.types.VIEW3D_MT_object.remove(panel.draw_menu)
     del bpy.types.Mesh.pns_live
     del bpy.types.Mesh.pns_result

@@ -13,13 +13,17 @@ from .writing import SHOWN
 
 
 class PNS_PG_result(bpy.types.PropertyGroup):  # noqa: N801 (Blender's names)
-    """The report, the notes, and the largest values of what the overlays show."""
+    """The report, the notes, the largest values of what the overlays show, and live mode's digest.
+
+    The digest changes with the mesh that this one was made from, and with what was asked for.
+    """
 
     report: StringProperty()
     notes: StringProperty()
     pns_ratio: FloatProperty()
     pns_gate: FloatProperty()
     pns_distance: FloatProperty()
+    digest: StringProperty()
 
 
 def remember(mesh: bpy.types.Mesh, refined: Refined, notes: list[str]) -> None:

@@ -47,6 +47,8 @@ class Run:
         self._steps = steps
         self.value: Any = None
         self.done = False
+        # In the midst of a step: what Blender tells of now, the step has done.
+        self.busy = False
 
     def advance(self, seconds: float = SLICE) -> bool:
         """Go on for so long, or until there is something to wait for; whether it is done.
@@ -56,11 +58,14 @@ class Run:
         """
         end = time.monotonic() + seconds
         while not self.done:
+            self.busy = True
             try:
                 state = next(self._steps)
             except StopIteration as finished:
                 self.done, self.value = True, finished.value
                 break
+            finally:
+                self.busy = False
             if state is WAITING or time.monotonic() >= end:
                 break
         return self.done
@@ -105,9 +110,17 @@ def refine_meshes(
 
 
 def refine_mesh(
-    obj: bpy.types.Object, choice: Choice, share: Share, number: int = 0, count: int = 1
+    obj: bpy.types.Object,
+    choice: Choice,
+    share: Share,
+    number: int = 0,
+    count: int = 1,
+    into: bpy.types.Mesh | None = None,
 ) -> Generator[object, None, Made]:
-    """Refine a copy of an object's mesh; the computation runs in a thread of its own."""
+    """Refine a copy of an object's mesh; the computation runs in a thread of its own.
+
+    ``into`` is written anew, if given, in place of a new mesh.
+    """
     mesh: bpy.types.Mesh = obj.data
     reading: Reading = yield from read_mesh(mesh)
     job = Job(partial(compute, reading.snapshot, choice)).start()
@@ -118,7 +131,7 @@ def refine_mesh(
         refined = job.answer()
     finally:
         job.cancel()
-    new, refused = yield from write_mesh(refined, reading, mesh)
+    new, refused = yield from write_mesh(refined, reading, mesh, into)
     notes = losses(obj, reading, quads=choice.quads) + irregularities(refined) + refused
     remember(new, refined, notes)
     return Made(mesh, new, refined)

@@ -21,19 +21,27 @@ FREE_NORMALS = (5, 0, 0)
 
 
 def write_mesh(
-    refined: Refined, reading: Reading, source: bpy.types.Mesh
+    refined: Refined,
+    reading: Reading,
+    source: bpy.types.Mesh,
+    into: bpy.types.Mesh | None = None,
 ) -> Generator[None, None, tuple[bpy.types.Mesh, list[str]]]:
     """Write a new mesh, as ``source`` in all but its geometry; yields between pieces.
 
-    Returns the mesh, and what Blender would not take, in words. Nothing is left behind if the
-    generator is closed before its end.
+    ``into`` is a mesh to write in its place: what it held is lost, and it gets no more than
+    geometry and materials. Returns the mesh, and what Blender would not take, in words. Nothing is
+    left behind if the generator is closed before its end.
     """
-    mesh = source.copy()
+    mesh = copied(source) if into is None else into
     carrier = bpy.data.objects.new(CARRIER, mesh)
     try:
         if mesh.shape_keys is not None:
             carrier.shape_key_clear()
         mesh.clear_geometry()
+        if into is not None:
+            mesh.materials.clear()
+            for material in source.materials:
+                mesh.materials.append(material)
         yield
         yield from _write_faces(mesh, refined)
         lost = yield from _write_layers(mesh, refined)
@@ -44,15 +52,26 @@ def write_mesh(
         mesh.update()
     except BaseException:
         bpy.data.objects.remove(carrier)
-        bpy.data.meshes.remove(mesh)
+        if into is None:
+            bpy.data.meshes.remove(mesh)
+        else:
+            into.clear_geometry()
         raise
     bpy.data.objects.remove(carrier)
     return mesh, lost
 
 
+def copied(source: bpy.types.Mesh) -> bpy.types.Mesh:
+    """Return a copy that is not shown live, as its source may be."""
+    mesh = source.copy()
+    for name in ("enabled", "cache", "spare", "first", "second", "problem"):
+        mesh.pns_live.property_unset(name)
+    return mesh
+
+
 def take_name(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
     """Call a refined mesh as its source was, which nothing has any more: files keep that name."""
-    if source.users:
+    if source.users or source.library is not None:
         return
     name = source.name
     # A name is given to one at a time.
@@ -111,7 +130,8 @@ def _write_groups(carrier: bpy.types.Object, refined: Refined, reading: Reading)
         attribute = mesh.attributes.new(".pns weights", "FLOAT", "POINT")
         attribute.data.foreach_set("value", _flat(weights, np.float32))
         mesh.attributes.active = mesh.attributes[attribute.name]
-        with bpy.context.temp_override(object=carrier, active_object=carrier):
+        # Whatever is edited meanwhile, the carrier is not.
+        with bpy.context.temp_override(object=carrier, active_object=carrier, edit_object=None):
             bpy.ops.geometry.attribute_convert(mode="VERTEX_GROUP")
         made = carrier.vertex_groups[-1]
         made.name, made.lock_weight = group.name, group.lock_weight

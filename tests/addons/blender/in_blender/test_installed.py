@@ -40,10 +40,11 @@ def traces():
     """What Blender knows of the extension."""
     handlers = [
         h
-        for group in ("depsgraph_update_post", "load_pre")
+        for group in dir(bpy.app.handlers)
+        if isinstance(getattr(bpy.app.handlers, group), list)
         for h in getattr(bpy.app.handlers, group)
     ]
-    live = sys.modules.get(f"{NAME}.live")
+    live = sys.modules.get(f"{NAME}.live_watch")
     return {
         "types": sorted(n for n in dir(bpy.types) if "pns" in n.lower()),
         "operators": [n for n in dir(bpy.ops.object) if n.startswith("pns_")],

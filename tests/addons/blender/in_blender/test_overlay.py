@@ -5,6 +5,8 @@ import bl_ext.user_default.pns_refine.result as result
 import bpy
 import numpy as np
 import pytest
+from live_scene import settle
+from mathutils import Matrix
 from scene import cube, evaluated, grid, numbers, points_of, refined
 
 
@@ -60,6 +62,13 @@ def test_live_results_have_overlays_too():
     bpy.ops.object.pns_live_add()
     assert bpy.ops.object.pns_overlay(shown="pns_distance") == {"FINISHED"}
     assert "pns_distance" in evaluated(obj).attributes
+    obj.data.transform(Matrix.Scale(10, 4))
+    obj.data.update()
+    settle()
+    # The ramp's end is what the legend says.
+    scale = overlay.ramp_of(obj).inputs[0]
+    highest = scale.links[0].from_node.inputs["From Max"].default_value
+    assert highest == overlay.shown_mesh(obj).pns_result.pns_distance
     bpy.ops.object.pns_live_remove()
     assert not obj.modifiers
 
