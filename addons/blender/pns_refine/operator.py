@@ -7,7 +7,10 @@ from bpy.props import BoolProperty
 
 from pns_common import PnsError
 
+from . import live
 from .animation import redirect_drivers
+from .live_nodes import remove_modifier
+from .overlay import hide
 from .run import Key, Made, Run, Share, key_of, refine_meshes
 from .settings import Settings, choice_of
 from .words import forecast, listed, too_many
@@ -106,6 +109,12 @@ class Refining(Settings):
         faces = sum(len(refined.mesh.polygons) for refined in made.values())
         self.report({"INFO"}, f"{faces:,} faces; what is kept and what not: sidebar, PNS")
 
+    def failed(self, error: PnsError) -> set[str]:
+        """Say what is wrong, and with which object."""
+        place = f"{self.share.text}: " if self.share.text else ""
+        self.report({"ERROR"}, f"{place}{error}")
+        return {"CANCELLED"}
+
 
 class OBJECT_OT_pns_refine(Refining, bpy.types.Operator):  # noqa: N801 (Blender's names)
     """Refine the selected meshes: Loop subdivision with a small, bounded, learned correction"""
@@ -131,8 +140,7 @@ class OBJECT_OT_pns_refine(Refining, bpy.types.Operator):  # noqa: N801 (Blender
             run = self.begin(context)
             self.place(context, run.finish())
         except PnsError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return self.failed(error)
         return {"FINISHED"}
 
 
@@ -151,8 +159,7 @@ class OBJECT_OT_pns_refine_large(Refining, bpy.types.Operator):  # noqa: N801 (B
         try:
             self.run = self.begin(context)
         except PnsError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return self.failed(error)
         self.timer = context.window_manager.event_timer_add(0.02, window=context.window)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -160,8 +167,7 @@ class OBJECT_OT_pns_refine_large(Refining, bpy.types.Operator):  # noqa: N801 (B
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Go on a little at each tick; Escape stops."""
         if event.type == "ESC":
-            self.run.cancel()
-            self.end(context)
+            self.cancel(context)
             self.report({"INFO"}, "Stopped; nothing was changed")
             return {"CANCELLED"}
         if event.type != "TIMER":
@@ -174,10 +180,17 @@ class OBJECT_OT_pns_refine_large(Refining, bpy.types.Operator):  # noqa: N801 (B
             self.place(context, self.run.value)
         except PnsError as error:
             self.end(context)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return self.failed(error)
+        except BaseException:
+            self.end(context)
+            raise
         self.end(context)
         return {"FINISHED"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Stop, as Escape asks, or Blender when the window closes."""
+        self.run.cancel()
+        self.end(context)
 
     def end(self, context: bpy.types.Context) -> None:
         """Take away the timer and the status line."""
@@ -186,17 +199,29 @@ class OBJECT_OT_pns_refine_large(Refining, bpy.types.Operator):  # noqa: N801 (B
 
 
 def place(obj: bpy.types.Object, made: Made, keep_original: bool) -> bpy.types.Object:
-    """Give a refined mesh to a copy of an object, or to itself; the object that has it."""
+    """Give a refined mesh to a copy of an object, or to itself; the object that has it.
+
+    It shows that mesh: not its old one live, nor by the old one's scale.
+    """
     if not keep_original:
+        live.remove(obj)
         obj.data = made.mesh
         return obj
     new = obj.copy()
     new.name = f"{obj.name} refined"
+    hide(new)
+    remove_modifier(new)
     new.data = made.mesh
-    for collection in obj.users_collection:
+    for collection in homes_of(obj):
         collection.objects.link(new)
     redirect_drivers(made.mesh.shape_keys, obj, new)
     return new
+
+
+def homes_of(obj: bpy.types.Object) -> list[bpy.types.Collection]:
+    """Return the collections that an object is in and a copy may be too; at least the scene's."""
+    own = [c for c in obj.users_collection if c.is_editable and c.override_library is None]
+    return own or [bpy.context.scene.collection]
 
 
 def draw_forecast(layout: bpy.types.UILayout, objects: list[bpy.types.Object], levels: int) -> None:

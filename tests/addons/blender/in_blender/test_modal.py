@@ -27,6 +27,7 @@ class Large(operator.Refining):
     invoke = operator.OBJECT_OT_pns_refine_large.invoke
     modal = operator.OBJECT_OT_pns_refine_large.modal
     end = operator.OBJECT_OT_pns_refine_large.end
+    cancel = operator.OBJECT_OT_pns_refine_large.cancel
 
 
 class Context:
@@ -131,6 +132,17 @@ def test_the_viewport_can_be_turned_and_nothing_else():
     assert run.modal(context, event("MIDDLEMOUSE")) == {"PASS_THROUGH"}
     assert run.modal(context, event("TAB")) == {"RUNNING_MODAL"}
     assert driven(run, context) == {"FINISHED"}
+
+
+def test_whatever_fails_the_status_line_goes():
+    grid(3)
+    context, run = Context(), Large(scheme="LOOP")
+    run.invoke(context, event("LEFTMOUSE"))
+    run.place = lambda *_: {}["no such place"]
+    with pytest.raises(KeyError):
+        driven(run, context)
+    assert context.timers == 0
+    assert context.status[-1] is None
 
 
 def test_a_mesh_that_cannot_be_refined_is_reported():

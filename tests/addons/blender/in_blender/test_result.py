@@ -6,6 +6,7 @@ import pytest
 from scene import (
     chosen,
     cube,
+    evaluated,
     grid,
     linked,
     points_of,
@@ -95,6 +96,52 @@ def test_a_linked_object_is_told_from_one_of_the_same_name(tmp_path):
     bpy.ops.object.pns_refine(levels=1)
     made = [len(obj.data.polygons) for obj in bpy.context.selected_objects]
     assert sorted(made) == [32, 48]
+
+
+def test_a_copy_of_what_lies_in_a_linked_collection_lies_in_the_scene(tmp_path):
+    own = bpy.data.collections.new("Own")
+    own.objects.link(cube())
+    path = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(path, {own})
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True, load_ui=False)
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.collections = ["Own"]
+    bpy.context.scene.collection.children.link(bpy.data.collections["Own"])
+    new = refined(bpy.data.objects["Cube"], levels=1)
+    assert new.users_collection == (bpy.context.scene.collection,)
+
+
+def test_a_linked_mesh_of_an_object_here_can_be_replaced(tmp_path):
+    linked(cube(), tmp_path / "library.blend")
+    obj = bpy.context.object.make_local()
+    chosen(obj)
+    there = obj.data
+    assert there.library is not None
+    assert refined(obj, levels=1, keep_original=False).data.library is None
+    assert there.name == "Cube"
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_what_is_refined_shows_its_own_mesh_and_no_longer_a_live_one(keep):
+    obj = grid(2)
+    bpy.ops.object.pns_live_add()
+    bpy.ops.object.pns_overlay(shown="pns_gate")
+    new = refined(obj, levels=1, keep_original=keep)
+    assert len(evaluated(new).polygons) == len(new.data.polygons) == 32
+    assert not new.modifiers
+    assert not new.data.pns_live.enabled
+    assert len(evaluated(obj).polygons) == (4 * 32 if keep else 32)
+    # The base, its copy's two holders; or the object alone.
+    assert len(bpy.data.objects) == (4 if keep else 1)
+
+
+def test_an_error_names_the_object():
+    good, bad = cube("Good"), cube("Bad")
+    bad.data.vertices[0].co.x = float("nan")
+    good.select_set(True)
+    with pytest.raises(RuntimeError, match="Bad: vertex 0"):
+        bpy.ops.object.pns_refine()
+    assert len(bpy.data.meshes) == 2
 
 
 def test_objects_that_share_a_mesh_share_the_result():
