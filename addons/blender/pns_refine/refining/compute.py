@@ -26,9 +26,10 @@ from .faces import (
     triangle_faces,
     used_edges,
 )
+from .hidden import hide_within
 from .positions import Positions, refine_positions
 from .shown_creases import shown_creases
-from .snapshot import Faces, Layer, Refined, Rule, Snapshot, edge_keys
+from .snapshot import Layer, Refined, Rule, Snapshot, edge_keys
 from .steps import Steps, edge_numbers, level_steps, refine_columns
 from .votes import vote_at_corners, vote_at_points
 from .watched import WatchedModel
@@ -93,23 +94,26 @@ def compute(
     edge_parent = edge_parents(steps, snapshot)
     used = used_edges(plan.faces, len(steps.final.edges))
     loose = np.flatnonzero(~snapshot.edge_used)
-    carry = _Carry(snapshot, choice.levels, steps, plan, np.r_[edge_parent[used], loose])
+    own_edge = np.r_[edge_parent[used], loose]
+    carry = _Carry(snapshot, choice.levels, steps, plan, own_edge)
     layers = []
     for number, layer in enumerate(snapshot.layers):
         layers.append(layer.of(carry(layer)))
         bar.reach("corners", (number + 1) / len(snapshot.layers))
     renumbered = np.cumsum(used) - 1
-    faces = plan.faces
+    faces = replace(plan.faces, edges=renumbered[plan.faces.edges])
+    edges = np.concatenate([steps.final.edges[used], snapshot.edges[loose]])
+    old, count = len(snapshot.points), len(positions.points)
     return Refined(
         points=positions.points,
-        faces=Faces(faces.starts, faces.vertices, renumbered[faces.edges], faces.parents),
-        edges=np.concatenate([steps.final.edges[used], snapshot.edges[loose]]),
+        faces=faces,
+        edges=edges,
         crease_sharpness=np.r_[
             _final_crease_sharpness(steps)[used], snapshot.crease_sharpness[loose]
         ],
         groups=np.clip(columns[:, :group_count], 0, 1),
         offsets=moves.reshape(len(columns), len(offsets), 3).transpose(1, 0, 2),
-        layers=tuple(layers),
+        layers=hide_within(tuple(layers), faces, edges, own_edge < 0, old, count),
         ratio=ratio,
         gate=gate,
         distance=distance,

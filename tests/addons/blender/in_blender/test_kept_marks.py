@@ -116,6 +116,30 @@ def freestyle_marks(mesh):
     return [row.value for row in mesh.attributes["freestyle_edge"].data]
 
 
+@pytest.mark.parametrize("levels", [1, 2])
+def test_what_is_in_hidden_faces_is_hidden(levels):
+    obj = grid(3)
+    mesh = obj.data
+    mesh.polygons.foreach_set("hide", [i in (0, 1, 3, 4) for i in range(9)])
+    for rows, hidden in zip((mesh.edges, mesh.vertices), hidden_around(mesh), strict=True):
+        rows.foreach_set("hide", hidden)
+    new = refined(obj, levels=levels).data
+    edges, points = hidden_around(new)
+    assert [e.hide for e in new.edges] == edges
+    assert [v.hide for v in new.vertices] == points
+    assert 0 < sum(edges) < len(edges)
+
+
+def hidden_around(mesh):
+    """Which edges, and which vertices, have hidden faces alone."""
+    edges, points = [True] * len(mesh.edges), [True] * len(mesh.vertices)
+    for face in mesh.polygons:
+        for corner in [] if face.hide else face.loop_indices:
+            edges[mesh.loops[corner].edge_index] = False
+            points[mesh.loops[corner].vertex_index] = False
+    return edges, points
+
+
 def test_flat_shading_stays_flat():
     obj = cube()
     obj.data.polygons[2].use_smooth = True
