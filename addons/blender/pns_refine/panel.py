@@ -7,7 +7,7 @@ import bpy
 from . import live
 from .operator import OBJECT_OT_pns_refine, chosen_objects, draw_forecast
 from .overlay import TITLES, current, ramp_of, shown_mesh
-from .result import certificate_lines, in_units, note_lines
+from .result import certificate_lines, in_units, largest_scale, note_lines
 
 
 class _Panel:
@@ -81,10 +81,8 @@ class VIEW3D_PT_pns_overlay(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's n
             return
         layout.template_color_ramp(ramp, "color_ramp", expand=False)
         highest = getattr(shown_mesh(obj).pns_result, now)
-        scale = max(map(abs, obj.matrix_world.to_scale()))
-        text = (
-            f"{highest:.3g}" if now != "pns_distance" else in_units(highest * scale, context.scene)
-        )
+        length = highest * largest_scale(obj)
+        text = f"{highest:.3g}" if now != "pns_distance" else in_units(length, context.scene)
         row = layout.row()
         row.label(text="0")
         row.label(text=text)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import bpy
+import numpy as np
 from bpy.props import FloatProperty, StringProperty
 
 from . import words
@@ -39,10 +40,15 @@ def certificate_lines(
 ) -> list[str]:
     """Return the certificate of a refined mesh in the scene's units, as the object is scaled."""
     report = json.loads(mesh.pns_result.report)
-    scale = max(obj.matrix_world.to_scale(), key=abs)
+    scale = largest_scale(obj)
     return words.certificate(
-        report, mesh.pns_result.pns_distance, lambda x: in_units(x * abs(scale), scene)
+        report, mesh.pns_result.pns_distance, lambda x: in_units(x * scale, scene)
     )
+
+
+def largest_scale(obj: bpy.types.Object) -> float:
+    """Return how much an object stretches its mesh at most, sheared by its parents or not."""
+    return float(np.linalg.norm(np.array(obj.matrix_world.to_3x3()), 2))
 
 
 def note_lines(mesh: bpy.types.Mesh) -> list[str]:

@@ -85,4 +85,13 @@ def test_the_certificate_is_in_the_scenes_units():
     assert result.in_units(farthest * 1000, scene) in text
     assert "m" in result.in_units(farthest * 1000, scene)
     scene.unit_settings.system = "NONE"
+    # A parent that shears it stretches it by more than its sides.
+    parent = bpy.data.objects.new("Parent", None)
+    scene.collection.objects.link(parent)
+    new.parent, new.rotation_euler.z, parent.scale.x = parent, np.pi / 4, 10
+    bpy.context.view_layer.update()
+    text = " ".join(result.certificate_lines(new, new.data, scene))
+    assert f"{farthest * 10000:.4g}" in text
+    parent.scale.x = 1
+    bpy.context.view_layer.update()
     assert f"{farthest * 1000:.4g}" in " ".join(result.certificate_lines(new, new.data, scene))
