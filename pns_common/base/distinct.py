@@ -33,13 +33,19 @@ def number_by_first_appearance(
 
     Return them, and where each occurs first.
     """
-    earliest = np.full(int(labels.max(initial=-1)) + 1, -1, dtype=np.int64)
-    # Written backwards, so that the earliest occurrence is the one that remains.
-    earliest[labels[::-1]] = np.arange(len(labels) - 1, -1, -1)
+    earliest = first_places(labels, int(labels.max(initial=-1)) + 1)
     first = np.sort(earliest[earliest >= 0])
     number = np.empty_like(earliest)
     number[labels[first]] = np.arange(len(first))
     return number[labels], first
+
+
+def first_places(labels: Int[np.ndarray, " N"], count: int) -> Int[np.ndarray, " S"]:
+    """Return where each of the labels 0 … count − 1 first occurs; −1 where it does not."""
+    earliest = np.full(count, -1, dtype=np.int64)
+    # Written backwards, so that the earliest occurrence is the one that remains.
+    earliest[labels[::-1]] = np.arange(len(labels) - 1, -1, -1)
+    return earliest
 
 
 def as_words(rows: Shaped[np.ndarray, "N K"]) -> UInt[np.ndarray, "N W"]:

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.base.distinct import first_places
 from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.fused import fits, kernels_available
 from pns_common.fused.known import kernels_know
@@ -132,10 +133,7 @@ def first_at_own(links: Links, own: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, 
 
     Of vertices around own faces alone that is sure.
     """
-    first = np.full(links.vertex_count, -1, dtype=np.int64)
-    corners = links.faces.reshape(-1)
-    # Written backwards, so that the earliest corner is the one that remains.
-    first[corners[::-1]] = np.arange(len(corners) - 1, -1, -1)
+    first = first_places(links.faces.reshape(-1), links.vertex_count)
     return (first >= 0) & own[first // 3]
 
 

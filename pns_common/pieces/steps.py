@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.base.distinct import first_places
 from pns_common.connectivity.creases import Creases
 from pns_common.connectivity.topology import Topology
 from pns_common.levels.array_steps import array_steps
@@ -103,13 +104,13 @@ def steps_by_kernels(
                 # The step has added to them in their place.
                 loop = loop_points(level.points, mesh, blocks)
         links = Links(
-            mesh.vertex_count,
-            mesh.faces,
-            mesh.edge_class,
-            mesh.interior,
-            mesh.half_edges[:, 0],
-            mesh.half_edges[:, 1],
-            level.several_fans if depth == 0 else None,
+            vertex_count=mesh.vertex_count,
+            faces=mesh.faces,
+            edge_class=mesh.edge_class,
+            interior=mesh.interior,
+            first=mesh.half_edges[:, 0],
+            second=mesh.half_edges[:, 1],
+            several_fans=level.several_fans if depth == 0 else None,
         )
         children = split_mesh_faces(mesh, np.int32, blocks)
         yield Step(links, level.points, made, children, placed, loop, may_flip)
@@ -118,16 +119,12 @@ def steps_by_kernels(
 
 
 def _links(topology: Topology, several_fans: Bool[np.ndarray, " V"] | None) -> Links:
-    first = np.empty(len(topology.edges), dtype=np.int64)
-    # Written backwards, so that the earliest half-edge is the one that remains.
-    half_edges = topology.face_edges.reshape(-1)
-    first[half_edges[::-1]] = np.arange(len(half_edges) - 1, -1, -1)
     return Links(
-        topology.vertex_count,
-        topology.faces,
-        topology.edge_class,
-        topology.interior,
-        first,
-        topology.half_edges[:, 1],
-        several_fans,
+        vertex_count=topology.vertex_count,
+        faces=topology.faces,
+        edge_class=topology.edge_class,
+        interior=topology.interior,
+        first=first_places(topology.face_edges.reshape(-1), len(topology.edges)),
+        second=topology.half_edges[:, 1],
+        several_fans=several_fans,
     )

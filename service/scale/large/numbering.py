@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Int
 
+from pns_common.base.distinct import first_places
 from pns_common.connectivity.topology import Topology, build_topology
 from pns_common.masks.linear import level_topologies
 from pns_common.mesh import repeated_vertex
@@ -107,11 +108,8 @@ def write_bases(
 
 def _openers(topology: Topology, control_faces: int) -> Int[np.ndarray, " F"]:
     """Count the edges that each control face's descendants are first to show."""
-    half_edges = topology.face_edges.reshape(-1)
-    first = np.empty(len(topology.edges), dtype=np.int64)
-    # Written backwards, so that the earliest half-edge is the one that remains.
-    first[half_edges[::-1]] = np.arange(len(half_edges) - 1, -1, -1)
-    share = len(half_edges) // control_faces
+    first = first_places(topology.face_edges.reshape(-1), len(topology.edges))
+    share = topology.face_edges.size // control_faces
     return np.bincount(first // share, minlength=control_faces)
 
 

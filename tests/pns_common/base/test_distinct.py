@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from pns_common.base import distinct as module
-from pns_common.base.distinct import distinct_rows, number_by_first_appearance
+from pns_common.base.distinct import distinct_rows, first_places, number_by_first_appearance
 
 # Values whose sums and bits are easy to confuse.
 VALUES = np.array([0, 1, 2, 1e-45, 3e38], dtype=np.float32).tolist()
@@ -52,3 +52,5 @@ def test_numbers_follow_first_appearance(labels):
     assert numbers.tolist() == expected
     assert [labels[place] for place in first] == list(dict.fromkeys(labels))
     assert first.tolist() == [labels.index(label) for label in dict.fromkeys(labels)]
+    places = first_places(np.array(labels, dtype=np.int64), 11)
+    assert places.tolist() == [labels.index(k) if k in labels else -1 for k in range(11)]

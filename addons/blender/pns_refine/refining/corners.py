@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common.base.distinct import first_places
 from pns_common.connectivity.creases import crease_children, with_creases
 from pns_common.connectivity.topology import Topology, build_topology, sharp_edge_count, split
 
@@ -27,8 +28,7 @@ def refine_corners(
     boundaries"). ``same`` are the values that say whether corners agree, if not ``values``.
     """
     patch = patch_points(faces.reshape(-1), values if same is None else same)
-    first = np.zeros(int(patch.max(initial=-1)) + 1, dtype=np.int64)
-    first[patch[::-1]] = np.arange(len(patch))[::-1]
+    first = first_places(patch, int(patch.max(initial=-1)) + 1)
     columns, vertex_of = values[first], faces.reshape(-1)[first]
     patches = patch.reshape(-1, 3)
     sharp: Int[np.ndarray, "N 2"] | None = None
@@ -53,8 +53,7 @@ def patch_points(
     vertices: Int[np.ndarray, " C"], values: Float[np.ndarray, "C K"]
 ) -> Int[np.ndarray, " C"]:
     """Give each corner a number; those of one vertex that have the same values share it."""
-    first = np.zeros(int(vertices.max(initial=-1)) + 1, dtype=np.int64)
-    first[vertices[::-1]] = np.arange(len(vertices))[::-1]
+    first = first_places(vertices, int(vertices.max(initial=-1)) + 1)
     # Corners that agree with their vertex's first are found without sorting: on most meshes, all.
     odd = (values != values[first[vertices]]).any(axis=1)
     number = vertices.astype(np.int64)
