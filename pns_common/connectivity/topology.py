@@ -194,7 +194,7 @@ def multi_fan_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
     corners, a closed one as many. Closed fans are told apart by pointer doubling.
     """
     corner_count = np.bincount(topology.faces.reshape(-1), minlength=topology.vertex_count)
-    following = _next_around_vertex(topology)
+    following = across_from_corners(topology, np.flatnonzero(topology.half_edges[:, 0] >= 0))
     corners = np.arange(len(following))
     label, hop = corners.copy(), following.copy()
     for _ in range(int(corner_count.max()).bit_length()):
@@ -230,10 +230,12 @@ def next_corner(corner: Int[np.ndarray, "..."]) -> Int[np.ndarray, "..."]:
     return corner + 1 - 3 * (place == 2)
 
 
-def _next_around_vertex(topology: Topology) -> Int[np.ndarray, " K"]:
-    """Return for each corner the next around its vertex, across the half-edge that leaves it."""
-    start = topology.half_edges[topology.half_edges[:, 0] >= 0]
-    end = next_corner(start)
-    following = np.full(topology.faces.size, -1, dtype=np.int64)
-    following[start] = end[:, ::-1]
-    return following
+def across_from_corners(topology: Topology, edges: Int[np.ndarray, " N"]) -> Int[np.ndarray, " C"]:
+    """Return for each corner the next clockwise around its vertex, across one of some edges.
+
+    They are interior or creases; −1 where the half-edge that leaves the corner is on none of them.
+    """
+    start = topology.half_edges[edges]
+    clockwise = np.full(topology.faces.size, -1, dtype=np.int64)
+    clockwise[start] = next_corner(start)[:, ::-1]
+    return clockwise

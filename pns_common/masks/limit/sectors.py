@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.connectivity.topology import Topology, next_corner
+from pns_common.connectivity.topology import Topology, across_from_corners
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Sectors:
 
 def sectors(topology: Topology) -> Sectors:
     """Find the sectors, by pointer doubling from corner to corner across interior edges."""
-    before = _previous_around_vertex(topology)
+    before = across_from_corners(topology, topology.interior)
     corners = np.arange(len(before))
     rounds = int(np.bincount(topology.faces.reshape(-1)).max()).bit_length()
     # A closed sector never runs out; it is opened before its lowest corner.
@@ -67,11 +67,3 @@ def sectors(topology: Topology) -> Sectors:
         size=np.bincount(of_corner, minlength=len(first)),
         closed=is_closed[first],
     )
-
-
-def _previous_around_vertex(topology: Topology) -> Int[np.ndarray, " C"]:
-    """Return each corner's predecessor, clockwise across the interior half-edge that leaves it."""
-    leaving = topology.half_edges[topology.interior]
-    before = np.full(topology.faces.size, -1, dtype=np.int64)
-    before[leaving] = next_corner(leaving)[:, ::-1]
-    return before
