@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.base.arrays import dot, norm
+from pns_common.base.arrays import dot
 from pns_common.connectivity.topology import EdgeClass, next_corner
 from pns_common.geometry.frames import face_normals
+from pns_common.levels.diagnostics import reach_of
 from pns_common.levels.step import AddedStep
 from pns_common.masks.crease_shift import crease_shift
 from pns_common.pieces.steps import Links, Step
 from pns_common.pieces.tally import LevelTally, Summed
-from pns_common.rules.placement import Added
 
 
 def tally_of(
@@ -69,15 +69,11 @@ def _with_rules(
         )
     if placed.guard is not None:
         tally = replace(tally, guarded=int((placed.guard[own_vertices] < 1).sum()))
-    both = ((vertices, own_old), (edges, own_edges))
-    bounds = [_largest(rule, rows) for rule, rows in both]
-    known = [bound for bound in bounds if bound is not None]
-    return replace(
-        tally,
-        learned=True,
-        displacement=max(_longest(rule, rows) for rule, rows in both),
-        envelope=max(known) if len(known) == len(bounds) else None,
+    own = AddedStep(
+        vertices.rows(np.flatnonzero(own_old)), edges.rows(np.flatnonzero(own_edges)), True, None
     )
+    reach = reach_of(own)
+    return replace(tally, learned=True, displacement=reach.longest, envelope=reach.bound)
 
 
 def _crease_shift(
@@ -98,17 +94,6 @@ def _crease_shift(
     if not (old.any() or new.any()):
         return None
     return float(max(shift.of_vertices[old].max(initial=0), shift.of_edges[new].max(initial=0)))
-
-
-def _longest(rule: Added, rows: Bool[np.ndarray, " N"]) -> float:
-    return 0.0 if rule.displacement is None else float(norm(rule.displacement[rows]).max(initial=0))
-
-
-def _largest(rule: Added, rows: Bool[np.ndarray, " N"]) -> float | None:
-    """Return the largest displacement that the rule may make; None where it may make any."""
-    if rule.displacement is None:
-        return 0.0
-    return None if rule.envelope is None else float(rule.envelope[rows].max(initial=0))
 
 
 def _flipped(step: Step, own: Bool[np.ndarray, " F"]) -> int:
