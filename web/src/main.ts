@@ -25,6 +25,7 @@ import {
 import { SettingsForm } from "./ui/settings-form";
 import { Stage } from "./ui/stage";
 import {
+  addNotice,
   announce,
   bindNotice,
   bindProblem,
@@ -57,6 +58,8 @@ const session = new Session({
     document.body.classList.remove("empty", "refined");
     fileList.show(source.upload);
     stage.open(source);
+    const { missing } = source.opened;
+    if (missing.length) addNotice(`${source.upload.name} names what is not among the files: ${listed(missing)}.`);
   },
   stayed: () => {
     const { source, ours } = session;

@@ -290,6 +290,16 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.deepEqual(await page.evaluate(() => [...window.sent]), ["file: a.gltf", "a.bin: a.bin"]);
   });
 
+  test("a texture that did not come with its document is named", async () => {
+    const page = await visit({ hash: "#levels=1", foreseen: /Couldn't load texture/ });
+    const json = { ...bare(), images: [{ uri: "wood.png" }], textures: [{ source: 0 }] };
+    json.materials = [{ pbrMetallicRoughness: { baseColorTexture: { index: 0 } } }];
+    json.meshes[0].primitives[0].material = 0;
+    await choose(page, { name: "a.gltf", mimeType: "", buffer: Buffer.from(JSON.stringify(json)) }, TRIANGLE);
+    await settled(page);
+    assert.match(await page.textContent("#notice-text"), /triangle\.obj too\. a\.gltf names what is not among the files: wood\.png\./);
+  });
+
   test("of a first file that cannot be drawn and is refused the form keeps no faces", async () => {
     const page = await visit({ expected: [422] });
     await page.locator("#limits:not(:empty)").waitFor();

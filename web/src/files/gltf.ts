@@ -77,10 +77,11 @@ export function hasNormals(json: GltfJson): boolean {
   return primitives.some(({ attributes }) => "NORMAL" in attributes);
 }
 
-/** Parse a glTF; `neighbours` are the files that it may name. */
+/** Parse a glTF; `neighbours` are the files that it may name, `missing` gets those that are not among them. */
 export async function parseGltf(
   bytes: ArrayBuffer,
   neighbours: Map<string, Blob> = new Map(),
+  missing = new Set<string>(),
 ): Promise<GLTF> {
   const made: string[] = [];
   const blobUrl = (blob: Blob): string => {
@@ -88,7 +89,6 @@ export async function parseGltf(
     made.push(url);
     return url;
   };
-  const missing: string[] = [];
   const manager = new LoadingManager();
   manager.setURLModifier((url) => {
     if (url.startsWith("blob:")) return url;
@@ -96,7 +96,7 @@ export async function parseGltf(
     if (url.startsWith("data:")) return blobUrl(blobOfDataUri(url));
     const file = neighbours.get(pathOf(url));
     if (file) return blobUrl(file);
-    missing.push(url);
+    missing.add(url);
     return blobUrl(new Blob());
   });
   const loader = new GLTFLoader(manager).register(numbered).register(whole);
@@ -118,13 +118,13 @@ export async function parseGltf(
     spread(gltf.scene);
     return gltf;
   } catch (error) {
-    if (missing.length) {
+    if (missing.size) {
       throw fileProblem(
         "A file is missing",
-        `The document names ${missing.join(", ")}: drop it together with the .gltf, or as a .zip.`,
+        `The document names ${[...missing].join(", ")}: drop it together with the .gltf, or as a .zip.`,
       );
     }
-    throw fileProblem("The file cannot be shown", `Its glTF cannot be read: ${why(error)}.`);
+    throw fileProblem("The file cannot be shown", `Its glTF cannot be read: ${why(error)}`);
   } finally {
     draco?.dispose();
     made.forEach((url) => URL.revokeObjectURL(url));

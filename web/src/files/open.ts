@@ -13,6 +13,8 @@ export interface Opened {
   clips: AnimationClip[];
   /** Faces that refinement starts from; an upper bound, since empty ones are dropped. */
   faces: number;
+  /** Files that it names and that did not come with it: textures, as it cannot be opened without others. */
+  missing: string[];
   /** Whether the file says how its surface is shaded. */
   normals: boolean;
   /** null where the file is no glTF. */
@@ -41,7 +43,7 @@ export async function open(upload: Upload): Promise<Opened> {
   plain([mesh]);
   const scene = new Group().add(mesh);
   const corners = geometry.index?.count ?? geometry.getAttribute("position").count;
-  return { scene, clips: [], faces: Math.floor(corners / 3), normals: false, json: null, gltf: null };
+  return { scene, clips: [], faces: Math.floor(corners / 3), missing: [], normals: false, json: null, gltf: null };
 }
 
 async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Promise<Opened> {
@@ -51,11 +53,13 @@ async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Prom
   } catch {
     throw unreadable("glTF", new Error("it is neither a GLB nor JSON with an asset"));
   }
-  const { scene, animations } = await parseGltf(bytes, neighbours);
+  const missing = new Set<string>();
+  const { scene, animations } = await parseGltf(bytes, neighbours, missing);
   return {
     scene,
     clips: animations,
     faces: triangles(json),
+    missing: [...missing],
     normals: hasNormals(json),
     json,
     gltf: { bytes, neighbours },

@@ -56,6 +56,12 @@ export function showNotice(text: string, again = false): void {
   announce(text);
 }
 
+/** Say something more. */
+export function addNotice(text: string): void {
+  const said = element("notice").hidden ? "" : element("notice-text").textContent;
+  showNotice(`${said} ${text}`.trim());
+}
+
 export function hideNotice(): void {
   element("notice").hidden = true;
 }
