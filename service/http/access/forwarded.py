@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from ipaddress import ip_address
 
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -10,6 +11,8 @@ from ..addresses import Network, is_named
 
 # Of more hops than this the rest is not looked at: each is an address to parse.
 MOST_HOPS = 32
+# Some proxies say the client's port too, and IPv6 then in brackets.
+_WITH_PORT = re.compile(r"\[(.+)\](?::\d+)?|([\d.]+):\d+", re.A)
 
 
 class Forwarded:
@@ -38,12 +41,18 @@ class Forwarded:
     def _address(self, hops: list[str]) -> str | None:
         for hop in reversed(hops[-MOST_HOPS:]):
             try:
-                address = str(ip_address(hop))
+                address = _address_of(hop)
             except ValueError:
                 return None
             if not is_named(address, self.proxies):
                 return address
         return None
+
+
+def _address_of(hop: str) -> str:
+    """Return the address that a hop says. Raises ValueError."""
+    parts = _WITH_PORT.fullmatch(hop)
+    return str(ip_address(hop if parts is None else parts[1] or parts[2]))
 
 
 def _values(scope: Scope, wanted: bytes) -> list[str]:
