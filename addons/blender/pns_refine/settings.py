@@ -15,6 +15,10 @@ from pns_common.runtimes.onnx_model import DEFAULT_MODEL, OnnxModel, bundled_mod
 from .refining.compute import Choice
 
 NO_ANGLE = math.pi
+# Since 5.0 a path says whether it may begin at the folder of the file, "//".
+PATH_OPTIONS = {"ANIMATABLE"}
+if bpy.app.version >= (5, 0, 0):
+    PATH_OPTIONS |= {"PATH_SUPPORTS_BLEND_RELATIVE"}
 BUDGET = load_model(DEFAULT_MODEL).card.budget
 
 
@@ -71,6 +75,7 @@ class Settings:
         name="Model File",
         description="A model file to use instead of a bundled model",
         subtype="FILE_PATH",
+        options=PATH_OPTIONS,
     )
     budget: FloatProperty(
         name="Budget C",

@@ -144,6 +144,13 @@ def test_an_error_names_the_object():
     assert len(bpy.data.meshes) == 2
 
 
+def test_a_model_file_may_be_named_from_the_files_folder(tmp_path):
+    cube()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    with pytest.raises(RuntimeError, match=str(tmp_path / "none.onnx")):
+        bpy.ops.object.pns_refine(model_file="//none.onnx")
+
+
 def test_objects_that_share_a_mesh_share_the_result():
     obj = cube()
     twin = obj.copy()
