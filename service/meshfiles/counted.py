@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -11,12 +10,10 @@ from jaxtyping import Int, UInt8
 
 from .obj_text import with_line_feeds
 from .ply.header import ply_header
+from .text_pieces import pieces_from_end
 
 # Of what is not counted an STL's face takes 50 bytes, more as text.
 BYTES_PER_FACE = 30
-
-# What is looked at in one go: text of nothing but short lines takes forty times its size.
-PIECE = 2**18
 
 _COMMENT = re.compile(rb"#[^\n]*")
 # Nothing that was passed over is tried again: to remember it would take a hundred times its size.
@@ -37,7 +34,7 @@ def count_triangles(data: bytes, kind: str) -> int:
     if kind == "obj":
         # A line that goes on in the next is one; of the same length, nothing is moved.
         text = with_line_feeds(data).replace(b"\\\n", b"  ").replace(b"\\\r\n", b"   ")
-        pieces = (_lines(_COMMENT.sub(b"", piece)) for piece in _pieces_from_end(text))
+        pieces = (_lines(_COMMENT.sub(b"", piece)) for piece in pieces_from_end(text))
         return sum(_triangles(piece.words[piece.firsts == _FACE]) for piece in pieces)
     if kind == "off":
         counts = _OFF_COUNTS.match(data)
@@ -62,7 +59,7 @@ def _by_size(data: bytes) -> int:
 def _in_last_lines(data: bytes, polygons: int) -> int:
     """Count the triangles of so many polygons, which come last."""
     triangles, left = 0, polygons
-    for piece in map(_lines, _pieces_from_end(data)):
+    for piece in map(_lines, pieces_from_end(data)):
         words = piece.words[max(len(piece.words) - left, 0) :]
         triangles += _triangles(words)
         left -= len(words)
@@ -80,19 +77,6 @@ class _Lines(NamedTuple):
 
     words: Int[np.ndarray, " L"]
     firsts: UInt8[np.ndarray, " L"]
-
-
-def _pieces_from_end(text: bytes) -> Iterator[bytes]:
-    """Yield whole lines, the last ones first: of so many bytes at most, or one that is longer."""
-    end = len(text)
-    while end:
-        # The last letter is a line's end, or there is none: it is no other line's.
-        before = text.find(b"\n", end - 1 - PIECE, end - 1) if end > PIECE else -1
-        if before < 0 and end > PIECE:
-            before = text.rfind(b"\n", 0, end - 1)
-        begin = before + 1
-        yield text[begin:end]
-        end = begin
 
 
 def _lines(text: bytes) -> _Lines:

@@ -22,6 +22,7 @@ from .obj_text import usual_obj, with_line_feeds, written_anew
 from .off import read_off, write_off
 from .ply.polygons import of_triangles
 from .single_precision import LARGEST
+from .text_pieces import without
 
 if TYPE_CHECKING:
     import trimesh
@@ -112,9 +113,9 @@ def _scene(data: bytes, kind: str) -> trimesh.Scene:
     readers = load_readers()
     text = _as_utf8(data) if kind == "obj" or (kind == "stl" and not _is_binary_stl(data)) else data
     if kind == "obj":
-        text = _OBJ_PART.sub(b"", usual_obj(text))
-    if kind == "stl" and not _is_binary_stl(data) and len(_STL_PART.findall(text)) > MOST_PARTS:
-        text = b"solid\n" + _STL_PART.sub(b"", text) + b"\nendsolid\n"
+        text = without(_OBJ_PART, usual_obj(text))
+    if kind == "stl" and not _is_binary_stl(data) and _parts(text) > MOST_PARTS:
+        text = b"solid\n" + without(_STL_PART, text) + b"\nendsolid\n"
     try:
         with warnings.catch_warnings():
             # Where a number cannot be read, numpy warns and leaves out all that follows.
@@ -133,6 +134,11 @@ def _scene(data: bytes, kind: str) -> trimesh.Scene:
         # All are cut to the length of the shortest: here, too, it is the line that is told.
         written_anew(text)
     return scene
+
+
+def _parts(text: bytes) -> int:
+    """Count the lines of an STL that begin or end a solid, one at a time."""
+    return sum(1 for _ in _STL_PART.finditer(text))
 
 
 def _as_utf8(data: bytes) -> bytes:
