@@ -55,7 +55,7 @@ def assert_pieces_are_the_whole(mesh, owner, scheme, levels, creases=None, lines
 
 def is_edged_mesh(mesh, lines):
     whole = np.zeros(len(mesh.faces), dtype=np.int64)
-    return is_edged(*turns_of_parts(mesh.vertices, mesh.faces, lines, whole, 1)[0])
+    return is_edged(*turns_of_parts(mesh.vertices, mesh.faces, lines, whole, 1)[0].tolist())
 
 
 def assert_report_is_the_whole(reduced, report):
