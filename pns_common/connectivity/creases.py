@@ -29,8 +29,8 @@ class Creases:
             limits take them as sharp for good.
 
     Raises:
-        ParameterError: those named are no pairs of whole numbers; the angle or the levels are out
-            of range.
+        ParameterError: those named are no pairs of whole numbers; an angle, the levels or `edged`
+            are out of range.
     """
 
     named: Int[np.ndarray, "N 2"] | None = None
@@ -50,6 +50,8 @@ class Creases:
             raise ParameterError("edged_angle", gentle, expected="degrees between 0 and line_angle")
         if levels is not None and not (is_whole(levels) and levels >= 1):
             raise ParameterError("levels", levels, expected="a whole number, at least 1")
+        if not isinstance(self.edged, bool | np.bool_ | None):
+            raise ParameterError("edged", self.edged, expected="True, False or None")
 
     def sharp_at(self, depth: int) -> bool:
         """Return whether they are sharp at a level; 0 is the control mesh's."""
@@ -138,6 +140,9 @@ def as_pairs(creases: Any) -> Int[np.ndarray, "N 2"]:
     Raises:
         ParameterError: they are something else.
     """
+    # numpy would read what lies under the mask.
+    if np.ma.is_masked(creases):
+        raise ParameterError("creases.mask", True, expected="no masked values")
     try:
         pairs = np.asarray(creases)
     except ValueError as error:  # rows differ in length

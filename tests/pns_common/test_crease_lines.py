@@ -49,6 +49,13 @@ def test_gentler_lines_are_below_the_others(angle):
         Creases(line_angle=66.0, edged_angle=angle)
 
 
+@pytest.mark.parametrize("edged", ["no", 0, np.ones(2)])
+def test_a_mesh_is_edged_or_it_is_not(edged):
+    # Where annotations are enforced, another kind ends there first.
+    with pytest.raises((ParameterError, TypeError), match="edged"):
+        Creases(line_angle=66.0, edged=edged)
+
+
 @pytest.mark.parametrize("levels", [0, -1, True])
 def test_creases_are_sharp_at_one_level_at_least(levels):
     with pytest.raises(ParameterError, match="levels"):

@@ -47,6 +47,7 @@ def test_a_closed_crease_refines_each_side_as_if_it_were_cut_open(levels):
         ([[0, 2**70]], "creases.dtype", "object"),
         ([["a", "b"]], "creases.dtype", "<U1"),
         ([[True, False]], "creases.dtype", "bool"),
+        (np.ma.array([[0, 1]], mask=[[False, True]]), "creases.mask", True),
         ([[0, 1], [-1, 0]], "creases[1]", [-1, 0]),
         ([[0, 1], [0, 9]], "creases[1]", [0, 9]),
         (np.array([[2**64 - 1, 0]], dtype=np.uint64), "creases[0]", [2**64 - 1, 0]),
