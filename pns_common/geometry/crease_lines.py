@@ -15,7 +15,7 @@ is what lies around:
 and a rim of six corners is a circle, but in edged meshes (below) six sides are edges.
 
 A part that is made of plane faces has gentler edges too, chamfers and the plates of a hull. It is
-known by its edges: a mesh is *edged* if at least half of those that turn by more than θ' = 20
+known by its edges: a mesh is *edged* if at least half of those that turn by more than θ' = 21
 degrees turn by more than θ. (Where sharp rims go round something most edges that turn are on the
 round.) There, edges beyond θ' are lines too with the marks 2 and 3. But those beyond θ in a hollow
 have to go on without gentler ones, as elsewhere (an armpit is round), and those up to 55 degrees
@@ -48,8 +48,8 @@ from pns_common.connectivity.topology import EdgeClass, Topology
 # θ in degrees, and at how many levels what is found is sharp: then it is smooth, and by then round
 # within a quarter of an edge.
 CREASE_ANGLE, CREASE_LEVELS = 66.0, 2
-# θ' in degrees, of edged meshes; and of how many edges beyond it one turns by more than θ there.
-EDGED_ANGLE, EDGED_ONE_IN = 20.0, 2
+# θ' in degrees, of edged meshes, between the turns of tubes of 17 and 18 sides; and of how many edges beyond it one turns by more than θ there.
+EDGED_ANGLE, EDGED_ONE_IN = 21.0, 2
 # Degrees beyond which an edge of an edged mesh need not stand alone: between the turns of a hexagon
 # and a heptagon.
 ROW_ANGLE = 55.0
@@ -190,7 +190,7 @@ def have_flat_sides(
 ) -> Bool[np.ndarray, " N"]:
     """Return at which sharp edges both faces have another edge that turns less than half as much.
 
-    An edge that is not interior turns by nothing.
+    An edge that is not interior turns by nothing, nor does one of a face without area.
     """
     sides = mesh.face_edges[mesh.half_edges[sharp] // 3]
     cosines = _cosines(normals, mesh, sides)
@@ -298,10 +298,12 @@ def _normals_at(
 def _cosines(
     normals: Float[np.ndarray, "F 3"], mesh: Edges, rows: Int[np.ndarray, "..."]
 ) -> Float[np.ndarray, "..."]:
-    """Return the cosines of edges' turns: 1 where they are not interior."""
+    """Return the cosines of edges' turns: 1 where they are not interior, or a face has no normal."""
     cosines = np.ones(rows.shape)
     interior = mesh.edge_class[rows] == EdgeClass.INTERIOR
-    cosines[interior] = dot(*_normals_at(normals, mesh, rows[interior]))
+    n1, n2 = _normals_at(normals, mesh, rows[interior])
+    defined = (dot(n1, n1) > 0) & (dot(n2, n2) > 0)
+    cosines[interior] = np.where(defined, dot(n1, n2), 1.0)
     return cosines
 
 

@@ -49,10 +49,11 @@ def mark_edges_beyond(normals, half_edges, edge_class, cosine, begin, end, beyon
 
 
 def _cosine(normals, half_edges, edge_class, e):
-    """Return the cosine of the turn at an edge: 1 where it is not interior."""
+    """Return the cosine of the turn at an edge: 1 where it is not interior, or a normal is none."""
     if edge_class[e] != INTERIOR:
         return 1.0
-    return dot(row(normals, half_edges[e, 0] // 3), row(normals, half_edges[e, 1] // 3))
+    n, m = row(normals, half_edges[e, 0] // 3), row(normals, half_edges[e, 1] // 3)
+    return dot(n, m) if dot(n, n) > 0 and dot(m, m) > 0 else 1.0
 
 
 def _half(cosine):

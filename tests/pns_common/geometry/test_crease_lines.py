@@ -153,6 +153,38 @@ def test_sharp_hollows_of_edged_meshes_go_on_among_sharp_edges_alone():
     assert len(lines(l_block(), edged)) == 22
 
 
+@pytest.mark.parametrize("creases", [SHARP_ALONE, WITH_GENTLE])
+def test_faces_without_area_take_no_lines_from_the_faces_beside_them(creases):
+    """A face along a diagonal, which closes a gap beside a vertex in its middle, turns nowhere."""
+    cube = box()
+    topology = build_topology(cube.faces, len(cube.vertices))
+    diagonals = set(range(18)) - set(line_rows(cube.vertices, normals_of(cube), topology, creases))
+    points, faces = list(cube.vertices), cube.faces.tolist()
+    for row in diagonals:
+        (a, b), middle = topology.edges[row].tolist(), len(points)
+        points.append((cube.vertices[a] + cube.vertices[b]) / 2)
+        first = next(face for face in faces if {a, b} <= {*face})
+        at = first.index(a) if first[first.index(a) - 2] == b else first.index(b)
+        start, end, apart = first[at], first[at - 2], first[at - 1]
+        faces.remove(first)
+        faces += [[start, middle, apart], [middle, end, apart], [start, end, middle]]
+    slivered = Mesh(np.array(points), np.array(faces))
+    assert lines(slivered, creases) == lines(cube, creases)
+
+
+@pytest.mark.parametrize("sides", [17, 18])
+def test_no_tube_s_walls_turn_by_the_angle_itself_however_they_lie(sides):
+    """Else rounding would decide of how many turns a mesh has, and whether it is edged."""
+    tube, rng = cylinder(sides), np.random.default_rng(0)
+    topology = build_topology(tube.faces, len(tube.vertices))
+    cosine = np.cos(np.radians(EDGED_ANGLE))
+    walls = sides if sides < 18 else 0
+    for _ in range(20):
+        normals = face_normals(tube.vertices @ rotation(rng).T, tube.faces)
+        bent = edges_beyond(normals, topology, topology.interior, cosine)
+        assert len(bent) == 2 * sides + walls
+
+
 def pleat(degrees):
     """A sheet of four by four cells, folded once along its middle row."""
     points, faces = grid(5)
