@@ -75,8 +75,8 @@ CreaseOption = Annotated[
     str,
     typer.Option(
         metavar="auto|lines|off|normals|angle:DEG",
-        help="edges to keep sharp; auto: the lines that the mesh shows, and hard edges of what is "
-        "shaded smooth, if the model asks for them",
+        help="edges to keep sharp; auto: the lines that the mesh shows, hard edges of what is "
+        "shaded smooth, and borders of materials on flat sides, if the model asks for them",
     ),
 ]
 WeldOption = Annotated[float, typer.Option(metavar="X", help="join vertices nearer than X times R")]

@@ -99,8 +99,8 @@ class Parameters(BaseModel):
         default=DEFAULTS.crease,
         pattern=f"^({CREASE_PATTERN})$",
         description="edges to keep sharp: `lines` (those that the mesh shows: sharp, flat on both "
-        "sides, and going on), `auto` (where the model's card asks for them, these and the hard "
-        "edges of what is shaded smooth), `off`, "
+        "sides, and going on), `auto` (where the model's card asks for them, these, the hard "
+        "edges of what is shaded smooth, and borders of primitives on flat sides), `off`, "
         "`normals` (where the two sides carry different normals) or `angle:` and degrees (where "
         "the faces meet at more)",
     )

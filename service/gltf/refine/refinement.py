@@ -21,10 +21,12 @@ from ...options import Options
 from ...report import Change
 from .common_slots import common_slots
 from .control_mesh import ControlMesh, vertex_rows
+from .drawn_borders import with_borders
+from .face_parts import part_of_face
 from .hard_edges import hard_edges
 from .parts import Parts
 from .refined_primitives import RefinedMesh
-from .shaded_edges import creases_by_shading, part_of_face
+from .shaded_edges import creases_by_shading
 from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
 from .where_acted import vertex_scalars
 
@@ -42,8 +44,9 @@ def creases_of(
         return Creases(hard_edges(control, control.cleaned))
     mesh = control.cleaned.mesh
     creases = creases_by_shape(mesh, options, scheme)
-    if options.crease == "auto":
+    if options.crease == "auto" and creases.line_angle is not None:
         creases = creases_by_shading(control, control.cleaned, creases, parts)
+        creases = with_borders(control, control.cleaned, creases, parts)
     known = control.skin_and_morph.any or options.normals != "keep" or options.uv == "smooth"
     if not known:
         return creases

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Int
 
 from pns_common.connectivity.creases import Creases
 from pns_common.crease_lines import named_on_parts, without_gentle
@@ -13,6 +12,7 @@ from pns_common.geometry.shaded_smooth import shaded_smooth
 from pns_common.mesh import Cleaned
 
 from .control_mesh import ControlMesh
+from .face_parts import part_of_face
 from .hard_edges import corner_labels, shading_of, without_one_normal
 from .parts import Parts
 
@@ -25,7 +25,7 @@ def creases_by_shading(
     The lines alone, as they are, where there are none. `parts` are the meshes of a union; None: it
     is one mesh.
     """
-    if lines.line_angle is None or not _have_normals(control):
+    if not _have_normals(control):
         return lines
     mesh, labels = cleaned.mesh, corner_labels(control, cleaned)
     parted = without_one_normal(cleaned, labels)
@@ -51,13 +51,3 @@ def creases_by_shading(
 
 def _have_normals(control: ControlMesh) -> bool:
     return any("NORMAL" in primitive.attributes for primitive in control.primitives)
-
-
-def part_of_face(
-    control: ControlMesh, cleaned: Cleaned, parts: Parts | None
-) -> tuple[Int[np.ndarray, " F"], int]:
-    """Return the part of each face of the mesh to refine, and how many there are."""
-    if parts is None:
-        return np.zeros(len(cleaned.mesh.faces), dtype=np.int64), 1
-    of_face = control.of_cleaned(cleaned, parts.of_face[np.concatenate(control.kept)])
-    return of_face, parts.count

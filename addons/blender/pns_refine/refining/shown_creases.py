@@ -1,14 +1,18 @@
-"""Edges that a mesh shows to be sharp: lines of its shape, and hard edges of smooth shading."""
+"""Edges that a mesh shows to be sharp: lines of its shape, and hard edges of smooth shading.
+
+And borders of materials on its flat sides, which the shape does not show.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Int, Shaped
 
 from pns_common import Creases, Mesh
 from pns_common.crease_lines import named_on, without_gentle
+from pns_common.flat_borders import flat_borders
 from pns_common.fused.interior_edges import interior_edges
 from pns_common.geometry.shaded_smooth import shaded_smooth
 
@@ -16,9 +20,22 @@ from .snapshot import Domain, Snapshot, edge_keys
 
 
 def shown_creases(snapshot: Snapshot, asked: Creases) -> Creases:
-    """Return what is asked for, by name; with lines also the hard edges of a smooth mesh."""
+    """Return what is asked for, by name.
+
+    With lines also the hard edges of a smooth mesh, and borders of materials on flat sides.
+    """
     if asked.line_angle is None:
         return asked
+    shown = _lines_and_hard_edges(snapshot, asked)
+    assert shown.named is not None
+    material = _values(snapshot, "material_index", Domain.FACE)
+    if material is None:
+        return shown
+    borders = flat_borders(snapshot.points, snapshot.triangles, material[snapshot.polygons])
+    return replace(shown, named=np.concatenate([borders, shown.named]))
+
+
+def _lines_and_hard_edges(snapshot: Snapshot, asked: Creases) -> Creases:
     mesh = Mesh(snapshot.points, snapshot.triangles)
     lines = named_on(mesh, asked)
     edges, faces, hard = shaded_edges(snapshot)
@@ -50,7 +67,13 @@ def shaded_edges(
 
 def _marked(snapshot: Snapshot, name: str, domain: Domain, count: int) -> Bool[np.ndarray, " N"]:
     """Return where an attribute of this name is set; nowhere, where there is none."""
+    values = _values(snapshot, name, domain)
+    return np.zeros(count, dtype=bool) if values is None else values.astype(bool)
+
+
+def _values(snapshot: Snapshot, name: str, domain: Domain) -> Shaped[np.ndarray, " N"] | None:
+    """Return the first column of an attribute of this name; None where there is none."""
     for layer in snapshot.layers:
         if layer.name == name and layer.domain is domain:
-            return layer.values.reshape(count, -1)[:, 0].astype(bool)
-    return np.zeros(count, dtype=bool)
+            return layer.values[:, 0]
+    return None
