@@ -23,7 +23,9 @@ def common_slots(
     if min(slots) == max(slots):
         return None
     of_kept = np.repeat(slots, [int(keep.sum()) for keep in control.kept])
-    of_face = control.of_cleaned(cleaned, of_kept)
+    of_face = np.full(len(cleaned.mesh.faces), max(slots))
+    # Copies of a face share its refined vertices.
+    np.minimum.at(of_face, cleaned.representative[np.concatenate(control.kept)], of_kept)
     at_vertices = np.full(count, max(slots))
     # Descendants lie as their faces do.
     children = np.repeat(of_face, len(refined_faces) // len(of_face))

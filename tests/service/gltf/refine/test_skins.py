@@ -166,7 +166,7 @@ def test_a_mesh_shown_with_and_without_its_skin_is_refined_once(tmp_path):
 
 
 @pytest.mark.parametrize("copies", [1, 2])
-def test_primitives_of_one_and_of_two_sets_move_alike_along_their_common_edge(copies):
+def test_primitives_of_one_and_of_two_sets_move_alike_where_they_meet(copies):
     rng, shape = np.random.default_rng(5), octahedron()
     weights = np.zeros((6, 8))
     # Each vertex has four joints, and its neighbours have others.
@@ -174,11 +174,12 @@ def test_primitives_of_one_and_of_two_sets_move_alike_along_their_common_edge(co
         row[rng.permutation(8)[:4]] = rng.dirichlet(np.ones(4))
     named = np.argsort(weights, axis=1)[:, ::-1].astype(np.uint8)
     heavy = np.take_along_axis(weights, named.astype(int), axis=1)
-    one = octahedron(indices=shape["indices"][:4], JOINTS_0=named[:, :4], WEIGHTS_0=heavy[:, :4])
+    # Along their common edge, and on a face that both have.
+    one = octahedron(indices=shape["indices"][:5], JOINTS_0=named[:, :4], WEIGHTS_0=heavy[:, :4])
     two = octahedron(indices=shape["indices"][4:], JOINTS_0=named[:, :4], WEIGHTS_0=heavy[:, :4])
     two |= {"JOINTS_1": named[:, 4:], "WEIGHTS_1": heavy[:, 4:]}
-    result = subdivide(*([[one, two]] * copies), levels=2)
-    narrow, wide = (files.primitive_of(result.glb, copies - 1, place)[1] for place in (0, 1))
+    result = subdivide(*([[two, one]] * copies), levels=2)
+    wide, narrow = (files.primitive_of(result.glb, copies - 1, place)[1] for place in (0, 1))
     places = {p.tobytes(): w for p, w in zip(narrow["POSITION"], by_joint(narrow, 8), strict=True)}
     rows = by_joint(wide, 8, sets=2)
     pairs = [
@@ -186,10 +187,10 @@ def test_primitives_of_one_and_of_two_sets_move_alike_along_their_common_edge(co
         for p, row in zip(wide["POSITION"], rows, strict=True)
         if p.tobytes() in places
     ]
-    assert len(pairs) == 16
+    assert len(pairs) == 16 + 10
     for ours, theirs in pairs:
         np.testing.assert_array_equal(ours, theirs)
-    # Beyond the edge there is room for all.
+    # Beyond there is room for all.
     assert ((rows > 0).sum(axis=1) > 4).any()
     lost = [c for c in result.report["changes"] if "lost their lightest joints" in c["what"]]
     assert [change["count"] >= len(pairs) // 2 for change in lost] == [True] * copies
