@@ -28,8 +28,8 @@ are lines only if
 
 Both numbers are counts: a mesh in pieces has the same. Turning, moving, scaling or renumbering a
 mesh does not change the answer, nor does mirroring it with its faces turned, but where rounding
-decides: walls of 18 sides turn by θ' exactly. A mesh whose faces are turned over has ridges for
-hollows, and if it is edged it may have other lines.
+decides. A mesh whose faces are turned over has ridges for hollows, and if it is edged it may have
+other lines.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ from pns_common.connectivity.topology import EdgeClass, Topology
 # θ in degrees, and at how many levels what is found is sharp: then it is smooth, and by then round
 # within a quarter of an edge.
 CREASE_ANGLE, CREASE_LEVELS = 66.0, 2
-# θ' in degrees, of edged meshes, between the turns of tubes of 17 and 18 sides; and of how many
-# edges beyond it one turns by more than θ there.
+# θ' in degrees, of edged meshes, between the turns of tubes of 17 and 18 sides: where many edges
+# turn by θ' itself, rounding decides. And of how many beyond it one turns by more than θ there.
 EDGED_ANGLE, EDGED_ONE_IN = 21.0, 2
 # Degrees beyond which an edge of an edged mesh need not stand alone: between the turns of a hexagon
 # and a heptagon.
@@ -299,7 +299,7 @@ def _normals_at(
 def _cosines(
     normals: Float[np.ndarray, "F 3"], mesh: Edges, rows: Int[np.ndarray, "..."]
 ) -> Float[np.ndarray, "..."]:
-    """Return the cosines of edges' turns: 1 where not interior, or where a face has no normal."""
+    """Return the cosines of edges' turns: 1 where one is not interior, or a face has no normal."""
     cosines = np.ones(rows.shape)
     interior = mesh.edge_class[rows] == EdgeClass.INTERIOR
     n1, n2 = _normals_at(normals, mesh, rows[interior])
