@@ -45,7 +45,7 @@ class Outlet:
         Where it knows of no such bounds it has its own.
         """
         connection = self.real.get_extra_info("socket")
-        untaken = min(max(1, round(1000 * seconds)), _MOST)
+        untaken = max(1, round(min(1000 * seconds, _MOST)))
         for option, value in (_UNSENT, UNSENT_BYTES), (_UNTAKEN, untaken):
             if option is not None:
                 # Reset already, or no TCP.
