@@ -32,6 +32,7 @@ class ControlMesh:
         cleaned: the mesh to refine; None where no face is left.
         skin_and_morph: what follows the rows of all primitives.
         near: for each part how many vertices were joined that are not equal.
+        authored: whether its normals are its file's, and not made anew.
     """
 
     primitives: Sequence[TrianglePrimitive]
@@ -41,6 +42,7 @@ class ControlMesh:
     cleaned: Cleaned | None
     skin_and_morph: SkinAndMorph
     near: Int[np.ndarray, " P"]
+    authored: bool = True
 
     @property
     def degenerate(self) -> int:
@@ -74,8 +76,8 @@ class ControlMesh:
         of_face[place[place >= 0]] = of_kept[place >= 0]
         return of_face
 
-    def with_split_rows(self, primitives: Sequence[TrianglePrimitive]) -> ControlMesh:
-        """Return the same mesh over primitives whose faces have more rows in the same places."""
+    def with_new_normals(self, primitives: Sequence[TrianglePrimitive]) -> ControlMesh:
+        """Return the same mesh over primitives with new normals: more rows in the same places."""
         rows = _rows_of(primitives)
         vertex_of = np.full(rows[-1].stop, -1, dtype=np.int64)
         vertex_of[np.concatenate(_corners_of(primitives, rows))] = self.weld.faces
@@ -85,6 +87,7 @@ class ControlMesh:
             weld=replace(self.weld, vertex_of=vertex_of),
             rows=rows,
             skin_and_morph=read_skin_and_morph(primitives),
+            authored=False,
         )
 
 

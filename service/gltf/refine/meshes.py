@@ -175,7 +175,7 @@ def _alone(
         if options.normals != "keep" and control.cleaned is not None:
             sharp = creases.left_after(options.levels)
             primitives = with_smooth_normals(control, control.cleaned, sharp)
-            control = control.with_split_rows(primitives)
+            control = control.with_new_normals(primitives)
     pointer = f"/meshes/{plan.mesh}"
     with course.stage("refine", shares.refine, shares.attributes):
         made = refine_control_mesh(control, creases, scheme, options, pointer, course)

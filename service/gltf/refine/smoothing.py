@@ -124,7 +124,7 @@ def normal_groups(
         connectivity=groups,
         ids={number: groups.ids[part] for number, part in zip(chosen, shares, strict=True)},
         given=given,
-        own=_own(control, chosen, corners, given(None)),
+        own=_own(control, chosen, corners, given(None)) if control.authored else None,
     )
 
 

@@ -153,7 +153,7 @@ def _smoothed(
             for share, primitive in zip(control.rows, primitives, strict=True)
         ]
     )
-    return control.with_split_rows(primitives), replace(parts, of_row=of_row)
+    return control.with_new_normals(primitives), replace(parts, of_row=of_row)
 
 
 def _chosen_together(

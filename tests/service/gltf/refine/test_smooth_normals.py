@@ -34,6 +34,15 @@ def test_a_file_without_normals_gets_the_vertex_normals_of_its_refined_surface()
     np.testing.assert_allclose(result["NORMAL"], surface.vertex_normals, atol=1e-5)
 
 
+def test_copies_of_faces_make_no_new_normal_somebody_s_own():
+    """They count in the surface's normals, and not in those that the control mesh is given."""
+    shape = plain(octahedron())
+    faces = np.asarray(shape["indices"]).reshape(-1, 3)
+    result = primitive_of(refined([shape | {"indices": np.concatenate([faces, *[faces[:1]] * 3])}]))
+    surface = trimesh.Trimesh(result["POSITION"], result["indices"].reshape(-1, 3), process=False)
+    np.testing.assert_allclose(result["NORMAL"], surface.vertex_normals, atol=1e-5)
+
+
 def test_without_the_option_a_file_without_normals_stays_without():
     assert "NORMAL" not in primitive_of(refined([plain(octahedron())], normals="keep"))
 
