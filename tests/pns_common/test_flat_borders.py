@@ -53,7 +53,7 @@ def test_a_border_along_a_bend_is_none():
 
 def test_one_group_a_face_without_area_and_three_faces_at_an_edge_make_none():
     points, faces, group = sheet()
-    assert found(points, faces, np.zeros(len(faces))) == set()
+    assert found(points, faces, np.zeros(len(faces), dtype=int)) == set()
     assert found(points, faces[:0], group[:0]) == set()
     flat = points.copy()
     flat[:, 1] = 0  # no face has an area

@@ -213,7 +213,8 @@ function describe(ours: Result): void {
   if (!source) return;
   showCertificate(ours.report, lengths(ours, null));
   if (facts?.source !== source) facts = { source, before: before(source) };
-  showStatistics(facts.before, ours.report, ours.bytes.byteLength);
+  const sharpest = (): number => dihedrals(ours.model).max;
+  showStatistics(facts.before, ours.report, ours.bytes.byteLength, sharpest);
   showChanges(ours.report);
 }
 

@@ -54,6 +54,17 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     }
   });
 
+  test("edges that are kept sharp are among a result's sharpest", async () => {
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => `v ${i & 1} ${(i >> 1) & 1} ${i >> 2}`);
+    const sides = ["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"].map((side) => `f ${side}`);
+    const page = await visit({ hash: "#levels=1" });
+    await drop(page, Buffer.from([...corners, ...sides].join("\n")), "box.obj");
+    await settled(page);
+    const cells = await page.$$eval("#statistics tr:has(th:text-is('Sharpest edge')) td", (cells) =>
+      cells.map(({ textContent }) => textContent));
+    assert.deepEqual(cells, ["90°", "90°"]);
+  });
+
   test("what is downloaded is what the service answers, byte for byte", async () => {
     const page = await visit({ hash: "#levels=1" });
     await choose(page, example);

@@ -32,6 +32,7 @@ class Asset(Part, frozen=True):
     """`asset`."""
 
     version: str
+    min_version: str | None = None
 
 
 class Buffer(Part, frozen=True):

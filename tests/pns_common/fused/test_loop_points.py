@@ -51,6 +51,6 @@ def test_a_coordinate_out_of_range_is_found_in_any_block(bad):
     np.testing.assert_equal(moved, largest)
     assert longest == 13
     assert largest == abs(bad) or np.isnan(bad) == np.isnan(largest)
-    with pytest.raises(MeshError, match="too large"):
+    with pytest.raises(MeshError, match="not numbers" if np.isnan(bad) else "too large"):
         check_coordinates(largest)
     check_coordinates(largest_size(np.full((3, 3), -1e75), Blocks(1)))

@@ -41,7 +41,10 @@ export interface Before {
   sharpest: number;
 }
 
-export function showStatistics(before: Before, report: Report, size: number): void {
+/** `sharpest` is asked for where a report does not say it: its largest jump leaves creases out. */
+export function showStatistics(
+  before: Before, report: Report, size: number, sharpest: () => number,
+): void {
   const last = report.levels.at(-1);
   const { surface } = before;
   const angle = (degrees: number): string => `${figure(degrees)}°`;
@@ -51,11 +54,12 @@ export function showStatistics(before: Before, report: Report, size: number): vo
     ["File", bytes(before.bytes), bytes(size)],
   ];
   if (last) {
+    const after = last.edges.crease ? sharpest() : (last.normal_jump_max * 180) / Math.PI;
     rows.push(
       ["Vertices of the surface", count(surface.vertices), count(last.vertices)],
       ["Boundary edges", count(surface.boundary), count(last.edges.boundary)],
       ["Irregular edges", count(surface.irregular), count(last.edges.irregular)],
-      ["Sharpest edge", angle(before.sharpest), angle((last.normal_jump_max * 180) / Math.PI)],
+      ["Sharpest edge", angle(before.sharpest), angle(after)],
       ["Faces turned over", "–", count(report.levels.reduce((n, l) => n + l.flipped_faces, 0))],
     );
     if (last.edges.crease) rows.push(["Crease edges", "–", count(last.edges.crease)]);

@@ -18,6 +18,7 @@ _BY_NUMBER = ("CESIUM_primitive_outline", "EXT_mesh_primitive_edge_visibility")
 _FEATURES, _SOURCES = "EXT_mesh_features", {"attribute", "texture"}
 # No zeros in front, no digits of other scripts: two names of one number would be two attributes.
 _SKIN_SET = re.compile(r"(JOINTS|WEIGHTS)_(0|[1-9][0-9]{0,2})")
+_AT_MOST_2_0 = re.compile(r"[01]\.[0-9]+|2\.0")
 _SKIN_NAMES = ("JOINTS_", "WEIGHTS_")
 _PARTNER = {"JOINTS": "WEIGHTS", "WEIGHTS": "JOINTS"}
 _INTEGERS = (UNSIGNED_BYTE, UNSIGNED_SHORT)
@@ -31,15 +32,19 @@ _GEOMETRY = _DELTAS | {"TANGENT": "VEC4", "JOINTS_n": "VEC4", "WEIGHTS_n": "VEC4
 
 
 def refuse_version(document: Document) -> None:
-    """Refuse another version of glTF.
+    """Refuse another version of glTF, and what a reader of version 2.0 is not to read.
 
     Raises:
-        UnsupportedFeature: another version of glTF.
+        UnsupportedFeature: it is one.
     """
     if document.asset.version.partition(".")[0] != "2":
         raise UnsupportedFeature(
             f"glTF version {document.asset.version[:16]}", pointer="/asset/version"
         )
+    least = document.asset.min_version
+    if least is not None and not _AT_MOST_2_0.fullmatch(least):
+        what = f"what needs glTF version {least[:16]} at least"
+        raise UnsupportedFeature(what, pointer="/asset/minVersion")
 
 
 def refuse_features(document: Document) -> None:

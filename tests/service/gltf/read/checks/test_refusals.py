@@ -191,6 +191,7 @@ def test_values_that_are_not_finite_are_refused(place, name, value):
 
 UNSUPPORTED = [
     ("/asset/version", "1.0", "glTF version 1.0"),
+    ("/asset/minVersion", "2.1", "what needs glTF version 2.1 at least"),
     ("/meshes/0/primitives/0/attributes", {"NORMAL": 1}, "a primitive without POSITION"),
     (
         "/meshes/0/primitives/0/extensions",
