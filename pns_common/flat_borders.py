@@ -1,8 +1,11 @@
-"""Where groups of faces meet in a plane: the borders of what materials draw on a flat side.
+"""Where groups of faces meet inside a plane: the borders of what materials draw on a flat side.
 
 The correction is 0 on planes, and what is left there is Loop's rule, which moves old vertices along
 the plane, far where triangles are long. The shape stays as it is, but a rectangle of another colour
-becomes an arrow. As creases such borders are curves of their own, and no shape changes by it.
+becomes an arrow. As creases such borders are curves of their own.
+
+Those that reach a rim of the plane end before it: a crease more makes a corner of a vertex on a
+rim, and a round one would have dents. So no vertex leaves its plane by this, nor a rim its curve.
 """
 
 from __future__ import annotations
@@ -10,8 +13,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
+from pns_common.base.arrays import marked
 from pns_common.fused.interior_edges import interior_edges
 from pns_common.geometry.frames import face_normals
 from pns_common.geometry.sharp_edges import turn_by_more
@@ -26,19 +30,39 @@ def flat_borders(
     faces: Int[np.ndarray, "F 3"],
     group_of_face: Int[np.ndarray, " F"],
 ) -> Int[np.ndarray, "N 2"]:
-    """Return the interior edges, as pairs of vertices, of two faces in a plane of different groups.
+    """Return the edges, as pairs of vertices, of faces of different groups inside of planes.
 
-    A face without area lies in no plane.
+    Around both ends all lies in one plane, and has an area.
     """
     if len(faces) == 0 or (group_of_face == group_of_face[0]).all():
         return np.zeros((0, 2), dtype=np.int64)
     edges, half_edges = interior_edges(faces, len(points))
     both = half_edges // 3
-    rows = np.flatnonzero(group_of_face[both[:, 0]] != group_of_face[both[:, 1]])
-    edges, (first, second) = edges[rows], both[rows].T
-    beside = np.concatenate([first, second])
-    normals = face_normals(points, faces[beside])
-    pairs = np.arange(2 * len(rows)).reshape(2, -1).T
-    flat = ~turn_by_more(normals, pairs, IN_ONE_PLANE)
-    known = normals.any(axis=1)[pairs].all(axis=1)
-    return edges[flat & known].astype(np.int64)
+    is_border = group_of_face[both[:, 0]] != group_of_face[both[:, 1]]
+    inside = _inside_planes(points, faces, edges, both, edges[is_border].reshape(-1))
+    return edges[is_border & inside[edges].all(axis=1)].astype(np.int64)
+
+
+def _inside_planes(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    edges: Int[np.ndarray, "I 2"],
+    both: Int[np.ndarray, "I 2"],
+    asked: Int[np.ndarray, " N"],
+) -> Bool[np.ndarray, " V"]:
+    """Return which of the vertices that are asked for have one plane around them.
+
+    ``edges`` are the interior ones, ``both`` their faces.
+    """
+    count = len(points)
+    inside = marked(asked, count)
+    near_edges, near_faces = inside[edges].any(axis=1), inside[faces].any(axis=1)
+    edges, both, near = edges[near_edges], both[near_edges], faces[near_faces]
+    normals = np.zeros((len(faces), 3))
+    normals[near_faces] = face_normals(points, near)
+    leaves = turn_by_more(normals, both, IN_ONE_PLANE) | ~normals.any(axis=1)[both].all(axis=1)
+    # Where all edges are interior there are as many as faces.
+    ends, corners = (np.bincount(each.reshape(-1), minlength=count) for each in (edges, near))
+    inside &= ends == corners
+    inside[edges[leaves]] = False
+    return inside

@@ -18,9 +18,9 @@ from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.geometry.crease_lines import (
     PARALLEL,
     ROW_ANGLE,
-    at_others,
     cosine_of,
     is_edged,
+    may_end,
     with_gentler,
 )
 
@@ -47,7 +47,7 @@ def crease_line_rows(
     is_flat = np.empty(len(sharp), dtype=bool)
     sides = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
     blocks.run(len(sharp), mark_flat_sides.over(*sides, ROWS, is_flat))
-    flat, at_rim = sharp[is_flat], at_others(mesh)
+    flat, at_rim = sharp[is_flat], may_end(mesh, normals)
 
     def going_on(rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
         left = np.ones(len(rows), dtype=bool)

@@ -8,8 +8,8 @@ is what lies around:
 2. *its sides are flat*: in each of the two faces another edge turns by less than half as much;
 3. *it goes on*: at both ends it meets another such edge that runs on within θ of straight, or a
    corner of three or more, or a boundary, a crease that is named or another edge that is not
-   interior; what does not is dropped, ``ROUNDS`` times over, so that a line that ends in a smooth
-   surface loses as many edges there.
+   interior, or a face without area; what does not is dropped, ``ROUNDS`` times over, so that a line
+   that ends in a smooth surface loses as many edges there.
 
 θ of 66 degrees lies between the turns of a hexagon and a pentagon: tubes of six sides stay round,
 and a rim of six corners is a circle, but in edged meshes (below) six sides are edges.
@@ -134,8 +134,10 @@ def line_rows(
         return sharp
     flat = sharp[have_flat_sides(normals, mesh, sharp)]
 
+    at_rim = may_end(mesh, normals)
+
     def going_on(rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
-        return rows[go_on(points, mesh, rows, cosine)]
+        return rows[go_on(points, mesh, rows, at_rim, cosine)]
 
     if not gentle:
         return going_on(flat)
@@ -259,12 +261,18 @@ def _like(
 
 
 def go_on(
-    points: Float[np.ndarray, "V 3"], mesh: Edges, flat: Int[np.ndarray, " N"], cosine: float
+    points: Float[np.ndarray, "V 3"],
+    mesh: Edges,
+    flat: Int[np.ndarray, " N"],
+    at_rim: Bool[np.ndarray, " V"],
+    cosine: float,
 ) -> Bool[np.ndarray, " N"]:
-    """Return which edges are left when those are dropped that do not go on at both ends."""
+    """Return which edges are left when those are dropped that do not go on at both ends.
+
+    ``at_rim`` says where a line may end.
+    """
     ends = mesh.edges[flat]
     along = unit(points[ends[:, 1]] - points[ends[:, 0]])
-    at_rim = at_others(mesh)
     left = np.ones(len(flat), dtype=bool)
     for _ in range(ROUNDS):
         at = ends[left].T.reshape(-1)
@@ -282,10 +290,11 @@ def go_on(
     return left
 
 
-def at_others(mesh: Edges) -> Bool[np.ndarray, " V"]:
-    """Return which vertices are on an edge that is not interior: there a line may end."""
+def may_end(mesh: Edges, normals: Float[np.ndarray, "F 3"]) -> Bool[np.ndarray, " V"]:
+    """Return where a line may end: at edges that are not interior, and faces without a normal."""
     others = mesh.edges[mesh.edge_class != EdgeClass.INTERIOR]
-    return marked(others.reshape(-1), mesh.vertex_count)
+    without = mesh.faces[dot(normals, normals) == 0]
+    return marked(np.concatenate([others.reshape(-1), without.reshape(-1)]), mesh.vertex_count)
 
 
 def _normals_at(

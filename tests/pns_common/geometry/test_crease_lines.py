@@ -153,23 +153,32 @@ def test_sharp_hollows_of_edged_meshes_go_on_among_sharp_edges_alone():
     assert len(lines(l_block(), edged)) == 22
 
 
+def with_face_without_area(mesh, a, b):
+    """Put a vertex in the middle of an edge of one of its faces, and a face that closes the gap."""
+    faces, middle = mesh.faces.tolist(), len(mesh.vertices)
+    first = next(face for face in faces if {a, b} <= {*face})
+    at = next(k for k in range(3) if {first[k], first[k - 2]} == {a, b})
+    start, end, apart = first[at], first[at - 2], first[at - 1]
+    faces.remove(first)
+    faces += [[start, middle, apart], [middle, end, apart], [start, end, middle]]
+    points = np.concatenate([mesh.vertices, [(mesh.vertices[a] + mesh.vertices[b]) / 2]])
+    return Mesh(points, np.array(faces))
+
+
 @pytest.mark.parametrize("creases", [SHARP_ALONE, WITH_GENTLE])
-def test_faces_without_area_take_no_lines_from_the_faces_beside_them(creases):
-    """A face along a diagonal, which closes a gap beside a vertex in its middle, turns nowhere."""
+def test_a_face_without_area_takes_no_lines_but_that_which_it_lies_on(creases):
+    """One that closes a gap along an edge turns nowhere, and lines may end there."""
     cube = box()
-    topology = build_topology(cube.faces, len(cube.vertices))
-    diagonals = set(range(18)) - set(line_rows(cube.vertices, normals_of(cube), topology, creases))
-    points, faces = list(cube.vertices), cube.faces.tolist()
-    for row in diagonals:
-        (a, b), middle = topology.edges[row].tolist(), len(points)
-        points.append((cube.vertices[a] + cube.vertices[b]) / 2)
-        first = next(face for face in faces if {a, b} <= {*face})
-        at = first.index(a) if first[first.index(a) - 2] == b else first.index(b)
-        start, end, apart = first[at], first[at - 2], first[at - 1]
-        faces.remove(first)
-        faces += [[start, middle, apart], [middle, end, apart], [start, end, middle]]
-    slivered = Mesh(np.array(points), np.array(faces))
-    assert lines(slivered, creases) == lines(cube, creases)
+    sharp = lines(cube, creases)
+    every = build_topology(cube.faces, len(cube.vertices)).edges
+    for a, b in every.tolist():
+        found = lines(with_face_without_area(cube, a, b), creases)
+        assert found == sharp - {(a, b)}
+    slivered = cube
+    for a, b in every.tolist():
+        if (a, b) not in sharp:
+            slivered = with_face_without_area(slivered, a, b)
+    assert lines(slivered, creases) == sharp
 
 
 @pytest.mark.parametrize("sides", [17, 18])

@@ -12,7 +12,7 @@ from pns_common.fused.kernels.creases import (
     mark_edges_beyond,
     mark_flat_sides,
 )
-from pns_common.geometry.crease_lines import at_others, edges_beyond, go_on, have_flat_sides
+from pns_common.geometry.crease_lines import edges_beyond, go_on, have_flat_sides, may_end
 from pns_common.geometry.frames import face_normals
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import block, bumpy_sphere, manifolds, soups
@@ -75,9 +75,10 @@ def test_lines_lose_the_ends_that_the_formula_takes(way, mesh, cosine, straight)
     topology = build_topology(mesh.faces, len(mesh.vertices))
     rows = edges_beyond(normals, topology, topology.interior, cosine)
     left, met = np.ones(len(rows), dtype=bool), np.zeros(edges.vertex_count, dtype=np.int32)
-    args = mesh.vertices, edges.edges, rows.astype(np.int32), at_others(edges), straight
+    at_rim = may_end(edges, normals)
+    args = mesh.vertices, edges.edges, rows.astype(np.int32), at_rim, straight
     total = np.zeros((edges.vertex_count, 3))
     WAYS[way](drop_loose_ends)(*args, met, total, left)
-    np.testing.assert_array_equal(left, go_on(mesh.vertices, topology, rows, straight))
+    np.testing.assert_array_equal(left, go_on(mesh.vertices, topology, rows, at_rim, straight))
     assert not met.any()
     assert not total.any()
