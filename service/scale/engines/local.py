@@ -6,7 +6,7 @@ import multiprocessing
 import os
 import signal
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 MOST_BROKEN = 100
 # A process ends itself past a task's time; this is for one that cannot, beyond a chunk's seconds.
 GRACE_SECONDS = 5.0
+# How often is looked after pools that may have ended.
+LOOK_SECONDS = 1.0
 NO_TASK = -1
 
 # In a worker: memory that its driver sees too, with the number of the task it is at.
@@ -63,7 +65,7 @@ def local(work: Work[T, R], workers: int) -> Engine[T, R]:
                     continue
                 if not busy:
                     return
-                for future in wait(busy, return_when=FIRST_COMPLETED).done:
+                for future in _ended({future: worker.pool for future, (worker, _) in busy.items()}):
                     worker, chunk = busy.pop(future)
                     idle.append(worker)
                     lost: BaseException
@@ -166,6 +168,20 @@ def _do(job: Callable[[T], R], tasks: list[T], seconds: float | None) -> Done[R]
         current.value = NO_TASK if number is None else number
 
     return chunks.do(job, tasks, seconds, begins)
+
+
+def _ended(pools: Mapping[Future[R], ProcessPool]) -> set[Future[R]]:
+    """Wait for calls to end, at least one; return those that have.
+
+    A pool whose process dies before it is ready may end without a word about what it was given.
+    """
+    silent: set[Future[R]] = set()
+    while not (ended := wait(pools, LOOK_SECONDS, FIRST_COMPLETED).done):
+        for future in silent:
+            future.set_exception(BrokenProcessPool("the pool has ended"))
+        # Not at once: what is told of an end is told soon after it.
+        silent = {future for future, pool in pools.items() if not pool.active}
+    return ended
 
 
 def _first(waiting: deque[T], size: int) -> list[T]:

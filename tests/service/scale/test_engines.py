@@ -3,6 +3,8 @@
 import os
 import signal
 import sys
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from types import SimpleNamespace
 
 import pytest
@@ -54,6 +56,16 @@ def test_workers_that_never_begin_are_told(tmp_path, monkeypatch):
     work = Work(process_of, never, 1, None, ends_at_once)
     with pytest.raises(WorkerDied, match="2 workers ended"):
         list(local.local(work, 1)(iter(tasks(tmp_path, 1))))
+
+
+def test_a_pool_that_ends_without_a_word_is_noticed(monkeypatch):
+    """Of a call that it never took it says nothing, and whoever waits for that waits for ever."""
+    monkeypatch.setattr(local, "LOOK_SECONDS", 0.001)
+    alive, ended = (SimpleNamespace(active=active) for active in (True, False))
+    waiting, lost = Future(), Future()
+    assert local._ended({waiting: alive, lost: ended}) == {lost}
+    assert isinstance(lost.exception(), BrokenProcessPool)
+    assert not waiting.done()
 
 
 def test_ctrl_c_is_the_driver_s_alone(tmp_path):
