@@ -9,7 +9,7 @@ from jaxtyping import Int
 
 from pns_common.base.blocks import available_threads
 from pns_common.base.memory import memory_here
-from pns_common.base.parameters import is_number, is_whole
+from pns_common.base.parameters import is_bool, is_number, is_whole
 from pns_common.connectivity.creases import Creases
 from pns_common.errors import ParameterError
 from pns_common.schemes import Scheme
@@ -65,7 +65,7 @@ def check_reference_length(given: float | str) -> None:
 
 def check_limit(given: object) -> None:
     """Refuse what is no bool, numpy's included."""
-    if not isinstance(given, bool | np.bool_):
+    if not is_bool(given):
         raise ParameterError("limit", given, expected="True or False")
 
 

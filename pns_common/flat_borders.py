@@ -15,7 +15,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import marked
+from pns_common.base.arrays import dot, marked
 from pns_common.fused.interior_edges import interior_edges
 from pns_common.geometry.frames import face_normals
 from pns_common.geometry.sharp_edges import turn_by_more
@@ -60,7 +60,8 @@ def _inside_planes(
     edges, both, near = edges[near_edges], both[near_edges], faces[near_faces]
     normals = np.zeros((len(faces), 3))
     normals[near_faces] = face_normals(points, near)
-    leaves = turn_by_more(normals, both, IN_ONE_PLANE) | ~normals.any(axis=1)[both].all(axis=1)
+    known = dot(normals, normals) > 0
+    leaves = turn_by_more(normals, both, IN_ONE_PLANE) | ~(known[both[:, 0]] & known[both[:, 1]])
     # Where all edges are interior there are as many as faces.
     ends, corners = (np.bincount(each.reshape(-1), minlength=count) for each in (edges, near))
     inside &= ends == corners

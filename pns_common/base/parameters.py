@@ -1,9 +1,11 @@
-"""What counts as a number in an argument."""
+"""What counts as a number, or as yes or no, in an argument."""
 
 from __future__ import annotations
 
 import math
 from numbers import Integral, Real
+
+import numpy as np
 
 
 def is_number(value: object) -> bool:
@@ -14,6 +16,11 @@ def is_number(value: object) -> bool:
         return math.isfinite(value)
     except OverflowError:  # a whole number beyond all floats
         return False
+
+
+def is_bool(value: object) -> bool:
+    """Return whether a value is True or False, numpy's too."""
+    return isinstance(value, bool | np.bool_)
 
 
 def is_whole(value: object) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Int
 
 from pns_common.base.arrays import marked
-from pns_common.base.parameters import is_number, is_whole
+from pns_common.base.parameters import is_bool, is_number, is_whole
 from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.errors import ParameterError
 
@@ -50,7 +50,7 @@ class Creases:
             raise ParameterError("edged_angle", gentle, expected="degrees between 0 and line_angle")
         if levels is not None and not (is_whole(levels) and levels >= 1):
             raise ParameterError("levels", levels, expected="a whole number, at least 1")
-        if not isinstance(self.edged, bool | np.bool_ | None):
+        if self.edged is not None and not is_bool(self.edged):
             raise ParameterError("edged", self.edged, expected="True, False or None")
 
     def sharp_at(self, depth: int) -> bool:
