@@ -28,9 +28,7 @@ from .overlay import hide, rescale
 from .reading import read_mesh
 from .run import Made, Share, refine_mesh
 from .settings import Settings, choice_of
-from .writing import copied, take_name
-
-CACHE = ("cache", "spare", "first", "second")
+from .writing import CACHE, LIVE, copied, take_name
 
 
 class PNS_PG_live(Settings, bpy.types.PropertyGroup):  # noqa: N801 (Blender's names)
@@ -170,7 +168,7 @@ def _forget(mesh: bpy.types.Mesh) -> None:
     if users_of(mesh):
         return
     take_away_cache(mesh)
-    for name in ("enabled", "problem"):
+    for name in LIVE:
         mesh.pns_live.property_unset(name)
 
 

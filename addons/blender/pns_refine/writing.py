@@ -13,6 +13,10 @@ from .reading import FREESTYLE, Reading
 from .refining.snapshot import Domain, Refined
 from .refining.steps import crease_of
 
+# What a mesh that is shown live says of its refined copy, and of itself.
+CACHE = ("cache", "spare", "first", "second")
+LIVE = ("enabled", *CACHE, "problem")
+
 # Attributes that the overlays show.
 SHOWN = ("pns_ratio", "pns_gate", "pns_distance")
 CARRIER = ".pns carrier"
@@ -64,7 +68,7 @@ def write_mesh(
 def copied(source: bpy.types.Mesh) -> bpy.types.Mesh:
     """Return a copy that is not shown live, as its source may be."""
     mesh = source.copy()
-    for name in ("enabled", "cache", "spare", "first", "second", "problem"):
+    for name in LIVE:
         mesh.pns_live.property_unset(name)
     return mesh
 

@@ -83,8 +83,7 @@ def _check_accessors(document: Document) -> None:
                     pointer=f"/accessors/{number}",
                 )
             end = accessor.byte_offset + stride * (accessor.count - 1) + size
-            if end > view.byte_length:
-                _check_end(end, view.byte_length, f"/accessors/{number}")
+            _check_end(end, view.byte_length, f"/accessors/{number}")
         if accessor.sparse is not None:
             _check_sparse(document, accessor, accessor.sparse, f"/accessors/{number}/sparse")
 
