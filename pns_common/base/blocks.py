@@ -27,7 +27,7 @@ def nobody_listens(rows: int) -> None:
 
 @dataclass(frozen=True)
 class Blocks:
-    """How to run row-wise work: ``threads`` workers over blocks of ``rows`` rows.
+    """How to run row-wise work: ``threads`` workers over even blocks of at most ``rows`` rows.
 
     ``before`` is called with the number of rows of each block before it is begun, from whichever
     thread that is; what it raises ends the work. Where there is less to do than two blocks for each
@@ -44,10 +44,13 @@ class Blocks:
         return Blocks(self.threads, rows, self.before)
 
     def rows_of(self, count: int) -> int:
-        """Return how many rows a block has where there are so many in all."""
-        if self.least is None:
-            return self.rows
-        return min(self.rows, max(self.least, -(-count // (2 * self.threads))))
+        """Return how many rows a block has where there are so many in all: the last one's fewer."""
+        return max(1, -(-count // max(1, self.count(count))))
+
+    def count(self, rows: int) -> int:
+        """Return how many blocks ``run`` makes of so many rows."""
+        enough = 0 if self.least is None else min(2 * self.threads, rows // self.least)
+        return max(enough, -(-rows // self.rows))
 
     def unheard(self) -> Blocks:
         """Return the same for work after the end, of which nobody is told."""
@@ -79,20 +82,23 @@ class Blocks:
         if helpers < 1:
             drain()
             return
-        here = current_processor()
+        here, begun = current_processor(), list[int]()
 
-        def help_out() -> None:
+        def help_out(helper: int) -> None:
             leave(here)
+            begun.append(helper)
             drain()
 
         # Each helper in the caller's context: numpy's error state is part of it.
         pool = _pool(self.threads - 1)
-        jobs = [pool.submit(copy_context().run, help_out) for _ in range(helpers)]
+        jobs = [pool.submit(copy_context().run, help_out, helper) for helper in range(helpers)]
         try:
             drain()
         finally:
-            # A helper that others keep from starting has nothing left to do.
-            running = [job for job in jobs if not job.cancel()]
+            # Who has not begun has nothing left to do, and takes as long to wake up as a block.
+            for job in jobs:
+                job.cancel()
+            running = [jobs[helper] for helper in begun]
             wait(running)
         for job in running:
             job.result()
@@ -115,10 +121,6 @@ class Blocks:
 
         self.run(count, keep)
         return tuple(namespace(*pieces).concat(pieces) for pieces in zip(*parts, strict=True))
-
-    def count(self, rows: int) -> int:
-        """Return how many blocks ``run`` makes of so many rows."""
-        return -(-rows // self.rows_of(rows))
 
     def number(self, rows: slice, count: int) -> int:
         """Return which block of ``count`` rows it is."""

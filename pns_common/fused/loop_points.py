@@ -40,7 +40,8 @@ def owners(blocks: Blocks, count: int) -> Blocks:
 
     Each reads all edges, so there are no more of them than threads.
     """
-    return blocks.of_rows(max(blocks.least or blocks.rows, -(-count // blocks.threads)))
+    some = max(1, min(blocks.threads, count // (blocks.least or blocks.rows)))
+    return blocks.of_rows(max(1, -(-count // some)))
 
 
 def largest_size(points: Float[np.ndarray, "V 3"], blocks: Blocks) -> float:

@@ -38,14 +38,18 @@ def test_blocks_cover_all_rows_and_are_counted(count, rows, least):
 def test_little_work_is_divided_among_all_threads_but_not_into_crumbs():
     blocks = Blocks(threads=3, rows=100, least=4)
     assert [blocks.rows_of(count) for count in (0, 10, 60, 61, 599, 10_000)] == [
-        4,
-        4,
+        1,
+        5,
         10,
         11,
         100,
         100,
     ]
-    assert blocks.of_rows(7).rows_of(1) == 7
+
+
+def test_blocks_are_even_so_that_no_thread_waits_for_a_long_one():
+    blocks = Blocks(threads=2, rows=100)
+    assert [blocks.rows_of(count) for count in (1, 100, 101, 250)] == [1, 100, 51, 84]
 
 
 class StopRefiningError(Exception):

@@ -56,5 +56,5 @@ def test_what_edges_read_outlives_the_rings():
 def test_networks_see_rows_in_the_array_kernels_blocks_whatever_the_threads():
     for threads in (1, 4):
         blocks = surroundings(blocks=Blocks(threads, rows=10**6, least=5)).network_blocks
-        assert blocks.rows_of(9000) == BLOCK_ROWS
+        assert blocks.rows_of(9000) == Blocks(1, BLOCK_ROWS).rows_of(9000)
     assert surroundings(blocks=Blocks(1, rows=7)).network_blocks.rows == 7
