@@ -8,7 +8,7 @@ import os
 import signal
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -18,9 +18,10 @@ from ..request_ids import REQUEST_ID
 
 T = TypeVar("T")
 
-# Of 1000. Out of memory, the kernel should take a worker (one request) before the server (all of
-# them).
+# Out of memory, the kernel should take a worker (one request) before the server (all of them): so
+# much is added to its preference, of the most that there is.
 OOM_PREFERENCE = 500
+MOST_PREFERRED = 1000
 # New objects between two searches for cycles. A scene of thousands of meshes is hundreds of
 # thousands of objects, hardly one of them in a cycle: to search them as often as usual is a fifth
 # of its time.
@@ -41,9 +42,17 @@ def prepare() -> None:
     # A signal to the server's process group (a terminal, a supervisor) must not end requests that
     # run.
     os.setsid()
-    preference = Path("/proc/self/oom_score_adj")
-    if preference.exists():
-        preference.write_text(str(OOM_PREFERENCE))
+    prefer(Path("/proc/self/oom_score_adj"))
+
+
+def prefer(file: Path) -> None:
+    """Have the kernel prefer the process of a file of /proc where memory runs out.
+
+    What there is is added to: a cluster gives pods a preference of their own, and to go below it
+    is refused. A worker does its work without any, too.
+    """
+    with suppress(OSError):
+        file.write_text(str(min(int(file.read_text()) + OOM_PREFERENCE, MOST_PREFERRED)))
 
 
 def call(function: Callable[..., T], *arguments: object) -> T:
