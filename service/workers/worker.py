@@ -15,6 +15,7 @@ from typing import TypeVar
 from .. import log_lines
 from ..errors import ServiceError
 from ..request_ids import REQUEST_ID
+from .parent import end_with_parent
 
 T = TypeVar("T")
 
@@ -42,6 +43,7 @@ def prepare() -> None:
     # A signal to the server's process group (a terminal, a supervisor) must not end requests that
     # run.
     os.setsid()
+    end_with_parent()
     prefer(Path("/proc/self/oom_score_adj"))
 
 

@@ -16,6 +16,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from ...errors import WorkerDied
+from ...workers.parent import end_with_parent
 from . import chunks
 from .chunks import Done
 from .work import Engine, R, T, Work
@@ -157,6 +158,7 @@ def _no_interrupt() -> Iterator[None]:
 def _begin(current: Any, prepare: Callable[[], None]) -> None:
     """Set up a process: one thread, since the files are the parallelism."""
     os.environ["OMP_NUM_THREADS"] = "1"
+    end_with_parent()
     _current.set(current)
     prepare()
 
