@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import signal
 import socket
 from functools import partial
 from types import FrameType
@@ -31,7 +32,7 @@ WAITING = 2048
 
 
 class DrainingServer(uvicorn.Server):
-    """On the first SIGTERM or SIGINT it takes nothing new, and exits once no request is under way.
+    """On a first signal it takes nothing new, and exits once no request is under way.
 
     Bodies that have not arrived whole by then are refused: they may never. Until it exits it still
     answers: /readyz and new requests with 503; uvicorn's own shutdown would close the socket at
@@ -81,6 +82,9 @@ def serve(settings: Settings) -> None:
     server = DrainingServer(
         configuration(app, settings), app.state.admission, settings.drain_seconds
     )
+    # A terminal that closes; whoever was started by nohup goes on. Windows has no such signal.
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
+        signal.signal(signal.SIGHUP, server.handle_exit)
     if settings.metrics_port is None:
         server.run()
         return

@@ -18,7 +18,12 @@ def ctrl_c_interrupts():
 
 
 @pytest.mark.parametrize(
-    ("number", "kind"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)]
+    ("number", "kind"),
+    [
+        (signal.SIGINT, KeyboardInterrupt),
+        (signal.SIGTERM, SystemExit),
+        (signal.SIGHUP, SystemExit),
+    ],
 )
 def test_a_signal_ends_what_is_inside_and_tells_how_to_go_on(number, kind, ctrl_c_interrupts):
     said = io.StringIO()
@@ -28,8 +33,30 @@ def test_a_signal_ends_what_is_inside_and_tells_how_to_go_on(number, kind, ctrl_
     assert kind is KeyboardInterrupt or stopped.value.code == 128 + number
 
 
-def test_signals_are_afterwards_what_they_were():
-    before = signal.getsignal(signal.SIGTERM)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_signals_are_afterwards_what_they_were(number):
+    before = signal.getsignal(number)
     with stoppable(Console(file=io.StringIO())):
-        assert signal.getsignal(signal.SIGTERM) != before
-    assert signal.getsignal(signal.SIGTERM) == before
+        assert signal.getsignal(number) != before
+    assert signal.getsignal(number) == before
+
+
+def test_what_nohup_has_started_goes_on_when_the_terminal_closes():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stoppable(Console(file=io.StringIO())):
+            signal.raise_signal(signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+class ClosedTerminal(io.StringIO):
+    def write(self, text):
+        raise OSError(5, "Input/output error")
+
+
+def test_a_terminal_that_is_gone_hides_no_stop():
+    with pytest.raises(SystemExit) as stopped, stoppable(Console(file=ClosedTerminal())):
+        signal.raise_signal(signal.SIGHUP)
+    assert stopped.value.code == 128 + signal.SIGHUP

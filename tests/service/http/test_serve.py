@@ -231,7 +231,11 @@ def test_a_second_sigterm_and_the_deadline_end_running_jobs_in_order(drain_secon
         assert "Traceback" not in server.whole_log()
 
 
-def test_a_job_that_ended_just_before_sigterm_waits_to_be_fetched_too() -> None:
+@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
+def test_a_job_that_ended_just_before_a_signal_waits_to_be_fetched_too(
+    sent: signal.Signals,
+) -> None:
+    """SIGHUP: the terminal is closed."""
     with serving(PNS_WORKERS="1") as server:
         server.wait_until_ready()
         with closing(server.connect()) as connection:
@@ -240,7 +244,7 @@ def test_a_job_that_ended_just_before_sigterm_waits_to_be_fetched_too() -> None:
             job = f"/jobs/{json.loads(connection.getresponse().read())['id']}"
         while b'"done"' not in server.get(job)[1]:
             time.sleep(0.01)
-        server.process.send_signal(signal.SIGTERM)
+        server.process.send_signal(sent)
         # Long enough that a server which waits for nobody is gone.
         for _ in range(20):
             assert server.status("/healthz") == 200
