@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from pebble import ProcessExpired, ProcessPool
 
-from ..errors import BusyError, JobTimeout, ServiceError, WorkerDied
+from ..errors import BusyError, JobTimeout, WorkerDied
 from . import worker
 from .memory_file import MemoryFile
 
@@ -27,7 +27,7 @@ WARM_UP_SECONDS = 120.0
 # fresh one takes as long to warm up: to kill it earlier would only let those who leave end workers
 # faster than they start, with bodies that take long to decode.
 GRACE_SECONDS = 2.0
-# How long a worker that has died may go unnoticed while none is asked for.
+# How long a worker that has died may go unnoticed where nothing tells of it.
 WATCH_SECONDS = 1.0
 
 log = logging.getLogger("pns.service")
@@ -112,7 +112,7 @@ class Workers:
         self._known[pool] = files
         try:
             future = _scheduled(pool, function, *arguments)
-            value = await _result(future, must_end)
+            value = await _result(pool, future, must_end)
         except asyncio.CancelledError:
             if stop is None:
                 self._replace(pool, "stopped")
@@ -171,13 +171,13 @@ class Workers:
         self._pools.add(pool)
         try:
             future = _scheduled(pool, self._warm_up)
-            await _result(future, time.monotonic() + WARM_UP_SECONDS)
+            await _result(pool, future, time.monotonic() + WARM_UP_SECONDS)
         except (JobTimeout, WorkerDied) as error:
-            log.warning("a worker did not start: %s", error)
+            log.warning("a worker did not start: %s", _reason(error))
             await asyncio.sleep(RESTART_SECONDS)
             self._replace(pool, "start")
             return
-        except (ServiceError, worker.JobFaultError) as error:
+        except Exception as error:
             # The process lives: it may still serve what does not need the thing that failed.
             log.warning("a worker did not warm up: %s", error)
         else:
@@ -229,7 +229,7 @@ def _scheduled(
     """Schedule what a process is to answer. Nothing ever cancels it: pebble would act on that."""
     try:
         future = asyncio.wrap_future(pool.schedule(worker.call, args=(function, *arguments)))
-    except RuntimeError as error:
+    except (RuntimeError, OSError) as error:
         # The process could not be started, or has died since the pool was looked at.
         raise WorkerDied("no worker process could be started") from error
     # What comes after everybody has gone is nobody's surprise.
@@ -237,16 +237,25 @@ def _scheduled(
     return future
 
 
-async def _result(future: asyncio.Future[T], must_end: float) -> T:
+async def _result(pool: ProcessPool, future: asyncio.Future[T], must_end: float) -> T:
+    silent = False
     # The clock is ours: a process that is frozen does not even say that it has begun.
-    await asyncio.wait({future}, timeout=max(must_end - time.monotonic(), 0))
-    if not future.done():
+    while not (future.done() or silent) and (left := must_end - time.monotonic()) > 0:
+        # A pool may end without a word; what it tells of its end it tells soon after.
+        silent = not pool.active
+        await asyncio.wait({future}, timeout=min(left, WATCH_SECONDS))
+    if not (future.done() or silent):
         raise JobTimeout("the job took longer than a job may")
-    if _lost(future):
+    if not future.done() or _lost(future):
         raise WorkerDied(
             "the worker process ended before it answered; it may have run out of memory"
         )
     return future.result()
+
+
+def _reason(error: BaseException) -> BaseException:
+    """Return what an error began with: pebble's own, in between, may say nothing."""
+    return error if error.__cause__ is None else _reason(error.__cause__)
 
 
 def _lost(future: asyncio.Future[T]) -> bool:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from pebble import ProcessPool
+from pebble.pool import process as pebble_process
 
 from service.errors import BusyError, GltfError, JobTimeout, WorkerDied
 from service.workers.memory_file import MemoryFile
@@ -310,5 +311,64 @@ def test_a_worker_whose_warm_up_kills_it_is_tried_again_without_haste() -> None:
             with pytest.raises(BusyError):
                 await pool.run(jobs.nothing)
             assert not pool.ready
+
+    run(scenario)
+
+
+@pytest.mark.parametrize("what", ["channels", "launch_process"])
+def test_a_process_that_the_system_refuses_is_told_and_tried_again(
+    what: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """No descriptor, no semaphore or no process is left: for a while."""
+    makes = getattr(pebble_process, what)
+    refusals = [OSError(11, "Resource temporarily unavailable")]
+
+    def refuses_once(*arguments: object) -> object:
+        if refusals:
+            raise refusals.pop()
+        return makes(*arguments)
+
+    monkeypatch.setattr(pebble_process, what, refuses_once)
+
+    async def scenario() -> None:
+        async with workers() as pool:
+            assert await pool.run(jobs.sleep, 0.0) == "slept"
+
+    run(scenario)
+    told = "a worker did not start: [Errno 11] Resource temporarily unavailable"
+    assert told in caplog.messages
+
+
+def test_a_warm_up_that_cannot_be_sent_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    async def scenario() -> None:
+        async with workers(warm_up=lambda: None) as pool:
+            await pool.run(jobs.nothing)
+            assert not pool.ready
+
+    run(scenario)
+    assert any("a worker did not warm up" in message for message in caplog.messages)
+
+
+def test_a_pool_that_ends_without_a_word_is_noticed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[ProcessPool] = []
+    start = ProcessPool._start_pool
+
+    def seen(pool: ProcessPool) -> None:
+        made.append(pool)
+        start(pool)
+
+    monkeypatch.setattr(ProcessPool, "_start_pool", seen)
+
+    async def scenario() -> None:
+        async with workers() as pool:
+            job = asyncio.create_task(pool.run(jobs.begin_to_hold, tmp_path / "begun"))
+            await until((tmp_path / "begun").exists)
+            # Its threads end, and nobody is left to tell what becomes of the job.
+            made[0].stop()
+            with pytest.raises(WorkerDied):
+                await job
+            assert await pool.run(jobs.sleep, 0.0) == "slept"
 
     run(scenario)
