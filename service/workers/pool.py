@@ -15,6 +15,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from ..errors import BusyError, JobTimeout, WorkerDied
 from . import worker
+from .interrupts import no_interrupt
 from .memory_file import MemoryFile
 
 T = TypeVar("T")
@@ -228,7 +229,9 @@ def _scheduled(
 ) -> asyncio.Future[T]:
     """Schedule what a process is to answer. Nothing ever cancels it: pebble would act on that."""
     try:
-        future = asyncio.wrap_future(pool.schedule(worker.call, args=(function, *arguments)))
+        # The first call starts the process.
+        with no_interrupt():
+            future = asyncio.wrap_future(pool.schedule(worker.call, args=(function, *arguments)))
     except (RuntimeError, OSError) as error:
         # The process could not be started, or has died since the pool was looked at.
         raise WorkerDied("no worker process could be started") from error

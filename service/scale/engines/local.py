@@ -9,13 +9,13 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from ...errors import WorkerDied
+from ...workers.interrupts import no_interrupt
 from ...workers.parent import end_with_parent
 from . import chunks
 from .chunks import Done
@@ -132,7 +132,7 @@ class _Worker:
         arguments = work.job, chunk, work.seconds
         try:
             # The first call starts a process, and the thread that will start others in its place.
-            with _no_interrupt():
+            with no_interrupt():
                 return self, self.pool.schedule(_do, args=arguments, timeout=longest)
         except RuntimeError:
             return self.replaced(work.prepare).sent(work, chunk)
@@ -142,17 +142,6 @@ class _Worker:
         self.pool.stop()
         self.pool.join()
         return _Worker.new(prepare)
-
-
-@contextmanager
-def _no_interrupt() -> Iterator[None]:
-    """Keep Ctrl-C from threads and processes that are started inside: it is the driver's to end
-    them, and one that is still importing would say so at length."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin(current: Any, prepare: Callable[[], None]) -> None:

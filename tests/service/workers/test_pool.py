@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import asynccontextmanager
 from functools import partial
+from multiprocessing import resource_tracker
 from pathlib import Path
 
 import pytest
@@ -337,6 +338,21 @@ def test_a_process_that_the_system_refuses_is_told_and_tried_again(
     run(scenario)
     told = "a worker did not start: [Errno 11] Resource temporarily unavailable"
     assert told in caplog.messages
+
+
+def test_ctrl_c_is_the_server_s_alone() -> None:
+    """A terminal sends it to all; a worker that is still importing would draw its traceback."""
+
+    # Python starts its own with the first of all workers, which lets through what is blocked.
+    resource_tracker._resource_tracker._stop()  # pyright: ignore[reportAttributeAccessIssue]
+
+    async def scenario() -> None:
+        async with workers() as pool:
+            blocked = await pool.run(signal.pthread_sigmask, signal.SIG_BLOCK, ())
+            assert signal.SIGINT in blocked
+            assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+    run(scenario)
 
 
 def test_a_warm_up_that_cannot_be_sent_is_told(caplog: pytest.LogCaptureFixture) -> None:
