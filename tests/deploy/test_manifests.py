@@ -74,7 +74,10 @@ def test_the_cluster_adds_nothing_to_the_environment():
 
 
 def test_a_drain_has_its_time():
-    assert POD["terminationGracePeriodSeconds"] >= Settings().drain_seconds
+    """In a cluster what is sent before the ingress knows that a pod goes meets no closed port."""
+    before = CONTAINER["lifecycle"]["preStop"]["exec"]["command"]
+    assert before[0] == "sleep"
+    assert POD["terminationGracePeriodSeconds"] >= int(before[1]) + Settings().drain_seconds
     grace = COMPOSE["services"]["service"]["stop_grace_period"]
     assert int(grace.removesuffix("s")) >= Settings().drain_seconds
 
