@@ -65,6 +65,21 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.deepEqual(cells, ["90°", "90°"]);
   });
 
+  test("where streams cannot be iterated over, as in Safari, a file is refined all the same", async () => {
+    const page = await visit();
+    await page.addInitScript(() => {
+      delete ReadableStream.prototype[Symbol.asyncIterator];
+      delete ReadableStream.prototype.values;
+    });
+    await page.goto(`${page.url()}#levels=1`);
+    await page.reload();
+    await choose(page, example);
+    await page.locator("body.refined, #problem:not([hidden])").first().waitFor();
+    assert.equal(await page.textContent("#problem-title"), "");
+    await settled(page);
+    assert.equal(report((await downloaded(page, "#download")).bytes).totals.faces, 4 * PART_FACES);
+  });
+
   test("what is downloaded is what the service answers, byte for byte", async () => {
     const page = await visit({ hash: "#levels=1" });
     await choose(page, example);

@@ -51,11 +51,16 @@ export async function request(path: string, init: RequestInit = {}): Promise<Res
 /** An answer's body as it comes; `nothing` is the title of the problem that it has none. */
 export async function* pieces(response: Response, nothing: string): AsyncGenerator<Uint8Array> {
   if (!response.body) throw localProblem(nothing, "The answer has no body.");
+  // Safari's streams cannot be iterated over.
+  const reader = response.body.getReader();
   try {
-    for await (const piece of response.body) yield piece;
+    for (let next = await reader.read(); !next.done; next = await reader.read()) yield next.value;
   } catch (error) {
     if (isAbort(error)) throw error;
     throw localProblem("The connection broke", "Is the service running, and the network up?");
+  } finally {
+    // Nobody may want the rest.
+    void reader.cancel().catch(() => {});
   }
 }
 
