@@ -80,7 +80,8 @@ export function fromHash(hash: string): { settings: Settings; view: Record<strin
   settings.levels = whole(levels, 1, 6) ?? settings.levels;
   settings.model = model ?? settings.model;
   settings.budget = number(budget, 0, Infinity);
-  settings.limit = limit === "true";
+  // Normals of the limit surface stand there.
+  settings.limit = limit === "true" || normals === "limit";
   settings.crease = oneOf(crease, ["auto", "off", "lines", "normals", "angle"]) ?? settings.crease;
   settings.angle = number(angle, 0, 180) ?? settings.angle;
   settings.uv = oneOf(uv, ["linear", "smooth"]) ?? settings.uv;

@@ -283,6 +283,31 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.ok(!(await page.evaluate(() => location.hash)).includes("budget"));
   });
 
+  test("beside a number that cannot be, whether it is seen or not, other settings may change", async () => {
+    const page = await visit({ hash: "#levels=1&crease=angle&angle=25.5" });
+    await choose(page, example);
+    await settled(page);
+    assert.ok(await page.$eval("#angle", (angle) => angle.validity.valid));
+    await page.click(".more summary");
+    await page.fill("#angle", "999");
+    await page.click(".more summary");
+    await page.selectOption("#levels", "2");
+    await page.locator("#label-right", { hasText: `${number(16 * PART_FACES)} faces` }).waitFor({ timeout: 20_000 });
+    assert.match(await page.evaluate(() => location.hash), /angle=25\.5/);
+  });
+
+  test("normals of the limit surface and the limit surface come and go together", async () => {
+    const page = await visit({ hash: "#levels=1&normals=limit" });
+    assert.ok(await page.isChecked("#limit"));
+    await choose(page, example);
+    await settled(page);
+    await page.uncheck("#limit");
+    assert.equal(await page.inputValue("#normals"), "smooth");
+    await page.click(".more summary");
+    await page.selectOption("#normals", "limit");
+    assert.ok(await page.isChecked("#limit"));
+  });
+
   test("a link restores the settings", async () => {
     const page = await visit();
     await choose(page, example);

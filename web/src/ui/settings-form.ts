@@ -32,8 +32,14 @@ export class SettingsForm {
     const form = element<HTMLFormElement>("settings");
     form.addEventListener("submit", (event) => event.preventDefault());
     form.addEventListener("input", ({ target }) => {
+      // The browser says what is wrong with a number, in the user's language.
+      if (target instanceof HTMLInputElement && !target.reportValidity()) return;
       // Each model has its own budget: a number meant for another is let go.
       if (target === select("model")) input("budget").value = "";
+      // Normals of the limit surface stand on the limit surface, and nowhere else.
+      if (target === input("limit") && !input("limit").checked && select("normals").value === "limit") {
+        select("normals").value = "smooth";
+      }
       this.read();
     });
     this.write();
@@ -140,19 +146,17 @@ export class SettingsForm {
     const before = this.settings;
     const budget = input("budget");
     const angle = input("angle");
-    // The browser says what is wrong with a number, in the user's language.
-    if (!budget.reportValidity() || !angle.reportValidity()) return;
+    // Where a number cannot be, that before it holds: other settings may change.
     const settings: Settings = {
       levels: Number(select("levels").value),
       model: select("model").value,
-      budget: budget.value === "" ? null : Number(budget.value),
+      budget: !budget.validity.valid ? before.budget : budget.value === "" ? null : Number(budget.value),
       limit: input("limit").checked,
       crease: select("crease").value as Settings["crease"],
-      angle: Number(angle.value || DEFAULTS.angle),
+      angle: angle.validity.valid ? Number(angle.value || DEFAULTS.angle) : before.angle,
       uv: select("uv").value as Settings["uv"],
       normals: select("normals").value as Settings["normals"],
     };
-    // Normals of the limit surface stand on the limit surface.
     if (settings.normals === "limit" && !settings.limit) {
       settings.limit = input("limit").checked = true;
     }
