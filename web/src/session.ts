@@ -148,7 +148,13 @@ export class Session {
       // It is there already where Loop's side alone was cancelled.
       const there = this.ours?.key === query(asked.settings).toString() ? this.ours : null;
       if (there) there.asked = asked;
-      await this.complete(there ?? (await this.refine(order, signal)), signal);
+      try {
+        await this.complete(there ?? (await this.refine(order, signal)), signal);
+      } catch (error) {
+        // What was ended has given way to something else by now.
+        if (!signal.aborted) this.listener.stayed();
+        throw error;
+      }
     });
   }
 

@@ -180,6 +180,27 @@ describe("what is on its way", { skip: noBrowser, timeout: 900_000 }, () => {
     assert.equal(await page.inputValue("#levels"), "3");
   });
 
+  test("other settings that are refused, or do not arrive, leave the form to what is shown", async () => {
+    const page = await visit({ hash: "#levels=1", expected: [422], foreseen: /ERR_FAILED/ });
+    await choose(page, example);
+    await settled(page);
+    const refusal = { title: "A parameter is out of range", detail: "No.", parameter: "budget", status: 422 };
+    await page.route(/\/jobs\?/, (route) => route.fulfill({ status: 422, json: refusal }));
+    await page.fill("#budget", "77");
+    await page.locator("#problem-pointer", { hasText: "budget" }).waitFor();
+    assert.equal(await page.inputValue("#budget"), "");
+    assert.ok(!(await page.evaluate(() => location.hash)).includes("budget"));
+    await page.unroute(/\/jobs\?/);
+    await page.route(/\/jobs\?/, (route) => route.abort());
+    await page.selectOption("#levels", "2");
+    await page.locator("#problem-again").waitFor();
+    assert.equal(await page.inputValue("#levels"), "1");
+    await page.unroute(/\/jobs\?/);
+    await page.click("#problem-again");
+    await page.locator("#label-right", { hasText: number(16 * PART_FACES) }).waitFor();
+    assert.equal(await page.inputValue("#levels"), "2");
+  });
+
   test("normals as in the file, chosen on its way, stay", async () => {
     const page = await visit({ hash: "#levels=1" });
     await choose(page, example);
