@@ -2,7 +2,8 @@
 
 import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
-import { readdir, readFile } from "node:fs/promises";
+import { mkdtemp, readdir, readFile, rm, utimes, writeFile } from "node:fs/promises";
+import { tmpdir } from "node:os";
 import { basename, dirname, join } from "node:path";
 import { describe, test } from "node:test";
 import { fileURLToPath } from "node:url";
@@ -235,6 +236,28 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       assert.ok(await page.isHidden("#problem-again"));
     });
   }
+
+  test("a file that was written anew since it was chosen is called that, at work and where it waits", async () => {
+    const folder = await mkdtemp(join(tmpdir(), "pns-page-"));
+    const paths = ["a.glb", "b.glb"].map((name) => join(folder, name));
+    try {
+      for (const path of paths) await writeFile(path, part);
+      const page = await visit({ hash: "#levels=1", foreseen: /ERR_UPLOAD_FILE_CHANGED/ });
+      await page.setInputFiles("#files", paths);
+      await settled(page);
+      for (const path of paths) await utimes(path, 1, 1);
+      await page.selectOption("#levels", "2");
+      await page.locator("#problem-title", { hasText: "The file has changed" }).waitFor();
+      assert.ok(await page.isHidden("#problem-again"));
+      await page.click("#problem-close");
+      await page.selectOption("#file", "1");
+      await page.locator("#problem").waitFor();
+      assert.equal(await page.textContent("#problem-title"), "The file has changed");
+      assert.equal(await page.inputValue("#file"), "0");
+    } finally {
+      await rm(folder, { recursive: true });
+    }
+  });
 
   test("of several meshes one is opened, the others are a choice away, and what is left is named", async () => {
     const page = await visit({ hash: "#levels=1" });

@@ -78,14 +78,23 @@ function upload(
         reject(problemOf(sent.status, sent.responseText));
       }
     };
-    sent.onerror = () =>
-      reject(localProblem("The upload did not arrive", "The connection to the service broke."));
+    sent.onerror = () => {
+      const broken = localProblem("The upload did not arrive", "The connection to the service broke.");
+      // A file that is not there any more does not arrive either.
+      readable(body).then(() => reject(broken), reject);
+    };
     sent.onabort = () => reject(new DOMException("cancelled", "AbortError"));
     signal.addEventListener("abort", () => sent.abort());
     if (signal.aborted) return reject(new DOMException("cancelled", "AbortError"));
     tell({ step: "upload", share: 0 });
     sent.send(body.content);
   });
+}
+
+/** Reject as the browser does where a file of a body has changed since it was chosen. */
+async function readable({ content }: Body): Promise<void> {
+  const parts = content instanceof Blob ? [content] : content.values();
+  for (const part of parts) if (part instanceof Blob) await part.slice(0, 1).arrayBuffer();
 }
 
 /** Follow the job's events to its end. */

@@ -10,7 +10,8 @@ export async function part<T>(coming: Promise<T>): Promise<T> {
     // An update of the service leaves other names than those that this page knows.
     throw localProblem(
       "A part of the page did not come",
-      "Is the service running, and the network up? If it was updated, reload the page.",
+      // Many browsers ask for a part once, and remember that it did not come.
+      "Is the service running, and the network up? Where another try does not help, reload the page.",
     );
   }
 }

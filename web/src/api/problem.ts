@@ -47,6 +47,14 @@ export function problemOf(status: number, text: string): Problem {
   return localProblem(`The server answered ${status}`, "It gave no further explanation.");
 }
 
+/** What to say of an error; null of one of the page's own. */
+export function problemFrom(error: unknown): Problem | null {
+  if (error instanceof Problem) return error;
+  // Browsers keep the place of a file and not its bytes.
+  if (!(error instanceof DOMException) || !["NotReadableError", "NotFoundError"].includes(error.name)) return null;
+  return fileProblem("The file has changed", "It was written anew, moved or deleted since it was chosen: choose it again.");
+}
+
 export function isAbort(error: unknown): boolean {
   return error instanceof DOMException && error.name === "AbortError";
 }

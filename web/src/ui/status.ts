@@ -2,7 +2,7 @@
 
 import { useKey } from "../api/client";
 import type { Progress } from "../api/jobs";
-import { Problem } from "../api/problem";
+import { problemFrom } from "../api/problem";
 import { percent, seconds } from "../report/format";
 import { element, input } from "./dom";
 
@@ -85,7 +85,7 @@ export function announce(text: string): void {
 }
 
 export function showProblem(error: unknown): void {
-  const problem = error instanceof Problem ? error : null;
+  const problem = problemFrom(error);
   if (!problem) console.error(error);
   element("problem-title").textContent = problem?.title ?? "The page failed";
   element("problem-detail").textContent = problem?.message ?? String(error);
