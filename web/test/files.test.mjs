@@ -313,6 +313,33 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.deepEqual(await page.evaluate(() => [...window.sent]), ["file: a.gltf", "a.bin: a.bin"]);
   });
 
+  const { buffers: [{ uri: data }], ...document } = bare();
+  const bin = Buffer.from(data.slice(data.indexOf(",") + 1), "base64");
+  const naming = (uri) => Buffer.from(JSON.stringify({ ...document, buffers: [{ byteLength: bin.length, uri }] }));
+  const apart = "käse.bin".normalize("NFD");
+  for (const [how, files] of Object.entries({
+    "by a path out of its folder": { "scenes/a.gltf": naming("../data/a.bin"), "data/a.bin": bin },
+    "in an archive of PowerShell’s": { "m\\a.gltf": naming("t/a.bin"), "m\\t\\a.bin": bin },
+    "by a path of Windows’": { "a.gltf": naming("t\\a.bin"), "t/a.bin": bin },
+    "with accents apart": { "a.gltf": naming("käse.bin"), [apart]: bin },
+  })) {
+    test(`a file in a .zip is found ${how}`, async () => {
+      const page = await visit({ hash: "#levels=1" });
+      await choose(page, { name: "a.zip", mimeType: "", buffer: Buffer.from(zipSync(files)) });
+      await page.locator("body.refined, #problem:not([hidden])").first().waitFor();
+      assert.equal(await page.textContent("#problem-detail"), "");
+      await settled(page);
+    });
+  }
+
+  test("a file beside a document is found with accents apart, as macOS hands it over", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, { name: "a.gltf", mimeType: "", buffer: naming("k%C3%A4se.bin") }, { name: apart, mimeType: "", buffer: bin });
+    await page.locator("body.refined, #problem:not([hidden])").first().waitFor();
+    assert.equal(await page.textContent("#problem-detail"), "");
+    await settled(page);
+  });
+
   test("a texture that did not come with its document is named", async () => {
     const page = await visit({ hash: "#levels=1", foreseen: /Couldn't load texture/ });
     const json = { ...bare(), images: [{ uri: "wood.png" }], textures: [{ source: 0 }] };

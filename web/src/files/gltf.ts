@@ -41,7 +41,13 @@ export function pathOf(address: string): string {
   } catch {
     // A name with a per cent sign of its own.
   }
-  return path.split("/").filter((step) => step !== "" && step !== ".").join("/");
+  return shortest(path);
+}
+
+/** A path in its shortest form: a `\` is a `/`, as on Windows, and accents are composed, as macOS leaves them apart. */
+export function shortest(path: string): string {
+  const steps = path.normalize("NFC").replaceAll("\\", "/").split("/");
+  return steps.filter((step) => step !== "" && step !== ".").join("/");
 }
 
 /** The paths of the files that a document names; what is no JSON names none. */

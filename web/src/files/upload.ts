@@ -3,7 +3,7 @@
 import type { Body } from "../api/jobs";
 import { fileProblem } from "../api/problem";
 import { listed } from "../report/format";
-import { filesNamedIn } from "./gltf";
+import { filesNamedIn, shortest } from "./gltf";
 import { kindOf, MEDIA_TYPES, type Kind } from "./kinds";
 
 /** A file with the folder that it came in. */
@@ -53,7 +53,10 @@ export async function uploadsOf(given: PathedFile[]): Promise<Dropped> {
   const used = new Set(documents.map(({ path }) => path));
   const uploads: Upload[] = [];
   for (const { path, file, kind } of documents) {
-    const neighbours = kind === "gltf" ? await namedBy(path, file, files) : [];
+    const folder = path.slice(0, path.lastIndexOf("/") + 1);
+    // A form has no place for what lies elsewhere.
+    const beside = files.filter((other) => other.path.startsWith(folder));
+    const neighbours = kind === "gltf" ? await namedBy(path, file, beside) : [];
     neighbours.forEach(([, beside]) => used.add(beside.path));
     uploads.push({
       name: file.name,
@@ -68,13 +71,15 @@ export async function uploadsOf(given: PathedFile[]): Promise<Dropped> {
 }
 
 /** The files that a .gltf names, by path relative to it. */
-async function namedBy(path: string, file: File, files: PathedFile[]): Promise<[string, PathedFile][]> {
-  const named = filesNamedIn(await file.arrayBuffer());
-  const folder = path.slice(0, path.lastIndexOf("/") + 1);
-  return files
-    .filter((other) => other.path.startsWith(folder))
-    .map((other): [string, PathedFile] => [other.path.slice(folder.length), other])
-    .filter(([name]) => named.has(name));
+export async function namedBy(path: string, file: Blob, files: PathedFile[]): Promise<[string, PathedFile][]> {
+  const among = new Map(files.map((other) => [shortest(other.path), other]));
+  const folder = shortest(path).split("/").slice(0, -1);
+  return [...filesNamedIn(await file.arrayBuffer())].flatMap((name) => {
+    const up = /^(\.\.\/)*/.exec(name)![0].length / 3;
+    const there = [...folder.slice(0, Math.max(folder.length - up, 0)), name.slice(3 * up)].join("/");
+    const other = up <= folder.length ? among.get(there) : undefined;
+    return other ? [[name, other] as [string, PathedFile]] : [];
+  });
 }
 
 /** The body of a job. */
