@@ -55,6 +55,7 @@ def read_primitive(
         UnsupportedFeature: a strip or fan of which an index restarts it.
     """
     primitive = document.meshes[mesh].primitives[number]
+    where = f"/meshes/{mesh}/primitives/{number}"
     count = document.accessors[primitive.attributes["POSITION"]].count
     if primitive.indices is None:
         flat = np.arange(count, dtype=np.int64)
@@ -66,10 +67,17 @@ def read_primitive(
             if primitive.mode != TRIANGLES and flat.max() == np.iinfo(stored.dtype).max:
                 # As KHR_mesh_primitive_restart lets it, and nothing else does.
                 raise UnsupportedFeature("a strip or fan with restarts", pointer=pointer)
-            raise GltfError(f"index {flat.max()}, but there are {count} vertices", pointer=pointer)
+            raise GltfError(
+                f"{where} has index {flat.max()}, but there are {count} vertices", pointer=pointer
+            )
     used, corners = compact(flat, count)
-    attributes, accessors = _read_attributes(document, buffers, primitive.attributes, used)
-    targets = [_read_attributes(document, buffers, t, used) for t in primitive.targets]
+    attributes, accessors = _read_attributes(
+        document, buffers, primitive.attributes, used, f"{where}/attributes"
+    )
+    targets = [
+        _read_attributes(document, buffers, target, used, f"{where}/targets/{place}")
+        for place, target in enumerate(primitive.targets)
+    ]
     return TrianglePrimitive(
         number=number,
         rows=used,
@@ -86,17 +94,18 @@ def _read_attributes(
     buffers: Sequence[memoryview],
     indices: dict[str, int],
     rows: Int[np.ndarray, " N"],
+    where: str,
 ) -> tuple[dict[str, Shaped[np.ndarray, "N K"]], dict[str, Accessor]]:
-    """Read the rows of attributes, by name, and what describes them."""
+    """Read the rows of attributes, by name, and what describes them; errors name `where` too."""
     attributes: dict[str, Shaped[np.ndarray, "N K"]] = {}
     accessors: dict[str, Accessor] = {}
     for name, index in indices.items():
         accessor = document.accessors[index]
         values = read_rows(document, buffers, index, rows)
         if accessor.component_type == FLOAT and not np.isfinite(values).all():
-            raise GltfError(f"{name} holds NaN or infinity", pointer=f"/accessors/{index}")
+            raise GltfError(f"{where}/{name} holds NaN or infinity", pointer=f"/accessors/{index}")
         if name.startswith("WEIGHTS_") and accessor.component_type == FLOAT and (values < 0).any():
-            raise GltfError(f"{name} holds negative weights", pointer=f"/accessors/{index}")
+            raise GltfError(f"{where}/{name} holds negative weights", pointer=f"/accessors/{index}")
         attributes[name], accessors[name] = dequantised(name, values, accessor)
     return attributes, accessors
 
