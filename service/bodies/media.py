@@ -66,10 +66,15 @@ def sniff(data: bytes) -> str:
         return GLB
     if data.startswith(ZIP_MAGIC):
         return ZIP
-    # A slice: a file of nothing but blanks is not to be copied to find that out.
-    if data[:4096].lstrip(b"\xef\xbb\xbf" + BLANK).startswith(b"{"):
+    if begins_as_json(data):
         return GLTF
     raise MediaTypeError("the file is neither a GLB nor glTF JSON, nor a .zip of one")
+
+
+def begins_as_json(data: bytes) -> bool:
+    """Return whether a file begins as a JSON object does."""
+    # A slice: a file of nothing but blanks is not to be copied to find that out.
+    return data[:4096].lstrip(b"\xef\xbb\xbf" + BLANK).startswith(b"{")
 
 
 def mesh_kind_of(name: str) -> Kind | None:

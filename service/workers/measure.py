@@ -10,7 +10,7 @@ import msgspec
 
 from ..bodies.media import Kind
 from ..errors import ServiceError
-from ..gltf.read.container import read_glb
+from ..gltf.read.container import read_container
 from ..gltf.read.json_text import BOM, check_size, json_items
 from ..meshfiles.counted import count_triangles
 from ..options import Limits
@@ -58,7 +58,7 @@ def cost_of_gltf(
     costs no more than its bytes.
     """
     try:
-        text = read_glb(data).text if kind == "glb" else data
+        text = read_container(data, kind).text
         check_size(text, limits)
         counts = msgspec.json.decode(text.removeprefix(BOM), type=_Counts)
     except (ServiceError, msgspec.DecodeError, ValueError):

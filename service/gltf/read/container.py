@@ -6,7 +6,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...bodies.media import GLB_MAGIC
+from ...bodies.media import GLB_MAGIC, begins_as_json
 from ...errors import UnreadableError, check_limit
 from ..constants import BIN_CHUNK, GLB_VERSION, JSON_CHUNK
 
@@ -31,6 +31,16 @@ class Container:
     text: bytes
     binary: memoryview | None = None
     others: tuple[tuple[bytes, memoryview], ...] = ()
+
+
+def read_container(data: bytes, kind: str) -> Container:
+    """Read a .glb, or a .gltf as its text alone; whatever it is called, its first bytes tell.
+
+    Raises as read_glb.
+    """
+    if data.startswith(GLB_MAGIC) or (kind == "glb" and not begins_as_json(data)):
+        return read_glb(data)
+    return Container(text=data)
 
 
 def read_glb(data: bytes) -> Container:

@@ -8,7 +8,7 @@ from ...bodies.media import GLTF_KINDS
 from ...bodies.sibling_files import has_scheme
 from ...errors import ServiceError
 from ...options import Limits
-from .container import Container, read_glb
+from .container import read_container
 from .json_text import decode_object
 
 
@@ -17,7 +17,7 @@ def named_files(data: bytes, kind: str, limits: Limits) -> list[str]:
     if kind not in GLTF_KINDS:
         return []
     try:
-        text = (read_glb(data) if kind == "glb" else Container(text=data)).text
+        text = read_container(data, kind).text
         # Most files hold all that is theirs; an escape could spell the word too.
         if b'"uri"' not in text and b"\\u" not in text:
             return []

@@ -16,7 +16,7 @@ from .checks.references import check_references
 from .checks.refusals import refuse_features, refuse_version
 from .compressed.draco import decode_primitives
 from .compressed.meshopt import decode_views
-from .container import Container, read_glb
+from .container import Container, read_container
 from .images import embed_images
 from .index_references import unknown_extensions
 from .json_text import decode_object, decoded_size
@@ -66,7 +66,7 @@ def read_upload(
     Raises:
         ServiceError: the file is unreadable, wrong, over a limit, or cannot be refined yet.
     """
-    container = read_glb(data) if media == "glb" else Container(text=data)
+    container = read_container(data, media)
     tree = decode_object(container.text, limits)
     document = view(tree)
     refuse_version(document)

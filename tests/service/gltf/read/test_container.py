@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from service.errors import LimitError, UnreadableError
-from service.gltf.read.container import read_glb, write_glb
+from service.gltf.read.container import read_container, read_glb, write_glb
 from tests.support.gltf import files
 
 
@@ -47,6 +47,17 @@ def test_a_foreign_second_chunk_is_not_taken_for_the_binary_one():
     container = read_glb(files.pack(b"{}", others=[(b"XTRA", b"more")]))
     assert container.binary is None
     assert len(container.others) == 1
+
+
+def test_first_bytes_say_which_of_both_a_file_is():
+    binary, text = files.pack(b"{}", b"1234"), b"\xef\xbb\xbf\n {}"
+    for kind in ("glb", "gltf"):
+        assert read_container(binary, kind).binary == b"1234"
+        assert read_container(text, kind).text == text
+    # What is neither is looked at as its name says.
+    assert read_container(b"[]", "gltf").text == b"[]"
+    with pytest.raises(UnreadableError, match="magic"):
+        read_container(b"a text that is no GLB", "glb")
 
 
 WHOLE = files.pack(b"{}", b"1234")
