@@ -84,14 +84,17 @@ def safe_name(uri: str, folder: str = "") -> str | None:
     if has_scheme(uri):
         return None
     # Exporters on Windows write its separators, and browsers take them for slashes too.
-    path, folders = unquote(uri).replace("\\", "/"), folder.split("/") if folder else []
-    while path.startswith("../"):
-        if not folders:
-            return None
-        folders.pop()
-        path = path.removeprefix("../")
-    name = relative_name(path)
-    return None if name is None else "/".join([*folders, name])
+    path, steps = unquote(uri).replace("\\", "/"), folder.split("/") if folder else []
+    if path.startswith("/"):
+        return None
+    for step in path.split("/"):
+        if step not in ("", ".", ".."):
+            steps.append(step)
+        elif step == "..":
+            if not steps:
+                return None
+            steps.pop()
+    return relative_name("/".join(steps))
 
 
 def _spellings(name: str) -> Iterable[str]:
