@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...bodies.sibling_files import Opened
 from ...errors import GltfError
-from .compressed.meshopt import placeholders
+from .compressed.meshopt import needed_buffers
 from .data_uri import data_of, is_data
 from .schema import Buffer, Document
 
@@ -17,15 +17,15 @@ def resolve_buffers(
     A data URI's bytes are fewer than its characters, so the body's limit bounds them too.
 
     Raises:
-        GltfError: no bytes, or fewer than `byteLength` says; a file that did not come, or a URI
-            that leads elsewhere.
+        GltfError: no bytes where views lie, or fewer than `byteLength` says; a file that did not
+            come, or a URI that leads elsewhere.
     """
     resolved: list[memoryview] = []
-    without = placeholders(document)
+    needed = needed_buffers(document)
     for number, buffer in enumerate(document.buffers):
         pointer = f"/buffers/{number}"
         is_binary = number == 0 and binary is not None
-        if buffer.uri is None and not is_binary and number in without:
+        if buffer.uri is None and not is_binary and number not in needed:
             resolved.append(memoryview(b""))
             continue
         content = _content(buffer, binary if number == 0 else None, opened, pointer)

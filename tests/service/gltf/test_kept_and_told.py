@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from service.course import Course
+from service.errors import GltfError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles.example import part_glb
 from service.options import Limits, Options
@@ -201,6 +202,16 @@ def test_buffers_are_joined_where_numbers_of_eight_bytes_may_begin():
     view = after["bufferViews"][len(tree["bufferViews"]) - 1]
     assert view["byteOffset"] % 8 == 0
     assert np.frombuffer(content, "<f8", 1, view["byteOffset"]).tolist() == [1.5]
+
+
+def test_a_buffer_without_bytes_stops_only_what_lies_in_it():
+    tree, binary = files.document([octahedron()])
+    tree["buffers"] = [{"byteLength": len(binary)}, {"byteLength": 8}]
+    assert files.unpack(subdivide(data=files.pack(tree, binary)).glb)[0]["buffers"][1:] == []
+    tree["bufferViews"].append({"buffer": 1, "byteLength": 8})
+    with pytest.raises(GltfError, match="neither a URI nor a BIN chunk") as refusal:
+        subdivide(data=files.pack(tree, binary))
+    assert refusal.value.pointer == "/buffers/1"
 
 
 def test_extras_that_are_no_object_move_and_are_reported():

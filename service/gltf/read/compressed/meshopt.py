@@ -47,12 +47,12 @@ class _Packed:
         return f"/bufferViews/{self.number}/extensions/{self.name}"
 
 
-def placeholders(document: Document) -> set[int]:
-    """Return buffers that may have no bytes, since compressed views only claim to lie in them."""
+def needed_buffers(document: Document) -> set[int]:
+    """Return the buffers that views lie in, but for compressed views, which only claim to."""
     return {
         view.buffer
         for view in document.buffer_views
-        if view.extensions and any(name in view.extensions for name in EXTENSIONS)
+        if view.extensions.keys().isdisjoint(EXTENSIONS)
     }
 
 
