@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,11 +14,13 @@ from ..gltf.read.index_references import INSTANCING
 from ..gltf.read.modes import SURFACES, TRIANGLES
 from ..gltf.read.primitives import TrianglePrimitive, read_primitive
 from ..gltf.read.upload import read_upload
+from ..gltf.refine.skins import read_binding
 from ..meshes.weld import weld
 from ..options import Limits
 from ..report import Change
 from .formats import HOLDS_UV
 from .indexed_triangles import IndexedTriangles
+from .pose import joint_matrices, posed
 
 LOST = ("materials", "textures", "images", "animations", "skins", "cameras", "extensions")
 
@@ -38,16 +39,17 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, li
         ]
         for mesh in upload.plans
     }
+    worlds = _placed_nodes(upload.tree)
     placed = [
-        (primitives[mesh], matrix)
-        for mesh, matrix in _placed_meshes(upload.tree)
-        if mesh in primitives
+        (primitives[mesh], worlds[node], joint_matrices(upload, node, worlds))
+        for node in worlds
+        if (mesh := upload.document.nodes[node].mesh) in primitives
     ]
     if not placed:
         raise UnrefinableError("the default scene shows no triangles")
-    names = [set(p.attributes) for shown, _ in placed for p in shown]
+    names = [set(p.attributes) for shown, *_ in placed for p in shown]
     keeps_uv = kind in HOLDS_UV and all("TEXCOORD_0" in name for name in names)
-    mesh_file = _joined([_placed(shown, matrix, keeps_uv=keeps_uv) for shown, matrix in placed])
+    mesh_file = _joined([_placed(*where, keeps_uv=keeps_uv) for where in placed])
     showing = sum(node.get("mesh") in primitives for node in upload.tree["nodes"])
     changes = _changes(upload.tree, len(placed), names, kind, keeps_uv=keeps_uv)
     if elsewhere := showing - len(placed):
@@ -55,8 +57,8 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, li
     return mesh_file, changes
 
 
-def _placed_meshes(tree: dict[str, Any]) -> Iterator[tuple[int, Float[np.ndarray, "4 4"]]]:
-    """Yield each mesh that the default scene shows, with its node's world matrix."""
+def _placed_nodes(tree: dict[str, Any]) -> dict[int, Float[np.ndarray, "4 4"]]:
+    """Return the world matrices of the default scene's nodes, in the order of its tree."""
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])
     children = set(_children(nodes))
@@ -66,18 +68,16 @@ def _placed_meshes(tree: dict[str, Any]) -> Iterator[tuple[int, Float[np.ndarray
     # A root that is a child too stands where its parent puts it: those without parents come first.
     ordered = sorted(roots, key=lambda root: root in children)
     pending = [(root, np.eye(4)) for root in reversed(ordered)]
-    placed = set[int]()
+    placed: dict[int, Float[np.ndarray, "4 4"]] = {}
     while pending:
         number, above = pending.pop()
         # Once, whatever its parents: n nodes that are twice among the children of one are 2^n.
         if number in placed:
             continue
-        placed.add(number)
         node = nodes[number]
-        world = above @ _local_matrix(node)
-        if "mesh" in node:
-            yield node["mesh"], world
+        placed[number] = world = above @ _local_matrix(node)
         pending += [(child, world) for child in reversed(node.get("children", []))]
+    return placed
 
 
 def _children(nodes: list[dict[str, Any]]) -> list[int]:
@@ -103,19 +103,32 @@ def _local_matrix(node: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
 
 
 def _placed(
-    primitives: list[TrianglePrimitive], matrix: Float[np.ndarray, "4 4"], *, keeps_uv: bool
+    primitives: list[TrianglePrimitive],
+    matrix: Float[np.ndarray, "4 4"],
+    joints: Float[np.ndarray, "J 4 4"] | None,
+    *,
+    keeps_uv: bool,
 ) -> IndexedTriangles:
     """Place one mesh in the world; closed at its seams where nothing is left to tell them by."""
     positions = np.concatenate([p.attributes["POSITION"] for p in primitives]).astype(np.float64)
     faces = disjoint_faces((p.corners, len(p.attributes["POSITION"])) for p in primitives)
     uv = np.concatenate([_uv(p) for p in primitives]) if keeps_uv else None
+    rows = np.arange(len(positions))
     if uv is None:
         welded = weld(positions, faces)
+        used = np.flatnonzero(welded.vertex_of >= 0)[::-1]
+        rows = np.empty(len(welded.points), dtype=np.int64)
+        rows[welded.vertex_of[used]] = used
         positions, faces = welded.points, welded.faces
+    world = positions @ matrix[:3, :3].T + matrix[:3, 3]
+    binding = read_binding(primitives)
+    if joints is not None and binding is not None:
+        world = posed(positions, binding.take(rows), joints, placed=world)
+        matrix = joints[0]
     if np.linalg.det(matrix[:3, :3]) < 0:
         # A mirroring node turns faces over; their order of corners keeps them facing outwards.
         faces = faces[:, ::-1]
-    return IndexedTriangles(positions @ matrix[:3, :3].T + matrix[:3, 3], faces, uv)
+    return IndexedTriangles(world, faces, uv)
 
 
 def _joined(parts: list[IndexedTriangles]) -> IndexedTriangles:
