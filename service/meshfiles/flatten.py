@@ -151,7 +151,7 @@ def _uv(primitive: TrianglePrimitive) -> Float[np.ndarray, "N 2"]:
 def _changes(
     tree: dict[str, Any], placed: int, names: list[set[str]], kind: str, *, keeps_uv: bool
 ) -> list[Change]:
-    # Some of them know more: what they are given is positions, faces and, an OBJ, one set of UVs.
+    # Some of them know more: they are given positions, faces and, OBJ and PLY, one set of UVs.
     why = f": not written to {kind.upper()} files"
     changes = [
         Change(f"/{name}", f"{name} dropped{why}", len(tree[name]))

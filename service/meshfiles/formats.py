@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import trimesh
 
 HOLDS_DOUBLE = frozenset({"obj", "off"})
-HOLDS_UV = frozenset({"obj", *GLTF_KINDS})
+HOLDS_UV = frozenset({"obj", "ply", *GLTF_KINDS})
 
 _OBJ_UV = re.compile(rb"^[ \t]*vt[ \t]", re.MULTILINE)
 _OBJ_PART = re.compile(rb"^[ \t]*(?:usemtl|o|g)(?:[ \t][^\n]*)?$", re.MULTILINE)
@@ -103,6 +103,9 @@ def write(mesh_file: IndexedTriangles, kind: str) -> bytes:
     mesh = load_readers().Trimesh(
         mesh_file.vertices, mesh_file.faces, process=False, validate=False
     )
+    if kind == "ply" and mesh_file.uv is not None:
+        # As Blender and MeshLab name them.
+        mesh.vertex_attributes |= dict(zip("st", mesh_file.uv.astype(np.float32).T, strict=True))
     exported: Any = mesh.export(file_type=kind)  # bytes for these kinds
     return bytes(exported)
 

@@ -98,7 +98,9 @@ def test_what_a_format_cannot_hold_is_said_and_reported(
         assert f"{name} dropped" in outcome.err
     outcome = pns("subdivide", str(part_file), "-o", "out.obj")
     assert "TEXCOORD_0" not in outcome.err
-    outcome = pns("subdivide", "out.obj", "-o", "out.ply", "--diagnostics", "full")
+    outcome = pns("subdivide", "out.obj", "-o", "out.ply")
+    assert "dropped" not in outcome.err
+    outcome = pns("subdivide", "out.ply", "-o", "out.off", "--diagnostics", "full")
     assert "texture coordinates dropped" in outcome.err
     assert "values at vertices dropped" in outcome.err
 
