@@ -22,6 +22,7 @@ from .formats import HOLDS_UV
 from .indexed_triangles import IndexedTriangles
 from .pose import joint_matrices, posed
 
+TRANSFORM = "KHR_texture_transform"
 LOST = ("materials", "textures", "images", "animations", "skins", "cameras", "extensions")
 
 
@@ -175,6 +176,9 @@ def _changes(
     lost = set[str]().union(*names) - {"POSITION"}
     if keeps_uv:
         lost.discard("TEXCOORD_0")
+        if TRANSFORM in tree.get("extensionsUsed", []):
+            what = f"texture coordinates written as they are stored: {TRANSFORM} is not applied"
+            changes.append(Change("/materials", what, 1))
     changes += [
         Change(
             "/meshes",

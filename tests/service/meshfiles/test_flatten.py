@@ -53,6 +53,17 @@ def test_morph_targets_and_instances_that_are_lost_are_told():
     assert told["copies by EXT_mesh_gpu_instancing dropped: not written to STL files"] == 9
 
 
+def test_texture_coordinates_that_a_material_transforms_are_told():
+    tree, binary = files.document([{**octahedron(), "TEXCOORD_0": np.ones((6, 2))}])
+    tree["extensionsUsed"] = ["KHR_texture_transform"]
+    told = {
+        kind: any("KHR_texture_transform is not applied" in change.what for change in changes)
+        for kind in ("obj", "ply", "stl")
+        for _, changes in [flatten(files.pack(tree, binary), kind, Limits())]
+    }
+    assert told == {"obj": True, "ply": True, "stl": False}
+
+
 def test_a_node_with_several_parents_stands_once_and_that_is_told():
     """Each but the last is twice the parent of the next: it stood there a million times."""
     tree, binary = files.document([octahedron()])
