@@ -190,7 +190,11 @@ def _beside_triangles(
             elements = parts[0].metadata["_ply_raw"]
             if polygons is not None:
                 elements["face"]["length"] = polygons
-            return int(elements["face"]["length"]), unsupported.of_ply(elements, has_uv=has_uv)
+            return int(elements["face"]["length"]), unsupported.of_ply(
+                data, elements, has_uv=has_uv
+            )
+        case "stl" if _is_binary_stl(data):
+            return None, unsupported.of_stl(data)
         case _:
             return None, {}
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .ply.header import LONGEST
 from .ply.textured_text import CORNER_UV
 
 _OBJ_STATEMENT = re.compile(rb"^[ \t]*(vn|usemtl|g|o|s|l|p|vp|curv|surf)[ \t]", re.MULTILINE)
@@ -31,6 +32,11 @@ _OBJ_NAMES = {
 }
 _PLY_KEPT = frozenset({"x", "y", "z", "vertex_index", "vertex_indices"})
 _PLY_UV = frozenset({"u", "v", "s", "t", "texture_u", "texture_v"})
+# As MeshLab writes it, in the header.
+_PLY_TEXTURE = re.compile(rb"^comment TextureFile[ \t]", re.MULTILINE)
+# Behind a header, and behind the twelve numbers of each face: by no standard its colour.
+_STL_HEADER = 84
+_STL_FACE = np.dtype([("numbers", "V48"), ("attribute", "<u2")])
 
 
 def of_obj(data: bytes) -> dict[str, int]:
@@ -55,7 +61,14 @@ def unused_in_obj(data: bytes) -> int:
     return len(starts) - len(np.unique(index[(index >= 0) & (index < len(starts))]))
 
 
-def of_ply(elements: dict[str, Any], *, has_uv: bool) -> dict[str, int]:
+def of_stl(data: bytes) -> dict[str, int]:
+    """Count the faces of a binary STL with a colour."""
+    faces = np.frombuffer(data, _STL_FACE, offset=_STL_HEADER)
+    coloured = int(np.count_nonzero(faces["attribute"]))
+    return {"colours of faces": coloured} if coloured else {}
+
+
+def of_ply(data: bytes, elements: dict[str, Any], *, has_uv: bool) -> dict[str, int]:
     """Count, by name, the properties and elements that are passed over."""
     kept = _PLY_KEPT
     if has_uv:
@@ -70,4 +83,6 @@ def of_ply(elements: dict[str, Any], *, has_uv: bool) -> dict[str, int]:
         for name in content["properties"]:
             if name not in kept:
                 counts[f"{element} property {name}"] = int(content["length"])
+    if textures := len(_PLY_TEXTURE.findall(data[:LONGEST].partition(b"\nend_header")[0])):
+        counts["names of textures"] = textures
     return counts

@@ -194,6 +194,12 @@ def test_polygons_are_split_and_counted(kind: str) -> None:
             .replace(b" 0\n", b" 0 255\n"),
             {"vertex property red"},
         ),
+        (
+            "ply",
+            POLYGONS["ply"].replace(b"element", b"comment TextureFile a b.png\nelement", 1),
+            {"names of textures"},
+        ),
+        ("stl", formats.write(part(), "stl")[:-2] + b"\x1f\x80", {"colours of faces"}),
         ("off", POLYGONS["off"].replace(b"OFF", b"COFF"), {"values that COFF adds to vertices"}),
     ],
 )
