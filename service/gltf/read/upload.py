@@ -68,8 +68,8 @@ def read_upload(
     """
     container = read_container(data, media)
     tree = decode_object(container.text, limits)
+    refuse_version(tree)
     document = view(tree)
-    refuse_version(document)
     opened = Opened(siblings)
     buffers = resolve_buffers(document, container.binary, opened)
     original = document

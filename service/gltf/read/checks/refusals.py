@@ -10,7 +10,7 @@ from ...constants import FLOAT, UNSIGNED_BYTE, UNSIGNED_SHORT
 from ..json_text import escaped
 from ..modes import SURFACES
 from ..quantization import allowed, is_dequantised
-from ..schema import Accessor, Document, Primitive
+from ..schema import Accessor, Asset, Document, Primitive, checked
 
 # Extensions of primitives that name vertices or faces by number: refined ones have other numbers.
 _BY_NUMBER = ("CESIUM_primitive_outline", "EXT_mesh_primitive_edge_visibility")
@@ -31,17 +31,19 @@ _DELTAS = {"POSITION": "VEC3", "NORMAL": "VEC3", "TANGENT": "VEC3", "TEXCOORD_n"
 _GEOMETRY = _DELTAS | {"TANGENT": "VEC4", "JOINTS_n": "VEC4", "WEIGHTS_n": "VEC4"}
 
 
-def refuse_version(document: Document) -> None:
+def refuse_version(tree: dict[str, Any]) -> None:
     """Refuse another version of glTF, and what a reader of version 2.0 is not to read.
+
+    It comes before the document has been looked at: nothing else in it need be as in 2.0.
 
     Raises:
         UnsupportedFeature: it is one.
+        GltfError: it does not say.
     """
-    if document.asset.version.partition(".")[0] != "2":
-        raise UnsupportedFeature(
-            f"glTF version {document.asset.version[:16]}", pointer="/asset/version"
-        )
-    least = document.asset.min_version
+    asset = checked(tree.get("asset", {}), Asset, "/asset")
+    if asset.version.partition(".")[0] != "2":
+        raise UnsupportedFeature(f"glTF version {asset.version[:16]}", pointer="/asset/version")
+    least = asset.min_version
     if least is not None and not _AT_MOST_2_0.fullmatch(least):
         what = f"what needs glTF version {least[:16]} at least"
         raise UnsupportedFeature(what, pointer="/asset/minVersion")

@@ -220,6 +220,16 @@ def test_what_cannot_be_refined_yet_is_refused_by_name(path, value, feature):
     assert (refusal.value.status, refusal.value.code) == (422, "unsupported-feature")
 
 
+def test_the_version_is_refused_whatever_else_the_document_has():
+    # As glTF 1.0 wrote it: by names, where 2.0 counts.
+    first = {"asset": {"version": "1.0"}, "accessors": {"a": {}}, "meshes": {}, "scene": "s"}
+    with pytest.raises(UnsupportedFeature, match=r"glTF version 1\.0"):
+        refine(files.pack(first))
+    with pytest.raises(GltfError, match="version") as refusal:
+        refine(files.pack({"meshes": {}}))
+    assert refusal.value.pointer == "/asset"
+
+
 def test_features_that_do_not_go_by_the_numbers_of_vertices_are_taken():
     sets = [{"featureCount": 3, "attribute": 0}, {"featureCount": 3, "texture": {"index": 0}}]
     extensions = {"EXT_mesh_features": {"featureIds": sets}}
