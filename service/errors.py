@@ -40,8 +40,8 @@ class ServiceError(Exception):
         return self.detail if self.pointer is None else f"{self.detail} (at {self.pointer})"
 
     def __reduce__(self) -> tuple[object, ...]:
-        # Errors cross from worker processes: the default reduction would drop pointer and code.
-        return (type(self), (self.detail,), dict(self.__dict__))
+        # Errors cross from worker processes, and are made from other things than their detail.
+        return (_restored, (type(self), dict(self.__dict__)))
 
 
 class UnreadableError(ServiceError):
@@ -59,23 +59,11 @@ class LimitError(ServiceError):
     code = "limit-exceeded"
     title = "The request is over a limit"
 
-    def __init__(
-        self,
-        detail: str,
-        *,
-        limit: str,
-        allowed: int | float,
-        found: int | float,
-        pointer: str | None = None,
-        code: str | None = None,
-    ) -> None:
-        super().__init__(detail, pointer=pointer, code=code)
+    def __init__(self, detail: str, *, limit: str, allowed: float, found: float) -> None:
+        super().__init__(detail)
         self.limit = limit
         self.allowed = allowed
         self.found = found
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return (_restore_limit_error, (type(self), dict(self.__dict__)))
 
 
 class MediaTypeError(ServiceError):
@@ -113,9 +101,6 @@ class UnsupportedFeature(ServiceError):  # noqa: N818
         super().__init__(f"{feature} cannot be refined yet", pointer=pointer)
         self.feature = feature
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return (type(self), (self.feature,), dict(self.__dict__))
-
 
 class UnrefinableError(ServiceError):
     """A mesh that cannot be refined: no triangles, or no face left after cleaning."""
@@ -136,9 +121,6 @@ class InvalidParameter(ServiceError):  # noqa: N818
         super().__init__(detail)
         self.name = name
         self.choices = tuple(choices)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return (type(self), (self.name, self.detail), dict(self.__dict__))
 
 
 class BusyError(ServiceError):
@@ -201,7 +183,8 @@ def check_choice(name: str, value: str, choices: Sequence[str]) -> None:
         raise InvalidParameter(name, text, choices=choices)
 
 
-def _restore_limit_error(kind: type[LimitError], state: dict[str, object]) -> LimitError:
+def _restored(kind: type[ServiceError], state: dict[str, object]) -> ServiceError:
+    """Restore an error that crossed from another process."""
     error = kind.__new__(kind)
     Exception.__init__(error, state["detail"])
     error.__dict__.update(state)

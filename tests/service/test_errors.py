@@ -11,7 +11,7 @@ from service.errors import ServiceError
 EXAMPLES = [
     errors.ServiceError("plain", pointer="/a"),
     errors.UnreadableError("cut off"),
-    errors.LimitError("too many", limit="faces", allowed=1, found=2, pointer="/meshes"),
+    errors.LimitError("too many", limit="faces", allowed=1, found=2),
     errors.MediaTypeError("text/html"),
     errors.GltfError("index 9", pointer="/accessors/3"),
     errors.UnsupportedFeature("a triangle strip", pointer="/meshes/0"),
@@ -45,7 +45,7 @@ def test_no_error_keeps_more_of_an_upload_than_a_page(error):
     if kind is errors.InvalidParameter:
         long = kind("model", "x" * 10**6)
     elif kind is errors.LimitError:
-        long = kind("x" * 10**6, limit="faces", allowed=1, found=2, pointer="/a/" + "b" * 10**6)
+        long = kind("x" * 10**6, limit="faces", allowed=1, found=2)
     elif kind in (errors.BusyError, errors.JobTimeout, errors.WorkerDied):
         long = kind("x" * 10**6)
     else:
