@@ -83,15 +83,15 @@ def by_curvature(gate: Gate) -> FrameGate:
     return of_frames
 
 
-def project_to_ball(vectors: Float[Array, "N 3"], radius: float = 1.0) -> Float[Array, "N 3"]:
-    """Shorten vectors longer than ``radius`` to it, also huge ones; none is lengthened."""
+def project_to_ball(vectors: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
+    """Shorten vectors longer than 1 to that, also huge ones; none is lengthened."""
     xp = namespace(vectors)
     # Dividing by the largest component first keeps the square of a huge vector finite.
     size = xp.abs(vectors)
     largest = xp.maximum(xp.maximum(size[:, 0], size[:, 1]), size[:, 2])
     scale = xp.where(largest > 1, largest, 1.0)[:, None]
     length = norm(vectors / scale)[:, None] * scale
-    return vectors * (radius / xp.where(length > radius, length, radius))
+    return vectors * (1.0 / xp.where(length > 1, length, 1.0))
 
 
 def correct(

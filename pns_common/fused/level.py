@@ -111,7 +111,7 @@ def control_edges(
     return _with_creases(build_edges(in_int32(faces, blocks), vertex_count, blocks), creases)
 
 
-def next_edges(mesh: MeshEdges, blocks: Blocks, *, sharp: bool = True) -> MeshEdges:
+def next_edges(mesh: MeshEdges, blocks: Blocks, *, sharp: bool) -> MeshEdges:
     """Return the edges of the split mesh; children of creases are creases, unless they end here."""
     if not sharp:
         return split_mesh_edges(_without_creases(mesh), blocks)

@@ -125,7 +125,7 @@ def level_report(
     topology: Connectivity,
     step: AddedStep,
     children: ChildAngles,
-    shift: float | None = None,
+    shift: float | None,
     reach: Reach | None = None,
 ) -> LevelReport:
     """Summarise the step that refined ``topology``; ``shift`` is the longest way at creases.
