@@ -53,8 +53,9 @@ def bumpy_sphere(seed: int) -> Mesh:
     return Mesh(directions * bumps, np.asarray(sphere.faces, dtype=np.int64))
 
 
-def bumpy_torus(seed: int, around: int = 12, across: int = 6) -> Mesh:
+def bumpy_torus(seed: int) -> Mesh:
     """Return a torus of 12 × 6 quads, halved: closed and every vertex regular."""
+    around, across = 12, 6
     u, v = (axis.ravel() for axis in np.mgrid[:around, :across])
     phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, 2)
     alpha, beta = 2 * np.pi * u / around, 2 * np.pi * v / across

@@ -24,10 +24,8 @@ LARGEST = 20_000
 AT_MOST = 1 + 1e-12
 
 
-def bounded_displacement(
-    subject: Subject, bodies: Sequence[Body], levels: int = 3, reference_length: float = 1.0
-) -> Certificate:
-    """Certify T1 from output positions and an independent Loop, at every level.
+def bounded_displacement(subject: Subject, bodies: Sequence[Body], levels: int = 3) -> Certificate:
+    """Certify T1 from output positions and an independent Loop, at every level; R is 1.
 
     The value is the largest proximity ratio; positions may be off by their rounding.
     """
@@ -37,11 +35,11 @@ def bounded_displacement(
         for level in range(1, levels + 1):
             if level > 1 and len(mesh.faces) > LARGEST:
                 break
-            refined = refine(mesh, subject.scheme, 1, reference_length, threads=1).mesh
+            refined = refine(mesh, subject.scheme, 1, 1.0, threads=1).mesh
             ratio, place = worst_ratio(
                 mesh,
                 refined.vertices,
-                subject.budget / reference_length,
+                subject.budget,
                 moves_boundaries=subject.scheme.moves_boundaries,
                 wide_bound=subject.scheme.wide_bound,
             )

@@ -63,8 +63,8 @@ def largest_turn(
     return float(np.max(np.where(np.isnan(angle), 180.0, angle), initial=0.0))
 
 
-def limit_distance(subject: Subject, bodies: Sequence[Body], levels: int = 2) -> Certificate:
-    """Certify that the report bounds the distance from Loop's limit surface.
+def limit_distance(subject: Subject, bodies: Sequence[Body]) -> Certificate:
+    """Certify that the report of two levels bounds the distance from Loop's limit surface.
 
     The value is the largest distance between the two limits at common parameters, as a fraction of
     what the report says; and what it says must be no more than the budget's bound.
@@ -72,7 +72,7 @@ def limit_distance(subject: Subject, bodies: Sequence[Body], levels: int = 2) ->
     measured = []
     for body in bodies:
         ours, theirs = (
-            refine(body.mesh, scheme, levels, 1.0, limit=True, threads=1)
+            refine(body.mesh, scheme, 2, 1.0, limit=True, threads=1)
             for scheme in (subject.scheme, loop())
         )
         apart = np.linalg.norm(ours.mesh.vertices - theirs.mesh.vertices, axis=1).max()

@@ -6,7 +6,7 @@ import numpy as np
 
 from train.certificates.certificate import Certificate, Kind
 from train.certificates.subject import Subject
-from train.spectra.spectrum import VALENCES, follow_lift
+from train.spectra.spectrum import follow_lift
 
 # Lift, in spokes.
 HIGHEST = 0.4
@@ -14,7 +14,7 @@ HIGHEST = 0.4
 LIFTS = tuple(np.linspace(0, HIGHEST, 9).tolist())
 
 
-def lifted_stars(subject: Subject, valences: Sequence[int] = VALENCES) -> list[Certificate]:
+def lifted_stars(subject: Subject, valences: Sequence[int]) -> list[Certificate]:
     """Measure the least margin over valences at lift 0.4, and the largest |λ|, which 1 bounds."""
     followed = [(follow_lift(subject.exact, valence, LIFTS)[-1], valence) for valence in valences]
     least, at_least = min(followed, key=lambda entry: entry[0].margin)

@@ -11,7 +11,6 @@ from train.certificates.subject import Subject
 from train.spectra.spectrum import (
     SPOKE,
     TANGENT_COUNT,
-    VALENCES,
     closed_star,
     jacobian,
     loop_eigenvalue,
@@ -36,7 +35,7 @@ EIGENVALUE = 1e-9
 SHARPER_FLAT, SHARPER_EIGENVALUE = 1e-4, 1e-6
 
 
-def planar_spectrum(subject: Subject, valences: Sequence[int] = VALENCES) -> list[Certificate]:
+def planar_spectrum(subject: Subject, valences: Sequence[int]) -> list[Certificate]:
     """Certify T8 for each valence: the derivative, the tangent eigenvalues and the Reif gap."""
     deviations, tangents, gaps = [], [], []
     flat, finest = FLAT, EIGENVALUE

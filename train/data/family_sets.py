@@ -30,11 +30,11 @@ def held_out_families() -> list[Dataset]:
     return [sphere_ridge_held_out(), crossings, tori(), rounded_boxes()]
 
 
-def family_set(name: str, family: Family, count: int = COUNT) -> Dataset:
+def family_set(name: str, family: Family) -> Dataset:
     """Return draws of a family, each on the paper's 9 × 9 patch."""
     rng = np.random.default_rng(TEST_SEED)
     instances = []
-    for index in range(count):
+    for index in range(COUNT):
         drawn = family(rng)
         plane = jittered_grid(TEST_SEED + index, JITTER).double().numpy()
         instances.append(Instance(drawn.surface, Mesh(drawn.lift(plane), grid_faces())))

@@ -15,7 +15,6 @@ from pns_common.refine import refine
 from pns_common.schemes import Scheme
 from train.data.dense_meshes import DenseMesh, is_manifold, largest_part
 from train.metrics.surface_distance import (
-    SAMPLES,
     SURFACE_METRICS,
     SurfaceErrors,
     prepared,
@@ -136,8 +135,8 @@ def euler_characteristic(mesh: Mesh) -> int:
 def compare(
     pairs: Iterable[Pair],
     schemes: Mapping[str, Scheme],
-    levels: Iterable[int] = (2, 3),
-    samples: int = SAMPLES,
+    levels: Iterable[int],
+    samples: int,
 ) -> list[Row]:
     """Refine every coarse mesh by every scheme and measure it against its dense mesh."""
     rows, wanted = [], sorted(levels)

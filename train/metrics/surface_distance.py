@@ -11,9 +11,6 @@ from pns_common.mesh import Mesh
 from train.metrics.faces import point_mesh
 from train.metrics.faces.point_mesh import FaceTree, distances, face_tree, nearest
 
-# Sample points on each of the two surfaces.
-SAMPLES = 10_000
-
 SEED = 0
 
 
@@ -59,7 +56,7 @@ class Surface:
         return float(np.linalg.norm(np.ptp(self.tree.vertices, axis=0)))
 
 
-def prepared(mesh: Mesh, samples: int = SAMPLES) -> Surface:
+def prepared(mesh: Mesh, samples: int) -> Surface:
     """Return a mesh with its tree and so many sample points; the same mesh gives the same ones."""
     return _sampled(face_tree(mesh), samples)
 

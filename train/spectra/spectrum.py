@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 from torch import Tensor
 
+from pns_common.base.arrays import marked
 from pns_common.errors import ParameterError
 from pns_common.geometry.side_lengths import SideLengths
 from pns_common.mesh import Mesh
@@ -217,7 +218,7 @@ def flat_spectrum(
     """
     spectrum = _decomposed(matrix, blocks or (np.eye(len(matrix)),))
     nearest = np.argsort(np.abs(spectrum.values - loop_eigenvalue(valence)), kind="stable")
-    return replace(spectrum, tangent=_among(len(spectrum.values), nearest[:TANGENT_COUNT]))
+    return replace(spectrum, tangent=marked(nearest[:TANGENT_COUNT], len(spectrum.values)))
 
 
 def continued_spectrum(matrix: Float[np.ndarray, "L L"], before: Spectrum) -> Spectrum:
@@ -236,7 +237,7 @@ def continued_spectrum(matrix: Float[np.ndarray, "L L"], before: Spectrum) -> Sp
         own = np.flatnonzero(spectrum.block == block)
         nearest = own[np.argsort(-nearness[own], kind="stable")]
         tangents.append(nearest[:count])
-    return replace(spectrum, tangent=_among(len(spectrum.values), np.concatenate(tangents)))
+    return replace(spectrum, tangent=marked(np.concatenate(tangents), len(spectrum.values)))
 
 
 def follow_lift(scheme: Scheme, valence: int, lifts: Sequence[float]) -> list[Spectrum]:
@@ -263,12 +264,12 @@ def follow_lift(scheme: Scheme, valence: int, lifts: Sequence[float]) -> list[Sp
     return followed
 
 
-def strides(start: float, end: float, growth: float = GROWTH) -> list[float]:
-    """Return the lifts after `start` up to `end`, each `growth` times the one before."""
-    ends, lift = [], max(start * growth, FIRST_LIFT)
+def strides(start: float, end: float) -> list[float]:
+    """Return the lifts after `start` up to `end`, each GROWTH times the one before."""
+    ends, lift = [], max(start * GROWTH, FIRST_LIFT)
     while lift < end:
         ends.append(lift)
-        lift *= growth
+        lift *= GROWTH
     return [*ends, end]
 
 
@@ -289,9 +290,3 @@ def _decomposed(matrix: Float[np.ndarray, "L L"], blocks: tuple[Subspace, ...]) 
         blocks=blocks,
         block=np.repeat(np.arange(len(blocks)), [len(own) for own in values]),
     )
-
-
-def _among(count: int, chosen: Int[np.ndarray, " S"]) -> Bool[np.ndarray, " L"]:
-    marked = np.zeros(count, dtype=bool)
-    marked[chosen] = True
-    return marked

@@ -11,6 +11,8 @@ from train.spectra.stars import Star
 
 # An orthonormal basis of an invariant subspace.
 Subspace = Float[np.ndarray, "M D"]
+# What rounding may take out of a block, of a matrix's largest entry.
+ROUNDING = 1e-7
 
 
 def symmetry_blocks(star: Star, valence: int) -> tuple[Subspace, ...]:
@@ -43,12 +45,10 @@ def symmetry_blocks(star: Star, valence: int) -> tuple[Subspace, ...]:
     return tuple(blocks)
 
 
-def keeps_blocks(
-    matrix: Float[np.ndarray, "M M"], blocks: tuple[Subspace, ...], tolerance: float = 1e-7
-) -> bool:
-    """Return whether a matrix maps every block to itself."""
+def keeps_blocks(matrix: Float[np.ndarray, "M M"], blocks: tuple[Subspace, ...]) -> bool:
+    """Return whether a matrix maps every block to itself, but for rounding."""
     kept = sum(block @ (block.T @ matrix @ block) @ block.T for block in blocks)
-    return bool(np.abs(matrix - kept).max() <= tolerance * np.abs(matrix).max())
+    return bool(np.abs(matrix - kept).max() <= ROUNDING * np.abs(matrix).max())
 
 
 # The first spoke lies on the x axis.
