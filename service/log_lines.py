@@ -38,7 +38,7 @@ class JsonLines(logging.Formatter):
         return json.dumps(fields, default=str).replace("\x7f", "\\u007f")
 
 
-def configure(level: int = logging.INFO) -> None:
+def configure() -> None:
     """Send every logger's lines to stderr as JSON; uvicorn's own among them."""
     logging.config.dictConfig(
         {
@@ -48,8 +48,8 @@ def configure(level: int = logging.INFO) -> None:
             "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
             "root": {"handlers": ["stderr"], "level": logging.WARNING},
             "loggers": {
-                "pns": {"level": level},
-                "uvicorn.error": {"level": level},
+                "pns": {"level": logging.INFO},
+                "uvicorn.error": {"level": logging.INFO},
             },
         }
     )

@@ -9,13 +9,11 @@ from ..bodies import media
 BYTES = "application/octet-stream"
 
 
-def answer_type(request: Request, *, report: bool = False) -> str:
-    """Return the media type that the client wants most; `report` where the route has nothing else.
+def answer_type(request: Request) -> str:
+    """Return the media type that the client wants most.
 
     Generated clients know a file by `application/octet-stream` alone, and may ask for that.
     """
-    if report:
-        return media.JSON
     accept = request.headers.get("accept", "*/*")
     # In the order of preference among equals.
     return max((media.GLB, media.JSON, BYTES), key=lambda kind: media.quality(kind, accept))

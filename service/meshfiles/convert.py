@@ -110,7 +110,7 @@ def converted(
 
 
 def predicted_faces(
-    data: bytes, kind: str, options: Options, limits: Limits, siblings: SiblingFiles = ALONE
+    data: bytes, kind: str, options: Options, limits: Limits, siblings: SiblingFiles
 ) -> int:
     """Return how many faces the refined file will have, found without refining.
 

@@ -111,7 +111,7 @@ def run_large(
 
         def tasks(
             stage: str,
-            counts: tuple[str, ...] = (),
+            counts: tuple[str, ...],
             vertices: tuple[int, ...] = (),
             target: Target | Tiles | None = None,
             edged: bool | None = None,
