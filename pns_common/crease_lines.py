@@ -28,6 +28,7 @@ from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh, check_is_mesh
 
 LINES = Creases(line_angle=CREASE_ANGLE, levels=CREASE_LEVELS, edged_angle=EDGED_ANGLE)
+NO_PAIRS = np.zeros((0, 2), dtype=np.int64)
 
 
 def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2"]:
@@ -42,20 +43,10 @@ def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2
         ParameterError: it is no Mesh, or the angle is out of range.
     """
     check_is_mesh(mesh)
-    if angle is None:
-        return lines_on(mesh, LINES)
-    if not (is_number(angle) and 0 < angle < 180):
+    if not (angle is None or (is_number(angle) and 0 < angle < 180)):
         raise ParameterError("angle", angle, expected="degrees between 0 and 180")
-    return lines_on(mesh, Creases(line_angle=float(angle)))
-
-
-def lines_on(mesh: Mesh, creases: Creases) -> Int[np.ndarray, "N 2"]:
-    """Return the lines that creases say to look for, beside those that they name.
-
-    Raises:
-        ParameterError: one that is named is no edge of the mesh.
-    """
-    return _look(mesh.vertices, mesh.faces, creases.named).lines(creases)
+    asked = LINES if angle is None else Creases(line_angle=float(angle))
+    return _look(mesh.vertices, mesh.faces, None).lines(asked)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,52 +113,47 @@ def _look(
     )
 
 
-def named_on(mesh: Mesh, creases: Creases) -> Creases:
-    """Return creases with the lines that they look for found on a mesh, by name."""
-    if creases.line_angle is None:
-        return creases
-    return _with_names(creases, lines_on(mesh, creases))
+def named_on(mesh: Mesh, creases: Creases, smooth: Int[np.ndarray, "N 2"] = NO_PAIRS) -> Creases:
+    """Return creases with the lines that they look for found on a mesh, by name.
+
+    Lines that it has for being edged alone are none where they are ``smooth``, as was said of them.
+    """
+    part_of_face = np.zeros(len(mesh.faces), dtype=np.int64)
+    return named_on_parts(mesh, creases, part_of_face, 1, smooth)
 
 
 def named_on_parts(
-    mesh: Mesh, creases: Creases, part_of_face: Int[np.ndarray, " F"], count: int
+    mesh: Mesh,
+    creases: Creases,
+    part_of_face: Int[np.ndarray, " F"],
+    count: int,
+    smooth: Int[np.ndarray, "N 2"] = NO_PAIRS,
 ) -> Creases:
     """Return the same of a mesh of so many parts that share no vertex, each edged or not."""
-    is_known = creases.edged_angle is None or creases.edged is not None
-    if creases.line_angle is None or is_known or count == 1:
-        return named_on(mesh, creases)
+    if creases.line_angle is None:
+        return creases
     look = _look(mesh.vertices, mesh.faces, creases.named)
-    edged = _edged(look.turns(creases, part_of_face, count))
+    if creases.edged_angle is None or (count == 1 and len(smooth) == 0):
+        return _with_lines(creases, look.lines(creases))
+    edged = np.full(count, bool(creases.edged))
+    if creases.edged is None:
+        edged = _edged(look.turns(creases, part_of_face, count))
     lines = look.lines(replace(creases, edged=False))
     if edged.any():
         part_of_vertex = np.zeros(len(mesh.vertices), dtype=np.int64)
         part_of_vertex[mesh.faces] = part_of_face[:, None]
         gentle = look.lines(replace(creases, edged=True))
+        keys = [pair_keys(pairs, len(mesh.vertices)) for pairs in (gentle, lines, smooth)]
+        gentle = gentle[np.isin(keys[0], keys[1]) | ~np.isin(keys[0], keys[2])]
         in_edged = [edged[part_of_vertex[pairs[:, 0]]] for pairs in (lines, gentle)]
         lines = np.concatenate([lines[~in_edged[0]], gentle[in_edged[1]]])
-    return _with_names(creases, lines)
+    return _with_lines(creases, lines)
 
 
-def _with_names(creases: Creases, lines: Int[np.ndarray, "N 2"]) -> Creases:
+def _with_lines(creases: Creases, lines: Int[np.ndarray, "N 2"]) -> Creases:
     """Return the creases that are named, and the lines, as creases by name."""
     named = lines if creases.named is None else np.concatenate([creases.named, lines])
     return Creases(named, levels=creases.levels)
-
-
-def without_gentle(
-    creases: Creases, mesh: Mesh, asked: Creases, smooth: Int[np.ndarray, "N 2"]
-) -> Creases:
-    """Return named lines without those that are in ``smooth`` too, and in no mesh but edged ones.
-
-    ``asked`` is what they were looked for by; what that names stays.
-    """
-    kept = named_on(mesh, replace(asked, edged=False))
-    assert creases.named is not None
-    assert kept.named is not None
-    count = len(mesh.vertices)
-    keys = [pair_keys(pairs, count) for pairs in (creases.named, kept.named, smooth)]
-    gone = np.isin(keys[0], keys[2]) & ~np.isin(keys[0], keys[1])
-    return replace(creases, named=creases.named[~gone])
 
 
 def turns_of_parts(

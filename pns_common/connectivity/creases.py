@@ -53,6 +53,13 @@ class Creases:
         if self.edged is not None and not is_bool(self.edged):
             raise ParameterError("edged", self.edged, expected="True, False or None")
 
+    def with_named(self, pairs: Int[np.ndarray, "N 2"]) -> Creases:
+        """Return the same with further pairs of vertices named."""
+        if len(pairs) == 0:
+            return self
+        named = pairs if self.named is None else np.concatenate([pairs, self.named])
+        return replace(self, named=named)
+
     def sharp_at(self, depth: int) -> bool:
         """Return whether they are sharp at a level; 0 is the control mesh's."""
         return self.levels is None or depth < self.levels

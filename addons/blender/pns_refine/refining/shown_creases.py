@@ -5,13 +5,11 @@ And borders of materials on its flat sides, which the shape does not show.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from jaxtyping import Bool, Int, Shaped
 
 from pns_common import Creases, Mesh
-from pns_common.crease_lines import named_on, without_gentle
+from pns_common.crease_lines import named_on
 from pns_common.flat_borders import flat_borders
 from pns_common.fused.interior_edges import interior_edges
 from pns_common.geometry.shaded_smooth import shaded_smooth
@@ -27,26 +25,23 @@ def shown_creases(snapshot: Snapshot, asked: Creases) -> Creases:
     if asked.line_angle is None:
         return asked
     shown = _lines_and_hard_edges(snapshot, asked)
-    assert shown.named is not None
     material = _values(snapshot, "material_index", Domain.FACE)
     if material is None:
         return shown
     borders = flat_borders(snapshot.points, snapshot.triangles, material[snapshot.polygons])
-    return replace(shown, named=np.concatenate([borders, shown.named]))
+    return shown.with_named(borders)
 
 
 def _lines_and_hard_edges(snapshot: Snapshot, asked: Creases) -> Creases:
     mesh = Mesh(snapshot.points, snapshot.triangles)
-    lines = named_on(mesh, asked)
     edges, faces, hard = shaded_edges(snapshot)
     if not hard.any():
-        return lines
+        return named_on(mesh, asked)
     # Who said of some edges that they are hard meant others to be round.
-    lines = without_gentle(lines, mesh, asked, edges[~hard])
+    lines = named_on(mesh, asked, edges[~hard])
     if not shaded_smooth(snapshot.points, snapshot.triangles, faces, ~hard)[0]:
         return lines
-    assert lines.named is not None
-    return replace(lines, named=np.concatenate([edges[hard], lines.named]))
+    return lines.with_named(edges[hard])
 
 
 def shaded_edges(
