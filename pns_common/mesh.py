@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pns_common.base.arrays import marked
 from pns_common.base.extent import extent
 from pns_common.errors import MeshError, ParameterError
 
@@ -136,8 +137,7 @@ def clean(mesh: Mesh) -> Cleaned:
     face_map[proper[is_leader]] = number[is_leader]
 
     kept = np.take(mesh.faces, proper[is_leader], axis=0)
-    used = np.zeros(len(mesh.vertices), dtype=bool)
-    used[kept] = True
+    used = marked(kept.reshape(-1), len(mesh.vertices))
     vertex_map = np.where(used, np.cumsum(used) - 1, -1)
     same = len(kept) == len(mesh.faces) and used.all()
     return Cleaned(

@@ -113,8 +113,7 @@ def build_topology(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Topology
     first, second = order[run_start], order[np.minimum(run_start + 1, len(key) - 1)]
 
     # Number the edges by their first half-edge.
-    is_first = np.zeros(len(key), dtype=bool)
-    is_first[first] = True
+    is_first = marked(first, len(key))
     number = np.take(np.cumsum(is_first), first) - 1
     edge_of = np.empty(len(key), dtype=np.int64)
     edge_of[order] = np.repeat(number, count)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pns_common.base.arrays import marked
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import EdgeClass
 from pns_common.formula.side_gate import GENTLE_TO_SHARP, widest, with_neighbours
@@ -52,9 +53,7 @@ def measure_bends(
     blocks.run(len(bends), face_bends.over(mesh.face_edges, jumps, gentle, sharp, ROWS, bends))
     boundary = mesh.sharp_edges[mesh.edge_class[mesh.sharp_edges] == EdgeClass.BOUNDARY]
     # By marks: for its ``unique`` numpy loads a module, 8 ms of a first call.
-    at_boundary = np.zeros(len(bends), dtype=bool)
-    at_boundary[mesh.half_edges[boundary, 0] // 3] = True
-    rows = np.flatnonzero(at_boundary)
+    rows = np.flatnonzero(marked(mesh.half_edges[boundary, 0] // 3, len(bends)))
     faces = with_neighbours(rows, mesh.face_edges, mesh.half_edges, mesh.edge_class)
     bends[rows] = widest(bends, faces)
     return bends

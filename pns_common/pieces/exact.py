@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import cross, dot, norm
+from pns_common.base.arrays import cross, dot, marked, norm
 from pns_common.geometry.frames import NO_AREA
 
 # Beside the rounding of a few products; angles are not that near to θ by chance.
@@ -52,8 +52,7 @@ def guarded_exact(
             is not known.
         angle: θ of the guard, radians.
     """
-    unknown = np.zeros(len(loop), dtype=bool)
-    unknown[children[~exact].reshape(-1)] = True
+    unknown = marked(children[~exact].reshape(-1), len(loop))
     seen = ~exact
     while True:
         front = np.flatnonzero(unknown[children].any(axis=1) & ~seen)

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from pns_common.base.arrays import marked
 from pns_common.base.distinct import as_words, distinct_rows, number_by_first_appearance
 from pns_common.connectivity.creases import Creases, pair_keys
 from pns_common.connectivity.topology import EdgeClass, Topology, split
@@ -82,6 +83,5 @@ def _chart_vertices(
 ) -> Float[np.ndarray, "V 2"]:
     """Move vertices inside by Loop's rule; on a boundary they stay, as in linear blending."""
     rim = (topology.edge_class != EdgeClass.INTERIOR) & (topology.edge_class != EdgeClass.CREASE)
-    at_rim = np.zeros(len(columns), dtype=bool)
-    at_rim[topology.edges[rim]] = True
+    at_rim = marked(topology.edges[rim].reshape(-1), len(columns))
     return np.where(at_rim[:, None], columns, loop_vertex_vertices(columns, topology))

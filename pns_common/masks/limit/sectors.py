@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int
 
+from pns_common.base.arrays import marked
 from pns_common.connectivity.topology import Topology, across_from_corners
 
 
@@ -46,8 +47,7 @@ def sectors(topology: Topology) -> Sectors:
         label = np.minimum(label, label[np.where(hop >= 0, hop, corners)])
         hop = np.where(hop >= 0, hop[hop], -1)
     is_closed = hop >= 0
-    follows = np.zeros(len(before), dtype=bool)
-    follows[before[before >= 0]] = True
+    follows = marked(before[before >= 0], len(before))
     before[is_closed & (label == corners)] = -1
 
     rank = (before >= 0).astype(np.int64)

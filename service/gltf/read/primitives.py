@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int, Shaped
 
+from pns_common.base.arrays import marked
 from pns_common.base.distinct import as_words, distinct_rows, number_by_first_appearance
 
 from ...errors import GltfError, UnsupportedFeature
@@ -121,8 +122,7 @@ def compact(
     if count > 8 * len(indices):
         used = np.unique(indices)
         return used, np.searchsorted(used, indices)
-    flags = np.zeros(count, dtype=bool)
-    flags[indices] = True
+    flags = marked(indices, count)
     return np.flatnonzero(flags), (np.cumsum(flags) - 1)[indices]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int
 
+from pns_common.base.arrays import marked
 from pns_common.connectivity.topology import next_corner
 from pns_common.fused.interior_edges import interior_edges
 from pns_common.mesh import Cleaned
@@ -53,9 +54,7 @@ def without_one_normal(cleaned: Cleaned, labels: Int[np.ndarray, "F 3"]) -> Bool
     of_vertex = np.empty(len(cleaned.mesh.vertices), dtype=label.dtype)
     of_vertex[faces] = label
     others = (of_vertex[faces] != label) | (label == NO_NORMAL)
-    found = np.zeros(len(of_vertex), dtype=bool)
-    found[faces[others]] = True
-    return found
+    return marked(faces[others], len(of_vertex))
 
 
 def shading_of(

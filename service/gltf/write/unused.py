@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Int
 
+from pns_common.base.arrays import marked
+
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Document
 
@@ -37,9 +39,7 @@ class VertexUse:
                 rows = primitive.rows
                 # A primitive's rows are those that its faces name.
                 if not keep.all():
-                    used = np.zeros(len(rows), dtype=bool)
-                    used[primitive.corners[keep]] = True
-                    rows = rows[used]
+                    rows = rows[marked(primitive.corners[keep].reshape(-1), len(rows))]
                 self.rows[source.attributes["POSITION"]].append(rows)
 
     def unused(self) -> int:

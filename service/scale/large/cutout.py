@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
+from pns_common.base.arrays import marked
 from pns_common.connectivity.creases import Creases, pair_keys
 from pns_common.pieces import Piece
 
@@ -34,8 +35,7 @@ def cutout(mesh: ArrayMesh, adjacency: Adjacency, own: Int[np.ndarray, " N"], ri
     corners = np.asarray(mesh.faces[faces], dtype=np.int64)
     vertices, local = np.unique(corners, return_inverse=True)
     local = local.reshape(-1, 3)
-    is_own = np.zeros(len(faces), dtype=bool)
-    is_own[np.searchsorted(faces, own)] = True
+    is_own = marked(np.searchsorted(faces, own), len(faces))
     points = np.asarray(mesh.positions[vertices], dtype=np.float64)
     whole = whole_vertices(adjacency, vertices, local)
     piece = Piece(points, local, is_own, whole, Creases(_local_creases(mesh, vertices, local)))
