@@ -41,11 +41,11 @@ def router(prefix: str = "") -> APIRouter:
     """
     routes = APIRouter(include_in_schema=False)
 
-    @routes.api_route("/", methods=["GET", "HEAD"])
+    @routes.get("/")
     def page(request: Request) -> Response:
         return answer(request, _page(prefix), POLICY)
 
-    @routes.api_route("/assets/{name}", methods=["GET", "HEAD"])
+    @routes.get("/assets/{name}")
     def asset(request: Request, name: str) -> Response:
         path = f"assets/{name}"
         if path not in _paths():

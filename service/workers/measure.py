@@ -12,6 +12,7 @@ from ..bodies.media import Kind
 from ..errors import ServiceError
 from ..gltf.read.container import read_container
 from ..gltf.read.json_text import BOM, check_size, json_items
+from ..gltf.read.modes import SURFACES, TRIANGLES
 from ..meshfiles.counted import count_triangles
 from ..options import Limits
 from .costs import Cost, cost_of
@@ -24,8 +25,6 @@ LEAST_VALUES = 1_000
 # A further set of joints costs as many other attributes: each vertex mixes all of its neighbours'.
 VALUES_PER_FURTHER_SET = 100
 
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
-
 
 class _Accessor(msgspec.Struct):
     count: int = 0
@@ -34,7 +33,7 @@ class _Accessor(msgspec.Struct):
 class _Primitive(msgspec.Struct):
     attributes: dict[str, int] = {}
     indices: int | None = None
-    mode: int = _TRIANGLES
+    mode: int = TRIANGLES
     targets: list[dict[str, int]] = []
 
 
@@ -105,6 +104,6 @@ def _triangles(primitive: _Primitive, accessors: list[_Accessor]) -> int:
     if not 0 <= index < len(accessors):
         return 0
     corners = max(accessors[index].count, 0)
-    if primitive.mode == _TRIANGLES:
+    if primitive.mode == TRIANGLES:
         return corners // 3
-    return max(corners - 2, 0) if primitive.mode in (_STRIP, _FAN) else 0
+    return max(corners - 2, 0) if primitive.mode in SURFACES else 0

@@ -133,7 +133,7 @@ class Skin(Part, frozen=True):
 
 
 class Image(Part, frozen=True):
-    """`images[]`; its `uri` is never followed."""
+    """`images[]`; its `uri` is followed to files that came with the document alone."""
 
     buffer_view: Index | None = None
     uri: str | None = None
