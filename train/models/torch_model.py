@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from pns_common.errors import ModelError
 from pns_common.models.card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
+from train.models.checkpoint import joined_state
 from train.models.networks import BoundedNet, unit_correction
 from train.models.recipes import Recipe
 
@@ -30,10 +31,7 @@ class TorchModel:
     @property
     def hash(self) -> str:
         """The sha256 of the weights."""
-        weights = dict(self.network.state_dict())
-        if self.vertex_network is not None:
-            extra = self.vertex_network.state_dict()
-            weights |= {f"vertex.{name}": tensor for name, tensor in extra.items()}
+        weights = joined_state(self.network, self.vertex_network)
         return hashlib.sha256(safetensors.torch.save(weights)).hexdigest()
 
     def __call__(
