@@ -36,6 +36,16 @@ class DoubledFaces:
     collapsed: Int[np.ndarray, " N"]
 
 
+def is_plain(topology: Topology) -> bool:
+    """Return whether no face has a vertex twice and no two have the same three."""
+    if repeated_vertex(topology.faces).any():
+        return False
+    # Two faces with two sides in common have all three.
+    sides = np.sort(topology.face_edges, axis=1)
+    pairs = np.sort(sides[:, 0] * np.int64(len(topology.edges)) + sides[:, 1])
+    return not (pairs[1:] == pairs[:-1]).any()
+
+
 def doubled_faces(topology: Topology) -> DoubledFaces | None:
     """Return where faces lie on each other; None where none do."""
     # Two faces on one edge lie on each other where both have one vertex opposite; where more do,

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.doubled_faces import is_plain
 from pns_common.connectivity.topology import build_topology
 from pns_common.fused.freed_memory import make_room
 from pns_common.fused.kernels.children import (
@@ -29,7 +30,6 @@ from pns_common.fused.kernels.edges import (
     count_ends,
 )
 from pns_common.fused.kernels.owned import PASSED_BY
-from pns_common.mesh import repeated_vertex
 
 # Steps along chains that an edge may take on average: more, and a sort is as fast.
 STEPS = 32
@@ -195,10 +195,6 @@ def _sorted_edges(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> MeshEdges
         lone, NONE, np.where(half_edges[:, 1] < 0, SEVERAL, half_edges[:, 1])
     )
     half_edges[:, 0] = np.unique(edge_of, return_index=True)[1]
-    # Two faces with two edges in common have all three.
-    three = np.sort(topology.face_edges, axis=1)
-    pairs = np.sort(three[:, 0] * len(half_edges) + three[:, 1])
-    repeated = bool((pairs[1:] == pairs[:-1]).any() or repeated_vertex(faces).any())
     return MeshEdges(
         vertex_count,
         faces,
@@ -206,5 +202,5 @@ def _sorted_edges(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> MeshEdges
         topology.face_edges.astype(np.int32),
         half_edges,
         topology.edge_class,
-        plain=not repeated,
+        plain=is_plain(topology),
     )

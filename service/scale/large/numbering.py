@@ -17,9 +17,9 @@ import numpy as np
 from jaxtyping import Int
 
 from pns_common.base.distinct import first_places
+from pns_common.connectivity.doubled_faces import is_plain
 from pns_common.connectivity.topology import Topology, build_topology
 from pns_common.masks.linear import level_topologies
-from pns_common.mesh import repeated_vertex
 from pns_common.pieces import Piece
 
 from .arrays import blocks_of, finished_array, let_go
@@ -37,7 +37,7 @@ def shown_first(piece: Piece, levels: int) -> Int[np.ndarray, "N L"]:
     topology = build_topology(piece.faces, len(piece.points))
     shown = np.empty((int(piece.own.sum()), levels), dtype=np.int64)
     shown[:, 0] = _openers(topology, len(piece.faces))[piece.own]
-    if levels > 1 and not _is_plain(topology):
+    if levels > 1 and not is_plain(topology):
         finer = level_topologies(piece.faces, len(piece.points), levels)
         for level in range(1, levels):
             shown[:, level] = _openers(finer[level], len(piece.faces))[piece.own]
@@ -111,13 +111,3 @@ def _openers(topology: Topology, control_faces: int) -> Int[np.ndarray, " F"]:
     first = first_places(topology.face_edges.reshape(-1), len(topology.edges))
     share = topology.face_edges.size // control_faces
     return np.bincount(first // share, minlength=control_faces)
-
-
-def _is_plain(topology: Topology) -> bool:
-    """Return whether no face repeats a vertex and no two faces have the same three."""
-    if repeated_vertex(topology.faces).any():
-        return False
-    # Two faces with two edges in common have all three.
-    three = np.sort(topology.face_edges, axis=1)
-    pairs = np.sort(three[:, 0] * len(topology.edges) + three[:, 1])
-    return not (pairs[1:] == pairs[:-1]).any()
