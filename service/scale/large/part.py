@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Int
 
 from pns_common.base.whole_file import replace_file, replacing
-from pns_common.connectivity.creases import NO_CREASES, Creases
+from pns_common.connectivity.creases import NO_CREASES
 from pns_common.crease_lines import turns_of_parts
 from pns_common.errors import PnsError
 from pns_common.fused import kernel_blocks, load_kernels
@@ -235,9 +235,7 @@ def with_angle_creases(piece: Piece, angle: float | None) -> Piece:
     if angle is None:
         return piece
     sharp = edges_sharper_than(piece.points, piece.faces, angle)
-    given = piece.creases.named
-    creases = sharp if given is None else np.concatenate([given, sharp])
-    return replace(piece, creases=Creases(creases))
+    return replace(piece, creases=piece.creases.with_named(sharp))
 
 
 @cache

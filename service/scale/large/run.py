@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -109,33 +109,39 @@ def run_large(
             # Where they are not compiled yet: here once, not in each worker.
             load_kernels()
 
-        def tasks(
-            stage: str,
-            counts: tuple[str, ...],
-            vertices: tuple[int, ...] = (),
-            target: Target | Tiles | None = None,
-            edged: bool | None = None,
-        ) -> list[PartTask]:
-            folders = str(mesh.folder.resolve()), str(work.resolve())
-            memory = None if large.parts else large.memory
-            what = large.options, large.model, length, about.sides
-            known = counts, vertices, target, memory, edged
-            return [
-                PartTask(stage, part, parts, *folders, *what, *known)
-                for part in range(parts)
-                if not done_file(work, stage, part).exists()
-            ]
+        def tasks(stage: str, **known: Any) -> list[PartTask]:
+            task = PartTask(
+                stage=stage,
+                part=0,
+                parts=parts,
+                mesh=str(mesh.folder.resolve()),
+                work=str(work.resolve()),
+                options=large.options,
+                model=large.model,
+                length=length,
+                sides=about.sides,
+                memory=None if large.parts else large.memory,
+                **known,
+            )
+            left = (part for part in range(parts) if not done_file(work, stage, part).exists())
+            return [replace(task, part=part) for part in left]
 
         gentle = mesh.creases is None and lines_of(large.options, scheme).edged_angle is not None
         counts = (EDGES,) * kind.numbered + (TURNS,) * gentle
         with spent.stage("count"):
             if counts:
-                _do(tasks(COUNT, counts), parts, engine, console, Spent())
+                _do(tasks(COUNT, counts=counts), parts, engine, console, Spent())
             vertices = _numbered(about, parts, large.options.levels, work) if kind.numbered else ()
             edged = is_edged(*_turns(parts, work)) if gentle else None
         target = _target(kind, mesh, about, vertices, large.options.levels, work)
         with spent.stage("refine"):
-            _do(tasks(REFINE, (), vertices, target, edged), parts, engine, console, spent)
+            _do(
+                tasks(REFINE, vertices=vertices, target=target, edged=edged),
+                parts,
+                engine,
+                console,
+                spent,
+            )
         with spent.stage("finish"):
             done = [kept(done_file(work, REFINE, part)) for part in range(parts)]
             fitted = scheme.fitted(lambda: about.sides)
