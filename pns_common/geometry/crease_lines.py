@@ -22,9 +22,10 @@ have to go on without gentler ones, as elsewhere (an armpit is round), and those
 are lines only if
 
 4. *it stands alone*: not on both of its sides is there another edge like it, which runs within 20
-   degrees of parallel and turns the same way, with a third to three times its 1 − cos t; one that
+   degrees of parallel and turns the same way, with a quarter to three times its 1 − cos t; one that
    goes on from its end is not beside it. A row of such edges is a tube or an arc: one of seven
-   sides or more stays round, as a barrel does, where its walls are quads cut in two.
+   sides or more stays round, as a barrel does, where its walls are quads cut in two. So does a
+   fillet of three pieces or more, whose arc begins and ends with half the turn of those between.
 
 Both numbers are counts: a mesh in pieces has the same. Turning, moving, scaling or renumbering a
 mesh does not change the answer, nor does mirroring it with its faces turned, but where rounding
@@ -54,9 +55,10 @@ EDGED_ANGLE, EDGED_ONE_IN = 21.0, 2
 # Degrees beyond which an edge of an edged mesh need not stand alone: between the turns of a hexagon
 # and a heptagon.
 ROW_ANGLE = 55.0
-# Edges are like one another within 20 degrees of parallel, and where 1 − cos t is at most so many
-# times the other's: of 45 degrees 30 and 60 are like, and 90 is not.
-PARALLEL, ALIKE = math.cos(math.radians(20)), 3.0
+# Others are like an edge within 20 degrees of parallel, and where their 1 − cos t is at most so
+# many times its own, and its own so many times theirs: of 45 degrees 30 and 60 are like, and 90 is
+# not. Half as many degrees are always like: their 1 − cos t is more than a quarter.
+PARALLEL, TIMES_ITS_OWN, TIMES_THEIRS = math.cos(math.radians(20)), 3.0, 4.0
 ROUNDS = 5
 # Edges whose surroundings are looked at together.
 AT_ONCE = 8192
@@ -252,7 +254,7 @@ def _like(
     along = dot(other, own[:, None])
     parallel = along * along >= PARALLEL**2 * (dot(other, other) * dot(own, own)[:, None])
     bend, bends = (1 - turn)[:, None], 1 - cosines
-    as_far = (bends <= ALIKE * bend) & (bend <= ALIKE * bends)
+    as_far = (bends <= TIMES_ITS_OWN * bend) & (bend <= TIMES_THEIRS * bends)
     same_way = _rises(points, normals, mesh, seen) == _rises(points, normals, mesh, flat)[:, None]
     ends, own_ends = mesh.edges[seen], mesh.edges[flat][:, None]
     starts, stops = (ends == own_ends).any(axis=-1), (ends == own_ends[..., ::-1]).any(axis=-1)

@@ -20,7 +20,7 @@ from pns_common.fused.kernels.compiled import (
 )
 from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.rings import between, divisor, dot, row
-from pns_common.geometry.crease_lines import ALIKE, CORNER, ROUNDS
+from pns_common.geometry.crease_lines import CORNER, ROUNDS, TIMES_ITS_OWN, TIMES_THEIRS
 
 
 def normals_beside(normals, half_edges, edge_class, e):
@@ -99,7 +99,7 @@ def _is_like(points, normals, faces, edges, half_edges, edge_class, parallel, e,
     if other == e or edge_class[other] != INTERIOR:
         return False
     bend, its_bend = 1 - turn, 1 - _cosine(normals, half_edges, edge_class, other)
-    if not (its_bend <= ALIKE * bend and bend <= ALIKE * its_bend):
+    if not (its_bend <= TIMES_ITS_OWN * bend and bend <= TIMES_THEIRS * its_bend):
         return False
     own = between(points, edges[e, 0], edges[e, 1])
     its = between(points, edges[other, 0], edges[other, 1])

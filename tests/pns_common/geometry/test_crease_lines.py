@@ -123,6 +123,19 @@ def test_an_edge_is_not_beside_one_that_goes_on_from_it(rows):
     assert len(lines(mesh, WITH_GENTLE)) == 2 * n + 5 * rows
 
 
+@pytest.mark.parametrize("pieces", [2, 3, 4])
+def test_fillets_of_three_pieces_or_more_stay_round(pieces):
+    """An arc from one flat side to the next, of which a piece turns into a side by half as much."""
+    angles = np.radians(np.linspace(0, 90, pieces + 1)) + np.radians([[0], [90], [180], [270]])
+    centres = np.array([[2, 1], [-2, 1], [-2, -1], [2, -1]])
+    arcs = centres[:, None] + np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    profile = arcs.reshape(-1, 2)
+    rims = 2 * len(profile)
+    # Where an arc of two pieces meets its sides it turns by more than 21 degrees.
+    at_ends = 8 if pieces == 2 else 0
+    assert len(lines(prism(profile), WITH_GENTLE)) == rims + at_ends
+
+
 def test_a_mesh_is_edged_where_half_of_its_turns_are_sharp():
     assert is_edged(1, 2)
     assert not is_edged(1, 3)
