@@ -21,11 +21,13 @@ round.) There, edges beyond θ' are lines too with the marks 2 and 3. But those 
 have to go on without gentler ones, as elsewhere (an armpit is round), and those up to 55 degrees
 are lines only if
 
-4. *it stands alone*: not on both of its sides is there another edge like it, which runs within 20
-   degrees of parallel and turns the same way, with a quarter to three times its 1 − cos t; one that
-   goes on from its end is not beside it. A row of such edges is a tube or an arc: one of seven
-   sides or more stays round, as a barrel does, where its walls are quads cut in two. So does a
-   fillet of three pieces or more, whose arc begins and ends with half the turn of those between.
+4. *it stands alone*: it is not in a row. Edges in a row have walls on both sides that are about as
+   wide, and across each of these another edge like it, which runs within 20 degrees of parallel
+   and turns the same way, with a quarter to three times its 1 − cos t; one that goes on from its
+   end is not beside it. A row ends where walls of one width meet a sharper edge, whichever way
+   that turns. A row is a tube or an arc: one of seven sides or more stays round, as a barrel does,
+   where its walls are quads cut in two. So does a fillet of three pieces or more, whose arc begins
+   and ends with half the turn of those between. But the chamfers of a bar are no row.
 
 Both numbers are counts: a mesh in pieces has the same. Turning, moving, scaling or renumbering a
 mesh does not change the answer, nor does mirroring it with its faces turned, but where rounding
@@ -42,7 +44,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import dot, marked, segment_sum, unit
+from pns_common.base.arrays import cross, dot, marked, segment_sum, unit
 from pns_common.connectivity.creases import Creases, with_crease_rows
 from pns_common.connectivity.topology import EdgeClass, Topology
 
@@ -59,6 +61,9 @@ ROW_ANGLE = 55.0
 # many times its own, and its own so many times theirs: of 45 degrees 30 and 60 are like, and 90 is
 # not. Half as many degrees are always like: their 1 − cos t is more than a quarter.
 PARALLEL, TIMES_ITS_OWN, TIMES_THEIRS = math.cos(math.radians(20)), 3.0, 4.0
+# How many times as wide as the other the wider of an edge's walls may be: in a row twice, as where
+# a simplifier made one wall of two, and where it ends they are those of one arc, and not plates.
+UNEVEN, UNEVEN_END = 2.05, 1.1
 ROUNDS = 5
 # Edges whose surroundings are looked at together.
 AT_ONCE = 8192
@@ -212,7 +217,7 @@ def stand_alone(
     mesh: Edges,
     flat: Int[np.ndarray, " N"],
 ) -> Bool[np.ndarray, " N"]:
-    """Return which edges, beside flat sides, turn far or have no like on one of their sides."""
+    """Return which edges, beside flat sides, turn far or are in no row."""
     alone = np.empty(len(flat), dtype=bool)
     # A dozen others are looked at for each: not for all at once.
     for start in range(0, len(flat), AT_ONCE):
@@ -228,27 +233,45 @@ def _stand_alone(
     flat: Int[np.ndarray, " N"],
 ) -> Bool[np.ndarray, " N"]:
     turn = _cosines(normals, mesh, flat)
-    has_like = np.ones(len(flat), dtype=bool)
-    for face in (mesh.half_edges[flat] // 3).T:
+    has_like, has_sharper = (np.empty((2, len(flat)), dtype=bool) for _ in range(2))
+    for side, face in enumerate((mesh.half_edges[flat] // 3).T):
         sides = mesh.face_edges[face]
         is_flat = (sides != flat[:, None]) & (_cosines(normals, mesh, sides) > _half(turn)[:, None])
         beyond = _across(mesh, sides, face[:, None])
         # What lies across a side that is not flat, or is none, is the edge itself: no other.
         others = np.where(is_flat[:, :, None], mesh.face_edges[beyond], flat[:, None, None])
         seen = np.concatenate([sides, others.reshape(len(flat), -1)], axis=1)
-        has_like &= _like(points, normals, mesh, flat, turn, seen).any(axis=1)
-    return (turn < cosine_of(ROW_ANGLE)) | ~has_like
+        like, sharper = _beside(points, normals, mesh, flat, turn, seen)
+        has_like[side], has_sharper[side] = like.any(axis=1), sharper.any(axis=1)
+    ends = (has_like & has_sharper[::-1]).any(axis=0) & _as_wide(points, mesh, flat, UNEVEN_END)
+    in_row = (has_like.all(axis=0) & _as_wide(points, mesh, flat, UNEVEN)) | ends
+    return (turn < cosine_of(ROW_ANGLE)) | ~in_row
 
 
-def _like(
+def _as_wide(
+    points: Float[np.ndarray, "V 3"], mesh: Edges, flat: Int[np.ndarray, " N"], times: float
+) -> Bool[np.ndarray, " N"]:
+    """Return at which edges neither face is more than so many times as wide as the other."""
+    # Over a common edge that is how their areas are.
+    corners = points[mesh.faces[mesh.half_edges[flat].T.reshape(-1) // 3]]
+    area = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    first, second = dot(area, area).reshape(2, -1)
+    most = times * times
+    return (first <= most * second) & (second <= most * first)
+
+
+def _beside(
     points: Float[np.ndarray, "V 3"],
     normals: Float[np.ndarray, "F 3"],
     mesh: Edges,
     flat: Int[np.ndarray, " N"],
     turn: Float[np.ndarray, " N"],
     seen: Int[np.ndarray, "N K"],
-) -> Bool[np.ndarray, "N K"]:
-    """Return which other edges run beside each one and turn as it does; ``turn`` is its cosine."""
+) -> tuple[Bool[np.ndarray, "N K"], Bool[np.ndarray, "N K"]]:
+    """Return which other edges run beside each one and turn as it does, and which more sharply.
+
+    ``turn`` is its cosine.
+    """
     cosines = _cosines(normals, mesh, seen)
     own, other = _along(points, mesh, flat), _along(points, mesh, seen)
     along = dot(other, own[:, None])
@@ -259,7 +282,8 @@ def _like(
     ends, own_ends = mesh.edges[seen], mesh.edges[flat][:, None]
     starts, stops = (ends == own_ends).any(axis=-1), (ends == own_ends[..., ::-1]).any(axis=-1)
     goes_on = (starts & (along < 0)) | (stops & (along > 0))
-    return (seen != flat[:, None]) & parallel & as_far & same_way & ~goes_on
+    beside = (seen != flat[:, None]) & parallel & ~goes_on
+    return beside & as_far & same_way, beside & (bends > TIMES_ITS_OWN * bend)
 
 
 def go_on(

@@ -215,3 +215,13 @@ def block(cells=3, noise=0.0, seed=0, closed=True):
     rng = np.random.default_rng(seed)
     points = sides[first] + noise * rng.standard_normal((len(first), 3))
     return points, number.reshape(-1)[np.concatenate(faces)]
+
+
+def prism(profile):
+    """A convex profile, drawn along z."""
+    n = len(profile)
+    points = np.concatenate([np.c_[profile, np.zeros(n)], np.c_[profile, np.full(n, 3.0)]])
+    k, after = np.arange(n), (np.arange(n) + 1) % n
+    fan = np.stack([0 * k[2:], k[1:-1], k[2:]], axis=1)
+    walls = [np.c_[k, after, n + after], np.c_[k, n + after, n + k]]
+    return Mesh(points, np.concatenate([*walls, fan[:, ::-1], fan + n]))

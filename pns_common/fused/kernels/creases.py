@@ -19,8 +19,19 @@ from pns_common.fused.kernels.compiled import (
     natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
-from pns_common.fused.kernels.rings import between, divisor, dot, row
-from pns_common.geometry.crease_lines import CORNER, ROUNDS, TIMES_ITS_OWN, TIMES_THEIRS
+from pns_common.fused.kernels.rings import between, cross, divisor, dot, row
+from pns_common.geometry.crease_lines import (
+    CORNER,
+    ROUNDS,
+    TIMES_ITS_OWN,
+    TIMES_THEIRS,
+    UNEVEN,
+    UNEVEN_END,
+)
+
+# What an edge beside another is to it.
+NEITHER, LIKE, SHARPER = 0, 1, 2
+BOTH = 3
 
 
 def normals_beside(normals, half_edges, edge_class, e):
@@ -94,23 +105,40 @@ def _rises(points, normals, faces, edges, half_edges, e):
     return dot(row(normals, f), between(points, a, apart)) > 0
 
 
-def _is_like(points, normals, faces, edges, half_edges, edge_class, parallel, e, turn, other):
-    """Return whether another edge runs and turns as an edge does whose turn has this cosine."""
+def _beside(points, normals, faces, edges, half_edges, edge_class, parallel, e, turn, other):
+    """Return what another edge is to an edge whose turn has this cosine."""
     if other == e or edge_class[other] != INTERIOR:
-        return False
+        return NEITHER
     bend, its_bend = 1 - turn, 1 - _cosine(normals, half_edges, edge_class, other)
-    if not (its_bend <= TIMES_ITS_OWN * bend and bend <= TIMES_THEIRS * its_bend):
-        return False
+    sharper = its_bend > TIMES_ITS_OWN * bend
+    if not (sharper or bend <= TIMES_THEIRS * its_bend):
+        return NEITHER
     own = between(points, edges[e, 0], edges[e, 1])
     its = between(points, edges[other, 0], edges[other, 1])
     along = dot(its, own)
     if not along * along >= parallel * (dot(its, its) * dot(own, own)):
-        return False
+        return NEITHER
     a, b, c, d = edges[e, 0], edges[e, 1], edges[other, 0], edges[other, 1]
     if ((a == c or b == d) and along < 0) or ((a == d or b == c) and along > 0):
-        return False  # it goes on from this one's end
+        return NEITHER  # it goes on from this one's end
+    if sharper:
+        return SHARPER
     rises = _rises(points, normals, faces, edges, half_edges, e)
-    return _rises(points, normals, faces, edges, half_edges, other) == rises
+    return LIKE if _rises(points, normals, faces, edges, half_edges, other) == rises else NEITHER
+
+
+def _area_square(points, faces, f):
+    """Return four times the square of a face's area."""
+    area = cross(
+        between(points, faces[f, 0], faces[f, 1]), between(points, faces[f, 0], faces[f, 2])
+    )
+    return dot(area, area)
+
+
+def _as_wide(first, second, times):
+    """Return whether neither of two faces is so many times as wide, of the squares of areas."""
+    most = times * times
+    return first <= most * second and second <= most * first
 
 
 @kernel(
@@ -133,7 +161,7 @@ def mark_alone(
     end,
     alone,
 ):
-    """Mark those of the edges begin … end − 1 that turn far, or have no like on one side.
+    """Mark those of the edges begin … end − 1 that turn far, or are in no row.
 
     On a side are the edges of its face, and of the faces across those of them that turn less than
     half as much. ``parallel`` is the square of the least cosine between edges.
@@ -142,12 +170,14 @@ def mark_alone(
     for i in range(natural(begin), end):
         e = flat[i]
         turn = _cosine(normals, half_edges, edge_class, e)
-        sides_with_like = 0
+        like, sharper = 0, 0  # a bit for each side
         for h in range(2):
-            f, found = half_edges[e, h] // 3, False
+            f = half_edges[e, h] // 3
             for k in range(3):
                 side = face_edges[f, k]
-                found |= _is_like(*shape, e, turn, side)
+                found = _beside(*shape, e, turn, side)
+                like |= (found == LIKE) << h
+                sharper |= (found == SHARPER) << h
                 if side == e or edge_class[side] != INTERIOR:
                     continue
                 if not _cosine(normals, half_edges, edge_class, side) > _half(turn):
@@ -155,9 +185,15 @@ def mark_alone(
                 first = half_edges[side, 0] // 3
                 beyond = half_edges[side, 1] // 3 if first == f else first
                 for m in range(3):
-                    found |= _is_like(*shape, e, turn, face_edges[beyond, m])
-            sides_with_like += found
-        alone[i] = turn < row_cosine or sides_with_like < 2
+                    found = _beside(*shape, e, turn, face_edges[beyond, m])
+                    like |= (found == LIKE) << h
+                    sharper |= (found == SHARPER) << h
+        first = _area_square(points, faces, half_edges[e, 0] // 3)
+        second = _area_square(points, faces, half_edges[e, 1] // 3)
+        in_row = like == BOTH and _as_wide(first, second, UNEVEN)
+        meets = (like & 1 and sharper & 2) or (like & 2 and sharper & 1)
+        ends = meets and _as_wide(first, second, UNEVEN_END)
+        alone[i] = turn < row_cosine or not (in_row or ends)
     return 0
 
 

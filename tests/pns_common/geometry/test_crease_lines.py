@@ -19,7 +19,7 @@ from pns_common.geometry.crease_lines import (
     with_crease_lines,
 )
 from pns_common.geometry.frames import face_normals
-from tests.support.meshes import block, bumpy_sphere, grid, manifolds, rotation, soups
+from tests.support.meshes import block, bumpy_sphere, grid, manifolds, prism, rotation, soups
 from train.data.primitives import box, cone, cylinder, globe, icosphere, l_block, tetrahedron, torus
 
 SHARP_ALONE = Creases(line_angle=CREASE_ANGLE)
@@ -73,16 +73,6 @@ def test_edges_between_flat_sides_are_lines(name):
     assert len(lines(mesh)) == count
 
 
-def prism(profile):
-    """A convex profile, drawn along z."""
-    n = len(profile)
-    points = np.concatenate([np.c_[profile, np.zeros(n)], np.c_[profile, np.full(n, 3.0)]])
-    k, after = np.arange(n), (np.arange(n) + 1) % n
-    fan = np.stack([0 * k[2:], k[1:-1], k[2:]], axis=1)
-    walls = [np.c_[k, after, n + after], np.c_[k, n + after, n + k]]
-    return Mesh(points, np.concatenate([*walls, fan[:, ::-1], fan + n]))
-
-
 # All turns beyond 66 degrees but at the two edges of the chamfer, which turn by 45.
 CHAMFERED = prism([[0, 0], [2, 0], [2, 1.5], [1.5, 2], [0, 2]])
 # Plates of a hull: turns of 20 to 50 degrees between plane faces of any width.
@@ -134,6 +124,27 @@ def test_fillets_of_three_pieces_or_more_stay_round(pieces):
     # Where an arc of two pieces meets its sides it turns by more than 21 degrees.
     at_ends = 8 if pieces == 2 else 0
     assert len(lines(prism(profile), WITH_GENTLE)) == rims + at_ends
+
+
+@pytest.mark.parametrize("pieces", [4, 6, 8])
+def test_an_arc_stays_round_up_to_the_sharp_edge_where_it_ends(pieces):
+    angles = np.linspace(0, np.pi, pieces + 1)
+    profile = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    assert len(lines(prism(profile), WITH_GENTLE)) == 2 * len(profile) + 2
+
+
+@pytest.mark.parametrize("ratio", [2.15, 4, 10])
+def test_all_edges_of_a_bar_s_four_chamfers_are_lines(ratio):
+    """Each is beside one like it on both sides; but the walls are so many times as wide."""
+    cut, half = 1 / np.sqrt(2), ratio / 2 + 1 / np.sqrt(2)
+    corner = np.array([[half, half - cut], [half - cut, half]])
+    profile = np.concatenate([corner @ rotation_by(k).T for k in range(4)])
+    assert len(lines(prism(profile), WITH_GENTLE)) == 3 * 8
+
+
+def rotation_by(quarters):
+    """So many quarter turns of the plane."""
+    return np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), quarters)
 
 
 def test_a_mesh_is_edged_where_half_of_its_turns_are_sharp():
