@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import pkgutil
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
@@ -56,17 +57,25 @@ def _library() -> Library:
     modules = kernel_modules()
     file = kernel_file(key_of(modules))
     assert file is not None  # ``kernels_available`` says so
-    if not file.exists():
-        # numba itself is not needed before.
-        from pns_common.fused.compiler import compile_kernels
-
-        file.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(file, compile_kernels(modules))
-    builder = _llvm.JITLibraryBuilder().add_object_img(file.read_bytes()).add_current_process()
+    code = file.read_bytes() if file.exists() else _compiled(modules, file)
+    builder = _llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
     for kernel in kernels_of(modules):
         builder.export_symbol(kernel.name)
     jit = _llvm.create_lljit_compiler(target_machine())
     return Library(jit, builder.link(jit, kernels.__name__))
+
+
+def _compiled(modules: Sequence[ModuleType], file: Path) -> bytes:
+    """Compile all kernels, and keep them in a file where there is room."""
+    # numba itself is not needed before.
+    from pns_common.fused.compiler import compile_kernels
+
+    code = compile_kernels(modules)
+    # A full disk costs the next process its time, and this one nothing.
+    with suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(file, code)
+    return code
 
 
 def kernel_modules() -> list[ModuleType]:

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from pns_common.fused import load_kernels
+from pns_common.fused import library, load_kernels
 from pns_common.fused.kernels import masks, normals
 from pns_common.fused.kernels.masks import largest_coordinate, sum_rings
 from pns_common.fused.library import kernel_modules, kernels_of, key_of
@@ -14,7 +14,7 @@ from pns_common.fused.library import kernel_modules, kernels_of, key_of
 LOADED_ALONE = """
 import sys
 from pns_common import Mesh, loop, refine
-from pns_common.fused import load_kernels
+from pns_common.fused import library, load_kernels
 load_kernels()
 refined = refine(Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), loop())
 assert len(refined.mesh.faces) == 4 and "llvmlite" in sys.modules
@@ -26,6 +26,15 @@ sys.exit("numba" in sys.modules)
 def test_kernels_are_loaded_without_numba():
     assert load_kernels()  # compiled, that is
     assert subprocess.run([sys.executable, "-c", LOADED_ALONE], check=False).returncode == 0
+
+
+def test_kernels_that_cannot_be_kept_serve_all_the_same(tmp_path, monkeypatch):
+    """On a full disk, or in a folder that cannot be made."""
+    monkeypatch.setattr("pns_common.fused.compiler.compile_kernels", lambda modules: b"code")
+    (tmp_path / "file").touch()
+    assert library._compiled([], tmp_path / "file" / "kernels.o") == b"code"
+    assert library._compiled([], tmp_path / "new" / "kernels.o") == b"code"
+    assert (tmp_path / "new" / "kernels.o").read_bytes() == b"code"
 
 
 def test_every_kernel_has_a_name_of_its_own():
