@@ -325,9 +325,11 @@ function bindFiles(): void {
     if (!event.relatedTarget) document.body.classList.remove("dragging");
   });
   document.addEventListener("drop", (event) => {
+    // Words may be dropped into a field.
+    if (!event.dataTransfer || !hasFiles(event)) return;
     event.preventDefault();
     document.body.classList.remove("dragging");
-    if (event.dataTransfer) void take(dropped(event.dataTransfer));
+    void take(dropped(event.dataTransfer));
   });
   document.addEventListener("paste", (event) => {
     if (event.clipboardData?.files.length) void take(chosen(event.clipboardData.files));

@@ -67,6 +67,8 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await page.click("#play");
     await page.waitForFunction(() => document.querySelector("#scrub").value < 0.99);
     assert.equal(await page.getAttribute("#play", "aria-pressed"), "true");
+    // Pressed, it is heard as that already: "Pause, pressed" would say that it stands.
+    assert.equal(await page.getAttribute("#play", "aria-label"), "Play");
   });
 
   for (const compress of ["meshopt", "draco"]) {

@@ -391,6 +391,45 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await page.focus("#canvas");
     await page.keyboard.press("3");
     assert.ok(await page.isChecked('input[value="overlay"]'));
+    await page.keyboard.press("1");
+    await page.press("#wipe", "ArrowUp");
+    assert.equal(await page.getAttribute("#wipe", "aria-valuenow"), "52");
+  });
+
+  test("a screen reader hears each step once, and no percents of it", async () => {
+    const page = await visit({ hash: "#levels=4&model=full" });
+    await page.evaluate(() => {
+      window.heard = [];
+      const hear = ({ target }) => {
+        const region = (target instanceof Element ? target : target.parentElement).closest("[role=status], [role=alert]");
+        if (region) window.heard.push(region.textContent);
+      };
+      new MutationObserver((changes) => changes.forEach(hear)).observe(document.body, {
+        subtree: true,
+        childList: true,
+        characterData: true,
+      });
+    });
+    await choose(page, example);
+    await settled(page);
+    const heard = await page.evaluate(() => window.heard);
+    assert.deepEqual(heard.slice(0, 2), ["Opening the file", "Uploading"]);
+    assert.match(heard.at(-1), /^Refined\. /);
+    assert.deepEqual(heard.slice(0, -1).filter((text) => /\d|^$/.test(text)), []);
+    assert.ok(heard.every((text, i) => text !== heard[i - 1]), heard.join(" | "));
+  });
+
+  test("words may be dropped into a field", async () => {
+    const page = await visit();
+    const words = await page.evaluateHandle(() => {
+      const transfer = new DataTransfer();
+      transfer.setData("text/plain", "3");
+      return transfer;
+    });
+    await page.dispatchEvent("#budget", "drop", { dataTransfer: words });
+    // What is dropped is read in the same turn.
+    await page.waitForTimeout(100);
+    assert.ok(await page.isHidden("#problem"));
   });
 
   for (const colorScheme of ["light", "dark"]) {

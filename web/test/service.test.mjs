@@ -191,6 +191,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
         });
         await page.fill("#key", key);
         await page.keyboard.press("Enter");
+        assert.equal(await page.evaluate(() => document.activeElement.id), "panel");
         await settled(page);
         for (const kind of ["POST /jobs", "GET /jobs/ID/events", "GET /jobs/ID/result", "DELETE /jobs/ID"]) {
           assert.equal(sent.get(kind), `Bearer ${key}`, kind);

@@ -34,10 +34,10 @@ export function sentence({ step, share, place, stage, estimate }: Progress): str
 export function showProgress(progress: Progress, what = ""): void {
   element("work").hidden = false;
   const text = `${sentence(progress)}${what ? ` · ${what}` : ""}`;
-  const line = element("work-text");
+  element("work-text").textContent = text;
   // A screen reader hears each step, not each percent.
-  line.setAttribute("aria-label", text.replace(/ \d+ %/, ""));
-  line.textContent = text;
+  const step = text.replace(/ \d+ %.*?(?= ·|$)/, "");
+  if (element("announce").textContent !== step) announce(step);
   const bar = element<HTMLProgressElement>("work-bar");
   if (progress.share === null) bar.removeAttribute("value");
   else bar.value = progress.share;
@@ -120,6 +120,7 @@ export function bindProblem(again: () => void): void {
     event.preventDefault();
     useKey(input("key").value);
     input("key").value = "";
+    element("panel").focus();
     hideProblem();
     again();
   });

@@ -47,9 +47,7 @@ export class Timeline {
   write(): void {
     const { playback } = this;
     const { time, duration, playing } = playback;
-    const button = element("play");
-    button.setAttribute("aria-pressed", String(playing));
-    button.setAttribute("aria-label", playing ? "Pause" : "Play");
+    element("play").setAttribute("aria-pressed", String(playing));
     input("scrub").value = String(duration ? time / duration : 0);
     input("scrub").setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
     element("time").textContent = duration ? `${time.toFixed(2)} / ${duration.toFixed(2)} s` : "";

@@ -25,6 +25,8 @@ export function bindWipe(moved: (share: number) => void): (share: number) => voi
   const keys: Record<string, () => number> = {
     ArrowLeft: () => share - 0.02,
     ArrowRight: () => share + 0.02,
+    ArrowDown: () => share - 0.02,
+    ArrowUp: () => share + 0.02,
     PageDown: () => share - 0.1,
     PageUp: () => share + 0.1,
     Home: () => 0,
