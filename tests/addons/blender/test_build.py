@@ -14,7 +14,9 @@ def test_the_manifest_is_what_blender_asks_for():
     assert manifest["id"] == SOURCE.name
     assert manifest["blender_version_min"] == "4.2.0"
     assert manifest["license"] == ["SPDX:GPL-3.0-or-later"]
-    assert "permissions" not in manifest
+    (reason,) = [manifest["permissions"].pop("files"), *manifest["permissions"].values()]
+    assert len(reason) <= 64
+    assert not reason.endswith(".")
     assert "blender" not in manifest["name"].lower()
     assert len(manifest["tagline"]) <= 64
     assert not manifest["tagline"].endswith(".")
