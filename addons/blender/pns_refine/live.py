@@ -23,7 +23,7 @@ from bpy.props import BoolProperty, PointerProperty, StringProperty
 
 from pns_common import PnsError
 
-from .live_nodes import add_modifier, modifier_of, point_at, remove_modifier
+from .live_nodes import modifier_of, point_at, remove_modifier
 from .overlay import hide, rescale
 from .reading import read_mesh
 from .run import Made, Share, refine_mesh
@@ -59,12 +59,6 @@ def live_meshes() -> list[bpy.types.Mesh]:
     return [mesh for mesh in bpy.data.meshes if mesh.pns_live.enabled and mesh.is_editable]
 
 
-def enable(obj: bpy.types.Object) -> None:
-    """Show an object's mesh live; objects that share the mesh are not touched."""
-    obj.data.pns_live.enabled = True
-    add_modifier(obj)
-
-
 def refreshed(obj: bpy.types.Object, share: Share) -> Generator[object, None, bool]:
     """Refine an object's mesh again if it, or what is asked for, has changed; whether it had.
 
@@ -83,6 +77,8 @@ def _refreshed(
     mesh: bpy.types.Mesh, still: bpy.types.Object, share: Share
 ) -> Generator[object, None, bool]:
     live = mesh.pns_live
+    # Its object may have the modifier of another.
+    live.enabled = True
     digest = yield from _digest(still.data, live)
     whole = all(getattr(live, name) is not None for name in CACHE)
     if not whole or (_borrowed(mesh) and shown_of(live).pns_result.digest != digest):

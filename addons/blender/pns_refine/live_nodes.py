@@ -10,8 +10,8 @@ INFO = "Result"
 
 
 def modifier_of(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
-    """Return the live modifier of an object."""
-    return obj.modifiers.get(MODIFIER)
+    """Return the live modifier of an object, whatever its user calls it."""
+    return next((m for m in obj.modifiers if m.type == "NODES" and _is_live(m)), None)
 
 
 def add_modifier(obj: bpy.types.Object) -> None:
@@ -45,6 +45,11 @@ def point_at(obj: bpy.types.Object, cache: bpy.types.Object | None) -> None:
 def result_of(group: bpy.types.NodeTree | None) -> bpy.types.Object | None:
     """Return the result that a group of nodes gives."""
     return None if group is None else group.nodes[INFO].inputs["Object"].default_value
+
+
+def _is_live(modifier: bpy.types.NodesModifier) -> bool:
+    group = modifier.node_group
+    return modifier.name == MODIFIER or (group is not None and group.name.startswith(GROUP))
 
 
 def _group(cache: bpy.types.Object) -> bpy.types.NodeTree:

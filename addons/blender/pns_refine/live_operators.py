@@ -7,6 +7,7 @@ import bpy
 from pns_common import PnsError
 
 from . import live
+from .live_nodes import add_modifier
 from .run import Run, Share, Steps
 
 LINKED = "Linked from another file, which alone can keep live mode: make it local first"
@@ -59,7 +60,7 @@ class OBJECT_OT_pns_live_add(bpy.types.Operator):  # noqa: N801 (Blender's names
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Start, and refine for the first time."""
-        live.enable(context.object)
+        add_modifier(context.object)
         result = refresh(self, context.object)
         if result == {"CANCELLED"}:
             live.remove(context.object)

@@ -22,7 +22,7 @@ from .live import (
     take_away_cache,
     users_of,
 )
-from .live_nodes import point_at
+from .live_nodes import modifier_of, point_at, result_of
 from .run import Run, Share
 
 # How long a mesh must be left alone before it is refined again, and how often that is looked at.
@@ -172,8 +172,17 @@ def _is_followed(mesh: bpy.types.Mesh) -> bool:
 
 @persistent
 def before_save(*_: object) -> None:
-    """Let no half of a result be saved."""
+    """Let no half of a result be saved, and no copy that nothing shows.
+
+    A modifier may have been removed by hand; a copy that is not automatic would not come back by
+    undo.
+    """
     WATCH.pause()
+    modifiers = filter(None, map(modifier_of, bpy.data.objects))
+    shown = [result_of(modifier.node_group) for modifier in modifiers]
+    for mesh in live_meshes():
+        if mesh.pns_live.automatic and mesh.pns_live.cache not in shown:
+            take_away_cache(mesh)
 
 
 @persistent

@@ -8,6 +8,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty
 
+from .live_nodes import modifier_of
+
 MODIFIER = "PNS Overlay"
 GROUP = ".PNS Overlay"
 MATERIAL = ".PNS Overlay"
@@ -64,7 +66,8 @@ def shown_mesh(obj: bpy.types.Object | None) -> bpy.types.Mesh | None:
     """Return the refined mesh that an object shows: its own, or a live result; None if neither."""
     if obj is None or obj.type != "MESH":
         return None
-    cache = obj.data.pns_live.cache
+    # A modifier may be taken away, or applied, by hand: then the base is what is seen.
+    cache = None if modifier_of(obj) is None else obj.data.pns_live.cache
     mesh = obj.data if cache is None else cache.data
     return mesh if mesh.pns_result.report else None
 

@@ -223,6 +223,64 @@ def test_remove_leaves_the_base():
     assert not bpy.data.node_groups
 
 
+def removed_by_hand(obj):
+    obj.modifiers.remove(obj.modifiers["PNS Live"])
+
+
+def applied_by_hand(obj):
+    bpy.ops.object.modifier_apply(modifier="PNS Live")
+
+
+def deleted(obj):
+    bpy.ops.object.delete()
+
+
+@pytest.mark.parametrize("end", [removed_by_hand, applied_by_hand])
+def test_what_is_no_more_shown_is_not_told_of(end):
+    obj = started(cube())
+    assert bpy.ops.object.pns_overlay.poll()
+    end(obj)
+    assert not bpy.ops.object.pns_overlay.poll()
+    assert bpy.ops.object.pns_live_add.poll()
+
+
+@pytest.mark.parametrize("end", [removed_by_hand, applied_by_hand, deleted])
+def test_what_is_no_more_shown_is_not_saved(end, tmp_path):
+    end(started(cube()))
+    path = str(tmp_path / "live.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    left = [] if end is deleted else ["Cube"]
+    assert [block.name for block in (*bpy.data.objects, *bpy.data.meshes)] == left * 2
+
+
+def test_a_modifier_with_another_name_is_followed():
+    obj = started(grid(4))
+    obj.modifiers["PNS Live"].name = "Smooth"
+    before = shown(obj)
+    obj.data.vertices[7].co.z += 1
+    obj.data.update()
+    settle()
+    assert np.abs(shown(obj) - before).max() > 0.1
+    bpy.ops.object.pns_live_remove()
+    assert not obj.modifiers
+
+
+def test_an_object_with_the_modifier_of_another_is_live_once_it_is_refreshed():
+    obj, other = started(grid(4)), cube("Other")
+    chosen(obj)
+    other.select_set(True)
+    bpy.ops.object.make_links_data(type="MODIFIERS")
+    chosen(other)
+    bpy.ops.object.pns_live_refresh()
+    before = shown(other)
+    assert len(evaluated(other).polygons) == 12 * 16
+    other.data.vertices[0].co.z += 1
+    other.data.update()
+    settle()
+    assert np.abs(shown(other) - before).max() > 0.1
+
+
 def test_shape_keys_are_refused_in_words():
     obj = cube()
     obj.shape_key_add(name="Basis")

@@ -65,6 +65,19 @@ def test_undo_while_it_is_refreshed_is_followed(pieces):
     assert len(bpy.data.meshes) == 3
 
 
+def test_undo_of_a_removal_by_hand_that_was_saved_shows_the_result_again(tmp_path):
+    bpy.context.preferences.edit.use_global_undo = True
+    obj = started(grid(4))
+    before = shown(obj)
+    bpy.ops.ed.undo_push(message="live")
+    obj.modifiers.remove(obj.modifiers["PNS Live"])
+    bpy.ops.ed.undo_push(message="removed")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "live.blend"))
+    bpy.ops.ed.undo()
+    settle()
+    np.testing.assert_allclose(shown(bpy.data.objects["Grid"]), before, atol=1e-6)
+
+
 def test_before_undo_nothing_refers_to_what_it_may_free():
     obj = started(grid(4))
     bpy.ops.object.duplicate()
