@@ -502,6 +502,31 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.deepEqual(outside, []);
   });
 
+  test("on a phone nothing that is told or has the focus lies under the canvas", async () => {
+    const page = await visit({ viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true, hash: "#levels=1", foreseen: /ERR_FAILED/ });
+    await choose(page, example);
+    await settled(page);
+    await page.check("#attributes");
+    await page.route(/\/jobs\?/, (route) => route.abort());
+    await page.click("#download");
+    await page.locator("#problem").waitFor();
+    const covered = () => page.evaluate(() => {
+      const { bottom } = document.querySelector(".stage").getBoundingClientRect();
+      const here = document.querySelector("#problem:not([hidden])") ?? document.activeElement;
+      const { top } = here.getBoundingClientRect();
+      return !here.closest(".stage, .bar") && here !== document.body && top < bottom ? here.id || here.textContent : null;
+    });
+    assert.equal(await covered(), null);
+    await page.click("#problem-close");
+    await unfold(page);
+    await page.focus("#download-picture");
+    // Backwards, past every control of the panel.
+    for (let i = 0; i < 30; i++) {
+      await page.keyboard.press("Shift+Tab");
+      assert.equal(await covered(), null);
+    }
+  });
+
   test("upload after upload, the graphics card holds no more", async () => {
     const page = await visit({ hash: "#levels=1" });
     const held = async () => {
