@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 
 # It is text, and a file may be one long comment.
-LONGEST = 2**16
+LONGEST = 2**20
 POLYGON = frozenset({"vertex_index", "vertex_indices"})
 
 _FORMAT = {b"ascii": None, b"binary_little_endian": "<", b"binary_big_endian": ">"}
@@ -20,7 +20,7 @@ _TYPES = {
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
-_BEGIN = re.compile(rb"ply\s+(?:comment[^\n]*\n)*format (\w+) 1\.0\s")
+_BEGIN = re.compile(rb"ply\s+(?:(?:comment|obj_info)[^\n]*\n)*format (\w+) 1\.0\s")
 _END = re.compile(rb"^end_header\r?\n", re.MULTILINE)
 
 

@@ -28,19 +28,13 @@ from ...gltf.constants import (
 )
 from ...gltf.read.modes import TRIANGLES
 from ...meshfiles.obj_text import line_end
+from ...meshfiles.ply.header import LONGEST, POLYGON, Element, PlyHeader, ply_header
 from ...meshfiles.text_numbers import reals, whole
 from .arrays import blocks_of
 from .sink import Sink
 
 # Bytes of text that are read at a time.
 TEXT = 1 << 24
-PLY_TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
-    "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
-    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
-}  # fmt: skip
-CORNER_LISTS = ("vertex_indices", "vertex_index")
-LONGEST_HEADER = 1 << 20
 # What a tree that is not a glTF's, or lies, does to those who read it.
 UNREADABLE = (
     AttributeError, LookupError, OverflowError, RecursionError, TypeError, ValueError, struct.error,
@@ -57,9 +51,10 @@ def read_ply(path: Path, sink: Sink) -> None:
     Raises:
         UnreadableError: another file, or a face that is no triangle.
     """
-    order, elements, start = _ply_header(path)
-    for name, count, properties in elements:
-        kind = _ply_record(path, order, name, properties)
+    header = _ply_header(path)
+    start = header.end
+    for element in header.elements:
+        name, count, kind = element.name, element.rows, _ply_record(path, header, element)
         if path.stat().st_size < start + count * kind.itemsize:
             raise UnreadableError(f"{path}: it ends within its {name} elements")
         if count and name in ("vertex", "face"):
@@ -83,52 +78,39 @@ def _add_triangles(path: Path, records: np.ndarray, first: int, sink: Sink) -> N
     sink.add_faces(records["corners"])
 
 
-def _ply_header(path: Path) -> tuple[str, list[tuple[str, int, list[list[str]]]], int]:
+def _ply_header(path: Path) -> PlyHeader:
     with path.open("rb") as file:
-        head = file.read(LONGEST_HEADER)
-    end = re.search(rb"^end_header\r?\n", head, re.MULTILINE)
-    if not re.match(rb"ply\r?\n", head) or end is None:
-        raise UnreadableError(f"{path}: this is not a PLY file")
-    order, elements = "", list[tuple[str, int, list[list[str]]]]()
-    for words in (line.split() for line in head[: end.start()].decode("latin-1").splitlines()):
-        match words:
-            case ["format", "binary_little_endian", _]:
-                order = "<"
-            case ["format", "binary_big_endian", _]:
-                order = ">"
-            case ["element", name, count] if count.isdecimal():
-                elements.append((name, int(count), []))
-            case ["property", *described] if elements:
-                elements[-1][2].append(described)
-            case _:
-                pass
-    if not order:
+        head = file.read(LONGEST)
+    header = ply_header(head)
+    if header is None:
+        what = "the PLY header cannot be read" if head[:3] == b"ply" else "this is not a PLY file"
+        raise UnreadableError(f"{path}: {what}")
+    if header.order is None:
         raise UnreadableError(f"{path}: only a binary PLY is read")
-    if {"vertex", "face"} - {name for name, _, _ in elements}:
+    if {"vertex", "face"} - {element.name for element in header.elements}:
         raise UnreadableError(f"{path}: the PLY file has no vertices or no faces")
-    return order, elements, end.end()
+    return header
 
 
-def _ply_record(path: Path, order: str, element: str, properties: list[list[str]]) -> np.dtype:
+def _ply_record(path: Path, header: PlyHeader, element: Element) -> np.dtype:
     """Return the record of an element, whose lists are of triangles' corners."""
     fields: list[Any] = []
+    for one in element.properties:
+        kind = f"{header.order}{one.kind}"
+        if one.count_kind is None:
+            fields.append((one.name, kind))
+        elif one.name in POLYGON and element.name == "face":
+            fields.append(("count", f"{header.order}{one.count_kind}"))
+            fields.append(("corners", kind, (3,)))
+        else:
+            raise UnreadableError(f"{path}: the list '{one.name}' of {element.name} is not read")
     try:
-        for words in properties:
-            match words:
-                case ["list", size, item, name] if name in CORNER_LISTS and element == "face":
-                    fields.append(("count", order + PLY_TYPES[size]))
-                    fields.append(("corners", order + PLY_TYPES[item], (3,)))
-                case [item, name]:
-                    fields.append((name, order + PLY_TYPES[item]))
-                case _:
-                    listed = " ".join(words)
-                    raise UnreadableError(f"{path}: '{listed}' of {element} is not read")
         kind = np.dtype(fields)
-    except (KeyError, ValueError) as error:
-        raise UnreadableError(f"{path}: the PLY header's {element} cannot be read") from error
-    needed = {"vertex": {"x", "y", "z"}, "face": {"corners"}}.get(element, set())
+    except ValueError as error:  # a name that is there twice
+        raise UnreadableError(f"{path}: the PLY header's {element.name} cannot be read") from error
+    needed = {"vertex": {"x", "y", "z"}, "face": {"corners"}}.get(element.name, set())
     if needed - set(kind.names or ()):
-        raise UnreadableError(f"{path}: the PLY file's {element} has no {sorted(needed)}")
+        raise UnreadableError(f"{path}: the PLY file's {element.name} has no {sorted(needed)}")
     return kind
 
 
