@@ -14,6 +14,7 @@ from pns_common.mesh import Mesh
 from pns_common.refine import refine
 from pns_common.schemes import Scheme
 from train.data.dense_meshes import DenseMesh, is_manifold, largest_part
+from train.data.simplifiers import AGGRESSIVENESS
 from train.metrics.surface_distance import (
     SURFACE_METRICS,
     SurfaceErrors,
@@ -26,9 +27,6 @@ COARSE_FACES = 800
 
 # The dense mesh has at least so many times the faces of the coarse one.
 LEAST_REDUCTION = 5
-
-# How fast the simplification raises its threshold: below the library's 7, for better triangles.
-AGGRESSIVENESS = 5.0
 
 # Largest share of the coarse faces that may be cut off as pinched.
 LARGEST_CUT = 1 / 20

@@ -10,7 +10,8 @@ from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import loop, pns
 from train.data.dense_meshes import DenseMesh, asset_meshes
 from train.data.simplifiers import SIMPLIFIERS, simplified
-from train.experiments.beyond.real_meshes import LEAST_REDUCTION, read_files
+from train.experiments.beyond.models import models_and_assets
+from train.experiments.beyond.real_meshes import LEAST_REDUCTION
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
@@ -147,5 +148,5 @@ EXPERIMENT = Experiment(
     run=run,
     seconds=45,
     needs_assets=True,
-    reads=read_files,
+    reads=models_and_assets,
 )

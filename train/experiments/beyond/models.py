@@ -46,6 +46,12 @@ def model_files(_: Laboratory) -> Iterable[Path]:
     return [Path(str(BUNDLED / f"{name}.onnx")) for name in bundled_models()]
 
 
+def models_and_assets(laboratory: Laboratory) -> Iterable[Path]:
+    """Return these and all files of the folder of meshes."""
+    folder = () if laboratory.assets is None else laboratory.assets.rglob("*")
+    return [*model_files(laboratory), *(path for path in folder if path.is_file())]
+
+
 def bundled_schemes() -> dict[str, Scheme]:
     """Return PNS with every bundled model, the default last, as the product runs them."""
     names = sorted(bundled_models(), key=lambda name: (name == DEFAULT_MODEL, name))

@@ -12,7 +12,7 @@ from pns_common.refine import refine
 from pns_common.schemes import Scheme
 from train.data.dense_meshes import DenseMesh, asset_meshes, cad_meshes
 from train.data.simplifiers import SIMPLIFIERS, simplified
-from train.experiments.beyond.models import model_files
+from train.experiments.beyond.models import models_and_assets
 from train.experiments.harness.contenders import LOOP, contenders
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
@@ -237,19 +237,13 @@ def _dense_files(folder: Path) -> Iterator[DenseMesh]:
     return (mesh for mesh in asset_meshes(folder) if isinstance(mesh, DenseMesh))
 
 
-def read_files(laboratory: Laboratory) -> list[Path]:
-    """Return the bundled models and all files of the folder."""
-    folder = () if laboratory.assets is None else laboratory.assets.rglob("*")
-    return [*model_files(laboratory), *(path for path in folder if path.is_file())]
-
-
 TEST = Experiment(
     name="real-meshes",
     title="Real meshes, simplified",
     source="Beyond the paper. The test set: run once, when everything was chosen.",
     run=run_test,
     seconds=300,
-    reads=read_files,
+    reads=models_and_assets,
 )
 VALIDATION = Experiment(
     name="real-validation",
@@ -258,5 +252,5 @@ VALIDATION = Experiment(
     run=run_validation,
     seconds=150,
     needs_assets=True,
-    reads=read_files,
+    reads=models_and_assets,
 )

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from itertools import islice
 
 from pns_common.mesh import Mesh
+from train.experiments.beyond.models import models_and_assets
 from train.experiments.beyond.whole_meshes import (
     MORE,
     REFERENCE,
     Row,
     crossing,
     meshes,
-    read_files,
     rows_of,
 )
 from train.experiments.harness.contenders import LOOP, OURS, contenders
@@ -104,5 +104,5 @@ EXPERIMENT = Experiment(
     source="Beyond the paper.",
     run=run,
     seconds=80,
-    reads=read_files,
+    reads=models_and_assets,
 )

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +13,7 @@ from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme
 from train.data.dense_meshes import asset_files, read_mesh
 from train.data.primitives import PRIMITIVES
-from train.experiments.beyond.models import model_files
+from train.experiments.beyond.models import models_and_assets
 from train.experiments.harness.contenders import LOOP, OURS, contenders
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
@@ -191,17 +190,11 @@ def _total(method: str, rows: list[Row]) -> Total:
     )
 
 
-def read_files(laboratory: Laboratory) -> list[Path]:
-    """Return the bundled models and all files of the folder."""
-    folder = () if laboratory.assets is None else laboratory.assets.rglob("*")
-    return [*model_files(laboratory), *(path for path in folder if path.is_file())]
-
-
 EXPERIMENT = Experiment(
     name="whole-meshes",
     title="Primitives and assets stay whole",
     source="Beyond the paper.",
     run=run,
     seconds=60,
-    reads=read_files,
+    reads=models_and_assets,
 )
