@@ -119,7 +119,8 @@ def feature_basis(
     """
     count = group.order.shape[1]
     basis, pairs = np.eye(count), list[tuple[int, int]]()
-    acts = [np.eye(count)[group.order[g]] * group.signs[g][:, None] for g in _generators_of(group)]
+    generators = _generators(len(group.order))
+    acts = [np.eye(count)[group.order[g]] * group.signs[g][:, None] for g in generators]
     for act in acts:
         moved = _in_basis(act, basis)
         for k in range(count):
@@ -167,10 +168,6 @@ def _is_tied(layers: Sequence[Layer], widths: Sequence[int], group: Symmetries) 
 def _generators(size: int) -> list[int]:
     """Return which elements make all others: the group's numbering has one bit for each."""
     return [1 << bit for bit in range(size.bit_length() - 1)]
-
-
-def _generators_of(group: Symmetries) -> list[int]:
-    return _generators(len(group.order))
 
 
 def _characters(signs: Float[np.ndarray, "B N"]) -> Int32[np.ndarray, " N"]:

@@ -45,11 +45,6 @@ class ControlMesh:
     authored: bool = True
 
     @property
-    def degenerate(self) -> int:
-        """Faces that name a welded vertex twice: they have no area and are dropped."""
-        return sum(int((~keep).sum()) for keep in self.kept)
-
-    @property
     def copies(self) -> int:
         """Faces with the same three vertices as an earlier one: refined once, kept each."""
         return 0 if self.cleaned is None else self.cleaned.dropped_duplicate
