@@ -59,14 +59,13 @@ class Journal:
         self._database.execute("INSERT OR IGNORE INTO outputs VALUES (?, ?)", (output, path))
         query = "SELECT path FROM outputs WHERE output = ?"
         holder = str(self._database.execute(query, (output,)).fetchone()[0])
-        if holder == path:
-            return True
-        if not place_of(holder).is_gone():
+        if holder != path and not place_of(holder).is_gone():
             return False
-        # Its row would tell of a result that is replaced.
+        # Rows of another file's or of another work's result there, which is about to be replaced.
         self._database.execute(
-            "DELETE FROM rows WHERE path = ? AND json_extract(row, '$.output') = ?",
-            (holder, output),
+            "DELETE FROM rows WHERE path = ? AND NOT (path = ? AND work = ?) "
+            "AND json_extract(row, '$.output') = ?",
+            (holder, path, self._work, output),
         )
         self._database.execute("UPDATE outputs SET path = ? WHERE output = ?", (path, output))
         return True

@@ -77,6 +77,17 @@ def test_other_options_are_other_work(tmp_path):
     assert work_hash(deeper) != work_hash(batch_of(tmp_path))
 
 
+def test_a_result_that_other_options_replaced_is_made_again(tmp_path):
+    library(tmp_path / "in", ["a.obj"])
+    batch = batch_of(tmp_path)
+    refined(batch)
+    expected = hashes(tmp_path / "out")
+    refined(batch_of(tmp_path, options=Options(scheme="loop", levels=2)))
+    assert refined(batch).counts == {"done": 1}
+    assert hashes(tmp_path / "out") == expected
+    assert refined(batch).counts == {"skipped": 1}
+
+
 def test_a_run_that_was_stopped_goes_on(tmp_path):
     library(tmp_path / "in")
 
