@@ -94,7 +94,7 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
         InvalidParameter: the source, the destination, the report, the model or a format cannot be
             used.
     """
-    check_report(batch.report)
+    check_report(batch.report, batch.source)
     if batch.to is not None and batch.to not in KINDS:
         raise InvalidParameter("to", f"{batch.to}: it must be one of {', '.join(KINDS)}")
     listing = items_of(batch.source, KINDS, place_of(batch.destination))

@@ -344,6 +344,24 @@ def test_what_is_not_refined_is_not_collected(tmp_path):
     assert refined(batch, looks).counts == {"failed": 50}
 
 
+def test_a_report_replaces_no_manifest(tmp_path):
+    library(tmp_path / "in", ["a.obj"])
+    manifest = tmp_path / "list.jsonl"
+    manifest.write_text('{"path": "in/a.obj", "note": "mine"}\n')
+    (tmp_path / "linked").symlink_to(tmp_path)
+    with pytest.raises(InvalidParameter, match=r"list\.jsonl: the report would replace SOURCE"):
+        refined(batch_of(tmp_path, manifest, report=tmp_path / "linked" / "list.jsonl"))
+    assert "mine" in manifest.read_text()
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_report_that_is_a_folder_is_told_before_the_work(tmp_path):
+    (tmp_path / "r.jsonl").mkdir()
+    with pytest.raises(InvalidParameter, match=r"r\.jsonl: it is a folder"):
+        refined(batch_of(tmp_path, library(tmp_path / "in"), report=tmp_path / "r.jsonl"))
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_parquet_report_without_what_writes_it_is_told_beforehand(tmp_path, monkeypatch):
     monkeypatch.setattr("service.scale.journal.find_spec", lambda _: None)
     with pytest.raises(InvalidParameter, match=r"Parquet needs the extra.*\.jsonl needs none"):
