@@ -198,14 +198,11 @@ def large(
 
     from rich.console import Console
 
-    from ..errors import InvalidParameter
     from ..scale.engines.named import engine_of
-    from ..scale.large.plan import Large, keep
+    from ..scale.large.plan import Large, check_report, keep
     from ..scale.large.run import large_work, run_large
     from .stops import stoppable
 
-    if report is not None and not report.parent.is_dir():
-        raise InvalidParameter("report", f"{report.parent}: there is no such folder")
     chosen = Large(
         source,
         output,
@@ -214,6 +211,8 @@ def large(
         parts,
         model,
     )
+    if report is not None:
+        check_report(report, chosen)
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     where = engine_of(large_work(), engine, address, workers, console.print)
     with stoppable(console):

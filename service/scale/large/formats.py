@@ -110,6 +110,8 @@ def output_kind(output: Path) -> OutputKind:
     """
     ending = output.suffix.lower()
     if ending == PLY:
+        if output.is_dir():
+            raise InvalidParameter("OUT", f"{output}: it is a folder")
         return OutputKind(PLY, None)
     if ending not in ("", TILES):
         raise InvalidParameter(

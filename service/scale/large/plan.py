@@ -47,6 +47,16 @@ class Large:
         return self.output.with_name(f"{self.output.name}.work")
 
 
+def check_report(report: Path, large: Large) -> None:
+    """Raise InvalidParameter where a report cannot be written, or would replace a mesh."""
+    if not report.parent.is_dir():
+        raise InvalidParameter("report", f"{report.parent}: there is no such folder")
+    if report.is_dir():
+        raise InvalidParameter("report", f"{report}: it is a folder")
+    if report.resolve() in (large.source.resolve(), large.output.resolve()):
+        raise InvalidParameter("report", f"{report}: the report would replace a mesh")
+
+
 @contextmanager
 def work_folder(large: Large, model_hash: str | None) -> Iterator[Path]:
     """Yield the folder of a work, with what an earlier run of the same left in it; no other run's.

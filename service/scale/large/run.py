@@ -90,6 +90,8 @@ def run_large(
         OSError: a file cannot be read or written.
     """
     kind = output_kind(large.output)
+    if large.options.crease == "normals":
+        raise InvalidParameter("crease", "crease=normals: none are read; use angle:DEGREES here")
     scheme = scheme_of(large.options, large.model)
     spent = Spent()
     with work_folder(large, scheme.model_hash) as work:

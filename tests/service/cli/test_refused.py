@@ -52,6 +52,11 @@ NAMES = ", ".join(bundled_models())
         ("serve --port 70000", 2, "port"),
         ("subdivide part.glb", 2, "--output"),
         ("large part.glb out.ply --report nowhere/report.json", 2, "nowhere"),
+        ("large part.glb out.ply --report part.glb", 2, "part.glb: the report would"),
+        ("large part.glb out.ply --report folder/../out.ply", 2, "would replace a mesh"),
+        ("large part.glb out.ply --report folder", 2, "folder: it is a folder"),
+        ("large part.glb folder.ply", 2, "folder.ply: it is a folder"),
+        ("large part.glb out.ply --crease normals", 2, "angle:DEGREES"),
         ("large part.glb out.ply --memory much", 2, "as 4GiB"),
         ("large part.glb out.ply --memory 1,5GiB", 2, "as 4GiB"),
     ],
@@ -64,6 +69,8 @@ def test_errors_are_one_line_and_leave_no_file(
     tree = tree_of_bytes(part_glb())
     tree["buffers"][0]["uri"] = "part.bin"
     (tmp_path / "external.gltf").write_bytes(msgspec.json.encode(tree))
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder.ply").mkdir()
     before = set(tmp_path.iterdir())
     outcome = pns(*arguments.split())
     assert outcome.code == code, outcome.err
