@@ -42,7 +42,9 @@ UNREADABLE = (
 
 _OBJ_VERTEX = re.compile(rb"^[ \t]*v(?=[ \t])" + 3 * rb"(?:[ \t]+([^\s#]+))?", re.MULTILINE)
 _OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]+([^\r\n#]*)", re.MULTILINE)
-_STL_VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+_STL_FACE = re.compile(
+    rb"outer\s+loop" + 3 * rb"\s+vertex\s+(\S+)\s+(\S+)\s+(\S+)" + rb"\s+endloop", re.IGNORECASE
+)
 
 
 def read_ply(path: Path, sink: Sink) -> None:
@@ -130,16 +132,20 @@ def read_stl(path: Path, sink: Sink) -> None:
         for rows in blocks_of(count):
             _add_soup(sink, np.array(records["corners"][rows]).reshape(-1, 3))
         return
-    left: np.ndarray = np.zeros((0, 3))
-    for text in _text_blocks(path):
-        points = np.concatenate([left, _numbers(path, _STL_VERTEX.findall(text))])
-        whole = len(points) - len(points) % 3
-        _add_soup(sink, points[:whole])
-        left = points[whole:]
-    if len(left):
-        raise UnreadableError(f"{path}: the STL file ends within a face")
-    if not sink.faces:
+    with path.open("rb") as file:
+        start = file.read(TEXT)
+    # Some programs write all words in capitals.
+    end = b"ENDLOOP" if b"ENDLOOP" in start else b"endloop"
+    if end not in start:
         raise UnreadableError(f"{path}: it has no faces as text, and is no whole binary STL")
+    text = b""
+    for text in _text_blocks(path, end):
+        faces = _STL_FACE.findall(text)
+        if len(faces) != text.count(end):
+            raise UnreadableError(f"{path}: a face is no triangle")
+        _add_soup(sink, _numbers(path, faces))
+    if b"endsolid" not in text.lower():
+        raise UnreadableError(f"{path}: the STL file ends within a solid")
 
 
 def _add_soup(sink: Sink, points: np.ndarray) -> None:
@@ -192,7 +198,7 @@ def _numbers(path: Path, rows: list[Any]) -> np.ndarray:
 
 
 def _text_blocks(path: Path, end: bytes = b"\n") -> Iterator[bytes]:
-    """Yield a file's text in blocks of whole lines; a line that fills a block is no mesh's."""
+    """Yield a file's text in blocks that end with `end`; a line that fills one is no mesh's."""
     with path.open("rb") as file:
         left = b""
         if file.read(len(BOM_UTF8)) != BOM_UTF8:
@@ -200,7 +206,7 @@ def _text_blocks(path: Path, end: bytes = b"\n") -> Iterator[bytes]:
         while block := file.read(TEXT):
             lines, last, rest = (left + block).rpartition(end)
             if len(rest) >= TEXT:
-                raise UnreadableError(f"{path}: a line of more than {TEXT} bytes")
+                raise UnreadableError(f"{path}: a line, or a face, of more than {TEXT} bytes")
             yield lines + last
             left = rest
         yield left

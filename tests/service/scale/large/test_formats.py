@@ -159,12 +159,32 @@ def test_an_obj_s_vertex_without_three_coordinates_is_refused(tmp_path, short):
         refined(tmp_path / "in.obj", tmp_path / "out", 1)
 
 
-def test_an_stl_may_be_text(tmp_path, monkeypatch):
-    monkeypatch.setattr("service.scale.large.readers.TEXT", 40)
-    mesh = trimesh.Trimesh(*grid(3), process=False)
-    (tmp_path / "in.stl").write_text(mesh.export(file_type="stl_ascii"))
+def stl_text(spelled=str):
+    return spelled(trimesh.Trimesh(*grid(3), process=False).export(file_type="stl_ascii"))
+
+
+@pytest.mark.parametrize(
+    "spelled",
+    [
+        str,
+        str.upper,
+        lambda text: text.replace("\n", "\r"),
+        lambda text: text.replace("outer loop\n", "outer loop "),
+    ],
+)
+def test_an_stl_may_be_text(tmp_path, monkeypatch, spelled):
+    monkeypatch.setattr("service.scale.large.readers.TEXT", 400)
+    (tmp_path / "in.stl").write_text(stl_text(spelled))
     refined(tmp_path / "in.stl", tmp_path / "out", 2)
     assert_same(tmp_path / "out", refine(control_of(*grid(3)), loop()).mesh)
+
+
+@pytest.mark.parametrize("place", ["endloop", "facet", "endsolid"])
+def test_an_stl_s_text_that_is_cut_off_is_told(tmp_path, place):
+    text = stl_text()
+    (tmp_path / "in.stl").write_text(text[: text.rindex(place)])
+    with pytest.raises(UnreadableError, match="ends within a solid"):
+        refined(tmp_path / "in.stl", tmp_path / "out", 2)
 
 
 def test_a_ply_may_be_of_either_byte_order_with_other_properties(tmp_path):
@@ -262,6 +282,7 @@ def _elsewhere(tree):
 
 PLY = b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\n"
 FACE = b"element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+STL = b"solid\nfacet normal 0 0 0\nouter loop\n%b\nendloop\nendfacet\nendsolid\n"
 XYZ = b"property float y\nproperty float z\n"
 
 
@@ -277,10 +298,12 @@ XYZ = b"property float y\nproperty float z\n"
         ("a.ply", PLY + XYZ + FACE, "ends within its vertex"),
         ("a.ply", PLY + XYZ + FACE + bytes(12) + b"\4" + bytes(16), "face 0 has 4 corners"),
         ("a.ply", PLY + XYZ + FACE + bytes(12) + struct.pack("<B3i", 3, 0, 1, 2), "indices"),
-        ("a.stl", b"solid\nvertex 0 0 0\n", "ends within a face"),
+        ("a.stl", b"solid\nvertex 0 0 0\n", "no faces as text"),
+        ("a.stl", STL % b"vertex 0 0 0", "no triangle"),
+        ("a.stl", STL % (4 * b"vertex 0 0 0\n"), "no triangle"),
         ("a.stl", b"", "no whole binary STL"),
         ("a.stl", bytes(80) + struct.pack("<I", 9) + bytes(50 * 8), "no whole binary STL"),
-        ("a.stl", b"solid\nvertex 0 0 x\n", "no number"),
+        ("a.stl", STL % b"vertex 0 0 x vertex 1 0 0 vertex 0 1 0", "no number"),
         ("a.obj", b"v 0 0 0\nf 1 2 3 4\n", "4 corners"),
         ("a.obj", b"v 0 0 zero\n", "no number"),
         ("a.obj", b"v 0 0 0\nf 1 x 3\n", "no number"),
