@@ -15,7 +15,7 @@ from jaxtyping import Bool, Int
 from pns_common.connectivity.topology import stable_sort
 
 from ...errors import UnrefinableError
-from .arrays import ArrayMesh, blocks_of, finished_array, let_go
+from .arrays import ArrayMesh, append, blocks_of, finished_array, let_go
 
 # Vertices a range: about 12 million corners.
 RANGE = 1 << 21
@@ -123,8 +123,7 @@ def _deal_out(mesh: ArrayMesh, files: list[Path]) -> None:
         ends = np.cumsum(counts)
         pairs = np.stack([corners, faces], axis=1)[order]
         for number in np.flatnonzero(counts):
-            with files[number].open("ab") as file:
-                pairs[ends[number] - counts[number] : ends[number]].tofile(file)
+            append(files[number], pairs[ends[number] - counts[number] : ends[number]])
         let_go(mesh.faces)
 
 

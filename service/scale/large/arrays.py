@@ -121,6 +121,23 @@ def _no_room(path: Path, size: int, free: int) -> LimitError:
     )
 
 
+def append(path: Path, rows: np.ndarray) -> None:
+    """Write rows at the end of a file, which may be new.
+
+    Raises:
+        OSError: it names the file and says why; numpy's own does neither where the disk is full.
+    """
+    data = np.ascontiguousarray(rows).reshape(-1).view(np.uint8).data
+    # Without a buffer: what that holds is written at the end, by a close that names no file.
+    with path.open("ab", buffering=0) as file:
+        try:
+            while len(data):
+                data = data[file.write(data) :]
+        except OSError as error:
+            error.filename = str(path)
+            raise
+
+
 def blocks_of(count: int, rows: int = BLOCK) -> Iterator[slice]:
     """Yield slices of so many rows that cover range(count)."""
     for start in range(0, count, rows):

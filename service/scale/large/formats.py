@@ -94,8 +94,8 @@ def input_mesh(source: Path, work: Path) -> tuple[ArrayMesh, dict[str, Any]]:
     folder.mkdir(exist_ok=True)
     dropped = kept(folder / ABOUT)
     if dropped is None:
-        with Sink(folder) as sink:
-            reader(source, sink)
+        sink = Sink(folder)
+        reader(source, sink)
         dropped = asdict(weld_outside_memory(*sink.rows(), folder))
         sink.remove()
         keep(folder / ABOUT, dropped)

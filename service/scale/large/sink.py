@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Self
 
 import numpy as np
+
+from .arrays import append
 
 POSITIONS, FACES = "raw-positions", "raw-faces"
 
@@ -16,28 +17,21 @@ class Sink:
     def __init__(self, folder: Path) -> None:
         self.vertices, self.faces = 0, 0
         self._folder = folder
-        self._positions = (folder / POSITIONS).open("wb")
-        self._faces = (folder / FACES).open("wb")
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._positions.close()
-        self._faces.close()
+        # Of a run that was stopped.
+        self.remove()
 
     def add_vertices(self, points: np.ndarray) -> None:
         """Append (N, 3) positions."""
-        np.ascontiguousarray(points, dtype="<f8").tofile(self._positions)
+        append(self._folder / POSITIONS, points.astype("<f8", copy=False))
         self.vertices += len(points)
 
     def add_faces(self, faces: np.ndarray) -> None:
         """Append (N, 3) rows of positions, which may come later."""
-        np.ascontiguousarray(faces, dtype="<i8").tofile(self._faces)
+        append(self._folder / FACES, faces.astype("<i8", copy=False))
         self.faces += len(faces)
 
     def rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return all positions and faces, by memory map, once the files are closed."""
+        """Return all positions and faces, by memory map."""
         return (
             _mapped(self._folder / POSITIONS, "<f8", self.vertices),
             _mapped(self._folder / FACES, "<i8", self.faces),

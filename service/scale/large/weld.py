@@ -20,7 +20,7 @@ from pns_common.mesh import repeated_vertex
 
 from ...errors import UnrefinableError
 from ...meshes.weld import canonical_zero
-from .arrays import FACES, POSITIONS, blocks_of, index_type, let_go, new_array
+from .arrays import FACES, POSITIONS, append, blocks_of, index_type, let_go, new_array
 
 # Rows a file that is sorted in memory.
 SORTED = 1 << 21
@@ -99,8 +99,7 @@ class _Scratch:
             counts = np.bincount(group, minlength=number)
             ends = np.cumsum(counts)
             for k in np.flatnonzero(counts):
-                with files[k].open("ab") as file:
-                    block[order[ends[k] - counts[k] : ends[k]]].tofile(file)
+                append(files[k], block[order[ends[k] - counts[k] : ends[k]]])
         for file in files:
             if columns:
                 yield np.fromfile(file, dtype=np.int64).reshape(-1, columns)

@@ -23,7 +23,7 @@ from service.errors import (
 )
 from service.options import Options
 from service.scale.large import plan
-from service.scale.large.arrays import let_go, new_array, open_mesh, reserve
+from service.scale.large.arrays import append, let_go, new_array, open_mesh, reserve
 from service.scale.large.plan import Large, work_folder
 from service.scale.large.run import run_large
 from service.scale.large.target import new_ply
@@ -161,6 +161,14 @@ def test_a_disk_that_fills_while_room_is_taken_is_empty_again(tmp_path, monkeypa
     with pytest.raises(LimitError, match="GB are needed"):
         reserve(tmp_path / "file", 1000)
     assert (tmp_path / "file").stat().st_size == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_disk_that_is_full_is_told_with_the_file_that_it_has_no_room_for(tmp_path):
+    (tmp_path / "rows").symlink_to("/dev/full")
+    with pytest.raises(OSError, match="No space left") as refusal:
+        append(tmp_path / "rows", np.zeros((5, 3)))
+    assert refusal.value.filename == f"{tmp_path}/rows"
 
 
 def test_a_disk_that_breaks_is_not_called_full(tmp_path, monkeypatch):
