@@ -102,12 +102,12 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
     if (first := next(items, None)) is None:
         text = f"{batch.source}: there is no file to refine ({', '.join(KINDS)})"
         raise InvalidParameter("SOURCE", text)
-    work = work_hash(batch)
+    model = model_hash(batch)
     destination = _destination(batch)
     counts: Counter[str] = Counter()
     faces: Counter[str] = Counter()
     codes: Counter[str] = Counter()
-    with open_journal(batch.report, work) as journal, _progress(console) as bar:
+    with open_journal(batch.report, work_hash(batch, model)) as journal, _progress(console) as bar:
         line = bar.add_task("refining", total=None, failed=0)
         _count_aside(listing, bar, line)
 
@@ -122,7 +122,7 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
                 console.print("\n".join(said), markup=False)
             bar.update(line, advance=len(rows), failed=counts[FAILED])
 
-        for rows in engine(_tasks(batch, chain([first], items), destination, journal, note)):
+        for rows in engine(_tasks(batch, model, chain([first], items), destination, journal, note)):
             note(rows)
     failures = sorted(codes.items(), key=lambda entry: (-entry[1], entry[0]))
     return Summary(batch.report, dict(counts), dict(faces), failures)
@@ -146,25 +146,29 @@ def print_summary(summary: Summary, console: Console) -> None:
         console.print(f"a row for each file: {summary.report}", markup=False)
 
 
-def work_hash(batch: Batch) -> str:
-    """Return what, beside its input, a result depends on, as one hash: options, model, format.
+def model_hash(batch: Batch) -> str | None:
+    """Return the hash of the model that a batch refines with; None without one.
 
     Raises:
         NoModelError: there is no such model, or it cannot be used.
         InvalidParameter: it is of no use with these options.
     """
-    model = None
-    if batch.options.scheme == "pns":
-        from pns_common import ModelError, load_model
+    if batch.options.scheme != "pns":
+        return None
+    from pns_common import ModelError, load_model
 
-        from ..gltf.subdivide import make_scheme
+    from ..gltf.subdivide import make_scheme
 
-        try:
-            loaded = load_model(batch.model)
-        except ModelError as error:
-            raise NoModelError(str(error)) from error
-        make_scheme(batch.options, loaded)
-        model = loaded.hash
+    try:
+        loaded = load_model(batch.model)
+    except ModelError as error:
+        raise NoModelError(str(error)) from error
+    make_scheme(batch.options, loaded)
+    return loaded.hash
+
+
+def work_hash(batch: Batch, model: str | None) -> str:
+    """Return what, beside its input, a result depends on, as one hash: options, model, format."""
     parts = {
         "options": asdict(batch.options),
         "model": model,
@@ -193,6 +197,7 @@ def _destination(batch: Batch) -> Place:
 
 def _tasks(
     batch: Batch,
+    model: str | None,
     items: Iterator[Item],
     destination: Place,
     journal: Journal,
@@ -204,7 +209,7 @@ def _tasks(
         with journal.together():
             for item in block:
                 try:
-                    tasks.append(_task(batch, item, destination, journal))
+                    tasks.append(_task(batch, model, item, destination, journal))
                 except ServiceError as error:
                     rejected.append(failed(_shown(item.url), "", error))
         if rejected:
@@ -212,7 +217,9 @@ def _tasks(
         yield from tasks
 
 
-def _task(batch: Batch, item: Item, destination: Place, journal: Journal) -> Task:
+def _task(
+    batch: Batch, model: str | None, item: Item, destination: Place, journal: Journal
+) -> Task:
     """Return what is to be done with a file, with what is known of it.
 
     Raises:
@@ -238,6 +245,7 @@ def _task(batch: Batch, item: Item, destination: Place, journal: Journal) -> Tas
         batch.options,
         batch.model,
         batch.limits,
+        model,
         known=journal.known(item.url),
         dry=batch.dry,
     )

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InvalidParameter, LimitError, NoModelError, ServiceError
 from ..options import Limits, Options
+from .same_model import check_same_model
 
 if TYPE_CHECKING:
     from pns_common.schemes import Model
@@ -28,6 +29,7 @@ class Task:
     Attributes:
         url, output: where it is read, where its result goes.
         kind, target: formats, by extension.
+        model_hash: of the model that the run began with; None without one.
         known: the hash of the input that the result at `output` was made of; None: there is none.
         attempt: 1, then 2 where the first worker died or hung.
         dry: predict the cost, write nothing.
@@ -40,6 +42,7 @@ class Task:
     options: Options
     model: str | None
     limits: Limits
+    model_hash: str | None = None
     known: str | None = None
     attempt: int = 1
     dry: bool = False
@@ -124,6 +127,7 @@ def _refine(task: Task) -> Row:
     if task.known == digest and output.is_file():
         return Row(task.url, task.output, SKIPPED, input_sha256=digest, bytes_in=len(data))
     model = _model(task.model) if task.options.scheme == "pns" else None
+    check_same_model(task.model, None if model is None else model.hash, task.model_hash)
     try:
         with memory_cap(task.limits.max_memory_bytes):
             written = converted(

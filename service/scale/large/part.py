@@ -27,6 +27,7 @@ from ...errors import LimitError, NoModelError, UnrefinableError
 from ...gltf.subdivide import make_scheme
 from ...meshes.shape_creases import lines_of
 from ...options import Options
+from ..same_model import check_same_model
 from .adjacency import Adjacency
 from .arrays import ArrayMesh, open_mesh
 from .cutout import Cutout, cutout
@@ -54,6 +55,7 @@ class PartTask:
         stage: COUNT or REFINE.
         mesh, work: folders of the mesh and of what is known of it.
         length, sides: R, and the sides of all faces.
+        model_hash: of the model that the run began with; None without one.
         counts: what COUNT counts: EDGES, TURNS, or both.
         vertices: of each level of the whole mesh; empty while it is counted.
         target: where to write; None while it is counted.
@@ -69,6 +71,7 @@ class PartTask:
     work: str
     options: Options
     model: str | None
+    model_hash: str | None
     length: float
     sides: SideLengths
     counts: tuple[str, ...] = ()
@@ -130,7 +133,7 @@ def _refine(
     """Refine the part, write it, and say what was done."""
     load_kernels()
     levels = task.options.levels
-    scheme = scheme_of(task.options, task.model).fitted(lambda: task.sides)
+    scheme = _scheme(task).fitted(lambda: task.sides)
     rings, cut, made = _surely_refined(task, scheme, mesh, adjacency, own)
     box = None
     if isinstance(task.target, Tiles):
@@ -154,7 +157,7 @@ def _edges(task: PartTask, piece: Piece) -> Int[np.ndarray, "N L"]:
 
 def _turns(task: PartTask, piece: Piece) -> Int[np.ndarray, " 2"]:
     load_kernels()
-    lines = lines_of(task.options, scheme_of(task.options, task.model))
+    lines = lines_of(task.options, _scheme(task))
     of_own = piece.own.astype(np.int64)
     return turns_of_parts(piece.points, piece.faces, lines, of_own, 2)[1]
 
@@ -236,6 +239,17 @@ def with_angle_creases(piece: Piece, angle: float | None) -> Piece:
         return piece
     sharp = edges_sharper_than(piece.points, piece.faces, angle)
     return replace(piece, creases=piece.creases.with_named(sharp))
+
+
+def _scheme(task: PartTask) -> Scheme:
+    """Return the scheme of a task.
+
+    Raises:
+        NoModelError: its model is not the one that the run began with, or there is none.
+    """
+    scheme = scheme_of(task.options, task.model)
+    check_same_model(task.model, scheme.model_hash, task.model_hash)
+    return scheme
 
 
 @cache

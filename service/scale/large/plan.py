@@ -14,7 +14,7 @@ from typing import Any
 
 from pns_common.base.whole_file import replace_file
 
-from ...errors import InvalidParameter, ServiceError, WorkerDied
+from ...errors import InvalidParameter, ServiceError, UnreadableError, WorkerDied
 from ...options import Options
 from .arrays import CREASES, FACES, POSITIONS
 
@@ -107,6 +107,12 @@ def work_folder(large: Large, model_hash: str | None) -> Iterator[Path]:
             _remove(work, folder)
             raise
         _remove(work, folder)
+
+
+def check_unchanged(large: Large, folder: Path) -> None:
+    """Raise UnreadableError where the input is not the one that a work began with."""
+    if identity(large.source) != kept(folder / PLAN)["source"]:
+        raise UnreadableError(f"{large.source}: it changed while it was refined; run it again")
 
 
 def _remove(work: Path, folder: Path) -> None:

@@ -38,7 +38,7 @@ from .part import (
     run_part,
     scheme_of,
 )
-from .plan import Large, keep, kept, work_folder
+from .plan import Large, check_unchanged, keep, kept, work_folder
 from .room import check_room
 from .survey import Survey, survey, used_vertices
 from .target import Target
@@ -97,6 +97,7 @@ def run_large(
     with work_folder(large, scheme.model_hash) as work:
         with spent.stage("read"):
             mesh, read = input_mesh(large.source, work)
+            check_unchanged(large, work)
         with spent.stage("survey"):
             about = _surveyed(mesh, work)
         length = _length(large, about)
@@ -120,6 +121,7 @@ def run_large(
                 work=str(work.resolve()),
                 options=large.options,
                 model=large.model,
+                model_hash=scheme.model_hash,
                 length=length,
                 sides=about.sides,
                 memory=None if large.parts else large.memory,
@@ -145,6 +147,8 @@ def run_large(
                 spent,
             )
         with spent.stage("finish"):
+            if large.source.is_dir():
+                check_unchanged(large, work)
             done = [kept(done_file(work, REFINE, part)) for part in range(parts)]
             fitted = scheme.fitted(lambda: about.sides)
             report = _report(fitted, length, about, done, read)

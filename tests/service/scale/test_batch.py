@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import pickle
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pns_common.runtimes.onnx_model import BUNDLED
 from service.cli import app
 from service.errors import InvalidParameter, NoModelError
 from service.meshfiles.convert import converted
@@ -28,6 +30,7 @@ from tests.service.scale.libraries import (
     TETRAHEDRON,
     batch_of,
     hashes,
+    here,
     library,
     refined,
     rows,
@@ -74,7 +77,23 @@ def test_other_options_are_other_work(tmp_path):
     refined(batch_of(tmp_path))
     deeper = batch_of(tmp_path, options=Options(scheme="loop", levels=2))
     assert refined(deeper).counts == {"done": 1}
-    assert work_hash(deeper) != work_hash(batch_of(tmp_path))
+    assert work_hash(deeper, None) != work_hash(batch_of(tmp_path), None)
+
+
+def test_a_model_that_is_replaced_meanwhile_is_told(tmp_path):
+    library(tmp_path / "in", ["a.obj"])
+    model = tmp_path / "m.onnx"
+    shutil.copy(str(BUNDLED / "general.onnx"), model)
+
+    def replaced(tasks):
+        shutil.copy(str(BUNDLED / "paper.onnx"), model)
+        return here(tasks)
+
+    batch = batch_of(tmp_path, options=Options(), model=str(model))
+    summary = refined(batch, replaced)
+    assert summary.failures == [("no-model", 1)]
+    assert not (tmp_path / "out" / "a.obj").exists()
+    assert "not the model that this run began with" in rows(batch)["a.obj"]["detail"]
 
 
 def test_a_result_that_other_options_replaced_is_made_again(tmp_path):

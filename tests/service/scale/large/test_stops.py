@@ -3,15 +3,20 @@
 import shutil
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from pns_common import Mesh, loop, refine
+from pns_common.runtimes.onnx_model import BUNDLED
 from service.errors import (
     InvalidParameter,
+    NoModelError,
+    UnreadableError,
     WorkerDied,
 )
+from service.options import Options
 from service.scale.engines.local import local
-from service.scale.large import part
+from service.scale.large import formats, part, readers
 from service.scale.large.part import run_part
 from service.scale.large.run import large_work
 from tests.service.scale.large.jobs import dies_at_first, dies_often
@@ -61,6 +66,51 @@ def test_another_input_or_option_begins_anew(tmp_path):
     mesh = Mesh(*grid(9, bent))
     refined(arrays(tmp_path / "in", mesh), tmp_path / "out", 3)
     assert_is(tmp_path / "out", refine(mesh, loop(), 2))
+
+
+def test_an_input_that_changes_meanwhile_is_told(tmp_path):
+    """Some parts would be of what it was, others of what it is."""
+    source = arrays(tmp_path / "in", many_kinds())
+
+    def changes(tasks):
+        positions = np.load(source / "positions.npy")
+        np.save(tmp_path / "changed.npy", 2 * positions)
+        (tmp_path / "changed.npy").replace(source / "positions.npy")
+        return here(tasks)
+
+    with pytest.raises(UnreadableError, match="in: it changed"):
+        refined(source, tmp_path / "out", 3, engine=changes)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["in"]
+
+
+def test_a_file_that_changes_while_it_is_read_is_told(tmp_path, monkeypatch):
+    source = tmp_path / "in.obj"
+    source.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+
+    def reads(path, sink):
+        readers.read_obj(path, sink)
+        with path.open("a") as file:
+            file.write("v 0 0 1\nf 1 2 4\n")
+
+    monkeypatch.setitem(formats.READERS, ".obj", reads)
+    with pytest.raises(UnreadableError, match=r"in\.obj: it changed"):
+        refined(source, tmp_path / "out", 1)
+    assert [path.name for path in tmp_path.iterdir()] == ["in.obj"]
+
+
+def test_a_model_that_is_replaced_meanwhile_is_told(tmp_path):
+    model = tmp_path / "m.onnx"
+    shutil.copy(str(BUNDLED / "general.onnx"), model)
+
+    def replaced(tasks):
+        shutil.copy(str(BUNDLED / "paper.onnx"), model)
+        part.scheme_of.cache_clear()  # as in a worker, which has loaded none yet
+        return here(tasks)
+
+    source = arrays(tmp_path / "in", many_kinds())
+    with pytest.raises(NoModelError, match="not the model that this run began with"):
+        refined(source, tmp_path / "out", 3, Options(), engine=replaced, model=str(model))
+    assert not (tmp_path / "out").exists()
 
 
 def test_two_runs_do_not_share_a_work(tmp_path):
