@@ -12,7 +12,8 @@ from typing import Annotated
 import typer
 
 from ..options import DEFAULTS
-from .errors import FAILURE, explained, printable
+from ..printable import printable
+from .errors import FAILURE, explained
 from .parameters import (
     AddressOption,
     BudgetOption,

@@ -41,8 +41,3 @@ def explained(error: Exception) -> tuple[str, int] | None:
             return f"{error.filename or 'output'}: {error.strerror or error}", FAILURE
         case _:
             return None
-
-
-def printable(text: str) -> str:
-    """Return a text as a terminal may show it: a file's name or content may hold its commands."""
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

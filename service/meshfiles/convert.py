@@ -25,6 +25,7 @@ from ..gltf.read.extras import REPORT_KEY
 from ..gltf.read.upload import read_upload
 from ..gltf.subdivide import make_scheme, subdivide_gltf
 from ..options import Limits, Options
+from ..printable import printable
 from ..report import Change
 from . import formats
 from .flatten import flatten
@@ -75,7 +76,7 @@ def convert(
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
         replace_file(report_file, text + b"\n")
     for line in _lines(written.report):
-        console.print(line, markup=False)
+        console.print(printable(line), markup=False)
     seconds = time.perf_counter() - began
     console.print(f"{output}: {written.faces:,} faces in {seconds:.1f} s", markup=False)
 

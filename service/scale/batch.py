@@ -28,6 +28,7 @@ from rich.text import Text
 from ..bodies.media import KINDS
 from ..errors import InvalidParameter, NoModelError, ServiceError
 from ..options import Limits, Options
+from ..printable import printable
 from .engines.work import Engine, Work
 from .job import DONE, FAILED, PLANNED, SKIPPED, Row, Task, failed, read_libraries, run, target_of
 from .journal import Journal, check_report, open_journal
@@ -291,8 +292,11 @@ def _count_aside(listing: Callable[[], Iterator[Item]], bar: Progress, line: Tas
 
 def _line(row: Row) -> str:
     """Return what is said of a file at once: why it failed, or what is planned."""
+    path = printable(row.path)
     if row.status == FAILED:
-        return f"{row.path}: {row.detail} [{row.code}]"
+        # Of a fault of ours it is a traceback.
+        detail = "\n".join(map(printable, row.detail.split("\n")))
+        return f"{path}: {detail} [{row.code}]"
     if row.status == PLANNED:
-        return f"{row.path} -> {row.output}: {row.faces_in:,} faces to {row.faces_out:,}"
+        return f"{path} -> {printable(row.output)}: {row.faces_in:,} faces to {row.faces_out:,}"
     return ""

@@ -18,10 +18,10 @@ from pns_common.masks.stencils import limit_ring_weight
 from pns_common.runtimes.onnx_model import DEFAULT_MODEL, bundled_models, load_model
 from service import cli
 from service.__main__ import main
-from service.gltf.read.container import read_glb
+from service.gltf.read.container import read_glb, write_glb
 from service.http.access import keys
 from service.meshfiles.example import part_glb
-from tests.service.cli.trees import FACES, tree_of
+from tests.service.cli.trees import FACES, tree_of, tree_of_bytes
 from tests.support.meshes import icosphere
 from tests.support.networks import vertex_model_bytes
 
@@ -183,6 +183,31 @@ def test_a_files_name_cannot_speak_to_the_terminal(pns: Any) -> None:
     code, _, err = pns("subdivide", "\x1b[31mred\x9b.glb", "-o", "out.glb")
     assert code != 0
     assert "\\x1b[31mred\\x9b.glb" in err
+    assert err.replace("\n", "").isprintable()
+
+
+def test_what_a_file_holds_cannot_speak_to_the_terminal(pns: Any, tmp_path: Path) -> None:
+    tree = tree_of_bytes(part_glb())
+    primitive = tree["meshes"][0]["primitives"][0]
+    primitive["attributes"]["_\x1b[31mRED"] = primitive["attributes"]["POSITION"]
+    binary = read_glb(part_glb()).binary
+    (tmp_path / "red.glb").write_bytes(write_glb(msgspec.json.encode(tree), [binary], []))
+    code, _, err = pns("subdivide", "red.glb", "-o", "out.obj")
+    assert code == 0
+    assert "attribute _\\x1b[31mRED dropped" in err
+    assert err.replace("\n", "").isprintable()
+
+
+@pytest.mark.parametrize("more", [[], ["--dry-run"]])
+def test_a_library_s_names_cannot_speak_to_the_terminal(
+    pns: Any, tmp_path: Path, more: list[str]
+) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "\x1b[31mred\n.obj").write_text("bad")
+    (tmp_path / "in" / "\x1b[31mplain.glb").write_bytes(part_glb())
+    arguments = ["--scheme", "loop", "--workers", "1", "--report", "r.jsonl", *more]
+    _, _, err = pns("batch", "in", "out", *arguments)
+    assert "\\x1b[31mred\\n.obj: " in err
     assert err.replace("\n", "").isprintable()
 
 
