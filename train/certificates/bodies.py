@@ -53,6 +53,17 @@ def bumpy_sphere(seed: int) -> Mesh:
     return Mesh(directions * bumps, np.asarray(sphere.faces, dtype=np.int64))
 
 
+def spiky_sphere(seed: int) -> Mesh:
+    """Return a sphere of 320 faces with radii of 0.1 to 1.9: what is added to Loop would fold it.
+
+    On smooth bodies a trained rule turns no face far enough for the fold guard to act.
+    """
+    sphere = trimesh.creation.icosphere(subdivisions=2)
+    directions = np.asarray(sphere.vertices, dtype=np.float64)
+    radii = np.random.default_rng(seed).uniform(0.1, 1.9, (len(directions), 1))
+    return Mesh(directions * radii, np.asarray(sphere.faces, dtype=np.int64))
+
+
 def bumpy_torus(seed: int) -> Mesh:
     """Return a torus of 12 × 6 quads, halved: closed and every vertex regular."""
     around, across = 12, 6

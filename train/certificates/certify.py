@@ -12,7 +12,7 @@ from rich.table import Table
 from pns_common.errors import ModelError, PnsError
 from pns_common.runtimes.onnx_model import DEFAULT_MODEL, load_model
 from train.certificates.affine import affine_reproduction
-from train.certificates.bodies import Body, flat_bodies, synthetic_bodies
+from train.certificates.bodies import Body, flat_bodies, spiky_sphere, synthetic_bodies
 from train.certificates.certificate import Certificate
 from train.certificates.displacement import bounded_displacement
 from train.certificates.double_precision import double_model, read_bytes
@@ -109,20 +109,23 @@ def scheme_steps(
         Step("T6", "normal-variation slope", lambda: normal_variation_slope(subject, shaped)),
         Step("T7", "Lipschitz slope", lambda: lipschitz_slope(subject, shaped, seed)),
         Step("T8", "planar spectrum", lambda: planar_spectrum(subject, valences)),
-        *_steps_of_kind(subject, every, valences),
+        *_steps_of_kind(subject, every, seed, valences),
     ]
 
 
-def _steps_of_kind(subject: Subject, bodies: Sequence[Body], valences: Sequence[int]) -> list[Step]:
+def _steps_of_kind(
+    subject: Subject, bodies: Sequence[Body], seed: int, valences: Sequence[int]
+) -> list[Step]:
     """Return the certificates that a kind of scheme has.
 
     Schemes that turn into Loop have its spectra; of others lifted stars say more.
     """
     if subject.scheme.guard is None:
         return [Step("stars", "lifted stars", lambda: lifted_stars(subject, valences))]
+    rough = (*bodies, Body("spiky sphere", spiky_sphere(seed)))
     return [
-        Step("folds", "fold-free", lambda: fold_free(subject, bodies)),
-        Step("limit", "limit distance", lambda: limit_distance(subject, bodies)),
+        Step("folds", "fold-free", lambda: fold_free(subject, rough)),
+        Step("limit", "limit distance", lambda: limit_distance(subject, rough)),
         Step("class", "smoothness class", lambda: smoothness_class(subject, bodies)),
         Step("scale", "resolution independence", lambda: resolution_independence(subject, bodies)),
     ]

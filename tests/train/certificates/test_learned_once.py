@@ -12,8 +12,9 @@ from pns_common.rules.scale_free import ScaleFreeEdgeRule
 from pns_common.schemes import loop_edge_rule, loop_vertex_rule, scale_free_form
 from tests.support.meshes import bumpy_sphere, icosphere
 from tests.support.networks import SCALE_FREE_CARD, scale_free_model
-from train.certificates.bodies import Body, synthetic_bodies
+from train.certificates.bodies import Body, spiky_sphere, synthetic_bodies
 from train.certificates.certify import scheme_steps
+from train.certificates.displacement import bounded_displacement
 from train.certificates.learned_once import (
     fold_free,
     largest_turn,
@@ -65,6 +66,30 @@ def test_rules_without_a_guard_fold():
     assert result.value > 75
     assert not result.passed
     assert fold_free(wild, BODIES).passed
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_default_is_certified_where_its_guard_acts(seed):
+    general = subject_of_scheme(pns(load_model()), 10.0)
+    bare = replace(general, scheme=replace(general.scheme, guard=None))
+    (folds,) = (step for step in scheme_steps(general, (), seed, ()) if step.theorem == "folds")
+    result = folds.work()
+    assert result.passed, (result.value, result.where)
+    assert fold_free(bare, [Body("spiky sphere", spiky_sphere(seed))]).value > 90
+
+
+def test_a_scale_free_rule_beyond_its_budget_is_found():
+    """At the size of a certificate's meshes it asks for less than the budget anyway."""
+    sound = subject()
+    assert bounded_displacement(sound, BODIES, levels=1).passed
+    assert not bounded_displacement(replace(sound, budget=sound.budget / 2), BODIES, 1).passed
+
+
+def test_crease_lines_do_not_count_against_the_bound():
+    tight = pns(load_model(), budget=0.05)
+    box_alone = [Body("box", box())]
+    assert tight.creases.levels > 0
+    assert bounded_displacement(subject_of_scheme(tight, 0.05), box_alone, levels=1).passed
 
 
 def test_a_guard_that_is_looser_than_it_says_is_found():
