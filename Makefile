@@ -9,8 +9,8 @@ PEERS := .venv-bench
 INTEROP := .venv-interop
 # Tests start hundreds of processes: each would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
-# Pins what is installed, and what builds it.
-export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
+# Pins what is installed, and what builds it. pip takes a list here: a blank in the folder's name would part it.
+export PIP_CONSTRAINT := file://$(subst $() ,%20,$(CURDIR))/constraints.txt
 # What has one maintainer is pinned by hash, and first.
 HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.txt
 
@@ -149,14 +149,14 @@ addon: $(DEV)/.ready $(BLENDER)-5.0/.ready
 
 # What the extension costs on 100,000 vertices, beside the library alone.
 blender-measure: addon
-	$(BLENDER)-5.0/bin/python addons/blender/measure.py $(CURDIR)/dist/pns_refine-*.zip
+	$(BLENDER)-5.0/bin/python addons/blender/measure.py "$(CURDIR)"/dist/pns_refine-*.zip
 
 # It is installed from the zip into each of these, and every property that it keeps is looked at.
 BPY_VERSIONS ?= 4.2 5.0 $(if $(shell python3.13 --version 2>/dev/null),5.2)
 blender-test: addon $(foreach version,$(BPY_VERSIONS),$(BLENDER)-$(version)/.ready)
-	set -e; zip=$$(echo $(CURDIR)/dist/pns_refine-*.zip); cd tests/addons/blender/in_blender; \
+	set -e; zip=$$(echo "$(CURDIR)"/dist/pns_refine-*.zip); cd tests/addons/blender/in_blender; \
 	for version in $(BPY_VERSIONS); do \
-	  PNS_ADDON=$$zip OMP_NUM_THREADS=1 $(CURDIR)/$(BLENDER)-$$version/bin/python -m pytest -c pytest.ini --confcutdir .; \
+	  PNS_ADDON="$$zip" OMP_NUM_THREADS=1 "$(CURDIR)"/$(BLENDER)-$$version/bin/python -m pytest -c pytest.ini --confcutdir .; \
 	done
 
 # The page: from web/ to the bundle in service/web, which is committed. Only who changes it needs node.
@@ -165,11 +165,11 @@ web: web/node_modules/.ready
 
 # The page in Chromium against a real server; without chromium its tests are skipped, by name.
 web-test: $(DEV)/.ready web/node_modules/.ready
-	cd web && PNS=$(CURDIR)/$(DEV)/bin/pns node --test --test-concurrency=1 test/*.test.mjs
+	cd web && PNS="$(CURDIR)"/$(DEV)/bin/pns node --test --test-concurrency=1 test/*.test.mjs
 
 # The pictures of README and docs, and how fast the page is on this machine.
 web-pictures web-measure: web-%: $(DEV)/.ready web/node_modules/.ready
-	cd web && PNS=$(CURDIR)/$(DEV)/bin/pns node $*.mjs
+	cd web && PNS="$(CURDIR)"/$(DEV)/bin/pns node $*.mjs
 
 web/node_modules/.ready: web/package-lock.json
 	cd web && npm ci --ignore-scripts --no-audit --no-fund
@@ -199,7 +199,7 @@ $(DEV)/.ready: pyproject.toml setup.py constraints.txt
 	$(DEV)/bin/python -m pip install --quiet torch==2.13.0
 	$(DEV)/bin/python -m pip install --quiet --editable '.[dev]'
 	# The laboratory is no part of the package: its commands import it from here.
-	echo $(CURDIR) > "$$($(DEV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/pns-checkout.pth"
+	echo "$(CURDIR)" > "$$($(DEV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/pns-checkout.pth"
 	touch $@
 
 # Resolve every dependency anew within pyproject's ranges and write the pins.

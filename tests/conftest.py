@@ -55,6 +55,7 @@ KINDS = {
         "soak",
         "test_architecture.py",
         "test_benchmarks.py",
+        "test_makefile.py",
         "test_wheel.py",
         "web",
     ),
