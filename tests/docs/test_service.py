@@ -2,10 +2,12 @@
 
 import json
 import re
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
+from pns_common import load_model
 from service.errors import ServiceError
 from service.http import documentation, routes  # noqa: F401  (every error's class)
 from service.http.connection.protocol import HEAD_BYTES
@@ -24,6 +26,16 @@ def test_every_setting_is_on_the_page(name):
 def test_the_list_of_models_has_the_fields_of_the_example():
     models, _ = examples()
     assert [set(entry) for entry in models] == [set(ModelEntry.model_fields)]
+
+
+def test_the_example_of_a_model_is_true_of_it():
+    ((said, *_), _) = examples()
+    model = load_model(said["name"])
+    true = {"hash": f"{model.hash[:4]}…", "size": model.size} | asdict(model.card)
+    # Of these it has the beginnings.
+    assert said.pop("training").items() <= true.pop("training").items()
+    assert said.pop("metrics").keys() == true.pop("metrics").keys()
+    assert {key: said[key] for key in true} == true
 
 
 def test_the_example_of_a_job_has_the_fields_of_a_job():
