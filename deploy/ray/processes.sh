@@ -3,7 +3,7 @@
 #   deploy/ray/processes.sh pns batch in/ out/ --report report.parquet
 # `--address` is added to the command.
 set -eu
-port=${PNS_RAY_PORT:-6379}
+port=${RAY_PORT:-6379}
 here=$(mktemp -d)
 nodes=""
 stop() {

@@ -1,5 +1,6 @@
 """The cluster of a batch: valid, restricted, and its commands are ones that exist."""
 
+import re
 import shlex
 import shutil
 import subprocess
@@ -9,6 +10,7 @@ import pytest
 import typer
 
 from service.cli import app
+from service.settings import Settings
 
 yaml = pytest.importorskip("yaml")
 
@@ -145,6 +147,15 @@ def test_compose_has_a_head_and_two_workers_that_nobody_outside_reaches():
 
 def test_the_script_of_processes_is_a_shell_script():
     subprocess.run(["sh", "-n", str(DEPLOY / "ray" / "processes.sh")], check=True)
+
+
+def test_what_is_set_around_a_command_of_ours_does_not_make_it_refuse_to_start():
+    """`pns` refuses a PNS_… that is no setting; what these files read is set in its shell."""
+    texts = [path.read_text() for path in DEPLOY.rglob("*") if path.is_file()]
+    read = {name for text in texts for name in re.findall(r"\$\{?(\w+)", text)}
+    assert {"RAY_PORT", "RAY_AUTH_TOKEN", "BASE_IMAGE"} <= read
+    settings = {f"PNS_{name.upper()}" for name in Settings.model_fields}
+    assert {name for name in read if name.startswith("PNS_")} <= settings
 
 
 def test_the_cluster_is_of_the_ray_that_is_pinned():
