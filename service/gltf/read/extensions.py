@@ -21,6 +21,14 @@ def withdraw(tree: dict[str, Any], name: str) -> bool:
     return listed
 
 
+def drop(holder: dict[str, Any], name: str) -> None:
+    """Take an extension out of what has it, if it does; no object without members stays behind."""
+    extensions = holder.get("extensions", {})
+    extensions.pop(name, None)
+    if not extensions:
+        holder.pop("extensions", None)
+
+
 def declare(tree: dict[str, Any], name: str) -> None:
     """Put an extension that no reader can do without on both lists."""
     for key in _LISTS:

@@ -103,11 +103,7 @@ def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, l
     for mesh in plans:
         for number in mesh.primitives:
             primitive = document.meshes[mesh.mesh].primitives[number]
-            width = sum(
-                element_size(document.accessors[index])
-                for attributes in (primitive.attributes, *primitive.targets)
-                for index in attributes.values()
-            )
+            width = sum(element_size(document.accessors[index]) for _, index in primitive.named)
             before = triangle_count(_corner_count(document, primitive), primitive.mode, "")
             faces = before * 4**levels
             total += BYTES_PER_PRIMITIVE + faces * (BYTES_PER_FACE + BYTES_PER_VERTEX_BYTE * width)

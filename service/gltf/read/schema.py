@@ -101,6 +101,13 @@ class Primitive(Part, frozen=True):
     targets: list[dict[str, Index]] = []
     extensions: dict[str, Any] = {}
 
+    @property
+    def named(self) -> list[tuple[str, int]]:
+        """What its vertices have, and how morph targets move it: attributes and accessors."""
+        return [
+            entry for attributes in (self.attributes, *self.targets) for entry in attributes.items()
+        ]
+
 
 class Mesh(Part, frozen=True):
     """`meshes[]`."""

@@ -39,8 +39,7 @@ def spare(
     for mesh in document.meshes:
         for primitive in mesh.primitives:
             if primitive.mode in SURFACES:
-                for attributes in (primitive.attributes, *primitive.targets):
-                    accessors.update(attributes.values())
+                accessors.update(index for _, index in primitive.named)
                 accessors |= set() if primitive.indices is None else {primitive.indices}
     views = set(draco_views)
     for index in accessors:

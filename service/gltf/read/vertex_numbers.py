@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...report import Change
-from .extensions import withdraw
+from .extensions import drop, withdraw
 from .modes import SURFACES, TRIANGLES
 
 BY_NUMBER = ("EXT_mesh_manifold", "EXT_mesh_primitive_restart", "BENTLEY_primitive_restart")
@@ -32,9 +32,7 @@ def _leave_out(tree: dict[str, Any], name: str) -> list[Change]:
         if not any(p.get("mode", TRIANGLES) in SURFACES for p in mesh.get("primitives", [])):
             stays = True
             continue
-        del extensions[name]
-        if not extensions:
-            del mesh["extensions"]
+        drop(mesh, name)
         what = f"left out: {name}, by the numbers of vertices"
         changes.append(Change(f"/meshes/{number}", what, 1))
     if changes and not stays:

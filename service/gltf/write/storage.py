@@ -60,17 +60,13 @@ def _of_primitive(document: Document, primitive: Primitive, pointer: str) -> Ite
     if primitive.mode in _MODES:
         yield Change(f"{pointer}/mode", _MODES[primitive.mode], 1)
     indices = [] if primitive.indices is None else [primitive.indices]
-    named = [
-        (name, index)
-        for attributes in (primitive.attributes, *primitive.targets)
-        for name, index in attributes.items()
-    ]
-    stored = [*indices, *(index for _, index in named)]
+    stored = [*indices, *(index for _, index in primitive.named)]
     sparse = sum(accessors[index].sparse is not None for index in stored)
     if sparse:
         yield Change(pointer, "sparse accessors written dense", sparse)
     quantised = sum(
-        is_dequantised(name) and accessors[index].component_type != FLOAT for name, index in named
+        is_dequantised(name) and accessors[index].component_type != FLOAT
+        for name, index in primitive.named
     )
     if quantised:
         yield Change(pointer, "quantised attributes written as float32", quantised)

@@ -53,11 +53,10 @@ def _attributes(document: Document) -> Iterator[tuple[str, str]]:
     """Yield what is wrong with accessors as attributes; each is looked at once a name."""
     declared = EXTENSION in document.extensions_used
     used = {
-        (name, index): None
+        entry: None
         for mesh in document.meshes
         for primitive in mesh.primitives
-        for attributes in (primitive.attributes, *primitive.targets)
-        for name, index in attributes.items()
+        for entry in primitive.named
     }
     for name, index in used:
         accessor = document.accessors[index]

@@ -121,11 +121,7 @@ def _check_primitive(document: Document, primitive: Primitive, pointer: str) -> 
     ]:
         for name, index in attributes.items():
             refer(index, document.accessors, f"{pointer}/{place}/{escaped(name)}")
-    counts = {
-        document.accessors[index].count
-        for attributes in (primitive.attributes, *primitive.targets)
-        for index in attributes.values()
-    }
+    counts = {document.accessors[index].count for _, index in primitive.named}
     if len(counts) > 1:
         raise GltfError(
             f"the attributes have different counts: {sorted(counts)}",

@@ -15,15 +15,16 @@ from jaxtyping import Shaped
 from ....errors import GltfError, LimitError
 from ....options import Limits
 from ...constants import COMPONENT_COUNTS, COMPONENT_TYPES, UNSIGNED_INT
-from ..extensions import withdraw
+from ..checks.references import refer
+from ..extensions import drop, withdraw
 from ..memory_cap import memory_cap
+from ..modes import STRIP, TRIANGLES
 from ..plan import check_decoded
 from ..schema import Document, Index, Part, Primitive, checked
 from .draco_header import read_header
 
 EXTENSION = "KHR_draco_mesh_compression"
 
-TRIANGLES, STRIP = 4, 5
 # Peak bytes while decoding, at least twice what was measured on 200,000 and 320,000 faces with
 # normals and UVs (138 to 355 for each face).
 BYTES_PER_FACE = 300
@@ -85,11 +86,7 @@ def _decode(
     wanted = checked(primitive.extensions[EXTENSION], CompressedPrimitive, here)
     if primitive.mode not in (TRIANGLES, STRIP):
         raise GltfError("Draco holds triangles only", pointer=f"{pointer}/mode")
-    if wanted.buffer_view >= len(document.buffer_views):
-        raise GltfError(
-            f"index {wanted.buffer_view}, but there are {len(document.buffer_views)}",
-            pointer=f"{here}/bufferView",
-        )
+    refer(wanted.buffer_view, document.buffer_views, f"{here}/bufferView")
     view = document.buffer_views[wanted.buffer_view]
     data = bytes(buffers[view.buffer][view.byte_offset : view.byte_offset + view.byte_length])
     header = read_header(data, here)
@@ -181,6 +178,4 @@ def _store(
         tree["buffers"].append({"byteLength": len(data)})
         buffers.append(data)
     primitive.pop("mode", None)
-    del primitive["extensions"][EXTENSION]
-    if not primitive["extensions"]:
-        del primitive["extensions"]
+    drop(primitive, EXTENSION)

@@ -15,7 +15,8 @@ import numpy as np
 
 from ....errors import GltfError
 from ....options import Limits
-from ..extensions import withdraw
+from ..checks.references import refer
+from ..extensions import drop, withdraw
 from ..plan import check_decoded
 from ..schema import Document, Index, Part, Size, checked
 
@@ -86,13 +87,13 @@ def decode_views(
     for entry, data in zip(packed, decoded, strict=True):
         view = tree["bufferViews"][entry.number]
         view |= {"buffer": len(buffers), "byteOffset": 0}
-        _drop(view, entry.name)
+        drop(view, entry.name)
         tree["buffers"].append({"byteLength": len(data)})
         buffers.append(data)
     for name in EXTENSIONS:
         withdraw(tree, name)
         for buffer in tree.get("buffers", []):
-            _drop(buffer, name)
+            drop(buffer, name)
     return [
         (f.view.buffer, f.view.byte_offset, f.view.byte_offset + f.view.byte_length) for f in packed
     ]
@@ -123,10 +124,7 @@ def _checked_view(value: Any, length: int, number: int, name: str) -> Compressed
 
 def _decode(entry: _Packed, buffers: Sequence[memoryview]) -> memoryview:
     view = entry.view
-    if view.buffer >= len(buffers):
-        raise GltfError(
-            f"index {view.buffer}, but there are {len(buffers)}", pointer=f"{entry.pointer}/buffer"
-        )
+    refer(view.buffer, buffers, f"{entry.pointer}/buffer")
     end = view.byte_offset + view.byte_length
     if end > len(buffers[view.buffer]):
         raise GltfError(
@@ -140,10 +138,3 @@ def _decode(entry: _Packed, buffers: Sequence[memoryview]) -> memoryview:
     except (ValueError, RuntimeError) as error:
         raise GltfError(f"the data do not decode: {error}", pointer=entry.pointer) from error
     return np.ascontiguousarray(decoded).reshape(-1).view(np.uint8).data.cast("B")
-
-
-def _drop(holder: dict[str, Any], name: str) -> None:
-    extensions = holder.get("extensions", {})
-    extensions.pop(name, None)
-    if not extensions:
-        holder.pop("extensions", None)
