@@ -122,7 +122,7 @@ def _placed(
         rows[welded.vertex_of[used]] = used
         positions, faces = welded.points, welded.faces
     world = positions @ matrix[:3, :3].T + matrix[:3, 3]
-    binding = read_binding(primitives)
+    binding = None if joints is None else read_binding(primitives)
     if joints is not None and binding is not None:
         world = posed(positions, binding.take(rows), joints, placed=world)
         matrix = joints[0]

@@ -28,7 +28,7 @@ def joint_matrices(
     `worlds` are the world matrices of the scene's nodes; a skin with joints elsewhere is none.
 
     Raises:
-        GltfError: inverse bind matrices of another type, or fewer than joints.
+        GltfError: inverse bind matrices that are none, or fewer than joints.
     """
     number = upload.document.nodes[node].skin
     if number is None:
@@ -46,13 +46,14 @@ def joint_matrices(
 def _inverse_bind_matrices(upload: Upload, skin: int, index: int) -> Float[np.ndarray, "N 4 4"]:
     accessor = upload.document.accessors[index]
     joints = len(upload.document.skins[skin].joints)
-    if (accessor.type, accessor.component_type) != ("MAT4", FLOAT) or accessor.count < joints:
+    columns = read(upload.document, upload.buffers, index)
+    is_matrix = (accessor.type, accessor.component_type) == ("MAT4", FLOAT)
+    if not is_matrix or len(columns) < joints or not np.isfinite(columns).all():
         raise GltfError(
-            f"{joints} joints need as many MAT4 of floats",
+            f"{joints} joints need as many MAT4 of finite floats",
             pointer=f"/skins/{skin}/inverseBindMatrices",
         )
-    columns = read(upload.document, upload.buffers, index).astype(np.float64)
-    return columns.reshape(-1, 4, 4).transpose(0, 2, 1)
+    return columns.astype(np.float64).reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
 def posed(

@@ -78,11 +78,15 @@ def test_a_mesh_that_stands_as_it_was_bound_keeps_its_bits():
 
 
 @pytest.mark.parametrize(
-    ("joint", "count", "says"),
-    [(2, 2, "joint 2 of 2"), (1, 1, "2 joints need as many MAT4 of floats")],
+    ("joint", "inverse", "says"),
+    [
+        (2, [np.eye(4)] * 2, "joint 2 of 2"),
+        (1, [np.eye(4)], "2 joints need as many MAT4"),
+        (1, [np.eye(4), np.full((4, 4), np.nan)], "finite"),
+    ],
 )
-def test_joints_that_there_are_not_are_told(joint, count, says):
-    tree, binary = skinned([[joint, 0, 0, 0]] * 6, [[1, 0, 0, 0]] * 6, [np.eye(4)] * count)
+def test_joints_and_matrices_that_there_are_not_are_told(joint, inverse, says):
+    tree, binary = skinned([[joint, 0, 0, 0]] * 6, [[1, 0, 0, 0]] * 6, inverse)
     with pytest.raises(GltfError, match=says):
         corners(tree, binary)
 
