@@ -1,4 +1,4 @@
-"""Ctrl-C, which a terminal sends to the workers of a process too."""
+"""What a terminal sends to the workers of a process too: Ctrl-C, and that it closes."""
 
 from __future__ import annotations
 
@@ -7,15 +7,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 
+OF_TERMINAL = {signal.SIGINT, signal.SIGHUP}
+
 
 @contextmanager
 def no_interrupt() -> Iterator[None]:
-    """Keep Ctrl-C from threads and processes that are started inside: to end them is for whoever
+    """Keep these from threads and processes that are started inside: to end them is for whoever
     starts them, and one that is still importing would say so at length."""
-    # As it starts, with the first lock of a process's, it lets through what is kept.
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_TERMINAL)
     try:
+        # Python's own, which counts locks and is started with the first, lets Ctrl-C through.
+        resource_tracker.ensure_running()
+        signal.pthread_sigmask(signal.SIG_BLOCK, OF_TERMINAL)
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
