@@ -33,7 +33,7 @@ def bundled_file(recipe: Recipe) -> Path | None:
 
 PUBLISHED_MODELS = Path("checkpoints/published")
 
-app = typer.Typer(help="Turn a checkpoint into a model file.", pretty_exceptions_enable=False)
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 
 @app.command()

@@ -47,7 +47,12 @@ else:  # A type checker cannot see the members that a table gives.
     RecipeName = StrEnum("RecipeName", {name: name for name in RECIPES})
 DEFAULT_RECIPE = RecipeName("paper")
 
-app = typer.Typer(help="Train, measure and certify the operator.", pretty_exceptions_enable=False)
+app = typer.Typer(
+    help="Train, measure and certify the operator.",
+    # It would be for a command named run.py, which is not how this is started.
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
 app.command("reproduce")(reproduce_command)
 app.command("certify")(certify_command)
 

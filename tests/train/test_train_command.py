@@ -57,3 +57,5 @@ def test_scripts_run_from_the_repository_root():
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("Usage") == 2
+    # It is of a shell's commands, and these are none.
+    assert "completion" not in done.stdout
