@@ -7,7 +7,17 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from ..options import Compression, Diagnostics, NormalRule, Options, SchemeName, UvRule
+from ..options import (
+    MAX_LEVELS,
+    MAX_PRIOR_STRENGTH,
+    MAX_WELD_TOLERANCE,
+    Compression,
+    Diagnostics,
+    NormalRule,
+    Options,
+    SchemeName,
+    UvRule,
+)
 
 
 def options_of(context: typer.Context) -> Options:
@@ -40,12 +50,17 @@ def _size(text: str) -> int:
         raise typer.BadParameter("it must be a size, as 4GiB") from error
 
 
-LevelsOption = Annotated[int, typer.Option(help="depth: four faces of one at each level")]
+LevelsOption = Annotated[
+    int, typer.Option(help=f"depth, 1 to {MAX_LEVELS}: four faces of one at each level")
+]
 SchemeOption = Annotated[SchemeName, typer.Option(help="the rules")]
 BudgetOption = Annotated[float | None, typer.Option(metavar="C", help="default: the model's own")]
 StrengthOption = Annotated[
     float | None,
-    typer.Option(metavar="S", help="0 to 100, of the model's prior; default: as meshes call for"),
+    typer.Option(
+        metavar="S",
+        help=f"0 to {MAX_PRIOR_STRENGTH:g}, of the model's prior; default: as meshes call for",
+    ),
 ]
 ModelOption = Annotated[
     str | None,
@@ -69,7 +84,10 @@ DiagnosticsOption = Annotated[Diagnostics, typer.Option(help="what a glTF carrie
 UvOption = Annotated[UvRule, typer.Option(help="smooth: Loop's stencil inside charts")]
 NormalsOption = Annotated[
     NormalRule,
-    typer.Option(help="smooth: new ones in a glTF, but across creases"),
+    typer.Option(
+        help="smooth: new ones in a glTF, smooth but across creases; limit: those of the limit "
+        "surface, with --limit"
+    ),
 ]
 CreaseOption = Annotated[
     str,
@@ -79,7 +97,12 @@ CreaseOption = Annotated[
         "shaded smooth, and borders of materials on flat sides, if the model asks for them",
     ),
 ]
-WeldOption = Annotated[float, typer.Option(metavar="X", help="join vertices nearer than X times R")]
+WeldOption = Annotated[
+    float,
+    typer.Option(
+        metavar="X", help=f"0 to {MAX_WELD_TOLERANCE}: join vertices nearer than X times R"
+    ),
+]
 CompressOption = Annotated[Compression, typer.Option(help="how a glTF's geometry is written")]
 EngineOption = Annotated[
     Literal["local", "ray"], typer.Option(help="processes of this machine, or a Ray cluster")

@@ -69,6 +69,12 @@ def test_help_says_that_a_model_is_a_name_or_a_file(pns: Any) -> None:
     assert "./NAME" in pns("subdivide", "--help").out
 
 
+def test_help_says_which_numbers_are_taken(pns: Any) -> None:
+    said = " ".join(pns("subdivide", "--help").out.replace("│", " ").split())
+    for taken in ("1 to 6", "0 to 100", "0 to 0.01"):
+        assert taken in said
+
+
 def test_info_lists_models_and_shows_a_card(pns: Any) -> None:
     listed = pns("info").out.splitlines()
     assert set(bundled_models()) <= {line.partition(" ")[0] for line in listed}
