@@ -4,13 +4,17 @@ The wheel holds the library and the service. The folder service/ is installed as
 `service` is a name that others use too; inside it all imports are relative.
 """
 
-from setuptools import find_packages, setup
+from setuptools import find_namespace_packages, find_packages, setup
 
 setup(
     packages=[
         *find_packages(include=["pns_common", "pns_common.*"]),
         "pns_service",
-        *(f"pns_service.{room}" for room in find_packages("service")),
+        # Folders of data alone, too: setuptools takes each for a package that was forgotten.
+        *(
+            f"pns_service.{room}"
+            for room in find_namespace_packages("service", exclude=["*__pycache__*"])
+        ),
     ],
     package_dir={"pns_service": "service"},
 )

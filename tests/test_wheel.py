@@ -3,13 +3,16 @@
 import json
 import os
 import re
+import runpy
 import struct
 import subprocess
 import sys
 import zipfile
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
+import setuptools
 
 from pns_common.runtimes.onnx_model import DEFAULT_MODEL
 from pns_common.version import VERSION
@@ -77,6 +80,17 @@ def test_nothing_of_the_service_is_left_out(wheel):
     installed = {n.removeprefix("pns_service/") for n in names if n.startswith("pns_service/")}
     known = run("git", "ls-files", "service", cwd=ROOT).split()
     assert {name.removeprefix("service/") for name in known} - installed == set()
+
+
+def test_setuptools_takes_no_folder_of_the_service_for_a_forgotten_package(monkeypatch):
+    """It warns of each that is none, at every build, and says that it would leave it out."""
+    said = {}
+    monkeypatch.setattr(setuptools, "setup", lambda **given: said.update(given))
+    monkeypatch.chdir(ROOT)
+    runpy.run_path("setup.py")
+    known = run("git", "ls-files", "service").split()
+    folders = {Path(name).parent.as_posix().replace("/", ".") for name in known}
+    assert {f"pns_{folder}" for folder in folders} <= set(said["packages"])
 
 
 def test_the_library_asks_for_numpy_and_two_small_packages(wheel, tmp_path):
