@@ -9,7 +9,7 @@ from pns_common.base.blocks import Blocks
 from pns_common.fused.kernels.normals import HELD, flipped_children, largest_jump
 from pns_common.fused.kernels.together import TOGETHER
 from pns_common.fused.mesh_edges import MeshEdges
-from pns_common.geometry.child_faces import ChildAngles, angle_between
+from pns_common.geometry.child_faces import ChildAngles, angle_of_chord
 
 
 def look_at_children(
@@ -33,4 +33,4 @@ def look_at_children(
             flipped[block] = flipped_children(points, loop_points, *faces, *bounds)
 
     blocks.run(count, look)
-    return ChildAngles(int(flipped.sum()), angle_between(jumps.max(initial=0)))
+    return ChildAngles(int(flipped.sum()), angle_of_chord(jumps.max(initial=0)))

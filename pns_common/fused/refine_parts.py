@@ -21,7 +21,7 @@ from pns_common.fused.learned_step import learned_points
 from pns_common.fused.level import FusedLevel, control_level, crease_shift_of, next_level
 from pns_common.fused.loop_points import largest_size, loop_points
 from pns_common.fused.mesh_edges import MeshEdges, split_mesh_faces
-from pns_common.geometry.child_faces import ChildAngles, angle_between
+from pns_common.geometry.child_faces import ChildAngles, angle_of_chord
 from pns_common.levels.diagnostics import LevelReport, level_report
 from pns_common.levels.refined_levels import check_coordinates
 from pns_common.levels.step import AddedStep
@@ -235,5 +235,5 @@ def _children(
         flipped = 0
         if counterpart is not None:
             flipped = flipped_children(points, counterpart, *faces, count, *at_faces)
-        seen.append(ChildAngles(int(flipped), angle_between(jump)))
+        seen.append(ChildAngles(int(flipped), angle_of_chord(jump)))
     return seen

@@ -85,10 +85,10 @@ def child_faces(
 
     blocks.run(len(topology.interior), look_across)
     chord = max(inside.max(initial=0), across.max(initial=0))
-    return ChildFaces(int(flipped.sum()), angle_between(chord), normals)
+    return ChildFaces(int(flipped.sum()), angle_of_chord(chord), normals)
 
 
-def angle_between(chord: float) -> float:
+def angle_of_chord(chord: float) -> float:
     """Return the angle between two unit normals, 0 … π radians, from their squared distance.
 
     That keeps small angles, which 1 − cos would round away.

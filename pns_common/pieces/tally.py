@@ -16,7 +16,7 @@ from typing import Any, NotRequired, TypedDict
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.geometry.child_faces import angle_between
+from pns_common.geometry.child_faces import angle_of_chord
 from pns_common.levels.diagnostics import GATE_ACTIVE, Displacements, EdgeCounts, limit_distances
 
 STEPS = 2**40
@@ -182,7 +182,7 @@ def _reduced(level: LevelTally) -> ReducedLevel:
         "flipped_faces": level.flipped_faces,
         "proximity_ratio": _ratio(level.ratio),
         "gate": _gate(level.gate),
-        "normal_jump_max": angle_between(level.chord),
+        "normal_jump_max": angle_of_chord(level.chord),
     }
     if level.vertex_ratio is not None and level.vertex_gate is not None:
         report["vertex_rule"] = {

@@ -6,7 +6,7 @@ import pytest
 from pns_common import Mesh, loop, pns, refine
 from pns_common.base.blocks import WHOLE, Blocks
 from pns_common.connectivity.topology import build_topology
-from pns_common.geometry.child_faces import angle_between, child_faces
+from pns_common.geometry.child_faces import angle_of_chord, child_faces
 from tests.support.meshes import bent, bumpy_sphere, grid, icosphere
 from tests.support.networks import random_model
 
@@ -49,8 +49,8 @@ def test_an_angle_is_that_of_its_chord(degrees):
     angle = np.radians(degrees)
     apart = np.array([1, 0]) - np.array([np.cos(angle), np.sin(angle)])
     chord = apart @ apart if degrees > 1e-3 else angle**2  # cosines round small angles away
-    assert angle_between(float(chord)) == pytest.approx(angle, rel=1e-12, abs=1e-15)
-    assert angle_between(4.0 + 1e-12) == np.pi
+    assert angle_of_chord(float(chord)) == pytest.approx(angle, rel=1e-12, abs=1e-15)
+    assert angle_of_chord(4.0 + 1e-12) == np.pi
 
 
 def test_faces_without_area_make_no_angle_and_blocks_change_nothing():
