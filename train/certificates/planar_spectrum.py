@@ -18,6 +18,7 @@ from train.spectra.spectrum import (
     of_regular_mesh,
     perturbed_stars,
     refined_inner,
+    reif_gap,
     without_translations,
 )
 
@@ -45,10 +46,9 @@ def planar_spectrum(subject: Subject, valences: Sequence[int]) -> list[Certifica
         place = f"k = {valence}"
         size = spectrum(subject.exact, valence)
         tangent = np.abs(size[:TANGENT_COUNT] - loop_eigenvalue(valence)).max()
-        gap = size[TANGENT_COUNT - 1] - size[TANGENT_COUNT]
         deviations.append((derivative_of_departure(subject.exact, valence), place))
         tangents.append((float(tangent), place))
-        gaps.append((float(abs(gap - loop_gap(valence))), place))
+        gaps.append((abs(reif_gap(size) - loop_gap(valence)), place))
     rows = (
         ("derivative of the departure from Loop", deviations, flat),
         ("tangent eigenvalues against 3/8 + ¼ cos 2π/k", tangents, finest),

@@ -60,6 +60,11 @@ def loop_gap(valence: int) -> float:
     return loop_eigenvalue(valence) - loop_third(valence)
 
 
+def reif_gap(size: Float[np.ndarray, " M"]) -> float:
+    """Return λ_t − |λ_3| of eigenvalues' magnitudes without translations, largest first."""
+    return float(size[TANGENT_COUNT - 1] - size[TANGENT_COUNT])
+
+
 def of_regular_mesh(scheme: Scheme) -> Scheme:
     """Return a scheme as it is on a large regular mesh, of which a star is a spot.
 

@@ -11,7 +11,13 @@ from jaxtyping import Float
 
 from pns_common.base.arrays import dot, norm
 from pns_common.connectivity.topology import EdgeClass, sharp_edge_count
-from pns_common.masks.stencils import loop_beta, loop_edge_vertices, loop_vertex_vertices
+from pns_common.masks.stencils import (
+    CURVE_LIMIT_CENTRE,
+    CURVE_LIMIT_NEIGHBOUR,
+    loop_beta,
+    loop_edge_vertices,
+    loop_vertex_vertices,
+)
 from pns_common.schemes import (
     ControlLevel,
     Placement,
@@ -21,7 +27,6 @@ from pns_common.schemes import (
 )
 
 Push = Callable[[ControlLevel], Float[np.ndarray, "V 3"]]
-CURVE_LIMIT_CENTRE, CURVE_LIMIT_NEIGHBOUR = 4 / 6, 1 / 6
 
 
 def q1() -> Scheme:

@@ -4,12 +4,11 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from pns_common.refine import refine
 from train.ablations.feature_groups import Choice, features_scheme, fit_features, named
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
-from train.experiments.paper.methods import PAPER_UNITS
+from train.experiments.paper.methods import largest_ratio
 from train.metrics.envelope import envelope_limit
 from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import Recipe, one_step, paper
@@ -89,10 +88,6 @@ def _row(laboratory: Laboratory, recipe: Recipe, choice: Choice) -> Row:
     network = fit_features(recipe, choice.features, on_step)
     scheme = features_scheme(recipe, choice.features, network)
     improvements = compare_with_loop(scheme, held_out)
-    ratio = max(
-        refine(instance.mesh, scheme, reference_length=PAPER_UNITS).ratio.max()
-        for instance in held_out.instances
-    )
     return Row(
         budget=recipe.budget,
         gate_sharpness=recipe.gate_sharpness,
@@ -103,7 +98,7 @@ def _row(laboratory: Laboratory, recipe: Recipe, choice: Choice) -> Row:
         hausdorff_percent=improvements["hausdorff"].percent,
         normal_near_percent=improvements["normal_near"].percent,
         normal_percent=improvements["normal"].percent,
-        max_ratio=float(ratio),
+        max_ratio=largest_ratio(scheme, held_out),
     )
 
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.refine import refine
 from pns_common.schemes import Scheme
 from train.data.datasets import Dataset
 from train.experiments.harness.comparison import LIMIT_NOTE
@@ -12,7 +11,7 @@ from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, panels
-from train.experiments.paper.methods import PAPER_UNITS
+from train.experiments.paper.methods import largest_ratio
 from train.experiments.paper.paper_values import PUBLISHED_C_SWEEP
 from train.experiments.paper.recipes import paper_with_budget
 from train.metrics.envelope import envelope_limit
@@ -68,10 +67,6 @@ def _row(scheme: Scheme, held_out: Dataset, budget: float) -> Row:
     limit = envelope_limit(held_out, budget, paper_with_budget(budget).gate_sharpness)
     near, everywhere = improvements["distance_near"], improvements["distance"]
     near_limit, global_limit = limit["distance_near"].percent, limit["distance"].percent
-    ratio = max(
-        refine(instance.mesh, scheme, reference_length=PAPER_UNITS).ratio.max()
-        for instance in held_out.instances
-    )
     published_near, published_global, published_ratio = PUBLISHED_C_SWEEP[str(budget)]
     return Row(
         budget=budget,
@@ -85,7 +80,7 @@ def _row(scheme: Scheme, held_out: Dataset, budget: float) -> Row:
         global_high=everywhere.high,
         global_limit_percent=global_limit,
         global_share_of_limit=everywhere.percent / global_limit,
-        max_ratio=float(ratio),
+        max_ratio=largest_ratio(scheme, held_out),
         published_near_percent=published_near,
         published_global_percent=published_global,
         published_max_ratio=published_ratio,

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 
 from matplotlib.figure import Figure as Drawing
 
-from train.ablations.variants import UNCONSTRAINED, variant_recipe, variant_scheme
 from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
 from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import table
 from train.experiments.harness.style import COLOURS, TITLES, panels, zero_line
+from train.experiments.paper.methods import unconstrained_scheme
 from train.experiments.paper.paper_values import (
     PAPER_HEADLINE,
     PAPER_UNCONSTRAINED,
@@ -38,10 +38,8 @@ NOTES = (
 def run(laboratory: Laboratory) -> Outcome:
     """Train PNS, the paper's text and the unconstrained network, and measure them."""
     held_out, recipe = laboratory.dataset("ridge-held-out"), paper()
-    free = variant_recipe(recipe, UNCONSTRAINED)
-    free_scheme = variant_scheme(UNCONSTRAINED, laboratory.network(free, UNCONSTRAINED), free)
     ours = compare_with_loop(laboratory.scheme(recipe), held_out)
-    unconstrained = compare_with_loop(free_scheme, held_out)
+    unconstrained = compare_with_loop(unconstrained_scheme(laboratory), held_out)
     text = compare_with_loop(laboratory.scheme(paper_text()), held_out)
     laboratory.progress("the envelope's limit", 0, 1)
     limit = envelope_limit(held_out, recipe.budget, recipe.gate_sharpness)

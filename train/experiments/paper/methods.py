@@ -6,14 +6,13 @@ from typing import cast
 from pns_common.mesh import Mesh
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme, loop
-from train.ablations.variants import UNCONSTRAINED, variant_recipe
+from train.ablations.variants import UNCONSTRAINED, variant_recipe, variant_scheme
 from train.baselines.butterfly import modified_butterfly
 from train.baselines.curvature_adaptive import curvature_adaptive
 from train.baselines.normal_displacement import fit_scalar, normal_displacement
 from train.baselines.pn_triangles import pn_triangles
 from train.baselines.quadric import quadric_fit
-from train.baselines.unconstrained import unconstrained
-from train.data.datasets import Instance, ridge_held_out
+from train.data.datasets import Dataset, Instance, ridge_held_out
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.paper.paper_values import PAPER_INSTANCE
 from train.models.recipes import one_step, paper
@@ -49,9 +48,12 @@ def learned_methods(laboratory: Laboratory) -> dict[str, Scheme]:
 
 
 def unconstrained_scheme(laboratory: Laboratory) -> Scheme:
-    """Return the unconstrained network, trained on the same ridges."""
+    """Return the unconstrained network, trained on the same ridges; ratios are against PNS's C h².
+
+    It is a control that shows what the envelope is for, and no method to use.
+    """
     recipe = variant_recipe(paper(), UNCONSTRAINED)
-    return unconstrained(laboratory.network(recipe, UNCONSTRAINED), recipe)
+    return variant_scheme(UNCONSTRAINED, laboratory.network(recipe, UNCONSTRAINED), recipe)
 
 
 def hard_instance() -> Instance:
@@ -68,6 +70,14 @@ def hard_instance() -> Instance:
 def ridge_of(instance: Instance) -> Ridge:
     """Return the surface of an instance from a data set of ridges."""
     return cast(Ridge, instance.surface)
+
+
+def largest_ratio(scheme: Scheme, dataset: Dataset) -> float:
+    """Return the largest proximity ratio of one step, over all instances."""
+    return max(
+        float(refine(instance.mesh, scheme, reference_length=PAPER_UNITS).ratio.max())
+        for instance in dataset.instances
+    )
 
 
 def level_by_level(mesh: Mesh, scheme: Scheme, levels: int) -> Iterator[Refinement]:

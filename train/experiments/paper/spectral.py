@@ -26,6 +26,7 @@ from train.spectra.spectrum import (
     jacobian,
     loop_eigenvalue,
     loop_gap,
+    reif_gap,
     without_translations,
 )
 from train.spectra.stars import star
@@ -131,7 +132,7 @@ def planar_row(exact: Scheme, operator: Operator, valence: int) -> PlanarRow:
         valence=valence,
         tangent=float(size[:TANGENT_COUNT].min()),
         tangent_analytic=loop_eigenvalue(valence),
-        gap=float(size[TANGENT_COUNT - 1] - size[TANGENT_COUNT]),
+        gap=reif_gap(size),
         gap_analytic=loop_gap(valence),
         gap_one_ring=one_ring_gap(exact, valence),
         departure=derivative_of_departure(exact, valence),
@@ -144,8 +145,7 @@ def planar_row(exact: Scheme, operator: Operator, valence: int) -> PlanarRow:
 def one_ring_gap(scheme: Scheme, valence: int) -> float:
     """Return the Reif gap of the (k+1)-star, as it was published."""
     matrix = without_translations(jacobian(scheme, star(valence, 2, SPOKE, inner_rings=1)))
-    size = np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
-    return float(size[TANGENT_COUNT - 1] - size[TANGENT_COUNT])
+    return reif_gap(np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1])
 
 
 def _draw(attacks: list[GapAttack]) -> Drawing:

@@ -1,9 +1,7 @@
 """The structural tables: T1–T8 for several weights and with parts removed, and adversaries."""
 
 import copy
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 import torch
@@ -23,6 +21,7 @@ from train.certificates.subject import Subject, in_double, subject_of_network
 from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
+from train.experiments.paper.ablation import REMOVED_TITLES
 from train.experiments.paper.paper_values import PUBLISHED_ADVERSARIAL, PUBLISHED_STRUCTURAL
 from train.models.from_recipe import initial_network
 from train.models.networks import BoundedNet
@@ -36,14 +35,6 @@ SCALED = 5.0
 
 ATTACK_STEPS = 200
 
-REMOVED_TITLES: Mapping[str, str] = MappingProxyType(
-    {
-        "no-h2": "no h² (one power of h)",
-        "no-gate": "no gate",
-        "unbounded": "unbounded output",
-        "unconstrained": "unconstrained MLP",
-    }
-)
 REMOVED_COLUMNS = (
     Column("variant", "Variant"),
     *(Column(f"t{number}", f"T{number}") for number in range(1, 9)),
