@@ -8,10 +8,9 @@ import numpy as np
 from pns_common.refine import Refinement, refine
 from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import loop, pns
-from train.data.dense_meshes import DenseMesh, asset_meshes
 from train.data.simplifiers import SIMPLIFIERS, simplified
 from train.experiments.beyond.models import models_and_assets
-from train.experiments.beyond.real_meshes import LEAST_REDUCTION
+from train.experiments.beyond.real_meshes import LEAST_REDUCTION, dense_files
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
@@ -72,8 +71,7 @@ def run(laboratory: Laboratory) -> Outcome:
     """Refine every mesh with every value."""
     assert laboratory.assets is not None  # needs_assets
     scale, samples = laboratory.scale, SAMPLES_A_DRAW * laboratory.scale.samples
-    files = asset_meshes(laboratory.assets / "dense")
-    dense = list(islice((m for m in files if isinstance(m, DenseMesh)), scale.instances))
+    dense = list(islice(dense_files(laboratory.assets / "dense"), scale.instances))
     swept = [(*names, values[: scale.instances]) for *names, values in SWEPT]
     levels = min(LEVELS, scale.levels)
     model = load_model()

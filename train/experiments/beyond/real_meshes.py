@@ -217,7 +217,7 @@ def _row(measured: Measured) -> EachRow:
 
 def run_test(laboratory: Laboratory) -> Outcome:
     """Measure on the files in the folder itself, and on CAD-like parts."""
-    files = () if laboratory.assets is None else _dense_files(laboratory.assets)
+    files = () if laboratory.assets is None else dense_files(laboratory.assets)
     meshes = chain(
         coarse_meshes(files),
         coarse_meshes(cad_meshes()),
@@ -229,11 +229,12 @@ def run_test(laboratory: Laboratory) -> Outcome:
 def run_validation(laboratory: Laboratory) -> Outcome:
     """Measure on the files of the folder `dense` in it, on which everything was chosen."""
     assert laboratory.assets is not None  # needs_assets
-    meshes = coarse_meshes(_dense_files(laboratory.assets / "dense"))
+    meshes = coarse_meshes(dense_files(laboratory.assets / "dense"))
     return _outcome("real_validation", "Simplified meshes (validation)", meshes, laboratory)
 
 
-def _dense_files(folder: Path) -> Iterator[DenseMesh]:
+def dense_files(folder: Path) -> Iterator[DenseMesh]:
+    """Yield the meshes of a folder that can be simplified."""
     return (mesh for mesh in asset_meshes(folder) if isinstance(mesh, DenseMesh))
 
 
