@@ -14,7 +14,8 @@ from export.published import export_published
 from pns_common.errors import PnsError
 from pns_common.models.manifest import write_manifest
 from train.models.checkpoint import load_checkpoint
-from train.models.recipes import RECIPES, Recipe
+from train.models.recipe import Recipe
+from train.models.recipes import RECIPES
 
 MODELS = Path(__file__).resolve().parents[1] / "pns_common" / "models"
 # The bundled file of a recipe with its own seed.

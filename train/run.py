@@ -26,7 +26,8 @@ from train.metrics.one_step import improvements_as_data
 from train.metrics.tables import improvement_table
 from train.models.checkpoint import Checkpoint, Distillation, load_checkpoint, save_checkpoint
 from train.models.networks import BoundedNet
-from train.models.recipes import RECIPES, Recipe
+from train.models.recipe import Recipe
+from train.models.recipes import RECIPES
 from train.models.torch_model import recipe_model
 
 CHECKPOINTS = Path("checkpoints")

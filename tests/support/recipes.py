@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import msgspec
 
-from train.models.recipes import Recipe, ToLimit, VertexRule, signed
+from train.models.recipe import Recipe, ToLimit, VertexRule
+from train.models.recipes import signed
 
 
 def tiny(recipe: Recipe, steps: int = 4) -> Recipe:

@@ -21,7 +21,7 @@ from train.data.batch import Batch
 from train.fitting.one_step import refine_once
 from train.fitting.trainer import OnStep, optimise, step_loss
 from train.models.networks import BoundedNet, SymmetricNet, unit_correction
-from train.models.recipes import Recipe
+from train.models.recipe import Recipe
 from train.models.torch_model import numpy_correction
 
 

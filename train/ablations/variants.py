@@ -28,7 +28,7 @@ from train.data.batch import Batch
 from train.fitting.one_step import displaced
 from train.fitting.trainer import Fit, OnStep, optimise, step_loss, with_quiet
 from train.models.networks import RAW_COORDINATES, BoundedNet, unit_correction
-from train.models.recipes import Recipe, one_step
+from train.models.recipe import Recipe, one_step
 
 # Interior edges, the network, its recipe and C / R to what is added to Loop's edge vertices.
 #

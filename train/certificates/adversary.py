@@ -29,7 +29,7 @@ from train.models.from_recipe import (
     vertex_rule_operator,
 )
 from train.models.networks import BoundedNet
-from train.models.recipes import Recipe
+from train.models.recipe import Recipe
 
 # Called after each step with the number of steps done and the value found.
 OnStep = Callable[[int, float], None]

@@ -15,7 +15,7 @@ from pns_common.schemes import pns
 from train.certificates.adversary import OnStep, Operator, ascend, initial_operator
 from train.certificates.lifted_star import LIFTS
 from train.models.networks import BoundedNet
-from train.models.recipes import Recipe
+from train.models.recipe import Recipe
 from train.models.torch_model import recipe_model
 from train.spectra.margin_gradient import margin_gradient
 from train.spectra.spectrum import (

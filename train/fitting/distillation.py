@@ -29,7 +29,7 @@ from train.fitting.determinism import deterministic
 from train.models.checkpoint import Checkpoint, Distillation
 from train.models.from_recipe import initial_network, initial_vertex_network
 from train.models.networks import BoundedNet
-from train.models.recipes import Recipe
+from train.models.recipe import Recipe
 from train.models.torch_model import TorchModel, recipe_model
 
 # Rows of a mesh that are kept, of each network; those of a regular one are repeated to so many.

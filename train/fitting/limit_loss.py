@@ -15,7 +15,7 @@ from torch import Tensor
 
 from train.fitting.chords import squared_chords
 from train.fitting.limit_batch import LimitBatch, LimitSurface
-from train.models.recipes import LimitWeights
+from train.models.recipe import LimitWeights
 
 # Exponents of the soft maxima of distances, and of turns between neighbouring normals.
 PEAK, JUMP = 10, 16

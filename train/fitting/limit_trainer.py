@@ -21,7 +21,7 @@ from train.models.from_recipe import (
     recipe_scheme,
 )
 from train.models.networks import BoundedNet
-from train.models.recipes import Recipe, ToLimit
+from train.models.recipe import Recipe, ToLimit
 
 # Share of the steps in which the learning rate rises.
 WARM_UP = 0.1

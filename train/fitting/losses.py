@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from pns_common.base.arrays import dot, gather
-from train.models.recipes import LossWeights
+from train.models.recipe import LossWeights
 
 
 def distance_loss(distance: Float[Tensor, " I"]) -> Float[Tensor, ""]:

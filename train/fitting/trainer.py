@@ -19,7 +19,7 @@ from train.fitting.one_step import Step, refine_once, vertex_normals
 from train.fitting.quiet import quiet_term
 from train.models.from_recipe import initial_network, recipe_operator
 from train.models.networks import BoundedNet
-from train.models.recipes import OneStep, Recipe, ToLimit, one_step
+from train.models.recipe import OneStep, Recipe, ToLimit, one_step
 from train.surfaces.implicit import signed_distance, unit_normal
 
 # Called after each step with the number of steps done and the loss.

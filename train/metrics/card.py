@@ -9,7 +9,7 @@ from train.data.datasets import Dataset, ridge_held_out, saddle_held_out, sphere
 from train.metrics.evaluation import compare_with_loop
 from train.metrics.one_step import Improvement, improvement
 from train.metrics.whole_surface import whole_surface
-from train.models.recipes import OneStep, Recipe
+from train.models.recipe import OneStep, Recipe
 
 LEVELS = 4
 

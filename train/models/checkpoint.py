@@ -16,7 +16,7 @@ from pns_common.base.whole_file import replace_file
 from pns_common.errors import ModelError
 from train.models.from_recipe import initial_network, initial_vertex_network
 from train.models.networks import BoundedNet
-from train.models.recipes import Recipe
+from train.models.recipe import Recipe
 
 METADATA_KEY = "pns"
 VERTEX = "vertex."

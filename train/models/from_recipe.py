@@ -17,7 +17,7 @@ from pns_common.formula.vertex_operator import VertexOperator
 from pns_common.rules.scale_free import ScaleFreeForm
 from pns_common.schemes import Scheme, scale_free_scheme
 from train.models.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_correction
-from train.models.recipes import Recipe, ToLimit, VertexRule
+from train.models.recipe import Recipe, ToLimit, VertexRule
 from train.models.tied import TiedNet
 
 # Usual sizes of features, by kind, on simplified meshes; others are about 1. Tied networks read

@@ -1,186 +1,22 @@
 """Recipes: each function returns one whole training configuration, ready to run."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 import msgspec
 
-from pns_common.errors import ParameterError
 from pns_common.geometry.crease_lines import CREASE_ANGLE, CREASE_LEVELS, EDGED_ANGLE
-
-
-@dataclass(frozen=True, slots=True)
-class LossWeights:
-    """Weights of the four loss terms (λ_sdf, λ_n, λ_f, λ_p in the paper)."""
-
-    distance: float
-    normal: float
-    fairness: float
-    proximity: float
-
-
-@dataclass(frozen=True, slots=True)
-class LimitWeights:
-    """Weights of the limit loss (train/fitting/limit_loss.py); each term is an error over Loop's.
-
-    Attributes:
-        mean, spread, peak: distance: its mean, its root mean square, its soft maximum.
-        normal, normal_spread: normals: mean and root mean square.
-        worse: beside each of these, what is above `worse_from` of Loop's.
-        bend: logarithm of bending over the prior's own (of authored meshes, over Loop's).
-        sharp: the same above `sharp_bend`, of surfaces that may have edges.
-        ripples: above `smooth_bend` on smooth surfaces, above `authored_bend` on authored meshes.
-        jump: logarithm of the largest turn over Loop's, above `allowed_jump`.
-    """
-
-    mean: float
-    spread: float
-    peak: float
-    normal: float
-    normal_spread: float
-    worse: float
-    worse_from: float
-    bend: float
-    sharp: float
-    sharp_bend: float
-    ripples: float
-    smooth_bend: float
-    authored_bend: float
-    jump: float
-    allowed_jump: float
-
-
-@dataclass(frozen=True, slots=True)
-class VertexRule:
-    """The learned rule for old vertices: its features, hidden widths and gate, as on the card."""
-
-    features: str
-    hidden: tuple[int, ...]
-    gate_sharpness: float
-
-
-@dataclass(frozen=True, slots=True)
-class ScaleFree:
-    """What makes a recipe's rule scale-free (format 3), as on the card.
-
-    Attributes:
-        prior_strength: s.
-        network_scale: τ, in edge lengths.
-        fold_angle: θ, degrees.
-        learned_levels: K; training sees the first.
-        boundary_strength: b of the boundary's prior; None leaves boundaries to Loop.
-        side_gates: whether an edge's gate reads the sides of its two faces too.
-        network_altitudes: α, the longest that τ's unit may be, in altitudes; None for no limit. As
-            the next, it acts in use, and not in training.
-        wide_bound: whether h of an edge's bound is the longest edge of its two faces.
-        crease_prior: whether the boundary's prior acts at creases too, in use; training sees none.
-        tip_strength: a, how much of Loop's own move is given back at tips; in use alone, too.
-        even_prior_strength: s of even meshes (formula/prior_strength.py), in use; training has one.
-        crease_angle: θ in degrees of the crease lines that are kept in use; training sees none.
-        crease_levels: at how many levels these are sharp.
-        edged_crease_angle: θ' of those of edged meshes.
-    """
-
-    prior_strength: float
-    network_scale: float
-    fold_angle: float
-    learned_levels: int
-    boundary_strength: float | None = None
-    side_gates: bool | None = None
-    network_altitudes: float | None = None
-    wide_bound: bool | None = None
-    crease_prior: bool | None = None
-    tip_strength: float | None = None
-    even_prior_strength: float | None = None
-    crease_angle: float | None = None
-    crease_levels: int | None = None
-    edged_crease_angle: float | None = None
-
-
-class OneStep(msgspec.Struct, frozen=True, tag=True):
-    """Training on one step, at the inserted vertices, over a fixed data set.
-
-    Attributes:
-        dataset: its name.
-        weights: of the loss.
-        batch_size: meshes in each step, drawn without replacement (at most the whole set).
-        final_learning_rate: at the last step, to which the rate falls along a half cosine; the same
-            value as the first gives a constant rate.
-        quiet: weight of the quiet term (train/fitting/quiet.py), for the features paper-5; 0 leaves
-            it out.
-    """
-
-    dataset: str
-    weights: LossWeights
-    batch_size: int
-    final_learning_rate: float
-    quiet: float = 0.0
-
-
-class ToLimit(msgspec.Struct, frozen=True, tag=True):
-    """Training on the limit surface after one learned level, over the stream of pairs.
-
-    The learning rate rises to the recipe's in the first tenth of the steps and falls to nothing.
-
-    Attributes:
-        weights: of the loss.
-        faces: coarse faces in a batch, about.
-        pool: batches kept to draw from, at most.
-        reuse: after every so many steps a new batch comes in, in the end for the oldest.
-        trained_strength: s of the prior while the network is trained; in use it is the form's.
-    """
-
-    weights: LimitWeights
-    faces: int
-    pool: int
-    reuse: int
-    trained_strength: float
-
-
-@dataclass(frozen=True, slots=True)
-class Recipe:
-    """Everything that decides the trained weights, apart from the machine.
-
-    Attributes:
-        features: name of the feature set, as on the model card.
-        hidden: widths of the hidden layers.
-        activation: "gelu", "smoothstep" or "tanh", between layers.
-        budget: C, in the paper's units (the reference length is 1).
-        gate_sharpness: c of the gate tanh(c x²).
-        training: what is trained on, and how.
-        steps: Adam steps.
-        learning_rate: the highest.
-        seed: of the initial weights and of the batches.
-        orientation: as on the model card; "symmetric" keeps the stencil's symmetries.
-        vertex: the learned rule for old vertices; None leaves them to Loop.
-        scale_free: the rule of format 3; None is the paper's.
-    """
-
-    name: str
-    features: str
-    hidden: tuple[int, ...]
-    activation: str
-    budget: float
-    gate_sharpness: float
-    training: OneStep | ToLimit
-    steps: int
-    learning_rate: float
-    seed: int
-    orientation: str = "first-face"
-    vertex: VertexRule | None = None
-    scale_free: ScaleFree | None = None
-
-
-def one_step(recipe: Recipe) -> OneStep:
-    """Return how a recipe trains on one step.
-
-    Raises:
-        ParameterError: it trains otherwise.
-    """
-    if not isinstance(recipe.training, OneStep):
-        raise ParameterError("recipe", recipe.name, expected="one that trains on one step")
-    return recipe.training
+from train.models.recipe import (
+    LimitWeights,
+    LossWeights,
+    OneStep,
+    Recipe,
+    ScaleFree,
+    ToLimit,
+    VertexRule,
+    one_step,
+)
 
 
 def paper(seed: int = 0) -> Recipe:

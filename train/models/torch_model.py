@@ -13,7 +13,7 @@ from pns_common.errors import ModelError
 from pns_common.models.card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
 from train.models.checkpoint import joined_state
 from train.models.networks import BoundedNet, unit_correction
-from train.models.recipes import Recipe
+from train.models.recipe import Recipe
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,8 @@ from train.fitting import distillation
 from train.fitting.distillation import Mean, asked, coarse_and_fine, distil, planned, regular_meshes
 from train.models.checkpoint import Checkpoint, Distillation, load_checkpoint, save_checkpoint
 from train.models.from_recipe import initial_network, initial_vertex_network
-from train.models.recipes import VertexRule, general, paper
+from train.models.recipe import VertexRule
+from train.models.recipes import general, paper
 from train.models.torch_model import recipe_model
 
 

@@ -11,7 +11,7 @@ from train.fitting.losses import (
     proximity_loss,
     weighted_loss,
 )
-from train.models.recipes import LossWeights
+from train.models.recipe import LossWeights
 
 
 def unit_rows(seed, count=6):

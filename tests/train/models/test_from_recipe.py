@@ -6,7 +6,8 @@ import torch
 
 from pns_common.errors import ParameterError
 from train.models.from_recipe import initial_network, initial_vertex_network, recipe_scheme
-from train.models.recipes import general, one_step, paper, signed
+from train.models.recipe import one_step
+from train.models.recipes import general, paper, signed
 from train.models.tied import TiedNet
 
 

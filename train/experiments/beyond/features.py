@@ -11,7 +11,8 @@ from train.experiments.harness.rows import column, table
 from train.experiments.paper.methods import largest_ratio
 from train.metrics.envelope import envelope_limit
 from train.metrics.evaluation import compare_with_loop
-from train.models.recipes import Recipe, one_step, paper
+from train.models.recipe import Recipe, one_step
+from train.models.recipes import paper
 
 # C and c: the paper's, and an envelope in which there is more to gain.
 SETTINGS = ((0.5, 10.0), (1.0, 100.0))

@@ -14,7 +14,7 @@ from train.experiments.harness.sources import code_of, sources_of
 from train.fitting.determinism import machine_fingerprint
 from train.models.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from train.models.networks import BoundedNet
-from train.models.recipes import Recipe
+from train.models.recipe import Recipe
 from train.models.torch_model import recipe_model
 
 # Called with what is being done, how many steps of it are done, and of how many.

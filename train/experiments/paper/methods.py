@@ -15,7 +15,8 @@ from train.baselines.quadric import quadric_fit
 from train.data.datasets import Dataset, Instance, ridge_held_out
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.paper.paper_values import PAPER_INSTANCE
-from train.models.recipes import one_step, paper
+from train.models.recipe import one_step
+from train.models.recipes import paper
 from train.surfaces.implicit import Ridge
 
 # Reference length of all experiments: the paper's C is absolute.

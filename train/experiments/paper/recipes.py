@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import msgspec
 
-from train.models.recipes import Recipe, one_step, paper
+from train.models.recipe import Recipe, one_step
+from train.models.recipes import paper
 
 
 def paper_with_budget(budget: float) -> Recipe:

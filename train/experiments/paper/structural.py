@@ -25,7 +25,8 @@ from train.experiments.paper.ablation import REMOVED_TITLES
 from train.experiments.paper.paper_values import PUBLISHED_ADVERSARIAL, PUBLISHED_STRUCTURAL
 from train.models.from_recipe import initial_network
 from train.models.networks import BoundedNet
-from train.models.recipes import Recipe, paper
+from train.models.recipe import Recipe
+from train.models.recipes import paper
 from train.models.torch_model import recipe_model
 from train.spectra.spectrum import VALENCES
 
