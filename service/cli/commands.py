@@ -140,8 +140,9 @@ def batch(
 
     from rich.console import Console
 
-    from ..scale.batch import Batch, batch_work, print_summary, run_batch
+    from ..scale.batch import Batch, batch_work, run_batch
     from ..scale.engines.named import engine_of
+    from ..scale.told import print_summary
     from ..settings import Settings
     from .stops import stoppable
 

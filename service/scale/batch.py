@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
@@ -12,28 +11,16 @@ from itertools import chain, islice
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    TaskID,
-    TextColumn,
-    TimeRemainingColumn,
-)
-from rich.progress import Task as RichTask
-from rich.table import Table
-from rich.text import Text
 
 from ..bodies.media import KINDS
 from ..errors import InvalidParameter, NoModelError, ServiceError
 from ..options import Limits, Options
-from ..printable import printable
 from .engines.work import Engine, Work
-from .job import DONE, FAILED, PLANNED, SKIPPED, Row, Task, failed, read_libraries, run, target_of
+from .job import FAILED, UNREADABLE_FOLDER, Row, Task, failed, read_libraries, run, target_of
 from .journal import Journal, check_report, open_journal
 from .places import Place, place_of
 from .sources import Item, items_of
+from .told import Summary, count_aside, line_of, progress
 
 
 @dataclass(frozen=True)
@@ -56,21 +43,6 @@ class Batch:
     to: str | None = None
     model: str | None = None
     dry: bool = False
-
-
-@dataclass(frozen=True)
-class Summary:
-    """How many files ended how, the faces of their results, the failures by code; the report."""
-
-    report: Path
-    counts: dict[str, int]
-    faces: dict[str, int]
-    failures: list[tuple[str, int]]
-
-    @property
-    def failed(self) -> int:
-        """Files that could not be refined."""
-        return self.counts.get(FAILED, 0)
 
 
 # A file that its worker does not survive twice is taken to be the cause.
@@ -108,9 +80,9 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
     counts: Counter[str] = Counter()
     faces: Counter[str] = Counter()
     codes: Counter[str] = Counter()
-    with open_journal(batch.report, work_hash(batch, model)) as journal, _progress(console) as bar:
+    with open_journal(batch.report, work_hash(batch, model)) as journal, progress(console) as bar:
         line = bar.add_task("refining", total=None, failed=0)
-        _count_aside(listing, bar, line)
+        count_aside(listing, bar, line)
 
         def note(rows: list[Row]) -> None:
             journal.put(rows)
@@ -119,7 +91,7 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
                 faces[row.status] += row.faces_out
                 if row.status == FAILED:
                     codes[row.code] += 1
-            if said := [text for row in rows if (text := _line(row))]:
+            if said := [text for row in rows if (text := line_of(row))]:
                 console.print("\n".join(said), markup=False)
             bar.update(line, advance=len(rows), failed=counts[FAILED])
 
@@ -127,24 +99,6 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
             note(rows)
     failures = sorted(codes.items(), key=lambda entry: (-entry[1], entry[0]))
     return Summary(batch.report, dict(counts), dict(faces), failures)
-
-
-def print_summary(summary: Summary, console: Console) -> None:
-    """Print what became of the files or would, in faces too, and the failures by code."""
-    table = Table("files", "", "faces")
-    for status in (DONE, SKIPPED, PLANNED, FAILED):
-        if status in summary.counts:
-            faces = summary.faces[status]
-            table.add_row(f"{summary.counts[status]:,}", status, f"{faces:,}" if faces else "")
-    console.print(table)
-    if summary.failures:
-        codes = Table("files", "code")
-        for code, count in summary.failures:
-            codes.add_row(f"{count:,}", code)
-        console.print(codes)
-    # What is only planned was said file by file, and is in no report.
-    if PLANNED not in summary.counts:
-        console.print(f"a row for each file: {summary.report}", markup=False)
 
 
 def model_hash(batch: Batch) -> str | None:
@@ -229,6 +183,8 @@ def _task(
     if _shown(item.url) != item.url:
         # Neither a journal nor a report can hold it.
         raise ServiceError("its name is not in UTF-8", code="unreadable-name")
+    if item.fault:
+        raise ServiceError(f"nothing in it is refined: {item.fault}", code=UNREADABLE_FOLDER)
     kind, target, relative = target_of(item.relative, batch.to, KINDS)
     place = destination.below(relative)
     output = place.url
@@ -255,48 +211,3 @@ def _task(
 def _shown(url: str) -> str:
     """Show a name as text: bytes of a file's name that are no UTF-8 are spelled out."""
     return url.encode(errors="backslashreplace").decode()
-
-
-class _Rate(ProgressColumn):
-    """Files a second."""
-
-    def render(self, task: RichTask) -> Text:
-        """Return the rate, as far as it is known."""
-        return Text("" if task.speed is None else f"{task.speed:.1f} a second")
-
-
-def _progress(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        _Rate(),
-        TextColumn("{task.fields[failed]} failed"),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )
-
-
-def _count_aside(listing: Callable[[], Iterator[Item]], bar: Progress, line: TaskID) -> None:
-    """Count the files beside the work, so that the estimate knows how many there are."""
-    if bar.disable:
-        return
-
-    def count() -> None:
-        bar.update(line, total=sum(1 for _ in listing()))
-
-    threading.Thread(target=count, daemon=True).start()
-
-
-def _line(row: Row) -> str:
-    """Return what is said of a file at once: why it failed, or what is planned."""
-    path = printable(row.path)
-    if row.status == FAILED:
-        # Of a fault of ours it is a traceback.
-        detail = "\n".join(map(printable, row.detail.split("\n")))
-        return f"{path}: {detail} [{row.code}]"
-    if row.status == PLANNED:
-        return f"{path} -> {printable(row.output)}: {row.faces_in:,} faces to {row.faces_out:,}"
-    return ""

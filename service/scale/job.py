@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from ..bodies.sibling_files import SiblingFiles
 
 DONE, SKIPPED, FAILED, PLANNED = "done", "skipped", "failed", "planned"
+# The code of a folder that cannot be listed: it is told, but is no file of the report.
+UNREADABLE_FOLDER = "unreadable-folder"
 
 
 @dataclass(frozen=True, slots=True)

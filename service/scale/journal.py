@@ -19,7 +19,7 @@ from typing import Any
 from pns_common.base.whole_file import replacing
 
 from ..errors import InvalidParameter
-from .job import PLANNED, SKIPPED, Row
+from .job import PLANNED, SKIPPED, UNREADABLE_FOLDER, Row
 from .places import THIS_MACHINE, Place, place_of
 
 SCHEMA = """
@@ -71,8 +71,12 @@ class Journal:
         return True
 
     def put(self, rows: list[Row]) -> None:
-        """Keep rows; those skipped, or only planned, leave what is known as it is."""
-        kept = [row for row in rows if row.status not in (SKIPPED, PLANNED)]
+        """Keep rows of files; those skipped, or only planned, leave what is known as it is."""
+        kept = [
+            row
+            for row in rows
+            if row.status not in (SKIPPED, PLANNED) and row.code != UNREADABLE_FOLDER
+        ]
         if not kept:
             return
         with self.together():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import posixpath
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -121,10 +121,13 @@ class Place:
             with TemporaryFile(dir=self.path):
                 pass
 
-    def files(self) -> Iterator[str]:
-        """Yield the relative paths of all files below a folder, each folder in order of name."""
+    def files(self, unreadable: Callable[[OSError], None]) -> Iterator[str]:
+        """Yield the relative paths of all files below a folder, each folder in order of name.
+
+        ``unreadable`` is told of folders that cannot be listed.
+        """
         with self._foreign():
-            for folder, folders, names in self._walk():
+            for folder, folders, names in self._walk(unreadable):
                 folders.sort()
                 inside = posixpath.relpath(folder, self.path)
                 for name in sorted(names):
@@ -132,9 +135,13 @@ class Place:
                     if name and posixpath.join(folder, name) != self.path:
                         yield name if inside == "." else f"{inside}/{name}"
 
-    def _walk(self) -> Iterator[tuple[str, list[str], list[str]]]:
-        # A local folder of a million files is names alone, not what fsspec tells of each.
-        return os.walk(self.path) if self.local else self.system.walk(self.path)
+    def _walk(
+        self, unreadable: Callable[[OSError], None]
+    ) -> Iterator[tuple[str, list[str], list[str]]]:
+        if self.local:
+            # A local folder of a million files is names alone, not what fsspec tells of each.
+            return os.walk(self.path, onerror=unreadable)
+        return self.system.walk(self.path, on_error=unreadable)
 
     @contextmanager
     def _foreign(self) -> Iterator[None]:

@@ -23,10 +23,14 @@ ROWS = 4096
 
 @dataclass(frozen=True)
 class Item:
-    """A file to refine: its URL, and where its result lies below the destination."""
+    """A file to refine: its URL, and where its result lies below the destination.
+
+    Or a folder that cannot be listed, with what is wrong: the files in it are not refined.
+    """
 
     url: str
     relative: str
+    fault: str = ""
 
 
 def items_of(
@@ -55,16 +59,23 @@ def items_of(
             raise InvalidParameter(
                 "DEST", f"{source} is SOURCE too: results need a folder of their own"
             )
-        return lambda: (
-            Item(place.below(file).url, file)
-            for file in place.files()
-            if file.lower().endswith(endings) and not _is_result(file, inside)
-        )
+        return lambda: _in_folder(place, endings, inside)
     if place.is_file():
         raise InvalidParameter(
             "SOURCE", f"{source}: a manifest's name ends in one of {', '.join(MANIFESTS)}"
         )
     raise InvalidParameter("SOURCE", f"{source}: there is no such folder, glob or manifest")
+
+
+def _in_folder(place: Place, endings: tuple[str, ...], results: str | None) -> Iterator[Item]:
+    faults: list[OSError] = []
+    for file in place.files(faults.append):
+        if file.lower().endswith(endings) and not _is_result(file, results):
+            yield Item(place.below(file).url, file)
+    for error in faults:
+        # One that has gone meanwhile is not there to be refined.
+        if not isinstance(error, FileNotFoundError):
+            yield Item(str(error.filename or place.url), "", error.strerror or str(error))
 
 
 def _is_result(file: str, results: str | None) -> bool:

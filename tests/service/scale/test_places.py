@@ -21,7 +21,7 @@ class Broken:
         return f"far://{path}"
 
     def __getattr__(self, name):
-        def fails(*_):
+        def fails(*_, **__):
             raise ForeignError("no route")
 
         return fails
@@ -35,7 +35,7 @@ class Broken:
         Place.is_folder,
         Place.matches,
         lambda place: place.write(b""),
-        lambda place: list(place.files()),
+        lambda place: list(place.files(print)),
     ],
 )
 def test_an_error_of_a_library_names_its_file(act):

@@ -1,5 +1,6 @@
 """What a batch works through: manifests, globs and folders, here and behind URLs."""
 
+import errno
 import json
 import os
 import socket
@@ -16,6 +17,7 @@ from rich.console import Console
 from service.errors import InvalidParameter
 from service.scale.batch import run_batch
 from service.scale.job import SKIPPED, Row
+from service.scale.places import place_of
 from service.scale.sources import items_of
 from tests.service.scale.libraries import (
     KINDS,
@@ -24,6 +26,7 @@ from tests.service.scale.libraries import (
     hashes,
     library,
     refined,
+    rows,
 )
 
 
@@ -225,6 +228,36 @@ def s3(monkeypatch):
     running.start()
     yield
     running.stop()
+
+
+def test_a_folder_that_cannot_be_listed_costs_its_own_files_and_is_told(tmp_path, monkeypatch):
+    library(tmp_path / "in", ["a.obj", "private/b.obj", "z.obj"])
+
+    def scandir(path, real=os.scandir):
+        if str(path).endswith("private"):
+            raise PermissionError(errno.EACCES, "Permission denied", path)
+        return real(path)
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    batch = batch_of(tmp_path)
+    summary = refined(batch)
+    assert summary.counts == {"done": 2, "failed": 1}
+    assert summary.failures == [("unreadable-folder", 1)]
+    assert sorted(rows(batch)) == ["a.obj", "z.obj"]
+    monkeypatch.undo()
+    assert refined(batch).counts == {"done": 1, "skipped": 2}
+
+
+def test_a_folder_of_a_store_that_cannot_be_listed_is_told(monkeypatch):
+    place = place_of("memory://private/library")
+    place.below("a.obj").write(b"")
+
+    def refuses(*_, **__):
+        raise PermissionError(errno.EACCES, "Permission denied", "/private/library")
+
+    monkeypatch.setattr(type(place.system), "ls", refuses)
+    (item,) = items_of("memory://private/library", KINDS)()
+    assert item.fault == "Permission denied"
 
 
 @pytest.mark.filterwarnings("ignore")
