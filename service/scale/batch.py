@@ -158,7 +158,8 @@ def _tasks(
     journal: Journal,
     reject: Callable[[list[Row]], None],
 ) -> Iterator[Task]:
-    while block := list(islice(items, LOOK_UP)):
+    # A file that a manifest names again is refined once: nearby so, and known as done from then on.
+    while block := list(dict.fromkeys(islice(items, LOOK_UP))):
         tasks: list[Task] = []
         rejected: list[Row] = []
         with journal.together():

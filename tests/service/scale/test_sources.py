@@ -230,6 +230,12 @@ def s3(monkeypatch):
     running.stop()
 
 
+def test_a_file_that_a_manifest_names_twice_is_refined_once(tmp_path):
+    library(tmp_path, ["a.obj", "b.obj"])
+    (tmp_path / "list.txt").write_text("a.obj\nb.obj\n./a.obj\n")
+    assert refined(batch_of(tmp_path, tmp_path / "list.txt")).counts == {"done": 2}
+
+
 def test_a_folder_that_cannot_be_listed_costs_its_own_files_and_is_told(tmp_path, monkeypatch):
     library(tmp_path / "in", ["a.obj", "private/b.obj", "z.obj"])
 
