@@ -124,16 +124,18 @@ def _remove(work: Path, folder: Path) -> None:
 def identity(source: Path) -> list[Any]:
     """Return what tells a file, or arrays of a folder, from others: name, size, time of change.
 
+    That of the file's entry: nobody can set it, as archives do with that of the content.
+
     Raises:
         InvalidParameter: there is no such file.
     """
     files = [source]
     if source.is_dir():
         files = [source / name for name in (POSITIONS, FACES, CREASES)]
-    known = [(str(file), file.stat()) for file in files if file.exists()]
+    known = [(str(file.resolve()), file.stat()) for file in files if file.exists()]
     if not known:
         raise InvalidParameter("IN", f"{source}: there is no such file or folder of arrays")
-    return [[name, status.st_size, status.st_mtime_ns] for name, status in known]
+    return [[name, status.st_size, status.st_ctime_ns] for name, status in known]
 
 
 def keep(file: Path, values: Any) -> None:

@@ -1,5 +1,6 @@
 """Drivers that are stopped, workers that are killed: nothing is lost, and nothing done twice."""
 
+import os
 import shutil
 from dataclasses import replace
 
@@ -65,6 +66,26 @@ def test_another_input_or_option_begins_anew(tmp_path):
     shutil.rmtree(source)
     mesh = Mesh(*grid(9, bent))
     refined(arrays(tmp_path / "in", mesh), tmp_path / "out", 3)
+    assert_is(tmp_path / "out", refine(mesh, loop(), 2))
+
+
+def test_another_input_of_the_same_size_and_date_begins_anew(tmp_path):
+    """As archives and reproducible builds make them."""
+    source = arrays(tmp_path / "in", Mesh(*grid(9)))
+
+    def stops(tasks):
+        for task in tasks:
+            yield [run_part(task)]
+            if task.stage == part.REFINE:
+                raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refined(source, tmp_path / "out", 3, engine=stops)
+    date = (source / "positions.npy").stat().st_mtime_ns
+    mesh = Mesh(*grid(9, bent))
+    np.save(source / "positions.npy", mesh.vertices)
+    os.utime(source / "positions.npy", ns=(date, date))
+    refined(source, tmp_path / "out", 3)
     assert_is(tmp_path / "out", refine(mesh, loop(), 2))
 
 
