@@ -144,5 +144,19 @@ def keep(file: Path, values: Any) -> None:
 
 
 def kept(file: Path) -> Any:
-    """Return what ``keep`` wrote; None where it has not."""
-    return json.loads(file.read_text()) if file.exists() else None
+    """Return what ``keep`` wrote; None where it has not.
+
+    Raises:
+        UnreadableError: it is not whole.
+    """
+    if not file.exists():
+        return None
+    try:
+        return json.loads(file.read_text())
+    except ValueError as error:
+        raise damaged(file) from error
+
+
+def damaged(file: Path) -> UnreadableError:
+    """Return the error of a file of a work that is not whole: with it goes the work."""
+    return UnreadableError(f"{file}: it was not written whole; the same command begins anew")

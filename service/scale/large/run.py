@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from rich.console import Console
@@ -38,7 +39,7 @@ from .part import (
     run_part,
     scheme_of,
 )
-from .plan import Large, check_unchanged, keep, kept, work_folder
+from .plan import Large, check_unchanged, damaged, keep, kept, work_folder
 from .room import check_room
 from .survey import Survey, survey, used_vertices
 from .target import Target
@@ -208,8 +209,12 @@ def _turns(parts: int, work: Path) -> list[int]:
 
 
 def _counted(work: Path, part: int, what: str) -> np.ndarray:
-    with np.load(done_file(work, COUNT, part)) as counted:
-        return counted[what]
+    file = done_file(work, COUNT, part)
+    try:
+        with np.load(file) as counted:
+            return counted[what]
+    except (ValueError, EOFError, BadZipFile) as error:
+        raise damaged(file) from error
 
 
 def _target(

@@ -89,6 +89,31 @@ def test_another_input_of_the_same_size_and_date_begins_anew(tmp_path):
     assert_is(tmp_path / "out", refine(mesh, loop(), 2))
 
 
+@pytest.mark.parametrize(
+    "name", ["plan.json", "survey.json", "count-00001.npz", "target.json", "part-00002.json"]
+)
+def test_a_work_that_is_damaged_is_told_and_begun_anew(tmp_path, name):
+    source = arrays(tmp_path / "in", many_kinds())
+    refined(source, tmp_path / "expected", 3)
+
+    def stops(tasks):
+        for task in tasks:
+            yield [run_part(task)]
+        if task.stage == part.REFINE:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refined(source, tmp_path / "out", 3, engine=stops)
+    (file,) = (tmp_path / "out.work").glob(f"*/{name}")
+    file.write_bytes(b"")
+    if name.startswith("count"):
+        (file.parent / "numbered.json").unlink()
+    with pytest.raises(UnreadableError, match="begins anew"):
+        refined(source, tmp_path / "out", 3)
+    refined(source, tmp_path / "out", 3)
+    assert contents(tmp_path / "out") == contents(tmp_path / "expected")
+
+
 def test_an_input_that_changes_meanwhile_is_told(tmp_path):
     """Some parts would be of what it was, others of what it is."""
     source = arrays(tmp_path / "in", many_kinds())
