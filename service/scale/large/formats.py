@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -63,7 +64,11 @@ class OutputKind:
         report: dict[str, Any],
         boxes: list[Any],
     ) -> None:
-        """Put what is full in its place."""
+        """Put what is full in its place.
+
+        Raises:
+            FileExistsError: what came there meanwhile is somebody's.
+        """
         out = work / "out"
         if not out.exists():
             return  # a run before this one ended between the last renaming and its own tidying
@@ -72,6 +77,9 @@ class OutputKind:
         elif self.holds is not None:
             keep(out / ABOUT, report)
         if self.holds is not None and output.exists():
+            # No error of ours, with which the work would go.
+            if words := _not_ours(output, self):
+                raise FileExistsError(errno.EEXIST, words, str(output))
             output.rename(work / "replaced")
         out.rename(output)
 
@@ -118,14 +126,18 @@ def output_kind(output: Path) -> OutputKind:
             "OUT", f"{output}: it must end in {PLY} or {TILES}, or in nothing: a folder of arrays"
         )
     kind = OutputKind(ending, TILESET if ending else ABOUT)
-    if output.exists():
-        strangers = _strangers(output, kind)
-        if strangers or not (output / str(kind.holds)).exists():
-            named = f": {strangers[0]}" if strangers else ""
-            raise InvalidParameter(
-                "OUT", f"{output}: it is there already, and holds something else{named}"
-            )
+    if output.exists() and (words := _not_ours(output, kind)):
+        raise InvalidParameter("OUT", f"{output}: {words}")
     return kind
+
+
+def _not_ours(output: Path, kind: OutputKind) -> str:
+    """Say why a folder is not to be replaced; nothing where it may be."""
+    strangers = _strangers(output, kind)
+    if not strangers and (output / str(kind.holds)).exists():
+        return ""
+    named = f": {strangers[0]}" if strangers else ""
+    return f"it is there already, and holds something else{named}"
 
 
 def _strangers(output: Path, kind: OutputKind) -> list[str]:

@@ -214,6 +214,27 @@ def test_a_folder_that_holds_a_stranger_s_file_is_not_replaced(source, tmp_path)
     assert (output / "notes.txt").read_text() == "mine"
 
 
+def test_a_folder_that_came_meanwhile_is_not_replaced_and_the_work_stays(source, tmp_path):
+    theirs = tmp_path / "out" / "notes.txt"
+
+    def meanwhile(tasks):
+        theirs.parent.mkdir(exist_ok=True)
+        theirs.write_text("mine")
+        return here(tasks)
+
+    def never(_):
+        raise AssertionError("all parts are done")
+
+    large = Large(source, tmp_path / "out", LOOP, 2**31, 2)
+    with pytest.raises(FileExistsError, match="something else: notes") as refusal:
+        run_large(large, meanwhile, Console(file=io.StringIO()))
+    assert refusal.value.filename == str(tmp_path / "out")
+    assert theirs.read_text() == "mine"
+    theirs.parent.rename(tmp_path / "elsewhere")
+    run_large(large, lambda tasks: never(tasks) if list(tasks) else iter(()), Console())
+    assert (tmp_path / "out" / "mesh.json").exists()
+
+
 @pytest.mark.parametrize(
     ("name", "content"),
     [
