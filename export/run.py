@@ -8,10 +8,11 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from export.model_file import Exported, export_model
 from export.published import export_published
-from pns_common.errors import PnsError
+from pns_common.errors import ParameterError, PnsError
 from pns_common.models.manifest import write_manifest
 from train.models.checkpoint import load_checkpoint
 from train.models.recipe import Recipe
@@ -62,15 +63,17 @@ def main(
         else:
             made = load_checkpoint(checkpoint)
             path = output or bundled_file(made.recipe) or checkpoint.with_suffix(".onnx")
+            if path.is_dir():
+                raise ParameterError("output", str(path), expected="a file, not a folder")
             written = {path: export_model(made, path)}
             if path.parent == MODELS:
                 write_manifest(MODELS)
     except PnsError as error:
-        console.print(str(error), style="red", soft_wrap=True)
+        console.print(escape(str(error)), style="red", soft_wrap=True)
         raise typer.Exit(1) from error
     for path, exported in written.items():
         console.print(f"parity with torch: {exported.parity.difference:.1e} of the budget")
-        console.print(f"{path} written, sha256 {exported.sha256}", soft_wrap=True)
+        console.print(f"{escape(str(path))} written, sha256 {exported.sha256}", soft_wrap=True)
 
 
 if __name__ == "__main__":

@@ -154,6 +154,22 @@ def test_export_command_refuses_what_is_no_checkpoint(tmp_path):
     assert not (tmp_path / "m.onnx").exists()
 
 
+def test_export_command_refuses_a_folder_to_write_to(tmp_path):
+    path = tmp_path / "c.safetensors"
+    save_checkpoint(path, Checkpoint(paper(), initial_network(paper()), {}, "machine"))
+    outcome = export_command(path, tmp_path)
+    assert outcome.exit_code == 1
+    assert "expected a file" in outcome.output
+
+
+def test_export_command_names_files_as_they_are_called(tmp_path):
+    """Square brackets are markup to what prints."""
+    path, missing = tmp_path / "rate[1e-3].safetensors", tmp_path / "rate[/1e-3].safetensors"
+    save_checkpoint(path, Checkpoint(paper(), initial_network(paper()), {}, "machine"))
+    assert "rate[1e-3].onnx written" in export_command(path, path.with_suffix(".onnx")).output
+    assert "rate[/1e-3].safetensors" in export_command(missing, tmp_path / "m.onnx").output
+
+
 def export_command(checkpoint, output):
     arguments = ["--checkpoint", str(checkpoint), "--output", str(output)]
     return CliRunner().invoke(export.run.app, arguments, catch_exceptions=False)

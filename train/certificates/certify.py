@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+from rich.markup import escape
 from rich.table import Table
 
 from pns_common.errors import ModelError, PnsError
@@ -171,7 +172,7 @@ def verdict_json(verdict: Verdict) -> bytes:
 
 def verdict_table(verdict: Verdict) -> Table:
     """Return the verdict as a table, one row a certificate."""
-    table = Table(title=f"Certificates of {verdict.name}", title_justify="left")
+    table = Table(title=f"Certificates of {escape(verdict.name)}", title_justify="left")
     for heading in ("", "Property"):
         table.add_column(heading, no_wrap=heading == "")
     for heading in ("Value", "Bound"):
@@ -188,7 +189,7 @@ def _rows(verdict: Verdict) -> Iterator[tuple[str, ...]]:
         word = "pass" if certificate.passed else "fail"
         kind = "" if certificate.kind == "certificate" else f" ({certificate.kind})"
         name = (
-            f"{certificate.name}\n[dim]{_escaped(certificate.where)}[/dim]"
+            f"{certificate.name}\n[dim]{escape(certificate.where)}[/dim]"
             if certificate.where
             else certificate.name
         )
@@ -199,11 +200,6 @@ def _rows(verdict: Verdict) -> Iterator[tuple[str, ...]]:
             certificate.bound,
             f"[{colour}]{word}[/]{kind}",
         )
-
-
-def _escaped(text: str) -> str:
-    # rich reads square brackets as markup.
-    return text.replace("[", "\\[")
 
 
 def _number(value: float) -> float | None:

@@ -29,7 +29,9 @@ def certify_command(
             exists=True, file_okay=False, help="Folder of obj, off, ply and stl files to add."
         ),
     ] = None,
-    json: Annotated[Path | None, typer.Option(help="File to write the verdict to.")] = None,
+    json: Annotated[
+        Path | None, typer.Option(dir_okay=False, help="File to write the verdict to.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the meshes and motions.")] = 0,
 ) -> None:
     """Certify a model file, also one that someone else made; exit 1 if a certificate fails."""

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from pns_common.errors import PnsError
@@ -57,7 +58,7 @@ def reproduce_command(
         laboratory = Laboratory(FULL, networks, checkpoints, published, silent, assets)
         run_all(chosen, laboratory, output, console, processes, force=force)
     except PnsError as error:
-        console.print(str(error), style="red", soft_wrap=True)
+        console.print(escape(str(error)), style="red", soft_wrap=True)
         raise typer.Exit(1) from error
 
 
@@ -95,7 +96,7 @@ def run_all(
     page = output / "README.md"
     before = page.read_text(encoding="utf-8") if page.is_file() else ""
     page.write_text(markdown_page(EXPERIMENTS, _records(output), before), encoding="utf-8")
-    console.print(f"{page} written", soft_wrap=True)
+    console.print(f"{escape(str(page))} written", soft_wrap=True)
 
 
 def _chosen(name: str | None, published: Path | None, assets: Path | None) -> list[Experiment]:

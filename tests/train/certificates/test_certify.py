@@ -230,6 +230,19 @@ def test_the_command_passes_and_looks_at_given_meshes(tmp_path, monkeypatch):
     assert json.loads(verdict.read_text())["meshes"] == ["tetrahedron"]
 
 
+def test_the_command_names_a_file_as_it_is_called():
+    """Square brackets are markup to what prints."""
+    outcome = CliRunner().invoke(train.run.app, ["certify", "a[/b].onnx"], catch_exceptions=False)
+    assert outcome.exit_code == 1
+    assert "Certificates of a[/b].onnx" in outcome.output
+
+
+def test_a_verdict_into_a_folder_is_refused_before_the_work(tmp_path):
+    arguments = ["certify", "none.onnx", "--json", str(tmp_path)]
+    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
+    assert outcome.exit_code == 2
+
+
 def test_a_folder_without_meshes_is_an_error_of_use(tmp_path):
     arguments = ["certify", "--meshes", str(tmp_path)]
     outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)

@@ -215,14 +215,14 @@ def test_what_an_experiment_cannot_use_is_told_and_ends_the_command(
     tmp_path, monkeypatch, experiment
 ):
     def cannot(laboratory):
-        raise MeshError("no file that can be used", element="folder")
+        raise MeshError("no file in [/meshes]", element="folder")
 
     cannot.__module__ = Counting.__module__
     monkeypatch.setattr(command, "EXPERIMENTS", {"cannot": replace(experiment, run=cannot)})
     arguments = ["reproduce", "cannot", "--output", str(tmp_path)]
     outcome = CliRunner().invoke(train.run.app, arguments)
     assert outcome.exit_code == 1
-    assert "folder: no file that can be used" in outcome.output
+    assert "folder: no file in [/meshes]" in outcome.output
 
 
 @pytest.mark.spawning
