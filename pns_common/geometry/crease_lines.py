@@ -61,9 +61,9 @@ ROW_ANGLE = 55.0
 # many times its own, and its own so many times theirs: of 45 degrees 30 and 60 are like, and 90 is
 # not. Half as many degrees are always like: their 1 − cos t is more than a quarter.
 PARALLEL, TIMES_ITS_OWN, TIMES_THEIRS = math.cos(math.radians(20)), 3.0, 4.0
-# How many times as wide as the other the wider of an edge's walls may be: in a row twice, as where
-# a simplifier made one wall of two, and where it ends they are those of one arc, and not plates.
-UNEVEN, UNEVEN_END = 2.05, 1.1
+# How many times as wide as the other the wider of an edge's walls may be: in a row four times, as
+# where a simplifier made one wall of some, and where it ends they are those of one arc, no plates.
+UNEVEN, UNEVEN_END = 4.05, 1.1
 ROUNDS = 5
 # Edges whose surroundings are looked at together.
 AT_ONCE = 8192
