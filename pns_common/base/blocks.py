@@ -45,12 +45,12 @@ class Blocks:
 
     def rows_of(self, count: int) -> int:
         """Return how many rows a block has where there are so many in all: the last one's fewer."""
-        return max(1, -(-count // max(1, self.count(count))))
+        enough = 1 if self.least is None else min(2 * self.threads, count // self.least)
+        return max(1, -(-count // max(1, enough, -(-count // self.rows))))
 
     def count(self, rows: int) -> int:
         """Return how many blocks ``run`` makes of so many rows."""
-        enough = 0 if self.least is None else min(2 * self.threads, rows // self.least)
-        return max(enough, -(-rows // self.rows))
+        return -(-rows // self.rows_of(rows))
 
     def unheard(self) -> Blocks:
         """Return the same for work after the end, of which nobody is told."""

@@ -24,12 +24,14 @@ def test_threads_in_haste_take_each_block_once(hasty):
         assert sorted(rows.start for rows in taken) == list(range(5000))
 
 
-@pytest.mark.parametrize(("count", "rows"), [(0, 5), (3, 5), (5, 5), (11, 5)])
+@pytest.mark.parametrize(("count", "rows"), [(0, 5), (3, 5), (5, 5), (11, 5), (41, 30)])
 @pytest.mark.parametrize("least", [None, 2])
-def test_blocks_cover_all_rows_and_are_counted(count, rows, least):
+@pytest.mark.parametrize("threads", [1, 4, 12])
+def test_blocks_cover_all_rows_and_are_counted(count, rows, least, threads):
     taken = []
-    blocks = Blocks(threads=1, rows=rows, least=least)
+    blocks = Blocks(threads, rows, least=least)
     blocks.run(count, taken.append)
+    taken.sort(key=lambda part: part.start)
     assert [row for part in taken for row in range(part.start, part.stop)] == list(range(count))
     assert len(taken) == blocks.count(count)
     assert [blocks.number(part, count) for part in taken] == list(range(len(taken)))
