@@ -5,9 +5,14 @@ from __future__ import annotations
 import sys
 
 from pns_common.fused import load_kernels
-from pns_common.fused.storage import cache_folder
 
 if __name__ == "__main__":
     if not load_kernels():
         sys.exit("no kernels: numba is not installed, or no folder can be written")
-    print(f"kernels are in {cache_folder()}")
+    # Without numba there is nothing that it could load.
+    from pns_common.fused.library import place_of_kernels
+
+    file = place_of_kernels()
+    if not file.exists():
+        sys.exit(f"kernels are not kept: {file.parent} is full, or cannot be written")
+    print(f"kernels are in {file.parent}")

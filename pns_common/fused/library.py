@@ -54,15 +54,20 @@ def library() -> Library:
 @cache
 def _library() -> Library:
     keep_freed_memory()
-    modules = kernel_modules()
-    file = kernel_file(key_of(modules))
-    assert file is not None  # ``kernels_available`` says so
+    modules, file = kernel_modules(), place_of_kernels()
     code = file.read_bytes() if file.exists() else _compiled(modules, file)
     builder = _llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
     for kernel in kernels_of(modules):
         builder.export_symbol(kernel.name)
     jit = _llvm.create_lljit_compiler(target_machine())
     return Library(jit, builder.link(jit, kernels.__name__))
+
+
+def place_of_kernels() -> Path:
+    """Return the file that this processor's kernels are kept in, if there is room."""
+    file = kernel_file(key_of(kernel_modules()))
+    assert file is not None  # ``kernels_available`` says so
+    return file
 
 
 def _compiled(modules: Sequence[ModuleType], file: Path) -> bytes:

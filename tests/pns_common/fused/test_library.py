@@ -14,7 +14,7 @@ from pns_common.fused.library import kernel_modules, kernels_of, key_of
 LOADED_ALONE = """
 import sys
 from pns_common import Mesh, loop, refine
-from pns_common.fused import library, load_kernels
+from pns_common.fused import load_kernels
 load_kernels()
 refined = refine(Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), loop())
 assert len(refined.mesh.faces) == 4 and "llvmlite" in sys.modules
