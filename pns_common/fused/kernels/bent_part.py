@@ -22,7 +22,7 @@ from pns_common.fused.kernels.compiled import (
 )
 from pns_common.fused.kernels.creases import normals_beside
 from pns_common.fused.kernels.edges import BOUNDARY, INTERIOR, IRREGULAR, NONE
-from pns_common.fused.kernels.rings import dot, row
+from pns_common.fused.kernels.vectors import difference, dot, row
 
 
 def _bends(normals, half_edges, edge_class, e):
@@ -31,7 +31,7 @@ def _bends(normals, half_edges, edge_class, e):
     Faces without a normal are not known to lie in a plane.
     """
     n, m = normals_beside(normals, half_edges, edge_class, e)
-    chord = n[0] - m[0], n[1] - m[1], n[2] - m[2]
+    chord = difference(n, m)
     return (edge_class[e] == INTERIOR) & ((dot(n, m) != 1.0) | (dot(chord, chord) != 0.0))
 
 

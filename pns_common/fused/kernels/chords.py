@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pns_common.fused.kernels.compiled import INDICES, LONG_INDEX, POINTS, REAL, SIZE, kernel
 from pns_common.fused.kernels.normals import squared_chord, unit_normal
+from pns_common.fused.kernels.vectors import dot
 
 
 def _normal(points, children, f):
@@ -40,5 +41,5 @@ def flipped_among(points, loop_points, children, faces):
         for i in range(4):
             n = _normal(points, children, 4 * f + i)
             m = _normal(loop_points, children, 4 * f + i)
-            flipped += n[0] * m[0] + n[1] * m[1] + n[2] * m[2] < 0
+            flipped += dot(n, m) < 0
     return flipped

@@ -19,7 +19,7 @@ from pns_common.fused.kernels.compiled import (
     natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
-from pns_common.fused.kernels.rings import between, cross, divisor, dot, row
+from pns_common.fused.kernels.vectors import between, cross, divisor, dot, row
 from pns_common.geometry.crease_lines import (
     CORNER,
     ROUNDS,

@@ -19,9 +19,9 @@ from pns_common.fused.kernels.compiled import (
     kernel,
     natural,
 )
-from pns_common.fused.kernels.curves import across, less, over, to_sides
+from pns_common.fused.kernels.curves import across, over, to_sides
 from pns_common.fused.kernels.edge_correction import shortened
-from pns_common.fused.kernels.rings import between, dot, norm, row
+from pns_common.fused.kernels.vectors import between, difference, dot, norm, row
 from pns_common.fused.kernels.vertex_prior import LEFT_FROM, LEFT_TO, rise
 from pns_common.masks.stencils import CURVE_CENTRE, CURVE_NEIGHBOUR, MIDPOINT
 
@@ -74,7 +74,7 @@ def _far_behind(push, pushed, moved, a, b):
         CURVE_FURTHER * (push[1] - pushed[1] - moved[1]) - push[1],
         CURVE_FURTHER * (push[2] - pushed[2] - moved[2]) - push[2],
     )
-    chord = less(b, a)
+    chord = difference(b, a)
     longer = max(norm(chord), (norm(a) + norm(b)) * CLEAR_CHORD)
     # Two neighbours at the vertex itself leave no direction.
     left = norm(across(behind, over(chord, longer if longer > 0 else math.inf)))
@@ -109,7 +109,7 @@ def move_vertices_but_at_tips(
     for i in range(end - begin):
         v = vertices[natural(begin) + i]
         a, b = to_sides(points, sides, v)
-        moved, pushed = less(row(loop, v), row(points, v)), _pushed(pushes, sides, v)
+        moved, pushed = difference(row(loop, v), row(points, v)), _pushed(pushes, sides, v)
         tip = _far_behind(row(pushes, v), pushed, moved, a, b)
         wanted = (
             pushed[0] - tip * (tip_strength * moved[0] + pushed[0]),

@@ -18,7 +18,7 @@ from pns_common.fused.kernels.compiled import (
     natural,
 )
 from pns_common.fused.kernels.owned import owned_rows
-from pns_common.fused.kernels.rings import between, divisor, dot
+from pns_common.fused.kernels.vectors import between, difference, divisor, dot
 
 
 @kernel(SIZE, INDICES, INDEX, FLAGS, INDEX, SIZE, SIZE, INDICES_OUT, CLASSES_OUT)
@@ -46,11 +46,6 @@ def follow_curves(edges, sharp_edges, of_curve, sharp, begin, end, sides, met):
                 sides[b, natural(met[b])] = a
                 met[b] += 1
     return 0
-
-
-def less(v, u):
-    """Return v − u."""
-    return v[0] - u[0], v[1] - u[1], v[2] - u[2]
 
 
 def over(v, size):
@@ -87,7 +82,7 @@ def push_curves(points, sides, vertices, gates, strength, begin, end, pushes):
     for i in range(end - begin):
         v = vertices[natural(begin) + i]
         a, b = to_sides(points, sides, v)
-        chord = less(b, a)
+        chord = difference(b, a)
         middle = (a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2
         off = across(middle, over(chord, divisor(chord)))
         size = -(gates[i] / 3)

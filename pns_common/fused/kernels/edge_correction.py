@@ -17,8 +17,9 @@ from pns_common.fused.kernels.compiled import (
     natural,
 )
 from pns_common.fused.kernels.normals import NORMAL_NUMBERS
-from pns_common.fused.kernels.rings import HEIGHT, cross, divisor, dot, norm, row
+from pns_common.fused.kernels.rings import HEIGHT
 from pns_common.fused.kernels.together import TOGETHER, keep, kept
+from pns_common.fused.kernels.vectors import cross, difference, divisor, dot, norm, row
 from pns_common.geometry.frames import ANTIPARALLEL
 from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
 
@@ -156,7 +157,7 @@ def look(
             p, q = _vector(points, 3 * a), _vector(points, 3 * b)
             keep(held, FIRST, lane, _vector(normals, 3 * f))
             keep(held, SECOND, lane, _vector(normals, 3 * g))
-            keep(held, SPOKE, lane, (q[0] - p[0], q[1] - p[1], q[2] - p[2]))
+            keep(held, SPOKE, lane, difference(q, p))
             h = lengths[e]
             held[H * TOGETHER + lane] = length[i] = h
             if len(bends):

@@ -16,8 +16,9 @@ from pns_common.fused.kernels.compiled import (
     natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
-from pns_common.fused.kernels.rings import AREA, between, cross, dot, row
+from pns_common.fused.kernels.rings import AREA
 from pns_common.fused.kernels.together import TOGETHER, keep, kept
+from pns_common.fused.kernels.vectors import between, cross, difference, dot, row
 
 # What is held of TOGETHER edges, a row of numbers each: the spoke, the normals to its left and to
 # its right, the smaller area of both faces, and 1 where the edge is interior, else 0; then what is
@@ -35,7 +36,7 @@ def _measure(held, altitudes):
         size = math.sqrt(square)
         length = size if square > 0 else math.inf
         wide = altitudes * held[LEAST * TOGETHER + lane] / length
-        chord = n[0] - m[0], n[1] - m[1], n[2] - m[2]
+        chord = difference(n, m)
         known = inner & (dot(n, n) > 0) & (dot(m, m) > 0)
         direction = spoke[0] / length, spoke[1] / length, spoke[2] / length
         # Beside 0 there is no −0 in the array kernels' sums either.

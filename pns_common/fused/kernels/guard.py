@@ -24,8 +24,8 @@ from pns_common.fused.kernels.normals import (
     child_corners,
     clearly_less,
 )
-from pns_common.fused.kernels.rings import cross, dot, row
 from pns_common.fused.kernels.together import TOGETHER, keep, kept
+from pns_common.fused.kernels.vectors import cross, difference, dot, row
 from pns_common.geometry.frames import NO_AREA
 
 # What is held of a face: where Loop puts its corners and the middles of its edges, each with its
@@ -104,15 +104,11 @@ def _any_changed(changed, faces, face_edges, middles, first, count):
     return found
 
 
-def _difference(p, q):
-    return q[0] - p[0], q[1] - p[1], q[2] - p[2]
-
-
 @called_seldom
 def _turned(a, b, c, cosine):
     """Return whether a child turned or shrank too much; False if it had no area (``turned``)."""
-    u, v = _difference(a[0], b[0]), _difference(a[0], c[0])
-    old, new = cross(u, v), cross(_difference(a[1], b[1]), _difference(a[1], c[1]))
+    u, v = difference(b[0], a[0]), difference(c[0], a[0])
+    old, new = cross(u, v), cross(difference(b[1], a[1]), difference(c[1], a[1]))
     old_square, new_square = dot(old, old), dot(new, new)
     least = NO_AREA * (dot(u, u) + dot(v, v))
     if not old_square > least * least:

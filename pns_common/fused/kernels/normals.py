@@ -6,8 +6,6 @@ what may be the largest angle, or may be a flipped face, is computed as diagnost
 
 from __future__ import annotations
 
-import math
-
 from pns_common.fused.kernels.compiled import (
     CLASSES,
     INDICES,
@@ -21,6 +19,7 @@ from pns_common.fused.kernels.compiled import (
 )
 from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.together import TOGETHER, keep, kept
+from pns_common.fused.kernels.vectors import cross, difference, dot, norm, row
 from pns_common.geometry.frames import NO_AREA
 
 # Far more than the cosine of two computed area vectors is wrong by, and what it counts for.
@@ -35,29 +34,25 @@ CORNERS, MIDDLES, FAR, LONE, HELD = 0, 9, 18, 36, 39
 
 def unit_normal(points, a, b, c):
     """Return a triangle's unit normal; zeros where it has no area (``frames.triangle_normals``)."""
-    normal, _, _ = normal_and_area(_row(points, a), _row(points, b), _row(points, c))
+    normal, _, _ = normal_and_area(row(points, a), row(points, b), row(points, c))
     return normal
 
 
 def normal_and_area(p, q, r):
     """Return the same of three points, twice the area vector, and the length of that."""
-    u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    v0, v1, v2 = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-    x, y, z = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
-    square = x * x + y * y + z * z
-    length = math.sqrt(square) if square > 0 else 0.0
-    shortest = NO_AREA * ((u0 * u0 + u1 * u1 + u2 * u2) + (v0 * v0 + v1 * v1 + v2 * v2))
+    u, v = difference(q, p), difference(r, p)
+    vector = cross(u, v)
+    square, length = dot(vector, vector), norm(vector)
+    shortest = NO_AREA * (dot(u, u) + dot(v, v))
     if square > shortest * shortest:
-        return (x / length, y / length, z / length), (x, y, z), length
-    return (0.0, 0.0, 0.0), (x, y, z), length
+        return (vector[0] / length, vector[1] / length, vector[2] / length), vector, length
+    return (0.0, 0.0, 0.0), vector, length
 
 
 def squared_chord(n, m):
     """Return the squared distance between two unit normals; 0 where one is undefined."""
-    if n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0 and m[0] * m[0] + m[1] * m[1] + m[2] * m[2] > 0:
-        x, y, z = n[0] - m[0], n[1] - m[1], n[2] - m[2]
-        return x * x + y * y + z * z
-    return 0.0
+    chord = difference(n, m)
+    return dot(chord, chord) if dot(n, n) > 0 and dot(m, m) > 0 else 0.0
 
 
 def _after(i):
@@ -66,10 +61,6 @@ def _after(i):
 
 def _before(i):
     return i - 1 if i > 0 else 2
-
-
-def _row(points, i):
-    return points[i, 0], points[i, 1], points[i, 2]
 
 
 def child_corners(faces, face_edges, vertex_count, f, i):
@@ -90,10 +81,8 @@ def _child_normal(points, vertex_count, faces, face_edges, f, i):
 
 def area(p, q, r):
     """Return twice the area vector of a triangle, and its square."""
-    u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    v0, v1, v2 = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-    x, y, z = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
-    return x, y, z, x * x + y * y + z * z
+    vector = cross(difference(q, p), difference(r, p))
+    return vector[0], vector[1], vector[2], dot(vector, vector)
 
 
 def clearly_less(n, m, bound):
@@ -101,7 +90,7 @@ def clearly_less(n, m, bound):
 
     It does not branch, so that loops of it alone run on vectors.
     """
-    inner, squares = n[0] * m[0] + n[1] * m[1] + n[2] * m[2], n[3] * m[3]
+    inner, squares = dot(n, m), n[3] * m[3]
     return (inner > 0) & (squares > NORMAL_NUMBERS) & (inner * inner > bound * squares)
 
 
@@ -157,14 +146,14 @@ def _chord_of_face(points, faces, face_edges, half_edges, edge_class, vertex_cou
 
 def _hold_side(points, faces, face_edges, half_edges, edge_class, vertex_count, f, i, lane, held):
     """Hold corner i of face f, the edge that leaves it, and what is across."""
-    keep(held, CORNERS + 3 * i, lane, _row(points, faces[f, i]))
-    keep(held, MIDDLES + 3 * i, lane, _row(points, vertex_count + face_edges[f, i]))
+    keep(held, CORNERS + 3 * i, lane, row(points, faces[f, i]))
+    keep(held, MIDDLES + 3 * i, lane, row(points, vertex_count + face_edges[f, i]))
     h = _across(half_edges, edge_class, face_edges[f, i], 3 * f + i)
     g = h // 3
     j = h - 3 * g
     # The other face runs along the edge in the opposite direction.
-    by_start = _row(points, vertex_count + face_edges[g, _after(j)])
-    by_stop = _row(points, vertex_count + face_edges[g, _before(j)])
+    by_start = row(points, vertex_count + face_edges[g, _after(j)])
+    by_stop = row(points, vertex_count + face_edges[g, _before(j)])
     keep(held, FAR + 6 * i, lane, by_start)
     keep(held, FAR + 6 * i + 3, lane, by_stop)
     held[(LONE + i) * TOGETHER + lane] = 1.0 if h == 3 * f + i else 0.0
@@ -247,11 +236,11 @@ def flipped_children(points, loop_points, faces, face_edges, vertex_count, begin
     for f in range(begin, end):
         for i in range(4):
             a, b, c = child_corners(faces, face_edges, vertex_count, f, i)
-            n = area(_row(points, a), _row(points, b), _row(points, c))
-            m = area(_row(loop_points, a), _row(loop_points, b), _row(loop_points, c))
+            n = area(row(points, a), row(points, b), row(points, c))
+            m = area(row(loop_points, a), row(loop_points, b), row(loop_points, c))
             if clearly_less(n, m, CLEARLY_SAME_SIDE):
                 continue
             n = _child_normal(points, vertex_count, faces, face_edges, f, i)
             m = _child_normal(loop_points, vertex_count, faces, face_edges, f, i)
-            flipped += n[0] * m[0] + n[1] * m[1] + n[2] * m[2] < 0
+            flipped += dot(n, m) < 0
     return flipped

@@ -24,6 +24,7 @@ from pns_common.fused.kernels.compiled import (
 )
 from pns_common.fused.kernels.normals import normal_and_area
 from pns_common.fused.kernels.owned import owned_rows
+from pns_common.fused.kernels.vectors import between, dot, norm, row
 
 # Columns of a vertex's sums, which become means.
 UMBRELLA, RING_SQUARE, MEAN_JUMP, MEAN_BEND, BEND_SQUARE, LENGTH, PULL = 0, 3, 4, 5, 6, 7, 8
@@ -36,47 +37,11 @@ AREA = 3
 HEIGHT = 3
 
 
-def dot(u, v):
-    """Return the inner product, summed in the order of ``arrays.dot``."""
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-
-
-def cross(u, v):
-    """Return the cross product, as ``arrays.cross`` has it."""
-    return (
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    )
-
-
-def between(points, a, b):
-    """Return the vector from row a to row b."""
-    return points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
-
-
-def norm(v):
-    """Return the length of a vector, 0 for zero vectors and NaN, as in ``arrays.norm``."""
-    square = dot(v, v)
-    return math.sqrt(square) if square > 0 else 0.0
-
-
-def divisor(v):
-    """Return the length that makes a unit vector of v; infinite where it has none."""
-    square = dot(v, v)
-    return math.sqrt(square) if square > 0 else math.inf
-
-
 def clear_normal(mean):
     """Return m̂ of a mean normal, as in ``prior.clear_normals``."""
     agreement = norm(mean)
     clear = agreement if agreement > CLEAR_NORMAL else CLEAR_NORMAL
     return mean[0] / clear, mean[1] / clear, mean[2] / clear
-
-
-def row(values, i):
-    """Return the first three columns of a row."""
-    return values[i, 0], values[i, 1], values[i, 2]
 
 
 @kernel(SIZE, POINTS, INDICES, SIZE, SIZE, POINTS_OUT, POINTS_OUT, by_rows=True)

@@ -10,7 +10,7 @@ from pns_common.fused.kernels.compiled import (
     SIZE,
     kernel,
 )
-from pns_common.fused.kernels.rings import between, norm
+from pns_common.fused.kernels.vectors import between, norm
 
 
 @kernel(SIZE, POINTS, LONG_INDICES, LONG_INDEX, LONG_INDEX, SIZE, SIZE, POINTS_OUT)

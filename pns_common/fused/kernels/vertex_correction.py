@@ -29,9 +29,8 @@ from pns_common.fused.kernels.rings import (
     PULL,
     RING_SQUARE,
     UMBRELLA,
-    dot,
-    row,
 )
+from pns_common.fused.kernels.vectors import dot, row
 
 
 def _divided(value, by):

@@ -16,15 +16,8 @@ from pns_common.fused.kernels.compiled import (
     natural,
 )
 from pns_common.fused.kernels.normals import NORMAL_NUMBERS
-from pns_common.fused.kernels.rings import (
-    MEAN_JUMP,
-    NEAR_JUMP,
-    RING_SQUARE,
-    UMBRELLA,
-    clear_normal,
-    dot,
-    row,
-)
+from pns_common.fused.kernels.rings import MEAN_JUMP, NEAR_JUMP, RING_SQUARE, UMBRELLA, clear_normal
+from pns_common.fused.kernels.vectors import dot, row
 
 # A kernel reads numbers, not pairs.
 (LEFT_FROM, LEFT_TO), (BENDS_FROM, BENDS_TO) = LEFT, BENDS_MORE

@@ -6,16 +6,11 @@ import pytest
 from pns_common import Mesh
 from pns_common.fused.kernels.rings import (
     HEIGHT,
-    between,
-    cross,
-    dot,
     face_bends,
     mean_normals,
     mean_spokes,
     measure_faces,
-    norm,
     prior_pushes,
-    row,
     umbrella_heights,
 )
 from tests.support.kernels import WAYS, edges_built
@@ -25,14 +20,6 @@ POINTS = np.array([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1]])
 FACES = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
 MESH = edges_built(Mesh(POINTS, FACES))
 THIRD = 3**-0.5
-
-
-def test_vectors():
-    u, v = (1.0, 2.0, 2.0), (0.0, 3.0, -4.0)
-    assert (dot(u, v), norm(u), norm((0.0, 0.0, 0.0))) == (-2, 3, 0)
-    assert cross(u, v) == tuple(np.cross(u, v))
-    assert between(POINTS, 0, 4) == (-1, 0, 1)
-    assert row(POINTS, 3) == (0, -1, 0)
 
 
 @pytest.mark.parametrize("way", WAYS)
