@@ -2,9 +2,9 @@
 
 from numba import njit
 
-from pns_common.fused.kernels import rings
+from pns_common.fused.kernels import vectors
 
-cross, dot = njit(rings.cross), njit(rings.dot)
+cross, dot = njit(vectors.cross), njit(vectors.dot)
 
 
 @njit
