@@ -9,7 +9,7 @@ Where to read, each room seeing only those above it:
 
     base/           arrays of any backend, row blocks, whole files; errors.py beside it
     mesh.py         the control mesh; connectivity/ what follows from its faces: topology.py (split)
-    geometry/       what is measured on it: frames.py F, rings.py, thin_faces.py ℓ, crease_lines.py
+    geometry/       what is measured on it: frames.py F, rings.py, thin_faces.py ℓ, crease_lines/
     masks/          Loop: stencils.py one step's masks, limit/ those of the limit surface
     features/       φ, what the networks read of an edge and of a vertex's ring
     formula/        correction.py (edges) and vertex_operator.py (old vertices); side_gate.py γ,

@@ -18,12 +18,10 @@ from pns_common.geometry.crease_lines import (
     CREASE_ANGLE,
     CREASE_LEVELS,
     EDGED_ANGLE,
-    Edges,
-    cosine_of,
-    edges_beyond,
     is_edged,
     line_rows,
 )
+from pns_common.geometry.crease_lines.turns import Edges, cosine_of, edges_beyond
 from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh, check_is_mesh
 
@@ -37,7 +35,7 @@ def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2
     These turn by more than ``angle`` (degrees, between 0 and 180), lie between sides that are flat
     beside them, and go on at both ends. None: by more than 66 degrees, and where at least half of
     the edges beyond 21 degrees are beyond 66, by more than 21, but for rows of like ones; so the
-    default model keeps them (geometry/crease_lines.py).
+    default model keeps them (geometry/crease_lines).
 
     Raises:
         ParameterError: it is no Mesh, or the angle is out of range.

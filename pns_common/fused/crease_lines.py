@@ -8,21 +8,14 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.creases import Creases
 from pns_common.fused.kernels.compiled import ROWS
-from pns_common.fused.kernels.creases import (
-    drop_loose_ends,
-    mark_alone,
-    mark_edges_beyond,
-    mark_flat_sides,
-)
+from pns_common.fused.kernels.edge_rows import mark_alone
+from pns_common.fused.kernels.going_on import drop_loose_ends
+from pns_common.fused.kernels.turns import mark_edges_beyond, mark_flat_sides
 from pns_common.fused.mesh_edges import MeshEdges
-from pns_common.geometry.crease_lines import (
-    PARALLEL,
-    ROW_ANGLE,
-    cosine_of,
-    is_edged,
-    may_end,
-    with_gentler,
-)
+from pns_common.geometry.crease_lines import is_edged, with_gentler
+from pns_common.geometry.crease_lines.edge_rows import PARALLEL, ROW_ANGLE
+from pns_common.geometry.crease_lines.going_on import may_end
+from pns_common.geometry.crease_lines.turns import cosine_of
 
 
 def crease_line_rows(

@@ -31,7 +31,7 @@ from __future__ import annotations
 from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.errors import ParameterError, PnsError
 from pns_common.features.edge_features import paper_features
-from pns_common.geometry.crease_lines import ROUNDS
+from pns_common.geometry.crease_lines.going_on import ROUNDS
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
 from pns_common.rules.loop import loop_vertex_rule
 from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule

@@ -217,6 +217,11 @@ def block(cells=3, noise=0.0, seed=0, closed=True):
     return points, number.reshape(-1)[np.concatenate(faces)]
 
 
+def noisy_blocks():
+    """Blocks whose vertices lie beside their sides, more and more; every other one has no lid."""
+    return st.sampled_from([Mesh(*block(3, noise=0.2 * k, closed=k % 2 == 0)) for k in range(4)])
+
+
 def prism(profile):
     """A convex profile, drawn along z."""
     n = len(profile)

@@ -20,8 +20,8 @@ from pns_common.fused.kernels.compiled import (
     kernel,
     natural,
 )
-from pns_common.fused.kernels.creases import normals_beside
 from pns_common.fused.kernels.edges import BOUNDARY, INTERIOR, IRREGULAR, NONE
+from pns_common.fused.kernels.turns import normals_beside
 from pns_common.fused.kernels.vectors import difference, dot, row
 
 

@@ -13,7 +13,7 @@ from pns_common.fused.face_measures import face_normals
 from pns_common.geometry.crease_lines import line_rows
 from pns_common.geometry.frames import face_normals as array_normals
 from tests.support.kernels import edges_built
-from tests.support.meshes import block, manifolds, prism, soups
+from tests.support.meshes import block, manifolds, soups
 
 
 def found_by_kernels(mesh, creases, blocks):
@@ -47,14 +47,3 @@ def test_they_find_those_of_a_noisy_block(closed):
     found = found_by_kernels(mesh, creases, Blocks(2, 7))
     np.testing.assert_array_equal(found, expected_lines(mesh, creases))
     assert len(found) > 20
-
-
-@pytest.mark.parametrize("wide", [1.0, 1.6, 3.0])
-@pytest.mark.parametrize("sides", [4, 8, 12])
-def test_they_find_those_of_arcs_that_meet_a_plane(sides, wide):
-    """Of rows with walls as wide, and more and less so, that end at sharp edges."""
-    angles = np.linspace(0, np.pi, sides + 1)
-    mesh = prism(np.stack([wide * np.cos(angles), np.sin(angles)], axis=-1))
-    creases = Creases(line_angle=66.0, edged_angle=21.0)
-    found = found_by_kernels(mesh, creases, Blocks(2, 7))
-    np.testing.assert_array_equal(found, expected_lines(mesh, creases))

@@ -1,0 +1,132 @@
+"""Crease lines: edges that the mesh itself shows to be sharp, found by four marks.
+
+A coarse mesh does not say which of its turns are sharp and which are round: an edge of a cube turns
+by 90 degrees, and one of an octahedron, which may stand for a sphere, by 71. What tells them apart
+is what lies around:
+
+1. *it is sharp*: its two faces' normals differ by more than θ;
+2. *its sides are flat*: in each of the two faces another edge turns by less than half as much;
+3. *it goes on*: at both ends it meets another such edge that runs on within θ of straight, or a
+   corner of three or more, or a boundary, a crease that is named or another edge that is not
+   interior, or a face without area; what does not is dropped, ``ROUNDS`` times over, so that a line
+   that ends in a smooth surface loses as many edges there.
+
+θ of 66 degrees lies between the turns of a hexagon and a pentagon: tubes of six sides stay round,
+and a rim of six corners is a circle, but in edged meshes (below) six sides are edges.
+
+A part that is made of plane faces has gentler edges too, chamfers and the plates of a hull. It is
+known by its edges: a mesh is *edged* if at least half of those that turn by more than θ' = 21
+degrees turn by more than θ. (Where sharp rims go round something most edges that turn are on the
+round.) There, edges beyond θ' are lines too with the marks 2 and 3. But those beyond θ in a hollow
+have to go on without gentler ones, as elsewhere (an armpit is round), and those up to 55 degrees
+are lines only if
+
+4. *it stands alone*: it is not in a row. Edges in a row have walls on both sides that are about as
+   wide, and across each of these another edge like it, which runs within 20 degrees of parallel
+   and turns the same way, with a quarter to three times its 1 − cos t; one that goes on from its
+   end is not beside it. A row ends where walls of one width meet a sharper edge, whichever way
+   that turns. A row is a tube or an arc: one of seven sides or more stays round, as a barrel does,
+   where its walls are quads cut in two. So does a fillet of three pieces or more, whose arc begins
+   and ends with half the turn of those between. But the chamfers of a bar are no row.
+
+Both numbers are counts: a mesh in pieces has the same. Turning, moving, scaling or renumbering a
+mesh does not change the answer, nor does mirroring it with its faces turned, but where rounding
+decides. A mesh whose faces are turned over has ridges for hollows, and if it is edged it may have
+other lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.connectivity.creases import Creases, with_crease_rows
+from pns_common.connectivity.topology import Topology
+from pns_common.geometry.crease_lines.edge_rows import stand_alone
+from pns_common.geometry.crease_lines.going_on import go_on, may_end
+from pns_common.geometry.crease_lines.turns import (
+    Edges,
+    cosine_of,
+    edges_beyond,
+    have_flat_sides,
+    rises,
+    turn_cosines,
+)
+
+# θ in degrees, and at how many levels what is found is sharp: then it is smooth, and by then round
+# within a quarter of an edge.
+CREASE_ANGLE, CREASE_LEVELS = 66.0, 2
+# θ' in degrees, of edged meshes, between the turns of tubes of 17 and 18 sides: where many edges
+# turn by θ' itself, rounding decides. And of how many beyond it one turns by more than θ there.
+EDGED_ANGLE, EDGED_ONE_IN = 21.0, 2
+
+
+def with_crease_lines(
+    topology: Topology,
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    creases: Creases,
+) -> Topology:
+    """Return the topology with its crease lines as creases; unchanged where none are looked for."""
+    if creases.line_angle is None:
+        return topology
+    return with_crease_rows(topology, line_rows(points, normals, topology, creases))
+
+
+def line_rows(
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Topology,
+    creases: Creases,
+) -> Int[np.ndarray, " N"]:
+    """Return the edges of a mesh's crease lines, which ``creases`` say to look for.
+
+    ``normals`` are the faces' unit normals, 0 without area.
+    """
+    assert creases.line_angle is not None
+    cosine = cosine_of(creases.line_angle)
+    sharp = edges_beyond(normals, mesh, mesh.interior, cosine)
+    gentle = False
+    if creases.edged_angle is not None:
+        bent = edges_beyond(normals, mesh, mesh.interior, cosine_of(creases.edged_angle))
+        known = creases.edged
+        gentle = is_edged(len(sharp), len(bent)) if known is None else known
+        sharp = bent if gentle else sharp
+    if len(sharp) == 0:
+        return sharp
+    flat = sharp[have_flat_sides(normals, mesh, sharp)]
+
+    at_rim = may_end(mesh, normals)
+
+    def going_on(rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
+        return rows[go_on(points, mesh, rows, at_rim, cosine)]
+
+    if not gentle:
+        return going_on(flat)
+    alone = flat[stand_alone(points, normals, mesh, flat)]
+    return with_gentler(points, normals, mesh, alone, cosine, going_on)
+
+
+def with_gentler(
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Edges,
+    alone: Int[np.ndarray, " N"],
+    cosine: float,
+    going_on: Callable[[Int[np.ndarray, " N"]], Int[np.ndarray, " M"]],
+) -> Int[np.ndarray, " M"]:
+    """Return the lines of an edged mesh: of edges with marks 1, 2 and 4 those that go on.
+
+    ``going_on`` returns them of some edges.
+    """
+    is_sharp = turn_cosines(normals, mesh, alone) < cosine
+    in_hollow = is_sharp & rises(points, normals, mesh, alone)
+    by_themselves = going_on(alone[is_sharp])
+    return going_on(alone[~in_hollow | np.isin(alone, by_themselves)])
+
+
+def is_edged(sharp: int, bent: int) -> bool:
+    """Return whether a mesh with so many edges beyond θ, and beyond θ', is edged."""
+    return sharp > 0 and EDGED_ONE_IN * sharp >= bent

@@ -1,0 +1,81 @@
+"""Rows: chamfers and plates stand alone, tubes and arcs do not."""
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh
+from tests.support.crease_lines import CHAMFERED, WITH_GENTLE, lines
+from tests.support.meshes import prism
+from train.data.primitives import cone, cylinder, l_block
+
+# Plates of a hull: turns of 20 to 50 degrees between plane faces of any width.
+HULL = prism([[0, 0], [3, 0], [4.5, 0.9], [4.9, 2], [3, 3.1], [1.2, 3.3], [0, 2]])
+
+
+@pytest.mark.parametrize(
+    ("mesh", "sharp", "all_of_them"),
+    [
+        (CHAMFERED, 13, 15),
+        (HULL, 16, 21),
+        (cylinder(6), 12, 18),
+        *((cylinder(sides), 2 * sides, 2 * sides) for sides in (7, 8, 12, 16)),
+        (cylinder(8, rows=3), 16, 16),
+        (cone(16), 16, 16),
+        (l_block(), 22, 22),
+    ],
+)
+def test_edged_meshes_keep_gentler_edges_that_stand_alone(mesh, sharp, all_of_them):
+    assert len(lines(mesh)) == sharp
+    assert len(lines(mesh, WITH_GENTLE)) == all_of_them
+
+
+@pytest.mark.parametrize("rows", [1, 2, 5])
+def test_an_edge_is_not_beside_one_that_goes_on_from_it(rows):
+    """However a chamfer's walls are cut: some have the next edge of the line in the next face."""
+    profile = np.array([[0, 0], [2, 0], [2, 1.5], [1.5, 2], [0, 2]])
+    n, k, after = 5, np.arange(5), (np.arange(5) + 1) % 5
+    points = np.concatenate([np.c_[profile, np.full(n, height)] for height in range(rows + 1)])
+    walls = []
+    for row in range(rows):
+        a, b, c, d = k, after, n + after, n + k
+        cut = [np.c_[a, b, c], np.c_[a, c, d]] if row % 2 else [np.c_[a, b, d], np.c_[b, c, d]]
+        walls += [faces + n * row for faces in cut]
+    fan = np.stack([0 * k[2:], k[1:-1], k[2:]], axis=1)
+    mesh = Mesh(points, np.concatenate([*walls, fan[:, ::-1], fan + n * rows]))
+    assert len(lines(mesh)) == 2 * n + 3 * rows
+    assert len(lines(mesh, WITH_GENTLE)) == 2 * n + 5 * rows
+
+
+@pytest.mark.parametrize("pieces", [2, 3, 4])
+def test_fillets_of_three_pieces_or_more_stay_round(pieces):
+    """An arc from one flat side to the next, of which a piece turns into a side by half as much."""
+    angles = np.radians(np.linspace(0, 90, pieces + 1)) + np.radians([[0], [90], [180], [270]])
+    centres = np.array([[2, 1], [-2, 1], [-2, -1], [2, -1]])
+    arcs = centres[:, None] + np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    profile = arcs.reshape(-1, 2)
+    rims = 2 * len(profile)
+    # Where an arc of two pieces meets its sides it turns by more than 21 degrees.
+    at_ends = 8 if pieces == 2 else 0
+    assert len(lines(prism(profile), WITH_GENTLE)) == rims + at_ends
+
+
+@pytest.mark.parametrize("pieces", [4, 6, 8])
+def test_an_arc_stays_round_up_to_the_sharp_edge_where_it_ends(pieces):
+    angles = np.linspace(0, np.pi, pieces + 1)
+    profile = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    assert len(lines(prism(profile), WITH_GENTLE)) == 2 * len(profile) + 2
+
+
+@pytest.mark.parametrize(("ratio", "is_bar"), [(1, False), (4, False), (4.1, True), (10, True)])
+def test_a_bar_with_four_chamfers_is_no_tube(ratio, is_bar):
+    """Each edge is beside one like it on both sides; but the walls are so many times as wide."""
+    cut, half = 1 / np.sqrt(2), ratio / 2 + 1 / np.sqrt(2)
+    corner = np.array([[half, half - cut], [half - cut, half]])
+    profile = np.concatenate([corner @ rotation_by(k).T for k in range(4)])
+    rims = 2 * len(profile)
+    assert len(lines(prism(profile), WITH_GENTLE)) == rims + 8 * is_bar
+
+
+def rotation_by(quarters):
+    """So many quarter turns of the plane."""
+    return np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), quarters)
