@@ -20,7 +20,8 @@ ROW_ANGLE = 55.0
 PARALLEL, TIMES_ITS_OWN, TIMES_THEIRS = math.cos(math.radians(20)), 3.0, 4.0
 # How many times as wide as the other the wider of an edge's walls may be: in a row four times, as
 # where a simplifier made one wall of some, and where it ends they are those of one arc, no plates.
-UNEVEN, UNEVEN_END = 4.05, 1.1
+# Walls that are just four times as wide, or eleven tenths, are in it: else rounding would decide.
+UNEVEN, UNEVEN_END = 4.05, 1.105
 # Edges whose surroundings are looked at together.
 AT_ONCE = 8192
 

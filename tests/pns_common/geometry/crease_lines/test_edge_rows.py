@@ -5,7 +5,7 @@ import pytest
 
 from pns_common import Mesh
 from tests.support.crease_lines import CHAMFERED, WITH_GENTLE, lines
-from tests.support.meshes import prism
+from tests.support.meshes import prism, rotation
 from train.data.primitives import cone, cylinder, l_block
 
 # Plates of a hull: turns of 20 to 50 degrees between plane faces of any width.
@@ -64,6 +64,16 @@ def test_an_arc_stays_round_up_to_the_sharp_edge_where_it_ends(pieces):
     angles = np.linspace(0, np.pi, pieces + 1)
     profile = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     assert len(lines(prism(profile), WITH_GENTLE)) == 2 * len(profile) + 2
+
+
+def test_walls_of_eleven_beside_those_of_ten_end_a_row_however_they_lie():
+    """Else rounding would decide where an arc whose last walls are a little wider ends."""
+    widths, angles = np.array([11, 10, 10, 10, 10, 11]), np.radians(np.arange(15, 180, 30))
+    walls = widths * [np.cos(angles), np.sin(angles)]
+    arc, rng = prism(np.concatenate([[[0, 0]], walls.T.cumsum(axis=0)])), np.random.default_rng(0)
+    for _ in range(20):
+        turned = Mesh(arc.vertices @ rotation(rng).T, arc.faces)
+        assert len(lines(turned, WITH_GENTLE)) == 2 * 7 + 2
 
 
 @pytest.mark.parametrize(("ratio", "is_bar"), [(1, False), (4, False), (4.1, True), (10, True)])
