@@ -21,18 +21,19 @@ round.) There, edges beyond θ' are lines too with the marks 2 and 3. But those 
 have to go on without gentler ones, as elsewhere (an armpit is round), and those up to 55 degrees
 are lines only if
 
-4. *it stands alone*: it is not in a row. Edges in a row have walls on both sides that are about as
-   wide, and across each of these another edge like it, which runs within 20 degrees of parallel
-   and turns the same way, with a quarter to three times its 1 − cos t; one that goes on from its
-   end is not beside it. A row ends where walls of one width meet a sharper edge, whichever way
-   that turns. A row is a tube or an arc: one of seven sides or more stays round, as a barrel does,
-   where its walls are quads cut in two. So does a fillet of three pieces or more, whose arc begins
-   and ends with half the turn of those between. But the chamfers of a bar are no row.
+4. *it stands alone*: it is not in a row. Edges in a row have walls on both sides, neither more than
+   four times as wide as the other, and across each of these another edge like it, which runs within
+   20 degrees of parallel and turns the same way, with a quarter to three times its 1 − cos t; one
+   that goes on from its end is not beside it. A row ends where walls of one width, to a tenth, meet
+   a sharper edge, whichever way that turns. A row is a tube or an arc: one of seven sides or more
+   stays round, as a barrel does, where its walls are quads cut in two. So does a fillet of three
+   pieces or more, whose arc begins and ends with half the turn of those between. But chamfers of a
+   bar that are a fifth as wide as its sides are no row.
 
-Both numbers are counts: a mesh in pieces has the same. Turning, moving, scaling or renumbering a
-mesh does not change the answer, nor does mirroring it with its faces turned, but where rounding
-decides. A mesh whose faces are turned over has ridges for hollows, and if it is edged it may have
-other lines.
+What makes a mesh edged are counts, and those of its pieces add up. Turning, moving, scaling or
+renumbering a mesh does not change the answer, nor does mirroring it with its faces turned, but
+where rounding decides. A mesh whose faces are turned over has ridges for hollows, and if it is
+edged it may have other lines.
 """
 
 from __future__ import annotations
