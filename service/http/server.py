@@ -61,6 +61,11 @@ class DrainingServer(uvicorn.Server):
         # The third is for a shutdown that hangs.
         self.force_exit = self._signals > 2
 
+    def hang_up(self, sig: int, frame: FrameType | None) -> None:
+        """Take the end of a terminal for one signal: a shell tells of it, then the system again."""
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+        self.handle_exit(sig, frame)
+
     async def on_tick(self, counter: int) -> bool:
         """Decide, ten times a second, whether to exit."""
         if self._admission.draining:
@@ -82,9 +87,9 @@ def serve(settings: Settings) -> None:
     server = DrainingServer(
         configuration(app, settings), app.state.admission, settings.drain_seconds
     )
-    # A terminal that closes; whoever was started by nohup goes on. Windows has no such signal.
-    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
-        signal.signal(signal.SIGHUP, server.handle_exit)
+    # Whoever was started by nohup goes on.
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
+        signal.signal(signal.SIGHUP, server.hang_up)
     if settings.metrics_port is None:
         server.run()
         return

@@ -56,7 +56,19 @@ class ClosedTerminal(io.StringIO):
         raise OSError(5, "Input/output error")
 
 
-def test_a_terminal_that_is_gone_hides_no_stop():
-    with pytest.raises(SystemExit) as stopped, stoppable(Console(file=ClosedTerminal())):
-        signal.raise_signal(signal.SIGHUP)
+def test_a_terminal_that_closes_ends_what_is_inside_in_order():
+    """Its shell tells of it, and the system again; nothing can be drawn on it any more."""
+    console, ended = Console(file=ClosedTerminal(), force_terminal=True), []
+
+    def work():
+        try:
+            signal.raise_signal(signal.SIGHUP)
+        finally:
+            console.print("half of it is done")
+            signal.raise_signal(signal.SIGHUP)
+            ended.append("a report")
+
+    with pytest.raises(SystemExit) as stopped, stoppable(console):
+        work()
     assert stopped.value.code == 128 + signal.SIGHUP
+    assert ended

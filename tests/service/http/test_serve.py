@@ -235,7 +235,7 @@ def test_a_second_sigterm_and_the_deadline_end_running_jobs_in_order(drain_secon
 def test_a_job_that_ended_just_before_a_signal_waits_to_be_fetched_too(
     sent: signal.Signals,
 ) -> None:
-    """SIGHUP: the terminal is closed."""
+    """SIGHUP: the terminal is closed. Its shell tells of it, and then the system again."""
     with serving(PNS_WORKERS="1") as server:
         server.wait_until_ready()
         with closing(server.connect()) as connection:
@@ -245,6 +245,10 @@ def test_a_job_that_ended_just_before_a_signal_waits_to_be_fetched_too(
         while b'"done"' not in server.get(job)[1]:
             time.sleep(0.01)
         server.process.send_signal(sent)
+        if sent == signal.SIGHUP:
+            while server.status("/readyz") != 503:
+                pass
+            server.process.send_signal(sent)
         # Long enough that a server which waits for nobody is gone.
         for _ in range(20):
             assert server.status("/healthz") == 200
