@@ -43,13 +43,15 @@ def point_at(obj: bpy.types.Object, cache: bpy.types.Object | None) -> None:
 
 
 def result_of(group: bpy.types.NodeTree | None) -> bpy.types.Object | None:
-    """Return the result that a group of nodes gives."""
-    return None if group is None else group.nodes[INFO].inputs["Object"].default_value
+    """Return the result that a group of nodes gives; None without one."""
+    info = None if group is None else group.nodes.get(INFO)
+    return None if info is None else info.inputs["Object"].default_value
 
 
 def _is_live(modifier: bpy.types.NodesModifier) -> bool:
     group = modifier.node_group
-    return modifier.name == MODIFIER or (group is not None and group.name.startswith(GROUP))
+    # Its user may have given it nodes of their own: then it is theirs.
+    return modifier.name.startswith(MODIFIER) if group is None else group.name.startswith(GROUP)
 
 
 def _group(cache: bpy.types.Object) -> bpy.types.NodeTree:

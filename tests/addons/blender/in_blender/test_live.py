@@ -266,6 +266,18 @@ def test_a_modifier_with_another_name_is_followed():
     assert not obj.modifiers
 
 
+def test_a_modifier_with_nodes_of_its_user_s_own_is_the_user_s(tmp_path, capfd):
+    obj = started(cube())
+    nodes = bpy.data.node_groups.new("Mine", "GeometryNodeTree")
+    obj.modifiers["PNS Live"].node_group = nodes
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "live.blend"))
+    assert "Traceback" not in capfd.readouterr().err
+    assert list(bpy.data.objects) == [obj]
+    bpy.ops.object.pns_live_add()
+    bpy.ops.object.pns_live_remove()
+    assert [modifier.node_group for modifier in obj.modifiers] == [nodes]
+
+
 def test_an_object_with_the_modifier_of_another_is_live_once_it_is_refreshed():
     obj, other = started(grid(4)), cube("Other")
     chosen(obj)
