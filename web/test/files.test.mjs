@@ -322,8 +322,10 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   for (const [how, files] of Object.entries({
     "by a path out of its folder": { "scenes/a.gltf": naming("../data/a.bin"), "data/a.bin": bin },
     "in an archive of PowerShell’s": { "m\\a.gltf": naming("t/a.bin"), "m\\t\\a.bin": bin },
+    "by a path that goes up on its way": { "a.gltf": naming("./t/../a.bin"), "a.bin": bin },
     "by a path of Windows’": { "a.gltf": naming("t\\a.bin"), "t/a.bin": bin },
     "with accents apart": { "a.gltf": naming("käse.bin"), [apart]: bin },
+    "with accents together": { "a.gltf": naming(apart), "käse.bin": bin },
   })) {
     test(`a file in a .zip is found ${how}`, async () => {
       const page = await visit({ hash: "#levels=1" });
@@ -331,6 +333,7 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       await page.locator("body.refined, #problem:not([hidden])").first().waitFor();
       assert.equal(await page.textContent("#problem-detail"), "");
       await settled(page);
+      assert.match(await page.textContent("#validation-text"), /Input: (?!.*error)/);
     });
   }
 

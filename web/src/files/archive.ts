@@ -2,8 +2,8 @@
 
 import { unzip as inflate, type Unzipped } from "three/addons/libs/fflate.module.js";
 import { fileProblem } from "../api/problem";
-import { shortest } from "./gltf";
 import { kindOf } from "./kinds";
+import { shortest } from "./path";
 import { unreadable } from "./unreadable";
 import { namedBy, uploadsOf, type PathedFile, type Upload } from "./upload";
 

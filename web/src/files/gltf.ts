@@ -6,6 +6,7 @@ import { part } from "../api/part";
 import { fileProblem } from "../api/problem";
 import { spread } from "./instances";
 import { numbered } from "./numbered";
+import { pathOf } from "./path";
 import { why } from "./unreadable";
 import { whole } from "./whole";
 
@@ -31,23 +32,6 @@ export function jsonOf(bytes: ArrayBuffer): GltfJson {
   const json = JSON.parse(new TextDecoder().decode(text)) as GltfJson | null;
   if (!json?.asset) throw new Error("it names no version");
   return json;
-}
-
-/** The path that a relative address names, in its shortest form. */
-export function pathOf(address: string): string {
-  let path = address;
-  try {
-    path = decodeURIComponent(address);
-  } catch {
-    // A name with a per cent sign of its own.
-  }
-  return shortest(path);
-}
-
-/** A path in its shortest form: a `\` is a `/`, as on Windows, and accents are composed, as macOS leaves them apart. */
-export function shortest(path: string): string {
-  const steps = path.normalize("NFC").replaceAll("\\", "/").split("/");
-  return steps.filter((step) => step !== "" && step !== ".").join("/");
 }
 
 /** The paths of the files that a document names; what is no JSON names none. */

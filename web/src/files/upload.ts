@@ -3,8 +3,9 @@
 import type { Body } from "../api/jobs";
 import { fileProblem } from "../api/problem";
 import { listed } from "../report/format";
-import { filesNamedIn, shortest } from "./gltf";
+import { filesNamedIn } from "./gltf";
 import { kindOf, MEDIA_TYPES, type Kind } from "./kinds";
+import { shortest } from "./path";
 
 /** A file with the folder that it came in. */
 export interface PathedFile {

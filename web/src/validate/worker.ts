@@ -1,6 +1,7 @@
 /** Khronos' glTF Validator, off the page's thread. */
 
 import { validateBytes } from "gltf-validator";
+import { pathOf } from "../files/path";
 
 export interface Request {
   bytes: ArrayBuffer;
@@ -13,7 +14,7 @@ self.onmessage = async ({ data }: MessageEvent<Request>) => {
       maxIssues: 1000,
       writeTimestamp: false,
       externalResourceFunction: async (uri) => {
-        const file = data.neighbours.get(uri) ?? data.neighbours.get(decodeURIComponent(uri));
+        const file = data.neighbours.get(pathOf(uri));
         if (!file) throw new Error(`${uri} is not among the files`);
         return new Uint8Array(await file.arrayBuffer());
       },
