@@ -48,13 +48,14 @@ class Large:
 
 
 def check_report(report: Path, large: Large) -> None:
-    """Raise InvalidParameter where a report cannot be written, or would replace a mesh."""
+    """Raise InvalidParameter where a report cannot be written, or would lie in a mesh's place."""
     if not report.parent.is_dir():
         raise InvalidParameter("report", f"{report.parent}: there is no such folder")
     if report.is_dir():
         raise InvalidParameter("report", f"{report}: it is a folder")
-    if report.resolve() in (large.source.resolve(), large.output.resolve()):
-        raise InvalidParameter("report", f"{report}: the report would replace a mesh")
+    meshes = large.source.resolve(), large.output.resolve()
+    if any(report.resolve().is_relative_to(mesh) for mesh in meshes):
+        raise InvalidParameter("report", f"{report}: it must lie outside of IN and OUT")
 
 
 @contextmanager
