@@ -18,7 +18,6 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.arrays import dot, marked
 from pns_common.fused.interior_edges import interior_edges
 from pns_common.geometry.frames import face_normals
-from pns_common.geometry.sharp_edges import turn_by_more
 
 # Faces that turn by no more than this, in radians, lie in one plane: far above what single
 # precision does to one, far below what shading shows of an edge.
@@ -32,14 +31,14 @@ def flat_borders(
 ) -> Int[np.ndarray, "N 2"]:
     """Return the edges, as pairs of vertices, of faces of different groups inside of planes.
 
-    Around both ends all lies in one plane, and has an area.
+    Around both ends all lies in one plane.
     """
     if len(faces) == 0 or (group_of_face == group_of_face[0]).all():
         return np.zeros((0, 2), dtype=np.int64)
     edges, half_edges = interior_edges(faces, len(points))
     both = half_edges // 3
     is_border = group_of_face[both[:, 0]] != group_of_face[both[:, 1]]
-    inside = _inside_planes(points, faces, edges, both, edges[is_border].reshape(-1))
+    inside = _inside_planes(points, faces, edges, edges[is_border].reshape(-1))
     return edges[is_border & inside[edges].all(axis=1)].astype(np.int64)
 
 
@@ -47,23 +46,25 @@ def _inside_planes(
     points: Float[np.ndarray, "V 3"],
     faces: Int[np.ndarray, "F 3"],
     edges: Int[np.ndarray, "I 2"],
-    both: Int[np.ndarray, "I 2"],
     asked: Int[np.ndarray, " N"],
 ) -> Bool[np.ndarray, " V"]:
     """Return which of the vertices that are asked for have one plane around them.
 
-    ``edges`` are the interior ones, ``both`` their faces.
+    ``edges`` are the interior ones. Faces without area, which fill in where a vertex lies on a
+    longer edge, are in every plane.
     """
     count = len(points)
     inside = marked(asked, count)
-    near_edges, near_faces = inside[edges].any(axis=1), inside[faces].any(axis=1)
-    edges, both, near = edges[near_edges], both[near_edges], faces[near_faces]
-    normals = np.zeros((len(faces), 3))
-    normals[near_faces] = face_normals(points, near)
-    known = dot(normals, normals) > 0
-    leaves = turn_by_more(normals, both, IN_ONE_PLANE) | ~(known[both[:, 0]] & known[both[:, 1]])
+    edges, near = edges[inside[edges].any(axis=1)], faces[inside[faces].any(axis=1)]
     # Where all edges are interior there are as many as faces.
     ends, corners = (np.bincount(each.reshape(-1), minlength=count) for each in (edges, near))
     inside &= ends == corners
-    inside[edges[leaves]] = False
+    normals = face_normals(points, near)
+    known = normals.any(axis=1)
+    corner, normal = near[known].reshape(-1), np.repeat(normals[known], 3, axis=0)
+    of_vertex = np.zeros((count, 3))
+    of_vertex[corner] = normal
+    inside &= of_vertex.any(axis=1)
+    chord = normal - of_vertex[corner]
+    inside[corner[dot(chord, chord) > IN_ONE_PLANE**2]] = False
     return inside

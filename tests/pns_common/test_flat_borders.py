@@ -81,3 +81,18 @@ def test_one_group_a_face_without_area_and_three_faces_at_an_edge_make_none():
     more = np.vstack([faces, [*edge, len(points)]])
     away = {other for other in found(points, faces, group) if not other & edge}
     assert found(third, more, np.append(group, 7)) == away
+
+
+@pytest.mark.parametrize("degrees", [0, 40])
+def test_faces_without_area_that_fill_in_part_no_plane(degrees):
+    """Where a vertex lies on a longer edge, what fills in has its three corners on a line."""
+    points, faces, group = sheet(degrees)
+    before = found(points, faces, group)
+    a, b, c = next(face for face in faces[group == 1].tolist() if frozenset(face[:2]) in before)
+    first = int(np.flatnonzero((faces == [a, b, c]).all(axis=1))[0])
+    middle = len(points)
+    filled = np.vstack([faces, [middle, b, c], [a, b, middle]])
+    filled[first] = a, middle, c
+    halves = {frozenset((a, middle)), frozenset((middle, b))}
+    more = np.vstack([points, points[[a, b]].mean(axis=0)])
+    assert found(more, filled, np.append(group, [1, 0])) == before - {frozenset((a, b))} | halves
