@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from pns_common.base.arrays import Array
 from pns_common.base.parameters import is_number
@@ -223,15 +224,10 @@ def scale_free_form(card: ModelCard, budget: float) -> ScaleFreeForm | None:
 
 def edge_operator(model: Model) -> EdgeOperator:
     """Return what a model's card and network make of interior edges."""
-
-    def network(rows: Array) -> Array:
-        # The unit budget, scaled in float64 afterwards: one file serves every C / R exactly.
-        return model(rows, 1.0)
-
     return EdgeOperator(
         FEATURE_SETS[model.card.features],
         ORIENTATIONS[model.card.orientation],
-        network,
+        partial(_edges_at_unit_budget, model),
         curvature_gate(model.card.gate_sharpness),
     )
 
@@ -247,9 +243,18 @@ def vertex_operator(model: Model) -> VertexOperator | None:
         return None
     if not isinstance(model, VertexModel):
         raise ModelError(model.name, expected="a vertex network, as on the card", found="none")
-
-    def network(rows: Array) -> Array:
-        return model.vertex_correction(rows, 1.0)
-
     features = RING_FEATURE_SETS[card.vertex_features]
+    network = partial(_vertices_at_unit_budget, model)
     return VertexOperator(features, network, card.vertex_gate_sharpness)
+
+
+# The unit budget, scaled in float64 afterwards: one file serves every C / R exactly. Functions of
+# the module, so that a scheme can be sent to another process, as its model can.
+
+
+def _edges_at_unit_budget(model: Model, rows: Array) -> Array:
+    return model(rows, 1.0)
+
+
+def _vertices_at_unit_budget(model: VertexModel, rows: Array) -> Array:
+    return model.vertex_correction(rows, 1.0)

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -67,11 +68,12 @@ class Correction:
 
 def curvature_gate(gate_sharpness: float) -> Gate:
     """Return γ = tanh(c x²): 0, with derivative 0, where both faces are coplanar (equation 4)."""
+    # No function of its own: that could not be sent to another process.
+    return partial(_gate_of_curvature, gate_sharpness)
 
-    def gate(curvature: Array) -> Array:
-        return gate_of(gate_sharpness * curvature**2)
 
-    return gate
+def _gate_of_curvature(gate_sharpness: float, curvature: Array) -> Array:
+    return gate_of(gate_sharpness * curvature**2)
 
 
 def by_curvature(gate: Gate) -> FrameGate:

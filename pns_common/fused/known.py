@@ -23,12 +23,13 @@ def kernels_know(scheme: Scheme) -> bool:
     if _curves(edges) != _curves(vertices):
         return False
     if isinstance(vertices, LearnedVertexRule | ScaleFreeVertexRule):
-        if vertices.operator.features is not RING_10:
+        # Equal, not the same: a scheme that was copied or sent to another process has its own.
+        if vertices.operator.features != RING_10:
             return False
     elif vertices is not loop_vertex_rule:
         return False
-    known = any(edges.operator.features is features for features in FEATURES)
-    return known and edges.operator.orientation in (FIRST_FACE, SYMMETRIC)
+    operator = edges.operator
+    return operator.features in FEATURES and operator.orientation in (FIRST_FACE, SYMMETRIC)
 
 
 def _curves(rule: Rule) -> CurveRule | None:

@@ -1,13 +1,18 @@
 """Schemes are put together from a card as it says, with every number in its place."""
 
+import copy
 import math
+import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pns_common import ModelError, ParameterError, load_model, loop, pns
+from pns_common import Mesh, ModelError, ParameterError, load_model, loop, pns, refine
+from pns_common.fused.known import kernels_know
+from pns_common.runtimes.onnx_model import bundled_models
 from pns_common.schemes import edge_operator, loop_vertex_rule, scale_free_form, vertex_operator
+from tests.support.meshes import bumpy_sphere
 from tests.support.networks import (
     SCALE_FREE_CARD,
     Float64Model,
@@ -119,3 +124,14 @@ def test_rules_act_at_as_many_levels_as_the_scheme_says():
     assert [two.acts_at(level) for level in range(4)] == [True, True, False, False]
     assert not loop().acts_at(0)
     assert pns(load_model("paper")).acts_at(15)
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))])
+def test_a_scheme_travels_with_its_kernels(again):
+    mesh = Mesh(*bumpy_sphere(0))
+    for scheme in (loop(), *(pns(load_model(name)) for name in bundled_models())):
+        there = again(scheme)
+        assert kernels_know(there) == kernels_know(scheme)
+        ours, theirs = (refine(mesh, each, 2, creases=None) for each in (scheme, there))
+        np.testing.assert_array_equal(theirs.mesh.vertices, ours.mesh.vertices)
+        assert theirs.report == ours.report
