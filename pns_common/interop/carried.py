@@ -116,7 +116,8 @@ def between(
 ) -> Shaped[np.ndarray, " N *K"]:
     """Return the data halfway: the mean of numbers and colours (uint8), the first of labels."""
     if a.dtype.kind in "fc":
-        return ((a + b) / 2).astype(a.dtype)
+        # Halves first: the sum of two may be more than the type holds.
+        return (a / 2 + b / 2).astype(a.dtype)
     if a.dtype == np.uint8:
         return ((a.astype(np.uint16) + b + 1) // 2).astype(np.uint8)
     return a

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -28,8 +28,12 @@ def read_trimesh(mesh: Any) -> CarriedMesh:
 
 
 def write_trimesh(refined: CarriedMesh, given: Any) -> Any:
-    """Return a mesh of the class of ``given``, with its material and metadata."""
-    made = type(given)(
+    """Return a mesh of the class of ``given``, with its material and metadata.
+
+    Of a primitive (``Box``, ``Sphere``, …), which is made of its parameters: a ``Trimesh``.
+    """
+    kind = cast(Any, type(given.to_mesh() if hasattr(given, "to_mesh") else given))
+    made = kind(
         vertices=refined.vertices,
         faces=refined.faces,
         vertex_colors=refined.points.get("colour"),

@@ -72,7 +72,9 @@ def subdivide(
     if isinstance(given, (tuple, list)) and len(cast(Sequence[Any], given)) == 2:
         vertices, faces = cast(tuple[Any, Any], given)
         refined = refine(Mesh(vertices, faces), scheme, levels, **options).mesh
-        return type(mesh)((np.array(refined.vertices), np.array(refined.faces)))  # pyright: ignore
+        # A tuple with names takes its values one by one, but for this.
+        make: Any = getattr(type(mesh), "_make", type(mesh))
+        return make((np.array(refined.vertices), np.array(refined.faces)))
     adapter = _adapter(mesh)
     carried, _ = refine_carried(adapter.read(mesh), scheme, checked_levels(levels), options)
     return adapter.write(carried, mesh)

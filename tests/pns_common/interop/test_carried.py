@@ -79,6 +79,7 @@ def test_vertices_are_joined_by_first_appearance_and_minus_zero_is_zero():
     [
         (np.float32, 1, 2, 1.5),
         (np.float64, 1, 2, 1.5),
+        (np.float16, 60000, 60000, 60000),
         (np.uint8, 1, 4, 3),
         (np.uint8, 255, 255, 255),
         (np.int64, 7, 4, 7),

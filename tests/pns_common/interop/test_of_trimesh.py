@@ -20,6 +20,16 @@ class TestTrimesh:
         assert refined.metadata == given.metadata
         assert refined.metadata is not given.metadata
 
+    def test_a_primitive_becomes_a_mesh(self):
+        given = self.trimesh.primitives.Box(extents=(1, 2, 3))
+        given.metadata["name"] = "a box"
+        refined = subdivide(given, 2, SCHEME)
+        assert type(refined) is self.trimesh.Trimesh
+        assert refined.metadata["name"] == "a box"
+        alone = refine(Mesh(given.vertices, given.faces), SCHEME, 2).mesh
+        np.testing.assert_array_equal(refined.vertices, alone.vertices)
+        np.testing.assert_array_equal(refined.faces, alone.faces)
+
     def test_levels_may_be_a_small_number_of_numpy_s(self):
         refined = subdivide(self.mesh(face_attributes={"face": np.arange(len(FACES))}), np.uint8(4))
         np.testing.assert_array_equal(

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -16,10 +17,15 @@ def test_a_mesh():
     same_surface(refined.vertices, refined.faces)
 
 
-@pytest.mark.parametrize("kind", [tuple, list])
-def test_a_pair_of_arrays(kind):
-    refined = subdivide(kind((VERTICES, FACES)), 2, SCHEME)
-    assert type(refined) is kind
+class Surface(NamedTuple):
+    vertices: Any
+    faces: Any
+
+
+@pytest.mark.parametrize("given", [(VERTICES, FACES), [VERTICES, FACES], Surface(VERTICES, FACES)])
+def test_a_pair_of_arrays(given):
+    refined = subdivide(given, 2, SCHEME)
+    assert type(refined) is type(given)
     same_surface(*refined)
     refined[0][0] = 0  # the caller's own
 
