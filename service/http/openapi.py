@@ -18,10 +18,27 @@ from .problems import MEDIA_TYPE
 EVERYWHERE = {
     "401": "A key is needed, or the one sent is not known",
     "429": "Too much was asked for, or too many wrong keys (see Retry-After)",
+    "503": "Too many connections, or too many keys to check at once (see Retry-After)",
 }
 # And where it is asked for work.
 ASKED_FOR_WORK = {"403": "A page of another origin asks, and is not named"}
 OPEN_TAG = "probes"
+
+_REQUEST_ID = {
+    "X-Request-ID": {
+        "description": "the id that the client sent, or a new one",
+        "schema": {"type": "string"},
+    }
+}
+_RETRY_AFTER = {
+    "Retry-After": {
+        "description": "seconds after which to ask again; none where that does not help",
+        "schema": {"type": "integer", "minimum": 1},
+    }
+}
+_CHALLENGE = {"WWW-Authenticate": {"schema": {"type": "string"}}}
+# Beside those of a route's own.
+HEADERS = {"401": _CHALLENGE, "429": _RETRY_AFTER, "503": _RETRY_AFTER}
 
 
 def operation_id(route: APIRoute) -> str:
@@ -50,14 +67,17 @@ def _described(document: dict[str, Any]) -> dict[str, Any]:
     for operations in document["paths"].values():
         for method, operation in operations.items():
             responses = operation["responses"]
-            # FastAPI's own errors are never sent: ours are problems.
+            # FastAPI's own errors are never sent: ours are with the routes.
             if responses.get("422", {}).get("content", {}).get("application/json"):
-                responses["422"] = _problem("A bad parameter")
+                del responses["422"]
             if OPEN_TAG not in operation.get("tags", ()):
                 also = {} if method == "get" else ASKED_FOR_WORK
                 for status, text in (EVERYWHERE | also).items():
                     responses.setdefault(status, _problem(text))
                 operation["security"] = [{}, {"key": []}]
+            for status, answer in responses.items():
+                own = answer.get("headers", {})
+                answer["headers"] = own | HEADERS.get(status, {}) | _REQUEST_ID
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
     components["securitySchemes"] = {

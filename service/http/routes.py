@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import Response
 
 from ..bodies import media
 from ..errors import NoModelError
@@ -58,12 +58,12 @@ def router(service: Service) -> APIRouter:
         return {"status": "ok"}
 
     @routes.get("/readyz", **documentation.READYZ)
-    async def readyz() -> JSONResponse:
+    async def readyz() -> dict[str, str]:
         if service.admission.draining:
             raise DrainingError("no new request is taken", retry_after=5)
         if not service.desk.ready:
             raise NoModelError("no worker has loaded the model")
-        return JSONResponse({"status": "ready"})
+        return {"status": "ready"}
 
     return routes
 

@@ -78,6 +78,29 @@ def test_there_is_one_schema_of_problems(document):
     assert json.dumps(document).count('"JSON pointer of the offending value"') == 1
 
 
+def test_what_any_route_may_answer_stands_with_each(document):
+    for name, operation in operations(document):
+        if "probes" not in operation.get("tags", ()):
+            assert {"401", "429", "503"} <= set(operation["responses"]), name
+
+
+def test_no_status_is_told_that_is_never_sent(document):
+    """Of a job's id there is no wrong kind: one that is not known is 404."""
+    paths = document["paths"]
+    for route, method in (("", "get"), ("", "delete"), ("/events", "get")):
+        assert "422" not in paths["/jobs/{job_id}" + route][method]["responses"]
+
+
+def test_headers_that_clients_act_by_are_told(document):
+    for name, operation in operations(document):
+        for status, answer in operation["responses"].items():
+            told = set(answer["headers"])
+            assert "X-Request-ID" in told, (name, status)
+            assert ("Retry-After" in told) == (status in ("429", "503")), (name, status)
+            assert ("WWW-Authenticate" in told) == (status == "401"), (name, status)
+    assert "Location" in document["paths"]["/jobs"]["post"]["responses"]["202"]["headers"]
+
+
 @pytest.mark.parametrize("route", ["/jobs/{job_id}/result", "/jobs/{job_id}/report"])
 def test_a_result_may_find_no_room_or_be_the_problem_that_its_job_failed_with(document, route):
     told = set(document["paths"][route]["get"]["responses"])
