@@ -23,7 +23,12 @@ from .watch.tracing import Traced
 if TYPE_CHECKING:
     from opentelemetry.trace import Tracer
 
-# What a page of another origin may read of an answer beside its body.
+# What a page of another origin may send, beside what any may: all that is read here.
+TAKEN = (
+    *("Authorization", "Content-Type", "If-None-Match"),
+    *("Traceparent", "Tracestate", "X-Request-ID"),
+)
+# What it may read of an answer beside its body.
 EXPOSED = ("ETag", "Location", "Retry-After", "Server-Timing", "X-Request-ID")
 
 
@@ -48,7 +53,7 @@ def around(
             app,
             allow_origins=settings.cors_origins,
             allow_methods=["GET", "POST", "DELETE"],
-            allow_headers=["Authorization", "Content-Type", "X-Request-ID"],
+            allow_headers=TAKEN,
             expose_headers=EXPOSED,
         )
     app = AsSaid(app)

@@ -395,7 +395,9 @@ def test_a_named_origin_may(keys_file):
     assert answer.headers["access-control-allow-origin"] == "https://a.example"
     assert "X-Request-ID" in answer.headers["access-control-expose-headers"]
     asks = {"Access-Control-Request-Method": "POST"}
-    asks["Access-Control-Request-Headers"] = "Authorization, Content-Type"
+    asks["Access-Control-Request-Headers"] = (
+        "Authorization, Content-Type, If-None-Match, traceparent, tracestate, X-Request-ID"
+    )
     assert cross(client, "OPTIONS", **asks).status_code == 200
     other = client.get("/healthz", headers={"Origin": "https://b.example"})
     assert "access-control-allow-origin" not in other.headers
