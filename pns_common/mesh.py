@@ -42,21 +42,10 @@ class Mesh:
             raise MeshError(f"shape {vertices.shape}, expected (V, 3)", element="vertices")
         if vertices.dtype.kind not in "fiu":
             raise MeshError(f"type {vertices.dtype}, expected real numbers", element="vertices")
-        if faces.ndim != 2 or faces.shape[1] != 3:
-            raise MeshError(f"shape {faces.shape}, expected (F, 3)", element="faces")
-        if faces.shape[0] == 0:
-            raise MeshError("no faces to refine", element="faces")
-        if faces.dtype.kind not in "iu":
-            raise MeshError(f"type {faces.dtype}, expected integers", element="faces")
         # Before the cast: an index of 2⁶⁴ − 1 would become −1.
-        if not (faces.min() >= 0 and faces.max() < len(vertices)):
-            inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
-            worst = int(np.argmin(inside))
-            raise MeshError(
-                f"indices {faces[worst].tolist()}, expected 0 … {len(vertices) - 1}",
-                element="face",
-                index=worst,
-            )
+        check_faces(faces, len(vertices))
+        if len(faces) == 0:
+            raise MeshError("no faces to refine", element="faces")
         vertices, faces = _frozen(vertices, np.float64), _frozen(faces, np.int64)
         low, high = extent(vertices)
         # Written so that NaN fails it too.
@@ -160,6 +149,28 @@ def check_is_mesh(given: object) -> None:
     if not isinstance(given, Mesh):
         other = "Mesh(vertices, faces); subdivide takes arrays and other libraries' meshes"
         raise ParameterError("mesh", type(given), expected=other)
+
+
+def check_faces(faces: np.ndarray, vertex_count: int) -> None:
+    """Refuse what are no faces of so many vertices; there may be none.
+
+    Raises:
+        MeshError: wrong shape or type, or an index out of range.
+    """
+    if faces.ndim != 2 or faces.shape[1] != 3:
+        raise MeshError(f"shape {faces.shape}, expected (F, 3)", element="faces")
+    if len(faces) == 0:  # an empty list has no integers
+        return
+    if faces.dtype.kind not in "iu":
+        raise MeshError(f"type {faces.dtype}, expected integers", element="faces")
+    if not (faces.min() >= 0 and faces.max() < vertex_count):
+        inside = ((faces >= 0) & (faces < vertex_count)).all(axis=1)
+        worst = int(np.argmin(inside))
+        raise MeshError(
+            f"indices {faces[worst].tolist()}, expected 0 … {vertex_count - 1}",
+            element="face",
+            index=worst,
+        )
 
 
 def repeated_vertex(faces: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:

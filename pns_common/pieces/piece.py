@@ -21,6 +21,7 @@ from pns_common.fused import fits, kernels_available
 from pns_common.fused.known import kernels_know
 from pns_common.levels.refined_levels import check_coordinates
 from pns_common.levels.step import AddedStep
+from pns_common.mesh import check_faces
 from pns_common.pieces.exact import guarded_exact, shrunk
 from pns_common.pieces.halo import ThinHaloError, lines_reach, reach
 from pns_common.pieces.steps import Links, Step, steps_by_arrays, steps_by_kernels
@@ -35,10 +36,13 @@ class Piece:
 
     Attributes:
         points: (V, 3).
-        faces: (F, 3) rows of ``points``, int64.
+        faces: (F, 3) rows of ``points``.
         own: the faces to be refined; the others are the halo.
         whole: vertices whose faces are all here.
         creases: edges of the piece to keep sharp, named in its numbers or to be found.
+
+    Raises:
+        MeshError: a face has an index out of range.
     """
 
     points: Float[np.ndarray, "V 3"]
@@ -46,6 +50,12 @@ class Piece:
     own: Bool[np.ndarray, " F"]
     whole: Bool[np.ndarray, " V"]
     creases: Creases = NO_CREASES
+
+    def __post_init__(self) -> None:
+        # Kernels read where an index says, and know these types alone; no copy of what is so.
+        check_faces(self.faces, len(self.points))
+        for name, dtype in (("points", np.float64), ("faces", np.int64)):
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=dtype))
 
 
 @dataclass(frozen=True, eq=False)

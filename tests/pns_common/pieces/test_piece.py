@@ -1,5 +1,7 @@
 """One piece: what is its own, and what it says where its halo is too thin."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,3 +62,25 @@ def test_coordinates_that_outgrow_the_operator_are_an_error_in_a_piece_too():
         refine_piece(whole, pns(load_model("paper"), 1e80), 1, 1.0, Blocks(1))
     wide = pns(scale_free_model(0))
     assert refine_piece(whole, wide, 1, 1.0, Blocks(1)).own_vertices.all()
+
+
+def test_a_piece_may_have_its_arrays_in_any_order_and_in_smaller_types():
+    piece = left_half()[2].piece
+    single = piece.points.astype(np.float32)
+    given = replace(piece, points=np.asfortranarray(single), faces=piece.faces[:, ::-1])
+    plain = replace(piece, points=single.astype(float), faces=piece.faces[:, ::-1].copy())
+    small = replace(plain, faces=np.asfortranarray(plain.faces, dtype=np.int32))
+    made, *others = (
+        refine_piece(each, loop(), 2, 1.0, Blocks(1)) for each in (plain, given, small)
+    )
+    for other in others:
+        np.testing.assert_array_equal(other.points, made.points)
+        np.testing.assert_array_equal(other.faces, made.faces)
+
+
+def test_an_index_out_of_range_is_refused_before_a_kernel_reads_there():
+    piece = left_half()[2].piece
+    fewer = {"points": piece.points[:3], "whole": piece.whole[:3]}
+    for wrong in (fewer, {"faces": piece.faces - 1}):
+        with pytest.raises(MeshError, match=r"face \d+: indices"):
+            replace(piece, **wrong)
