@@ -25,7 +25,7 @@ from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import SplitConnectivity, split_connectivity
 from .control_mesh import ControlMesh, slices
 from .normals import safe_unit
-from .own_normals import own_shares
+from .own_normals import border_vertices, own_shares, own_shares_at_border
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,4 +178,12 @@ def _own(
     blocks = Blocks(available_threads())
     computed = angle_weighted_normals(control.weld.points, faces, corners, len(given), blocks)
     shares = own_shares(given, computed)
+    if control.cleaned is not None:
+        at_border = np.zeros(len(given), dtype=bool)
+        at_border[corners] = border_vertices(control.cleaned.mesh)[
+            control.cleaned.vertex_map[faces]
+        ]
+        shares[at_border] = own_shares_at_border(
+            given, computed, control.weld.points, faces, corners, at_border
+        )
     return shares if shares.any() else None

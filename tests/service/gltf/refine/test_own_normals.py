@@ -87,3 +87,25 @@ def test_normals_averaged_by_area_or_evenly_are_made_anew_alike():
         for weights in (lambda normal: normal, unit)
     ]
     np.testing.assert_array_equal(made[0]["NORMAL"], made[1]["NORMAL"])
+
+
+@pytest.mark.parametrize("levels", [1, 3])
+def test_no_seam_is_seen_where_two_meshes_meet_that_were_shaded_as_one(levels):
+    whole = sheet(0.5)
+    points, normals = whole["POSITION"], averaged(whole, lambda normal: normal)
+    left = points[whole["indices"]].mean(axis=1)[:, 0] < 0
+    halves = [
+        {"POSITION": points, "NORMAL": normals, "indices": whole["indices"][side]}
+        for side in (left, ~left)
+    ]
+    data = subdivide(*([half] for half in halves), levels=levels)
+    made = [files.primitive_of(data, mesh)[1] for mesh in (0, 1)]
+    one, other = (
+        dict(zip(map(tuple, each["POSITION"].tolist()), each["NORMAL"], strict=True))
+        for each in made
+    )
+    # But near its ends, which are corners of both.
+    border = one.keys() & other.keys()
+    assert len(border) > 2 * 2**levels
+    for place in border:
+        np.testing.assert_allclose(one[place], other[place], atol=1e-6)
