@@ -79,7 +79,7 @@ def subdivide_gltf(
     with course.part(READ, PUT_TOGETHER):
         for mesh in refined_meshes(upload, scheme, options, course):
             with course.stage("write"):
-                writer.replace_mesh(mesh.index, mesh.refined, course)
+                written = writer.replace_mesh(mesh.index, mesh.refined, course)
                 vertices.add(mesh.index, mesh.primitives, mesh.kept)
             changes += mesh.changes
             results.append(
@@ -87,7 +87,7 @@ def subdivide_gltf(
                     index=mesh.index,
                     instances=instances[mesh.index],
                     primitives=len(mesh.refined),
-                    vertices=sum(len(p.attributes["POSITION"]) for p in mesh.refined),
+                    vertices=written,
                     faces=sum(len(p.faces) for p in mesh.refined),
                     degenerate=mesh.degenerate,
                     copies=mesh.copies,

@@ -88,22 +88,21 @@ class DracoWriter(Writer):
     plain: list[Change] = field(default_factory=list)
     grid: draco_encode.Grid | None = None
 
-    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], course: Course) -> None:
-        """Compress the primitives of a mesh on one grid."""
+    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], course: Course) -> int:
+        """Compress the primitives of a mesh on one grid; the vertices written."""
         if refined:
             positions = [primitive.attributes["POSITION"] for primitive in refined]
             self.grid = draco_encode.grid_of(positions)
-        super().replace_mesh(mesh, refined, course)
+        return super().replace_mesh(mesh, refined, course)
 
-    def replace(self, mesh: int, refined: RefinedPrimitive) -> None:
-        """Point a primitive of the tree at its compressed geometry, or at plain geometry."""
+    def replace(self, mesh: int, refined: RefinedPrimitive) -> int:
+        """Point a primitive at its compressed geometry, or at plain geometry; the vertices."""
         primitive = self.tree["meshes"][mesh]["primitives"][refined.source.number]
         made = self._encoded(refined)
         if made is None:
-            super().replace(mesh, refined)
             pointer = f"/meshes/{mesh}/primitives/{refined.source.number}"
             self.plain.append(Change(pointer, "not compressed: Draco cannot hold it", 1))
-            return
+            return super().replace(mesh, refined)
         before = refined.source.accessors
         primitive["attributes"] = {
             name: self._described(before.get(name), name, values)
@@ -118,6 +117,7 @@ class DracoWriter(Writer):
             "attributes": made.ids,
         }
         self.encoded += 1
+        return len(made.attributes["POSITION"])
 
     def finish(self) -> list[bytes | memoryview]:
         """Write the buffer's length into the tree; the pieces of BIN."""

@@ -53,18 +53,20 @@ class Writer:
                 view["buffer"] = 0
         return writer
 
-    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], course: Course) -> None:
-        """Point the primitives of a mesh at their refined geometry."""
+    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], course: Course) -> int:
+        """Point the primitives of a mesh at their refined geometry; the vertices written."""
+        vertices = 0
         for number, primitive in enumerate(refined):
             course.reach(number / len(refined))
-            self.replace(mesh, primitive)
+            vertices += self.replace(mesh, primitive)
+        return vertices
 
     def changes(self) -> list[Change]:
         """Return what was not written as it was made."""
         return []
 
-    def replace(self, mesh: int, refined: RefinedPrimitive) -> None:
-        """Point a primitive of the tree at its refined geometry."""
+    def replace(self, mesh: int, refined: RefinedPrimitive) -> int:
+        """Point a primitive of the tree at its refined geometry; the vertices written."""
         primitive = self.tree["meshes"][mesh]["primitives"][refined.source.number]
         primitive["attributes"] = {
             name: self._attribute(refined.source.accessors.get(name), name, values)
@@ -82,6 +84,7 @@ class Writer:
         count = len(refined.attributes["POSITION"])
         indices = as_indices(refined.faces, count).reshape(-1, 1)
         self.set_indices(primitive, self._accessor(indices, ELEMENT_ARRAY_BUFFER, "SCALAR"))
+        return count
 
     def set_indices(self, primitive: dict[str, Any], index: int) -> None:
         """Point a primitive at its new indices, called as those before them were."""

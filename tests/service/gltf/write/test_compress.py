@@ -57,6 +57,26 @@ def test_compressed_output_is_smaller_and_declared(compress):
     assert any(what.startswith(SAYS[compress]) for what in whats)
 
 
+@pytest.mark.parametrize("compress", ["none", *KINDS])
+def test_the_report_counts_the_vertices_of_the_file(compress):
+    # Draco joins what is alike: both sides of a hard edge inside a plane.
+    square = {
+        "POSITION": np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]]),
+        "NORMAL": np.array([[0.0, 0, 1]] * 3 + [[0.01, 0, 1]] * 3),
+        "indices": np.arange(6).reshape(-1, 3),
+    }
+    packed = refine(files.glb([square], [octahedron(), box()]), compress)
+    tree, _ = files.unpack(packed.glb)
+    written = [
+        sum(
+            tree["accessors"][each["attributes"]["POSITION"]]["count"]
+            for each in mesh["primitives"]
+        )
+        for mesh in tree["meshes"]
+    ]
+    assert packed.report["totals"]["vertices"] == sum(written)
+
+
 @pytest.mark.parametrize("compress", KINDS)
 def test_refining_compressed_output_is_refining_plain_output(compress):
     plain, packed = (read_back(refine(sample(), kind).glb) for kind in ("none", compress))
