@@ -45,7 +45,7 @@ def add_at_edges(
     bends = level.bends if reads_sides else NO_BENDS
     measures = level.points, normals, fields, bends, level.edges.lengths, level.logs
     read = [each.reshape(-1) for each in (*measures, *connectivity)]
-    look_at = look.over(*read, ROWS, int(rule.operator.orientation is SYMMETRIC))
+    look_at = look.over(*read, ROWS, int(rule.operator.orientation == SYMMETRIC))
     if isinstance(rule, LearnedEdgeRule):
         write = correct.over(mesh.interior, ROWS, *out)
     else:

@@ -95,6 +95,6 @@ def reach(scheme: Scheme, level: int) -> int:
         if isinstance(vertices, LearnedVertexRule):
             return FIELDS_REACH
         if vertices is loop_vertex_rule:
-            plain = edges.operator.features is paper_features
+            plain = edges.operator.features == paper_features
             return LOOP_REACH if plain else FIELDS_REACH
     raise ParameterError("scheme", scheme.name, expected="loop() or pns(model)")
