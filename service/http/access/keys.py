@@ -111,7 +111,7 @@ def toml_entry(entry: Entry) -> str:
     """Return an entry as the file holds it."""
     lines = ["[[key]]", f'name = "{entry.name}"', f'hash = "{entry.hash}"']
     if entry.faces_per_minute is not None:
-        lines.append(f"faces_per_minute = {entry.faces_per_minute:g}")
+        lines.append(f"faces_per_minute = {entry.faces_per_minute}")
     return "\n".join(lines)
 
 

@@ -168,13 +168,14 @@ def test_a_place_for_metrics_that_cannot_be_had_ends_it_by_name(
     assert (code, last) == (1, f"pns: metrics on 127.0.0.1:{port}: Address already in use")
 
 
-def test_a_key_and_its_entry(pns: Any, tmp_path: Path) -> None:
-    code, entry, fresh = pns("key", "studio", "--faces-per-minute", "5e6")
+@pytest.mark.parametrize("budget", [5e6, 1234567.0, 0.1, 1e16])
+def test_a_key_and_its_entry(pns: Any, tmp_path: Path, budget: float) -> None:
+    code, entry, fresh = pns("key", "studio", "--faces-per-minute", f"{budget!r}")
     assert code == 0
     file = tmp_path / "keys.toml"
     file.write_text(entry)
     (kept,) = keys.read_keys(file).values()
-    assert (kept.name, kept.faces_per_minute) == ("studio", 5e6)
+    assert (kept.name, kept.faces_per_minute) == ("studio", budget)
     assert keys.matches(fresh.strip(), kept.hash)
     assert fresh.strip() not in entry
 
