@@ -27,9 +27,10 @@ class FacesBudget:
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now = now
-        # For each client what it has used and when that was last counted; who has used nothing is
-        # not kept, so that strangers take no memory for longer than a minute or their debt.
-        self._used: dict[str, tuple[float, float]] = {}
+        # For each client what it has used, when that was last counted, and its faces a minute; who
+        # has used nothing is not kept, so that strangers take no memory for longer than a minute or
+        # their debt.
+        self._used: dict[str, tuple[float, float, float]] = {}
 
     def charge(self, client: str, faces: int, per_minute: float | None) -> None:
         """Take a job's faces from a client's budget; None is no limit.
@@ -39,7 +40,7 @@ class FacesBudget:
         """
         if per_minute is None:
             return
-        used = self._used_by(client, per_minute)
+        used = self._used_by(client)
         missing = used + min(faces, per_minute) - per_minute
         if missing > 0:
             raise OverBudgetError(
@@ -48,27 +49,28 @@ class FacesBudget:
                 retry_after=int(missing / per_minute * MINUTE) + 1,
             )
         if len(self._used) > 10_000:
-            self._forget(per_minute)
-        self._used[client] = (used + faces, self._now())
+            self._used = {
+                name: own for name, own in self._used.items() if self._still_used(own) > 0
+            }
+        self._keep(client, used + faces, per_minute)
 
     def give_back(self, client: str, faces: int, per_minute: float | None) -> None:
         """Give back what a job was charged that no worker has begun."""
         if per_minute is not None and client in self._used:
-            used = max(self._used_by(client, per_minute) - faces, 0.0)
-            self._used[client] = (used, self._now())
+            used = max(self._used_by(client) - faces, 0.0)
+            self._keep(client, used, per_minute)
 
     def settle(self, client: str, faces: int, per_minute: float | None) -> None:
         """Take the faces that a job made beyond those that it was charged for."""
         if per_minute is not None and faces > 0:
-            self._used[client] = (self._used_by(client, per_minute) + faces, self._now())
+            self._keep(client, self._used_by(client) + faces, per_minute)
 
-    def _used_by(self, client: str, per_minute: float) -> float:
-        used, then = self._used.get(client, (0.0, 0.0))
+    def _keep(self, client: str, used: float, per_minute: float) -> None:
+        self._used[client] = (used, self._now(), per_minute)
+
+    def _used_by(self, client: str) -> float:
+        return self._still_used(self._used[client]) if client in self._used else 0.0
+
+    def _still_used(self, entry: tuple[float, float, float]) -> float:
+        used, then, per_minute = entry
         return max(used - (self._now() - then) * per_minute / MINUTE, 0.0)
-
-    def _forget(self, per_minute: float) -> None:
-        self._used = {
-            client: entry
-            for client, entry in self._used.items()
-            if self._used_by(client, per_minute) > 0
-        }

@@ -86,3 +86,15 @@ def test_strangers_are_forgotten_once_they_owe_nothing() -> None:
     budget.charge("last", 1, 60)
     budget.charge("one more", 1, 60)
     assert len(budget._used) < 10
+
+
+def test_who_owes_something_is_not_forgotten_for_a_richer_client() -> None:
+    clock = Clock()
+    budget = FacesBudget(clock)
+    budget.charge("poor", 60, 60)
+    for number in range(10_000):
+        budget.charge(f"{number}", 1, 60)
+    clock.now = 6
+    budget.charge("rich", 1, 10**6)
+    with pytest.raises(OverBudgetError, match="6 of 60"):
+        budget.charge("poor", 60, 60)
