@@ -152,6 +152,7 @@ def test_a_name_is_plain(name):
         ("ENTRY\nENTRY", "two entries have one name"),
         ("[[key]]\nname = 'a'\nhash = 'scrypt$24$8$1$SALT$DIGEST'", "asks for too much"),
         ("ENTRY\nfaces_per_minute = inf", "faces_per_minute"),
+        ("ENTRY\nfaces_per_minute = 0", "faces_per_minute"),
     ],
 )
 def test_a_file_that_cannot_be_used_is_refused_at_start(tmp_path, text, reason):
