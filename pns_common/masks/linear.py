@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Real
 
 from pns_common.connectivity.creases import NO_CREASES, Creases, crease_children, with_creases
 from pns_common.connectivity.topology import Topology, build_topology, split
+from pns_common.errors import ParameterError
 from pns_common.masks.limit import refined_limit_positions
 from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
+from pns_common.mesh import check_faces
 
 
 def level_topologies(
@@ -28,7 +30,12 @@ def level_topologies(
     """Return the topologies that ``levels`` steps of ``refine`` go through, control mesh first.
 
     The creases are those that are named: nothing is known here of the mesh's shape.
+
+    Raises:
+        MeshError: wrong shape or type of the faces, or an index out of range.
+        ParameterError: a crease is no edge.
     """
+    check_faces(faces, vertex_count)
     topologies: list[Topology] = []
     named = creases.named
     for depth in range(levels):
@@ -42,9 +49,18 @@ def level_topologies(
 
 
 def refine_linear(
-    columns: Float[np.ndarray, "V K"], topologies: Sequence[Topology]
+    columns: Real[np.ndarray, "V K"], topologies: Sequence[Topology]
 ) -> Float[np.ndarray, "W K"]:
-    """Refine columns by Loop's masks, level by level."""
+    """Refine columns by Loop's masks, level by level; whole numbers as float64.
+
+    Raises:
+        ParameterError: there is not one row for each vertex.
+    """
+    if topologies and (columns.ndim != 2 or len(columns) != topologies[0].vertex_count):
+        expected = f"({topologies[0].vertex_count}, K), a row for each vertex"
+        raise ParameterError("columns.shape", columns.shape, expected=expected)
+    if columns.dtype.kind != "f":
+        columns = columns.astype(np.float64)
     for topology in topologies:
         vertices = loop_vertex_vertices(columns, topology)
         columns = np.concatenate([vertices, loop_edge_vertices(columns, topology)])

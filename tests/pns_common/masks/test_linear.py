@@ -1,13 +1,14 @@
 """Loop's masks over columns: the stencil that moves the vertices, and nothing beside it."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Mesh, loop, refine
+from pns_common import Mesh, MeshError, ParameterError, loop, refine
 from pns_common.connectivity.creases import Creases
 from pns_common.masks.linear import level_topologies, refine_linear
-from tests.support.meshes import manifolds, soups
+from tests.support.meshes import bumpy_sphere, manifolds, soups
 
 MESHES = st.one_of(manifolds(), soups())
 
@@ -50,3 +51,20 @@ def test_creases_are_followed():
     expected = refine(mesh, loop(), 3, creases=crease).mesh.vertices
     steps = level_topologies(mesh.faces, 4, 3, Creases(crease))
     np.testing.assert_array_equal(refine_linear(vertices, steps), expected)
+
+
+@pytest.mark.parametrize("kind", [np.int64, np.uint8])
+def test_whole_numbers_have_halves(kind):
+    mesh = Mesh(*bumpy_sphere(0))
+    columns = (np.arange(len(mesh.vertices)) % 7)[:, None].astype(kind)
+    steps = topologies(mesh, 2)
+    expected = refine_linear(columns.astype(float), steps)
+    np.testing.assert_array_equal(refine_linear(columns, steps), expected)
+
+
+def test_columns_and_faces_of_another_mesh_are_refused():
+    mesh = Mesh(*bumpy_sphere(0))
+    with pytest.raises(ParameterError, match=r"columns.shape = \(41, 3\): expected \(42, K\)"):
+        refine_linear(mesh.vertices[1:], topologies(mesh, 1))
+    with pytest.raises(MeshError, match="expected 0 … 40"):
+        level_topologies(mesh.faces, 41, 1)
