@@ -30,7 +30,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pns_common.base.arrays import Array, as_numpy, namespace, norm
+from pns_common.base.arrays import Array, as_numpy, detached, namespace, norm
 from pns_common.errors import ModelError
 from pns_common.formula.gate import gate_of
 from pns_common.geometry.frames import EdgeFrames, EdgeStencil, edge_frames, rotate
@@ -192,6 +192,11 @@ def checked_answer(eta: Array, like: Float[Array, "N 3"]) -> Float[Array, "N 3"]
         ModelError: it is not.
     """
     xp = namespace(like)
+    if type(like) is np.ndarray:
+        # A model of one's own may answer in lists, or by a tensor.
+        eta = np.asarray(detached(eta))
+        if eta.dtype.kind not in "fiub":
+            raise ModelError("network", expected="real numbers", found=f"{eta.dtype}")
     if tuple(eta.shape) != tuple(like.shape):
         raise ModelError(
             "network", expected=f"corrections of shape {tuple(like.shape)}", found=f"{eta.shape}"

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -47,8 +48,21 @@ def test_projection_never_leaves_the_ball_and_keeps_what_is_inside(vector):
 
 @pytest.mark.parametrize(
     ("answer", "says"),
-    [(np.zeros((4, 2)), r"\(4, 2\)"), (np.full((4, 3), np.nan), "NaN"), (np.zeros(12), r"\(12,\)")],
+    [
+        (np.zeros((4, 2)), r"\(4, 2\)"),
+        (np.full((4, 3), np.nan), "NaN"),
+        (np.zeros(12), r"\(12,\)"),
+        (None, "object"),
+        (np.zeros((4, 3), complex), "complex128"),
+    ],
 )
 def test_answers_of_another_shape_or_that_are_no_numbers_are_an_error(answer, says):
     with pytest.raises(ModelError, match=says):
         checked_answer(answer, np.zeros((4, 3)))
+
+
+def test_answers_may_be_tensors_or_lists_beside_arrays():
+    for answer in (torch.ones((4, 3), requires_grad=True), [[1, 1, 1]] * 4):
+        checked = checked_answer(answer, np.zeros((4, 3)))
+        assert checked.dtype == np.float64
+        np.testing.assert_array_equal(checked, np.ones((4, 3)))
