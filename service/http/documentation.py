@@ -139,7 +139,10 @@ JOB_FIELDS: dict[str, Any] = {
     "share": {"type": "number", "description": "share of the work that is done, 0 … 1"},
     "estimate_seconds": {"type": ["number", "null"], "description": "until it ends"},
     "faces": {"type": ["integer", "null"], "description": "predicted refined faces"},
-    "problem": {"anyOf": [_named("Problem"), {"type": "null"}]},
+    "problem": {
+        "anyOf": [_named("Problem"), {"type": "null"}],
+        "description": "what it failed with; its `request_id` is that of the request that made it",
+    },
 }
 
 _JOB = {"type": "object", "required": list(JOB_FIELDS), "properties": JOB_FIELDS}

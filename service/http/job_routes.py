@@ -93,6 +93,11 @@ def job_json(service: Service, job: Job) -> dict[str, Any]:
     """Return a job as its client sees it."""
     queued = job.state is State.QUEUED
     estimate = service.desk.remaining(job)
+    problem = None
+    if job.error is not None:
+        # By the id of the request that handed it in: what the log says of it stands under that.
+        problem = json.loads(bytes(problems.of_job(job.error).body))
+        problem["request_id"] = job.work.request_id
     return {
         "id": job.id,
         "state": str(job.state),
@@ -101,9 +106,7 @@ def job_json(service: Service, job: Job) -> dict[str, Any]:
         "share": round(job.share, 4),
         "estimate_seconds": None if estimate is None else round(estimate, 1),
         "faces": None if job.cost is None else job.cost.faces,
-        "problem": None
-        if job.error is None
-        else json.loads(bytes(problems.of_job(job.error).body)),
+        "problem": problem,
     }
 
 

@@ -128,6 +128,12 @@ def test_a_job_that_fails_keeps_its_problem(client: httpx2.Client) -> None:
     assert result.json() | {"request_id": ""} == failed["problem"] | {"request_id": ""}
 
 
+def test_a_failed_job_names_the_request_that_the_log_has_it_under(client: httpx2.Client) -> None:
+    answer = client.post("/jobs", content=b"fault", headers=GLB | {"X-Request-ID": "handed-in"})
+    failed = ended(client, answer.json()["id"])
+    assert failed["problem"]["request_id"] == "handed-in"
+
+
 def test_a_fault_of_ours_is_not_explained(client: httpx2.Client) -> None:
     failed = ended(client, started(client, b"fault"))
     assert failed["problem"]["code"] == "internal-error"
