@@ -14,6 +14,7 @@ def answer_type(request: Request) -> str:
 
     Generated clients know a file by `application/octet-stream` alone, and may ask for that.
     """
-    accept = request.headers.get("accept", "*/*")
+    # Several lines of it are one; without any, all are equal.
+    accept = ",".join(request.headers.getlist("accept"))
     # In the order of preference among equals.
     return max((media.GLB, media.JSON, BYTES), key=lambda kind: media.quality(kind, accept))

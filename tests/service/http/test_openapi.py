@@ -137,6 +137,11 @@ def test_an_answer_is_sent_as_what_was_asked_for():
         ):
             answer = client.post("/subdivide", content=b"{}", headers=glb | {"Accept": accept})
             assert answer.headers["content-type"] == kind
+        twice = [("Content-Type", "model/gltf-binary"), ("Accept", "text/html")]
+        answer = client.post(
+            "/subdivide", content=b"{}", headers=[*twice, ("Accept", "application/json")]
+        )
+        assert answer.headers["content-type"] == "application/json"
         answer = client.post(
             "/report", content=b"{}", headers=glb | {"Accept": "model/gltf-binary"}
         )
