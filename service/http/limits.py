@@ -6,6 +6,7 @@ from pydantic import BaseModel, Field
 
 from ..bodies import media
 from ..settings import Settings
+from .clients import Client
 
 
 class Range(BaseModel):
@@ -21,7 +22,7 @@ class LimitsEntry(BaseModel):
     body_bytes: int = Field(description="largest body")
     faces: int = Field(description="most faces predicted in an answer")
     faces_per_minute: float | None = Field(
-        description="most faces that one client may ask for in a minute; null: no such limit"
+        description="most faces that the client may ask for in a minute; null: no such limit"
     )
     levels: Range
     memory_bytes: int = Field(description="most memory predicted for one job")
@@ -32,12 +33,12 @@ class LimitsEntry(BaseModel):
     formats: list[str] = Field(description="media types of bodies")
 
 
-def limits_of(settings: Settings) -> LimitsEntry:
-    """Return the limits that the settings set."""
+def limits_of(settings: Settings, client: Client) -> LimitsEntry:
+    """Return the limits that the settings set, and the budget of who asks."""
     return LimitsEntry(
         body_bytes=int(settings.body),
         faces=settings.faces,
-        faces_per_minute=settings.faces_per_minute,
+        faces_per_minute=client.faces_per_minute,
         levels=Range(min=1, max=settings.levels),
         memory_bytes=int(settings.memory),
         seconds=settings.job_seconds,

@@ -18,6 +18,7 @@ from . import documentation
 from .admission import DrainingError
 from .answer import FileAnswer
 from .answer_types import answer_type
+from .clients import client_of
 from .intake import Wanted, taken_in
 from .leaving import unless_gone
 from .limits import LimitsEntry, limits_of
@@ -50,8 +51,8 @@ def router(service: Service) -> APIRouter:
         return Response(catalogue.content, headers=headers, media_type=media.JSON)
 
     @routes.get("/limits", response_model=LimitsEntry, **documentation.LIMITS)
-    async def limits() -> LimitsEntry:
-        return limits_of(service.settings)
+    async def limits(request: Request) -> LimitsEntry:
+        return limits_of(service.settings, client_of(request, service.settings))
 
     @routes.get("/healthz", **documentation.HEALTHZ)
     async def healthz() -> dict[str, str]:

@@ -179,6 +179,15 @@ def test_what_costs_something_needs_a_key(client):
         assert client.get(path).status_code == 200, path
 
 
+def test_limits_are_those_of_the_key_that_is_sent(client):
+    def told(**headers):
+        return client.get("/limits", headers=headers).json()["faces_per_minute"]
+
+    assert told() == Settings().faces_per_minute
+    assert told(**bearer(KEY)) is None
+    assert told(**bearer(OTHER)) == 4000
+
+
 def test_a_target_with_a_host_needs_a_key_as_its_path_does(keys_file):
     with (
         served(workers=1, keys_file=keys_file) as where,

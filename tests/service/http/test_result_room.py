@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from service.http import result_room
+from service.http.clients import Client
 from service.http.limits import limits_of
 from service.settings import Settings, StartError
 
@@ -33,7 +34,7 @@ def test_results_take_no_more_than_leaves_room_for_those_that_are_made(
     asked = on_a_disk(monkeypatch, 1000)
     settings = result_room.fitting(Settings(result_bytes=900, result_folder=tmp_path))
     assert asked == [tmp_path]
-    assert limits_of(settings).result_bytes == 750
+    assert limits_of(settings, Client("", None)).result_bytes == 750
     assert "750, in place of the 900 of PNS_RESULT_BYTES" in caplog.text
 
 
