@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.base.cached import cached_property
 from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.rings import measure_faces
 

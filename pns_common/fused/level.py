@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.arrays import marked, norm
 from pns_common.base.blocks import Blocks
+from pns_common.base.cached import cached_property
 from pns_common.connectivity.creases import Creases, crease_classes, crease_halves
 from pns_common.connectivity.topology import EdgeClass, Topology
 from pns_common.fused.additions import Additions

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.base.cached import cached_property
 from pns_common.connectivity.doubled_faces import is_plain
 from pns_common.connectivity.topology import build_topology
 from pns_common.fused.freed_memory import make_room

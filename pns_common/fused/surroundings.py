@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import BLOCK_ROWS, Blocks
+from pns_common.base.cached import cached_property
 from pns_common.fused.budgets import budgets_per_length
 from pns_common.fused.curves import NO_RULE, CurveMoves
 from pns_common.fused.edge_measures import EdgeMeasures, edge_measures, log_lengths

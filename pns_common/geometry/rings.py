@@ -12,7 +12,6 @@ the spokes:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -28,6 +27,7 @@ from pns_common.base.arrays import (
     segment_sum,
     unit,
 )
+from pns_common.base.cached import cached_property
 from pns_common.connectivity.edge_order import left_face_order
 from pns_common.connectivity.topology import Topology, sharp_edge_count
 from pns_common.geometry.ring_sums import divided, mean_normals, neighbour_mean, spokes

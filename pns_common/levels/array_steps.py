@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
+from pns_common.base.cached import cached_property
 from pns_common.connectivity.creases import Creases, crease_children, with_creases
 from pns_common.connectivity.topology import (
     EdgeClass,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from functools import cache, partial
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.base.arrays import Array
 from pns_common.base.blocks import WHOLE, Blocks
+from pns_common.base.cached import cached_property
 from pns_common.connectivity.topology import Topology
 from pns_common.formula.correction import BudgetPerLength
 from pns_common.formula.curve_prior import Curves, Kinds, curve_pushes, find_curves
