@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import h11
@@ -15,6 +16,8 @@ FREE_PIECES = 256
 BYTES_A_PIECE = 512
 # Name of the ASGI extension that tells whether a request's body has passed them: a function.
 FLOODED = "pns.flooded"
+# Errors end with the bytes that they are about: these may be a key, and are for nobody's log.
+_QUOTED = re.compile(r":? b(ytearray\(b)?['\"].*", re.DOTALL)
 
 
 class Parser(h11.Connection):
@@ -29,6 +32,7 @@ class Parser(h11.Connection):
         self.out_of_breath = False
         self.flooded = False
         self.status_hint = 400
+        self.complaint = ""
         self._longest_head = longest_head
         self._chunked = False
         self._left = 0
@@ -52,6 +56,7 @@ class Parser(h11.Connection):
             event = self._checked_event()
         except h11.RemoteProtocolError as error:
             self.status_hint = error.error_status_hint
+            self.complaint = _QUOTED.sub("", str(error))
             raise
         if isinstance(event, h11.Data):
             self._count(event)

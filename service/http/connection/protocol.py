@@ -217,7 +217,7 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
             self.cycle.disconnected = True
             self.cycle.message_event.set()
         if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
-            self._say(self.conn.status_hint, "invalid-http", msg)
+            self._say(self.conn.status_hint, "invalid-http", self.conn.complaint or msg)
         else:
             self.transport.close()
 

@@ -8,6 +8,7 @@ import gc
 import http.client
 import itertools
 import json
+import re
 import socket
 import time
 from contextlib import ExitStack, closing
@@ -248,22 +249,27 @@ def test_of_an_answer_that_is_not_read_neither_server_nor_system_holds_much(addr
 
 
 @pytest.mark.parametrize(
-    ("sent", "expected"),
+    ("sent", "expected", "detail"),
     [
-        (b"nonsense\r\n\r\n", 400),
-        (b"GET / HTTP/1.1\r\n\r\n", 400),
-        (b"GET / HTTP/1.1\r\nHost: a\r\nX: " + b"x" * 2**17, 431),
-        (b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: gzip\r\n\r\n", 501),
+        (b"secret\r\n\r\n", 400, "illegal request line"),
+        (b"GET / HTTP/1.1\r\n\r\n", 400, "Missing mandatory Host: header"),
+        (b"GET / HTTP/1.1\r\nKey : secret\r\n\r\n", 400, "illegal header line"),
+        (b"GET / HTTP/1.1\r\nHost: a\nX: secret\r\n\r\n", 400, "lines end with CR and LF"),
+        (b"GET / HTTP/1.1\r\nHost: a\r\nX: " + b"x" * 2**17, 431, "too long"),
+        (b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: gzip\r\n\r\n", 501, "Only .*chunked"),
     ],
 )
 def test_what_is_no_http_is_answered_with_a_problem_and_written_down(
-    address, sent, expected, caplog
+    address, sent, expected, detail, caplog
 ):
     with connect(address) as connection:
         connection.sendall(sent)
         answer = received(connection)
     assert status(answer) == expected
     assert problem(answer)["status"] == expected
+    assert re.search(detail, problem(answer)["detail"])
+    # What it could not read may have been a key.
+    assert "secret" not in caplog.text
     (line,) = [record for record in caplog.records if record.name == "pns.connection"]
     assert line.fields == {"status": expected, "code": "invalid-http", "client": "127.0.0.1"}
 
