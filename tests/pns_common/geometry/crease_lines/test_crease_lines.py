@@ -64,6 +64,11 @@ def test_a_mesh_is_edged_where_half_of_its_turns_are_sharp():
         assert len(lines(pleat(30), replace(WITH_GENTLE, edged=edged))) == count
 
 
+@pytest.mark.parametrize("degrees", [30, -30])
+def test_gentle_folds_of_edged_meshes_are_lines_on_ridges_and_in_hollows(degrees):
+    assert len(lines(pleat(degrees), replace(WITH_GENTLE, edged=True))) == 4
+
+
 def pleat(degrees):
     """A sheet of four by four cells, folded once along its middle row."""
     points, faces = grid(5)

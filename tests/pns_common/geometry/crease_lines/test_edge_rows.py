@@ -1,5 +1,7 @@
 """Rows: chamfers and plates stand alone, tubes and arcs do not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,9 +43,11 @@ def test_an_edge_is_not_beside_one_that_goes_on_from_it(rows):
         cut = [np.c_[a, b, c], np.c_[a, c, d]] if row % 2 else [np.c_[a, b, d], np.c_[b, c, d]]
         walls += [faces + n * row for faces in cut]
     fan = np.stack([0 * k[2:], k[1:-1], k[2:]], axis=1)
-    mesh = Mesh(points, np.concatenate([*walls, fan[:, ::-1], fan + n * rows]))
-    assert len(lines(mesh)) == 2 * n + 3 * rows
-    assert len(lines(mesh, WITH_GENTLE)) == 2 * n + 5 * rows
+    faces = np.concatenate([*walls, fan[:, ::-1], fan + n * rows])
+    for order in (np.arange(len(points)), np.random.default_rng(0).permutation(len(points))):
+        mesh = Mesh(points[np.argsort(order)], order[faces])
+        assert len(lines(mesh)) == 2 * n + 3 * rows
+        assert len(lines(mesh, WITH_GENTLE)) == 2 * n + 5 * rows
 
 
 @pytest.mark.parametrize("pieces", [2, 3, 4])
@@ -89,3 +93,67 @@ def test_a_bar_with_four_chamfers_is_no_tube(ratio, is_bar):
 def rotation_by(quarters):
     """So many quarter turns of the plane."""
     return np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), quarters)
+
+
+def folds(turns):
+    """Return which folds of a sheet, which is edged, are lines.
+
+    Its walls are as wide as one another, and turn one after the other by so many degrees.
+    """
+    at = np.radians(np.cumsum([0, *turns]))
+    profile = np.concatenate([[[0, 0]], np.stack([np.cos(at), np.sin(at)], axis=1).cumsum(axis=0)])
+    n = len(profile)
+    points = np.concatenate([np.c_[profile, np.zeros(n)], np.c_[profile, np.full(n, 2.0)]])
+    a = np.arange(n - 1)
+    mesh = Mesh(points, np.concatenate([np.c_[a, a + 1, a + n + 1], np.c_[a, a + n + 1, a + n]]))
+    found = lines(mesh, replace(WITH_GENTLE, edged=True))
+    return [(k, k + n) in found for k in range(1, n - 1)]
+
+
+def degrees_of(times, degrees):
+    """The turn whose 1 − cos t is so many times that of another."""
+    return np.degrees(np.arccos(1 - times * (1 - np.cos(np.radians(degrees)))))
+
+
+@pytest.mark.parametrize(
+    ("turn", "beside", "is_alone"),
+    [
+        (54, 54, False),
+        (56, 56, True),
+        (22, degrees_of(2.9, 22), False),
+        (22, degrees_of(3.1, 22), True),
+        (45, degrees_of(1 / 3.9, 45), False),
+        (45, degrees_of(1 / 4.1, 45), True),
+        (40, -40, True),
+    ],
+)
+def test_an_edge_is_in_a_row_with_such_as_turn_like_it_the_same_way(turn, beside, is_alone):
+    assert folds([90, beside, turn, beside, 90])[2] == is_alone
+    assert folds([-90, -beside, -turn, -beside, -90])[2] == is_alone
+
+
+@pytest.mark.parametrize(("lean", "is_alone"), [(25, False), (29, True)])
+def test_edges_in_a_row_run_within_20_degrees_of_parallel(lean, is_alone):
+    """Those of eight sides of a pyramid without its tip: they are 18.6 and 21.4 degrees apart."""
+    tube = cylinder(8, height=1.0)
+    taper = 1 - tube.vertices[:, 2:] * np.tan(np.radians(lean))
+    mesh = Mesh(tube.vertices * np.c_[taper, taper, 0 * taper + 1], tube.faces)
+    assert len(lines(mesh, replace(WITH_GENTLE, edged=True))) == 16 + 8 * is_alone
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("sharp", [-75, 75])
+def test_a_row_ends_at_a_sharper_edge_whichever_way_that_turns(side, sharp):
+    found = folds([side * turn for turn in (sharp, 30, 30, 30, sharp)])
+    assert found == [True, False, False, False, True]
+
+
+def test_there_is_nothing_across_the_edge_of_a_sheet():
+    """Of two sheets, each folded once, the one is not beside the other's fold."""
+    up = np.sin(np.radians(15))
+    sheet = np.array([[-1, 0, 0], [-1, 3, 0], [0, 0, up], [0, 3, up], [1, 0, 0], [1, 3, 0]])
+    faces = np.array([[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]])
+    mesh = Mesh(
+        np.concatenate([sheet, sheet + np.array([9, 0, 0])]), np.concatenate([faces, faces + 6])
+    )
+    assert lines(mesh, replace(WITH_GENTLE, edged=True)) == {(2, 3), (8, 9)}

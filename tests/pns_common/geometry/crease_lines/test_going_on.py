@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
+from pns_common.connectivity.creases import with_creases
 from pns_common.connectivity.topology import build_topology
-from pns_common.geometry.crease_lines.going_on import ROUNDS
+from pns_common.geometry.crease_lines import line_rows
+from pns_common.geometry.crease_lines.going_on import ROUNDS, go_on
 from pns_common.geometry.crease_lines.turns import edges_beyond
 from tests.support.crease_lines import SHARP_ALONE, WITH_GENTLE, lines, normals_of
-from tests.support.meshes import grid
+from tests.support.meshes import grid, prism
 from train.data.primitives import box
 
 
@@ -64,3 +66,26 @@ def test_a_line_that_ends_in_a_smooth_surface_loses_as_many_edges_as_there_are_r
 
 def test_a_line_from_boundary_to_boundary_loses_none():
     assert len(lines(folded_sheet(6, loose=-6))) == 12
+
+
+@pytest.mark.parametrize(("corners", "is_circle"), [(5, False), (6, True)])
+def test_a_rim_of_six_corners_goes_on_and_one_of_five_does_not(corners, is_circle):
+    """It turns by 60 degrees at each, or by 72; walls' edges are not asked about."""
+    at = 2 * np.pi * np.arange(corners) / corners
+    tube = prism(np.stack([np.cos(at), np.sin(at)], axis=1))
+    topology = build_topology(tube.faces, len(tube.vertices))
+    pairs = np.sort(np.stack([np.arange(corners), np.roll(np.arange(corners), -1)], axis=1), axis=1)
+    rim = np.flatnonzero((topology.edges[:, None] == pairs).all(axis=-1).any(axis=1))
+    nowhere = np.zeros(len(tube.vertices), dtype=bool)
+    on = go_on(tube.vertices, topology, rim, nowhere, np.cos(np.radians(66)))
+    assert (len(rim), on.all()) == (corners, is_circle)
+
+
+def test_a_line_that_ends_at_a_crease_that_is_named_loses_none():
+    mesh = folded_sheet(12, loose=6)
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    along = 25  # from a vertex to the next one on the fold
+    last = max(map(max, lines(mesh))) + ROUNDS * along
+    creased = with_creases(topology, np.array([[last, last + 1]]))
+    found = line_rows(mesh.vertices, normals_of(mesh), creased, SHARP_ALONE)
+    assert len(found) == len(lines(mesh)) + ROUNDS
