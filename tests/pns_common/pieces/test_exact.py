@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from pns_common.formula.fold_guard import FoldGuard
 from pns_common.pieces.exact import guarded_exact, may_fold, shrunk
-from tests.support.meshes import grid
+from tests.support.meshes import grid, rotation
 
 
 @given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.01, 2))
@@ -20,6 +20,26 @@ def test_no_scales_fold_what_may_not_fold(seed, size):
         scale = rng.choice([0, 0.25, 0.5, 1], 60) if rng.random() < 0.5 else rng.random(60)
         s = guard(faces[safe], loop_points, scale[:, None] * asked)
         assert (s == 1).all()
+
+
+@given(st.integers(0, 99), st.floats(0.05, 1.57), st.floats(0, 1), st.floats(1, 9))
+def test_what_turns_with_the_least_effort_may_fold(seed, angle, share, width):
+    """The end of an area vector goes straight to the cone of θ: in a corner, or in two at once."""
+    turn, faces, guard = rotation(np.random.default_rng(seed)), np.arange(3)[None], FoldGuard(angle)
+    wide = np.array([[0.0, 0, 0], [width, 0, 0], [0, 1, 0]])
+    way = 1.01 * np.sin(angle) * np.array([0, -np.sin(angle), np.cos(angle)])
+    for at in (0, share):
+        asked = np.outer([-at, -at, 1 - at], way)
+        folds = (guard(faces, wide @ turn.T, asked @ turn.T) < 1).any()
+        assert folds
+        assert may_fold(faces, wide @ turn.T, asked @ turn.T, angle).all()
+
+
+def test_what_loses_its_area_may_fold_whatever_the_angle():
+    flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    asked = np.array([[0.0, 0, 0], [0, 0, 0], [0, -0.9995, 0]])
+    assert (FoldGuard(1.5705)(np.arange(3)[None], flat, asked) < 1).all()
+    assert may_fold(np.arange(3)[None], flat, asked, 1.5705).all()
 
 
 @given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.01, 0.6))

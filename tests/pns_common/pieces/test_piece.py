@@ -7,8 +7,9 @@ import pytest
 
 from pns_common import Mesh, MeshError, load_model, loop, pns
 from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import Creases
 from pns_common.pieces import ThinHaloError, halo_rings, refine_piece
-from pns_common.pieces.piece import first_at_own, steps_of
+from pns_common.pieces.piece import _asked, first_at_own, steps_of
 from pns_common.runtimes.onnx_model import bundled_models
 from tests.support.meshes import bumpy_sphere, grid
 from tests.support.networks import scale_free_model
@@ -27,6 +28,38 @@ def test_a_halo_that_is_too_thin_is_told(name):
         with pytest.raises(ThinHaloError) as told:
             refine_piece(piece_of(mesh, own, rings - 1).piece, scheme, levels, 1.0, Blocks(1))
         assert told.value.faces > 0
+
+
+@pytest.mark.parametrize("gentle", [None, 21.0])
+def test_a_halo_that_is_too_thin_to_tell_lines_is_told(gentle):
+    lines = Creases(line_angle=66.0, edged_angle=gentle)
+    mesh = Mesh(*bumpy_sphere(5, 4))
+    own = np.arange(len(mesh.faces)) == 0
+    rings = halo_rings(loop(), 1, lines=lines)
+    for thinner, is_enough in ((0, True), (2, False)):
+        piece = piece_of(mesh, own, rings - thinner, lines=lines).piece
+        assert not piece.whole.all()
+        if is_enough:
+            refine_piece(piece, loop(), 1, 1.0, Blocks(1))
+        else:
+            with pytest.raises(ThinHaloError):
+                refine_piece(piece, loop(), 1, 1.0, Blocks(1))
+
+
+def test_what_was_asked_of_the_guard_is_what_is_added_without_it():
+    scheme = pns(scale_free_model(1, scale=30.0), budget=40.0)
+    mesh = Mesh(*bumpy_sphere(0, 2))
+    whole = piece_of(mesh, np.ones(len(mesh.faces), dtype=bool), 0).piece
+    guarded, free = (
+        next(steps_of(whole, each, 1, 1.0, Blocks(1)))
+        for each in (scheme, replace(scheme, guard=None))
+    )
+    scale, asked = guarded.placed.guard, _asked(guarded.placed)
+    assert ((scale > 0) & (scale < 1)).any()
+    added = np.concatenate([free.placed.vertices.displacement, free.placed.edges.displacement])
+    np.testing.assert_array_equal(asked, added)
+    # Where it took all nobody knows.
+    assert not np.isfinite(_asked(replace(guarded.placed, guard=0 * scale))).any()
 
 
 def left_half(scheme=None, levels=1):
