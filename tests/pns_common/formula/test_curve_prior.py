@@ -12,6 +12,8 @@ from pns_common.connectivity.topology import build_topology
 from pns_common.formula.curve_prior import (
     BOUNDARIES,
     BOUNDARIES_AND_CREASES,
+    curve_direction,
+    curve_gate,
     curve_mask,
     curve_pushes,
     find_curves,
@@ -32,6 +34,22 @@ def cone(rim, tip):
     around, count = np.arange(len(rim)), len(rim)
     faces = np.stack([around, (around + 1) % count, np.full(count, count)], axis=1)
     return Mesh(np.concatenate([rim, [tip]]), faces)
+
+
+def test_the_gate_of_curves_falls_from_turns_of_60_degrees_to_those_of_90():
+    turning = 1 - np.cos(np.radians([0, 10, 60, 90, 120]))
+    half = 0.75  # half way in x
+    sharp = curve_gate(np.append(turning, half), 1e9)
+    np.testing.assert_allclose(sharp, [0, 1, 1, 0, 0, 0.5], atol=1e-9)
+
+
+@pytest.mark.parametrize("turn", [0, 90, 150, 160, 180])
+def test_a_curve_has_a_direction_up_to_turns_of_150_degrees_and_less_beyond(turn):
+    angle = np.radians(180 - turn)
+    a, b = np.array([[2.0, 0, 0]]), 2 * np.array([[np.cos(angle), np.sin(angle), 0]])
+    length = np.linalg.norm(curve_direction(a, b))
+    assert length == pytest.approx(min(1.0, 4 * np.sin(angle / 2)), abs=1e-12)
+    assert (length > 1 - 1e-12) == (turn <= 150)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

@@ -88,6 +88,25 @@ def test_a_hopeless_face_ends_as_loops():
     assert scale[3] == 1
 
 
+@pytest.mark.parametrize("halvings", [1, 2, 7, 25])
+def test_a_face_is_scaled_no_further_than_it_must_be(halvings):
+    """A corner that is lifted turns its face by the arctangent of its height."""
+    triangle = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=float)
+    delta = np.zeros((3, 3))
+    delta[2, 2] = 1.9 * 2.0 ** (halvings - 1)
+    scale = FoldGuard(np.radians(45))(np.array([[0, 1, 2]]), triangle, delta)
+    np.testing.assert_array_equal(scale, 0.5**halvings)
+
+
+@pytest.mark.parametrize(("left", "is_kept"), [(0.0011, True), (0.0009, False)])
+def test_a_face_may_lose_all_but_a_thousandth_of_its_area(left, is_kept):
+    triangle = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=float)
+    delta = np.zeros((3, 3))
+    delta[2, 1] = left - 1
+    scale = FoldGuard(0.01)(np.array([[0, 1, 2]]), triangle, delta)
+    assert (scale == 1).all() == is_kept
+
+
 def test_faces_without_area_are_left_out_and_shrinking_ones_are_not():
     line = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0]], dtype=float)
     triangle = np.array([[0, 1, 2]])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pns_common.connectivity.topology import build_topology
-from pns_common.formula.prior import normal_pushes
+from pns_common.formula.prior import clear_normals, normal_pushes
 from pns_common.geometry.frames import face_normals
 from pns_common.geometry.rings import Rings
 from tests.support.meshes import grid, icosphere
@@ -36,3 +36,10 @@ def test_a_mesh_turned_over_is_pushed_the_same_way():
     points, faces = icosphere(1)
     points = points * [1, 2, 3]
     np.testing.assert_allclose(pushes(points, faces[:, ::-1]), pushes(points, faces), atol=1e-14)
+
+
+def test_mean_normals_are_scaled_to_1_down_to_a_quarter_and_fade_below():
+    mean = np.outer([1.0, 1 / 3, 0.25, 0.125, 0.0], [0.6, 0, 0.8])
+    np.testing.assert_allclose(
+        np.linalg.norm(clear_normals(mean), axis=1), [1, 1, 1, 0.5, 0], atol=1e-12
+    )

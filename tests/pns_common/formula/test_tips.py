@@ -11,7 +11,6 @@ from pns_common.connectivity.topology import build_topology
 from pns_common.formula.prior import clear_normals, normal_pushes
 from pns_common.formula.tips import (
     CURVE_FURTHER,
-    LEFT,
     bends_most,
     far_behind,
     kept_at_tips,
@@ -65,8 +64,7 @@ def test_what_is_left_behind_is_a_vertex_less_the_limit_of_all_pushed():
 
 
 def test_a_tip_rises_from_one_share_to_another_and_with_how_much_more_it_bends():
-    begin, end = LEFT
-    shares = np.array([0, begin, (begin + end) / 2, end, 9])[:, None]
+    shares = np.array([0, 1 / 20, 2 / 20, 3 / 20, 9])[:, None]
     expected = [[0], [0], [0.5], [1], [1]]
     np.testing.assert_allclose(far_behind(2 * shares, np.full((5, 1), 2.0)), expected, atol=1e-12)
     bends = np.array([0.4, 1.0, 1.5, 2.0, 5.0])[:, None]

@@ -66,3 +66,18 @@ def test_faces_without_area_make_no_angle_and_blocks_change_nothing():
     np.testing.assert_array_equal(divided.normals, whole.normals)
     flat = child_faces(topology, np.zeros_like(refined), refined, WHOLE)
     assert (flat.flipped, flat.normal_jump_max, flat.normals.any()) == (0, 0.0, False)
+
+
+@pytest.mark.parametrize("edge", [[1, 2], [0, 2], [0, 3]])
+def test_nor_does_one_without_area_beside_one_that_has_some(edge):
+    """The middle child of a face, and a corner's on either side of the edge between two."""
+    points = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [2, -2, 0]])
+    topology = build_topology(np.array([[0, 1, 2], [1, 0, 3]]), 4)
+    refined = np.concatenate([points, points[topology.edges].mean(axis=1)])
+    assert child_faces(topology, refined, None, WHOLE).normals.any(axis=1).all()
+    at = 4 + int(np.flatnonzero((topology.edges == edge).all(axis=1))[0])
+    # On the line through others that are corners of a child with it.
+    refined[at] = {2: [0.5, 0, 0], 3: [0.5, 0, 0]}[edge[1]] if edge[0] == 0 else [0.5, 0.5, 0]
+    made = child_faces(topology, refined, None, WHOLE)
+    assert (~made.normals.any(axis=1)).any()
+    assert made.normal_jump_max == 0

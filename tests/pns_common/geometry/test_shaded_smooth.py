@@ -45,3 +45,12 @@ def test_faces_without_area_turn_from_none():
     points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 1]])
     faces = np.array([[0, 1, 2], [1, 0, 3]])
     assert shaded_smooth(points, faces, np.array([[0, 1]]), np.array([True])) == [False]
+
+
+@pytest.mark.parametrize(("degrees", "turns"), [(0.9, False), (1.1, True)])
+def test_edges_that_turn_by_less_than_a_degree_say_nothing(degrees, turns):
+    half = np.radians(degrees) / 2
+    side = [np.cos(half), np.sin(half)]
+    points = np.array([[0.0, 0, 0], [0, 1, 0], [side[0], 0, side[1]], [-side[0], 0, side[1]]])
+    faces = np.array([[0, 1, 3], [1, 0, 2]])
+    assert shaded_smooth(points, faces, np.array([[0, 1]]), np.array([True])) == [turns]

@@ -1,12 +1,17 @@
 """The measured numbers of a level, each by a slow and obvious formula."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pns_common import Mesh, pns, refine
-from pns_common.levels.diagnostics import edge_counts, limit_distances
-from tests.support.meshes import bumpy_sphere
-from tests.support.networks import random_model
+from pns_common.connectivity.topology import build_topology
+from pns_common.levels.diagnostics import Reach, edge_counts, limit_distances, reach_of
+from pns_common.levels.step import AddedStep
+from pns_common.rules.placement import without_correction
+from tests.support.meshes import bumpy_sphere, grid
+from tests.support.networks import random_model, vertex_model
 
 MODEL = random_model(0, scale=30.0)
 
@@ -44,3 +49,37 @@ def test_distances_of_learned_levels_add_up_and_one_without_a_bound_leaves_none(
         "limit_distance_bound": 4.0,
     }
     assert limit_distances([first, second | {"envelope_max": None}])["limit_distance_bound"] is None
+
+
+def test_what_creases_keep_back_is_a_distance_of_its_level_and_of_the_limit():
+    """At a crease a shift is all that a vertex was moved by: the longer of both counts."""
+    levels = [
+        {"displacement_max": 0.5, "envelope_max": 2.0, "crease_shift_max": 0.75},
+        {"displacement_max": 0.5, "envelope_max": 0.5, "crease_shift_max": 0.625},
+        {"crease_shift_max": 0.125},
+    ]
+    assert limit_distances(levels, limit_shift=0.25) == {
+        "learned_levels": 2,
+        "limit_distance": 0.75 + 0.625 + 0.125 + 0.25,
+        "limit_distance_bound": 2.0 + 0.625 + 0.125 + 0.25,
+    }
+
+
+def test_gates_that_are_shut_are_those_of_both_rules():
+    mesh = Mesh(*grid(6, lambda x, y: np.maximum(x, 0) ** 2))
+    refined = refine(mesh, pns(vertex_model(0)))
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    movable = np.setdiff1d(np.arange(36), topology.edges[topology.edge_class != 0])
+    rows = np.concatenate([movable, 36 + topology.interior])
+    shut = refined.gate[rows] == 0
+    assert 0 < shut[: len(movable)].sum() < len(movable)
+    assert refined.report["levels"][0]["shut"] == shut.sum()
+
+
+@pytest.mark.parametrize("unbound", ["vertices", "edges"])
+def test_one_rule_without_a_bound_leaves_a_level_without(unbound):
+    nothing = without_correction(np.zeros((1, 3)))
+    known = replace(nothing, displacement=np.array([[3.0, 0, 4]]), envelope=np.array([6.0]))
+    rules = {"vertices": known, "edges": known, unbound: replace(known, envelope=None)}
+    assert reach_of(AddedStep(known, known, True, None)) == Reach(5.0, 6.0)
+    assert reach_of(AddedStep(rules["vertices"], rules["edges"], True, None)) == Reach(5.0, None)
