@@ -169,6 +169,13 @@ def test_a_file_that_is_not_there_is_refused_at_start(tmp_path):
         read_keys(tmp_path / "none.toml")
 
 
+def test_a_file_that_is_no_text_is_refused_at_start(tmp_path):
+    path = tmp_path / "keys.toml"
+    path.write_bytes(b"# Schl\xfcssel\n")
+    with pytest.raises(KeysError, match=r"keys\.toml: .*utf-8"):
+        read_keys(path)
+
+
 def test_what_costs_something_needs_a_key(client):
     for method, path in ("POST", "/subdivide"), ("GET", "/nothing"), ("POST", "/jobs"):
         answer = client.request(method, path, content=b"x", headers=GLB)

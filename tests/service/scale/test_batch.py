@@ -314,8 +314,10 @@ def test_what_cannot_be_used_is_told_before_anything_runs(tmp_path, changes):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "in"]
 
 
-def test_parquet_reports_hold_the_rows_that_json_lines_hold(tmp_path):
+def test_parquet_reports_hold_the_rows_that_json_lines_hold(tmp_path, monkeypatch):
     parquet = pytest.importorskip("pyarrow.parquet", reason="the extra [ray] is not installed")
+    # Written some at a time.
+    monkeypatch.setattr("service.scale.journal.BATCH", 2)
     library(tmp_path / "in")
     plain, columns = batch_of(tmp_path), batch_of(tmp_path, report=tmp_path / "report.parquet")
     refined(plain)
@@ -324,6 +326,7 @@ def test_parquet_reports_hold_the_rows_that_json_lines_hold(tmp_path):
     refined(columns)
     timed = ("seconds",)
     table = parquet.read_table(columns.report).to_pylist()
+    assert len(table) == len(rows(plain)) > 2
     for row in table:
         expected = rows(plain)[Path(row["path"]).name]
         assert {k: v for k, v in row.items() if not k.startswith(timed)} == {
