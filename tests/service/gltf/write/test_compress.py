@@ -96,6 +96,15 @@ def test_refining_compressed_output_is_refining_plain_output(compress):
             assert unpacked[name].dtype == wanted[name].dtype
 
 
+@pytest.mark.parametrize("compress", KINDS)
+def test_a_strip_is_written_as_the_triangles_that_it_is(compress):
+    strip = octahedron(indices=np.array([[0], [2], [4], [1], [3]]))
+    tree, binary = files.document([strip])
+    tree["meshes"][0]["primitives"][0]["mode"] = 5
+    result = refine(files.pack(tree, binary), compress, levels=1).glb
+    assert files.unpack(result)[0]["meshes"][0]["primitives"][0].get("mode", 4) == 4
+
+
 def test_draco_rounds_no_more_than_it_says():
     # One level of nothing: the stored positions themselves, decoded by the reader.
     shape = box()
