@@ -120,6 +120,13 @@ def test_tangents_are_perpendicular_units_with_their_handedness():
     assert np.unique(tangents[:, 3], return_counts=True)[1].tolist() == [75, 75]
 
 
+def test_a_face_whose_corners_differ_in_handedness_keeps_either():
+    shape = box()
+    shape["TANGENT"] = shape["TANGENT"] * np.where(np.arange(24) % 4 == 0, 1, -1)[:, None]
+    _, attributes = files.primitive_of(subdivide([shape], levels=2).glb)
+    assert set(attributes["TANGENT"][:, 3].tolist()) == {-1, 1}
+
+
 def test_useless_normals_and_tangents_become_unit_vectors():
     # Zeros in the file, and faces that cancel out: there is still a normal at every vertex.
     shape = octahedron()
@@ -147,6 +154,13 @@ def test_integer_colours_are_averaged_and_keep_their_type(dtype, full, width):
     values, counts = np.unique(attributes["COLOR_0"][:, 0], return_counts=True)
     assert values.tolist() == [0, (full + 1) // 2, full]
     assert counts.tolist() == [13, 4, 1]
+
+
+def test_integer_colours_that_are_not_said_to_be_fractions_are_averaged_too():
+    shape = octahedron(COLOR_0=np.repeat(np.uint8([[0, 0, 0], [200, 100, 50]]), 3, axis=0))
+    _, attributes = files.primitive_of(subdivide([shape]).glb)
+    found = np.unique(attributes["COLOR_0"], axis=0).tolist()
+    assert found == [[0, 0, 0], [100, 50, 25], [200, 100, 50]]
 
 
 def test_float_colours_and_custom_attributes_are_linear():

@@ -98,6 +98,33 @@ def test_morphed_tangents_are_unit_and_perpendicular_to_morphed_normals():
     np.testing.assert_allclose((tangents * normals).sum(axis=1), 0, atol=1e-5)
 
 
+def test_morphed_tangents_run_as_those_of_the_morphed_mesh():
+    moved = {"TANGENT": deltas(4, 24, 0.3)}
+    given = box()["TANGENT"].copy()
+    given[:, :3] += moved["TANGENT"]
+    result = subdivide([box(targets=[moved])], levels=2).glb
+    faces, attributes = files.primitive_of(result)
+    (target,) = files.targets_of(result)
+    expected_faces, expected = files.primitive_of(subdivide([box(TANGENT=given)], levels=2).glb)
+    np.testing.assert_allclose(
+        (attributes["TANGENT"][:, :3] + target["TANGENT"])[faces],
+        expected["TANGENT"][expected_faces][..., :3],
+        atol=1e-6,
+    )
+
+
+def test_tangents_under_a_target_without_normals_are_perpendicular_to_those_at_rest():
+    """Also where another primitive of the mesh has some there."""
+    names = ("POSITION", "NORMAL", "TANGENT")
+    moved = box_deltas(5, names)
+    aside = box(POSITION=box()["POSITION"] + 9, targets=[{n: moved[n] for n in names[::2]}])
+    result = subdivide([box(targets=[moved]), aside], levels=2).glb
+    _, attributes = files.primitive_of(result, 0, 1)
+    (target,) = files.targets_of(result, 0, 1)
+    tangents = attributes["TANGENT"][:, :3] + target["TANGENT"]
+    np.testing.assert_allclose((tangents * attributes["NORMAL"]).sum(axis=1), 0, atol=1e-5)
+
+
 def test_targets_without_normals_get_none_and_others_are_linear():
     names = ["POSITION", "COLOR_0", "TEXCOORD_0"]
     given = box_deltas(7, names)
@@ -110,6 +137,32 @@ def test_targets_without_normals_get_none_and_others_are_linear():
     corners = given["COLOR_0"][shape["indices"]]
     middle = (corners + np.roll(corners, -1, axis=1)) / 2
     np.testing.assert_allclose(targets[0]["COLOR_0"][faces[3::4]], middle, atol=1e-6)
+
+
+def test_a_target_that_moves_normals_alone_keeps_its_own():
+    moved = np.repeat(deltas(6, 6, 0.1), 4, axis=0)
+    result = subdivide([box(targets=[{"NORMAL": moved}])], levels=2).glb
+    faces, _ = files.primitive_of(result)
+    (target,) = files.targets_of(result)
+    # The same at all corners of a side, and so everywhere on it.
+    sides = target["NORMAL"][faces].reshape(6, -1, 3)
+    np.testing.assert_allclose(sides, np.broadcast_to(moved[::4, None], sides.shape), atol=1e-6)
+
+
+@pytest.mark.parametrize("others", [[{"POSITION": np.full((6, 3), -0.0)}], [{}], []])
+def test_a_zero_of_either_sign_or_none_moves_nothing_apart(others):
+    shape, still = octahedron(), [{"POSITION": np.zeros((6, 3))}]
+    halves = [
+        octahedron(indices=shape["indices"][at], targets=targets)
+        for at, targets in ((slice(4), still), (slice(4, 8), others))
+    ]
+    assert subdivide(halves).report["levels"][0]["edges"]["boundary"] == 0
+
+
+def test_tangents_of_a_target_alone_are_linear():
+    plain = {name: values for name, values in box().items() if name != "TANGENT"}
+    result = subdivide([{**plain, "targets": [{"TANGENT": np.full((24, 3), 0.25)}]}]).glb
+    assert (files.targets_of(result)[0]["TANGENT"] == 0.25).all()
 
 
 def test_closed_lips_that_part_stay_two():

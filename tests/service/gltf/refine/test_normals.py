@@ -1,6 +1,7 @@
 """Directions of normals, where there are none, and which are one."""
 
 import numpy as np
+import pytest
 
 from pns_common.base.distinct import number_by_first_appearance
 from service.gltf.refine.joined_normals import joined_normals
@@ -30,6 +31,14 @@ def test_normals_that_differ_by_rounding_are_one_and_by_a_degree_are_two():
     normals = np.array([tilted(0), tilted(0.01), tilted(1), tilted(1.01), tilted(-0.01)])
     labels = joined_normals(np.zeros(5, dtype=np.int64), normals)
     assert number_by_first_appearance(labels)[0].tolist() == [0, 0, 1, 1, 0]
+
+
+@pytest.mark.parametrize(("degrees", "are_one"), [(0.09, True), (0.11, False)])
+def test_normals_within_a_tenth_of_a_degree_are_one(degrees, are_one):
+    angle = np.radians(degrees)
+    normals = np.array([[0.0, 0.0, 1.0], [np.sin(angle), 0.0, np.cos(angle)]])
+    first, second = joined_normals(np.zeros(2, dtype=np.int64), normals)
+    assert (first == second) == are_one
 
 
 def test_zeros_of_either_sign_are_one_normal():

@@ -52,6 +52,19 @@ def test_weights_follow_the_positions_of_loop(levels):
     np.testing.assert_allclose(by_row[faces], expected.vertices[expected.faces], atol=2e-7)
 
 
+def test_where_there_is_room_for_all_joints_none_is_said_to_be_lost():
+    assert subdivide([bound(*random_binding(0))], levels=2).report["changes"] == []
+
+
+def test_a_joint_whose_weight_rounds_to_nothing_is_none():
+    """A 255th of one vertex is less than half as much everywhere else."""
+    joints, weights = np.tile([3, 0, 0, 0], (6, 1)), np.tile([255, 0, 0, 0], (6, 1))
+    joints[0, 1], weights[0, :2] = 7, [254, 1]
+    shape = bound(joints, files.Normalized(weights.astype(np.uint8)))
+    _, attributes = files.primitive_of(subdivide([shape], levels=2).glb)
+    assert not attributes["JOINTS_0"][attributes["WEIGHTS_0"] == 0].any()
+
+
 def test_the_learned_correction_changes_no_weight():
     shape = bound(*random_binding(1))
     pairs = [
@@ -95,21 +108,31 @@ def test_weights_sum_to_one_exactly_and_unused_joints_are_zero(dtype, sets):
     assert 0 < changes["refined vertices that lost their lightest joints"] <= len(shares)
 
 
-def test_lips_with_different_joints_stay_two():
-    # Two coincident open sheets, each on a joint of its own: welded, they would be one surface.
+@pytest.mark.parametrize(
+    ("joints", "weights", "shares"),
+    [
+        ([[0, 0, 0, 0], [1, 0, 0, 0]], [[1.0, 0, 0, 0], [1.0, 0, 0, 0]], [[1, 0], [0, 1]]),
+        (
+            [[0, 1, 0, 0], [0, 1, 0, 0]],
+            [[0.75, 0.25, 0, 0], [0.625, 0.375, 0, 0]],
+            [[0.75, 0.25], [0.625, 0.375]],
+        ),
+    ],
+)
+def test_lips_with_different_joints_or_weights_stay_two(joints, weights, shares):
+    # Two coincident open sheets, each bound in its own way: welded, they would be one surface.
     points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     pair = {
         "POSITION": np.concatenate([points, points]),
         "indices": np.concatenate([faces, faces[:, ::-1] + 4]),
-        "JOINTS_0": np.repeat(np.array([[0, 0, 0, 0], [1, 0, 0, 0]], dtype=np.uint8), 4, axis=0),
-        "WEIGHTS_0": np.tile([1.0, 0, 0, 0], (8, 1)),
+        "JOINTS_0": np.repeat(np.array(joints, dtype=np.uint8), 4, axis=0),
+        "WEIGHTS_0": np.repeat(weights, 4, axis=0),
     }
     result = subdivide([pair])
     assert result.report["levels"][0]["edges"] == {"interior": 2, "boundary": 8, "irregular": 0}
     _, attributes = files.primitive_of(result.glb)
-    assert set(attributes["JOINTS_0"][:, 0].tolist()) == {0, 1}
-    assert (attributes["WEIGHTS_0"] == [1, 0, 0, 0]).all()
+    assert np.unique(by_joint(attributes, 2), axis=0).tolist() == sorted(shares)
 
 
 def test_the_order_of_slots_and_unused_joints_do_not_open_a_seam():

@@ -103,6 +103,33 @@ def test_each_is_edged_or_not_by_itself(
     assert together.glb == alone.glb
 
 
+def skinned_pair(joint: int) -> list[dict[str, object]]:
+    """Halves of a surface, the one with wide joints, of which one reaches into the other."""
+    shape, bound = octahedron(), {"WEIGHTS_0": np.tile([1.0, 0, 0, 0], (6, 1))}
+    joints = np.zeros((6, 4), dtype=np.uint16)
+    joints[5] = joint
+    halves = ((shape["indices"][:4], np.zeros((6, 4), np.uint8)), (shape["indices"][4:], joints))
+    return [octahedron(indices=own, JOINTS_0=named, **bound) for own, named in halves]
+
+
+@pytest.mark.parametrize(
+    "kinds",
+    [
+        [[box(_T=files.Normalized(np.arange(24, dtype=np.uint8)[:, None]))] for _ in range(2)]
+        + [[box(_T=np.arange(24, dtype=np.uint8)[:, None])] for _ in range(2)],
+        [skinned_pair(1), skinned_pair(300), skinned_pair(2)],
+    ],
+    ids=["numbers and fractions", "narrow and wide joints"],
+)
+def test_meshes_of_two_kinds_are_as_alone(
+    kinds: list[list[dict[str, object]]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = files.glb(*kinds)
+    made = refine(data, scheme="loop")
+    monkeypatch.setattr(meshes, "MOST_FACES", -1)
+    assert made.glb == refine(data, scheme="loop").glb
+
+
 def random_mesh(rng: np.random.Generator, kind: int) -> list[dict[str, object]]:
     """Primitives of one of 16 kinds: skins, morph targets, normals, two pieces of one surface."""
     skinned, morphed, shaded, parted = (bool(kind >> bit & 1) for bit in range(4))
