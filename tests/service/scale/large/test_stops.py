@@ -21,7 +21,15 @@ from service.scale.large import formats, part, readers
 from service.scale.large.part import run_part
 from service.scale.large.run import large_work
 from tests.service.scale.large.jobs import dies_at_first, dies_often
-from tests.service.scale.large.parts import arrays, assert_is, contents, here, many_kinds, refined
+from tests.service.scale.large.parts import (
+    LOOP,
+    arrays,
+    assert_is,
+    contents,
+    here,
+    many_kinds,
+    refined,
+)
 from tests.support.meshes import bent, grid
 
 
@@ -54,15 +62,30 @@ def test_a_driver_that_was_stopped_goes_on(tmp_path):
     assert not (tmp_path / "out.work").exists()
 
 
-def test_another_input_or_option_begins_anew(tmp_path):
-    source = arrays(tmp_path / "in", many_kinds())
+def stops_after_one(tasks):
+    yield [run_part(next(tasks))]
+    raise KeyboardInterrupt
 
-    def stops(tasks):
-        yield [run_part(next(tasks))]
-        raise KeyboardInterrupt
 
+@pytest.mark.parametrize("change", [{"parts": 5}, {"options": LOOP}, {"model": "full"}], ids=str)
+def test_other_parts_or_options_or_another_model_begin_anew(tmp_path, change):
+    first = {"parts": 3, "options": Options(levels=1), "model": "paper"}
+    source, given = arrays(tmp_path / "in", many_kinds()), first | change
+    refined(source, tmp_path / "expected", **given)
     with pytest.raises(KeyboardInterrupt):
-        refined(source, tmp_path / "out", 3, engine=stops)
+        refined(source, tmp_path / "out", **first, engine=stops_after_one)
+    (before,) = (path for path in (tmp_path / "out.work").iterdir() if path.is_dir())
+    with pytest.raises(KeyboardInterrupt):
+        refined(source, tmp_path / "out", **given, engine=stops_after_one)
+    assert not before.exists()
+    refined(source, tmp_path / "out", **given)
+    assert contents(tmp_path / "out") == contents(tmp_path / "expected")
+
+
+def test_another_input_begins_anew(tmp_path):
+    source = arrays(tmp_path / "in", many_kinds())
+    with pytest.raises(KeyboardInterrupt):
+        refined(source, tmp_path / "out", 3, engine=stops_after_one)
     shutil.rmtree(source)
     mesh = Mesh(*grid(9, bent))
     refined(arrays(tmp_path / "in", mesh), tmp_path / "out", 3)
