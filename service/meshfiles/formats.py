@@ -155,7 +155,7 @@ def _as_utf8(data: bytes) -> bytes:
 
 def _is_binary_stl(data: bytes) -> bool:
     """Return whether the count of faces agrees with the length: text may begin in any way."""
-    return len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
+    return len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
 
 
 def _uv(parts: list[trimesh.Trimesh]) -> Float[np.ndarray, "N 2"] | None:
