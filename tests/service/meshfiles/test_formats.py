@@ -210,6 +210,26 @@ def test_what_is_left_out_is_named(kind: str, data: bytes, names: set[str]) -> N
     assert {f"{name} dropped" for name in names} <= {c["what"] for c in report["changes"]}
 
 
+def test_an_off_of_coloured_vertices_has_the_same_ones() -> None:
+    plain = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    coloured = b"COFF\n3 1 0\n0 0 0 9 9 9 1\n1 0 0 9 9 9 1\n0 1 0 9 9 9 1\n3 0 1 2\n"
+    first, second = (formats.read(data, "off") for data in (plain, coloured))
+    np.testing.assert_array_equal(first.vertices, second.vertices)
+    np.testing.assert_array_equal(first.faces, second.faces)
+
+
+@pytest.mark.parametrize("given", [b"vt 1e39 0\n", b"vt -1e39 0\n", b"vt .5\n"])
+def test_texture_coordinates_that_are_none_are_left_out_and_told(given: bytes) -> None:
+    """One number, or what float32 cannot hold; two that it can are kept."""
+    text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n%bf 1/1 2/1 3/1\n"
+    read = formats.read(text % given, "obj")
+    assert read.uv is None
+    assert read.unsupported == {"texture coordinates that not all faces have": 1}
+    kept = formats.read(text % b"vt 1e38 0\n", "obj")
+    assert kept.uv is not None
+    assert kept.uv.tolist() == [[np.float64("1e38"), 0]] * 3
+
+
 @pytest.mark.parametrize("has_others", [False, True])
 def test_texture_coordinates_at_corners_of_a_ply_are_not_said_to_be_dropped(
     has_others: bool,
@@ -343,6 +363,12 @@ def test_faces_of_two_vertices_are_counted() -> None:
 def test_numbers_that_make_no_mesh_are_refused(text: bytes) -> None:
     with pytest.raises(UnrefinableError):
         refined(formats.read(text, "off"))
+
+
+@pytest.mark.parametrize("corner", [-1, 3, 9])
+def test_a_corner_that_is_no_vertex_is_told_with_those_that_there_are(corner: int) -> None:
+    with pytest.raises(UnrefinableError, match=rf"vertices \[0, 1, {corner}\], expected 0 … 2"):
+        formats.read(b"OFF\n3 1 0\n" + TRIANGLE + b"3 0 1 %d\n" % corner, "off")
 
 
 @pytest.mark.parametrize("limits", [Limits(max_faces=100), Limits(max_memory_bytes=1000)])
