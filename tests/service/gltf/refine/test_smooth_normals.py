@@ -41,6 +41,8 @@ def test_copies_of_faces_make_no_new_normal_somebody_s_own():
     # They may begin at another corner.
     copies = [np.roll(faces[:1], first, axis=1) for first in range(3)]
     result = primitive_of(refined([shape | {"indices": np.concatenate([faces, *copies])}]))
+    placed = np.hstack([result["POSITION"], result["NORMAL"]])
+    assert len(np.unique(placed, axis=0)) == 66  # each point has one, whoever's it is
     surface = trimesh.Trimesh(result["POSITION"], result["indices"].reshape(-1, 3), process=False)
     np.testing.assert_allclose(result["NORMAL"], surface.vertex_normals, atol=1e-5)
 
