@@ -185,7 +185,7 @@ def _beside_triangles(
             coordinates = 0 if has_uv else len(_OBJ_UV.findall(data))
             if coordinates:
                 others["texture coordinates that not all faces have"] = coordinates
-            return len(_OBJ_FACE.findall(data)), others
+            return len(_OBJ_FACE.findall(data)) - others.get(unsupported.SIDES, 0), others
         case "ply":
             elements = parts[0].metadata["_ply_raw"]
             if polygons is not None:

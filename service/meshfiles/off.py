@@ -17,6 +17,7 @@ from ..errors import UnreadableError
 from .fans import fans
 from .indexed_triangles import NUMBER, IndexedTriangles
 from .text_numbers import reals, whole
+from .unsupported import SIDES
 
 # Lines whose words are held at the same time.
 BLOCK = 2**14
@@ -58,7 +59,7 @@ def read_off(data: bytes) -> IndexedTriangles:
     extras = header[1].decode()
     unsupported = {
         f"values that {extras}OFF adds to vertices": vertex_count if extras else 0,
-        "faces of fewer than three vertices": int((sizes < 3).sum()),
+        SIDES: int((sizes < 3).sum()),
     }
     return IndexedTriangles(
         vertices,

@@ -15,6 +15,7 @@ _OBJ_STATEMENT = re.compile(rb"^[ \t]*(vn|usemtl|g|o|s|l|p|vp|curv|surf)[ \t]", 
 _OBJ_COLOUR = re.compile(rb"^[ \t]*v(?:[ \t]+[^\s]+){6,}[ \t]*\r?$", re.MULTILINE)
 _OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
 _OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
+_OBJ_SIDE = re.compile(rb"^[ \t]*f(?:[ \t]+[^\s#\\]+){0,2}[ \t]*\r?(?:$|#)", re.MULTILINE)
 # The first number of each corner, and the ends of lines.
 _OBJ_REFERENCE = re.compile(rb"(?<![^\s])-?\d{1,18}|\n")
 _OBJ_CONTINUED = re.compile(rb"\\\r?\n")
@@ -37,6 +38,7 @@ _PLY_TEXTURE = re.compile(rb"^comment TextureFile[ \t]", re.MULTILINE)
 # Behind a header, and behind the twelve numbers of each face: by no standard its colour.
 _STL_HEADER = 84
 _STL_FACE = np.dtype([("numbers", "V48"), ("attribute", "<u2")])
+SIDES = "faces of fewer than three vertices"
 
 
 def of_obj(data: bytes) -> dict[str, int]:
@@ -44,6 +46,8 @@ def of_obj(data: bytes) -> dict[str, int]:
     counts = Counter(_OBJ_NAMES[name] for name in _OBJ_STATEMENT.findall(data))
     if colours := len(_OBJ_COLOUR.findall(data)):
         counts["vertex colours"] = colours
+    if sides := len(_OBJ_SIDE.findall(data)):
+        counts[SIDES] = sides
     return dict(counts)
 
 

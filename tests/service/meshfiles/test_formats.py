@@ -345,10 +345,17 @@ def test_names_in_old_encodings_are_no_obstacle(kind: str) -> None:
     assert len(formats.read(text[kind], kind).faces) == 1
 
 
-def test_faces_of_two_vertices_are_counted() -> None:
-    mesh_file = formats.read(b"OFF\n3 2 0\n" + TRIANGLE + b"3 0 1 2\n2 0 1\n", "off")
+@pytest.mark.parametrize(
+    ("kind", "data", "split"),
+    [
+        ("off", b"OFF\n3 2 0\n" + TRIANGLE + b"3 0 1 2\n2 0 1\n", 0),
+        ("obj", POLYGONS["obj"] + b"f 1 2 # a side\r\nf 1 \\\n 2 3\n", 3),
+    ],
+)
+def test_faces_of_two_vertices_are_counted(kind: str, data: bytes, split: int) -> None:
+    mesh_file = formats.read(data, kind)
     assert mesh_file.unsupported == {"faces of fewer than three vertices": 1}
-    assert mesh_file.split == 0
+    assert mesh_file.split == split
 
 
 @pytest.mark.parametrize(
