@@ -16,6 +16,7 @@ from pns_common.base.whole_file import replace_file
 
 from ...errors import InvalidParameter, ServiceError, UnreadableError, WorkerDied
 from ...options import Options
+from ..report_file import check_report_file
 from .arrays import CREASES, FACES, POSITIONS
 
 # Raised whenever parts come out otherwise than before: parts of two versions would not meet.
@@ -49,10 +50,7 @@ class Large:
 
 def check_report(report: Path, large: Large) -> None:
     """Raise InvalidParameter where a report cannot be written, or would lie in a mesh's place."""
-    if not report.parent.is_dir():
-        raise InvalidParameter("report", f"{report.parent}: there is no such folder")
-    if report.is_dir():
-        raise InvalidParameter("report", f"{report}: it is a folder")
+    check_report_file(report)
     meshes = large.source.resolve(), large.output.resolve()
     if any(report.resolve().is_relative_to(mesh) for mesh in meshes):
         raise InvalidParameter("report", f"{report}: it must lie outside of IN and OUT")
