@@ -37,7 +37,6 @@ _STL_PART = re.compile(rb"(?im)^[ \t]*(?:endsolid|solid)(?:[ \t][^\n]*)?\r?$")
 # parts that materials and names divide a file into. They are lost in any case: an OBJ's are passed
 # over before it reads, so that its faces stay in their order; an STL's beyond so many statements.
 MOST_PARTS = 100
-_OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]", re.MULTILINE)
 
 
 def load_readers() -> ModuleType:
@@ -80,7 +79,7 @@ def _read_by_trimesh(data: bytes, kind: str) -> IndexedTriangles:
         raise UnreadableError(f"the {kind.upper()} file has no faces{other}")
     faces = disjoint_faces((np.asarray(part.faces), len(part.vertices)) for part in parts)
     uv = _uv(parts)
-    count, others = _beside_triangles(data, kind, parts, polygons, has_uv=uv is not None)
+    count, unused, others = _beside_triangles(data, kind, parts, polygons, has_uv=uv is not None)
     if kind == "ply" and polygons is None and count is not None and len(faces) < count:
         # trimesh takes what is there of a text that was cut off.
         raise UnreadableError(f"the PLY file says {count} faces and ends after {len(faces)}")
@@ -88,7 +87,7 @@ def _read_by_trimesh(data: bytes, kind: str) -> IndexedTriangles:
         vertices=np.concatenate([np.asarray(part.vertices, dtype=np.float64) for part in parts]),
         faces=faces.astype(np.int64),
         uv=uv,
-        unused=unsupported.unused_in_obj(data) if kind == "obj" else 0,
+        unused=unused,
         split=0 if count is None else max(0, len(faces) - count),
         unsupported=others,
     )
@@ -174,8 +173,10 @@ def _uv(parts: list[trimesh.Trimesh]) -> Float[np.ndarray, "N 2"] | None:
 
 def _beside_triangles(
     data: bytes, kind: str, parts: list[trimesh.Trimesh], polygons: int | None, *, has_uv: bool
-) -> tuple[int | None, dict[str, int]]:
+) -> tuple[int | None, int, dict[str, int]]:
     """Count the faces that the file lists (None: triangles only), and what is beside them.
+
+    That is vertices that no face names, where trimesh leaves them out, and, by name, all else.
 
     `polygons` are those of a PLY that were cut before it was read.
     """
@@ -185,18 +186,20 @@ def _beside_triangles(
             coordinates = 0 if has_uv else len(_OBJ_UV.findall(data))
             if coordinates:
                 others["texture coordinates that not all faces have"] = coordinates
-            return len(_OBJ_FACE.findall(data)) - others.get(unsupported.SIDES, 0), others
+            faces = unsupported.faces_of_obj(data)
+            if faces.sides:
+                others[unsupported.SIDES] = faces.sides
+            return faces.polygons, faces.unused, others
         case "ply":
             elements = parts[0].metadata["_ply_raw"]
             if polygons is not None:
                 elements["face"]["length"] = polygons
-            return int(elements["face"]["length"]), unsupported.of_ply(
-                data, elements, has_uv=has_uv
-            )
+            others = unsupported.of_ply(data, elements, has_uv=has_uv)
+            return int(elements["face"]["length"]), 0, others
         case "stl" if _is_binary_stl(data):
-            return None, unsupported.of_stl(data)
+            return None, 0, unsupported.of_stl(data)
         case _:
-            return None, {}
+            return None, 0, {}
 
 
 def _obj(mesh_file: IndexedTriangles) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,6 @@ _OBJ_STATEMENT = re.compile(rb"^[ \t]*(vn|usemtl|g|o|s|l|p|vp|curv|surf)[ \t]", 
 _OBJ_COLOUR = re.compile(rb"^[ \t]*v(?:[ \t]+[^\s]+){6,}[ \t]*\r?$", re.MULTILINE)
 _OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
 _OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
-_OBJ_SIDE = re.compile(rb"^[ \t]*f(?:[ \t]+[^\s#\\]+){0,2}[ \t]*\r?(?:$|#)", re.MULTILINE)
 # The first number of each corner, and the ends of lines.
 _OBJ_REFERENCE = re.compile(rb"(?<![^\s])-?\d{1,18}|\n")
 _OBJ_CONTINUED = re.compile(rb"\\\r?\n")
@@ -46,23 +45,37 @@ def of_obj(data: bytes) -> dict[str, int]:
     counts = Counter(_OBJ_NAMES[name] for name in _OBJ_STATEMENT.findall(data))
     if colours := len(_OBJ_COLOUR.findall(data)):
         counts["vertex colours"] = colours
-    if sides := len(_OBJ_SIDE.findall(data)):
-        counts[SIDES] = sides
     return dict(counts)
 
 
-def unused_in_obj(data: bytes) -> int:
-    """Count the vertices that no face names; trimesh leaves them out without a word."""
+class ObjFaces(NamedTuple):
+    """What an OBJ's faces name, of which trimesh leaves out without a word what makes none.
+
+    Attributes:
+        polygons: faces of three vertices or more.
+        sides: those of fewer.
+        unused: vertices that no face names.
+    """
+
+    polygons: int
+    sides: int
+    unused: int
+
+
+def faces_of_obj(data: bytes) -> ObjFaces:
+    """Count the faces that an OBJ lists, and the vertices that none of them names."""
     text = _OBJ_CONTINUED.sub(b" ", data)
     starts = np.array([match.start() for match in _OBJ_VERTEX.finditer(text)], dtype=np.int64)
     lines = list(_OBJ_FACE.finditer(text))
     words = np.array(_OBJ_REFERENCE.findall(b"\n".join(line[1] for line in lines)), dtype=bytes)
     ends = words == b"\n"
     number, line = words[~ends].astype(np.int64), np.cumsum(ends)[~ends]
+    sides = int((np.bincount(line, minlength=len(lines)) < 3).sum())
     # A negative index counts back from its own line.
     before = starts.searchsorted([match.start() for match in lines])
     index = np.where(number < 0, before[line] + number, number - 1)
-    return len(starts) - len(np.unique(index[(index >= 0) & (index < len(starts))]))
+    used = np.unique(index[(index >= 0) & (index < len(starts))])
+    return ObjFaces(len(lines) - sides, sides, len(starts) - len(used))
 
 
 def of_stl(data: bytes) -> dict[str, int]:
