@@ -102,7 +102,7 @@ def scheme_steps(
     shaped, flat = synthetic_bodies(seed), flat_bodies(seed)
     every = (*shaped, *real)
     return [
-        Step("T1", "bounded displacement", lambda: bounded_displacement(subject, every)),
+        Step("T1", "bounded displacement", lambda: bounded_displacement(subject, every, seed=seed)),
         Step("T2", "equivariance", lambda: equivariance(subject, every, seed)),
         Step("T3", "affine reproduction", lambda: affine_reproduction(subject, flat, seed)),
         Step("T4", "proximity slope", lambda: proximity_slope(subject, every)),
@@ -125,8 +125,8 @@ def _steps_of_kind(
         return [Step("stars", "lifted stars", lambda: lifted_stars(subject, valences))]
     rough = (*bodies, Body("spiky sphere", spiky_sphere(seed)))
     return [
-        Step("folds", "fold-free", lambda: fold_free(subject, rough)),
-        Step("limit", "limit distance", lambda: limit_distance(subject, rough)),
+        Step("folds", "fold-free", lambda: fold_free(subject, rough, seed)),
+        Step("limit", "limit distance", lambda: limit_distance(subject, rough, seed)),
         Step("class", "smoothness class", lambda: smoothness_class(subject, bodies)),
         Step("scale", "resolution independence", lambda: resolution_independence(subject, bodies)),
     ]

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common.connectivity.creases import Creases
 from pns_common.connectivity.topology import split
 from pns_common.mesh import Mesh
 from pns_common.refine import refine
@@ -21,6 +22,7 @@ from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import rounding, step
 from train.certificates.subject import Subject
+from train.certificates.trials import trials
 
 # Child faces that Loop makes flatter than this, in squared edge lengths, have no direction.
 FLAT = 1e-9
@@ -33,15 +35,18 @@ SCALES = (2.0**-12, 2.0**-3, 2.0**5)
 UNBOUNDED = 1e15
 
 
-def fold_free(subject: Subject, bodies: Sequence[Body]) -> Certificate:
-    """Certify that no child face turns by more than θ from Loop's, in degrees."""
+def fold_free(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certificate:
+    """Certify that no child face turns by more than θ from Loop's with the same creases.
+
+    The value is the largest turn in degrees.
+    """
     guard = subject.scheme.guard
     allowed = math.nan if guard is None else math.degrees(guard.angle) + ROUNDING_ANGLE
     measured = []
-    for body in bodies:
-        base = plain_loop(body.mesh.vertices, body.mesh.faces).positions
-        made = step(subject.scheme, body.mesh)
-        measured.append((largest_turn(split(made.topology), base, made.positions), body.name))
+    for trial in trials(subject, bodies, seed):
+        base = plain_loop(trial.mesh.vertices, trial.mesh.faces, trial.creases).positions
+        made = step(subject.scheme, trial.mesh, creases=trial.creases)
+        measured.append((largest_turn(split(made.topology), base, made.positions), trial.name))
     angle, place = worst(measured)
     return Certificate("folds", "fold-free", angle, high=allowed, where=place)
 
@@ -63,25 +68,25 @@ def largest_turn(
     return float(np.max(np.where(np.isnan(angle), 180.0, angle), initial=0.0))
 
 
-def limit_distance(subject: Subject, bodies: Sequence[Body]) -> Certificate:
+def limit_distance(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certificate:
     """Certify that the report of two levels bounds the distance from Loop's limit surface.
 
     The value is the largest distance between the two limits at common parameters, as a fraction of
-    what the report says; and what it says must be no more than the budget's bound.
+    what the report says; and what it says must be no more than the budget's bound, which it comes
+    near where the budget cuts off. Creases are sharp at one level.
     """
     measured = []
-    for body in bodies:
-        ours, theirs = (
-            refine(body.mesh, scheme, 2, 1.0, limit=True, threads=1)
-            for scheme in (subject.scheme, loop())
-        )
+    for trial in trials(subject, bodies, seed):
+        creases = Creases(trial.creases, levels=1) if len(trial.creases) else "auto"
+        ours = refine(trial.mesh, subject.scheme, 2, 1.0, limit=True, creases=creases, threads=1)
+        theirs = refine(trial.mesh, loop(), 2, 1.0, limit=True, threads=1)
         apart = np.linalg.norm(ours.mesh.vertices - theirs.mesh.vertices, axis=1).max()
         stated, bound = (ours.report[key] for key in ("limit_distance", "limit_distance_bound"))
         assert stated is not None
-        slack = rounding(body.mesh)
-        measured.append((float(apart) / (stated + slack), body.name))
+        slack = rounding(trial.mesh)
+        measured.append((float(apart) / (stated + slack), trial.name))
         if bound is not None:
-            measured.append((stated / (bound * (1 + SAME) + slack), f"{body.name}, bound"))
+            measured.append((stated / (bound * (1 + SAME) + slack), f"{trial.name}, bound"))
     ratio, place = worst(measured)
     return Certificate("limit", "limit distance", ratio, high=1 + SAME, where=place)
 

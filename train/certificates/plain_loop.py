@@ -21,21 +21,29 @@ class PlainLoop:
             square length of the edges around an old vertex with interior edges only, and 0 where
             no correction is allowed.
         wide_reach: the same with the longest edge of both faces at an interior edge.
-        boundary_reach: the same where a rule for boundaries may move what lies on them: a boundary
-            edge's length, and the root mean square of both at a vertex on two of them and no other
-            sharp edge; 0 elsewhere.
+        curve_reach: the same where a rule for curves may move what lies on them: the length of a
+            boundary edge or a crease, and the root mean square of both at a vertex on two of them
+            and no other sharp edge; 0 elsewhere.
         labels: what each vertex is, for messages.
     """
 
     positions: Float[np.ndarray, "N 3"]
     reach: Float[np.ndarray, " N"]
     wide_reach: Float[np.ndarray, " N"]
-    boundary_reach: Float[np.ndarray, " N"]
+    curve_reach: Float[np.ndarray, " N"]
     labels: list[str]
 
 
-def plain_loop(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> PlainLoop:
-    """Subdivide once; every loop here is meant to be read, not to be fast."""
+def plain_loop(
+    vertices: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    creases: Int[np.ndarray, "N 2"] | None = None,
+) -> PlainLoop:
+    """Subdivide once; every loop here is meant to be read, not to be fast.
+
+    ``creases`` are edges to be kept sharp: pairs of vertices, the lower first.
+    """
+    named = set() if creases is None else set(map(tuple, creases.tolist()))
     opposites: dict[tuple[int, int], list[tuple[int, bool]]] = {}
     for a, b, c in faces.tolist():
         for start, end, opposite in ((a, b, c), (b, c, a), (c, a, b)):
@@ -44,32 +52,35 @@ def plain_loop(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
 
     neighbours: list[list[int]] = [[] for _ in vertices]
     sharp: list[list[int]] = [[] for _ in vertices]
-    borders: list[list[int]] = [[] for _ in vertices]
-    edge_positions, edge_reach, wide_reach, border_reach = [], [], [], []
+    curves: list[list[int]] = [[] for _ in vertices]
+    edge_positions, edge_reach, wide_reach, curve_reach = [], [], [], []
     labels = [f"vertex {v}" for v in range(len(vertices))]
     for (a, b), sides in opposites.items():
         for vertex, neighbour in ((a, b), (b, a)):
             neighbours[vertex].append(neighbour)
         labels.append(f"edge ({a}, {b})")
-        if len(sides) == 2 and sides[0][1] != sides[1][1]:
+        is_interior = len(sides) == 2 and sides[0][1] != sides[1][1]
+        is_crease = is_interior and (a, b) in named
+        if is_interior and not is_crease:
             (c, _), (d, _) = sides
             ends, wings = vertices[a] + vertices[b], vertices[c] + vertices[d]
             edge_positions.append((3 * ends + wings) / 8)
             edge_reach.append(math.dist(vertices[a], vertices[b]))
             sides_of_faces = ((a, b), (a, c), (b, c), (a, d), (b, d))
             wide_reach.append(max(math.dist(vertices[i], vertices[j]) for i, j in sides_of_faces))
-            border_reach.append(0.0)
+            curve_reach.append(0.0)
         else:
             edge_positions.append((vertices[a] + vertices[b]) / 2)
             edge_reach.append(0.0)
             wide_reach.append(0.0)
-            border_reach.append(math.dist(vertices[a], vertices[b]) if len(sides) == 1 else 0.0)
+            is_curve = is_crease or len(sides) == 1
+            curve_reach.append(math.dist(vertices[a], vertices[b]) if is_curve else 0.0)
             for vertex, neighbour in ((a, b), (b, a)):
                 sharp[vertex].append(neighbour)
-                if len(sides) == 1:
-                    borders[vertex].append(neighbour)
+                if is_curve:
+                    curves[vertex].append(neighbour)
 
-    moved, reach, on_border = [], [], []
+    moved, reach, on_curve = [], [], []
     for v, point in enumerate(vertices):
         ring = neighbours[v]
         if len(sharp[v]) > 2 or not ring:
@@ -83,14 +94,14 @@ def plain_loop(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
         smooth = bool(ring) and not sharp[v]
         squares = [math.dist(point, vertices[n]) ** 2 for n in ring]
         reach.append(math.sqrt(sum(squares) / len(ring)) if smooth else 0.0)
-        two = [math.dist(point, vertices[n]) ** 2 for n in borders[v]]
-        on_border.append(math.sqrt(sum(two) / 2) if len(two) == len(sharp[v]) == 2 else 0.0)
+        two = [math.dist(point, vertices[n]) ** 2 for n in curves[v]]
+        on_curve.append(math.sqrt(sum(two) / 2) if len(two) == len(sharp[v]) == 2 else 0.0)
 
     positions = np.array([*moved, *edge_positions])
     return PlainLoop(
         positions,
         np.array([*reach, *edge_reach]),
         np.array([*reach, *wide_reach]),
-        np.array([*on_border, *border_reach]),
+        np.array([*on_curve, *curve_reach]),
         labels,
     )

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
+from pns_common.connectivity.creases import with_creases
 from pns_common.connectivity.topology import Topology, build_topology
 from pns_common.levels.step import level_step
 from pns_common.mesh import Mesh
@@ -29,9 +30,14 @@ class Step:
     topology: Topology
 
 
-def step(scheme: Scheme, mesh: Mesh, reference_length: float = 1.0) -> Step:
-    """Apply a scheme once, as at the control mesh."""
-    topology = build_topology(mesh.faces, len(mesh.vertices))
+def step(
+    scheme: Scheme,
+    mesh: Mesh,
+    reference_length: float = 1.0,
+    creases: Int[np.ndarray, "N 2"] | None = None,
+) -> Step:
+    """Apply a scheme once, as at the control mesh; ``creases`` are edges to be kept sharp."""
+    topology = with_creases(build_topology(mesh.faces, len(mesh.vertices)), creases)
     made = level_step(control_level(mesh.vertices, topology, reference_length), scheme)
     placed = (made.vertices, made.edges)
     return Step(

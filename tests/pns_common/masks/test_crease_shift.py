@@ -85,6 +85,16 @@ def test_no_vertex_and_no_limit_is_farther_from_plain_loop_than_the_report_says(
         assert np.linalg.norm(later - limits, axis=1).max() <= stated
 
 
+@pytest.mark.parametrize(("limit", "share"), [(False, 1.0), (True, 0.7)])
+@pytest.mark.parametrize("name", MESHES)
+def test_creases_keep_back_as_much_as_the_report_says(name, limit, share):
+    mesh, pairs = MESHES[name], crease_lines(MESHES[name])
+    made, plain = (refine(mesh, loop(), 1, limit=limit, creases=given) for given in (pairs, None))
+    apart = np.linalg.norm(made.mesh.vertices - plain.mesh.vertices, axis=1).max()
+    for key in ("limit_distance", "limit_distance_bound"):
+        assert share * (1 - 1e-12) <= apart / made.report[key] <= 1 + 1e-12
+
+
 def test_a_round_mesh_says_nothing_of_creases():
     report = refine(Mesh(*bumpy_sphere()), GENERAL, 2).report
     assert all("crease_shift_max" not in level for level in report["levels"])

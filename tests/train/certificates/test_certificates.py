@@ -28,6 +28,7 @@ from train.certificates.regular import regular_smoothness
 from train.certificates.scaling import normal_variation_slope, proximity_slope
 from train.certificates.stability import lipschitz_slope
 from train.certificates.subject import Subject, subject_of_model, subject_of_network
+from train.certificates.trials import drawn_creases
 from train.models.networks import BoundedNet
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
@@ -175,6 +176,19 @@ def test_plain_loop_agrees_with_the_operators_on_every_kind_of_edge(mesh):
     base = plain_loop(mesh.vertices, mesh.faces)
     np.testing.assert_allclose(base.positions, refine(mesh, loop()).mesh.vertices, atol=1e-15)
     assert len(base.labels) == len(base.reach) == len(base.positions)
+
+
+@pytest.mark.parametrize(
+    "body", [*BODIES, Body("closed", Mesh(*icosphere(1)))], ids=lambda b: b.name
+)
+def test_plain_loop_keeps_the_creases_that_the_operator_keeps(body):
+    mesh, creases = body.mesh, drawn_creases(body.mesh, np.random.default_rng(0))
+    base = plain_loop(mesh.vertices, mesh.faces, creases)
+    kept = refine(mesh, loop(), creases=creases)
+    np.testing.assert_allclose(base.positions, kept.mesh.vertices, atol=1e-15)
+    inside, rims = (kept.report["levels"][0]["edges"][kind] for kind in ("crease", "boundary"))
+    assert inside > 0
+    assert np.count_nonzero(base.curve_reach[len(mesh.vertices) :]) == inside + rims
 
 
 def test_flat_bodies_are_flat_and_not_folded():

@@ -92,6 +92,18 @@ def test_crease_lines_do_not_count_against_the_bound():
     assert bounded_displacement(subject_of_scheme(tight, 0.05), box_alone, levels=1).passed
 
 
+def test_curves_beyond_their_bound_are_found_at_creases():
+    """Nothing else is moved: no network, no prior of the surface, no boundary."""
+    still = {"prior_strength": 0.0, "boundary_strength": 1.0, "crease_prior": True}
+    curves, closed = subject(0.0, **still), BODIES[3:]
+    honest = bounded_displacement(curves, closed, 1)
+    assert honest.passed
+    assert honest.value > 0.999
+    beyond = bounded_displacement(replace(curves, budget=curves.budget / 1.01), closed, 1)
+    assert not beyond.passed
+    assert beyond.where.startswith("creased")
+
+
 def test_a_guard_that_is_looser_than_it_says_is_found():
     wild = subject(200.0)
     honest = fold_free(wild, BODIES)
