@@ -13,8 +13,9 @@ from ..errors import UnrefinableError
 from ..gltf.read.index_references import INSTANCING
 from ..gltf.read.modes import SURFACES, TRIANGLES
 from ..gltf.read.primitives import TrianglePrimitive, read_primitive
+from ..gltf.read.schema import Document
 from ..gltf.read.upload import read_upload
-from ..gltf.refine.skins import read_binding
+from ..gltf.refine.skin_and_morph import read_skin_and_morph
 from ..meshes.weld import weld
 from ..options import Limits
 from ..report import Change
@@ -42,7 +43,12 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, li
     }
     worlds = _placed_nodes(upload.tree)
     placed = [
-        (primitives[mesh], worlds[node], joint_matrices(upload, node, worlds))
+        (
+            primitives[mesh],
+            _shown_weights(upload.document, node, mesh),
+            worlds[node],
+            joint_matrices(upload, node, worlds),
+        )
         for node in worlds
         if (mesh := upload.document.nodes[node].mesh) in primitives
     ]
@@ -103,8 +109,15 @@ def _local_matrix(node: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
     return matrix
 
 
+def _shown_weights(document: Document, node: int, mesh: int) -> list[float]:
+    """Return the weights of morph targets that viewers show a mesh with; none is 0 each."""
+    own = document.nodes[node].weights
+    return document.meshes[mesh].weights if own is None else own
+
+
 def _placed(
     primitives: list[TrianglePrimitive],
+    weights: list[float],
     matrix: Float[np.ndarray, "4 4"],
     joints: Float[np.ndarray, "J 4 4"] | None,
     *,
@@ -112,6 +125,9 @@ def _placed(
 ) -> IndexedTriangles:
     """Place one mesh in the world; closed at its seams where nothing is left to tell them by."""
     positions = np.concatenate([p.attributes["POSITION"] for p in primitives]).astype(np.float64)
+    follows = read_skin_and_morph(primitives)
+    for weight, delta in zip(weights, follows.deltas, strict=False):
+        positions += weight * delta.astype(np.float64)
     faces = disjoint_faces((p.corners, len(p.attributes["POSITION"])) for p in primitives)
     uv = np.concatenate([_uv(p) for p in primitives]) if keeps_uv else None
     rows = np.arange(len(positions))
@@ -122,9 +138,8 @@ def _placed(
         rows[welded.vertex_of[used]] = used
         positions, faces = welded.points, welded.faces
     world = positions @ matrix[:3, :3].T + matrix[:3, 3]
-    binding = None if joints is None else read_binding(primitives)
-    if joints is not None and binding is not None:
-        world = posed(positions, binding.take(rows), joints, placed=world)
+    if joints is not None and follows.binding is not None:
+        world = posed(positions, follows.binding.take(rows), joints, placed=world)
         matrix = joints[0]
     if np.linalg.det(matrix[:3, :3]) < 0:
         # A mirroring node turns faces over; their order of corners keeps them facing outwards.

@@ -113,6 +113,7 @@ class Mesh(Part, frozen=True):
     """`meshes[]`."""
 
     primitives: list[Primitive] = []
+    weights: list[float] = []
 
 
 class Node(Part, frozen=True):
@@ -122,6 +123,7 @@ class Node(Part, frozen=True):
     mesh: Index | None = None
     skin: Index | None = None
     camera: Index | None = None
+    weights: list[float] | None = None
     extensions: dict[str, Any] = {}
 
 

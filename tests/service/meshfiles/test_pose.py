@@ -95,3 +95,32 @@ def test_joints_of_another_scene_place_nothing():
     tree, binary = skinned([[1, 0, 0, 0]] * 6, [[1, 0, 0, 0]] * 6)
     tree["scenes"][0]["nodes"] = [0]
     np.testing.assert_array_equal(corners(tree, binary), 100 * own_corners())
+
+
+@pytest.mark.parametrize(
+    ("of_mesh", "of_node", "shown"),
+    [([0.5, 1], None, [0.5, 1]), ([0.5, 1], [0, 2], [0, 2]), (None, [1e39, 0], [1e39, 0])],
+)
+def test_morph_targets_stand_as_their_weights_show_them(of_mesh, of_node, shown):
+    rng = np.random.default_rng(0)
+    deltas = rng.normal(size=(2, 6, 3)).astype(np.float32)
+    shape = {**octahedron(), "targets": [{"POSITION": delta} for delta in deltas]}
+    tree, binary = files.document([shape])
+    tree["meshes"][0] |= {} if of_mesh is None else {"weights": of_mesh}
+    tree["nodes"][0] |= {} if of_node is None else {"weights": of_node}
+    faces = np.asarray(octahedron()["indices"]).reshape(-1, 3)
+    expected = octahedron()["POSITION"] + np.tensordot(shown, deltas, axes=1)
+    np.testing.assert_allclose(corners(tree, binary), expected[faces], rtol=1e-6)
+
+
+def test_joints_move_what_morph_targets_have_moved():
+    tree, binary = skinned([[1, 0, 0, 0]] * 6, [[1, 0, 0, 0]] * 6)
+    delta = np.arange(18, dtype=np.float32).reshape(6, 3)
+    tree["meshes"][0]["primitives"][0]["targets"] = [
+        {"POSITION": files.add_accessor(tree, binary, delta)}
+    ]
+    tree["buffers"] = [{"byteLength": len(binary)}]
+    tree["meshes"][0]["weights"] = [2.0]
+    faces = np.asarray(octahedron()["indices"]).reshape(-1, 3)
+    moved = (octahedron()["POSITION"] + 2 * delta) @ TURN[:3, :3].T + [5, 0, 0]
+    np.testing.assert_allclose(corners(tree, binary), moved[faces], atol=1e-5)
