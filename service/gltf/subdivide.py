@@ -22,6 +22,7 @@ from .read.upload import Media, Upload, read_upload
 from .refine.meshes import refined_meshes
 from .stage_shares import PUT_TOGETHER, READ
 from .write.packing import BYTES_PER_FACE, WRITERS
+from .write.same_geometry import SameGeometry
 from .write.storage import remove_replaced, storage_changes, withdraw_unused
 from .write.unused import VertexUse
 
@@ -75,11 +76,16 @@ def subdivide_gltf(
         writer = WRITERS[options.compress].start(upload.tree, upload.buffers)
 
     results: list[MeshResult] = []
-    vertices = VertexUse(upload.document)
+    vertices, same = VertexUse(upload.document), SameGeometry(upload.document)
+    written: dict[int, int] = {}
     with course.part(READ, PUT_TOGETHER):
         for mesh in refined_meshes(upload, scheme, options, course):
             with course.stage("write"):
-                written = writer.replace_mesh(mesh.index, mesh.refined, course)
+                first = same.before(mesh.index)
+                if first == mesh.index:
+                    written[first] = writer.replace_mesh(first, mesh.refined, course)
+                else:
+                    writer.repeat_mesh(mesh.index, first, mesh.refined)
                 vertices.add(mesh.index, mesh.primitives, mesh.kept)
             changes += mesh.changes
             results.append(
@@ -87,7 +93,7 @@ def subdivide_gltf(
                     index=mesh.index,
                     instances=instances[mesh.index],
                     primitives=len(mesh.refined),
-                    vertices=written,
+                    vertices=written[first],
                     faces=sum(len(p.faces) for p in mesh.refined),
                     degenerate=mesh.degenerate,
                     copies=mesh.copies,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -14,6 +15,7 @@ from pns_common.base.extent import extent
 from ...course import Course
 from ...report import Change
 from ..constants import ARRAY_BUFFER, COLUMNS, COMPONENT_TYPES, ELEMENT_ARRAY_BUFFER
+from ..read.compressed import draco
 from ..read.modes import TRIANGLES
 from ..read.schema import Accessor
 from ..read.spare import Spare
@@ -29,6 +31,9 @@ WIDEST = 8
 
 # What an accessor is called, and what applications say of it.
 KEPT = ("name", "extras")
+
+# What a primitive names of accessors.
+GEOMETRY = ("attributes", "targets", "indices")
 
 _COMPONENT_TYPE_OF = {dtype: number for number, dtype in COMPONENT_TYPES.items()}
 
@@ -60,6 +65,19 @@ class Writer:
             course.reach(number / len(refined))
             vertices += self.replace(mesh, primitive)
         return vertices
+
+    def repeat_mesh(self, mesh: int, first: int, refined: Sequence[RefinedPrimitive]) -> None:
+        """Point the primitives of a mesh at the geometry that the same ones of another have."""
+        meshes = self.tree["meshes"]
+        for number in (primitive.source.number for primitive in refined):
+            primitive, like = (meshes[place]["primitives"][number] for place in (mesh, first))
+            shared = {key: like[key] for key in GEOMETRY if key in like}
+            primitive.update(deepcopy(shared))
+            if primitive.get("mode", TRIANGLES) != TRIANGLES:
+                primitive["mode"] = TRIANGLES
+            if draco.EXTENSION in like.get("extensions", {}):
+                data = deepcopy(like["extensions"][draco.EXTENSION])
+                primitive.setdefault("extensions", {})[draco.EXTENSION] = data
 
     def changes(self) -> list[Change]:
         """Return what was not written as it was made."""
