@@ -35,7 +35,8 @@ def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2
     These turn by more than ``angle`` (degrees, between 0 and 180), lie between sides that are flat
     beside them, and go on at both ends. None: by more than 66 degrees, and where at least half of
     the edges beyond 21 degrees are beyond 66, by more than 21, but for rows of like ones; so the
-    default model keeps them (geometry/crease_lines).
+    default model keeps them (geometry/crease_lines). With them go edges within a plane side that
+    would fold it, as the mitres of a frame.
 
     Raises:
         ParameterError: it is no Mesh, or the angle is out of range.

@@ -15,6 +15,7 @@ from pns_common.fused.mesh_edges import MeshEdges
 from pns_common.geometry.crease_lines import is_edged, with_gentler
 from pns_common.geometry.crease_lines.edge_rows import PARALLEL, ROW_ANGLE
 from pns_common.geometry.crease_lines.going_on import may_end
+from pns_common.geometry.crease_lines.mitres import with_mitres
 from pns_common.geometry.crease_lines.turns import cosine_of
 
 
@@ -25,7 +26,7 @@ def crease_line_rows(
     creases: Creases,
     blocks: Blocks,
 ) -> Int[np.ndarray, " N"]:
-    """Return the edges of the lines to look for; ``normals`` are the faces'."""
+    """Return the edges of the lines to look for, and mitres; ``normals`` are the faces'."""
     assert creases.line_angle is not None
     cosine, known, gentle = cosine_of(creases.line_angle), creases.edged, False
     beyond, found = edges_beyond(mesh, normals, cosine, blocks)
@@ -35,7 +36,7 @@ def crease_line_rows(
         gentle = is_edged(found, more) if known is None else known
         beyond, found = (bent, more) if gentle else (beyond, found)
     if not found:
-        return np.zeros(0, dtype=np.int32)
+        return with_mitres(points, normals, mesh, np.zeros(0, dtype=np.int32))
     sharp = np.flatnonzero(beyond).astype(np.int32)
     is_flat = np.empty(len(sharp), dtype=bool)
     sides = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
@@ -48,13 +49,15 @@ def crease_line_rows(
         drop_loose_ends(points, mesh.edges, rows, at_rim, cosine, *met, left)
         return rows[left]
 
-    if not gentle:
-        return going_on(flat)
-    alone = np.empty(len(flat), dtype=bool)
-    around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
-    least = PARALLEL**2, cosine_of(ROW_ANGLE)
-    blocks.run(len(flat), mark_alone.over(points, normals, *around, *least, flat, ROWS, alone))
-    return with_gentler(points, normals, mesh, flat[alone], cosine, going_on)
+    if gentle:
+        alone = np.empty(len(flat), dtype=bool)
+        around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
+        least = PARALLEL**2, cosine_of(ROW_ANGLE)
+        blocks.run(len(flat), mark_alone.over(points, normals, *around, *least, flat, ROWS, alone))
+        lines = with_gentler(points, normals, mesh, flat[alone], cosine, going_on)
+    else:
+        lines = going_on(flat)
+    return with_mitres(points, normals, mesh, lines)
 
 
 def edges_beyond(

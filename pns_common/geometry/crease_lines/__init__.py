@@ -30,6 +30,8 @@ are lines only if
    pieces or more, whose arc begins and ends with half the turn of those between. But chamfers of a
    bar that are a fifth as wide as its sides are no row.
 
+With them go mitres, plane edges between corners of lines that would fold a side (mitres.py).
+
 What makes a mesh edged are counts, and those of its pieces add up. Turning, moving, scaling or
 renumbering a mesh does not change the answer, nor does mirroring it with its faces turned, but
 where rounding decides. A mesh whose faces are turned over has ridges for hollows, and if it is
@@ -47,6 +49,7 @@ from pns_common.connectivity.creases import Creases, with_crease_rows
 from pns_common.connectivity.topology import Topology
 from pns_common.geometry.crease_lines.edge_rows import stand_alone
 from pns_common.geometry.crease_lines.going_on import go_on, may_end
+from pns_common.geometry.crease_lines.mitres import with_mitres
 from pns_common.geometry.crease_lines.turns import (
     Edges,
     cosine_of,
@@ -82,7 +85,7 @@ def line_rows(
     mesh: Topology,
     creases: Creases,
 ) -> Int[np.ndarray, " N"]:
-    """Return the edges of a mesh's crease lines, which ``creases`` say to look for.
+    """Return the edges of a mesh's crease lines, which ``creases`` say to look for, and mitres.
 
     ``normals`` are the faces' unit normals, 0 without area.
     """
@@ -96,7 +99,7 @@ def line_rows(
         gentle = is_edged(len(sharp), len(bent)) if known is None else known
         sharp = bent if gentle else sharp
     if len(sharp) == 0:
-        return sharp
+        return with_mitres(points, normals, mesh, sharp)
     flat = sharp[have_flat_sides(normals, mesh, sharp)]
 
     at_rim = may_end(mesh, normals)
@@ -104,10 +107,12 @@ def line_rows(
     def going_on(rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
         return rows[go_on(points, mesh, rows, at_rim, cosine)]
 
-    if not gentle:
-        return going_on(flat)
-    alone = flat[stand_alone(points, normals, mesh, flat)]
-    return with_gentler(points, normals, mesh, alone, cosine, going_on)
+    if gentle:
+        alone = flat[stand_alone(points, normals, mesh, flat)]
+        lines = with_gentler(points, normals, mesh, alone, cosine, going_on)
+    else:
+        lines = going_on(flat)
+    return with_mitres(points, normals, mesh, lines)
 
 
 def with_gentler(
