@@ -9,13 +9,8 @@ from pns_common.formula.correction import where_open
 from pns_common.formula.side_gate import of_gentler, opened_where_shut
 from pns_common.fused.additions import Additions
 from pns_common.fused.kernels.compiled import ROWS
-from pns_common.fused.kernels.edge_correction import (
-    DIHEDRAL,
-    HELD,
-    correct,
-    correct_scale_free,
-    look,
-)
+from pns_common.fused.kernels.edge_correction import correct, correct_scale_free
+from pns_common.fused.kernels.edge_features import DIHEDRAL, HELD, look
 from pns_common.fused.kernels.together import TOGETHER
 from pns_common.fused.surroundings import Surroundings
 from pns_common.rules.learned import LearnedEdgeRule

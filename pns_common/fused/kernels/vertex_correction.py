@@ -15,7 +15,7 @@ from pns_common.fused.kernels.compiled import (
     kernel,
     natural,
 )
-from pns_common.fused.kernels.edge_correction import in_ball, shortened, write
+from pns_common.fused.kernels.edge_correction import gated, in_ball, shortened, write
 from pns_common.fused.kernels.rings import (
     BEND_SQUARE,
     HEIGHT,
@@ -157,12 +157,6 @@ def correct_scale_free(
             prior[v, 1] + asked * learned[1],
             prior[v, 2] + asked * learned[2],
         )
-        allowed = shortened(wanted, envelope)
-        # A rule for curves adds its nothing here too.
-        delta = (
-            gate[i] * allowed[0] + nothing,
-            gate[i] * allowed[1] + nothing,
-            gate[i] * allowed[2] + nothing,
-        )
+        delta = gated(gate[i], shortened(wanted, envelope), nothing)
         write(v, delta, gate[i], envelope, displacement, ratio, gates, envelopes)
     return 0
