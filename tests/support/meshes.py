@@ -120,6 +120,18 @@ def folded_sheet(n=4):
     return np.concatenate([points, points[inside]]), np.concatenate([faces, below])
 
 
+def every_edge_class():
+    """Vertices and faces by name: small meshes that together have each class of edge."""
+    return {
+        "closed": bumpy_sphere(0),
+        "open": grid(6, bent),
+        "bow-tie": bow_tie(),
+        "three pages": three_pages(),
+        "one-way pair": one_way_pair(),
+        "isolated vertex": (np.vstack([grid(3)[0], [[9, 9, 9]]]), grid(3)[1]),
+    }
+
+
 def face_lists():
     """Faces by name: closed, open, and what no surface has; one in Fortran's order."""
     return {

@@ -5,14 +5,9 @@ import pytest
 
 from pns_common.connectivity.topology import build_topology
 from pns_common.fused import face_edges, load_kernels
-from tests.support.meshes import bumpy_sphere, grid
+from tests.support.meshes import face_lists
 
-FACES = {
-    "closed": bumpy_sphere(0, subdivisions=2)[1],
-    "open": grid(4)[1],
-    "column by column": np.asfortranarray(grid(4)[1]),
-    "irregular": np.random.default_rng(0).integers(0, 9, (40, 3)),
-}
+FACES = face_lists()
 
 
 @pytest.mark.parametrize("loaded", [False, True])

@@ -2,7 +2,6 @@
 
 import sys
 
-import numpy as np
 import pytest
 import trimesh
 from hypothesis import given
@@ -17,16 +16,7 @@ from tests.support.kernels import (
     by_kernels,
     edges_of,
 )
-from tests.support.meshes import (
-    bent,
-    bow_tie,
-    bumpy_sphere,
-    grid,
-    manifolds,
-    one_way_pair,
-    soups,
-    three_pages,
-)
+from tests.support.meshes import bumpy_sphere, every_edge_class, manifolds, soups
 from tests.support.networks import (
     random_model,
     scale_free_model,
@@ -63,14 +53,7 @@ SCHEMES = {
     ),
     "format 3, no budget": pns(scale_free_model(), budget=0.0),
 }
-SHAPES = {
-    "closed": bumpy_sphere(0),
-    "open": grid(6, bent),
-    "bow-tie": bow_tie(),
-    "three pages": three_pages(),
-    "one-way pair": one_way_pair(),
-    "isolated vertex": (np.vstack([grid(3)[0], [[9, 9, 9]]]), grid(3)[1]),
-}
+SHAPES = every_edge_class()
 SEEDS = st.integers(0, 2**32 - 1)
 
 

@@ -2,7 +2,6 @@
 
 import sys
 
-import numpy as np
 import pytest
 import trimesh
 from hypothesis import given
@@ -18,27 +17,11 @@ from tests.support.kernels import (
     by_kernels,
     edges_of,
 )
-from tests.support.meshes import (
-    bent,
-    bow_tie,
-    bumpy_sphere,
-    grid,
-    manifolds,
-    one_way_pair,
-    soups,
-    three_pages,
-)
+from tests.support.meshes import bumpy_sphere, every_edge_class, manifolds, soups
 from tests.support.shared import shared_path
 
 SEEDS = st.integers(0, 2**32 - 1)
-SHAPES = {
-    "closed": bumpy_sphere(0),
-    "open": grid(6, bent),
-    "bow-tie": bow_tie(),
-    "three pages": three_pages(),
-    "one-way pair": one_way_pair(),
-    "isolated vertex": (np.vstack([grid(3)[0], [[9, 9, 9]]]), grid(3)[1]),
-}
+SHAPES = every_edge_class()
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -75,13 +75,19 @@ def test_ctrl_c_is_the_driver_s_alone(tmp_path):
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
-def test_of_a_chunk_whose_worker_dies_the_task_it_was_at_is_to_blame(tmp_path, monkeypatch):
+def blamed_of_a_chunk(tmp_path, monkeypatch):
+    """Run a chunk of which task 3 kills its worker; return its tasks."""
     monkeypatch.setattr(chunks, "FIRST", 6)
     all_tasks = tasks(tmp_path, 6)
     work = Work(third_dies, lambda task, _: (task.number, -task.attempt), 2, None)
     done = [result for results in local.local(work, 1)(iter(all_tasks)) for result in results]
     assert sorted(done) == [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
     assert len(all_tasks[3].processes) == 2
+    return all_tasks
+
+
+def test_of_a_chunk_whose_worker_dies_the_task_it_was_at_is_to_blame(tmp_path, monkeypatch):
+    all_tasks = blamed_of_a_chunk(tmp_path, monkeypatch)
     assert [len(task.processes) for task in all_tasks[4:]] == [1, 1]
 
 
@@ -96,12 +102,7 @@ def test_a_worker_that_dies_before_its_pool_knows_what_it_has_is_to_blame_too(
             begins(manager, task, process)
 
     monkeypatch.setattr(TaskManager, "task_start", unread)
-    monkeypatch.setattr(chunks, "FIRST", 6)
-    all_tasks = tasks(tmp_path, 6)
-    work = Work(third_dies, lambda task, _: (task.number, -task.attempt), 2, None)
-    done = [result for results in local.local(work, 1)(iter(all_tasks)) for result in results]
-    assert sorted(done) == [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
-    assert len(all_tasks[3].processes) == 2
+    blamed_of_a_chunk(tmp_path, monkeypatch)
 
 
 class TaskError(RuntimeError):

@@ -44,9 +44,9 @@ def costs_nothing(data, error, limits=None):
     return refusal.value
 
 
-def draco_file(data):
-    """A GLB whose one primitive is the given bitstream."""
-    tree, _ = files.document([octahedron()])
+def draco_file(data, tree=None):
+    """A GLB whose one primitive, an octahedron's if no other, is the given bitstream."""
+    tree = tree or files.document([octahedron()])[0]
     primitive = tree["meshes"][0]["primitives"][0]
     primitive["extensions"] = {
         "KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}
@@ -76,16 +76,9 @@ def test_draco_takes_normalised_integers():
     accessor = tree["accessors"][primitive["attributes"]["POSITION"]]
     assert (accessor["componentType"], accessor["normalized"]) == (5122, True)
     primitive["attributes"] = {"POSITION": primitive["attributes"]["POSITION"]}
-    primitive["extensions"] = {
-        "KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}
-    }
-    for accessor in tree["accessors"]:
-        del accessor["bufferView"]
-    tree["bufferViews"] = [{"buffer": 0, "byteLength": len(data)}]
-    tree["buffers"] = [{"byteLength": len(data)}]
     tree["extensionsUsed"] = ["KHR_draco_mesh_compression", "KHR_mesh_quantization"]
     expected = refine(files.pack(*files.document([plain])), Limits())
-    refined = refine(files.pack(tree, data), Limits())
+    refined = refine(draco_file(data, tree), Limits())
     assert refined.report["levels"] == expected.report["levels"]
     assert refined.report["meshes"] == expected.report["meshes"]
 
