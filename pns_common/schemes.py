@@ -66,7 +66,7 @@ class Scheme:
         name: how reports call it.
         vertex_rule, edge_rule: where new vertices go.
         budget, model, model_hash: for reports; None where there is none.
-        learned_levels: K, the levels at which the rules act; after them it is Loop. None: at all.
+        learned_levels: K, at so many levels the rules act, and then Loop. None: at every level.
         guard: what scales the displacements of a level back where a child face would fold.
         moves_boundaries: whether the rules move boundaries, by the boundary alone.
         wide_bound: whether h of an edge's bound C h² / R is the longest edge of its two faces.

@@ -68,7 +68,7 @@ class EdgeOperator:
         gate: FrameGate,
         wide_bound: bool,
     ) -> Correction:
-        """Return δ = γ Π_ρ(D + τ ℓ F z(φ)); likewise, with τ ℓ, D, and ``gate`` for its own."""
+        """Return δ = γ Π_ρ(D + τ ℓ F z(φ)); ``asked`` is τ ℓ, and ``gate`` serves for its own."""
         return correct_scale_free(
             stencil,
             self.features,

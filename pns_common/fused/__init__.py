@@ -19,8 +19,8 @@ from pns_common.fused.storage import cache_folder, kernels_are_kept
 
 # Rows a block: a kernel has no temporaries that must stay in a cache, and each call costs a little.
 KERNEL_ROWS = 32768
-# Fewer where each thread is to have some, but no fewer: another thread comes some 50 µs late, is
-# waited for as long, and takes turns with this one at all that is not a kernel.
+# Fewer where each thread is to have some, but no fewer than this: another thread starts some 50 µs
+# late, is waited for as long, and outside kernels has to share the interpreter with this one.
 LEAST_KERNEL_ROWS = 16384
 LARGEST_INDEX = 2**31 - 1
 # What the array kernels do in the time that loading these takes, in faces that Loop makes; and what
