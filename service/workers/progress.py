@@ -9,7 +9,6 @@ from __future__ import annotations
 import mmap
 import os
 from contextlib import ExitStack
-from types import TracebackType
 
 from ..errors import NoStorageError, ServiceError
 from . import memory_file
@@ -51,12 +50,7 @@ class ProgressPage:
     def __enter__(self) -> ProgressPage:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

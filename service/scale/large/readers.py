@@ -197,7 +197,7 @@ def _numbers(path: Path, rows: list[Any]) -> np.ndarray:
         raise UnreadableError(f"{path}: a coordinate is no number") from error
 
 
-def _text_blocks(path: Path, end: bytes = b"\n") -> Iterator[bytes]:
+def _text_blocks(path: Path, end: bytes) -> Iterator[bytes]:
     """Yield a file's text in blocks that end with `end`; a line that fills one is no mesh's."""
     with path.open("rb") as file:
         left = b""
