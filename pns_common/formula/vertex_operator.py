@@ -3,8 +3,8 @@
     format 3    p' = p0 + γ_v Π_ρ(D + τ ℓ_v Σ z_i e_i)      ‖z‖ ≤ 1,  ρ = C h_v² / R
     format 2    p' = p0 + h_v² γ_v (C / R) v                ‖v‖ ≤ 1,  γ_v = tanh(c_v x_v)
 
-h_v² is the mean of the squared lengths of the ring's edges, so h_v is no longer than the longest.
-x_v is the mean over the ring's edges of ‖n − n'‖² / 2: O(ε²) for a bump of height ε on a plane, so
+h_v² is the mean of the squared lengths of the vertex's edges, so h_v is no longer than the longest.
+x_v is the mean over these edges of ‖n − n'‖² / 2: O(ε²) for a bump of height ε on a plane, so
 that γ_v and its derivative vanish there. v = Σ z_i e_i is a sum of three equivariant vectors of
 length ≤ 1 (rings.ring_vectors) with the network's z as weights, shortened to the unit ball where
 it is longer. So ‖p' − p0‖ ≤ (C / R) h_v² for any weights, and each factor is Lipschitz.
