@@ -22,7 +22,7 @@ from pns_common.masks.limit import limit_positions
 from pns_common.masks.stencils import loop_vertex_vertices
 from tests.support.meshes import bent, grid, manifolds, soups
 from tests.support.networks import scale_free_model
-from tests.support.prior_step import prior_step
+from tests.support.prior_step import assert_numpy_and_torch_agree, prior_step
 
 STRONG, WITHOUT = (scale_free_model(0, 2.0, boundary_strength=b) for b in (1.0, None))
 OF_CREASES = scale_free_model(0, 2.0, boundary_strength=1.0, crease_prior=True)
@@ -184,18 +184,9 @@ def test_without_a_strength_boundaries_are_loops(mesh):
     np.testing.assert_array_equal(corrected[rows], base[rows])
 
 
-def step_on(points, topology, xp):
-    """The prior alone."""
-    return prior_step(points, topology, xp, boundary_strength=0.7)
-
-
 @given(manifolds() | soups())
 def test_numpy_and_torch_agree(mesh):
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    ours = step_on(mesh.vertices, topology, np)
-    theirs = step_on(torch.tensor(mesh.vertices), topology, torch)
-    scale = max(1.0, np.abs(mesh.vertices).max())
-    np.testing.assert_allclose(ours, theirs.numpy(), rtol=0, atol=1e-12 * scale)
+    assert_numpy_and_torch_agree(mesh, boundary_strength=0.7)
 
 
 def test_torch_differentiates_through_it():
@@ -204,5 +195,5 @@ def test_torch_differentiates_through_it():
     topology = build_topology(faces, len(points))
     tensor = torch.tensor(points, requires_grad=True)
     assert torch.autograd.gradcheck(
-        lambda p: step_on(p, topology, torch), (tensor,), fast_mode=True
+        lambda p: prior_step(p, topology, torch, boundary_strength=0.7), (tensor,), fast_mode=True
     )

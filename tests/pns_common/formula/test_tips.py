@@ -22,7 +22,7 @@ from pns_common.masks.stencils import loop_vertex_vertices
 from pns_common.rules.control_level import control_level
 from tests.support.meshes import bumpy_sphere, grid, icosphere, manifolds, soups, tilted_plane
 from tests.support.networks import scale_free_model
-from tests.support.prior_step import prior_step
+from tests.support.prior_step import assert_numpy_and_torch_agree, prior_step
 
 # The prior alone, its gates open: what becomes of a vertex is what the tips make of it.
 OPEN = {"budget": 1e6, "vertex_gate_sharpness": 1e9, "gate_sharpness": 1e9}
@@ -135,18 +135,9 @@ def test_tips_stay_within_the_budget_and_nothing_folds(mesh, budget, strength):
     assert refined.report["levels"][0]["flipped_faces"] == 0
 
 
-def step_on(points, topology, xp):
-    """The prior alone, with tips on curves and surfaces."""
-    return prior_step(points, topology, xp, boundary_strength=0.7, tip_strength=0.8)
-
-
 @given(manifolds() | soups())
 def test_numpy_and_torch_agree(mesh):
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    ours = step_on(mesh.vertices, topology, np)
-    theirs = step_on(torch.tensor(mesh.vertices), topology, torch)
-    scale = max(1.0, np.abs(mesh.vertices).max())
-    np.testing.assert_allclose(ours, theirs.numpy(), rtol=0, atol=1e-12 * scale)
+    assert_numpy_and_torch_agree(mesh, boundary_strength=0.7, tip_strength=0.8)
 
 
 def test_torch_differentiates_through_it():
@@ -155,5 +146,7 @@ def test_torch_differentiates_through_it():
     topology = build_topology(mesh.faces, len(points))
     tensor = torch.tensor(points, requires_grad=True)
     assert torch.autograd.gradcheck(
-        lambda p: step_on(p, topology, torch), (tensor,), fast_mode=True
+        lambda p: prior_step(p, topology, torch, boundary_strength=0.7, tip_strength=0.8),
+        (tensor,),
+        fast_mode=True,
     )
