@@ -392,6 +392,17 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.ok(x + width <= page.viewportSize().width);
   });
 
+  test("a tab is named after its file, and without one after the page", async () => {
+    const page = await visit({ hash: "#levels=1", expected: [422] });
+    const untitled = await page.title();
+    await choose(page, { ...example, name: "nan.glb", buffer: broken(part) });
+    await page.locator("#problem").waitFor();
+    assert.equal(await page.title(), untitled);
+    await choose(page, example);
+    await settled(page);
+    assert.equal(await page.title(), `${example.name} – PNS`);
+  });
+
   test("what readers of their own kind take amiss is drawn on both sides, and certified", async () => {
     const page = await visit({ hash: "#levels=1&layout=side" });
     for (const [name, content] of Object.entries(AMISS)) {

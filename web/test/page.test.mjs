@@ -251,6 +251,15 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.equal(new Set(edges).size, 1, String(edges));
   });
 
+  test("nothing behind them is seen through the tools, the timeline, the legend and the labels", async () => {
+    const page = await visit();
+    const sheets = await page.$$eval(".tools, .timeline, .legend, .side-label", (floating) =>
+      floating.map((one) => getComputedStyle(one).backgroundColor),
+    );
+    const panel = await page.$eval("#panel", (panel) => getComputedStyle(panel).backgroundColor);
+    assert.deepEqual([...new Set(sheets)], [panel]);
+  });
+
   test("beside a heat map a wireframe keeps its lines", async () => {
     const page = await visit({ hash: "#levels=1&layout=side" });
     await choose(page, example);

@@ -3,6 +3,8 @@
 import type { Upload } from "../files/upload";
 import { element, option, select } from "./dom";
 
+const UNTITLED = document.title;
+
 export class FileList {
   private dropped: Upload[] = [];
   private shown: Upload | null = null;
@@ -36,6 +38,8 @@ export class FileList {
   private write(chosen: Upload | null): void {
     const { listed, shown } = this;
     element("file-name").textContent = shown?.name ?? "";
+    // Tabs are told apart by it.
+    document.title = shown ? `${shown.name} – PNS` : UNTITLED;
     element("file-name").hidden = listed.length > 0;
     select("file").hidden = !listed.length;
     select("file").replaceChildren(
