@@ -141,6 +141,8 @@ async function prepare(upload: Upload, opened: Opened, signal: AbortSignal): Pro
   await offered;
   signal.throwIfAborted();
   form.fit({ upload, opened });
+  // It would be sent for nothing.
+  if (form.refused) throw fileProblem("The mesh is too large", `${upload.name} would have ${form.refused}.`);
   return form.asked;
 }
 

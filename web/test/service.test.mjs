@@ -103,6 +103,23 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     });
   });
 
+  test("a mesh to which no level is open is not sent", async () => {
+    await with_({ PNS_FACES: "5000" }, async ({ page }) => {
+      await page.locator("#limits:not(:empty)").waitFor();
+      page.on("request", (request) => assert.notEqual(request.method(), "POST"));
+      await choose(page, example);
+      await page.locator("#problem").waitFor();
+      assert.equal(await page.textContent("#problem-title"), "The mesh is too large");
+      assert.equal(
+        await page.textContent("#problem-detail"),
+        "part.glb would have 7,680 faces after 1 level, over the limit of 5,000 faces of this service.",
+      );
+      assert.ok(await page.isHidden("#problem-again"));
+      assert.ok(await page.isVisible("#welcome"));
+      assert.equal(await page.textContent("#levels-note"), "");
+    });
+  });
+
   test("levels over the limit are closed, and say why", async () => {
     await with_({ PNS_FACES: "50000" }, async ({ page }) => {
       await choose(page, example);

@@ -111,6 +111,13 @@ export class SettingsForm {
     return most && this.predicted(level) > most ? `over the limit of ${count(most)} faces` : "";
   }
 
+  /** Why no level at all is open to the file; empty where one is. */
+  get refused(): string {
+    const [first = 1] = this.levels();
+    const refusal = this.refusal(first);
+    return refusal && `${count(this.predicted(first))} faces after ${first} level, ${refusal} of this service`;
+  }
+
   private write(): void {
     const { settings } = this;
     select("levels").replaceChildren(
