@@ -473,10 +473,10 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     });
   }
 
-  test("with forced colours a switch is seen, and whether it is on", async () => {
-    const page = await visit({ forcedColors: "active" });
-    const lit = async () => {
-      const shot = (await page.locator("#limit").screenshot()).toString("base64");
+  test("with forced colours a switch is seen, whether it is on, and where the wipe stands", async () => {
+    const page = await visit({ forcedColors: "active", hash: "#levels=1" });
+    const lit = async (clip) => {
+      const shot = (await page.screenshot({ clip })).toString("base64");
       return page.evaluate(async (png) => {
         const bytes = Uint8Array.from(atob(png), (character) => character.charCodeAt(0));
         const bitmap = await createImageBitmap(new Blob([bytes]));
@@ -487,9 +487,15 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
         return [...new Set(new Uint32Array(row.buffer))].length;
       }, shot);
     };
-    assert.ok((await lit()) > 1);
+    const limit = await page.locator("#limit").boundingBox();
+    assert.ok((await lit(limit)) > 1);
     await page.check("#limit");
-    assert.ok((await lit()) > 1);
+    assert.ok((await lit(limit)) > 1);
+    await choose(page, example);
+    await settled(page);
+    // Above the model nothing else is drawn.
+    const wipe = await page.locator("#wipe").boundingBox();
+    assert.ok((await lit({ ...wipe, height: 20 })) > 1);
   });
 
   test("nothing overflows a phone of 360 pixels", async () => {
