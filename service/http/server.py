@@ -82,6 +82,7 @@ class DrainingServer(uvicorn.Server):
 
 def serve(settings: Settings) -> None:
     """Serve until a signal comes. Raises StartError."""
+    check_address(settings.host, settings.port)
     log_lines.configure()
     app = create_app(settings)
     server = DrainingServer(
@@ -104,6 +105,17 @@ def serve(settings: Settings) -> None:
         server.run()
     finally:
         stop()
+
+
+def check_address(host: str, port: int) -> None:
+    """Raise StartError where nobody can listen: uvicorn says so between its log lines alone."""
+    try:
+        with socket.create_server(
+            (host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET
+        ):
+            pass
+    except OSError as error:
+        raise StartError(f"{error.strerror}; give another --host or --port") from error
 
 
 def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:

@@ -157,6 +157,23 @@ def test_a_file_of_keys_that_cannot_be_used_ends_it(
     assert "none.toml" in err
 
 
+def test_a_port_that_is_taken_ends_it_in_one_line(pns: Any) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        code, out, err = pns("serve", "--port", str(port))
+    assert (code, out) == (1, "")
+    assert err.startswith("pns: Address already in use")
+    assert f"{port}" in err
+    assert err.count("\n") == 1
+
+
+def test_a_host_that_is_none_ends_it_in_one_line(pns: Any) -> None:
+    code, out, err = pns("serve", "--host", "300.0.0.1", "--port", "0")
+    assert (code, out) == (1, "")
+    assert "'300.0.0.1'" in err
+    assert err.count("\n") == 1
+
+
 def test_a_place_for_metrics_that_cannot_be_had_ends_it_by_name(
     pns: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
