@@ -38,7 +38,8 @@ def with_mitres(
     """Return the edges of lines and the mitres between them, in order."""
     is_sharp = mesh.edge_class != EdgeClass.INTERIOR
     is_sharp[lines] = True
-    meet = np.bincount(mesh.edges[is_sharp].reshape(-1), minlength=mesh.vertex_count)
+    ends = np.take(mesh.edges, np.flatnonzero(is_sharp), axis=0)
+    meet = np.bincount(ends.reshape(-1), minlength=mesh.vertex_count)
     stays = meet >= CORNER
     if not stays.any():
         return lines
