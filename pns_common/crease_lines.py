@@ -87,9 +87,9 @@ def _look(
         ParameterError: one that is named is no edge.
     """
     if kernels_available() and kernels_loaded() and fits(len(points), len(faces), 1):
-        from pns_common.fused import crease_lines as fused
-        from pns_common.fused.face_measures import face_normals as measured_normals
-        from pns_common.fused.level import control_edges
+        from pns_common.fused.levels import crease_lines as fused
+        from pns_common.fused.levels.face_measures import face_normals as measured_normals
+        from pns_common.fused.levels.level import control_edges
 
         blocks = kernel_blocks(available_threads())
         edges = control_edges(faces, len(points), named, blocks)

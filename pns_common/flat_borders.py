@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.arrays import dot, marked
-from pns_common.fused.interior_edges import interior_edges
+from pns_common.fused.where_loaded.interior_edges import interior_edges
 from pns_common.geometry.frames import face_normals
 
 # Faces that turn by no more than this, in radians, lie in one plane: far above what single

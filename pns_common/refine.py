@@ -158,8 +158,8 @@ def refine(
     kept = chosen_creases(creases, scheme)
     if kernels_can_serve(mesh, scheme, levels, unit) and kernels_pay(costs):
         # Loads the compiler's runtime, which whoever only imports the package does not need.
+        from pns_common.fused.levels.side_lengths import side_lengths
         from pns_common.fused.refine import refine_fused
-        from pns_common.fused.side_lengths import side_lengths
 
         blocks = kernel_blocks(workers, work.rows)
         scheme = scheme.fitted(lambda: side_lengths(mesh.vertices, mesh.faces, blocks))
@@ -265,7 +265,7 @@ def reference_length_of(
 ) -> float:
     """Return R of a mesh, by kernels where they are loaded."""
     if kernels_available() and kernels_loaded():
-        from pns_common.fused.extent import reference_length
+        from pns_common.fused.where_loaded.extent import reference_length
 
         return reference_length(vertices, faces, kernel_blocks(threads))
     return measure_reference_length(vertices, faces)

@@ -90,8 +90,8 @@ def refine_parts(
         return None
     part_of_face = np.repeat(np.arange(len(lengths)), np.diff(part_faces))
     kept = named_on_parts(mesh, chosen_creases(creases, scheme), part_of_face, len(lengths))
+    from pns_common.fused.levels.side_lengths import side_lengths_of_parts
     from pns_common.fused.refine_parts import Units, refine_parts_fused
-    from pns_common.fused.side_lengths import side_lengths_of_parts
 
     blocks = kernel_blocks(workers)
     sides = Deferred(lambda: side_lengths_of_parts(mesh.vertices, mesh.faces, part_faces, blocks))

@@ -3,6 +3,9 @@
 numba compiles them once (compiler.py); llvmlite alone loads what it made (library.py), and is not
 loaded before that pays: until then the array kernels serve, as they do without numba or a folder to
 keep code in. ``python -m pns_common.fused`` compiles all kernels.
+
+Above kernels/ stand levels/, a level as they see it and Loop's step of it; learned/, what learned
+rules add to that; where_loaded/, what others ask for by itself; and refine.py, all levels.
 """
 
 from __future__ import annotations
@@ -52,7 +55,7 @@ def load_kernels() -> bool:
     if not kernels_available():
         return False
     import_module(LIBRARY).library()
-    for learned_or_not in ("refine", "learned_step", "extent"):
+    for learned_or_not in ("refine", "learned.learned_step", "where_loaded.extent"):
         import_module(f"{__name__}.{learned_or_not}")
     return True
 

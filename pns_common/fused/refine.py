@@ -9,8 +9,14 @@ import numpy as np
 from pns_common.base.blocks import Blocks
 from pns_common.base.deferred import Deferred
 from pns_common.connectivity.creases import Creases
-from pns_common.fused.level import FusedLevel, FusedStep, control_level, loop_step, next_level
-from pns_common.fused.mesh_edges import split_mesh_faces
+from pns_common.fused.levels.level import (
+    FusedLevel,
+    FusedStep,
+    control_level,
+    loop_step,
+    next_level,
+)
+from pns_common.fused.levels.mesh_edges import split_mesh_faces
 from pns_common.levels.diagnostics import LevelReport
 from pns_common.levels.refined_levels import (
     AfterLevel,
@@ -74,7 +80,7 @@ def _checked_step(
         step = loop_step(level, blocks)
     else:
         # Loop has no use for its kernels.
-        from pns_common.fused.learned_step import learned_step
+        from pns_common.fused.learned.learned_step import learned_step
 
         # What overflows under an absurd budget is caught just below.
         with np.errstate(over="ignore", invalid="ignore"):

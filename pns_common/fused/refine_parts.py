@@ -17,10 +17,10 @@ from pns_common.connectivity.creases import Creases
 from pns_common.connectivity.topology import Topology
 from pns_common.fused.kernels.normals import HELD, flipped_children, largest_jump
 from pns_common.fused.kernels.together import TOGETHER
-from pns_common.fused.learned_step import learned_points
-from pns_common.fused.level import FusedLevel, control_level, crease_shift_of, next_level
-from pns_common.fused.loop_points import largest_size, loop_points
-from pns_common.fused.mesh_edges import MeshEdges, split_mesh_faces
+from pns_common.fused.learned.learned_step import learned_points
+from pns_common.fused.levels.level import FusedLevel, control_level, crease_shift_of, next_level
+from pns_common.fused.levels.loop_points import largest_size, loop_points
+from pns_common.fused.levels.mesh_edges import MeshEdges, split_mesh_faces
 from pns_common.geometry.child_faces import ChildAngles, angle_of_chord
 from pns_common.levels.diagnostics import LevelReport, level_report
 from pns_common.levels.refined_levels import check_coordinates

@@ -17,7 +17,7 @@ from jaxtyping import Float, Int, Shaped
 from pns_common.base.distinct import distinct_rows, number_by_first_appearance
 from pns_common.connectivity.creases import Creases, checked_pairs
 from pns_common.connectivity.topology import CHILDREN, split_faces
-from pns_common.fused.face_edges import number_edges
+from pns_common.fused.where_loaded.face_edges import number_edges
 from pns_common.mesh import Mesh
 from pns_common.refine import Refinement, refine
 from pns_common.schemes import Scheme

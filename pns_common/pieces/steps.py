@@ -82,10 +82,10 @@ def steps_by_kernels(
     blocks: Blocks,
 ) -> Iterator[Step]:
     """Yield the same from compiled kernels, which must know the scheme (``fused.known``)."""
-    from pns_common.fused.learned_step import learned_points
-    from pns_common.fused.level import control_level, next_level
-    from pns_common.fused.loop_points import loop_points
-    from pns_common.fused.mesh_edges import split_mesh_faces
+    from pns_common.fused.learned.learned_step import learned_points
+    from pns_common.fused.levels.level import control_level, next_level
+    from pns_common.fused.levels.loop_points import loop_points
+    from pns_common.fused.levels.mesh_edges import split_mesh_faces
 
     level, depth = control_level(points, faces, creases, blocks), 0
     while True:

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.base.blocks import Blocks, available_threads
-from pns_common.fused.face_edges import number_edges
-from pns_common.fused.grid_points import (
+from pns_common.fused.where_loaded.face_edges import number_edges
+from pns_common.fused.where_loaded.grid_points import (
     blend_along,
     blend_inside,
     move_to_vertices,

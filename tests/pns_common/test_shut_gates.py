@@ -14,8 +14,8 @@ from tests.support.networks import scale_free_model
 
 # The last is what the others take it from when they are first imported.
 WHERE = (
-    "pns_common.fused.edge_rule",
-    "pns_common.fused.vertex_rule",
+    "pns_common.fused.learned.edge_rule",
+    "pns_common.fused.learned.vertex_rule",
     "pns_common.formula.vertex_operator",
     "pns_common.formula.correction",
 )

@@ -8,7 +8,7 @@ from pns_common import loop
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.creases import Creases
 from pns_common.fused import KERNEL_ROWS
-from pns_common.fused.mesh_edges import build_edges
+from pns_common.fused.levels.mesh_edges import build_edges
 from pns_common.fused.refine import refine_fused
 from pns_common.refine import refine_arrays
 

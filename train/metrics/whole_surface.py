@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.base.blocks import Blocks
-from pns_common.fused.mesh_edges import build_edges
+from pns_common.fused.levels.mesh_edges import build_edges
 from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh
 from pns_common.refine import Refinement, refine

@@ -45,7 +45,7 @@ class TiedNetwork:
         if not kernels_loaded():
             return answers_of(form, rows, budget)
         # Not before the kernels are there: importing it would load them.
-        from pns_common.fused import tied_network
+        from pns_common.fused.learned import tied_network
 
         return tied_network.answers_of(form, rows, budget)
 

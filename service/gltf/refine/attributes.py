@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.base.blocks import Blocks, available_threads
-from pns_common.fused.tangents import perpendicular_tangents
+from pns_common.fused.where_loaded.tangents import perpendicular_tangents
 
 from ...meshes.split_connectivity import SplitConnectivity
 from ...meshes.uv_charts import UvBlend

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Int
 
 from pns_common.base.arrays import marked
 from pns_common.connectivity.topology import next_corner
-from pns_common.fused.interior_edges import interior_edges
+from pns_common.fused.where_loaded.interior_edges import interior_edges
 from pns_common.mesh import Cleaned
 
 from .control_mesh import ControlMesh

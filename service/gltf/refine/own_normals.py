@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.arrays import cross, dot, norm, unit
-from pns_common.fused.interior_edges import interior_edges
+from pns_common.fused.where_loaded.interior_edges import interior_edges
 from pns_common.mesh import Mesh
 
 # Exporters average the normals of faces by angle, by area or alike. On real meshes 9 of 10 of these

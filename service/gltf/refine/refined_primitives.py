@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.connectivity.grid_points import index_type
-from pns_common.fused.grid_points import rounded_rows, take_points
+from pns_common.fused.where_loaded.grid_points import rounded_rows, take_points
 from pns_common.mesh import Cleaned
 from pns_common.refine import Refinement
 

@@ -9,7 +9,7 @@ from pns_common.base.extent import extent
 from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.crease_lines import NO_PAIRS, named_on_parts
 from pns_common.errors import MeshError
-from pns_common.fused.linear import linear_refinement
+from pns_common.fused.where_loaded.linear import linear_refinement
 from pns_common.mesh import Cleaned, Mesh
 from pns_common.refine import refine
 from pns_common.schemes import Scheme

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Float32, Int
 
-from pns_common.fused.grid_points import rounded_rows
+from pns_common.fused.where_loaded.grid_points import rounded_rows
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int, Shaped
 
 from pns_common.base.blocks import available_threads
 from pns_common.fused import kernel_blocks
-from pns_common.fused.shares import keep_heaviest, scale_rows, whole_units
+from pns_common.fused.where_loaded.shares import keep_heaviest, scale_rows, whole_units
 from pns_common.masks.linear import ColumnRefinement
 
 from ..read.primitives import TrianglePrimitive

@@ -9,8 +9,8 @@ from jaxtyping import Float, Int
 
 from pns_common.base.blocks import Blocks, available_threads
 from pns_common.connectivity.topology import stable_sort
-from pns_common.fused.corner_normals import angle_weighted_normals
-from pns_common.fused.smooth_fans import smooth_fans
+from pns_common.fused.where_loaded.corner_normals import angle_weighted_normals
+from pns_common.fused.where_loaded.smooth_fans import smooth_fans
 from pns_common.mesh import Cleaned
 
 from ..constants import FLOAT

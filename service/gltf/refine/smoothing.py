@@ -18,7 +18,7 @@ from jaxtyping import Float, Int
 from pns_common.base.arrays import dot, unit
 from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads
 from pns_common.base.distinct import number_by_first_appearance
-from pns_common.fused.corner_normals import angle_weighted_normals
+from pns_common.fused.where_loaded.corner_normals import angle_weighted_normals
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid

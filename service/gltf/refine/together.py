@@ -16,7 +16,7 @@ from jaxtyping import Bool, Int
 from pns_common.base.deferred import Deferred
 from pns_common.connectivity.creases import Creases
 from pns_common.errors import MeshError
-from pns_common.fused.linear import linear_refinement
+from pns_common.fused.where_loaded.linear import linear_refinement
 from pns_common.mesh import Cleaned
 from pns_common.refine import Refinement, Report
 from pns_common.refine_parts import PartsRefinement, refine_parts

@@ -16,7 +16,7 @@ MESH = Mesh(*bumpy_sphere(0, subdivisions=0))
 
 def test_nobody_looks_at_the_levels_before_the_report_is_read(monkeypatch):
     looks = []
-    for module in ("level", "learned_step"):
+    for module in ("levels.level", "learned.learned_step"):
         look = f"pns_common.fused.{module}.look_at_children"
         original = __import__(f"pns_common.fused.{module}", fromlist=["x"]).look_at_children
         monkeypatch.setattr(look, lambda *given, o=original: (looks.append(1), o(*given))[1])

@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from pns_common.base.arrays import cross, dot
 from pns_common.base.blocks import Blocks
-from pns_common.fused.mesh_edges import build_edges
+from pns_common.fused.levels.mesh_edges import build_edges
 from pns_common.mesh import Mesh
 from train.metrics.faces import face_boxes
 from train.metrics.faces.face_boxes import FaceBoxes

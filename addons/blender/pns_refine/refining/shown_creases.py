@@ -11,7 +11,7 @@ from jaxtyping import Bool, Int, Shaped
 from pns_common import Creases, Mesh
 from pns_common.crease_lines import named_on
 from pns_common.flat_borders import flat_borders
-from pns_common.fused.interior_edges import interior_edges
+from pns_common.fused.where_loaded.interior_edges import interior_edges
 from pns_common.geometry.shaded_smooth import shaded_smooth
 
 from .snapshot import Domain, Snapshot, edge_keys

@@ -8,7 +8,7 @@ from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology, split
 from pns_common.fused.kernels.guard import HELD, find_folds
 from pns_common.fused.kernels.together import TOGETHER
-from pns_common.fused.loop_points import loop_points
+from pns_common.fused.levels.loop_points import loop_points
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bent, grid
 

@@ -5,9 +5,9 @@ import pytest
 
 from pns_common import Mesh
 from pns_common.base.blocks import Blocks
-from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.kernels.vertex_correction import correct, correct_scale_free, look_around
-from pns_common.fused.surroundings import Surroundings
+from pns_common.fused.learned.surroundings import Surroundings
+from pns_common.fused.levels.face_measures import FaceMeasures
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bumpy_sphere
 from tests.support.plain_operator import PlainMesh, shortened

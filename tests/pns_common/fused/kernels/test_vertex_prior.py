@@ -6,9 +6,9 @@ import pytest
 from pns_common import Mesh
 from pns_common.base.blocks import Blocks
 from pns_common.formula.tips import ring_further
-from pns_common.fused.face_measures import FaceMeasures
 from pns_common.fused.kernels.vertex_prior import add_priors, add_priors_but_at_tips
-from pns_common.fused.surroundings import Surroundings
+from pns_common.fused.learned.surroundings import Surroundings
+from pns_common.fused.levels.face_measures import FaceMeasures
 from pns_common.masks.stencils import loop_ring_weight
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bumpy_sphere

@@ -9,7 +9,7 @@ from onnx import numpy_helper
 
 from pns_common import Mesh, ModelError, load_model, pns, refine
 from pns_common.fused import load_kernels
-from pns_common.fused import tied_network as compiled
+from pns_common.fused.learned import tied_network as compiled
 from pns_common.models.tied_form import tied_form
 from pns_common.runtimes.numpy_network import open_network
 from pns_common.runtimes.onnx_model import bundled_models, installed_runtime, model_from_bytes

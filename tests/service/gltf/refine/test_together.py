@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pns_common import Mesh, load_model
-from pns_common.fused.linear import FusedLinearRefinement
+from pns_common.fused.where_loaded.linear import FusedLinearRefinement
 from pns_common.masks.linear import LinearRefinement
 from service.course import Course
 from service.gltf.read.plan import MeshPlan

@@ -1,0 +1,76 @@
+"""The crease lines of a level, as ``pns_common.geometry.crease_lines`` finds them."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.base.blocks import Blocks
+from pns_common.connectivity.creases import Creases
+from pns_common.fused.kernels.compiled import ROWS
+from pns_common.fused.kernels.edge_rows import mark_alone
+from pns_common.fused.kernels.going_on import drop_loose_ends
+from pns_common.fused.kernels.turns import mark_edges_beyond, mark_flat_sides
+from pns_common.fused.levels.mesh_edges import MeshEdges
+from pns_common.geometry.crease_lines import is_edged, with_gentler
+from pns_common.geometry.crease_lines.edge_rows import PARALLEL, ROW_ANGLE
+from pns_common.geometry.crease_lines.going_on import may_end
+from pns_common.geometry.crease_lines.mitres import with_mitres
+from pns_common.geometry.crease_lines.turns import cosine_of
+
+
+def crease_line_rows(
+    points: Float[np.ndarray, "V 3"],
+    mesh: MeshEdges,
+    normals: Float[np.ndarray, "F 3"],
+    creases: Creases,
+    blocks: Blocks,
+) -> Int[np.ndarray, " N"]:
+    """Return the edges of the lines to look for, and mitres; ``normals`` are the faces'."""
+    assert creases.line_angle is not None
+    cosine, known, gentle = cosine_of(creases.line_angle), creases.edged, False
+    beyond, found = edges_beyond(mesh, normals, cosine, blocks)
+    # Without an edge beyond θ no mesh is edged.
+    if creases.edged_angle is not None and (found if known is None else known):
+        bent, more = edges_beyond(mesh, normals, cosine_of(creases.edged_angle), blocks)
+        gentle = is_edged(found, more) if known is None else known
+        beyond, found = (bent, more) if gentle else (beyond, found)
+    if not found:
+        return with_mitres(points, normals, mesh, np.zeros(0, dtype=np.int32))
+    sharp = np.flatnonzero(beyond).astype(np.int32)
+    is_flat = np.empty(len(sharp), dtype=bool)
+    sides = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
+    blocks.run(len(sharp), mark_flat_sides.over(*sides, ROWS, is_flat))
+    flat, at_rim = sharp[is_flat], may_end(mesh, normals)
+
+    def going_on(rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
+        left = np.ones(len(rows), dtype=bool)
+        met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))
+        drop_loose_ends(points, mesh.edges, rows, at_rim, cosine, *met, left)
+        return rows[left]
+
+    if gentle:
+        alone = np.empty(len(flat), dtype=bool)
+        around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
+        least = PARALLEL**2, cosine_of(ROW_ANGLE)
+        blocks.run(len(flat), mark_alone.over(points, normals, *around, *least, flat, ROWS, alone))
+        lines = with_gentler(points, normals, mesh, flat[alone], cosine, going_on)
+    else:
+        lines = going_on(flat)
+    return with_mitres(points, normals, mesh, lines)
+
+
+def edges_beyond(
+    mesh: MeshEdges, normals: Float[np.ndarray, "F 3"], cosine: float, blocks: Blocks
+) -> tuple[Bool[np.ndarray, " E"], int]:
+    """Return which interior edges' normals have a smaller cosine, and how many."""
+    count = len(mesh.edges)
+    beyond, found = np.empty(count, dtype=bool), np.zeros(blocks.count(count), dtype=np.int64)
+    around = normals, mesh.half_edges, mesh.edge_class, cosine
+    mark_beyond = mark_edges_beyond.over(*around, ROWS, beyond)
+
+    def mark(rows: slice) -> None:
+        found[blocks.number(rows, count)] = mark_beyond(rows)
+
+    blocks.run(count, mark)
+    return beyond, int(found.sum())
