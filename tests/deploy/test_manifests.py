@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+from ipaddress import ip_address, ip_network
 from pathlib import Path
 
 import pytest
@@ -100,6 +101,19 @@ def test_only_the_proxy_is_reached_from_outside():
     address = services["proxy"]["networks"]["inside"]["ipv4_address"]
     assert services["service"]["environment"]["PNS_PROXIES"] == address
     assert all(port.startswith("127.0.0.1:") for port in services["proxy"]["ports"])
+
+
+def test_no_address_is_left_to_chance_beside_the_proxys():
+    """Docker gives the first free address to whoever starts first, which is not the proxy."""
+    network = ip_network(COMPOSE["networks"]["inside"]["ipam"]["config"][0]["subnet"])
+    inside = [
+        service["networks"]["inside"]["ipv4_address"]
+        for service in COMPOSE["services"].values()
+        if "inside" in service["networks"]
+    ]
+    gateway = next(network.hosts())
+    assert len({gateway, *map(ip_address, inside)}) == 1 + len(inside)
+    assert all(ip_address(address) in network for address in inside)
 
 
 @pytest.mark.parametrize("name", ["service", "proxy"])
