@@ -209,7 +209,11 @@ class Workers:
         """End a process, whoever waits for that, and then let go of the files that it knows."""
 
         async def end() -> None:
-            await asyncio.to_thread(_stop, pool)
+            try:
+                await asyncio.to_thread(_stop, pool)
+            except RuntimeError:
+                # No thread is left to wait in, and nothing else would start the next process.
+                _stop(pool)
             self._release(pool)
 
         self._pools.discard(pool)

@@ -12,6 +12,7 @@ from contextlib import asynccontextmanager
 from functools import partial
 from multiprocessing import resource_tracker
 from pathlib import Path
+from threading import Thread
 
 import pytest
 from pebble import ProcessPool
@@ -338,6 +339,30 @@ def test_a_process_that_the_system_refuses_is_told_and_tried_again(
     run(scenario)
     told = "a worker did not start: [Errno 11] Resource temporarily unavailable"
     assert told in caplog.messages
+
+
+def test_a_worker_is_replaced_where_no_thread_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A limit on processes counts threads, too."""
+
+    def refuses(thread: Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    async def scenario() -> None:
+        async with workers() as pool:
+            first = await pool.run(jobs.pid)
+            with MemoryFile() as file:
+                job = asyncio.create_task(pool.run(jobs.sleep, 30, files=[file]))
+                await asyncio.sleep(0.05)
+                with monkeypatch.context() as system:
+                    system.setattr(Thread, "start", refuses)
+                    os.kill(first, signal.SIGKILL)
+                    with pytest.raises(WorkerDied):
+                        await job
+                    await asyncio.sleep(0.05)
+            assert file.closed
+            assert await pool.run(jobs.pid) != first
+
+    run(scenario)
 
 
 def test_ctrl_c_is_the_server_s_alone() -> None:
