@@ -120,6 +120,7 @@ def check_address(host: str, port: int) -> None:
 
 def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:
     """Return uvicorn's settings, and the protocol that takes over where they end."""
+    admission: Admission = app.state.admission
     shared = Shared(
         Bounds(
             head_seconds=settings.head_seconds,
@@ -138,6 +139,7 @@ def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:
             settings.connections_of_address,
             settings.proxies,
         ),
+        drains=lambda: admission.draining,
     )
     metrics: Metrics = app.state.metrics
     metrics.gauge("pns_connections", "Open connections", lambda: len(shared.crowd))

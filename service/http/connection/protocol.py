@@ -248,8 +248,11 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
     # The answer
 
     async def _application(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Run the application; an answer before the body is whole says: the connection ends."""
-        parser = self.conn
+        """Run the application; an answer before the body is whole says: the connection ends.
+
+        So does each once the server drains: the next request would meet its end.
+        """
+        parser, drains = self.conn, self._shared.drains
         self._taking.begin()
         self._asked_at = self.loop.time()
         extensions = scope.setdefault("extensions", {})
@@ -257,7 +260,8 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
         extensions[LISTENS] = self._listen
 
         async def send_and_close(message: Message) -> None:
-            if message["type"] == "http.response.start" and parser.their_state is h11.SEND_BODY:
+            starts = message["type"] == "http.response.start"
+            if starts and (parser.their_state is h11.SEND_BODY or drains()):
                 # A copy, and bytes: an application may reuse its list, and give any pairs.
                 headers = [pair for pair in message["headers"] if pair[0].lower() != b"connection"]
                 message = {**message, "headers": [*headers, CLOSE_HEADER]}

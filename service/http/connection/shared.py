@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from .crowd import Crowd
@@ -30,10 +31,14 @@ class Bounds:
 
 @dataclass
 class Shared:
-    """What the connections of one server have in common."""
+    """What the connections of one server have in common.
+
+    `drains` tells whether the server is about to end: no connection is kept then after its answer.
+    """
 
     bounds: Bounds
     crowd: Crowd
+    drains: Callable[[], bool]
     turns: Turns = field(default_factory=Turns)
     # Filled and emptied within one callback, so one is enough for all.
     buffer: bytearray = field(default_factory=lambda: bytearray(READ_BYTES))

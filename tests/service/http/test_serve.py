@@ -127,6 +127,7 @@ class Drained(NamedTuple):
     default: list[str]
     late: tuple[int, bytes]
     healthy: int
+    kept: bool
     half_sent: tuple[int, bytes]
     under_way: tuple[int, bytes]
     job: tuple[int, bytes]
@@ -152,14 +153,17 @@ def drained() -> Drained:
         while server.status("/readyz") != 503:
             pass
         late = answered(begin_upload(server, body))
-        healthy = server.status("/healthz")
+        with closing(server.connect()) as connection:
+            connection.request("GET", "/healthz")
+            answer = connection.getresponse()
+            healthy, kept = answer.status, not answer.will_close
         refused = answered(half_sent)
         completed = answered(under_way)
         # The first that is no 409 is the result: it has been fetched.
         while (fetched := server.get(f"{job}/result"))[0] == 409:
             time.sleep(0.01)
         code = server.process.wait(HANGS)
-    return Drained(default, late, healthy, refused, completed, fetched, code)
+    return Drained(default, late, healthy, kept, refused, completed, fetched, code)
 
 
 def default_models(server: Server) -> list[str]:
@@ -196,6 +200,12 @@ def test_new_requests_after_sigterm_are_refused_and_probes_are_not(drained: Drai
     # Before its body, not with those whose body has not arrived.
     assert b"no new request is taken" in drained.late[1]
     assert drained.healthy == 200
+
+
+def test_no_connection_is_kept_after_sigterm_whose_next_request_would_meet_the_end(
+    drained: Drained,
+) -> None:
+    assert not drained.kept
 
 
 def test_a_job_at_sigterm_completes_and_waits_to_be_fetched(drained: Drained) -> None:
