@@ -45,7 +45,10 @@ def of_request(content_type: str) -> str:
 
 
 def quality(media: str, accept: str) -> float:
-    """Return how much an Accept header wants a media type, 0 to 1: by its most specific range."""
+    """Return how much an Accept header wants a media type, 0 to 1: by its most specific range.
+
+    A coding in Accept-Encoding reads as one.
+    """
     wanted: dict[str, float] = {}
     for entry in accept.split(","):
         pattern, *parameters = (part.strip().lower() for part in entry.split(";"))

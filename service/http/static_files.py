@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from starlette.requests import Request
 from starlette.responses import Response
 
+from ..bodies.media import quality
+
 MEDIA_TYPES = {
     ".css": "text/css; charset=utf-8",
     ".glb": "model/gltf-binary",
@@ -56,14 +58,7 @@ def answer(request: Request, file: StaticFile, policy: str, caching: str = ASK_A
     if file.tag in {tag.strip().removeprefix("W/") for tag in known.split(",")} or known == "*":
         return Response(status_code=304, headers=headers)
     content = file.content
-    if _takes_gzip(request.headers.get("accept-encoding", "")):
+    if quality("gzip", request.headers.get("accept-encoding", "")):
         content = file.packed
         headers["Content-Encoding"] = "gzip"
     return Response(content, headers=headers, media_type=file.media_type)
-
-
-def _takes_gzip(accept_encoding: str) -> bool:
-    codings = [coding.replace(" ", "").lower() for coding in accept_encoding.split(",")]
-    return any(coding == "gzip" or coding.startswith("gzip;q=0.") for coding in codings) and (
-        "gzip;q=0" not in codings and "gzip;q=0.0" not in codings
-    )

@@ -79,7 +79,10 @@ def test_a_client_that_has_the_file_gets_no_bytes(path: str) -> None:
 
 @pytest.mark.parametrize(
     ("accepted", "packed"),
-    [("gzip", True), ("br, GZIP", True), ("gzip;q=0.5", True), ("gzip;q=0", False), ("br", False)],
+    [
+        *[("gzip", True), ("br, GZIP", True), ("gzip;q=0.5", True), ("gzip;q=1.0,br;q=0.6", True)],
+        *[("gzip;q=0", False), ("gzip; q=0.000", False), ("br", False)],
+    ],
 )
 def test_a_client_that_takes_gzip_gets_it(accepted: str, packed: bool) -> None:
     with CLIENT.stream("GET", "/", headers={"Accept-Encoding": accepted}) as answer:
