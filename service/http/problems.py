@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from difflib import get_close_matches
 from http import HTTPStatus
 from typing import Any
 
@@ -19,6 +20,7 @@ from starlette.types import Receive, Scope, Send
 from ..errors import BusyError, InvalidParameter, LimitError, ServiceError, UnauthorizedError
 from ..request_ids import REQUEST_ID
 from ..workers.worker import JobFaultError
+from .parameters import Parameters
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -110,17 +112,23 @@ def of_job(error: Exception) -> JSONResponse:
 def _of_validation_error(error: RequestValidationError) -> JSONResponse:
     first = error.errors()[0]
     name = next((str(part) for part in first["loc"][1:]), "")
-    kind = InvalidParameter(name, f"{name}: {first['msg']}")
-    return of_service_error(kind)
+    text = first["msg"]
+    if first["type"] == "extra_forbidden":
+        near = get_close_matches(name, Parameters.model_fields, n=1)
+        text = f"there is no such parameter{f'; is it {near[0]}?' if near else ''}"
+    return of_service_error(InvalidParameter(name, f"{name}: {text}"))
 
 
 def _of_http_exception(request: Request, error: HTTPException) -> JSONResponse:
     title = HTTPStatus(error.status_code).phrase
     code = title.lower().replace(" ", "-")
-    headers = dict(error.headers or {})
+    headers, detail = dict(error.headers or {}), str(error.detail)
     if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
         headers["Allow"] = ", ".join(_allowed(request))
-    return problem(error.status_code, code, title, str(error.detail), headers=headers)
+        detail = f"this path takes {headers['Allow']}"
+    elif detail == HTTPStatus.NOT_FOUND.phrase:
+        detail = "there is nothing at this path; /docs shows what there is"
+    return problem(error.status_code, code, title, detail, headers=headers)
 
 
 def _allowed(request: Request) -> list[str]:

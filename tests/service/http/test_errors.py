@@ -95,6 +95,15 @@ def test_422_names_the_bad_parameter(client: TestClient, query: str, name: str) 
     assert document["parameter"] == name
 
 
+@pytest.mark.parametrize(("query", "hint"), [("level=2", "; is it levels?"), ("x=2", "")])
+def test_a_parameter_that_is_none_is_told_which_it_may_be(
+    client: TestClient, query: str, hint: str
+) -> None:
+    document = post(client, b"x", query).json()
+    name = query.partition("=")[0]
+    assert document["detail"] == f"{name}: there is no such parameter{hint}"
+
+
 @pytest.mark.parametrize("value", ["0", "-1", "inf", "nan", "Auto", "many"])
 def test_a_reference_length_is_explained_whole(client: TestClient, value: str) -> None:
     document = post(client, b"x", f"reference_length={value}").json()
@@ -197,7 +206,8 @@ def test_a_slash_too_many_leads_nowhere(client: TestClient, path: str) -> None:
 
 
 def test_404_and_405_are_problems_too(client: TestClient) -> None:
-    assert_problem(client.get("/nothing"), 404, "not-found")
+    nothing = assert_problem(client.get("/nothing"), 404, "not-found")
+    assert nothing["detail"] == "there is nothing at this path; /docs shows what there is"
     for path, allowed in {
         "/subdivide": "POST",
         "/jobs": "POST",
@@ -206,7 +216,8 @@ def test_404_and_405_are_problems_too(client: TestClient) -> None:
         "/": "HEAD, GET",
     }.items():
         wrong = client.put(path)
-        assert_problem(wrong, 405, "method-not-allowed")
+        document = assert_problem(wrong, 405, "method-not-allowed")
+        assert document["detail"] == f"this path takes {allowed}"
         assert wrong.headers["allow"] == allowed
     assert_problem(client.get("/subdivide"), 405, "method-not-allowed")
 
