@@ -191,7 +191,7 @@ RESULT: dict[str, Any] = {
     ),
     "responses": {
         200: _FILE,
-        **{code: SUBDIVIDE["responses"][code] for code in (400, 413, 422, 500, 504)},
+        **{code: SUBDIVIDE["responses"][code] for code in (400, 413, 415, 422, 500, 504)},
         **_problems(
             _404=_UNKNOWN,
             _409="The job has not ended, or was cancelled",

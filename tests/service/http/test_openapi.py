@@ -104,7 +104,7 @@ def test_headers_that_clients_act_by_are_told(document):
 @pytest.mark.parametrize("route", ["/jobs/{job_id}/result", "/jobs/{job_id}/report"])
 def test_a_result_may_find_no_room_or_be_the_problem_that_its_job_failed_with(document, route):
     told = set(document["paths"][route]["get"]["responses"])
-    assert {"200", "400", "404", "409", "413", "422", "500", "503", "504"} <= told
+    assert {"200", "400", "404", "409", "413", "415", "422", "500", "503", "504"} <= told
 
 
 def test_every_reference_leads_somewhere(document):
