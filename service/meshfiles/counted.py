@@ -12,8 +12,11 @@ from .obj_text import with_line_feeds
 from .ply.header import ply_header
 from .text_pieces import pieces_from_end
 
-# Of what is not counted an STL's face takes 50 bytes, more as text.
+# Of what tells no counts, and will hardly be read.
 BYTES_PER_FACE = 30
+# A face of an STL as text: a normal, three vertices, and the words that name and enclose them.
+WORDS_PER_STL_FACE = 21
+STL_HEADER, STL_FACE = 84, 50
 
 _COMMENT = re.compile(rb"#[^\n]*")
 # Nothing that was passed over is tried again: to remember it would take a hundred times its size.
@@ -28,7 +31,7 @@ _WORDS_BESIDE_TRIANGLES = 3
 def count_triangles(data: bytes, kind: str) -> int:
     """Return about how many triangles a mesh file's polygons make.
 
-    Text is counted by the words of its lines, a binary PLY by the bytes of its faces: polygons of
+    Text is counted by the words of its lines, binary files by the bytes of their faces: polygons of
     many corners share vertices, and their triangles take a few bytes each. Others go by their size.
     """
     if kind == "obj":
@@ -36,6 +39,8 @@ def count_triangles(data: bytes, kind: str) -> int:
         text = with_line_feeds(data).replace(b"\\\n", b"  ").replace(b"\\\r\n", b"   ")
         pieces = (_lines(_COMMENT.sub(b"", piece)) for piece in pieces_from_end(text))
         return sum(_triangles(piece.words[piece.firsts == _FACE]) for piece in pieces)
+    if kind == "stl":
+        return _of_stl(data)
     if kind == "off":
         counts = _OFF_COUNTS.match(data)
         return _by_size(data) if counts is None else _in_last_lines(data, int(counts[1]))
@@ -50,6 +55,18 @@ def count_triangles(data: bytes, kind: str) -> int:
     beside = before + np.dtype(polygon.count_kind).itemsize + behind
     corners = (len(data) - begin - element.rows * beside) // polygon.size
     return max(corners - 2 * element.rows, 0)
+
+
+def is_binary_stl(data: bytes) -> bool:
+    """Return whether the count of faces agrees with the length: text may begin in any way."""
+    return len(data) == STL_HEADER + STL_FACE * int.from_bytes(data[80:STL_HEADER], "little")
+
+
+def _of_stl(data: bytes) -> int:
+    if is_binary_stl(data):
+        return (len(data) - STL_HEADER) // STL_FACE
+    words = sum(int(piece.words.sum()) for piece in map(_lines, pieces_from_end(data)))
+    return words // WORDS_PER_STL_FACE
 
 
 def _by_size(data: bytes) -> int:

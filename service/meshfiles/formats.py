@@ -17,6 +17,7 @@ from pns_common.connectivity.disjoint_union import disjoint_faces
 from ..bodies.media import GLTF_KINDS
 from ..errors import UnreadableError, UnrefinableError
 from . import unsupported
+from .counted import is_binary_stl
 from .indexed_triangles import NUMBER, IndexedTriangles
 from .obj_text import usual_obj, with_line_feeds, written_anew
 from .off import read_off, write_off
@@ -113,10 +114,10 @@ def _scene(data: bytes, kind: str) -> trimesh.Scene:
     """Return what trimesh makes of the file."""
     # Before warnings become errors: what it imports may warn.
     readers = load_readers()
-    text = _as_utf8(data) if kind == "obj" or (kind == "stl" and not _is_binary_stl(data)) else data
+    text = _as_utf8(data) if kind == "obj" or (kind == "stl" and not is_binary_stl(data)) else data
     if kind == "obj":
         text = without(_OBJ_PART, usual_obj(text))
-    if kind == "stl" and not _is_binary_stl(data) and _parts(text) > MOST_PARTS:
+    if kind == "stl" and not is_binary_stl(data) and _parts(text) > MOST_PARTS:
         text = b"solid\n" + without(_STL_PART, text) + b"\nendsolid\n"
     try:
         with warnings.catch_warnings():
@@ -150,11 +151,6 @@ def _as_utf8(data: bytes) -> bytes:
     except UnicodeDecodeError:
         return data.decode("latin-1").encode()
     return data
-
-
-def _is_binary_stl(data: bytes) -> bool:
-    """Return whether the count of faces agrees with the length: text may begin in any way."""
-    return len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
 
 
 def _uv(parts: list[trimesh.Trimesh]) -> Float[np.ndarray, "N 2"] | None:
@@ -196,7 +192,7 @@ def _beside_triangles(
                 elements["face"]["length"] = polygons
             others = unsupported.of_ply(data, elements, has_uv=has_uv)
             return int(elements["face"]["length"]), 0, others
-        case "stl" if _is_binary_stl(data):
+        case "stl" if is_binary_stl(data):
             return None, 0, unsupported.of_stl(data)
         case _:
             return None, 0, {}

@@ -7,6 +7,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+import trimesh
 
 from service.meshfiles import text_pieces
 from service.meshfiles.counted import BYTES_PER_FACE, count_triangles
@@ -45,6 +46,19 @@ def test_polygons_of_many_corners_count_as_the_triangles_that_they_become(kind: 
     assert cost_of_other(data, kind, 1, Limits()).faces == 4 * triangles
 
 
+@pytest.mark.parametrize("file_type", ["stl", "stl_ascii"])
+def test_an_stl_counts_as_the_faces_that_it_has(file_type: str) -> None:
+    """A client pays for what is predicted: of a text that was seven times what it made."""
+    data = trimesh.creation.icosphere(3).export(file_type=file_type)
+    data = data if isinstance(data, bytes) else data.encode()
+    faces = len(read(data, "stl").faces)
+    assert count_triangles(data, "stl") == faces == 1280
+    if file_type == "stl_ascii":
+        # In one line, and of several solids.
+        assert count_triangles(data.replace(b"\n", b" "), "stl") == faces
+        assert count_triangles(data + b"\n" + data, "stl") == 2 * faces
+
+
 def test_a_face_of_an_obj_that_goes_on_in_the_next_line_is_one() -> None:
     data = text_of("obj")
     torn = re.sub(rb" 7 8 ", b" 7 \\\\\n8 ", data)
@@ -72,12 +86,15 @@ def test_what_is_no_mesh_counts_as_nearly_nothing(data: bytes, kind: str) -> Non
         ("off", b"9 9\n"),
         ("off", b"1 "),
         ("ply", b"1 \n"),
+        ("stl", b"f\n"),
+        ("stl", b"v "),
     ],
 )
 def test_counting_takes_little_beside_the_file(kind: str, line: bytes) -> None:
     """It is done to any file before its job has a turn, beside the worker of another."""
     head = {
         "obj": b"v 0 0 0\n",
+        "stl": b"solid\n",
         "off": b"OFF\n",
         "ply": b"ply\nformat ascii 1.0\nelement face 9999999\nproperty list int int vertex_index\n"
         b"end_header\n",

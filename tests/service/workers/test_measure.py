@@ -102,8 +102,8 @@ def test_every_value_of_the_json_and_every_array_costs_something() -> None:
 
 
 def test_other_formats_cost_by_their_bytes_within_the_limit() -> None:
-    assert cost_of_other(bytes(3000), "stl", 1, Limits()).faces == 400
-    assert cost_of_other(bytes(3000), "stl", 1, Limits(max_faces=9)).faces == 8
+    assert cost_of_other(bytes(3000), "ply", 1, Limits()).faces == 400
+    assert cost_of_other(bytes(3000), "ply", 1, Limits(max_faces=9)).faces == 8
 
 
 def test_an_archive_too_large_for_a_glance_is_taken_for_the_largest() -> None:
