@@ -153,6 +153,17 @@ def build_topology(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Topology
     )
 
 
+def vertices_across(
+    faces: Int[np.ndarray, "F 3"],
+    edges: Int[np.ndarray, "N 2"],
+    half_edges: Int[np.ndarray, "N 2"],
+) -> Int[np.ndarray, "N 2"]:
+    """Return the vertices that the two faces beside each of some edges have on neither end."""
+    # All three of a triangle less those two.
+    three = faces[half_edges // 3].sum(axis=2, dtype=np.int64)
+    return three - edges.sum(axis=1, dtype=np.int64)[:, None]
+
+
 def split(topology: Topology) -> Int[np.ndarray, "C 3"]:
     """Split 1-to-4: face f becomes (a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca).
 

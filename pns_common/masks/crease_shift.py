@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from pns_common.base.arrays import marked, norm
 from pns_common.connectivity.creases import with_creases
 from pns_common.connectivity.edges_alone import edges_alone
-from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.connectivity.topology import EdgeClass, build_topology, vertices_across
 from pns_common.masks.limit.positions import limit_positions
 from pns_common.masks.stencils import loop_edge_point, loop_vertex_vertices
 
@@ -80,9 +80,7 @@ def shift_of_edges(
 ) -> Float[np.ndarray, " N"]:
     """Return how far from Loop's smooth rule the vertices of some edges between two faces lie."""
     ends = edges[rows]
-    # The vertex of a triangle that is on neither end: all three less those two.
-    three = faces[half_edges[rows] // 3].sum(axis=2, dtype=np.int64)
-    across = three - ends.sum(axis=1, dtype=np.int64)[:, None]
+    across = vertices_across(faces, ends, half_edges[rows])
     a, b, c, d = (np.take(points, column, axis=0) for column in (*ends.T, *across.T))
     return norm(placed[len(points) + rows] - loop_edge_point(a, b, c, d))
 

@@ -12,7 +12,7 @@ from pns_common.base.arrays import marked, norm
 from pns_common.base.blocks import Blocks
 from pns_common.base.cached import cached_property
 from pns_common.connectivity.creases import Creases, crease_classes, crease_halves
-from pns_common.connectivity.topology import EdgeClass, Topology
+from pns_common.connectivity.topology import EdgeClass, Topology, vertices_across
 from pns_common.fused.levels.additions import Additions
 from pns_common.fused.levels.child_faces import look_at_children
 from pns_common.fused.levels.crease_lines import crease_line_rows
@@ -128,9 +128,7 @@ def topology_of(mesh: MeshEdges) -> Topology:
     stencil = np.full((len(edges), 4), -1, dtype=np.int64)
     stencil[:, :2] = edges
     rows = np.flatnonzero(opposed)
-    # The vertex of a triangle that is on neither end: all three less those two.
-    three, two = faces.sum(axis=1)[half_edges[rows] // 3], edges[rows].sum(axis=1)
-    stencil[rows, 2:] = three - two[:, None]
+    stencil[rows, 2:] = vertices_across(faces, edges[rows], half_edges[rows])
     return Topology(
         vertex_count=mesh.vertex_count,
         faces=faces,

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.arrays import cross, dot
-from pns_common.connectivity.topology import EdgeClass
+from pns_common.connectivity.topology import EdgeClass, vertices_across
 from pns_common.geometry.crease_lines.going_on import CORNER
 from pns_common.geometry.crease_lines.turns import Edges, cosine_of
 
@@ -54,10 +54,9 @@ def would_fold(
     points: Float[np.ndarray, "V 3"], mesh: Edges, rows: Int[np.ndarray, " N"]
 ) -> Bool[np.ndarray, " N"]:
     """Return of which interior edges a face's child would turn over."""
-    ends, faces = mesh.edges[rows].astype(np.int64), mesh.half_edges[rows] // 3
-    # The vertex of a triangle that is on neither end: all three less those two.
-    apart = mesh.faces[faces].sum(axis=2, dtype=np.int64) - ends.sum(axis=1)[:, None]
-    a, b, c, d = (points[column] for column in (*ends.T, *apart.T))
+    ends = mesh.edges[rows]
+    across = vertices_across(mesh.faces, ends, mesh.half_edges[rows])
+    a, b, c, d = (points[column] for column in (*ends.T, *across.T))
     middle = (a + b) / 2
     moved = middle + TWICE_AS_FAR * ((c + d) - (a + b))
     folds = np.zeros(len(rows), dtype=bool)
