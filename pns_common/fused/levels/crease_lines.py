@@ -27,6 +27,16 @@ def crease_line_rows(
     blocks: Blocks,
 ) -> Int[np.ndarray, " N"]:
     """Return the edges of the lines to look for, and mitres; ``normals`` are the faces'."""
+    return with_mitres(points, normals, mesh, _lines(points, mesh, normals, creases, blocks))
+
+
+def _lines(
+    points: Float[np.ndarray, "V 3"],
+    mesh: MeshEdges,
+    normals: Float[np.ndarray, "F 3"],
+    creases: Creases,
+    blocks: Blocks,
+) -> Int[np.ndarray, " N"]:
     assert creases.line_angle is not None
     cosine, known, gentle = cosine_of(creases.line_angle), creases.edged, False
     beyond, found = edges_beyond(mesh, normals, cosine, blocks)
@@ -36,7 +46,7 @@ def crease_line_rows(
         gentle = is_edged(found, more) if known is None else known
         beyond, found = (bent, more) if gentle else (beyond, found)
     if not found:
-        return with_mitres(points, normals, mesh, np.zeros(0, dtype=np.int32))
+        return np.zeros(0, dtype=np.int32)
     sharp = np.flatnonzero(beyond).astype(np.int32)
     is_flat = np.empty(len(sharp), dtype=bool)
     sides = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
@@ -49,15 +59,13 @@ def crease_line_rows(
         drop_loose_ends(points, mesh.edges, rows, at_rim, cosine, *met, left)
         return rows[left]
 
-    if gentle:
-        alone = np.empty(len(flat), dtype=bool)
-        around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
-        least = PARALLEL**2, cosine_of(ROW_ANGLE)
-        blocks.run(len(flat), mark_alone.over(points, normals, *around, *least, flat, ROWS, alone))
-        lines = with_gentler(points, normals, mesh, flat[alone], cosine, going_on)
-    else:
-        lines = going_on(flat)
-    return with_mitres(points, normals, mesh, lines)
+    if not gentle:
+        return going_on(flat)
+    alone = np.empty(len(flat), dtype=bool)
+    around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
+    least = PARALLEL**2, cosine_of(ROW_ANGLE)
+    blocks.run(len(flat), mark_alone.over(points, normals, *around, *least, flat, ROWS, alone))
+    return with_gentler(points, normals, mesh, flat[alone], cosine, going_on)
 
 
 def edges_beyond(

@@ -89,6 +89,15 @@ def line_rows(
 
     ``normals`` are the faces' unit normals, 0 without area.
     """
+    return with_mitres(points, normals, mesh, _lines(points, normals, mesh, creases))
+
+
+def _lines(
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Topology,
+    creases: Creases,
+) -> Int[np.ndarray, " N"]:
     assert creases.line_angle is not None
     cosine = cosine_of(creases.line_angle)
     sharp = edges_beyond(normals, mesh, mesh.interior, cosine)
@@ -99,7 +108,7 @@ def line_rows(
         gentle = is_edged(len(sharp), len(bent)) if known is None else known
         sharp = bent if gentle else sharp
     if len(sharp) == 0:
-        return with_mitres(points, normals, mesh, sharp)
+        return sharp
     flat = sharp[have_flat_sides(normals, mesh, sharp)]
 
     at_rim = may_end(mesh, normals)
@@ -107,12 +116,10 @@ def line_rows(
     def going_on(rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
         return rows[go_on(points, mesh, rows, at_rim, cosine)]
 
-    if gentle:
-        alone = flat[stand_alone(points, normals, mesh, flat)]
-        lines = with_gentler(points, normals, mesh, alone, cosine, going_on)
-    else:
-        lines = going_on(flat)
-    return with_mitres(points, normals, mesh, lines)
+    if not gentle:
+        return going_on(flat)
+    alone = flat[stand_alone(points, normals, mesh, flat)]
+    return with_gentler(points, normals, mesh, alone, cosine, going_on)
 
 
 def with_gentler(
