@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .counted import STL_HEADER
 from .ply.header import LONGEST
 from .ply.textured_text import CORNER_UV
 
@@ -34,8 +35,7 @@ _PLY_KEPT = frozenset({"x", "y", "z", "vertex_index", "vertex_indices"})
 _PLY_UV = frozenset({"u", "v", "s", "t", "texture_u", "texture_v"})
 # As MeshLab writes it, in the header.
 _PLY_TEXTURE = re.compile(rb"^comment TextureFile[ \t]", re.MULTILINE)
-# Behind a header, and behind the twelve numbers of each face: by no standard its colour.
-_STL_HEADER = 84
+# Behind the twelve numbers of each face: by no standard its colour.
 _STL_FACE = np.dtype([("numbers", "V48"), ("attribute", "<u2")])
 SIDES = "faces of fewer than three vertices"
 
@@ -80,7 +80,7 @@ def faces_of_obj(data: bytes) -> ObjFaces:
 
 def of_stl(data: bytes) -> dict[str, int]:
     """Count the faces of a binary STL with a colour."""
-    faces = np.frombuffer(data, _STL_FACE, offset=_STL_HEADER)
+    faces = np.frombuffer(data, _STL_FACE, offset=STL_HEADER)
     coloured = int(np.count_nonzero(faces["attribute"]))
     return {"colours of faces": coloured} if coloured else {}
 

@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 from jaxtyping import Int
 
+from pns_common.connectivity.topology import build_topology
 from pns_common.mesh import Mesh
 from train.certificates.bodies import Body
 from train.certificates.subject import Subject
@@ -40,6 +41,5 @@ def trials(subject: Subject, bodies: Sequence[Body], seed: int) -> Iterator[Tria
 
 def drawn_creases(mesh: Mesh, rng: np.random.Generator) -> Int[np.ndarray, "N 2"]:
     """Return a quarter of a mesh's edges, which make darts, curves and corners."""
-    ends = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    edges = np.unique(ends, axis=0)
+    edges = np.unique(build_topology(mesh.faces, len(mesh.vertices)).edges, axis=0)
     return edges[rng.random(len(edges)) < 1 / 4]
