@@ -73,8 +73,7 @@ class Writer:
             primitive, like = (meshes[place]["primitives"][number] for place in (mesh, first))
             shared = {key: like[key] for key in GEOMETRY if key in like}
             primitive.update(deepcopy(shared))
-            if primitive.get("mode", TRIANGLES) != TRIANGLES:
-                primitive["mode"] = TRIANGLES
+            _name_triangles(primitive)
             if draco.EXTENSION in like.get("extensions", {}):
                 data = deepcopy(like["extensions"][draco.EXTENSION])
                 primitive.setdefault("extensions", {})[draco.EXTENSION] = data
@@ -97,8 +96,7 @@ class Writer:
                     refined.source.target_accessors, refined.targets, strict=True
                 )
             ]
-        if primitive.get("mode", TRIANGLES) != TRIANGLES:
-            primitive["mode"] = TRIANGLES
+        _name_triangles(primitive)
         count = len(refined.attributes["POSITION"])
         indices = as_indices(refined.faces, count).reshape(-1, 1)
         self.set_indices(primitive, self._accessor(indices, ELEMENT_ARRAY_BUFFER, "SCALAR"))
@@ -198,6 +196,12 @@ class Writer:
         self.pieces.append(data)
         self.length = start + len(data)
         return start
+
+
+def _name_triangles(primitive: dict[str, Any]) -> None:
+    """Say that a primitive is made of triangles, whatever strip or fan it was."""
+    if primitive.get("mode", TRIANGLES) != TRIANGLES:
+        primitive["mode"] = TRIANGLES
 
 
 def describe(
