@@ -21,6 +21,7 @@ from pns_common.geometry.crease_lines import (
     is_edged,
     line_rows,
 )
+from pns_common.geometry.crease_lines.held_edges import with_held_edges
 from pns_common.geometry.crease_lines.turns import Edges, cosine_of, edges_beyond
 from pns_common.geometry.frames import face_normals
 from pns_common.mesh import Mesh, check_is_mesh
@@ -32,11 +33,11 @@ NO_PAIRS = np.zeros((0, 2), dtype=np.int64)
 def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2"]:
     """Return the edges that a mesh shows to be sharp, as pairs of vertices, for ``refine``.
 
-    These turn by more than ``angle`` (degrees, between 0 and 180), lie between sides that are flat
-    beside them, and go on at both ends. None: by more than 66 degrees, and where at least half of
+    These turn by more than ``angle`` (degrees, between 0 and 180), lie between two sides of a part,
+    and go on at both ends. None: by more than 66 degrees, and where at least half of
     the edges beyond 21 degrees are beyond 66, by more than 21, but for rows of like ones; so the
-    default model keeps them (geometry/crease_lines). With them go edges within a plane side that
-    would fold it, as the mitres of a frame.
+    default model keeps them (geometry/crease_lines). With them go edges within plane sides that
+    begin on them and would fold these sides, as the mitres of a frame.
 
     Raises:
         ParameterError: it is no Mesh, or the angle is out of range.
@@ -45,7 +46,8 @@ def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2
     if not (angle is None or (is_number(angle) and 0 < angle < 180)):
         raise ParameterError("angle", angle, expected="degrees between 0 and 180")
     asked = LINES if angle is None else Creases(line_angle=float(angle))
-    return _look(mesh.vertices, mesh.faces, None).lines(asked)
+    look = _look(mesh.vertices, mesh.faces, None)
+    return look.sharp(look.line_rows(asked))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,17 +55,29 @@ class _Look:
     """A mesh's edges, those that are named as creases, and what finds some of them.
 
     Attributes:
+        points: the mesh's vertices.
+        normals: unit normals of its faces.
         line_rows: returns the edges of the lines that creases say to look for.
         rows_beyond: returns the interior edges that turn by more than an angle in degrees.
     """
 
+    points: Float[np.ndarray, "V 3"]
+    normals: Float[np.ndarray, "F 3"]
     edges: Edges
     line_rows: Callable[[Creases], Int[np.ndarray, " N"]]
     rows_beyond: Callable[[float], Int[np.ndarray, " N"]]
 
-    def lines(self, creases: Creases) -> Int[np.ndarray, "N 2"]:
-        """Return the same lines as pairs of vertices."""
-        return self.edges.edges[self.line_rows(creases)].astype(np.int64)
+    def sharp(self, lines: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M 2"]:
+        """Return the edges of lines, and those held beside them, as pairs of vertices."""
+        rows = with_held_edges(self.points, self.normals, self.edges, lines)
+        return self.edges.edges[rows].astype(np.int64)
+
+    def are_among(
+        self, rows: Int[np.ndarray, " N"], pairs: Int[np.ndarray, "P 2"]
+    ) -> Bool[np.ndarray, " N"]:
+        """Return which edges are among pairs of vertices."""
+        count = len(self.points)
+        return np.isin(pair_keys(self.edges.edges[rows], count), pair_keys(pairs, count))
 
     def turns(
         self, creases: Creases, part_of_face: Int[np.ndarray, " F"], count: int
@@ -99,6 +113,8 @@ def _look(
             return np.flatnonzero(fused.edges_beyond(edges, measured, cosine_of(angle), blocks)[0])
 
         return _Look(
+            points,
+            measured,
             edges,
             lambda creases: fused.crease_line_rows(points, edges, measured, creases, blocks),
             rows_beyond,
@@ -106,6 +122,8 @@ def _look(
     topology = with_creases(build_topology(faces, len(points)), named)
     normals = face_normals(points, faces)
     return _Look(
+        points,
+        normals,
         topology,
         lambda creases: line_rows(points, normals, topology, creases),
         lambda angle: edges_beyond(normals, topology, topology.interior, cosine_of(angle)),
@@ -132,26 +150,27 @@ def named_on_parts(
     if creases.line_angle is None:
         return creases
     look = _look(mesh.vertices, mesh.faces, creases.named)
+    lines = look.line_rows
     if creases.edged_angle is None or (count == 1 and len(smooth) == 0):
-        return _with_lines(creases, look.lines(creases))
+        return _with_sharp(creases, look.sharp(lines(creases)))
     edged = np.full(count, bool(creases.edged))
     if creases.edged is None:
         edged = _edged(look.turns(creases, part_of_face, count))
-    lines = look.lines(replace(creases, edged=False))
+    rows = lines(replace(creases, edged=False))
     if edged.any():
         part_of_vertex = np.zeros(len(mesh.vertices), dtype=np.int64)
         part_of_vertex[mesh.faces] = part_of_face[:, None]
-        gentle = look.lines(replace(creases, edged=True))
-        keys = [pair_keys(pairs, len(mesh.vertices)) for pairs in (gentle, lines, smooth)]
-        gentle = gentle[np.isin(keys[0], keys[1]) | ~np.isin(keys[0], keys[2])]
-        in_edged = [edged[part_of_vertex[pairs[:, 0]]] for pairs in (lines, gentle)]
-        lines = np.concatenate([lines[~in_edged[0]], gentle[in_edged[1]]])
-    return _with_lines(creases, lines)
+        in_edged = edged[part_of_vertex[look.edges.edges[:, 0]]]
+        gentle = lines(replace(creases, edged=True))
+        meant = ~look.are_among(gentle, smooth)
+        gentle = gentle[np.isin(gentle, rows) | meant]
+        rows = np.sort(np.concatenate([rows[~in_edged[rows]], gentle[in_edged[gentle]]]))
+    return _with_sharp(creases, look.sharp(rows))
 
 
-def _with_lines(creases: Creases, lines: Int[np.ndarray, "N 2"]) -> Creases:
-    """Return the creases that are named, and the lines, as creases by name."""
-    named = lines if creases.named is None else np.concatenate([creases.named, lines])
+def _with_sharp(creases: Creases, sharp: Int[np.ndarray, "N 2"]) -> Creases:
+    """Return the creases that are named, and what a mesh shows to be sharp, as creases by name."""
+    named = sharp if creases.named is None else np.concatenate([creases.named, sharp])
     return Creases(named, levels=creases.levels)
 
 

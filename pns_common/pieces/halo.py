@@ -40,12 +40,12 @@ from pns_common.schemes import Scheme
 LOOP_REACH, FIELDS_REACH = 1, 2
 # Rings for the fold guard, where nothing is known yet of how far it goes.
 GUARD_RINGS = 1
-# A ring for each round, one for the sides of the farthest edge, one for the faces beside those, and
-# one for mitres, which lie between lines.
-LINES_REACH = ROUNDS + 3
+# A ring for each round, two for the sides of the farthest edge, one for the faces beside those, and
+# one for edges that are held, which begin on lines.
+LINES_REACH = ROUNDS + 4
 # With gentler lines the rounds are gone through twice, and faces are read across the edges of those
 # beside, which may be like.
-GENTLE_REACH = 2 * ROUNDS + 4
+GENTLE_REACH = 2 * ROUNDS + 5
 
 
 class ThinHaloError(PnsError):

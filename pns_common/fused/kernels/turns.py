@@ -7,7 +7,6 @@ import math
 from pns_common.fused.kernels.compiled import (
     CLASSES,
     FLAGS_OUT,
-    INDEX,
     INDICES,
     POINTS,
     REAL,
@@ -66,25 +65,3 @@ def mark_edges_beyond(normals, half_edges, edge_class, cosine, begin, end, beyon
         beyond[e] = (edge_class[e] == INTERIOR) & defined & (dot(n, m) < cosine)
         found += beyond[e]
     return found
-
-
-@kernel(SIZE, POINTS, INDICES, INDICES, CLASSES, INDEX, SIZE, SIZE, FLAGS_OUT)
-def mark_flat_sides(normals, face_edges, half_edges, edge_class, sharp, begin, end, flat):
-    """Mark those of the sharp edges begin … end − 1 both of whose faces are flat on another side.
-
-    That is where another edge of the face turns less than half as much.
-    """
-    for i in range(natural(begin), end):
-        e = sharp[i]
-        turn = turn_cosine(normals, half_edges, edge_class, e)
-        flattest = 1.0
-        for h in range(2):
-            f, flattest_of_face = half_edges[e, h] // 3, -1.0
-            for k in range(3):
-                side = face_edges[f, k]
-                if side != e:
-                    cosine = turn_cosine(normals, half_edges, edge_class, side)
-                    flattest_of_face = max(flattest_of_face, cosine)
-            flattest = min(flattest, flattest_of_face)
-        flat[i] = flattest > half(turn)
-    return 0

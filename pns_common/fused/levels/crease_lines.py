@@ -10,12 +10,12 @@ from pns_common.connectivity.creases import Creases
 from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.edge_rows import mark_alone
 from pns_common.fused.kernels.going_on import drop_loose_ends
-from pns_common.fused.kernels.turns import mark_edges_beyond, mark_flat_sides
+from pns_common.fused.kernels.sides import mark_between_sides
+from pns_common.fused.kernels.turns import mark_edges_beyond
 from pns_common.fused.levels.mesh_edges import MeshEdges
 from pns_common.geometry.crease_lines import is_edged, with_gentler
 from pns_common.geometry.crease_lines.edge_rows import PARALLEL, ROW_ANGLE
 from pns_common.geometry.crease_lines.going_on import may_end
-from pns_common.geometry.crease_lines.mitres import with_mitres
 from pns_common.geometry.crease_lines.turns import cosine_of
 
 
@@ -26,17 +26,7 @@ def crease_line_rows(
     creases: Creases,
     blocks: Blocks,
 ) -> Int[np.ndarray, " N"]:
-    """Return the edges of the lines to look for, and mitres; ``normals`` are the faces'."""
-    return with_mitres(points, normals, mesh, _lines(points, mesh, normals, creases, blocks))
-
-
-def _lines(
-    points: Float[np.ndarray, "V 3"],
-    mesh: MeshEdges,
-    normals: Float[np.ndarray, "F 3"],
-    creases: Creases,
-    blocks: Blocks,
-) -> Int[np.ndarray, " N"]:
+    """Return the edges of the lines to look for; ``normals`` are the faces'."""
     assert creases.line_angle is not None
     cosine, known, gentle = cosine_of(creases.line_angle), creases.edged, False
     beyond, found = edges_beyond(mesh, normals, cosine, blocks)
@@ -48,10 +38,10 @@ def _lines(
     if not found:
         return np.zeros(0, dtype=np.int32)
     sharp = np.flatnonzero(beyond).astype(np.int32)
-    is_flat = np.empty(len(sharp), dtype=bool)
-    sides = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
-    blocks.run(len(sharp), mark_flat_sides.over(*sides, ROWS, is_flat))
-    flat, at_rim = sharp[is_flat], may_end(mesh, normals)
+    is_between = np.empty(len(sharp), dtype=bool)
+    turning = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, beyond
+    blocks.run(len(sharp), mark_between_sides.over(*turning, sharp, ROWS, is_between))
+    between, at_rim = sharp[is_between], may_end(mesh, normals)
 
     def going_on(rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
         left = np.ones(len(rows), dtype=bool)
@@ -60,12 +50,14 @@ def _lines(
         return rows[left]
 
     if not gentle:
-        return going_on(flat)
-    alone = np.empty(len(flat), dtype=bool)
+        return going_on(between)
+    alone = np.empty(len(between), dtype=bool)
     around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
     least = PARALLEL**2, cosine_of(ROW_ANGLE)
-    blocks.run(len(flat), mark_alone.over(points, normals, *around, *least, flat, ROWS, alone))
-    return with_gentler(points, normals, mesh, flat[alone], cosine, going_on)
+    blocks.run(
+        len(between), mark_alone.over(points, normals, *around, *least, between, ROWS, alone)
+    )
+    return with_gentler(points, normals, mesh, between[alone], cosine, going_on)
 
 
 def edges_beyond(

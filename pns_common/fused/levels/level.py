@@ -20,6 +20,7 @@ from pns_common.fused.levels.face_measures import FaceMeasures
 from pns_common.fused.levels.fans import multi_fan_vertices
 from pns_common.fused.levels.loop_points import largest_size, loop_points, place_vertices
 from pns_common.fused.levels.mesh_edges import MeshEdges, build_edges, in_int32, split_mesh_edges
+from pns_common.geometry.crease_lines.held_edges import with_held_edges
 from pns_common.levels.diagnostics import Displacements, LevelReport, edge_counts
 from pns_common.masks.crease_shift import CreaseShift, shift_of_edges
 from pns_common.mesh import LARGEST_COORDINATE
@@ -81,8 +82,9 @@ def control_level(
     mesh = control_edges(faces, len(points), creases.named, blocks)
     level = FusedLevel.of(points, mesh, blocks)
     if creases.line_angle is not None:
-        of_lines = level.faces.normals, creases, blocks.unheard()
-        rows = crease_line_rows(points, mesh, *of_lines)
+        normals = level.faces.normals
+        lines = crease_line_rows(points, mesh, normals, creases, blocks.unheard())
+        rows = with_held_edges(points, normals, mesh, lines)
         if len(rows):
             classes = mesh.edge_class.copy()
             classes[rows] = EdgeClass.CREASE

@@ -5,7 +5,9 @@ by 90 degrees, and one of an octahedron, which may stand for a sphere, by 71. Wh
 is what lies around:
 
 1. *it is sharp*: its two faces' normals differ by more than θ;
-2. *its sides are flat*: in each of the two faces another edge turns by less than half as much;
+2. *it lies between two sides*: in each of its two faces another edge turns by less than half as
+   much, or in one, and the other is a side by itself, as the end of a wedge or a gable is: all of
+   its edges are sharp, and in each face across them another turns by less than half as much;
 3. *it goes on*: at both ends it meets another such edge that runs on within θ of straight, or a
    corner of three or more, or a boundary, a crease that is named or another edge that is not
    interior, or a face without area; what does not is dropped, ``ROUNDS`` times over, so that a line
@@ -30,7 +32,7 @@ are lines only if
    pieces or more, whose arc begins and ends with half the turn of those between. But chamfers of a
    bar that are a fifth as wide as its sides are no row.
 
-With them go mitres, plane edges between corners of lines that would fold a side (mitres.py).
+With them go edges that are held within plane sides, as a frame's mitres (held_edges.py).
 
 What makes a mesh edged are counts, and those of its pieces add up. Turning, moving, scaling or
 renumbering a mesh does not change the answer, nor does mirroring it with its faces turned, but
@@ -49,12 +51,12 @@ from pns_common.connectivity.creases import Creases, with_crease_rows
 from pns_common.connectivity.topology import Topology
 from pns_common.geometry.crease_lines.edge_rows import stand_alone
 from pns_common.geometry.crease_lines.going_on import go_on, may_end
-from pns_common.geometry.crease_lines.mitres import with_mitres
+from pns_common.geometry.crease_lines.held_edges import with_held_edges
+from pns_common.geometry.crease_lines.sides import between_sides
 from pns_common.geometry.crease_lines.turns import (
     Edges,
     cosine_of,
     edges_beyond,
-    have_flat_sides,
     rises,
     turn_cosines,
 )
@@ -73,10 +75,14 @@ def with_crease_lines(
     normals: Float[np.ndarray, "F 3"],
     creases: Creases,
 ) -> Topology:
-    """Return the topology with its crease lines as creases; unchanged where none are looked for."""
+    """Return the topology with its crease lines, and what is held beside them, as creases.
+
+    It is unchanged where none are looked for.
+    """
     if creases.line_angle is None:
         return topology
-    return with_crease_rows(topology, line_rows(points, normals, topology, creases))
+    lines = line_rows(points, normals, topology, creases)
+    return with_crease_rows(topology, with_held_edges(points, normals, topology, lines))
 
 
 def line_rows(
@@ -85,19 +91,10 @@ def line_rows(
     mesh: Topology,
     creases: Creases,
 ) -> Int[np.ndarray, " N"]:
-    """Return the edges of a mesh's crease lines, which ``creases`` say to look for, and mitres.
+    """Return the edges of a mesh's crease lines, which ``creases`` say to look for.
 
     ``normals`` are the faces' unit normals, 0 without area.
     """
-    return with_mitres(points, normals, mesh, _lines(points, normals, mesh, creases))
-
-
-def _lines(
-    points: Float[np.ndarray, "V 3"],
-    normals: Float[np.ndarray, "F 3"],
-    mesh: Topology,
-    creases: Creases,
-) -> Int[np.ndarray, " N"]:
     assert creases.line_angle is not None
     cosine = cosine_of(creases.line_angle)
     sharp = edges_beyond(normals, mesh, mesh.interior, cosine)
@@ -109,7 +106,7 @@ def _lines(
         sharp = bent if gentle else sharp
     if len(sharp) == 0:
         return sharp
-    flat = sharp[have_flat_sides(normals, mesh, sharp)]
+    between = sharp[between_sides(normals, mesh, sharp)]
 
     at_rim = may_end(mesh, normals)
 
@@ -117,8 +114,8 @@ def _lines(
         return rows[go_on(points, mesh, rows, at_rim, cosine)]
 
     if not gentle:
-        return going_on(flat)
-    alone = flat[stand_alone(points, normals, mesh, flat)]
+        return going_on(between)
+    alone = between[stand_alone(points, normals, mesh, between)]
     return with_gentler(points, normals, mesh, alone, cosine, going_on)
 
 

@@ -1,4 +1,4 @@
-"""How far edges turn, and which way: what is sharp, and what has flat sides (marks 1 and 2)."""
+"""How far edges turn, and which way: what is sharp (mark 1)."""
 
 from __future__ import annotations
 
@@ -65,22 +65,6 @@ def edges_beyond(
     n1, n2 = _normals_at(normals, mesh, rows)
     defined = (dot(n1, n1) > 0) & (dot(n2, n2) > 0)
     return rows[defined & (dot(n1, n2) < cosine)]
-
-
-def have_flat_sides(
-    normals: Float[np.ndarray, "F 3"], mesh: Edges, sharp: Int[np.ndarray, " N"]
-) -> Bool[np.ndarray, " N"]:
-    """Return at which sharp edges both faces have another edge that turns less than half as much.
-
-    An edge that is not interior turns by nothing, nor does one of a face without area.
-    """
-    sides = mesh.face_edges[mesh.half_edges[sharp] // 3]
-    cosines = turn_cosines(normals, mesh, sides)
-    own = sides == sharp[:, None, None]
-    turn = cosines[:, 0][own[:, 0]]
-    cosines[own] = -1.0
-    flattest = cosines.max(axis=-1).min(axis=-1)
-    return flattest > half(turn)
 
 
 def turn_cosines(

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from pns_common import Mesh
 from pns_common.connectivity.topology import build_topology
-from pns_common.fused.kernels.turns import mark_edges_beyond, mark_flat_sides
-from pns_common.geometry.crease_lines.turns import edges_beyond, have_flat_sides
+from pns_common.fused.kernels.turns import mark_edges_beyond
+from pns_common.geometry.crease_lines.turns import edges_beyond
 from pns_common.geometry.frames import face_normals
 from tests.support.kernels import WAYS, edges_built
-from tests.support.meshes import bumpy_sphere, manifolds, noisy_blocks, soups
+from tests.support.meshes import bumpy_sphere, manifolds, soups
 
 
 def marked(mesh, cosine, way):
@@ -43,15 +43,3 @@ def test_an_edge_at_the_angle_itself_is_not_beyond_it(way):
         found = marked(mesh, cosine, WAYS[way])
         assert (cosines[found] < cosine).all()
         assert len(found) == (cosines < cosine).sum()
-
-
-@pytest.mark.parametrize("way", WAYS)
-@given(mesh=manifolds() | soups() | noisy_blocks(), cosine=st.floats(-1, 1))
-def test_sides_are_flat_where_the_formula_has_them_so(way, mesh, cosine):
-    edges, normals = edges_built(mesh), face_normals(mesh.vertices, mesh.faces)
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    sharp = edges_beyond(normals, topology, topology.interior, cosine)
-    flat = np.ones(len(sharp), dtype=bool)
-    around = normals, edges.face_edges, edges.half_edges, edges.edge_class, sharp.astype(np.int32)
-    WAYS[way](mark_flat_sides)(*around, 0, len(sharp), flat)
-    np.testing.assert_array_equal(flat, have_flat_sides(normals, topology, sharp))

@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 from pns_common import Creases, Mesh
 from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.geometry.crease_lines import is_edged, with_crease_lines
-from tests.support.crease_lines import CHAMFERED, SHARP_ALONE, WITH_GENTLE, lines, normals_of
+from tests.support.crease_lines import (
+    CHAMFERED,
+    SHARP_ALONE,
+    WEDGE,
+    WITH_GENTLE,
+    lines,
+    normals_of,
+)
 from tests.support.meshes import block, bumpy_sphere, grid, manifolds, rotation, soups
 from train.data.primitives import box, cone, cylinder, globe, icosphere, l_block, tetrahedron, torus
 
@@ -35,6 +42,7 @@ SHARP = {
     "cylinder of 16 sides": (cylinder(16, rows=6), 32),
     "prism of five sides": (cylinder(5), 15),
     "cone": (cone(16), 16),
+    "wedge": (WEDGE, 9),
     "block": (Mesh(*block(4)), 48),
     "block without a lid": (Mesh(*block(4, closed=False)), 32),
     "noisy block": (Mesh(*block(4, noise=0.02)), 48),

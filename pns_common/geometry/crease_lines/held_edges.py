@@ -1,0 +1,104 @@
+"""Edges within plane sides that are held, since Loop would fold the sides beside their lines.
+
+A corner of lines stays where it is, and so does a line that runs straight. Loop's mask still moves
+the vertex of an edge that begins there, along the plane that its faces lie in: in a picture frame
+that of a mitre goes towards the frame's middle, over the inner rim, and in a side that is cut into
+uneven triangles it goes over a narrow one. Such an edge is kept straight as the lines are, which no
+one sees in a plane: its vertex stays at its middle, and those of the next level too.
+
+Both of its ends are such vertices, or one is, and all around the other lies in the plane. None ends
+where a line bends: one crease more would make a corner of a round rim. Where the mask's vertex is
+the edge's middle anyway, as in a parallelogram, nothing is held: a box has no such edges.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.base.arrays import dot, marked, segment_sum, unit
+from pns_common.connectivity.topology import EdgeClass, vertices_across
+from pns_common.geometry.crease_lines.going_on import CORNER
+from pns_common.geometry.crease_lines.turns import Edges, cosine_of, turn_cosines
+
+# Two faces that turn by less, in degrees, lie in one plane: far above what single precision does to
+# one, far below what a fine mesh of something round turns by.
+PLANE = 0.1
+# A line that turns by less at a vertex, in degrees, runs straight there.
+STRAIGHT = 0.5
+# Loop's 3/8 (a + b) + 1/8 (c + d) is 1/8 of c + d − a − b from an edge's middle; so far, as a share
+# of the edge, may it go.
+NEAR = 0.01
+
+
+def with_held_edges(
+    points: Float[np.ndarray, "V 3"],
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Edges,
+    lines: Int[np.ndarray, " N"],
+) -> Int[np.ndarray, " M"]:
+    """Return the edges of lines and those that are held beside them, in order."""
+    is_line = mesh.edge_class == EdgeClass.CREASE
+    is_line[lines] = True
+    if not is_line.any():
+        return lines
+    is_sharp = is_line | (mesh.edge_class != EdgeClass.INTERIOR)
+    stays = staying(points, mesh, np.flatnonzero(is_line), np.flatnonzero(is_sharp))
+    first, second = (stays[ends] for ends in mesh.edges.T)
+    rows = np.flatnonzero((first | second) & ~is_sharp)
+    rows = rows[turn_cosines(normals, mesh, rows) > cosine_of(PLANE)]
+    rows = rows[slides(points, mesh, rows)]
+    one_alone = ~(first & second)[rows]
+    ends = mesh.edges[rows[one_alone]]
+    others = np.where(stays[ends[:, 0]], ends[:, 1], ends[:, 0])
+    held = np.ones(len(rows), dtype=bool)
+    held[one_alone] = in_planes(normals, mesh, is_sharp, others)[others]
+    return np.sort(np.concatenate([lines, rows[held].astype(lines.dtype)]))
+
+
+def staying(
+    points: Float[np.ndarray, "V 3"],
+    mesh: Edges,
+    lines: Int[np.ndarray, " N"],
+    sharp: Int[np.ndarray, " S"],
+) -> Bool[np.ndarray, " V"]:
+    """Return at which vertices lines make a corner, or run straight on.
+
+    ``sharp`` are all edges that are not smooth, boundaries too.
+    """
+    ends = mesh.edges[lines]
+    on_lines, meet = (
+        np.bincount(mesh.edges[rows].reshape(-1), minlength=mesh.vertex_count)
+        for rows in (lines, sharp)
+    )
+    along = unit(points[ends[:, 1]] - points[ends[:, 0]])
+    # As in going_on: ‖u + v‖² = 2 + 2 u · v of two that meet.
+    away = segment_sum(np.concatenate([along, -along]), ends.T.reshape(-1), mesh.vertex_count)
+    straight = (on_lines == 2) & (dot(away, away) < 2 - 2 * cosine_of(STRAIGHT))
+    return (straight & (meet == 2)) | ((on_lines > 0) & (meet >= CORNER))
+
+
+def slides(
+    points: Float[np.ndarray, "V 3"], mesh: Edges, rows: Int[np.ndarray, " N"]
+) -> Bool[np.ndarray, " N"]:
+    """Return of which interior edges Loop's mask moves the vertex away from the middle."""
+    ends = mesh.edges[rows]
+    across = vertices_across(mesh.faces, ends, mesh.half_edges[rows])
+    a, b, c, d = (points[column] for column in (*ends.T, *across.T))
+    off, along = ((c + d) - (a + b)) / 8, b - a
+    return dot(off, off) > NEAR**2 * dot(along, along)
+
+
+def in_planes(
+    normals: Float[np.ndarray, "F 3"],
+    mesh: Edges,
+    is_sharp: Bool[np.ndarray, " E"],
+    asked: Int[np.ndarray, " N"],
+) -> Bool[np.ndarray, " V"]:
+    """Return which of the vertices that are asked for have one plane around them, and no line."""
+    inside = marked(asked, mesh.vertex_count)
+    rows = np.flatnonzero(inside[mesh.edges[:, 0]] | inside[mesh.edges[:, 1]])
+    bent = is_sharp[rows]
+    bent[~bent] = turn_cosines(normals, mesh, rows[~bent]) <= cosine_of(PLANE)
+    inside[mesh.edges[rows[bent]]] = False
+    return inside
