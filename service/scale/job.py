@@ -8,7 +8,7 @@ import time
 import traceback
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import InvalidParameter, LimitError, NoModelError, ServiceError
 from ..options import Limits, Options
@@ -18,10 +18,18 @@ if TYPE_CHECKING:
     from pns_common.schemes import Model
 
     from ..bodies.sibling_files import SiblingFiles
+    from .places import Place
 
 DONE, SKIPPED, FAILED, PLANNED = "done", "skipped", "failed", "planned"
 # The code of a folder that cannot be listed: it is told, but is no file of the report.
 UNREADABLE_FOLDER = "unreadable-folder"
+
+
+class Known(NamedTuple):
+    """The hashes of an input and of the result that was made of it."""
+
+    input: str
+    output: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +40,7 @@ class Task:
         url, output: where it is read, where its result goes.
         kind, target: formats, by extension.
         model_hash: of the model that the run began with; None without one.
-        known: the hash of the input that the result at `output` was made of; None: there is none.
+        known: what an earlier run of the same work has written at `output`; None: nothing.
         attempt: 1, then 2 where the first worker died or hung.
         dry: predict the cost, write nothing.
     """
@@ -45,7 +53,7 @@ class Task:
     model: str | None
     limits: Limits
     model_hash: str | None = None
-    known: str | None = None
+    known: Known | None = None
     attempt: int = 1
     dry: bool = False
 
@@ -126,7 +134,7 @@ def _refine(task: Task) -> Row:
     source, output = place_of(task.url), place_of(task.output)
     data, siblings = source.read(), source.siblings()
     digest = input_hash(data, task.kind, siblings, task.limits)
-    if task.known == digest and output.is_file():
+    if _is_done(task.known, digest, output):
         return Row(task.url, task.output, SKIPPED, input_sha256=digest, bytes_in=len(data))
     model = _model(task.model) if task.options.scheme == "pns" else None
     check_same_model(task.model, None if model is None else model.hash, task.model_hash)
@@ -180,7 +188,7 @@ def _plan(task: Task) -> Row:
     data, siblings = source.read(), source.siblings()
     digest = input_hash(data, task.kind, siblings, task.limits)
     faces = predicted_faces(data, task.kind, task.options, task.limits, siblings)
-    status = SKIPPED if task.known == digest and place_of(task.output).is_file() else PLANNED
+    status = SKIPPED if _is_done(task.known, digest, place_of(task.output)) else PLANNED
     return Row(
         task.url,
         task.output,
@@ -190,6 +198,13 @@ def _plan(task: Task) -> Row:
         bytes_in=len(data),
         input_sha256=digest,
     )
+
+
+def _is_done(known: Known | None, input_hash: str, output: Place) -> bool:
+    """Return whether a result is there, byte for byte: another run may have replaced it."""
+    if known is None or known.input != input_hash or not output.is_file():
+        return False
+    return hashlib.sha256(output.read()).hexdigest() == known.output
 
 
 def input_hash(data: bytes, kind: str, siblings: SiblingFiles, limits: Limits) -> str:

@@ -19,7 +19,7 @@ from typing import Any
 from pns_common.base.whole_file import replacing
 
 from ..errors import InvalidParameter
-from .job import PLANNED, SKIPPED, UNREADABLE_FOLDER, Row
+from .job import PLANNED, SKIPPED, UNREADABLE_FOLDER, Known, Row
 from .places import THIS_MACHINE, Place, place_of
 from .report_file import check_report_file
 
@@ -47,13 +47,14 @@ class Journal:
             self._database.execute("PRAGMA synchronous=NORMAL")
             self._database.executescript(SCHEMA)
 
-    def known(self, path: str) -> str | None:
-        """Return the hash of the input whose result this same work has written; None without."""
+    def known(self, path: str) -> Known | None:
+        """Return what this same work has made of a file; None without."""
         row = self._database.execute(
-            "SELECT input FROM rows WHERE path = ? AND work = ? AND status = 'done'",
+            "SELECT input, json_extract(row, '$.output_sha256') FROM rows "
+            "WHERE path = ? AND work = ? AND status = 'done'",
             (path, self._work),
         ).fetchone()
-        return None if row is None else str(row[0])
+        return None if row is None else Known(*row)
 
     def claim(self, output: str, path: str) -> bool:
         """Return whether a result may be written at `output`: no other file holds that place."""

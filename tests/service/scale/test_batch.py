@@ -23,7 +23,7 @@ from service.options import Limits, Options
 from service.scale.batch import batch_work, work_hash
 from service.scale.engines.local import local
 from service.scale.engines.work import nothing
-from service.scale.job import Task, run
+from service.scale.job import Known, Task, run
 from tests.service.scale.jobs import misbehave
 from tests.service.scale.libraries import (
     LOOP,
@@ -105,6 +105,34 @@ def test_a_result_that_other_options_replaced_is_made_again(tmp_path):
     assert refined(batch).counts == {"done": 1}
     assert hashes(tmp_path / "out") == expected
     assert refined(batch).counts == {"skipped": 1}
+
+
+def test_a_result_that_any_other_run_replaced_is_made_again(tmp_path):
+    library(tmp_path / "in", ["a.obj"])
+    batch = batch_of(tmp_path)
+    refined(batch)
+    expected = hashes(tmp_path / "out")
+    # Of which this report's journal knows nothing.
+    deeper = Options(scheme="loop", levels=2)
+    refined(batch_of(tmp_path, options=deeper, report=tmp_path / "other.jsonl"))
+    assert refined(replace(batch, dry=True)).counts == {"planned": 1}
+    assert refined(batch).counts == {"done": 1}
+    assert hashes(tmp_path / "out") == expected
+
+
+def test_of_two_works_at_once_the_one_that_is_replaced_is_done_again(tmp_path):
+    library(tmp_path / "in", ["a.obj"])
+    batch = batch_of(tmp_path)
+    deeper = batch_of(tmp_path, options=Options(scheme="loop", levels=2))
+
+    def meanwhile(tasks):
+        task = next(tasks)
+        refined(deeper)
+        yield [run(task)]
+
+    assert refined(batch, meanwhile).counts == {"done": 1}
+    assert refined(deeper).counts == {"done": 1}
+    assert refined(deeper).counts == {"skipped": 1}
 
 
 def test_a_run_that_was_stopped_goes_on(tmp_path):
@@ -400,5 +428,5 @@ def test_a_worker_starts_without_what_only_a_driver_needs():
 
 
 def test_tasks_cross_to_a_worker_as_they_are():
-    task = Task("a.obj", "b.obj", "obj", "obj", LOOP, None, Limits(), known="x")
+    task = Task("a.obj", "b.obj", "obj", "obj", LOOP, None, Limits(), known=Known("x", "y"))
     assert pickle.loads(pickle.dumps(task)) == task

@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 
 from pns_common.base.whole_file import replacing
-from service.scale.job import Row
+from service.scale.job import Known, Row
 from service.scale.journal import Journal, open_journal
 
 
 def test_a_journal_knows_only_what_was_done_by_the_same_work(tmp_path):
     journal = Journal(tmp_path / "r.jsonl", "one")
-    journal.put([Row("a", "x", "done", input_sha256="1")])
+    journal.put([Row("a", "x", "done", input_sha256="1", output_sha256="2")])
     journal.put([Row("b", "y", "failed", input_sha256="2")])
-    assert (journal.known("a"), journal.known("b")) == ("1", None)
+    assert (journal.known("a"), journal.known("b")) == (Known("1", "2"), None)
     journal.close()
     other = Journal(tmp_path / "r.jsonl", "two")
     assert other.known("a") is None
