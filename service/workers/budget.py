@@ -54,16 +54,10 @@ class FacesBudget:
             }
         self._keep(client, used + faces, per_minute)
 
-    def give_back(self, client: str, faces: int, per_minute: float | None) -> None:
-        """Give back what a job was charged that no worker has begun."""
-        if per_minute is not None and client in self._used:
-            used = max(self._used_by(client) - faces, 0.0)
-            self._keep(client, used, per_minute)
-
     def settle(self, client: str, faces: int, per_minute: float | None) -> None:
-        """Take the faces that a job made beyond those that it was charged for."""
-        if per_minute is not None and faces > 0:
-            self._keep(client, self._used_by(client) + faces, per_minute)
+        """Take what a job made beyond what it was charged for; below 0 it is given back."""
+        if per_minute is not None:
+            self._keep(client, max(self._used_by(client) + faces, 0.0), per_minute)
 
     def _keep(self, client: str, used: float, per_minute: float) -> None:
         self._used[client] = (used, self._now(), per_minute)

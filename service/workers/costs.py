@@ -19,11 +19,15 @@ SECONDS_PER_VALUE = 1.4e-7
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """A prediction: refined faces, primitives, and seconds of one core."""
+    """A prediction: refined faces, primitives, and seconds of one core.
+
+    `most`: of what was not looked into, it is the most that may come.
+    """
 
     faces: int
     primitives: int
     seconds: float
+    most: bool = False
 
 
 def cost_of(

@@ -172,7 +172,7 @@ class Desk:
             yield
         finally:
             if job.began is None:
-                self._budget.give_back(job.client, cost.faces, job.faces_per_minute)
+                self._budget.settle(job.client, -cost.faces, job.faces_per_minute)
 
     async def _run_in_turn(self, job: Job, waiting: Waiting) -> None:
         """Run a job in its turn. Raises JobStopped where a short job is overdue."""
@@ -186,7 +186,10 @@ class Desk:
 
                 done = job.done = await self._call(turn, job, self._run, begin)
         if cost is not None:
-            self._budget.settle(job.client, done.faces - cost.faces, job.faces_per_minute)
+            beyond = done.faces - cost.faces
+            # Fewer than were counted are no credit: faces that cleaning dropped were work too.
+            beyond = beyond if cost.most else max(beyond, 0)
+            self._budget.settle(job.client, beyond, job.faces_per_minute)
             self._slowness.learn(cost.seconds, turn.spent)
 
     @contextmanager

@@ -124,7 +124,7 @@ def measure(work: Work) -> Cost:
             if error.limit != "archive-bytes":
                 raise
             # Too large to be unpacked for a glance: it is taken for the largest that may come.
-            return cost_of(work.limits.max_faces, 1, len(body))
+            return replace(cost_of(work.limits.max_faces, 1, len(body)), most=True)
         levels, learned = work.options.levels, _learned_levels(work)
         if sent.kind in ("glb", "gltf"):
             return cost_of_gltf(sent.data, sent.kind, levels, work.limits, learned)

@@ -13,6 +13,7 @@ import pytest
 
 from service.errors import BusyError
 from service.workers.budget import FacesBudget, OverBudgetError
+from service.workers.costs import Cost
 from service.workers.desk import Desk
 from service.workers.job import State
 from service.workers.jobs import Done, Work
@@ -170,6 +171,30 @@ def test_a_job_that_no_worker_has_begun_is_free() -> None:
                 told = await asyncio.gather(serving, return_exceptions=True)
                 assert not isinstance(told[0], OverBudgetError)
             assert job.state is State.CANCELLED
+
+    run(scenario)
+
+
+@pytest.mark.parametrize(("most", "left"), [(True, 90), (False, 50)])
+def test_of_the_most_that_may_come_what_did_not_is_given_back(most: bool, left: int) -> None:
+    """Fewer faces than were counted are no credit: cleaning dropped them."""
+
+    async def scenario() -> None:
+        now, budget = cast(Workers, AtOnce()), FacesBudget()
+        desk = Desk(
+            {Lane.ANY: now, Lane.SHORT: now},
+            Turns(1, 1, 1.0),
+            budget,
+            run=lambda work: Done({}, None, faces=10),
+            measure=lambda work: Cost(50, 1, 0.01, most=most),
+            job_seconds=30,
+        )
+        with MemoryFile() as answer:
+            job = job_of(b"", answer)
+            job.faces_per_minute = 100.0
+            await desk.serve(job)
+        with pytest.raises(OverBudgetError, match=f"{left} of 100"):
+            budget.charge("a", 100, 100.0)
 
     run(scenario)
 
