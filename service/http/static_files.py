@@ -50,7 +50,8 @@ def answer(request: Request, file: StaticFile, policy: str, caching: str = ASK_A
     headers = {
         "Cache-Control": caching,
         "Content-Security-Policy": policy,
-        "ETag": file.tag,
+        # Weak: both encodings have it (RFC 9110, 8.8.1).
+        "ETag": f"W/{file.tag}",
         "Referrer-Policy": "no-referrer",
         "Vary": "Accept-Encoding",
     }

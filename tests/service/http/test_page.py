@@ -70,7 +70,9 @@ def test_the_page_is_asked_for_again_and_its_assets_never() -> None:
 @pytest.mark.parametrize("path", ["/", f"/assets/{ASSETS[0].name}"])
 def test_a_client_that_has_the_file_gets_no_bytes(path: str) -> None:
     tag = CLIENT.get(path).headers["ETag"]
-    for known in (tag, f"W/{tag}", f'"other", {tag}', "*"):
+    # A strong one would be the same bytes: it is one for what is compressed and what is not.
+    assert tag.startswith('W/"')
+    for known in (tag, tag.removeprefix("W/"), f'"other", {tag}', "*"):
         answer = CLIENT.get(path, headers={"If-None-Match": known})
         assert (answer.status_code, answer.content) == (304, b"")
         assert answer.headers["ETag"] == tag
