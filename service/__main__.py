@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import signal
+from types import FrameType
+
 OURS = ("pns_common", __package__)
 
 
 def main() -> None:
     """Run the command line, or say what to install."""
+    # The first process of a container hears no signal that it has no handler for, while it imports.
+    signal.signal(signal.SIGTERM, _end)
     try:
         from .cli import main as command_line
 
@@ -17,6 +22,10 @@ def main() -> None:
         raise SystemExit(
             f"pns: the package {error.name} is missing: pip install 'pns-subdivision[service]'"
         ) from error
+
+
+def _end(number: int, _: FrameType | None) -> None:
+    raise SystemExit(128 + number)
 
 
 if __name__ == "__main__":

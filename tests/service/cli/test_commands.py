@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import socket
 import subprocess
 import sys
@@ -41,8 +42,19 @@ def test_only_what_others_make_can_be_missing(
         raise ModuleNotFoundError("no module", name=lost)
 
     monkeypatch.setattr(cli, "main", loses_a_module)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
     with pytest.raises(error, match=text):
         main()
+
+
+def test_every_command_hears_sigterm_from_its_start() -> None:
+    """As the first process of a container it has no default, and is killed ten seconds later."""
+    code = (
+        "import signal; from service import __main__, cli; "
+        "cli.main = lambda: signal.raise_signal(signal.SIGTERM); __main__.main()"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], check=False)
+    assert ended.returncode == 128 + signal.SIGTERM
 
 
 def test_a_model_is_a_name_or_a_file_and_the_name_wins(
