@@ -6,6 +6,8 @@ import asyncio
 import logging
 import signal
 import socket
+from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
 from types import FrameType
 
@@ -82,40 +84,41 @@ class DrainingServer(uvicorn.Server):
 
 def serve(settings: Settings) -> None:
     """Serve until a signal comes. Raises StartError."""
-    check_address(settings.host, settings.port)
-    log_lines.configure()
-    app = create_app(settings)
-    server = DrainingServer(
-        configuration(app, settings), app.state.admission, settings.drain_seconds
-    )
-    # Whoever was started by nohup goes on.
-    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
-        signal.signal(signal.SIGHUP, server.hang_up)
-    if settings.metrics_port is None:
+    with ExitStack() as ends:
+        # Uvicorn says between its log lines alone that a port is taken, by the metrics too.
+        with _listening(settings.host, settings.port):
+            log_lines.configure()
+            app = create_app(settings)
+            if settings.metrics_port is not None:
+                ends.callback(_serve_metrics(app.state.metrics, settings))
+        server = DrainingServer(
+            configuration(app, settings), app.state.admission, settings.drain_seconds
+        )
+        # Whoever was started by nohup goes on.
+        if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
+            signal.signal(signal.SIGHUP, server.hang_up)
         server.run()
-        return
-    metrics: Metrics = app.state.metrics
-    try:
-        port, stop = metrics.serve(settings.metrics_host, settings.metrics_port)
-    except OSError as error:
-        where = f"{settings.metrics_host}:{settings.metrics_port}"
-        raise StartError(f"metrics on {where}: {error.strerror}") from error
-    log.info("metrics on http://%s:%d/metrics", settings.metrics_host, port)
-    try:
-        server.run()
-    finally:
-        stop()
 
 
-def check_address(host: str, port: int) -> None:
-    """Raise StartError where nobody can listen: uvicorn says so between its log lines alone."""
+def _listening(host: str, port: int) -> socket.socket:
+    """Listen at an address. Raises StartError where nobody can."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        with socket.create_server(
-            (host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET
-        ):
-            pass
+        return socket.create_server((host, port), family=family)
     except OSError as error:
         raise StartError(f"{error.strerror}; give another --host or --port") from error
+
+
+def _serve_metrics(metrics: Metrics, settings: Settings) -> Callable[[], None]:
+    """Answer on the port of the metrics; return what ends it. Raises StartError."""
+    host, wanted = settings.metrics_host, settings.metrics_port
+    try:
+        port, stop = metrics.serve(host, wanted or 0)
+    except OSError as error:
+        hint = "give a PNS_METRICS_PORT that is free, and not PNS_PORT"
+        raise StartError(f"metrics on {host}:{wanted}: {error.strerror}; {hint}") from error
+    log.info("metrics on http://%s:%d/metrics", host, port)
+    return stop
 
 
 def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:

@@ -186,15 +186,19 @@ def test_a_host_that_is_none_ends_it_in_one_line(pns: Any) -> None:
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize("its_own", [False, True])
 def test_a_place_for_metrics_that_cannot_be_had_ends_it_by_name(
-    pns: Any, monkeypatch: pytest.MonkeyPatch
+    pns: Any, monkeypatch: pytest.MonkeyPatch, its_own: bool
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
+        if its_own:
+            taken.close()
         monkeypatch.setenv("PNS_METRICS_PORT", str(port))
-        code, _, err = pns("serve", "--port", "0")
-    last = err.splitlines()[-1]
-    assert (code, last) == (1, f"pns: metrics on 127.0.0.1:{port}: Address already in use")
+        code, _, err = pns("serve", "--port", str(port) if its_own else "0")
+    hint = "give a PNS_METRICS_PORT that is free, and not PNS_PORT"
+    text = f"pns: metrics on 127.0.0.1:{port}: Address already in use; {hint}\n"
+    assert (code, err) == (1, text)
 
 
 @pytest.mark.parametrize("budget", [5e6, 1234567.0, 0.1, 1e16])
