@@ -23,7 +23,7 @@ from .formats import HOLDS_UV
 from .indexed_triangles import IndexedTriangles
 from .pose import joint_matrices, posed
 
-TRANSFORM = "KHR_texture_transform"
+TRANSFORM, VISIBILITY = "KHR_texture_transform", "KHR_node_visibility"
 LOST = ("materials", "textures", "images", "animations", "skins", "cameras", "extensions")
 
 
@@ -41,7 +41,7 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, li
         ]
         for mesh in upload.plans
     }
-    worlds = _placed_nodes(upload.tree)
+    worlds, hidden = _placed_nodes(upload.tree)
     placed = [
         (
             primitives[mesh],
@@ -50,22 +50,29 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, li
             joint_matrices(upload, node, worlds),
         )
         for node in worlds
-        if (mesh := upload.document.nodes[node].mesh) in primitives
+        if (mesh := upload.document.nodes[node].mesh) in primitives and node not in hidden
     ]
     if not placed:
         raise UnrefinableError("the default scene shows no triangles")
     names = [set(p.attributes) for shown, *_ in placed for p in shown]
     keeps_uv = kind in HOLDS_UV and all("TEXCOORD_0" in name for name in names)
     mesh_file = _joined([_placed(*where, keeps_uv=keeps_uv) for where in placed])
-    showing = sum(node.get("mesh") in primitives for node in upload.tree["nodes"])
     changes = _changes(upload.tree, len(placed), names, kind, keeps_uv=keeps_uv)
-    if elsewhere := showing - len(placed):
-        changes.append(Change("/nodes", "nodes outside of the default scene left out", elsewhere))
+    left = {n for n, node in enumerate(upload.document.nodes) if node.mesh in primitives}
+    for what, count in (
+        ("hidden nodes", len(left & hidden)),
+        ("nodes outside of the default scene", len(left - worlds.keys())),
+    ):
+        if count:
+            changes.append(Change("/nodes", f"{what} left out", count))
     return mesh_file, changes
 
 
-def _placed_nodes(tree: dict[str, Any]) -> dict[int, Float[np.ndarray, "4 4"]]:
-    """Return the world matrices of the default scene's nodes, in the order of its tree."""
+def _placed_nodes(tree: dict[str, Any]) -> tuple[dict[int, Float[np.ndarray, "4 4"]], set[int]]:
+    """Return the world matrices of the default scene's nodes, in the order of its tree.
+
+    And which of them are hidden, as all below a hidden one is.
+    """
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])
     children = set(_children(nodes))
@@ -74,17 +81,25 @@ def _placed_nodes(tree: dict[str, Any]) -> dict[int, Float[np.ndarray, "4 4"]]:
     roots = scenes[tree.get("scene", 0)].get("nodes", []) if scenes else parentless
     # A root that is a child too stands where its parent puts it: those without parents come first.
     ordered = sorted(roots, key=lambda root: root in children)
-    pending = [(root, np.eye(4)) for root in reversed(ordered)]
+    pending = [(root, np.eye(4), False) for root in reversed(ordered)]
     placed: dict[int, Float[np.ndarray, "4 4"]] = {}
+    hidden: set[int] = set()
     while pending:
-        number, above = pending.pop()
+        number, above, under_hidden = pending.pop()
         # Once, whatever its parents: n nodes that are twice among the children of one are 2^n.
         if number in placed:
             continue
         node = nodes[number]
         placed[number] = world = above @ _local_matrix(node)
-        pending += [(child, world) for child in reversed(node.get("children", []))]
-    return placed
+        if hides := under_hidden or _is_hidden(node):
+            hidden.add(number)
+        pending += [(child, world, hides) for child in reversed(node.get("children", []))]
+    return placed, hidden
+
+
+def _is_hidden(node: dict[str, Any]) -> bool:
+    visibility = node.get("extensions", {}).get(VISIBILITY)
+    return isinstance(visibility, dict) and visibility.get("visible") is False
 
 
 def _children(nodes: list[dict[str, Any]]) -> list[int]:

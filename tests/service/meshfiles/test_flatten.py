@@ -100,3 +100,36 @@ def test_what_the_scene_does_not_show_and_what_is_no_surface_are_told():
     assert told["nodes outside of the default scene left out"] == 2
     assert told["points and lines dropped: not written to PLY files"] == 2
     assert told["skins dropped: not written to PLY files"] == 1
+
+
+def test_hidden_nodes_and_what_is_below_them_are_left_out_and_told():
+    tree, binary = files.document([octahedron()])
+    hidden, shown = ({"KHR_node_visibility": {"visible": visible}} for visible in (False, True))
+    tree["nodes"] = [
+        {"children": [1, 2], "extensions": hidden},
+        {"mesh": 0, "extensions": shown},
+        {"mesh": 0},
+        {"mesh": 0, "translation": [5, 0, 0], "extensions": shown},
+        {"mesh": 0},
+    ]
+    tree["scenes"][0]["nodes"] = [0, 3]
+    flat, changes = flatten(files.pack(tree, binary), "obj", Limits())
+    assert len(flat.faces) == 8
+    assert flat.vertices[:, 0].min() == pytest.approx(4)
+    told = {change.what: change.count for change in changes}
+    assert told["hidden nodes left out"] == 2
+    assert told["nodes outside of the default scene left out"] == 1
+    tree["scenes"][0]["nodes"] = [0]
+    with pytest.raises(UnrefinableError, match="shows no triangles"):
+        flatten(files.pack(tree, binary), "obj", Limits())
+
+
+def test_joints_of_a_hidden_skeleton_move_what_is_shown():
+    rig = {"JOINTS_0": np.zeros((6, 4), np.uint8), "WEIGHTS_0": np.eye(4)[np.zeros(6, int)]}
+    tree, binary = files.document([octahedron() | rig])
+    tree["skins"] = [{"joints": [1]}]
+    bone = {"translation": [5, 0, 0], "extensions": {"KHR_node_visibility": {"visible": False}}}
+    tree["nodes"] = [{"mesh": 0, "skin": 0}, bone]
+    tree["scenes"][0]["nodes"] = [0, 1]
+    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
+    assert flat.vertices[:, 0].min() == pytest.approx(4)
