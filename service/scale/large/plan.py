@@ -21,7 +21,7 @@ from .arrays import CREASES, FACES, POSITIONS
 
 # Raised whenever parts come out otherwise than before: parts of two versions would not meet.
 VERSION = 2
-PLAN, LOCK = "plan.json", "pns-large.lock"
+PLAN, ENTRIES, LOCK = "plan.json", "entries.json", "pns-large.lock"
 
 
 @dataclass(frozen=True)
@@ -68,9 +68,10 @@ def work_folder(large: Large, model_hash: str | None) -> Iterator[Path]:
         InvalidParameter: there is no such input or no folder for the output, another run has the
             folder, or it is somebody's.
     """
-    source = identity(large.source)
+    entries = entries_of(large.source)
     if not large.output.parent.is_dir():
         raise InvalidParameter("OUT", f"{large.output.parent}: there is no such folder")
+    contents = contents_of(large.source)
     work = large.work
     work.mkdir(exist_ok=True)
     if any(work.iterdir()) and not (work / LOCK).exists():
@@ -82,7 +83,7 @@ def work_folder(large: Large, model_hash: str | None) -> Iterator[Path]:
             raise InvalidParameter("OUT", f"{work}: another run is at work there") from error
         plan = {
             "version": VERSION,
-            "source": source,
+            "source": contents,
             "options": asdict(large.options),
             "model": model_hash,
             "parts": large.parts,
@@ -97,6 +98,7 @@ def work_folder(large: Large, model_hash: str | None) -> Iterator[Path]:
                     shutil.rmtree(left) if left.is_dir() else left.unlink()
             folder.mkdir()
             replace_file(folder / PLAN, text)
+        keep(folder / ENTRIES, entries)
         try:
             yield folder
         except WorkerDied:
@@ -110,7 +112,10 @@ def work_folder(large: Large, model_hash: str | None) -> Iterator[Path]:
 
 def check_unchanged(large: Large, folder: Path) -> None:
     """Raise UnreadableError where the input is not the one that a work began with."""
-    if identity(large.source) != kept(folder / PLAN)["source"]:
+    began_with = kept(folder / PLAN)["source"]
+    # Read again only where somebody has touched it.
+    touched = entries_of(large.source) != kept(folder / ENTRIES)
+    if touched and contents_of(large.source) != began_with:
         raise UnreadableError(f"{large.source}: it changed while it was refined; run it again")
 
 
@@ -120,21 +125,38 @@ def _remove(work: Path, folder: Path) -> None:
     shutil.rmtree(work)
 
 
-def identity(source: Path) -> list[Any]:
-    """Return what tells a file, or arrays of a folder, from others: name, size, time of change.
+def contents_of(source: Path) -> list[list[str]]:
+    """Return what tells a file, or arrays of a folder, from others: the ending, and the bytes.
 
-    That of the file's entry: nobody can set it, as archives do with that of the content.
+    However often they were copied, moved, or given other dates and rights since.
+    """
+    hashes: list[list[str]] = []
+    for path in _files(source):
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        hashes.append([path.suffix if path == source else path.name, digest])
+    return hashes
+
+
+def entries_of(source: Path) -> list[list[int]]:
+    """Return what stays while nobody touches an input: whose entries, sizes, times of change.
+
+    Those of the entries: nobody can set them, as archives do with those of the contents.
 
     Raises:
         InvalidParameter: there is no such file.
     """
+    known = [file.stat() for file in _files(source)]
+    if not known:
+        raise InvalidParameter("IN", f"{source}: there is no such file or folder of arrays")
+    return [[entry.st_ino, entry.st_size, entry.st_ctime_ns] for entry in known]
+
+
+def _files(source: Path) -> list[Path]:
     files = [source]
     if source.is_dir():
         files = [source / name for name in (POSITIONS, FACES, CREASES)]
-    known = [(str(file.resolve()), file.stat()) for file in files if file.exists()]
-    if not known:
-        raise InvalidParameter("IN", f"{source}: there is no such file or folder of arrays")
-    return [[name, status.st_size, status.st_ctime_ns] for name, status in known]
+    return [file for file in files if file.exists()]
 
 
 def keep(file: Path, values: Any) -> None:

@@ -112,6 +112,27 @@ def test_another_input_of_the_same_size_and_date_begins_anew(tmp_path):
     assert_is(tmp_path / "out", refine(mesh, loop(), 2))
 
 
+def test_an_input_with_other_dates_rights_and_names_is_the_same(tmp_path):
+    """Also in the middle of the work: whoever links to a file, as backups do, changes its entry."""
+    source = arrays(tmp_path / "in", many_kinds())
+    refined(source, tmp_path / "expected", 3)
+    with pytest.raises(KeyboardInterrupt):
+        refined(source, tmp_path / "out", 3, engine=stops_after_one)
+    (before,) = (path for path in (tmp_path / "out.work").iterdir() if path.is_dir())
+    moved = source.rename(tmp_path / "elsewhere")
+    (moved / "positions.npy").chmod(0o400)
+    (moved / "faces.npy").touch()
+
+    def linked(tasks):
+        assert before.exists()
+        for array in moved.glob("*.npy"):
+            array.with_suffix(f".{len(list(moved.iterdir()))}").hardlink_to(array)
+        return here(tasks)
+
+    refined(moved, tmp_path / "out", 3, engine=linked)
+    assert contents(tmp_path / "out") == contents(tmp_path / "expected")
+
+
 @pytest.mark.parametrize(
     "name", ["plan.json", "survey.json", "count-00001.npz", "target.json", "part-00002.json"]
 )
