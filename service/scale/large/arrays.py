@@ -81,7 +81,14 @@ def finished_array(
     """
     temporary = path.with_name(f"{path.name}.tmp")
     yield new_array(temporary, shape, dtype)
+    sync(temporary)
     temporary.rename(path)
+
+
+def sync(path: Path) -> None:
+    """Have a file on the disk before it is told to be there: a power cut may leave it as zeros."""
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
 
 
 def reserve(path: Path, size: int) -> None:

@@ -102,7 +102,6 @@ def write_bases(
                 total = int(ends[-1])
                 let_go(bases)
             counts.append(counts[-1] + total)
-        bases.flush()
     return counts
 
 

@@ -22,6 +22,7 @@ from ...errors import UnrefinableError
 from ...meshfiles.indexed_triangles import IndexedTriangles
 from ...meshfiles.single_precision import LARGEST
 from ...meshfiles.triangles_glb import triangles_glb
+from .arrays import sync
 from .cutout import Cutout
 from .survey import Survey
 
@@ -61,7 +62,9 @@ def write_tile(tiles: Tiles, part: int, cut: Cutout, made: RefinedPiece, levels:
         raise UnrefinableError("positions leave the range of float32")
     points = points.astype(np.float32)
     glb = triangles_glb(IndexedTriangles(points, local.reshape(-1, 3)))
-    replace_file(Path(tiles.folder) / tile_name(part), glb)
+    file = Path(tiles.folder) / tile_name(part)
+    replace_file(file, glb)
+    sync(file)
     return [bound.tolist() for bound in extent(points)]
 
 

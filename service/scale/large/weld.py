@@ -20,7 +20,7 @@ from pns_common.mesh import repeated_vertex
 
 from ...errors import UnrefinableError
 from ...meshes.weld import canonical_zero
-from .arrays import FACES, POSITIONS, append, blocks_of, index_type, let_go, new_array
+from .arrays import FACES, POSITIONS, append, blocks_of, index_type, let_go, new_array, sync
 
 # Rows a file that is sorted in memory.
 SORTED = 1 << 21
@@ -64,6 +64,8 @@ def weld_outside_memory(positions: np.ndarray, faces: np.ndarray, folder: Path) 
         written[done : done + len(stay)] = place[stay]
         done += len(stay)
         let_go(faces, label, place, written)
+    sync(folder / POSITIONS)
+    sync(folder / FACES)
     scratch.remove()
     return Dropped(int(dropped.sum()) - repeated, repeated, len(positions) - count)
 

@@ -3,6 +3,7 @@
 import os
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -156,6 +157,28 @@ def test_a_work_that_is_damaged_is_told_and_begun_anew(tmp_path, name):
         refined(source, tmp_path / "out", 3)
     refined(source, tmp_path / "out", 3)
     assert contents(tmp_path / "out") == contents(tmp_path / "expected")
+
+
+def test_what_is_told_to_be_there_is_on_the_disk(tmp_path, monkeypatch):
+    """A power cut leaves zeros in what is not, and a later run would go on from them."""
+    arrays_of_work = ("order.npy", "faces-at.npy", "starts.npy")
+    told = {
+        "positions.npy": "mesh.json",
+        "faces.npy": "mesh.json",
+        "part-00000.glb": "../part-00000.json",
+    } | {f"{name}.tmp": name for name in arrays_of_work}
+    synced = set()
+
+    def fsync(descriptor):
+        file = Path(f"/proc/self/fd/{descriptor}").readlink()
+        synced.add(file.name)
+        assert not (file.parent / told[file.name]).exists()
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    source = tmp_path / "in.obj"
+    source.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    refined(source, tmp_path / "out.3dtiles", 1)
+    assert synced == told.keys()
 
 
 def test_an_input_that_changes_meanwhile_is_told(tmp_path):
