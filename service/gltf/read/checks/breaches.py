@@ -14,9 +14,10 @@ from ..quantization import EXTENSION, needs_extension
 from ..schema import Document
 
 LEAST_STRIDE, MOST_STRIDE = 4, 252
-_COLOUR, _MESHES, _STRIDE, _ALIGNMENT, _QUANTIZED = (
+_COLOUR, _MESHES, _TARGETS, _STRIDE, _ALIGNMENT, _QUANTIZED = (
     "integers in COLOR_n that are not normalized; averaged as colours",
     "meshes without primitives",
+    "morph targets that not all primitives of a mesh have; the others stay where they are",
     "a byteStride that is not a multiple of 4 from 4 to 252; 0 read as packed",
     "elements that do not begin at a multiple of their components' size",
     f"integers that need {EXTENSION}, which extensionsUsed does not name",
@@ -46,6 +47,8 @@ def _all(document: Document) -> Iterator[tuple[str, str]]:
     for number, mesh in enumerate(document.meshes):
         if not mesh.primitives:
             yield _MESHES, f"/meshes/{number}"
+        if len({len(primitive.targets) for primitive in mesh.primitives}) > 1:
+            yield _TARGETS, f"/meshes/{number}"
     yield from _attributes(document)
 
 

@@ -149,3 +149,23 @@ def test_what_is_made_anew_is_not_believed():
     assert tree["accessors"][position]["min"] == points.min(axis=0).tolist()
     assert tree["bufferViews"][tree["accessors"][position]["bufferView"]]["target"] == 34962
     assert tree["never"] == {"heard": "of"}
+
+
+def test_a_target_that_a_primitive_lacks_moves_it_nowhere():
+    """As with a target of zeros, also where it meets another that has one."""
+    upper, lower = octahedron(), octahedron()
+    upper["indices"], lower["indices"] = np.split(octahedron()["indices"].reshape(-1), 2)
+    lifted = upper | {"targets": [{"POSITION": np.tile([0, 0, 1.0], (6, 1))}]}
+    still = lower | {"targets": [{"POSITION": np.zeros((6, 3))}]}
+    made, right = refine(files.glb([lifted, lower])), refine(files.glb([lifted, still]))
+    for primitive in (0, 1):
+        (_, kept), (_, wanted) = (
+            files.primitive_of(each.glb, primitive=primitive) for each in (made, right)
+        )
+        np.testing.assert_array_equal(kept["POSITION"], wanted["POSITION"])
+    tree, _ = files.unpack(made.glb)
+    assert [len(each.get("targets", [])) for each in tree["meshes"][0]["primitives"]] == [1, 0]
+    ((pointer, words, count),) = found(made)
+    assert (pointer, count) == ("/meshes/0", 1)
+    assert "morph targets that not all" in words
+    assert found(right) == []
