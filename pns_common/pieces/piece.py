@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pns_common.arguments import checked_levels
 from pns_common.base.blocks import Blocks
 from pns_common.base.distinct import first_places
 from pns_common.connectivity.creases import NO_CREASES, Creases
@@ -87,10 +88,12 @@ def refine_piece(
 
     Raises:
         ThinHaloError: the halo is too thin to be sure of all own faces.
-        ParameterError: a crease is no edge of the piece, or the scheme is not known.
+        ParameterError: levels out of 1 … 16, a crease is no edge of the piece, or the scheme is not
+            known.
         ModelError: the network returned something that is not finite, or of another shape.
         MeshError: the refined coordinates are too large.
     """
+    levels = checked_levels(levels)
     own, rim = piece.own, ~piece.whole
     exact: Bool[np.ndarray, " F"] = np.ones(len(piece.faces), dtype=bool)
     own_vertices = np.zeros(0, dtype=bool)

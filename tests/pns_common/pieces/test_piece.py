@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pns_common import Mesh, MeshError, load_model, loop, pns
+from pns_common import Mesh, MeshError, ParameterError, load_model, loop, pns
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.creases import Creases
 from pns_common.pieces import ThinHaloError, halo_rings, refine_piece
@@ -117,3 +117,9 @@ def test_an_index_out_of_range_is_refused_before_a_kernel_reads_there():
     for wrong in (fewer, {"faces": piece.faces - 1}):
         with pytest.raises(MeshError, match=r"face \d+: indices"):
             replace(piece, **wrong)
+
+
+@pytest.mark.parametrize("levels", [0, -1, 17])
+def test_levels_out_of_range_are_refused_by_name(levels):
+    with pytest.raises(ParameterError, match=f"levels = {levels}: expected"):
+        refine_piece(left_half()[2].piece, loop(), levels, 1.0, Blocks(1))
