@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 from pns_common.schemes import Model, Scheme, loop, pns
@@ -22,7 +23,7 @@ from .read.upload import Media, Upload, read_upload
 from .refine.meshes import refined_meshes
 from .stage_shares import PUT_TOGETHER, READ
 from .write.packing import BYTES_PER_FACE, WRITERS
-from .write.same_geometry import SameGeometry
+from .write.same_geometry import same_geometry
 from .write.storage import remove_replaced, storage_changes, withdraw_unused
 from .write.unused import VertexUse
 
@@ -75,31 +76,32 @@ def subdivide_gltf(
         changes += upload.changes + storage_changes(upload.document, upload.plans)
         writer = WRITERS[options.compress].start(upload.tree, upload.buffers)
 
-    results: list[MeshResult] = []
-    vertices, same = VertexUse(upload.document), SameGeometry(upload.document)
-    written: dict[int, int] = {}
+    outcomes: dict[int, tuple[MeshResult, list[Change]]] = {}
+    vertices = VertexUse(upload.document)
+    alike = same_geometry(upload.document, (plan.mesh for plan in upload.plans))
+    firsts = [plan for plan in upload.plans if plan.mesh in alike]
     with course.part(READ, PUT_TOGETHER):
-        for mesh in refined_meshes(upload, scheme, options, course):
+        for first in refined_meshes(upload, firsts, scheme, options, course):
             with course.stage("write"):
-                first = same.before(mesh.index)
-                if first == mesh.index:
-                    written[first] = writer.replace_mesh(first, mesh.refined, course)
-                else:
-                    writer.repeat_mesh(mesh.index, first, mesh.refined)
-                vertices.add(mesh.index, mesh.primitives, mesh.kept)
-            changes += mesh.changes
-            results.append(
-                MeshResult(
-                    index=mesh.index,
-                    instances=instances[mesh.index],
-                    primitives=len(mesh.refined),
-                    vertices=written[first],
-                    faces=sum(len(p.faces) for p in mesh.refined),
-                    degenerate=mesh.degenerate,
-                    copies=mesh.copies,
-                    report=mesh.report,
-                )
-            )
+                written = writer.replace_mesh(first.index, first.refined, course)
+                later = [first.of(mesh) for mesh in alike[first.index]]
+                for mesh in later:
+                    writer.repeat_mesh(mesh.index, first.index, mesh.refined)
+                for mesh in (first, *later):
+                    vertices.add(mesh.index, mesh.primitives, mesh.kept)
+                    result = MeshResult(
+                        index=mesh.index,
+                        instances=instances[mesh.index],
+                        primitives=len(mesh.refined),
+                        vertices=written,
+                        faces=sum(len(p.faces) for p in mesh.refined),
+                        degenerate=mesh.degenerate,
+                        copies=mesh.copies,
+                        report=mesh.report,
+                    )
+                    outcomes[mesh.index] = result, mesh.changes
+    results, found = zip(*(outcomes[plan.mesh] for plan in upload.plans), strict=True)
+    changes += chain.from_iterable(found)
 
     with course.stage("write", PUT_TOGETHER, 1.0):
         withdraw_unused(upload.tree)

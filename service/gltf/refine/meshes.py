@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool
@@ -56,11 +56,20 @@ class MeshOutcome:
         """Faces that name a welded vertex twice."""
         return sum(int((~keep).sum()) for keep in self.kept)
 
+    def of(self, mesh: int) -> MeshOutcome:
+        """Return the same, of another mesh with the same geometry."""
+        before, after = (f"/meshes/{index}" for index in (self.index, mesh))
+        moved = [
+            Change(after + change.pointer.removeprefix(before), change.what, change.count)
+            for change in self.changes
+        ]
+        return replace(self, index=mesh, changes=moved)
+
 
 def refined_meshes(
-    upload: Upload, scheme: Scheme, options: Options, course: Course
+    upload: Upload, plans: Sequence[MeshPlan], scheme: Scheme, options: Options, course: Course
 ) -> Iterator[MeshOutcome]:
-    """Refine the meshes that the upload plans to.
+    """Refine meshes of an upload.
 
     Each is handed out inside the part of the course in which it is to be written.
 
@@ -69,8 +78,8 @@ def refined_meshes(
         pns_common.errors.ModelError: the model answered with something that is no correction.
     """
     shares = stage_shares(scheme, options)
-    total, done = sum(plan.faces for plan in upload.plans), 0
-    for window in _windows(upload.plans, options.levels):
+    total, done = sum(plan.faces for plan in plans), 0
+    for window in _windows(plans, options.levels):
         count = sum(plan.faces for plan in window)
         with course.part(done / total, (done + count) / total):
             yield from _window(upload, window, scheme, options, course, shares)

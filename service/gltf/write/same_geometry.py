@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from dataclasses import dataclass, field
+from collections import defaultdict
+from collections.abc import Hashable, Iterable
 
 from ..read.modes import SURFACES
 from ..read.schema import Document, Primitive
 
 
-@dataclass
-class SameGeometry:
-    """The meshes that were refined so far, by what their surfaces stand on."""
-
-    document: Document
-    first: dict[Hashable, int] = field(default_factory=dict)
-
-    def before(self, mesh: int) -> int:
-        """Return the first mesh with the geometry of this one; itself where there is none."""
-        primitives = self.document.meshes[mesh].primitives
-        key = tuple(_geometry(p) if p.mode in SURFACES else None for p in primitives)
-        return self.first.setdefault(key, mesh)
+def same_geometry(document: Document, meshes: Iterable[int]) -> dict[int, list[int]]:
+    """Return the first mesh of each geometry, and the later ones that have the same."""
+    alike: defaultdict[Hashable, list[int]] = defaultdict(list)
+    for mesh in meshes:
+        primitives = document.meshes[mesh].primitives
+        alike[tuple(_geometry(p) if p.mode in SURFACES else None for p in primitives)].append(mesh)
+    return {first: later for first, *later in alike.values()}
 
 
 def _geometry(primitive: Primitive) -> Hashable:
