@@ -10,7 +10,7 @@ from jaxtyping import Int, UInt8
 
 from .obj_text import with_line_feeds
 from .ply.header import ply_header
-from .text_pieces import pieces_from_end
+from .text_pieces import pieces_from_end, without
 
 # Of what tells no counts, and will hardly be read.
 BYTES_PER_FACE = 30
@@ -36,8 +36,9 @@ def count_triangles(data: bytes, kind: str) -> int:
     """
     if kind == "obj":
         # A line that goes on in the next is one; of the same length, nothing is moved.
-        text = with_line_feeds(data).replace(b"\\\n", b"  ").replace(b"\\\r\n", b"   ")
-        pieces = (_lines(_COMMENT.sub(b"", piece)) for piece in pieces_from_end(text))
+        text = without(_COMMENT, with_line_feeds(data))
+        text = text.replace(b"\\\n", b"  ").replace(b"\\\r\n", b"   ")
+        pieces = map(_lines, pieces_from_end(text))
         return sum(_triangles(piece.words[piece.firsts == _FACE]) for piece in pieces)
     if kind == "stl":
         return _of_stl(data)

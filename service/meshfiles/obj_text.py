@@ -114,7 +114,8 @@ def _statements(text: bytes) -> Iterator[tuple[int, bytes, bytes]]:
     # statement that the last one leaves open.
     for number, ended in enumerate(chain(io.BytesIO(text), [b""]), start=1):
         line = ended.rstrip(b"\r\n")
-        if line.endswith(b"\\"):
+        # A comment ends with its line, even one that names a folder.
+        if line.endswith(b"\\") and b"#" not in line:
             begun.append(line[:-1])
             continue
         words = b" ".join([*begun, line]).partition(b"#")[0].split(maxsplit=1)

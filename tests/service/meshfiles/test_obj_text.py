@@ -34,6 +34,11 @@ def triangles(text: str | bytes) -> list[list[int]]:
         (POSITIONS.replace("2 2 1", "2 2 1 # a tip") + "f 1 2 5\n", [[0, 1, 4]]),
         (POSITIONS + "f 1 2\\\n3\nf 1 2 \\\r\n 5\r\n", [[0, 1, 2], [0, 1, 4]]),
         (POSITIONS + "f 1 2 3\nf 1 2 5\\", [[0, 1, 2], [0, 1, 4]]),
+        # A comment that names a folder ends with its line, as in `pns large` and on the page.
+        (
+            "# of C:\\parts\\\n" + POSITIONS + "f 1 \\\n2 3 # D:\\\nf 1 2 5\n",
+            [[0, 1, 2], [0, 1, 4]],
+        ),
         # As many numbers as a hexagon has.
         (
             POSITIONS + "vt 0 0\nf 1/1 2/1 3/1\nf 1 2 3 4 5 6\n",
