@@ -1,8 +1,11 @@
 """A file is written whole or not at all."""
 
 import errno
+import os
 import resource
 import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -22,6 +25,37 @@ def test_a_name_may_be_as_long_as_the_system_allows(tmp_path, name):
     replace_file(tmp_path / name, b"whole")
     assert (tmp_path / name).read_bytes() == b"whole"
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_process_that_is_killed_leaves_nothing_of_what_it_was_writing(tmp_path):
+    try:
+        os.close(os.open(tmp_path, os.O_WRONLY | os.O_TMPFILE))
+    except (AttributeError, OSError):
+        pytest.skip("the system has no files without names here")
+    code = (
+        "import resource, signal; from pathlib import Path; "
+        "from pns_common.base.whole_file import replace_file; "
+        "signal.signal(signal.SIGXFSZ, signal.SIG_DFL); "
+        "resource.setrlimit(resource.RLIMIT_CORE, (0, 0)); "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)); "
+        f"replace_file(Path({str(tmp_path)!r}) / 'part.glb', bytes(10_000))"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], check=False)
+    assert ended.returncode == -signal.SIGXFSZ
+    assert list(tmp_path.iterdir()) == []
+
+
+def cannot(*_, **__):
+    raise OSError(errno.EOPNOTSUPP, "not here")
+
+
+@pytest.mark.parametrize(("name", "lacks"), [("O_TMPFILE", 0x40000000), ("link", cannot)])
+def test_a_system_without_files_that_have_no_name_does_without(tmp_path, monkeypatch, name, lacks):
+    monkeypatch.setattr(os, name, lacks, raising=False)
+    replace_file(tmp_path / "part.glb", b"whole")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [
+        ("part.glb", b"whole")
+    ]
 
 
 def test_nobody_sees_a_file_before_it_is_whole(tmp_path):
