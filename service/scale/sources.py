@@ -44,9 +44,10 @@ def items_of(
         InvalidParameter: there is nothing at `source`, or its results would take its place.
     """
     endings = tuple(f".{kind}" for kind in kinds)
-    if any(letter in source for letter in "*?["):
-        return lambda: _globbed(source, endings, results)
     place = place_of(source)
+    # What is there is meant by its name: `parts [v2]` is a folder.
+    if any(letter in source for letter in "*?[") and not (place.is_file() or place.is_folder()):
+        return lambda: _globbed(place, endings, results)
     name = place.path.lower()
     # Before folders: over HTTP, whatever holds links may be taken for one.
     if name.endswith((*endings, *MANIFESTS)) and place.is_file():
@@ -83,8 +84,7 @@ def _is_result(file: str, results: str | None) -> bool:
     return results is not None and file.startswith(f"{results}/")
 
 
-def _globbed(pattern: str, endings: tuple[str, ...], results: Place | None) -> Iterator[Item]:
-    place = place_of(pattern)
+def _globbed(place: Place, endings: tuple[str, ...], results: Place | None) -> Iterator[Item]:
     # The part before the first wildcard is the root that relative paths are taken from.
     fixed = place.path
     for letter in "*?[":

@@ -57,6 +57,14 @@ def test_a_glob_takes_what_it_matches(tmp_path):
     assert [item.relative for item in listing()] == ["c.obj", "e.obj"]
 
 
+@pytest.mark.parametrize("source", ["in [v2]", "in [v2]/a?.obj", "in [v2]/*.txt"])
+def test_what_is_there_is_no_glob_whatever_its_name(tmp_path, source):
+    library(tmp_path / "in [v2]", ["a?.obj"])
+    (tmp_path / "in [v2]" / "*.txt").write_text("a?.obj\n")
+    listing = items_of(f"{tmp_path}/{source}", KINDS)
+    assert [item.relative for item in listing()] == ["a?.obj"]
+
+
 @pytest.mark.parametrize("source", ["in", "in/**/*.obj"])
 def test_results_inside_the_source_are_no_sources(tmp_path, source):
     library(tmp_path / "in", ["a.obj", "refined2/c.obj"])
