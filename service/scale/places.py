@@ -178,7 +178,8 @@ def place_of(text: str) -> Place:
     Raises:
         InvalidParameter: no file system takes it, or what that needs is not installed.
     """
-    if "://" not in text and "::" not in text:
+    # No URL begins with a slash, and what does may have either in its name.
+    if posixpath.isabs(text) or ("://" not in text and "::" not in text):
         return Place(THIS_MACHINE, str(LocalFileSystem._strip_protocol(text)))
     try:
         system, path = fsspec.core.url_to_fs(text)

@@ -65,6 +65,13 @@ def test_what_is_there_is_no_glob_whatever_its_name(tmp_path, source):
     assert [item.relative for item in listing()] == ["a?.obj"]
 
 
+@pytest.mark.parametrize("source", ["in", "list.txt"])
+def test_two_colons_in_a_name_make_no_url_of_it(tmp_path, source):
+    library(tmp_path / "in", ["rig::body.obj"])
+    (tmp_path / "list.txt").write_text("in/rig::body.obj\n")
+    assert refined(batch_of(tmp_path, tmp_path / source)).counts == {"done": 1}
+
+
 @pytest.mark.parametrize("source", ["in", "in/**/*.obj"])
 def test_results_inside_the_source_are_no_sources(tmp_path, source):
     library(tmp_path / "in", ["a.obj", "refined2/c.obj"])
