@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from urllib.parse import unquote
 
 _SCHEME = "data:"
 _BASE64 = re.compile(r"data:[^,]*;base64,", re.IGNORECASE)
@@ -23,5 +24,6 @@ def data_of(uri: str) -> memoryview:
     head = _BASE64.match(uri)
     if head is None:
         raise ValueError("it is not base64")
-    encoded = uri[head.end() :]
+    # Some writers spell +, / and = by their numbers, as a URI may spell any letter.
+    encoded = unquote(uri[head.end() :])
     return memoryview(base64.b64decode(encoded + "=" * (-len(encoded) % 4), validate=True))

@@ -3,6 +3,7 @@
 import base64
 import json
 import tracemalloc
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -141,6 +142,15 @@ def test_buffers_in_data_uris_are_read_and_joined():
     assert result.report["changes"] == [
         {"pointer": "/buffers", "what": "joined into one", "count": 2}
     ]
+
+
+def test_a_data_uri_may_spell_its_letters_by_numbers():
+    tree, binary = files.document([octahedron()])
+    spelt = quote(base64.b64encode(binary), safe="")
+    assert "%" in spelt
+    tree["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{spelt}"
+    result = refine(json.dumps(tree).encode(), media="gltf")
+    assert result.glb == refine(files.glb([octahedron()])).glb
 
 
 def test_a_buffer_without_bytes_is_refused():
