@@ -7,6 +7,7 @@ from typing import Any
 
 from ....errors import GltfError, UnsupportedFeature
 from ...constants import FLOAT, UNSIGNED_BYTE, UNSIGNED_SHORT
+from ..index_references import KNOWN
 from ..json_text import escaped
 from ..modes import SURFACES
 from ..quantization import allowed, is_dequantised
@@ -53,8 +54,8 @@ def refuse_features(document: Document) -> None:
     """Refuse primitives of surfaces that would come back incomplete; references are checked.
 
     Raises:
-        UnsupportedFeature: no POSITION, weights of several types, or an extension that names
-            vertices or faces by number.
+        UnsupportedFeature: no POSITION, or one in an unknown extension alone, weights of several
+            types, or an extension that names vertices or faces by number.
         GltfError: an attribute of a type that glTF does not allow.
     """
     for number, mesh in enumerate(document.meshes):
@@ -70,6 +71,7 @@ def _refuse_primitive(document: Document, primitive: Primitive, pointer: str) ->
     _refuse_numbered_features(primitive.extensions.get(_FEATURES), f"{pointer}/extensions")
     if "POSITION" not in primitive.attributes:
         raise UnsupportedFeature("a primitive without POSITION", pointer=f"{pointer}/attributes")
+    _refuse_unknown_compression(document, primitive, pointer)
     for name, index in primitive.attributes.items():
         pair = _SKIN_SET.fullmatch(name)
         if pair is None and name.startswith(_SKIN_NAMES):
@@ -96,6 +98,17 @@ def _refuse_primitive(document: Document, primitive: Primitive, pointer: str) ->
     for target in primitive.targets:
         for name, index in target.items():
             _refuse_type(name, document.accessors[index], _DELTAS, f"/accessors/{index}")
+
+
+def _refuse_unknown_compression(document: Document, primitive: Primitive, pointer: str) -> None:
+    """Refuse positions that only an unknown extension can hold; glTF reads zeros in their place."""
+    positions = document.accessors[primitive.attributes["POSITION"]]
+    unknown = sorted(primitive.extensions.keys() - KNOWN)
+    if unknown and positions.buffer_view is None and positions.sparse is None:
+        raise UnsupportedFeature(
+            f"a primitive whose positions lie in {' or '.join(unknown)} alone",
+            pointer=f"{pointer}/extensions",
+        )
 
 
 def _refuse_numbered_features(features: Any, pointer: str) -> None:

@@ -220,6 +220,16 @@ def test_what_cannot_be_refined_yet_is_refused_by_name(path, value, feature):
     assert (refusal.value.status, refusal.value.code) == (422, "unsupported-feature")
 
 
+def test_positions_that_an_unknown_extension_holds_are_refused_by_its_name():
+    def edit(tree):
+        del tree["accessors"][0]["bufferView"]
+        tree["meshes"][0]["primitives"][0]["extensions"] = {"ACME_compression": {"view": 4}}
+
+    with pytest.raises(UnsupportedFeature, match="positions lie in ACME_compression") as refusal:
+        refine(edited(edit))
+    assert refusal.value.pointer == "/meshes/0/primitives/0/extensions"
+
+
 def test_the_version_is_refused_whatever_else_the_document_has():
     # As glTF 1.0 wrote it: by names, where 2.0 counts.
     first = {"asset": {"version": "1.0"}, "accessors": {"a": {}}, "meshes": {}, "scene": "s"}
