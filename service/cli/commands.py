@@ -221,6 +221,10 @@ def large(
         made, spent = run_large(chosen, where, console)
     if report is not None:
         keep(report, made)
+    # Vertices of a file are joined where they are one; faces that are missing are lost.
+    for name in ("degenerate_faces", "duplicate_faces"):
+        if count := made["dropped"].get(name):
+            console.print(f"{count} × {name.replace('_', ' ')} dropped", markup=False)
     stages = ", ".join(f"{name} {seconds:.1f}" for name, seconds in spent.seconds.items())
     console.print(
         f"{output}: {made['levels'][-1]['faces']:,} faces in {sum(spent.seconds.values()):.1f} s "
