@@ -43,7 +43,7 @@ def read_container(data: bytes, kind: str) -> Container:
     return Container(text=data)
 
 
-def read_glb(data: bytes) -> Container:
+def read_glb(data: bytes | memoryview) -> Container:
     """Split a GLB into its chunks, without copying BIN.
 
     Raises:

@@ -11,8 +11,9 @@ from typing import Any
 
 from ...errors import InvalidParameter
 from .arrays import ABOUT, ArrayMesh, open_mesh
+from .glb import read_glb
 from .plan import keep, kept
-from .readers import read_glb, read_obj, read_ply, read_stl
+from .readers import read_obj, read_ply, read_stl
 from .sink import Sink
 from .survey import Survey
 from .target import Target, new_folder, new_ply

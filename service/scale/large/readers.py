@@ -6,10 +6,7 @@ refused, and `pns subdivide` splits it where the file fits into memory.
 
 from __future__ import annotations
 
-import json
-import mmap
 import re
-import struct
 from codecs import BOM_UTF8
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,16 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...bodies.media import GLB_MAGIC
 from ...errors import UnreadableError
-from ...gltf.constants import (
-    COMPONENT_TYPES,
-    FLOAT,
-    GLB_VERSION,
-    JSON_CHUNK,
-    UNSIGNED_INTEGERS,
-)
-from ...gltf.read.modes import TRIANGLES
 from ...meshfiles.obj_text import line_end
 from ...meshfiles.ply.header import LONGEST, POLYGON, Element, PlyHeader, ply_header
 from ...meshfiles.text_numbers import reals, whole
@@ -35,10 +23,6 @@ from .sink import Sink
 
 # Bytes of text that are read at a time.
 TEXT = 1 << 24
-# What a tree that is not a glTF's, or lies, does to those who read it.
-UNREADABLE = (
-    AttributeError, LookupError, OverflowError, RecursionError, TypeError, ValueError, struct.error,
-)  # fmt: skip
 
 _OBJ_VERTEX = re.compile(rb"^[ \t]*v(?=[ \t])" + 3 * rb"(?:[ \t]+([^\s#]+))?", re.MULTILINE)
 _OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]+([^\r\n#]*)", re.MULTILINE)
@@ -210,67 +194,3 @@ def _text_blocks(path: Path, end: bytes) -> Iterator[bytes]:
             yield lines + last
             left = rest
         yield left
-
-
-def read_glb(path: Path, sink: Sink) -> None:
-    """Read the triangles of a GLB's one mesh, in its own coordinates, uncompressed.
-
-    Raises:
-        UnreadableError: another file, or one whose mesh is kept in another way.
-    """
-    try:
-        with path.open("rb") as file:
-            memory = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        magic, version, _, length, kind = struct.unpack_from("<4sIII4s", memory, 0)
-        if (magic, version, kind) != (GLB_MAGIC, GLB_VERSION, JSON_CHUNK):
-            raise UnreadableError(f"{path}: this is not a GLB file")
-        tree = json.loads(memory[20 : 20 + length])
-        meshes = tree["meshes"]
-        if len(meshes) != 1:
-            raise UnreadableError(f"{path}: it has {len(meshes)} meshes; only one is read")
-        for primitive in meshes[0]["primitives"]:
-            _read_primitive(path, memory, 28 + length, tree, primitive, sink)
-    except UNREADABLE as error:
-        raise UnreadableError(f"{path}: this is not a readable GLB file") from error
-
-
-def _read_primitive(
-    path: Path, memory: mmap.mmap, start: int, tree: Any, primitive: Any, sink: Sink
-) -> None:
-    if primitive.get("mode", TRIANGLES) != TRIANGLES or "extensions" in primitive:
-        raise UnreadableError(f"{path}: only plain, uncompressed triangles are read")
-    first = sink.vertices
-    position = primitive["attributes"]["POSITION"]
-    points = _accessor(path, memory, start, tree, position, (FLOAT,), 3)
-    for rows in blocks_of(len(points)):
-        sink.add_vertices(points[rows])
-    if "indices" in primitive:
-        flat = _accessor(path, memory, start, tree, primitive["indices"], UNSIGNED_INTEGERS, 1)
-    else:
-        flat = np.arange(len(points))
-    faces = flat.reshape(-1, 3)
-    for rows in blocks_of(len(faces)):
-        sink.add_faces(first + faces[rows].astype(np.int64))
-
-
-def _accessor(
-    path: Path,
-    memory: mmap.mmap,
-    start: int,
-    tree: Any,
-    number: int,
-    types: tuple[int, ...],
-    width: int,
-) -> np.ndarray:
-    """Return an accessor's rows where they lie."""
-    accessor = tree["accessors"][number]
-    if "sparse" in accessor or accessor["componentType"] not in types:
-        raise UnreadableError(f"{path}: accessor {number} is kept in a way that is not read")
-    view = tree["bufferViews"][accessor["bufferView"]]
-    if view.get("buffer", 0) != 0 or "uri" in tree["buffers"][0] or "extensions" in view:
-        raise UnreadableError(f"{path}: only what the GLB itself holds is read")
-    kind = COMPONENT_TYPES[accessor["componentType"]]
-    stride = view.get("byteStride", width * kind.itemsize)
-    offset = start + view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-    shape, strides = (accessor["count"], width), (stride, kind.itemsize)
-    return np.ndarray(shape, kind, memory, offset, strides)

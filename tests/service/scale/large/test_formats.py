@@ -280,6 +280,27 @@ def _elsewhere(tree):
     tree["buffers"][0]["uri"] = "x"
 
 
+def _past_its_view(tree):
+    tree["accessors"][0]["byteOffset"] = 4
+
+
+def _before_its_view(tree):
+    tree["accessors"][0]["byteOffset"] = -4
+
+
+def _no_bytes(tree):
+    del tree["accessors"][0]["bufferView"]
+
+
+def _compressed(tree):
+    tree["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": {}}
+
+
+def _five_corners(tree):
+    indices = tree["meshes"][0]["primitives"][0]["indices"]
+    tree["accessors"][indices]["count"] = 5
+
+
 PLY = b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\n"
 FACE = b"element face 1\nproperty list uchar int vertex_indices\nend_header\n"
 STL = b"solid\nfacet normal 0 0 0\nouter loop\n%b\nendloop\nendfacet\nendsolid\n"
@@ -310,13 +331,18 @@ XYZ = b"property float y\nproperty float z\n"
         ("a.obj", b"v 0 0 0\nf 1 1_0 3\n", "no number"),
         ("a.obj", b"v 0 0 1_0\n", "no number"),
         ("a.obj", b"v 0 0 0\nf 1 1 1\n", "three different"),
-        ("a.glb", b"no glb" * 9, "not a GLB"),
-        ("a.glb", b"x", "not a readable GLB"),
+        ("a.glb", b"no glb" * 9, "GLB magic"),
+        ("a.glb", b"x", "shorter than a GLB header"),
         ("a.glb", changed_glb(_two_meshes), "2 meshes"),
         ("a.glb", changed_glb(_lines), "plain, uncompressed"),
-        ("a.glb", changed_glb(_bytes), "is kept in a way"),
-        ("a.glb", changed_glb(_elsewhere), "itself holds"),
-        ("a.glb", changed_glb(lambda tree: tree.pop("meshes")), "not a readable GLB"),
+        ("a.glb", changed_glb(_bytes), "float32"),
+        ("a.glb", changed_glb(_elsewhere), "did not come with"),
+        ("a.glb", changed_glb(_past_its_view), "ends? at byte .* /accessors/0"),
+        ("a.glb", changed_glb(_before_its_view), "/accessors/0/byteOffset"),
+        ("a.glb", changed_glb(_no_bytes), "plain, uncompressed"),
+        ("a.glb", changed_glb(_compressed), "compressed buffer views"),
+        ("a.glb", changed_glb(_five_corners), "5 corners"),
+        ("a.glb", changed_glb(lambda tree: tree.pop("meshes")), "0 meshes"),
         ("a.fbx", b"", "must be a folder"),
     ],
 )
@@ -325,6 +351,25 @@ def test_files_that_cannot_be_read_are_told(tmp_path, name, data, words):
     with pytest.raises((UnreadableError, UnrefinableError, InvalidParameter), match=words):
         refined(tmp_path / name, tmp_path / "out", 1)
     assert not (tmp_path / "out").exists()
+
+
+def _variants(tree):
+    mappings = {"KHR_materials_variants": {"mappings": []}}
+    tree["meshes"][0]["primitives"][0]["extensions"] = mappings
+
+
+def _packed(tree):
+    tree["bufferViews"][0]["byteStride"] = 0
+
+
+@pytest.mark.parametrize("change", [_variants, _packed])
+def test_what_does_not_touch_the_bytes_of_a_glb_is_passed_over(tmp_path, change):
+    for name, data in (("plain", changed_glb(dict)), ("changed", changed_glb(change))):
+        (tmp_path / f"{name}.glb").write_bytes(data)
+        refined(tmp_path / f"{name}.glb", tmp_path / name, 1)
+    for array in ("positions.npy", "faces.npy"):
+        first, other = (tmp_path / name / array for name in ("plain", "changed"))
+        assert first.read_bytes() == other.read_bytes()
 
 
 def test_a_glb_of_several_primitives_is_one_mesh(tmp_path):
