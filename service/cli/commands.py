@@ -221,6 +221,8 @@ def large(
         made, spent = run_large(chosen, where, console)
     if report is not None:
         keep(report, made)
+    for change in made["changes"]:
+        console.print(printable(f"{change['count']} × {change['what']}"), markup=False)
     # Vertices of a file are joined where they are one; faces that are missing are lost.
     for name in ("degenerate_faces", "duplicate_faces"):
         if count := made["dropped"].get(name):

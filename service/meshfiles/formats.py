@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 HOLDS_DOUBLE = frozenset({"obj", "off"})
 HOLDS_UV = frozenset({"obj", "ply", *GLTF_KINDS})
 
-_OBJ_UV = re.compile(rb"^[ \t]*vt[ \t]", re.MULTILINE)
 _OBJ_PART = re.compile(rb"^[ \t]*(?:usemtl|o|g)(?:[ \t][^\n]*)?$", re.MULTILINE)
 _STL_PART = re.compile(rb"(?im)^[ \t]*(?:endsolid|solid)(?:[ \t][^\n]*)?\r?$")
 # trimesh gathers an OBJ's faces by material, the last first, and takes time in the square of the
@@ -179,8 +178,8 @@ def _beside_triangles(
     match kind:
         case "obj":
             others = unsupported.of_obj(data)
-            coordinates = 0 if has_uv else len(_OBJ_UV.findall(data))
-            if coordinates:
+            coordinates = others.pop(unsupported.COORDINATES, 0)
+            if coordinates and not has_uv:
                 others["texture coordinates that not all faces have"] = coordinates
             faces = unsupported.faces_of_obj(data)
             if faces.sides:

@@ -12,14 +12,17 @@ from .counted import STL_HEADER
 from .ply.header import LONGEST
 from .ply.textured_text import CORNER_UV
 
-_OBJ_STATEMENT = re.compile(rb"^[ \t]*(vn|usemtl|g|o|s|l|p|vp|curv|surf)[ \t]", re.MULTILINE)
-_OBJ_COLOUR = re.compile(rb"^[ \t]*v(?:[ \t]+[^\s]+){6,}[ \t]*\r?$", re.MULTILINE)
+# A line's end to begin with is looked for at once, its beginning at each letter.
+_OBJ_STATEMENT = re.compile(rb"\n[ \t]*(vt|vn|usemtl|g|o|s|l|p|vp|curv|surf)[ \t]")
+_OBJ_COLOUR = re.compile(rb"\n[ \t]*v(?:[ \t]+[^\s]+){6,}[ \t]*\r?$", re.MULTILINE)
 _OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
 _OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
 # The first number of each corner, and the ends of lines.
 _OBJ_REFERENCE = re.compile(rb"(?<![^\s])-?\d{1,18}|\n")
 _OBJ_CONTINUED = re.compile(rb"\\\r?\n")
+COORDINATES = "texture coordinates"
 _OBJ_NAMES = {
+    b"vt": COORDINATES,
     b"vn": "vertex normals",
     b"usemtl": "materials",
     b"g": "groups",
@@ -41,9 +44,10 @@ SIDES = "faces of fewer than three vertices"
 
 
 def of_obj(data: bytes) -> dict[str, int]:
-    """Count, by name, the statements that are passed over."""
-    counts = Counter(_OBJ_NAMES[name] for name in _OBJ_STATEMENT.findall(data))
-    if colours := len(_OBJ_COLOUR.findall(data)):
+    """Count, by name, the statements that are passed over where a mesh is positions and faces."""
+    lines = b"\n" + data
+    counts = Counter(_OBJ_NAMES[name] for name in _OBJ_STATEMENT.findall(lines))
+    if colours := len(_OBJ_COLOUR.findall(lines)):
         counts["vertex colours"] = colours
     return dict(counts)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InvalidParameter
+from ...report import Change
 from .arrays import ABOUT, ArrayMesh, open_mesh
 from .glb import read_glb
 from .plan import keep, kept
@@ -88,27 +89,33 @@ class OutputKind:
 def input_mesh(source: Path, work: Path) -> tuple[ArrayMesh, dict[str, Any]]:
     """Return the arrays of an input, and what is not in them: of a file they are made in ``work``.
 
+    What is not in them is told as reports tell it, under `dropped` and `changes`.
+
     Raises:
         InvalidParameter: none of the formats that are read.
         UnreadableError: not what its ending says.
         UnrefinableError: an index out of range, or no face with three different vertices.
     """
     if source.is_dir():
-        return open_mesh(source), {}
+        return open_mesh(source), {"dropped": {}, "changes": []}
     reader = READERS.get(source.suffix.lower())
     if reader is None:
         endings = ", ".join(READERS)
         raise InvalidParameter("IN", f"{source}: it must be a folder of arrays, or {endings}")
     folder = work / "input"
     folder.mkdir(exist_ok=True)
-    dropped = kept(folder / ABOUT)
-    if dropped is None:
+    missing = kept(folder / ABOUT)
+    if missing is None:
         sink = Sink(folder)
         reader(source, sink)
-        dropped = asdict(weld_outside_memory(*sink.rows(), folder))
+        changes = [Change("", f"{what} dropped", n) for what, n in sink.passed_over.items()]
+        missing = {
+            "dropped": asdict(weld_outside_memory(*sink.rows(), folder)),
+            "changes": [asdict(change) for change in changes],
+        }
         sink.remove()
-        keep(folder / ABOUT, dropped)
-    return open_mesh(folder), dropped
+        keep(folder / ABOUT, missing)
+    return open_mesh(folder), missing
 
 
 def output_kind(output: Path) -> OutputKind:

@@ -37,6 +37,10 @@ def read_glb(path: Path, sink: Sink) -> None:
     if len(document.meshes) != 1:
         raise UnreadableError(f"{path}: it has {len(document.meshes)} meshes; only one is read")
     for primitive in document.meshes[0].primitives:
+        names = primitive.attributes.keys() - {"POSITION"}
+        sink.passed_over.update(f"attribute {name}" for name in sorted(names))
+        if primitive.targets:
+            sink.passed_over["morph targets"] += len(primitive.targets)
         _read_primitive(path, document, buffers, primitive, sink)
 
 

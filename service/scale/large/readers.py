@@ -18,6 +18,7 @@ from ...errors import UnreadableError
 from ...meshfiles.obj_text import line_end
 from ...meshfiles.ply.header import LONGEST, POLYGON, Element, PlyHeader, ply_header
 from ...meshfiles.text_numbers import reals, whole
+from ...meshfiles.unsupported import of_obj, of_ply
 from .arrays import blocks_of
 from .sink import Sink
 
@@ -37,7 +38,15 @@ def read_ply(path: Path, sink: Sink) -> None:
     Raises:
         UnreadableError: another file, or a face that is no triangle.
     """
-    header = _ply_header(path)
+    header, head = _ply_header(path)
+    names = {
+        element.name: {
+            "length": element.rows,
+            "properties": [one.name for one in element.properties],
+        }
+        for element in header.elements
+    }
+    sink.passed_over.update(of_ply(head, names, has_uv=False))
     start = header.end
     for element in header.elements:
         name, count, kind = element.name, element.rows, _ply_record(path, header, element)
@@ -64,7 +73,8 @@ def _add_triangles(path: Path, records: np.ndarray, first: int, sink: Sink) -> N
     sink.add_faces(records["corners"])
 
 
-def _ply_header(path: Path) -> PlyHeader:
+def _ply_header(path: Path) -> tuple[PlyHeader, bytes]:
+    """Return the header, and the bytes that hold it."""
     with path.open("rb") as file:
         head = file.read(LONGEST)
     header = ply_header(head)
@@ -75,7 +85,7 @@ def _ply_header(path: Path) -> PlyHeader:
         raise UnreadableError(f"{path}: only a binary PLY is read")
     if {"vertex", "face"} - {element.name for element in header.elements}:
         raise UnreadableError(f"{path}: the PLY file has no vertices or no faces")
-    return header
+    return header, head
 
 
 def _ply_record(path: Path, header: PlyHeader, element: Element) -> np.dtype:
@@ -115,6 +125,8 @@ def read_stl(path: Path, sink: Sink) -> None:
         records = np.memmap(path, kind, "r", 84, (count,)) if count else np.zeros(0, kind)
         for rows in blocks_of(count):
             _add_soup(sink, np.array(records["corners"][rows]).reshape(-1, 3))
+            if coloured := int(np.count_nonzero(records["rest"][rows])):
+                sink.passed_over["colours of faces"] += coloured
         return
     with path.open("rb") as file:
         start = file.read(TEXT)
@@ -139,7 +151,7 @@ def _add_soup(sink: Sink, points: np.ndarray) -> None:
 
 
 def read_obj(path: Path, sink: Sink) -> None:
-    """Read an OBJ's positions and triangles; all else is passed over.
+    """Read an OBJ's positions and triangles; all else is passed over, and counted.
 
     Raises:
         UnreadableError: a number that is none, or a face that is no triangle.
@@ -148,6 +160,7 @@ def read_obj(path: Path, sink: Sink) -> None:
         end = line_end(file.read(TEXT))
     for block in _text_blocks(path, end):
         text = block.replace(end, b"\n")
+        sink.passed_over.update(of_obj(text))
         before = sink.vertices
         lines = list(_OBJ_VERTEX.finditer(text))
         # One that is missing is NaN, which is refused.

@@ -272,7 +272,7 @@ def _do(
 def _report(
     scheme: Scheme, length: float, about: Survey, done: list[Any], read: dict[str, Any]
 ) -> dict[str, Any]:
-    """Return the report: that of ``refine`` without percentiles, and what the reader dropped."""
+    """Return the report: that of ``refine`` without percentiles, and what was not read."""
     tallies = ([LevelTally.of_dict(level) for level in part["levels"]] for part in done)
     reduced = reduced_report(tallies)
     for level in reduced["levels"]:
@@ -286,5 +286,5 @@ def _report(
         "prior_strength": scheme.prior_strength,
         "multi_fan_vertices": sum(part["several_fans"] for part in done),
         **reduced,
-        "dropped": read,
+        **read,
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,14 @@ POSITIONS, FACES = "raw-positions", "raw-faces"
 
 
 class Sink:
-    """Rows of positions (float64) and faces (int64), appended to files in a folder."""
+    """Rows of positions (float64) and faces (int64), appended to files in a folder.
+
+    `passed_over` counts, by name, what the file holds beside them.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.vertices, self.faces = 0, 0
+        self.passed_over = Counter[str]()
         self._folder = folder
         # Of a run that was stopped.
         self.remove()

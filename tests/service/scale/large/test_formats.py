@@ -209,7 +209,12 @@ def test_a_ply_may_be_of_either_byte_order_with_other_properties(tmp_path):
         file.write(struct.pack(">i", 5))
         for face in faces:
             file.write(struct.pack(">B3Hf", 3, *face, 1.5))
-    refined(tmp_path / "in.ply", tmp_path / "out", 2)
+    report = refined(tmp_path / "in.ply", tmp_path / "out", 2)
+    assert [(change["count"], change["what"]) for change in report["changes"]] == [
+        (16, "vertex property quality dropped"),
+        (1, "element camera dropped"),
+        (len(faces), "face property area dropped"),
+    ]
     assert_same(tmp_path / "out", refine(control_of(points, faces), loop()).mesh)
 
 
@@ -370,6 +375,23 @@ def test_what_does_not_touch_the_bytes_of_a_glb_is_passed_over(tmp_path, change)
     for array in ("positions.npy", "faces.npy"):
         first, other = (tmp_path / name / array for name in ("plain", "changed"))
         assert first.read_bytes() == other.read_bytes()
+
+
+def test_what_a_file_holds_beside_its_faces_is_told(tmp_path):
+    (tmp_path / "in.glb").write_bytes(part_glb())
+    stl = formats.write(loose_triangles(), "stl")
+    (tmp_path / "in.stl").write_bytes(stl[:-2] + b"\xff\x7f")
+    told = {
+        ending: [f"{change['count']} {change['what']}" for change in report["changes"]]
+        for ending in ("glb", "stl")
+        if (report := refined(tmp_path / f"in.{ending}", tmp_path / ending, 1))
+    }
+    primitives = json.loads(read_glb(part_glb()).text)["meshes"][0]["primitives"]
+    assert told["glb"] == [
+        f"{sum(name in each['attributes'] for each in primitives)} attribute {name} dropped"
+        for name in ("NORMAL", "TEXCOORD_0")
+    ]
+    assert told["stl"] == ["1 colours of faces dropped"]
 
 
 def test_a_glb_of_several_primitives_is_one_mesh(tmp_path):
