@@ -75,7 +75,7 @@ def convert(
     if report_file is not None:
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
         replace_file(report_file, text + b"\n")
-    for line in _lines(written.report):
+    for line in lines_of(written.report):
         console.print(printable(line), markup=False)
     seconds = time.perf_counter() - began
     console.print(f"{output}: {written.faces:,} faces in {seconds:.1f} s", markup=False)
@@ -126,7 +126,7 @@ def predicted_faces(
     return faces
 
 
-def _lines(report: dict[str, Any]) -> Iterator[str]:
+def lines_of(report: dict[str, Any]) -> Iterator[str]:
     """Yield what was changed or lost, each thing once: how often, and where first."""
     said: Counter[str] = Counter()
     places: defaultdict[str, list[str]] = defaultdict(list)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..errors import InvalidParameter, LimitError, NoModelError, ServiceError
+from ..errors import LONGEST, InvalidParameter, LimitError, NoModelError, ServiceError
 from ..options import Limits, Options
 from .same_model import check_same_model
 
@@ -63,8 +63,8 @@ class Row:
     """What became of one file: a row of the report.
 
     `code`, `detail` and `pointer` are those of the service's problems, and empty for what went
-    well; `limit_distance` is the certificate, in the mesh's own units (of several meshes, the
-    largest).
+    well; `changes` says what was changed or lost on the way, a line each; `limit_distance` is the
+    certificate, in the mesh's own units (of several meshes, the largest).
     """
 
     path: str
@@ -73,6 +73,7 @@ class Row:
     code: str = ""
     detail: str = ""
     pointer: str = ""
+    changes: str = ""
     attempts: int = 1
     faces_in: int = 0
     faces_out: int = 0
@@ -128,7 +129,7 @@ def _refine(task: Task) -> Row:
     from pns_common.errors import PnsError
 
     from ..gltf.read.memory_cap import memory_cap
-    from ..meshfiles.convert import converted
+    from ..meshfiles.convert import converted, lines_of
     from .places import place_of
 
     source, output = place_of(task.url), place_of(task.output)
@@ -165,6 +166,7 @@ def _refine(task: Task) -> Row:
         task.url,
         task.output,
         DONE,
+        changes="\n".join(lines_of(written.report))[:LONGEST],
         faces_in=written.faces // 4**task.options.levels,
         faces_out=written.faces,
         bytes_in=len(data),

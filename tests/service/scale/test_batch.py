@@ -60,6 +60,17 @@ def test_rows_say_what_was_done(tmp_path):
     assert row["output_sha256"] == hashlib.sha256(data).hexdigest()
 
 
+def test_rows_say_what_was_changed_or_lost(tmp_path):
+    library(tmp_path / "in")
+    (tmp_path / "in" / "bare.obj").write_bytes(TETRAHEDRON + b"f 1 2 2\nvn 0 0 1\n")
+    batch = batch_of(tmp_path, to="obj")
+    refined(batch)
+    told = {name: row["changes"].splitlines() for name, row in rows(batch).items()}
+    assert told["a.obj"] == []
+    assert told["bare.obj"] == ["1 × vertex normals dropped", "1 × degenerate faces dropped"]
+    assert "1 × materials dropped: not written to OBJ files (/materials)" in told["d.glb"]
+
+
 def test_what_is_done_is_not_done_again(tmp_path):
     source = library(tmp_path / "in")
     batch = batch_of(tmp_path)
