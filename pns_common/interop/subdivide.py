@@ -87,4 +87,7 @@ def _adapter(mesh: object) -> Adapter:
         if known is not None:
             return known
     kinds = ", ".join(f"{package}.{name}" for package, name in ADAPTERS)
-    raise ParameterError("mesh", type(mesh), expected=f"a Mesh, a pair of arrays, or {kinds}")
+    # As trimesh loads a GLB.
+    others = "of a scene or a file, its meshes one by one"
+    expected = f"a Mesh, a pair of arrays, or {kinds}; {others}"
+    raise ParameterError("mesh", type(mesh), expected=expected)

@@ -38,7 +38,9 @@ def test_the_scheme_is_the_default_model_where_none_is_given():
 
 @pytest.mark.parametrize("mesh", [None, "part.glb", (VERTICES, FACES, FACES), VERTICES])
 def test_other_things_are_refused_with_the_kinds_that_there_are(mesh):
-    with pytest.raises(ParameterError, match=r"trimesh\.Trimesh"):
+    with pytest.raises(
+        ParameterError, match=r"trimesh\.Trimesh.*; of a scene or a file, its meshes"
+    ):
         subdivide(mesh)
 
 
