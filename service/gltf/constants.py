@@ -24,3 +24,7 @@ ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 # Its first word, which tells a GLB from other bodies, is bodies.media.GLB_MAGIC.
 GLB_VERSION = 2
 JSON_CHUNK, BIN_CHUNK = b"JSON", b"BIN\0"
+
+# Bytes of the widest numbers in buffers, which EXT_structural_metadata has: they begin at multiples
+# of as many, and so do BIN and buffers that are joined.
+WIDEST = 8

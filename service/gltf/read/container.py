@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ...bodies.media import GLB_MAGIC, begins_as_json
 from ...errors import UnreadableError, check_limit
-from ..constants import BIN_CHUNK, GLB_VERSION, JSON_CHUNK
+from ..constants import BIN_CHUNK, GLB_VERSION, JSON_CHUNK, WIDEST
 
 _HEADER = struct.Struct("<4sII")
 _CHUNK = struct.Struct("<I4s")
@@ -73,10 +73,13 @@ def write_glb(
 ) -> bytes:
     """Write a GLB of the JSON `text`, the BIN chunk made of the pieces `binary`, and more chunks.
 
+    BIN begins at a multiple of WIDEST bytes, as EXT_structural_metadata wants it.
+
     Raises:
         LimitError: the result would pass the 4 GiB that a GLB can hold.
     """
-    pieces = [*_padded_chunk(JSON_CHUNK, [text], b" ")]
+    spaces = b" " * (-(_HEADER.size + _CHUNK.size + len(text)) % WIDEST)
+    pieces = [*_padded_chunk(JSON_CHUNK, [text, spaces], b" ")]
     if binary:
         pieces += _padded_chunk(BIN_CHUNK, binary, b"\0")
     for kind, data in others:

@@ -14,7 +14,7 @@ from pns_common.base.extent import extent
 
 from ...course import Course
 from ...report import Change
-from ..constants import ARRAY_BUFFER, COLUMNS, COMPONENT_TYPES, ELEMENT_ARRAY_BUFFER
+from ..constants import ARRAY_BUFFER, COLUMNS, COMPONENT_TYPES, ELEMENT_ARRAY_BUFFER, WIDEST
 from ..read.compressed import draco
 from ..read.modes import TRIANGLES
 from ..read.schema import Accessor
@@ -24,10 +24,6 @@ from .prune import cut, moved, remove_unused
 
 # The largest value of an index type restarts primitives, so it may not be used as an index.
 LARGEST_UINT16_INDEX = 65534
-
-# Bytes of the widest numbers in buffers, which EXT_structural_metadata has: they begin at multiples
-# of as many, and so do buffers that are joined.
-WIDEST = 8
 
 # What an accessor is called, and what applications say of it.
 KEPT = ("name", "extras")
@@ -137,6 +133,7 @@ class Writer:
         """Write the buffer's length into the tree; the pieces of BIN."""
         if not self.pieces:
             return []
+        self.append(memoryview(b""), WIDEST)
         first = self.tree.get("buffers", [{}])[0]
         rest = {key: value for key, value in first.items() if key not in ("uri", "byteLength")}
         self.tree["buffers"] = [{"byteLength": self.length, **rest}]

@@ -1,6 +1,7 @@
 """What stays as it was, what is told, and how far the work has come."""
 
 import json
+import struct
 
 import numpy as np
 import pytest
@@ -202,6 +203,19 @@ def test_buffers_are_joined_where_numbers_of_eight_bytes_may_begin():
     view = after["bufferViews"][len(tree["bufferViews"]) - 1]
     assert view["byteOffset"] % 8 == 0
     assert np.frombuffer(content, "<f8", 1, view["byteOffset"]).tolist() == [1.5]
+
+
+@pytest.mark.parametrize("name", ["", "a", "ab", "abc", "abcd", "abcde", "abcdef", "abcdefg"])
+def test_bin_begins_and_ends_where_numbers_of_eight_bytes_may(name):
+    # EXT_structural_metadata asks for it: with BIN, its tables would lie between such places.
+    tree, binary = files.document([octahedron()])
+    tree["nodes"][0]["name"] = name
+    glb = subdivide(data=files.pack(tree, binary)).glb
+    after, _ = files.unpack(glb)
+    length = struct.unpack_from("<I", glb, 12)[0]
+    assert (20 + length) % 8 == 0
+    assert after["buffers"][0]["byteLength"] % 8 == 0
+    assert len(glb) == 28 + length + after["buffers"][0]["byteLength"]
 
 
 def test_a_buffer_without_bytes_stops_only_what_lies_in_it():

@@ -17,9 +17,9 @@ class Claimed(bytes):
 
 
 def test_chunks_are_read_and_written_again():
-    data = files.pack(b'{"a":1}', b"12345", [(b"XTRA", b"more"), (b"LAST", b"")])
+    data = files.pack(b'{"a":[1,2]}', b"12345", [(b"XTRA", b"more"), (b"LAST", b"")])
     container = read_glb(data)
-    assert container.text == b'{"a":1} '
+    assert container.text == b'{"a":[1,2]} '
     assert bytes(container.binary) == b"12345\0\0\0"
     assert [(kind, bytes(content)) for kind, content in container.others] == [
         (b"XTRA", b"more"),
