@@ -61,7 +61,9 @@ def _of_primitive(document: Document, primitive: Primitive, pointer: str) -> Ite
         yield Change(f"{pointer}/mode", _MODES[primitive.mode], 1)
     indices = [] if primitive.indices is None else [primitive.indices]
     stored = [*indices, *(index for _, index in primitive.named)]
-    sparse = sum(accessors[index].sparse is not None for index in stored)
+    # Those of morph targets stay sparse where that is smaller.
+    dense = [*indices, *primitive.attributes.values()]
+    sparse = sum(accessors[index].sparse is not None for index in dense)
     if sparse:
         yield Change(pointer, "sparse accessors written dense", sparse)
     quantised = sum(

@@ -14,7 +14,14 @@ from pns_common.base.extent import extent
 
 from ...course import Course
 from ...report import Change
-from ..constants import ARRAY_BUFFER, COLUMNS, COMPONENT_TYPES, ELEMENT_ARRAY_BUFFER, WIDEST
+from ..constants import (
+    ARRAY_BUFFER,
+    COLUMNS,
+    COMPONENT_TYPES,
+    ELEMENT_ARRAY_BUFFER,
+    UNSIGNED_INT,
+    WIDEST,
+)
 from ..read.compressed import draco
 from ..read.modes import TRIANGLES
 from ..read.schema import Accessor
@@ -87,7 +94,7 @@ class Writer:
         }
         if refined.targets:
             primitive["targets"] = [
-                {name: self._attribute(before[name], name, values[name]) for name in before}
+                {name: self._deltas(before[name], name, values[name]) for name in before}
                 for before, values in zip(
                     refined.source.target_accessors, refined.targets, strict=True
                 )
@@ -145,6 +152,28 @@ class Writer:
         kind = "SCALAR" if before is None else before.type
         index = self._accessor(values, ARRAY_BUFFER, kind)
         describe(self.tree["accessors"][index], before, name, values)
+        return index
+
+    def _deltas(self, before: Accessor, name: str, values: Shaped[np.ndarray, "N K"]) -> int:
+        """Write what a morph target adds: sparse, as it came, where it moves few vertices."""
+        rows = np.flatnonzero(values.any(axis=1)).astype(np.uint32)
+        moved = values[rows]
+        smaller = rows.nbytes + moved.nbytes < values.nbytes
+        if before.sparse is None or values.itemsize != rows.itemsize or not smaller:
+            return self._attribute(before, name, values)
+        index = self.add_accessor(values, before.type, None)
+        accessor = self.tree["accessors"][index]
+        if len(rows):
+            places, content = (in_words(part, "") for part in (rows[:, None], moved))
+            accessor["sparse"] = {
+                "count": len(rows),
+                "indices": {
+                    "bufferView": self.add_view(self.stored(places)),
+                    "componentType": UNSIGNED_INT,
+                },
+                "values": {"bufferView": self.add_view(self.stored(content))},
+            }
+        describe(accessor, before, name, values)
         return index
 
     def _accessor(self, values: Shaped[np.ndarray, "N K"], target: int, kind: str) -> int:

@@ -132,11 +132,27 @@ def unpack(data):
 def values_of(tree, binary, index):
     """The elements of an accessor, (N, K)."""
     accessor = tree["accessors"][index]
-    view = tree["bufferViews"][accessor["bufferView"]]
+    if "sparse" not in accessor:
+        return _stored(tree, binary, accessor)
+    count, apart = accessor["sparse"]["count"], accessor["sparse"]
+    places = _stored(tree, binary, {**apart["indices"], "count": count, "type": "SCALAR"})
+    values = _stored(
+        tree, binary, accessor | {"byteOffset": 0} | apart["values"] | {"count": count}
+    )
+    elements = _stored(tree, binary, accessor)
+    elements[places[:, 0]] = values
+    return elements
+
+
+def _stored(tree, binary, accessor):
+    """The elements as they lie in a view; zeros without one."""
     dtype = np.dtype(
         {number: name for name, number in COMPONENTS.items()}[accessor["componentType"]]
     )
     width = WIDTHS[accessor["type"]]
+    if "bufferView" not in accessor:
+        return np.zeros((accessor["count"], width), dtype)
+    view = tree["bufferViews"][accessor["bufferView"]]
     stride = view.get("byteStride", width * dtype.itemsize)
     start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
     rows = [
