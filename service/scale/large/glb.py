@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mmap
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,14 @@ from ...options import Limits
 from .arrays import blocks_of
 from .sink import Sink
 
+# Where a node puts its mesh, and its children, if it says nothing else.
+_UNMOVED: dict[str, list[float]] = {
+    "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+    "translation": [0, 0, 0],
+    "rotation": [0, 0, 0, 1],
+    "scale": [1, 1, 1],
+}
+
 
 def read_glb(path: Path, sink: Sink) -> None:
     """Read the triangles of a GLB's one mesh, in its own coordinates, uncompressed.
@@ -31,11 +40,17 @@ def read_glb(path: Path, sink: Sink) -> None:
             another way.
     """
     try:
-        document, buffers = _checked(path)
+        tree, document, buffers = _checked(path)
     except ServiceError as error:
         raise UnreadableError(f"{path}: {error.detail}", pointer=error.pointer) from error
     if len(document.meshes) != 1:
         raise UnreadableError(f"{path}: it has {len(document.meshes)} meshes; only one is read")
+    placed = sum(
+        any(node.get(key, unmoved) != unmoved for key, unmoved in _UNMOVED.items())
+        for node in tree.get("nodes", [])
+    )
+    if placed:
+        sink.passed_over["transforms of nodes"] += placed
     for primitive in document.meshes[0].primitives:
         names = primitive.attributes.keys() - {"POSITION"}
         sink.passed_over.update(f"attribute {name}" for name in sorted(names))
@@ -44,8 +59,11 @@ def read_glb(path: Path, sink: Sink) -> None:
         _read_primitive(path, document, buffers, primitive, sink)
 
 
-def _checked(path: Path) -> tuple[Document, list[memoryview]]:
-    """Return the document and its buffers, which are pages of the file. Raises ServiceError."""
+def _checked(path: Path) -> tuple[dict[str, Any], Document, list[memoryview]]:
+    """Return a document, its view and its buffers, which are pages of the file.
+
+    Raises ServiceError.
+    """
     with path.open("rb") as file:
         try:
             memory = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
@@ -59,7 +77,7 @@ def _checked(path: Path) -> tuple[Document, list[memoryview]]:
         raise UnreadableError("compressed buffer views are not read", pointer="/bufferViews")
     buffers = resolve_buffers(document, chunks.binary, Opened(ALONE))
     check_references(document, buffers)
-    return document, buffers
+    return tree, document, buffers
 
 
 def _read_primitive(

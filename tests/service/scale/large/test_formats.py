@@ -363,6 +363,14 @@ def _variants(tree):
     tree["meshes"][0]["primitives"][0]["extensions"] = mappings
 
 
+def _placed(tree):
+    tree["nodes"] = [
+        {"children": [1], "scale": [2, 2, 2]},
+        {"children": [2], "translation": [1, 0, 0]},
+        {"mesh": 0, "scale": [1.0, 1.0, 1.0]},
+    ]
+
+
 def _packed(tree):
     tree["bufferViews"][0]["byteStride"] = 0
 
@@ -392,6 +400,9 @@ def test_what_a_file_holds_beside_its_faces_is_told(tmp_path):
         for name in ("NORMAL", "TEXCOORD_0")
     ]
     assert told["stl"] == ["1 colours of faces dropped"]
+    (tmp_path / "in.glb").write_bytes(changed_glb(_placed))
+    (change,) = refined(tmp_path / "in.glb", tmp_path / "placed", 1)["changes"]
+    assert (change["what"], change["count"]) == ("transforms of nodes dropped", 2)
 
 
 def test_a_glb_of_several_primitives_is_one_mesh(tmp_path):
