@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from ..errors import ServiceError, UnreadableError, check_limit
+from .media import is_apple_double
 from .sibling_files import File, SiblingFiles, relative_name
 
 MAX_ENTRIES = 1024
@@ -85,7 +86,7 @@ def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
             raise ArchiveError("the archive is encrypted")
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise ArchiveError("the archive uses a compression other than deflate")
-        if path.endswith("/") or name.startswith("__MACOSX/") or name.endswith(".DS_Store"):
+        if path.endswith("/") or is_apple_double(name) or name.endswith(".DS_Store"):
             continue
         if name in entries:
             raise ArchiveError("two entries have the same name")

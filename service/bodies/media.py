@@ -35,6 +35,11 @@ ZIP_MAGIC = b"PK\x03\x04"
 BLANK = b" \t\r\n"
 
 
+def is_apple_double(path: str) -> bool:
+    """Return whether a file holds what macOS keeps of another, whose name it has behind `._`."""
+    return path.rpartition("/")[2].startswith("._")
+
+
 def of_request(content_type: str) -> str:
     """Return the media type of a Content-Type, without its parameters. Raises MediaTypeError."""
     media = content_type.partition(";")[0].strip().lower()

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from io import TextIOWrapper
 from typing import Any
 
+from ..bodies.media import is_apple_double
 from ..errors import InvalidParameter
 from .places import Place, place_of
 
@@ -71,12 +72,16 @@ def items_of(
 def _in_folder(place: Place, endings: tuple[str, ...], results: str | None) -> Iterator[Item]:
     faults: list[OSError] = []
     for file in place.files(faults.append):
-        if file.lower().endswith(endings) and not _is_result(file, results):
+        if _is_mesh(file, endings) and not _is_result(file, results):
             yield Item(place.below(file).url, file)
     for error in faults:
         # One that has gone meanwhile is not there to be refined.
         if not isinstance(error, FileNotFoundError):
             yield Item(str(error.filename or place.url), "", error.strerror or str(error))
+
+
+def _is_mesh(path: str, endings: tuple[str, ...]) -> bool:
+    return path.lower().endswith(endings) and not is_apple_double(path)
 
 
 def _is_result(file: str, results: str | None) -> bool:
@@ -93,7 +98,7 @@ def _globbed(place: Place, endings: tuple[str, ...], results: Place | None) -> I
     inside = None if results is None else root.path_to(results)
     for path in place.matches():
         file = posixpath.relpath(path, root.path)
-        if path.lower().endswith(endings) and not _is_result(file, inside):
+        if _is_mesh(path, endings) and not _is_result(file, inside):
             yield Item(Place(place.system, path).url, file)
 
 

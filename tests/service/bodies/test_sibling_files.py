@@ -201,8 +201,9 @@ def link(name):
 
 def test_an_archive_holds_a_document_and_its_neighbours():
     text, binary = external()
-    names = ["scene/box.gltf", "scene/box.bin", "readme.txt", "__MACOSX/._box.gltf"]
-    data = archive(zip(names, [text, binary, b"?", b"?"], strict=True))
+    apple = ["__MACOSX/scene/._box.gltf", "scene/._box.gltf"]
+    names = ["scene/box.gltf", "scene/box.bin", "readme.txt", *apple]
+    data = archive(zip(names, [text, binary, b"?", b"?", b"?"], strict=True))
     main, siblings = open_archive(data, 2**20)
     assert main.content == text
     result = refine(main.content, siblings)

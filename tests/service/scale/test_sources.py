@@ -65,6 +65,13 @@ def test_what_is_there_is_no_glob_whatever_its_name(tmp_path, source):
     assert [item.relative for item in listing()] == ["a?.obj"]
 
 
+@pytest.mark.parametrize("source", ["in", "in/**/*.obj"])
+def test_what_macos_keeps_beside_files_is_no_mesh(tmp_path, source):
+    library(tmp_path / "in", ["b/c.obj", "b/._c.obj", "__MACOSX/b/._c.obj"])
+    listing = items_of(f"{tmp_path}/{source}", KINDS)
+    assert [item.relative for item in listing()] == ["b/c.obj"]
+
+
 @pytest.mark.parametrize("source", ["in", "list.txt"])
 def test_two_colons_in_a_name_make_no_url_of_it(tmp_path, source):
     library(tmp_path / "in", ["rig::body.obj"])
