@@ -29,7 +29,8 @@ WARM_UP_SECONDS = 600.0
 # fresh one takes as long to warm up: to kill it earlier would only let those who leave end workers
 # faster than they start, with bodies that take long to decode.
 GRACE_SECONDS = 2.0
-# How long a worker that has died may go unnoticed where nothing tells of it.
+# How long a worker that has died may go unnoticed where nothing tells of it, and one that rests may
+# keep what its last job has freed.
 WATCH_SECONDS = 1.0
 
 log = logging.getLogger("pns.service")
@@ -51,6 +52,8 @@ class Workers:
         self._pools: set[ProcessPool] = set()
         self._background: set[asyncio.Task[None]] = set()
         self._warm: set[ProcessPool] = set()
+        # Those that may hold what they have freed: for a next job at once, not while they rest.
+        self._used: set[ProcessPool] = set()
         self._ends: set[asyncio.Task[None]] = set()
         self._known: dict[ProcessPool, Sequence[MemoryFile]] = {}
         self._stopping = False
@@ -142,15 +145,34 @@ class Workers:
             raise BusyError("no worker became free in time") from error
 
     async def _watch(self) -> None:
-        """Replace those that die idle: with no request to find them, readiness would not return."""
+        """Look after those that are idle.
+
+        One that has died is replaced: with no request to find it, readiness would not return. One
+        that had a job gives back what that has freed, hundreds of megabytes perhaps.
+        """
         while True:
             await asyncio.sleep(WATCH_SECONDS)
             for _ in range(self._free.qsize()):
                 pool = self._free.get_nowait()
-                if pool.active:
-                    self._free.put_nowait(pool)
-                else:
+                if not pool.active:
                     self._replace(pool, "idle")
+                elif pool in self._used:
+                    self._in_background(self._give_back(pool))
+                else:
+                    self._free.put_nowait(pool)
+
+    async def _give_back(self, pool: ProcessPool) -> None:
+        self._used.discard(pool)
+        try:
+            future = _scheduled(pool, worker.give_back)
+            await _result(pool, future, time.monotonic() + self._seconds)
+        except (JobTimeout, WorkerDied):
+            self._replace(pool, "idle")
+            return
+        except Exception as error:
+            # It serves all the same.
+            log.warning("a worker keeps what its jobs have freed: %s", error)
+        self._free.put_nowait(pool)
 
     async def _wind_down(self, pool: ProcessPool, future: asyncio.Future[T]) -> None:
         """Give a job that nobody wants the time to end itself."""
@@ -185,10 +207,11 @@ class Workers:
         else:
             self._warm.add(pool)
             self.warmed = True
-        self._free.put_nowait(pool)
+        self._let_go(pool)
 
     def _let_go(self, pool: ProcessPool) -> None:
         self._release(pool)
+        self._used.add(pool)
         self._free.put_nowait(pool)
 
     def _release(self, pool: ProcessPool) -> None:
@@ -218,6 +241,7 @@ class Workers:
 
         self._pools.discard(pool)
         self._warm.discard(pool)
+        self._used.discard(pool)
         task = asyncio.get_running_loop().create_task(end())
         self._ends.add(task)
         task.add_done_callback(self._ends.discard)

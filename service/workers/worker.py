@@ -83,3 +83,10 @@ def rare_searches() -> Iterator[None]:
     finally:
         gc.set_threshold(*usual)
         gc.collect(0)
+
+
+def give_back() -> None:
+    """Give what jobs have freed, and kept for the next one, back to the system."""
+    from pns_common.fused import freed_memory
+
+    freed_memory.give_back()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import os
+import platform
+import resource
 import signal
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -19,10 +21,13 @@ from pebble import ProcessPool
 from pebble.pool import process as pebble_process
 
 from service.errors import BusyError, GltfError, JobTimeout, WorkerDied
+from service.workers import pool as pools
 from service.workers.memory_file import MemoryFile
 from service.workers.pool import Workers
 from service.workers.worker import JobFaultError
 from tests.support import stand_in_jobs as jobs
+
+PAGE = resource.getpagesize()
 
 
 @asynccontextmanager
@@ -104,6 +109,36 @@ def test_a_worker_that_dies_idle_is_replaced() -> None:
             os.kill(first, signal.SIGKILL)
             await until(lambda: pool.restarts["idle"] == 1)
             assert await pool.run(jobs.pid) != first
+
+    run(scenario)
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
+def test_a_worker_that_rests_gives_back_what_its_job_has_freed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Kept for the next job, it would be counted against those of other workers."""
+    monkeypatch.setattr(pools, "WATCH_SECONDS", 0.05)
+
+    async def scenario() -> None:
+        async with workers() as pool:
+            process = await pool.run(jobs.pid)
+            kept = await pool.run(jobs.leave_freed)
+            await until(lambda: jobs.pages(process) < kept - 20 * 2**20 // PAGE)
+            assert await pool.run(jobs.pid) == process
+
+    run(scenario)
+
+
+def test_a_worker_that_cannot_give_back_serves_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pools, "WATCH_SECONDS", 0.05)
+    monkeypatch.setattr(pools.worker, "give_back", jobs.fault)
+
+    async def scenario() -> None:
+        async with workers() as pool:
+            process = await pool.run(jobs.pid)
+            await asyncio.sleep(0.2)
+            assert await pool.run(jobs.pid) == process
 
     run(scenario)
 
