@@ -9,6 +9,7 @@ from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from tests.support.gltf import files
 from tests.support.gltf.shapes import octahedron
+from tests.support.meshes import bumpy_sphere
 
 LOOP = Options(scheme="loop")
 
@@ -46,3 +47,18 @@ def test_prediction_grows_with_the_upload_by_what_an_answer_copies():
             subdivide_gltf(with_image(size), "glb", LOOP, None, Limits(max_memory_bytes=10**6))
         predicted.append(refusal.value.found)
     assert predicted[1] - predicted[0] >= 2 * 2**20
+
+
+def test_the_limit_is_predicted_where_every_edge_is_a_crease():
+    vertices, faces = bumpy_sphere(subdivisions=3)
+    data = files.glb([{"POSITION": vertices, "indices": faces}])
+    options = Options(scheme="loop", crease="angle:0", limit=True)
+    tracemalloc.start()
+    try:
+        subdivide_gltf(data, "glb", options, None, Limits())
+        used = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    with pytest.raises(LimitError) as refusal:
+        subdivide_gltf(data, "glb", options, None, Limits(max_memory_bytes=used))
+    assert refusal.value.limit == "memory"
