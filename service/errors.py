@@ -15,6 +15,16 @@ from collections.abc import Sequence
 LONGEST = 8_000
 
 
+def shortened(text: str) -> str:
+    """Return a text that is not too long."""
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
+
+
+def shortened_pointer(pointer: str) -> str:
+    """Return a pointer that is not too long: to what holds the value."""
+    return pointer if len(pointer) <= LONGEST else pointer[:LONGEST].rpartition("/")[0]
+
+
 class ServiceError(Exception):
     """Base of everything that the service answers with a problem document.
 
@@ -26,13 +36,10 @@ class ServiceError(Exception):
     title = "The request could not be answered"
 
     def __init__(self, detail: str, *, pointer: str | None = None, code: str | None = None) -> None:
-        if len(detail) > LONGEST:
-            detail = f"{detail[:LONGEST]}…"
-        if pointer is not None and len(pointer) > LONGEST:
-            pointer = pointer[:LONGEST].rpartition("/")[0]
+        detail = shortened(detail)
         super().__init__(detail)
         self.detail = detail
-        self.pointer = pointer
+        self.pointer = None if pointer is None else shortened_pointer(pointer)
         if code is not None:
             self.code = code
 

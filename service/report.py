@@ -10,14 +10,23 @@ from pns_common.levels.diagnostics import EdgeCounts, GateSummary, LevelReport, 
 from pns_common.refine import Report
 from pns_common.schemes import Scheme
 
+from .errors import shortened, shortened_pointer
+
 
 @dataclass(frozen=True)
 class Change:
-    """Something lost or changed beside the geometry: where (a JSON pointer), what, how often."""
+    """Something lost or changed beside the geometry: where (a JSON pointer), what, how often.
+
+    Of names without end, which an upload may hold, a beginning is told.
+    """
 
     pointer: str
     what: str
     count: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pointer", shortened_pointer(self.pointer))
+        object.__setattr__(self, "what", shortened(self.what))
 
 
 @dataclass(frozen=True, eq=False)

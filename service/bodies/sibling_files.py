@@ -9,6 +9,9 @@ from unicodedata import normalize
 from urllib.parse import unquote
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
+# The path of a file has 4,096 bytes at most, each as three characters. What is longer, without end
+# perhaps, would take eighty times its size to decode and to split.
+_LONGEST_URI = 2**14
 
 
 @dataclass(frozen=True)
@@ -79,9 +82,10 @@ def has_scheme(uri: str) -> bool:
 def safe_name(uri: str, folder: str = "") -> str | None:
     """Return the name of a file that may have come with a document; None for any other URI.
 
-    ``folder`` is the document's own among what came: so far up a URI may lead.
+    ``folder`` is the document's own among what came: so far up a URI may lead. One that is longer
+    than a path may be leads nowhere.
     """
-    if has_scheme(uri):
+    if len(uri) > _LONGEST_URI or has_scheme(uri):
         return None
     # Exporters on Windows write its separators, and browsers take them for slashes too.
     path, steps = unquote(uri).replace("\\", "/"), folder.split("/") if folder else []

@@ -4,6 +4,7 @@ import base64
 import io
 import json
 import os
+import tracemalloc
 import unicodedata
 import zipfile
 
@@ -70,6 +71,20 @@ def beside(**contents):
 def refine(text, siblings):
     options = Options(scheme="loop")
     return subdivide_gltf(text, "gltf", options, None, Limits(), siblings=siblings)
+
+
+@pytest.mark.parametrize("step", ["%41", "a/", "a"])
+def test_a_uri_without_end_takes_what_any_text_does(step):
+    text, content = external(images=[step * 2**20])
+    tracemalloc.start()
+    try:
+        refined = refine(text.replace(b"box.bin", b"b.bin"), beside(b__bin=content))
+        used = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert used < 6 * len(text)
+    (told,) = [change for change in refined.report["changes"] if change["pointer"] == "/images/0"]
+    assert len(told["what"]) < 10_000
 
 
 @pytest.mark.parametrize(("uri", "name"), SAFE)
