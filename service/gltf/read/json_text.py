@@ -28,6 +28,9 @@ _MARKS[[ord(mark) for mark in '{["]}']] = [1, 1, _QUOTE, -1, -1]
 _NO_ITEMS, _NO_MARKS = (bytes(set(range(256)) - set(kept)) for kept in (b'{[,:"', b'{["]}'))
 # A node of two separators takes 233 bytes, with its typed view: the most of all that were measured.
 BYTES_PER_ITEM = 128
+# More for each byte of a string that is not ASCII: its widest letter says what each takes, up to
+# four bytes, in the string and in what is told of it; and it is kept as UTF-8 once it was written.
+BYTES_PER_WIDE_BYTE = 6
 # Of brackets and quotes, whose depth is counted at a time.
 _BLOCK = 2**18
 BOM = b"\xef\xbb\xbf"
@@ -106,7 +109,7 @@ def check_size(text: bytes, limits: Limits) -> None:
     """Count the values that a JSON text may hold, and how deep. Raises LimitError."""
     items = json_items(text)
     check_limit("json-items", items, limits.max_json_items, f"the JSON holds {items} separators")
-    needed = BYTES_PER_INPUT_BYTE * len(text) + BYTES_PER_ITEM * items
+    needed = BYTES_PER_INPUT_BYTE * len(text) + decoded_size(text)
     allowed = limits.max_memory_bytes
     check_limit("memory", needed, allowed, f"the decoded JSON would take {needed} bytes")
     depth = _depth(text)
@@ -115,7 +118,15 @@ def check_size(text: bytes, limits: Limits) -> None:
 
 def decoded_size(text: bytes) -> int:
     """Return the bytes that the decoded text and its typed view will take, erring upwards."""
-    return BYTES_PER_ITEM * json_items(text)
+    return BYTES_PER_ITEM * json_items(text) + BYTES_PER_WIDE_BYTE * _wide_bytes(text)
+
+
+def _wide_bytes(text: bytes) -> int:
+    """Return the bytes of the strings that hold more than ASCII, or may: an escape spells any."""
+    if text.isascii() and b"\\u" not in text:
+        return 0
+    strings = (found[0] for found in _STRING.finditer(text))
+    return sum(len(s) for s in strings if not s.isascii() or b"\\u" in s)
 
 
 def json_items(text: bytes) -> int:

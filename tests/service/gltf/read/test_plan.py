@@ -1,6 +1,8 @@
 """What the prediction of memory must not leave out."""
 
+import json
 import tracemalloc
+from base64 import b64encode
 
 import pytest
 
@@ -61,4 +63,22 @@ def test_the_limit_is_predicted_where_every_edge_is_a_crease():
         tracemalloc.stop()
     with pytest.raises(LimitError) as refusal:
         subdivide_gltf(data, "glb", options, None, Limits(max_memory_bytes=used))
+    assert refusal.value.limit == "memory"
+
+
+@pytest.mark.parametrize("letter", ["\u00e9", "\u20ac", "\U0001f600", r"\ud83d\ude00"])
+@pytest.mark.parametrize("place", ["name", "uri"])
+def test_a_letter_that_makes_all_of_its_string_wide_is_predicted(letter, place):
+    tree, binary = files.document([octahedron()])
+    tree["buffers"][0]["uri"] = f"data:;base64,{b64encode(binary).decode()}"
+    tree["images"] = [{place: "@"}]
+    data = json.dumps(tree).encode().replace(b"@", b"a" * 2**21 + letter.encode())
+    tracemalloc.start()
+    try:
+        subdivide_gltf(data, "gltf", LOOP, None, Limits())
+        used = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    with pytest.raises(LimitError) as refusal:
+        subdivide_gltf(data, "gltf", LOOP, None, Limits(max_memory_bytes=used))
     assert refusal.value.limit == "memory"
