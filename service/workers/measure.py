@@ -24,6 +24,8 @@ USUAL_ATTRIBUTES = 4
 LEAST_VALUES = 1_000
 # A further set of joints costs as many other attributes: each vertex mixes all of its neighbours'.
 VALUES_PER_FURTHER_SET = 100
+# One that another primitive of its mesh has, and that is of zeros here.
+VALUES_PER_EMPTY_SET = 4
 
 
 class _Accessor(msgspec.Struct):
@@ -64,11 +66,15 @@ def cost_of_gltf(
         return cost_of(0, 0, len(data))
     faces, primitives, values = 0, 0, 0
     for mesh in counts.meshes:
+        # What moves the vertices of one primitive moves all of a mesh's, those of others by 0.
+        targets = max((len(primitive.targets) for primitive in mesh.primitives), default=0)
+        sets = max(map(_joint_sets, mesh.primitives), default=0)
         for primitive in mesh.primitives:
             triangles = _triangles(primitive, counts.accessors)
             faces += triangles
             primitives += triangles > 0
-            values += max(triangles * 4**levels, LEAST_VALUES) * _unusual(primitive)
+            unusual = _unusual(primitive, targets, sets)
+            values += max(triangles * 4**levels, LEAST_VALUES) * unusual
     refined = faces * 4**levels
     if refined > limits.max_faces:
         return cost_of(0, 0, len(data))
@@ -88,12 +94,20 @@ def _learned(faces: int, levels: int, learned_levels: int) -> int:
     return faces * 4 ** min(levels, learned_levels) if learned_levels else 0
 
 
-def _unusual(primitive: _Primitive) -> int:
-    """Count the attributes beside the usual ones that follow its vertices, morph targets' too."""
-    sets = sum(name.startswith("JOINTS_") for name in primitive.attributes)
+def _unusual(primitive: _Primitive, targets: int, sets: int) -> int:
+    """Count the attributes beside the usual ones that follow its vertices.
+
+    Morph targets' too: each has positions, of zeros where it names none.
+    """
+    own = _joint_sets(primitive)
     further = max(len(primitive.attributes) - USUAL_ATTRIBUTES, 0)
-    further += max(sets - 1, 0) * VALUES_PER_FURTHER_SET
-    return further + sum(map(len, primitive.targets))
+    further += max(own - 1, 0) * VALUES_PER_FURTHER_SET + (sets - own) * VALUES_PER_EMPTY_SET
+    further += sum(len(target.keys() - {"POSITION"}) for target in primitive.targets)
+    return further + targets
+
+
+def _joint_sets(primitive: _Primitive) -> int:
+    return sum(name.startswith("JOINTS_") for name in primitive.attributes)
 
 
 def _triangles(primitive: _Primitive, accessors: list[_Accessor]) -> int:

@@ -75,7 +75,9 @@ def test_more_levels_and_more_learned_levels_cost_more() -> None:
     assert cost(data, levels=3).seconds < cost(data, levels=4).seconds
 
 
-@pytest.mark.parametrize("place", ["targets", "attributes", "joints"])
+@pytest.mark.parametrize(
+    "place", ["targets", "empty targets", "another primitive", "attributes", "joints"]
+)
 def test_what_many_attributes_carry_is_no_short_job(place: str) -> None:
     """A hundred kilobytes that take ten seconds: every target may be the same accessor."""
     tree, binary = files.document([octahedron()])
@@ -84,6 +86,12 @@ def test_what_many_attributes_carry_is_no_short_job(place: str) -> None:
     few = cost(files.pack(tree, binary)).seconds
     if place == "targets":
         primitive["targets"] = [{"POSITION": 0}] * 4_000
+    elif place == "empty targets":
+        primitive["targets"] = [{}] * 4_000
+    elif place == "another primitive":
+        small = {"POSITION": len(tree["accessors"])}
+        tree["accessors"].append(tree["accessors"][0] | {"count": 3})
+        tree["meshes"][0]["primitives"].append({"attributes": small, "targets": [small] * 4_000})
     elif place == "attributes":
         primitive["attributes"] |= {f"_A{number}": 0 for number in range(4_000)}
     else:

@@ -4,6 +4,7 @@ import json
 import tracemalloc
 from base64 import b64encode
 
+import numpy as np
 import pytest
 
 from service.errors import LimitError
@@ -14,6 +15,19 @@ from tests.support.gltf.shapes import octahedron
 from tests.support.meshes import bumpy_sphere
 
 LOOP = Options(scheme="loop")
+
+
+def refuse_what_it_takes(data, media, options):
+    """Refine a file without limits, then within the memory that it took: the prediction is more."""
+    tracemalloc.start()
+    try:
+        subdivide_gltf(data, media, options, None, Limits())
+        used = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    with pytest.raises(LimitError) as refusal:
+        subdivide_gltf(data, media, options, None, Limits(max_memory_bytes=used))
+    assert refusal.value.limit == "memory"
 
 
 def with_image(size):
@@ -55,15 +69,7 @@ def test_the_limit_is_predicted_where_every_edge_is_a_crease():
     vertices, faces = bumpy_sphere(subdivisions=3)
     data = files.glb([{"POSITION": vertices, "indices": faces}])
     options = Options(scheme="loop", crease="angle:0", limit=True)
-    tracemalloc.start()
-    try:
-        subdivide_gltf(data, "glb", options, None, Limits())
-        used = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    with pytest.raises(LimitError) as refusal:
-        subdivide_gltf(data, "glb", options, None, Limits(max_memory_bytes=used))
-    assert refusal.value.limit == "memory"
+    refuse_what_it_takes(data, "glb", options)
 
 
 @pytest.mark.parametrize("letter", ["\u00e9", "\u20ac", "\U0001f600", r"\ud83d\ude00"])
@@ -73,12 +79,24 @@ def test_a_letter_that_makes_all_of_its_string_wide_is_predicted(letter, place):
     tree["buffers"][0]["uri"] = f"data:;base64,{b64encode(binary).decode()}"
     tree["images"] = [{place: "@"}]
     data = json.dumps(tree).encode().replace(b"@", b"a" * 2**21 + letter.encode())
-    tracemalloc.start()
-    try:
-        subdivide_gltf(data, "gltf", LOOP, None, Limits())
-        used = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    with pytest.raises(LimitError) as refusal:
-        subdivide_gltf(data, "gltf", LOOP, None, Limits(max_memory_bytes=used))
-    assert refusal.value.limit == "memory"
+    refuse_what_it_takes(data, "gltf", LOOP)
+
+
+@pytest.mark.parametrize("whose", ["its own", "another's", "another's joints"])
+def test_what_moves_a_mesh_is_predicted_where_it_moves_nothing(whose):
+    """Targets without positions, and what one primitive has and others have not, are zeros."""
+    vertices, faces = bumpy_sphere(subdivisions=3)
+    large = {"POSITION": vertices, "indices": faces}
+    small = octahedron(POSITION=4 + octahedron()["POSITION"])
+    if whose == "its own":
+        large["targets"] = [{}] * 200
+    elif whose == "another's":
+        small["targets"] = [{"POSITION": small["POSITION"]}] * 200
+    else:
+        joints, weights = np.zeros((6, 4), np.uint8), np.tile(np.float32([1, 0, 0, 0]), (6, 1))
+        small |= {f"JOINTS_{n}": joints for n in range(30)}
+        small |= {f"WEIGHTS_{n}": weights for n in range(30)}
+    tree, binary = files.document([large, small])
+    tree["nodes"], tree["skins"] = [{"mesh": 0, "skin": 0}, {}], [{"joints": [1]}]
+    data = files.pack(tree, binary)
+    refuse_what_it_takes(data, "glb", LOOP)
