@@ -110,7 +110,9 @@ def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, l
         targets = max(len(primitive.targets) for primitive in primitives)
         sets = max(map(_joint_sets, primitives))
         for primitive in primitives:
-            width = sum(element_size(document.accessors[index]) for _, index in primitive.named)
+            sizes = (element_size(document.accessors[index]) for _, index in primitive.named)
+            # As they are written: at multiples of four bytes.
+            width = sum(size + -size % 4 for size in sizes)
             still = targets - sum("POSITION" in target for target in primitive.targets)
             width += still * BYTES_PER_POSITION
             before = triangle_count(_corner_count(document, primitive), primitive.mode, "")

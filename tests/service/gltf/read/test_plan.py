@@ -82,6 +82,14 @@ def test_a_letter_that_makes_all_of_its_string_wide_is_predicted(letter, place):
     refuse_what_it_takes(data, "gltf", LOOP)
 
 
+def test_what_is_narrow_is_predicted_as_wide_as_it_is_written():
+    vertices, faces = bumpy_sphere(subdivisions=3)
+    corners = vertices[faces].reshape(-1, 3)
+    narrow = {f"_A{n}": np.ones((len(corners), 1), np.uint8) for n in range(100)}
+    data = files.glb([{"POSITION": corners, **narrow}])
+    refuse_what_it_takes(data, "glb", LOOP)
+
+
 @pytest.mark.parametrize("whose", ["its own", "another's", "another's joints"])
 def test_what_moves_a_mesh_is_predicted_where_it_moves_nothing(whose):
     """Targets without positions, and what one primitive has and others have not, are zeros."""
