@@ -14,12 +14,15 @@ from typing import TYPE_CHECKING
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ...request_ids import HEADER
+from .journal import METHODS
 
 if TYPE_CHECKING:
     from opentelemetry.trace import Tracer
 
 ENDPOINTS = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
 NAME = "pns"
+# What OpenTelemetry calls a method that it does not know.
+OTHER = "_OTHER"
 
 
 class TracingError(Exception):
@@ -70,7 +73,8 @@ class Traced:
             for name, value in scope["headers"]
             if name in (b"traceparent", b"tracestate")
         }
-        method = scope["method"]
+        # Anything may be sent as a method: of names without end others make series without end.
+        method = scope["method"] if scope["method"] in METHODS else OTHER
         with self.tracer.start_as_current_span(
             method,
             context=propagate.extract(carrier),

@@ -63,6 +63,14 @@ def test_a_fault_is_an_error_and_a_refusal_is_none(traced):
     assert "secret" not in str([span.to_json() for span in spans()])
 
 
+def test_a_stranger_names_no_span(traced):
+    client, spans = traced
+    client.request("SECRET" * 9, "/healthz")
+    (span,) = spans()
+    assert (span.name, span.attributes["http.request.method"]) == ("_OTHER /healthz", "_OTHER")
+    assert "SECRET" not in span.to_json()
+
+
 def test_without_an_endpoint_nothing_is_traced(monkeypatch):
     monkeypatch.delenv("OTEL_EXPORTER_OTLP_ENDPOINT", raising=False)
     assert tracer_from_environment() is None
