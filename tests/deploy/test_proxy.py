@@ -52,20 +52,21 @@ def proxy(tmp_path_factory):
         text = re.sub(r"(client_\w+_timeout) 10s", r"\1 1s", text)
         (folder / "nginx.conf").write_text(text)
         command = [nginx, "-p", folder, "-c", folder / "nginx.conf", "-g", "daemon off;"]
-        process = subprocess.Popen(command, stderr=subprocess.PIPE)
+        errors = folder / "error.log"
+        with errors.open("wb") as stderr:
+            process = subprocess.Popen(command, stderr=stderr)
         try:
             pause = threading.Event()
             for _ in range(300):
                 with closing(socket.socket()) as probe:
                     if probe.connect_ex(("127.0.0.1", port)) == 0:
                         break
-                assert process.poll() is None, process.stderr.read()
+                assert process.poll() is None, errors.read_text()
                 pause.wait(0.1)
             yield ("127.0.0.1", port), lines, folder
         finally:
             process.terminate()
             process.wait(30)
-            process.stderr.close()
             journal.removeHandler(handler)
             journal.setLevel(level)
 
@@ -225,10 +226,14 @@ def test_a_subscribers_ipv6_addresses_are_one(proxy):
     assert answer.status == 200
 
 
-def test_the_proxys_log_says_nothing_of_paths(proxy):
+def test_the_proxys_logs_say_nothing_of_paths(proxy):
+    """A job's id is all that its result takes."""
     address, _, folder = proxy
     ask(address, "GET", "/nothing?secret=1")
+    refused, _ = ask(address, "POST", "/nothing?secret=1", headers={"Content-Length": str(2**27)})
+    assert refused.status == 413
     log = (folder / "access.log").read_text()
-    assert "secret" not in log
-    assert "nothing" not in log
     assert all(json.loads(line)["status"] for line in log.splitlines())
+    for said in (log, (folder / "error.log").read_text()):
+        assert "secret" not in said
+        assert "nothing" not in said
