@@ -125,7 +125,9 @@ def _wide_bytes(text: bytes) -> int:
     """Return the bytes of the strings that hold more than ASCII, or may: an escape spells any."""
     if text.isascii() and b"\\u" not in text:
         return 0
-    strings = (found[0] for found in _STRING.finditer(text))
+    # Pairs of backslashes first: what is left of them escapes what follows.
+    bare = text.replace(rb"\\", b"..").replace(rb"\"", b"..") if b"\\" in text else text
+    strings = bare.split(b'"')[1::2]
     return sum(len(s) for s in strings if not s.isascii() or b"\\u" in s)
 
 
