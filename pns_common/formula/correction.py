@@ -67,7 +67,7 @@ class Correction:
 
 
 def curvature_gate(gate_sharpness: float) -> Gate:
-    """Return γ = tanh(c x²): 0, with derivative 0, where both faces are coplanar (equation 4)."""
+    """Return γ = tanh(c x²): 0, with derivative 0, where both faces are coplanar (equation 5)."""
     # No function of its own: that could not be sent to another process.
     return partial(_gate_of_curvature, gate_sharpness)
 
