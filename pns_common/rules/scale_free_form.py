@@ -16,7 +16,7 @@ class ScaleFreeForm:
     Attributes:
         budget: C ≥ 0; C / R bounds the displacement per squared length.
         prior_strength: s ≥ 0 of the prior D; 1 is full quasi-interpolation.
-        network_scale: τ > 0, the longest that the network may ask for, in edge lengths.
+        network_scale: τ > 0, the longest that the network may ask for at an edge, in its lengths.
         fold_angle: θ of the fold guard in degrees, 0 < θ < 90.
         learned_levels: K ≥ 1.
         boundary_strength: b ≥ 0 of the prior of curves; 1 is full quasi-interpolation.
