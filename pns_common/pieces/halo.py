@@ -30,7 +30,6 @@ from __future__ import annotations
 
 from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.errors import ParameterError, PnsError
-from pns_common.features.edge_features import paper_features
 from pns_common.geometry.crease_lines.going_on import ROUNDS
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
 from pns_common.rules.loop import loop_vertex_rule
@@ -96,6 +95,5 @@ def reach(scheme: Scheme, level: int) -> int:
         if isinstance(vertices, LearnedVertexRule):
             return FIELDS_REACH
         if vertices is loop_vertex_rule:
-            plain = edges.operator.features == paper_features
-            return LOOP_REACH if plain else FIELDS_REACH
+            return LOOP_REACH if edges.operator.features.vertex_fields is None else FIELDS_REACH
     raise ParameterError("scheme", scheme.name, expected="loop() or pns(model)")

@@ -1,15 +1,45 @@
 """How far a level's rules read, and how many rings a piece needs for that."""
 
+from dataclasses import replace
+
 import pytest
 
 from pns_common import Mesh, ParameterError, load_model, loop, pns, refine
+from pns_common.features.edge_features import FEATURE_SETS
+from pns_common.features.ring_features import RING_FEATURE_SETS
 from pns_common.pieces.halo import halo_rings, reach
-from pns_common.runtimes.onnx_model import bundled_models
+from pns_common.runtimes.onnx_model import bundled_models, model_from_bytes
 from tests.support.meshes import bumpy_sphere
+from tests.support.networks import (
+    CARD,
+    VERTEX_CARD,
+    perceptron_bytes,
+    random_layers,
+    two_perceptrons_bytes,
+)
 from tests.support.pieces import adjacent
 from tests.support.schemes import along_normal
 
 SCHEMES = {"loop": loop(), **{name: pns(load_model(name)) for name in bundled_models()}}
+
+
+def of_edges(name):
+    """A scheme whose edges see a feature set; its old vertices are Loop's."""
+    layers = random_layers(0, (FEATURE_SETS[name].count, 16, 3))
+    card = replace(CARD, features=name, orientation="symmetric")
+    return pns(model_from_bytes(perceptron_bytes(layers, card=card), name))
+
+
+def of_vertices(name):
+    """A scheme whose old vertices see a feature set."""
+    edges = random_layers(0, (FEATURE_SETS[VERTEX_CARD.features].count, 16, 3))
+    vertices = random_layers(1, (RING_FEATURE_SETS[name].count, 16, 3))
+    card = replace(VERTEX_CARD, vertex_features=name)
+    return pns(model_from_bytes(two_perceptrons_bytes(edges, vertices, card=card), name))
+
+
+SETS = {name: of_edges(name) for name in FEATURE_SETS}
+SETS |= {name: of_vertices(name) for name in RING_FEATURE_SETS}
 
 
 def test_rings_that_a_piece_needs():
@@ -25,9 +55,9 @@ def test_rings_that_a_piece_needs():
     }
 
 
-@pytest.mark.parametrize("name", SCHEMES)
+@pytest.mark.parametrize("name", SCHEMES | SETS)
 def test_a_level_reads_as_far_as_its_reach_and_no_farther(name):
-    scheme = SCHEMES[name]
+    scheme = (SCHEMES | SETS)[name]
     points, faces = bumpy_sphere(3, 2)
     before = refine(Mesh(points, faces), scheme, 1, 1.0).mesh
     moved = points.copy()
