@@ -150,27 +150,6 @@ def test_the_network_answers_every_reading_of_an_edge_alike(features):
     assert torch.linalg.vector_norm(plain, dim=1).max() > 0.1
 
 
-def test_the_average_is_over_a_group():
-    for features in FEATURE_SETS.values():
-        group = features.symmetries
-        assert len(group.order) in (4, 8)
-        elements = {
-            (tuple(o), tuple(s), tuple(d))
-            for o, s, d in zip(
-                group.order.tolist(), group.signs.tolist(), group.local.tolist(), strict=True
-            )
-        }
-        assert len(elements) == len(group.order)
-        for o1, s1, d1 in elements:
-            for o2, s2, d2 in elements:
-                product = (
-                    tuple(o1[k] for k in o2),
-                    tuple(s * s1[k] for s, k in zip(s2, o2, strict=True)),
-                    tuple(x * y for x, y in zip(d1, d2, strict=True)),
-                )
-                assert product in elements
-
-
 def test_weights_of_both_kinds_of_network_are_the_same():
     """Averaging adds nothing to a checkpoint."""
     keys = initial_network(replace(paper(), orientation="symmetric")).state_dict().keys()
