@@ -12,9 +12,10 @@
 
 q0 is Loop's edge vertex (masks/stencils.py), h the edge's length, F its frame (geometry/frames.py),
 φ what the network reads of its surroundings (features/edge_features.py), η and z what it answers, D
-a prior without weights (prior.py), C the budget and R the mesh's unit of length (refine.py). Π_ρ
-shortens to ρ. Beside thin faces ℓ is less than h, and h in ρ more (geometry/thin_faces.py); on
-others both are h. Old vertices get the like of it in vertex_operator.py, and fold_guard.py scales
+a prior without weights (prior.py), C the budget and R the mesh's unit of length
+(geometry/reference_length.py). Π_ρ shortens to ρ. Beside thin faces ℓ is less than h, and h in ρ
+more (geometry/thin_faces.py); on others both are h. The default's γ is open beside gentle bends too
+(side_gate.py). Old vertices get the like of it in vertex_operator.py, and fold_guard.py scales
 back what would fold.
 
 The bound is enforced here, in float64 and whatever the network returns: ‖δ‖ ≤ C h² / R for any

@@ -39,11 +39,13 @@ def _opened_before(half_edges, face):
     return least
 
 
-def _after(i):
+def corner_after(i):
+    """Return the corner after corner i of a face."""
     return i + 1 if i < 2 else 0
 
 
-def _before(i):
+def corner_before(i):
+    """Return the corner before it."""
     return i - 1 if i > 0 else 2
 
 
@@ -57,13 +59,13 @@ def number_halves(faces, face_edges, edges, half_edges, begin, end, halves):
     following = natural(3 * begin + 2 * _opened_before(half_edges, begin))
     for f in range(natural(begin), end):
         for i in range(3):
-            leaving, entering = face_edges[f, i], face_edges[f, _before(i)]
+            leaving, entering = face_edges[f, i], face_edges[f, corner_before(i)]
             vertex = faces[f, i]
             if half_edges[leaving, 0] == 3 * f + i:
                 halves[leaving, 0 if vertex == edges[leaving, 0] else 1] = following
                 following += 1
             following += 1
-            if half_edges[entering, 0] == 3 * f + _before(i):
+            if half_edges[entering, 0] == 3 * f + corner_before(i):
                 halves[entering, 0 if vertex == edges[entering, 0] else 1] = following
                 following += 1
     return following
@@ -75,7 +77,7 @@ def _at_vertex(half_edge, faces, vertex):
     i = half_edge - 3 * f
     if faces[f, i] == vertex:
         return 12 * f + 3 * i
-    return 12 * f + 3 * _after(i) + 2
+    return 12 * f + 3 * corner_after(i) + 2
 
 
 def _fill_half(
@@ -112,11 +114,11 @@ def split_edges(
     following = natural(3 * begin + 2 * _opened_before(half_edges, begin))
     for f in range(natural(begin), end):
         for i in range(3):
-            before = _before(i)
+            before = corner_before(i)
             leaving, entering = face_edges[f, i], face_edges[f, before]
             vertex = faces[f, i]
             # The edge's number is at its other end, if this face comes later.
-            out_of = halves[leaving, 0 if vertex < faces[f, _after(i)] else 1]
+            out_of = halves[leaving, 0 if vertex < faces[f, corner_after(i)] else 1]
             into = halves[entering, 0 if vertex < faces[f, before] else 1]
             if half_edges[leaving, 0] == 3 * f + i:
                 _fill_half(
@@ -166,7 +168,7 @@ def _split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
             middle = vertex_count + face_edges[f, i]
             to_faces[4 * f + i, 0] = faces[f, i]
             to_faces[4 * f + i, 1] = middle
-            to_faces[4 * f + i, 2] = vertex_count + face_edges[f, _before(i)]
+            to_faces[4 * f + i, 2] = vertex_count + face_edges[f, corner_before(i)]
             to_faces[4 * f + 3, i] = middle
 
 

@@ -1,4 +1,4 @@
-"""The largest angle between some children, and how many are flipped: with diagnostics.py's bits."""
+"""The largest angle between some children, and how many are flipped, with child_faces.py's bits."""
 
 from __future__ import annotations
 

@@ -1,11 +1,12 @@
-"""Normals of the children of faces and the angles between them, with diagnostics.py's bits.
+"""Normals of the children of faces and the angles between them, with child_faces.py's bits.
 
 What decides is compared without a root or a division wherever that is safe, by area vectors; only
-what may be the largest angle, or may be a flipped face, is computed as diagnostics.py does it.
+what may be the largest angle, or may be a flipped face, is computed as it is there.
 """
 
 from __future__ import annotations
 
+from pns_common.fused.kernels.children import corner_after, corner_before
 from pns_common.fused.kernels.compiled import (
     CLASSES,
     INDICES,
@@ -55,20 +56,12 @@ def squared_chord(n, m):
     return dot(chord, chord) if dot(n, n) > 0 and dot(m, m) > 0 else 0.0
 
 
-def _after(i):
-    return i + 1 if i < 2 else 0
-
-
-def _before(i):
-    return i - 1 if i > 0 else 2
-
-
 def child_corners(faces, face_edges, vertex_count, f, i):
     """Return the corners of face f's child at corner i; of the one in the middle for i = 3."""
     if i == 3:
         first, second, third = face_edges[f, 0], face_edges[f, 1], face_edges[f, 2]
         return vertex_count + first, vertex_count + second, vertex_count + third
-    leaving, entering = face_edges[f, i], face_edges[f, _before(i)]
+    leaving, entering = face_edges[f, i], face_edges[f, corner_before(i)]
     return faces[f, i], vertex_count + leaving, vertex_count + entering
 
 
@@ -116,10 +109,10 @@ def _chord_across(points, vertex_count, faces, face_edges, f, i, g, j):
     return max(
         squared_chord(
             _child_normal(points, vertex_count, faces, face_edges, f, i),
-            _child_normal(points, vertex_count, faces, face_edges, g, _after(j)),
+            _child_normal(points, vertex_count, faces, face_edges, g, corner_after(j)),
         ),
         squared_chord(
-            _child_normal(points, vertex_count, faces, face_edges, f, _after(i)),
+            _child_normal(points, vertex_count, faces, face_edges, f, corner_after(i)),
             _child_normal(points, vertex_count, faces, face_edges, g, j),
         ),
     )
@@ -152,8 +145,8 @@ def _hold_side(points, faces, face_edges, half_edges, edge_class, vertex_count, 
     g = h // 3
     j = h - 3 * g
     # The other face runs along the edge in the opposite direction.
-    by_start = row(points, vertex_count + face_edges[g, _after(j)])
-    by_stop = row(points, vertex_count + face_edges[g, _before(j)])
+    by_start = row(points, vertex_count + face_edges[g, corner_after(j)])
+    by_stop = row(points, vertex_count + face_edges[g, corner_before(j)])
     keep(held, FAR + 6 * i, lane, by_start)
     keep(held, FAR + 6 * i + 3, lane, by_stop)
     held[(LONE + i) * TOGETHER + lane] = 1.0 if h == 3 * f + i else 0.0

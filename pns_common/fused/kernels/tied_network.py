@@ -275,7 +275,7 @@ def answer(
     said,
     answers,
 ):
-    """Answer all rows of features; the weights are those of ``form.TiedForm``.
+    """Answer all rows of features; the weights are those of ``tied_form.TiedForm``.
 
     Args:
         last: (3 M,) products of one coordinate after the other.
