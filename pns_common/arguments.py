@@ -23,7 +23,9 @@ LEAST_BYTES_PER_FACE = 60
 def check_scheme(given: object) -> None:
     """Refuse what is no Scheme, as ``check_is_mesh`` what is no Mesh."""
     if not isinstance(given, Scheme):
-        raise ParameterError("scheme", type(given), expected="loop() or pns(load_model())")
+        raise ParameterError(
+            "scheme", type(given), expected="a Scheme, as loop() or pns(load_model())"
+        )
 
 
 def checked_levels(given: SupportsIndex) -> int:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from pns_common.base.arrays import Array
-from pns_common.base.parameters import is_number
+from pns_common.base.parameters import is_number, is_whole
 from pns_common.connectivity.creases import NO_CREASES, Creases
 from pns_common.errors import ModelError, ParameterError
 from pns_common.features.edge_features import FEATURE_SETS
@@ -71,6 +71,9 @@ class Scheme:
         moves_boundaries: whether the rules move boundaries, by the boundary alone.
         wide_bound: whether h of an edge's bound C h² / R is the longest edge of its two faces.
         creases: those that it keeps unless others are named.
+
+    Raises:
+        ParameterError: a rule that cannot be called, or levels that are no whole number from 0 on.
     """
 
     name: str
@@ -84,6 +87,14 @@ class Scheme:
     moves_boundaries: bool = field(default=False, repr=False)
     wide_bound: bool = field(default=False, repr=False)
     creases: Creases = field(default=NO_CREASES, repr=False)
+
+    def __post_init__(self) -> None:
+        for name, rule in (("vertex_rule", self.vertex_rule), ("edge_rule", self.edge_rule)):
+            if not callable(rule):
+                raise ParameterError(name, rule, expected="a function from a level to a placement")
+        levels = self.learned_levels
+        if levels is not None and not (is_whole(levels) and levels >= 0):
+            raise ParameterError("learned_levels", levels, expected="a whole number, or None")
 
     @property
     def prior_strength(self) -> float | None:

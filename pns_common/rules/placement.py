@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import Array, namespace, scatter
+from pns_common.base.arrays import Array, as_numpy, namespace, scatter
 from pns_common.base.blocks import Blocks
 from pns_common.errors import ParameterError
 from pns_common.formula.correction import Correction, proximity_ratio
@@ -95,15 +95,18 @@ def without_correction(positions: Float[Array, "N 3"]) -> Placement:
     return Placement(positions, None, nothing, nothing, xp.zeros_like(nothing, dtype=xp.bool))
 
 
-def placed_at(loop: Placement, positions: Float[Array, "N 3"]) -> Placement:
-    """Put vertices anywhere, without a bound: reports count how far that is from Loop's.
+def placed_at(loop: Placement, positions: Array) -> Placement:
+    """Put vertices at (N, 3) positions, without a bound: reports count how far that is from Loop's.
 
     Raises:
-        ParameterError: there is not one position for each of Loop's.
+        ParameterError: there is not one position for each of Loop's, or they are no real numbers.
     """
     if np.shape(positions) != tuple(loop.loop.shape):
         expected = f"an array of shape {tuple(loop.loop.shape)}, a row for each vertex"
         raise ParameterError("positions", np.shape(positions), expected=expected)
+    kind = np.asarray(as_numpy(positions)).dtype
+    if kind.kind not in "fiu":
+        raise ParameterError("positions.dtype", str(kind), expected="real numbers")
     return replace(loop, displacement=positions - loop.loop)
 
 

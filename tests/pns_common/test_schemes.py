@@ -128,6 +128,15 @@ def test_rules_act_at_as_many_levels_as_the_scheme_says():
     assert pns(load_model("paper")).acts_at(15)
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [{"vertex_rule": None}, {"edge_rule": 1}, *({"learned_levels": k} for k in (-1, 1.5, "1"))],
+)
+def test_what_is_no_rule_or_no_number_of_levels_is_refused(wrong):
+    with pytest.raises(ParameterError, match=next(iter(wrong))):
+        replace(loop(), **wrong)
+
+
 @pytest.mark.parametrize("again", [copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))])
 def test_a_scheme_travels_with_its_kernels(again):
     mesh = Mesh(*bumpy_sphere(0))

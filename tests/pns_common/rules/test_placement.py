@@ -55,6 +55,13 @@ def test_positions_of_another_number_of_vertices_are_refused():
             placed_at(BASE, BASE.loop[:count])
 
 
+@pytest.mark.parametrize("kind", [complex, object, str])
+def test_positions_that_are_no_real_numbers_are_refused(kind):
+    """Complex ones came out as a complex mesh."""
+    with pytest.raises(ParameterError, match=r"dtype.*expected real numbers"):
+        placed_at(BASE, BASE.loop.astype(kind))
+
+
 def test_a_correction_is_added_at_its_rows_alone():
     placed = with_correction(BASE, ROWS, CORRECTION)
     assert (placed.positions - BASE.loop).tolist() == [[0] * 3, [3, 4, 0], *[[0] * 3] * 3]
