@@ -68,6 +68,14 @@ def test_operations_have_names_of_their_own(document):
     assert {"subdivide", "report", "create_job", "read_job", "limits", "models"} <= set(names)
 
 
+def test_every_route_says_what_it_does_and_stands_on_the_page(document):
+    page = (ROOT / "docs" / "service.md").read_text()
+    for name, operation in operations(document):
+        # Without one it is made of the name.
+        assert operation["summary"].lower() != operation["operationId"].replace("_", " "), name
+        assert f"| `{name.replace('{job_id}', 'ID')}" in page or f", `{name}" in page, name
+
+
 def test_there_is_one_schema_of_problems(document):
     wanted = {"schema": {"$ref": "#/components/schemas/Problem"}}
     for name, operation in operations(document):
