@@ -10,6 +10,7 @@ import pytest
 import trimesh
 
 from pns_common.schemes import loop
+from service.bodies import media
 from service.errors import LimitError, UnreadableError, UnrefinableError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles import formats
@@ -20,7 +21,7 @@ from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Limits, Options
 from tests.support.shared import shared_path
 
-KINDS = ("obj", "ply", "stl", "off")
+KINDS = sorted(set(media.KINDS) - set(media.GLTF_KINDS))
 SQUARE = ("0 0 0", "1 0 0", "1 1 0", "0 1 0")
 
 
