@@ -4,6 +4,8 @@ It writes a checkpoint and prints the held-out table; so does `distil`, of sever
 """
 
 import time
+from collections.abc import Generator
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,6 +31,7 @@ from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
 from train.models.recipes import RECIPES
 from train.models.torch_model import recipe_model
+from train.output_file import prepare_output
 
 CHECKPOINTS = Path("checkpoints")
 # Of a distillation, where nothing else is said.
@@ -75,6 +78,8 @@ def train(
     console = Console()
     chosen = RECIPES[recipe](seed)
     path = output or CHECKPOINTS / f"{chosen.name}.safetensors"
+    with _errors_told(console):
+        prepare_output(path)
     began = time.perf_counter()
     with _progress(console) as progress:
         task = progress.add_task(f"training {chosen.name}", total=chosen.steps, loss=float("nan"))
@@ -93,16 +98,14 @@ def distil(
     """Fit the networks of a recipe to what those of its trainings answer in the mean."""
     console = Console()
     began = time.perf_counter()
-    try:
+    with _errors_told(console):
         members = [load_checkpoint(path) for path in checkpoints]
         recipe = _as_it_is_now(members[0].recipe)
         plan = planned(recipe, members, meshes, steps)
         path = output or CHECKPOINTS / f"{recipe.name}.safetensors"
         if path.resolve() in [each.resolve() for each in checkpoints]:
             raise ParameterError("output", str(path), expected="another file than the trainings")
-    except PnsError as error:
-        console.print(escape(str(error)), style="red", soft_wrap=True)
-        raise typer.Exit(1) from error
+        prepare_output(path)
     with _progress(console) as progress:
         task = progress.add_task(f"distilling {recipe.name}", total=2 * steps, loss=float("nan"))
         networks = distilled(
@@ -113,6 +116,16 @@ def distil(
         )
     _measure_and_save(path, recipe, *networks, plan, console)
     _say_written(path, began, console)
+
+
+@contextmanager
+def _errors_told(console: Console) -> Generator[None, None, None]:
+    """End the command in a line that says what was wrong."""
+    try:
+        yield
+    except PnsError as error:
+        console.print(escape(str(error)), style="red", soft_wrap=True)
+        raise typer.Exit(1) from error
 
 
 def _as_it_is_now(recipe: Recipe) -> Recipe:

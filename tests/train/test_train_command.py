@@ -3,10 +3,11 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 import train.run
-from train.models.checkpoint import load_checkpoint
+from train.models.checkpoint import Checkpoint, load_checkpoint
 from train.models.recipes import paper
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -34,6 +35,29 @@ def test_seed_and_output_can_be_chosen(tmp_path, monkeypatch):
     arguments = ["train", "--recipe", "paper", "--seed", "5", "--output", str(path)]
     assert CliRunner().invoke(train.run.app, arguments, catch_exceptions=False).exit_code == 0
     assert load_checkpoint(path).recipe.seed == 5
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["train", "--output"],
+        ["distil", "CHECKPOINT", "--output"],
+        ["certify", "--json"],
+        ["reproduce", "headline", "--output"],
+    ],
+)
+def test_what_cannot_be_written_is_told_before_the_work_begins(arguments, tmp_path, monkeypatch):
+    monkeypatch.setattr(train.run, "fit", lambda *_: pytest.fail("it trains"))
+    monkeypatch.setattr(train.run, "load_checkpoint", lambda _: Checkpoint(paper(), None, {}, ""))
+    monkeypatch.setattr(train.run, "planned", lambda *_: None)
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    outcome = CliRunner().invoke(
+        train.run.app, [*arguments, str(blocked / "x")], catch_exceptions=False
+    )
+    assert outcome.exit_code != 0
+    assert str(blocked / "x") in outcome.output
+    assert "a folder that can be written" in outcome.output
 
 
 # One process for both scripts: what takes long is what both import.

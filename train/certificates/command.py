@@ -17,6 +17,7 @@ from train.certificates.certify import (
     verdict_json,
     verdict_table,
 )
+from train.output_file import prepare_output
 
 
 def certify_command(
@@ -38,13 +39,14 @@ def certify_command(
     console = Console()
     try:
         real = () if meshes is None else real_bodies(meshes)
+        if json is not None:
+            prepare_output(json)
     except PnsError as error:
         console.print(escape(str(error)), style="red", soft_wrap=True)
         raise typer.Exit(2) from error
     verdict = _certify_with_progress(model, real, seed, console)
     console.print(verdict_table(verdict))
     if json is not None:
-        json.parent.mkdir(parents=True, exist_ok=True)
         replace_file(json, verdict_json(verdict))
     failed = [
         certificate.name

@@ -16,6 +16,9 @@ from train.experiments.harness.laboratory import FULL, Laboratory, silent
 from train.experiments.harness.page import markdown_page
 from train.experiments.harness.reproduce import Record, read_record
 from train.experiments.registry import EXPERIMENTS
+from train.output_file import prepare_output
+
+PAGE = "README.md"
 
 
 def reproduce_command(
@@ -54,6 +57,7 @@ def reproduce_command(
     console = Console()
     try:
         chosen = _chosen(name, published, assets)
+        prepare_output(output / PAGE)
         networks = output / "cache" / "networks"
         laboratory = Laboratory(FULL, networks, checkpoints, published, silent, assets)
         run_all(chosen, laboratory, output, console, processes, force=force)
@@ -93,7 +97,7 @@ def run_all(
                 progress.remove_task(steps.pop(ended.name))
             progress.advance(overall, ended.seconds)
             console.print(f"{ended.name}: {seconds:.1f} s")
-    page = output / "README.md"
+    page = output / PAGE
     before = page.read_text(encoding="utf-8") if page.is_file() else ""
     page.write_text(markdown_page(EXPERIMENTS, _records(output), before), encoding="utf-8")
     console.print(f"{escape(str(page))} written", soft_wrap=True)
