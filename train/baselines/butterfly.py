@@ -43,7 +43,7 @@ def butterfly_edge_vertices(
     interior = topology.interior
     if len(interior) == 0:
         return placed
-    valence = np.bincount(topology.edges.reshape(-1), minlength=topology.vertex_count)
+    valence = topology.valence
     extraordinary = _extraordinary(topology, valence)
     star_sum, stars = np.zeros((len(interior), 3)), np.zeros(len(interior))
     twin = _twins(topology)

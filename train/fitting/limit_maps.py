@@ -23,6 +23,8 @@ from pns_common.connectivity.topology import (
 )
 from pns_common.masks.stencils import (
     CURVE_CENTRE,
+    CURVE_LIMIT_CENTRE,
+    CURVE_LIMIT_NEIGHBOUR,
     CURVE_NEIGHBOUR,
     EDGE_ENDPOINT,
     EDGE_OPPOSITE,
@@ -30,8 +32,6 @@ from pns_common.masks.stencils import (
     limit_ring_weight,
     loop_beta,
 )
-
-LIMIT_CENTRE, LIMIT_NEIGHBOUR = 4 / 6, 1 / 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +76,7 @@ def limit_maps(topology: Topology, levels: int) -> LimitMaps:
 def loop_matrix(topology: Topology) -> sparse.csr_array:
     """Return one level of Loop: old vertices first, then edge vertices."""
     count, edges = topology.vertex_count, topology.edges
-    valence = np.bincount(edges.reshape(-1), minlength=count)
-    sharp = sharp_edge_count(topology)
+    valence, sharp = topology.valence, sharp_edge_count(topology)
     neighbour = np.where(sharp < 2, loop_beta(valence), np.where(sharp == 2, CURVE_NEIGHBOUR, 0))
     centre = np.where(sharp < 2, 1 - valence * neighbour, np.where(sharp == 2, CURVE_CENTRE, 1))
     rows, columns, values = [np.arange(count)], [np.arange(count)], [centre]
@@ -117,13 +116,12 @@ class _Applied(torch.autograd.Function):
 
 
 def _position_matrix(topology: Topology) -> sparse.csr_array:
-    count = topology.vertex_count
-    valence = np.bincount(topology.edges.reshape(-1), minlength=count)
+    count, valence = topology.vertex_count, topology.valence
     sharp, smooth = sharp_edge_count(topology), topology.smooth_vertices
     pull = limit_ring_weight(valence) * smooth
     curve = sharp == 2
-    centre = np.where(smooth, 1 - pull, np.where(curve, LIMIT_CENTRE, 1))
-    neighbour = np.where(smooth, pull / np.maximum(valence, 1), LIMIT_NEIGHBOUR * curve)
+    centre = np.where(smooth, 1 - pull, np.where(curve, CURVE_LIMIT_CENTRE, 1))
+    neighbour = np.where(smooth, pull / np.maximum(valence, 1), CURVE_LIMIT_NEIGHBOUR * curve)
     rows, columns, values = [np.arange(count)], [np.arange(count)], [centre]
     for here, there in _neighbours(topology, smooth):
         rows, columns = [*rows, here], [*columns, there]
@@ -134,7 +132,7 @@ def _position_matrix(topology: Topology) -> sparse.csr_array:
 def _tangent_matrices(topology: Topology) -> tuple[sparse.csr_array, sparse.csr_array]:
     """Return Σ cos(2πj/k) p_j and Σ sin(2πj/k) p_j round every closed ring, anticlockwise."""
     count, corners = topology.vertex_count, topology.faces.reshape(-1)
-    valence = np.bincount(topology.edges.reshape(-1), minlength=count)
+    valence = topology.valence
     twin = np.full(len(corners), -1)
     first, second = topology.half_edges[topology.interior].T
     twin[first], twin[second] = second, first

@@ -52,7 +52,7 @@ def limit_positions(level: ControlLevel) -> Float[np.ndarray, "V 3"]:
     and crease curves (1, 4, 1) / 6; corners and isolated vertices stay.
     """
     points, topology = level.points, level.topology
-    valence = np.bincount(topology.edges.reshape(-1), minlength=len(points))
+    valence = topology.valence
     pull = 8 * valence * loop_beta(valence)
     weight = pull / (pull + 3)
     sharp = sharp_edge_count(topology)
