@@ -137,7 +137,6 @@ def batch(
     ] = False,
 ) -> None:
     """Refine a library of files; what was done is not done again when it runs again."""
-
     from rich.console import Console
 
     from ..scale.batch import Batch, batch_work, run_batch

@@ -221,13 +221,10 @@ class _Places:
         self._ends: set[asyncio.Timeout] = set()
         self.taken = 0
 
-    def check(self) -> None:
-        if self._count is not None and self.taken >= self._count:
-            raise BusyError(f"{self.taken} {self._name} are under way; no more fit")
-
     @contextmanager
     def slot(self) -> Iterator[None]:
-        self.check()
+        if self._count is not None and self.taken >= self._count:
+            raise BusyError(f"{self.taken} {self._name} are under way; no more fit")
         self.taken += 1
         try:
             yield

@@ -84,7 +84,7 @@ def run_large(
 ) -> tuple[dict[str, Any], Spent]:
     """Refine a mesh of any size; what an earlier run of the same has done is not done again.
 
-    Returns what the run took, and the report, which is also where the output has room for it.
+    Returns the report, which is also where the output has room for it, and what the run took.
 
     Raises:
         ServiceError, PnsError: the input, the model or a parameter cannot be used.
