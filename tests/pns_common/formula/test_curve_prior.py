@@ -84,6 +84,25 @@ def test_the_curve_mask_is_what_loops_rule_makes_of_movable_vertices(mesh, seed)
     )
 
 
+def test_a_push_undoes_what_the_curve_cuts_off_across_its_chord():
+    rng = np.random.default_rng(0)
+    angle = np.sort(rng.uniform(0, 2 * np.pi, 24))
+    rim = np.stack([np.cos(angle), np.sin(angle), 0.05 * rng.standard_normal(24)], axis=1)
+    mesh = cone(rim, [0, 0, 0.5])
+    pushes = curve_pushes(find_curves(mesh.vertices, build_topology(mesh.faces, 25), BOUNDARIES), 5)
+    turns = set()
+    for v in range(24):
+        before, p, after = rim[v - 1], rim[v], rim[(v + 1) % 24]
+        u, t = (before + after) / 2 - p, (after - before) / np.linalg.norm(after - before)
+        first, second = ((q - p) / np.linalg.norm(q - p) for q in (before, after))
+        x = 1 + first @ second
+        gate = np.tanh(5 * x) * min(1, max(0, 2 * (1 - x)))
+        turns.add(gate > 0)
+        np.testing.assert_allclose(pushes[v], -gate / 3 * (u - (u @ t) * t), rtol=0, atol=1e-14)
+    assert turns == {True, False}
+    assert not pushes[24].any()
+
+
 def test_straight_boundaries_and_right_angles_stay():
     points, faces = grid(6)
     topology = build_topology(faces, len(points))
