@@ -81,6 +81,21 @@ def test_the_last_row_of_a_sheet_moves_with_the_others():
     np.testing.assert_allclose(bends, expected, rtol=1e-9)
 
 
+def test_a_face_at_a_boundary_takes_the_largest_of_its_own_bend_and_its_neighbours():
+    points, faces = grid(5)
+    topology = build_topology(faces, len(points))
+    jumps = np.zeros(len(topology.edges))
+    jumps[topology.interior] = np.random.default_rng(0).uniform(0, 0.3, len(topology.interior))
+    own, corners = (
+        jumps[topology.face_edges].sum(axis=1) / 3,
+        [set(face) for face in faces.tolist()],
+    )
+    beside = [[g for g in range(len(faces)) if len(face & corners[g]) >= 2] for face in corners]
+    expected = [max(own[g]) if len(g) < 4 else own[f] for f, g in enumerate(beside)]
+    assert np.count_nonzero(expected > own) > 5
+    np.testing.assert_allclose(face_bends(jumps, topology), expected, rtol=1e-12)
+
+
 def test_a_flat_sheet_stays_shut_up_to_its_boundary():
     points, faces = grid(6)
     level = control_level(points, build_topology(faces, len(points)))
