@@ -6,7 +6,7 @@ v), m_v the unit normal of the faces at v, weighted by area:
     flat   no refinement at all: every edge at its midpoint
     Q1     Loop on p + e: full quasi-interpolation, once
     N1     Loop on p + (e · m) m: the same along the normal
-    NC     N1 × 0.6, each new vertex's share of it gated and clipped to C h² / R, as PNS is
+    NC     N1 × 0.6, each vertex's share of it clipped to C h² / R, and at edges gated, as PNS is
 """
 
 import numpy as np
@@ -38,7 +38,7 @@ def flat() -> Scheme:
 
 
 def nc() -> Scheme:
-    """Return 0.6 of N1, gated and clipped to C h² / R at the first level, then Loop."""
+    """Return 0.6 of N1, gated at edges and clipped to C h² / R at the first level, then Loop."""
 
     def edge_rule(level: ControlLevel) -> Placement:
         base, interior = loop_edge_rule(level), level.topology.interior
