@@ -62,6 +62,17 @@ def test_a_torus_of_thin_faces_stays_as_smooth_as_loops(around, across):
     assert largest_turn(mesh, with_card(load_model(), **OF_LONG_EDGES)) > 2
 
 
+def test_on_thin_faces_neither_the_altitudes_nor_the_bound_suffice_alone():
+    """The numbers of docs/theorems.md, 9."""
+    mesh, model = Mesh(*torus_of_quads(16, 160)), load_model()
+    by_bound_alone = with_card(model, network_altitudes=None)
+    turns = [
+        largest_turn(mesh, given) for given in (with_card(model, **OF_LONG_EDGES), by_bound_alone)
+    ]
+    assert np.round(turns, 1).tolist() == [6.4, 2.5]
+    assert largest_turn(mesh, with_card(model, wide_bound=None)) > 6
+
+
 def test_a_wide_bound_leaves_quasi_interpolation_whole_on_thin_faces():
     """Short edges go where the long ones beside them go, also where C h² / R of theirs is less."""
     points, faces = torus_of_quads(16, 200)
