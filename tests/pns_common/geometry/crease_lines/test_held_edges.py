@@ -108,6 +108,19 @@ def test_a_side_that_is_not_plane_has_none():
     assert not {(4 + k, 8 + k) for k in range(4)} & held(Mesh(points, mesh.faces))
 
 
+@pytest.mark.parametrize(
+    "others", [[[0, 4, 5], [1, 6, 7]], [[0, 4, 5], [0, 4, 8], [1, 6, 7], [1, 6, 9]]]
+)
+def test_in_a_plane_there_are_none_though_other_edges_meet_in_corners(others):
+    """At both ends of two faces' common edge others touch in a vertex, or lie on each other."""
+    rim = [[0, 0], [1, 0], [6, 1], [5, -1], [-1, 0.3], [-1, -0.3], [2, -0.02], [2, 0.02]]
+    points = np.column_stack([[*rim, [-2, -0.3], [2, 0.03]], np.zeros(10)])
+    mesh = Mesh(points, [[0, 1, 2], [1, 0, 3], *others])
+    assert (face_normals(points, mesh.faces)[:, 2] == 1).all()
+    assert len(crease_lines(mesh)) == 0
+    assert "crease" not in refine(mesh, GENERAL).report["levels"][0]["edges"]
+
+
 def test_creases_that_are_named_have_them_too():
     mesh = frame(4, 0.2)
     topology = build_topology(mesh.faces, len(mesh.vertices))
