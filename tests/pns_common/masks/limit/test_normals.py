@@ -47,6 +47,34 @@ def test_normals_are_those_of_the_faces_of_a_deep_refinement(mesh):
         assert (around @ exact[v]).min() > np.cos(0.06)
 
 
+def test_a_corner_wider_than_half_a_turn_looks_where_its_faces_do():
+    """Three creases meet in a plane: sectors of 45, 45 and 270 degrees."""
+    angle = np.pi / 4 * np.arange(8)
+    points = np.concatenate([[[0.0, 0, 0]], np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1)])
+    around = np.arange(8)
+    faces = np.stack([0 * around, 1 + around, 1 + (around + 1) % 8], axis=1)
+    topology = with_creases(build_topology(faces, 9), np.array([[0, 1], [0, 2], [0, 3]]))
+    normals = limit_normals(points, topology)
+    assert len(np.unique(normals.sector_of_corner[::3])) == 3
+    np.testing.assert_allclose(normals.sectors[:, 2], 1, atol=1e-12)
+
+
+def test_on_a_curve_the_masks_say_which_way_is_out_and_not_the_faces():
+    """A steep fan, most of whose area looks the other way: deep refinement looks as they say."""
+    angle, rng = np.linspace(0, np.pi, 4), np.random.default_rng(0)
+    faces, against = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4]]), 0
+    for heights in rng.normal(0, 3, (100, 5)):
+        points = np.column_stack([[0, *np.cos(angle)], [0, *np.sin(angle)], heights])
+        normal = limit_normals(points, build_topology(faces, 5)).vertices[0]
+        spokes = points[faces[:, 1:]] - points[0]
+        if np.cross(spokes[:, 0], spokes[:, 1]).sum(axis=0) @ normal < 0:
+            against += 1
+            deep = refine(Mesh(points, faces), loop(), 6).mesh
+            around = face_normals(deep.vertices, deep.faces)[(deep.faces == 0).any(axis=1)]
+            assert (around @ normal).min() > 0.99
+    assert against
+
+
 def test_tangents_that_span_no_plane_leave_it_to_the_faces():
     first, second = np.array([[1.0, 0, 0], [1, 0, 0]]), np.array([[0.0, 2, 0], [3, 0, 0]])
     area = np.array([[0.0, 0, -5], [0, -4, 0]])
