@@ -11,9 +11,9 @@ With q_0 … q_k the neighbours of p in a sector of k faces, anticlockwise:
     dart         Σ sin(2πj/k) q_j and the even eigenvector, of which one number is solved for
 
 At k = 3 the curve's are the masks of Hoppe et al. 1994 for a regular crease; elsewhere theirs
-belong to their own rules next to creases, which are not the ones used here. Beyond k = 3 the
-surface bends back faster across a boundary than along it: the plane of both tangents is then what
-we call its tangent plane, and likewise at corners.
+belong to their own rules next to creases, which are not the ones used here. Where another mode
+shrinks no faster than these, Loop's surface has no tangent plane, and we call the plane of both
+tangents so: on curves from k = 6 on (Σ sin(2πj/k) q_j), at corners from k = 3 on (Σ sin(πj/k) q_j).
 """
 
 from __future__ import annotations
