@@ -154,22 +154,28 @@ class PlainMesh:
         return (1 - tip) * prior + tip * strength * back
 
     def length(self, a, b, altitudes):
-        """ℓ: h, or so many times the lower of both faces' altitudes over the edge."""
+        """ℓ: h, or so many times the lower of both faces' altitudes, less where both are thin."""
         h = np.linalg.norm(self.points[b] - self.points[a])
         if altitudes is None:
             return h
-        areas = [np.linalg.norm(self.area(*edge, self.across[edge])) for edge in ((a, b), (b, a))]
-        return min(h, altitudes * min(areas) / h)
+        edges = (a, b), (b, a)
+        areas = [np.linalg.norm(self.area(*edge, self.across[edge])) for edge in edges]
+        longest = [self.longest_of(*edge, self.across[edge]) for edge in edges]
+        shape = max(area / side**2 for area, side in zip(areas, longest, strict=True))
+        return min(h, altitudes * min(areas) / h) * min(1, 2 * altitudes * shape) ** 2
 
     def length_at(self, v, altitudes):
         """ℓ_v."""
         return np.mean([self.length(v, j, altitudes) ** 2 for j in self.ring[v]]) ** 0.5
 
+    def longest_of(self, a, b, c):
+        """Side of a face."""
+        sides = (a, b), (b, c), (c, a)
+        return max(np.linalg.norm(self.points[j] - self.points[i]) for i, j in sides)
+
     def longest_side(self, a, b):
         """Of both faces of an edge."""
-        c, d = self.across[a, b], self.across[b, a]
-        sides = [(a, b), (b, c), (c, a), (b, d), (d, a)]
-        return max(np.linalg.norm(self.points[j] - self.points[i]) for i, j in sides)
+        return max(self.longest_of(a, b, self.across[edge]) for edge in ((a, b), (b, a)))
 
     def side_gate(self, a, b, sharpness):
         """w: what the sides of both faces open."""

@@ -19,16 +19,26 @@ from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.rings import AREA
 from pns_common.fused.kernels.together import TOGETHER, keep, kept
 from pns_common.fused.kernels.vectors import between, cross, difference, dot, row
+from pns_common.geometry.thin_faces import OF_ALTITUDES
 
 # What is held of TOGETHER edges, a row of numbers each: the spoke, the normals to its left and to
-# its right, the smaller area of both faces, and 1 where the edge is interior, else 0; then what is
-# made of them in their place.
-SPOKE, LEFT, RIGHT, LEAST, INNER, HELD = 0, 3, 6, 9, 10, 11
+# its right, the smaller area of both faces, the wider shape of both, and 1 where the edge is
+# interior, else 0; then what is made of them in their place.
+SPOKE, LEFT, RIGHT, LEAST, SHAPE, INNER, HELD = 0, 3, 6, 9, 10, 11, 12
 LENGTH, NETWORK_LENGTH, JUMP, BEND = 0, 1, 2, 3
+
+
+def _shape(points, starts, f, area):
+    """Return the lowest altitude of a face over its longest side."""
+    a, b, c = starts[3 * f], starts[3 * f + 1], starts[3 * f + 2]
+    first, second, third = between(points, a, b), between(points, b, c), between(points, c, a)
+    longest = max(max(dot(first, first), dot(second, second)), dot(third, third))
+    return area / (longest if longest > 0 else 1.0)
 
 
 def _measure(held, altitudes):
     """Put h, ℓ, x and s in place of what they are made of, without a branch: it runs on vectors."""
+    of_shape = OF_ALTITUDES * altitudes
     for lane in range(TOGETHER):
         spoke, inner = kept(held, SPOKE, lane), held[INNER * TOGETHER + lane] > 0
         n, m = kept(held, LEFT, lane), kept(held, RIGHT, lane)
@@ -36,13 +46,15 @@ def _measure(held, altitudes):
         size = math.sqrt(square)
         length = size if square > 0 else math.inf
         wide = altitudes * held[LEAST * TOGETHER + lane] / length
+        share = of_shape * held[SHAPE * TOGETHER + lane]
         chord = difference(n, m)
         known = inner & (dot(n, n) > 0) & (dot(m, m) > 0)
         direction = spoke[0] / length, spoke[1] / length, spoke[2] / length
         # Beside 0 there is no −0 in the array kernels' sums either.
         jump, bend = dot(chord, chord) / 2 + 0.0, dot(cross(n, m), direction) + 0.0
         held[LENGTH * TOGETHER + lane] = size if square > 0 else 0.0
-        held[NETWORK_LENGTH * TOGETHER + lane] = wide if inner & (wide < size) else size
+        ell = (wide if wide < size else size) * (share * share if share < 1 else 1.0)
+        held[NETWORK_LENGTH * TOGETHER + lane] = ell if inner else size
         held[JUMP * TOGETHER + lane] = jump if known else 0.0
         held[BEND * TOGETHER + lane] = bend if inner else 0.0
 
@@ -90,7 +102,10 @@ def measure_edges(
             keep(held, SPOKE, lane, between(points, edges[e, 0], edges[e, 1]))
             keep(held, LEFT, lane, row(normals, f))
             keep(held, RIGHT, lane, row(normals, g))
-            held[LEAST * TOGETHER + lane] = min(areas[f, AREA], areas[g, AREA])
+            left, right = areas[f, AREA], areas[g, AREA]
+            held[LEAST * TOGETHER + lane] = min(left, right)
+            shapes = _shape(points, starts, f, left), _shape(points, starts, g, right)
+            held[SHAPE * TOGETHER + lane] = max(shapes[0], shapes[1])
             held[INNER * TOGETHER + lane] = 1.0 if inner else 0.0
         _measure(held, altitudes)
         for lane in range(count):
