@@ -68,6 +68,16 @@ class Topology:
         return used & (sharp_edge_count(self) == 0) & ~multi_fan_vertices(self)
 
     @cached_property
+    def ringed_vertices(self) -> Bool[np.ndarray, " V"]:
+        """The same with darts, where one crease ends: Loop's rule moves them as smooth ones."""
+        creases = self.edges[self.edge_class == EdgeClass.CREASE]
+        if len(creases) == 0:
+            return self.smooth_vertices
+        ends = np.bincount(creases.reshape(-1), minlength=self.vertex_count)
+        darts = (ends == 1) & (sharp_edge_count(self) == 1) & ~multi_fan_vertices(self)
+        return self.smooth_vertices | darts
+
+    @cached_property
     def valence(self) -> Int[np.ndarray, " V"]:
         """The number of edges at each vertex."""
         return np.bincount(self.edges.reshape(-1), minlength=self.vertex_count)

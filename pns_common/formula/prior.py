@@ -8,7 +8,8 @@ in, along its normal,
 
 and then subdividing by Loop is quasi-interpolation; D_v and D_e, Loop's two masks applied to d,
 are what one level of that adds to Loop. D is 0 on planes, linear in scale, and the same for a mesh
-turned over. d is 0 at boundary, irregular and crease edges, and where several fans meet.
+turned over. d is 0 at boundary, irregular and crease edges, and where several fans meet, but not at
+darts, where a crease ends: Loop's rule takes them in, and beside what is kept they would be dents.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ CLEAR_NORMAL = 1 / 4
 def normal_pushes(rings: Rings) -> Float[Array, "V 3"]:
     """Return d_v of all vertices for s = 1; everything after it is linear in s."""
     normal, topology = clear_normals(rings.normal), rings.topology
-    weight = limit_ring_weight(topology.valence) * topology.smooth_vertices
+    weight = limit_ring_weight(topology.valence) * topology.ringed_vertices
     inwards = beside(rings.points, weight, rings.points.dtype) * dot(rings.umbrella, normal)
     return -inwards[:, None] * normal
 

@@ -10,7 +10,7 @@ length ≤ 1 (rings.ring_vectors) with the network's z as weights, shortened to 
 it is longer. So ‖p' − p0‖ ≤ (C / R) h_v² for any weights, and each factor is Lipschitz.
 
 The rule is off at vertices on boundary, irregular or crease edges, where several fans meet, and at
-isolated ones.
+isolated ones; of format 3 it is on at darts, where one crease ends.
 """
 
 from __future__ import annotations

@@ -106,8 +106,8 @@ class ScaleFreeVertexRule:
         base = loop_vertex_rule(level)
         if level.reference_length == 0:
             return base
-        smooth = level.topology.smooth_vertices
-        rows = np.flatnonzero(smooth)
+        ringed = level.topology.ringed_vertices
+        rows = np.flatnonzero(ringed)
         pushes = gather(loop_vertex_vertices(level.pushes, level.topology), rows)
         prior = self.form.prior_strength * pushes
         if self.curves is not None:
@@ -119,7 +119,7 @@ class ScaleFreeVertexRule:
         lengths = level.network_lengths(self.form.network_altitudes).at_vertices
         asked = self.form.network_scale * gather(lengths, rows)
         made = self.operator.correct_scale_free(level.rings, rows, budget_per_length, asked, prior)
-        placed = replace(with_correction(base, rows, made), corrected=smooth)
+        placed = replace(with_correction(base, rows, made), corrected=ringed)
         return placed if self.curves is None else self.curves.move_vertices(level, placed)
 
     def _kept_at_tips(

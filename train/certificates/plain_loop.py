@@ -18,8 +18,8 @@ class PlainLoop:
     Attributes:
         positions: where Loop puts them.
         reach: the displacement's h there: the edge's length at an interior edge, the root mean
-            square length of the edges around an old vertex with interior edges only, and 0 where
-            no correction is allowed.
+            square length of the edges around an old vertex with interior edges only but for one
+            crease that ends there, and 0 where no correction is allowed.
         wide_reach: the same with the longest edge of both faces at an interior edge.
         curve_reach: the same where a rule for curves may move what lies on them: the length of a
             boundary edge or a crease, and the root mean square of both at a vertex on two of them
@@ -91,9 +91,9 @@ def plain_loop(
             # Loop's own weights: the centre keeps (3/8 + ¼ cos 2π/k)² + 3/8.
             keep = (3 / 8 + math.cos(2 * math.pi / len(ring)) / 4) ** 2 + 3 / 8
             moved.append(keep * point + (1 - keep) * vertices[ring].mean(axis=0))
-        smooth = bool(ring) and not sharp[v]
+        ringed = bool(ring) and (not sharp[v] or len(sharp[v]) == len(curves[v]) == 1)
         squares = [math.dist(point, vertices[n]) ** 2 for n in ring]
-        reach.append(math.sqrt(sum(squares) / len(ring)) if smooth else 0.0)
+        reach.append(math.sqrt(sum(squares) / len(ring)) if ringed else 0.0)
         two = [math.dist(point, vertices[n]) ** 2 for n in curves[v]]
         on_curve.append(math.sqrt(sum(two) / 2) if len(two) == len(sharp[v]) == 2 else 0.0)
 

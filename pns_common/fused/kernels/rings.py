@@ -172,16 +172,16 @@ def umbrella_heights(means, sharp, begin, end, fields):
 
 
 @kernel(SIZE, POINTS, POINTS, INDEX, INDEX, NUMBERS, SIZE, SIZE, POINTS_OUT)
-def prior_pushes(means, fields, valence, smooth, ring_weight, begin, end, pushes):
+def prior_pushes(means, fields, valence, ringed, ring_weight, begin, end, pushes):
     """Write d_v of the prior at s = 1 (``prior.normal_pushes``).
 
     Args:
-        smooth: 1 where the vertex may move, else 0.
+        ringed: 1 where the vertex may move, else 0.
         ring_weight: w_k for each valence that occurs.
     """
     for v in range(natural(begin), end):
         normal = clear_normal(row(fields, v))
-        weight = ring_weight[valence[v]] * smooth[v]
+        weight = ring_weight[valence[v]] * ringed[v]
         inwards = weight * dot(row(means, v), normal)
         for k in range(3):
             pushes[v, k] = -inwards * normal[k]

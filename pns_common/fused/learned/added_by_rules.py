@@ -14,9 +14,9 @@ from pns_common.fused.learned.bent_part import BentPart, bent_part
 from pns_common.fused.learned.curves import CurveMoves
 from pns_common.fused.learned.edge_rule import add_at_edges
 from pns_common.fused.learned.guard import EVERYWHERE
-from pns_common.fused.learned.rings import smooth_vertices
+from pns_common.fused.learned.rings import ringed_vertices
 from pns_common.fused.learned.surroundings import Surroundings
-from pns_common.fused.learned.vertex_rule import add_at_vertices
+from pns_common.fused.learned.vertex_rule import add_at_vertices, rule_vertices
 from pns_common.fused.levels.additions import Additions
 from pns_common.fused.levels.level import FusedLevel
 from pns_common.rules.curves import CurveRule
@@ -82,8 +82,8 @@ def _evaluated_on(part: BentPart, scheme: Scheme, whole: Surroundings) -> AddedB
     quiet = whole.blocks.unheard()
     of_vertices = part.vertices.spread(made.vertices, to.vertices, quiet)
     of_edges = part.edges.spread(made.edges, to.edges, quiet)
-    smooth = smooth_vertices(whole.mesh, whole.several_fans, quiet)
-    vertices = replace(to.vertices, corrected=smooth)
+    ringed = ringed_vertices(whole.mesh, whole.several_fans, quiet)
+    vertices = replace(to.vertices, corrected=ringed)
     return replace(to, vertices=vertices, moved=np.concatenate([of_vertices, of_edges]))
 
 
@@ -95,7 +95,7 @@ def _evaluated(scheme: Scheme, seen: Surroundings) -> AddedByRules:
     vertices = made.vertices
     if isinstance(vertex_rule, LearnedVertexRule | ScaleFreeVertexRule):
         # A copy: the rule of curves moves more vertices.
-        vertices = replace(vertices, corrected=seen.rings.smooth.copy())
+        vertices = replace(vertices, corrected=rule_vertices(vertex_rule, seen.rings).copy())
         add_at_vertices(vertex_rule, seen, vertices)
         seen.forget_rings()
     else:

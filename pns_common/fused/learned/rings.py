@@ -37,12 +37,14 @@ class RingMeasures:
         fields: mean normal and umbrella height.
         means: over the spokes of each vertex; none once forgotten.
         smooth: vertices with one closed ring of interior edges.
+        ringed: the same with darts, where one crease ends.
     """
 
     fields: Float[np.ndarray, "V 4"]
     means: Float[np.ndarray, "N M"]
     valence: Int[np.ndarray, " V"]
     smooth: Bool[np.ndarray, " V"]
+    ringed: Bool[np.ndarray, " V"]
 
 
 def measure_bends(
@@ -85,16 +87,16 @@ def measure_rings(
     by_owner.run(count, around)
     by_owner.run(count, mean_neighbours.over(*along, fields, valence, ROWS, means))
     smooth = _smooth(valence > 0, mesh, several_fans)
-    return RingMeasures(fields, means, valence, smooth)
+    return RingMeasures(fields, means, valence, smooth, _with_darts(smooth, mesh, several_fans))
 
 
-def smooth_vertices(
+def ringed_vertices(
     mesh: MeshEdges, several_fans: Bool[np.ndarray, " V"], blocks: Blocks
 ) -> Bool[np.ndarray, " V"]:
-    """Return the vertices with one closed ring of interior edges, without a look at the rings."""
+    """Return the vertices with one closed ring, and darts, without a look at the rings."""
     used = np.zeros(mesh.vertex_count, dtype=bool)
     blocks.run(len(mesh.faces), mark_referenced.over(mesh.faces, ROWS, used))
-    return _smooth(used, mesh, several_fans)
+    return _with_darts(_smooth(used, mesh, several_fans), mesh, several_fans)
 
 
 def _smooth(
@@ -107,11 +109,23 @@ def _smooth(
     return smooth
 
 
+def _with_darts(
+    smooth: Bool[np.ndarray, " V"], mesh: MeshEdges, several_fans: Bool[np.ndarray, " V"]
+) -> Bool[np.ndarray, " V"]:
+    """Return the same with the vertices where one crease ends (``topology.ringed_vertices``)."""
+    if len(mesh.sharp) == 0:
+        return smooth
+    sharp = mesh.sharp_edges
+    creases = mesh.edges[sharp[mesh.edge_class[sharp] == EdgeClass.CREASE]]
+    at_creases = marked(creases.reshape(-1), mesh.vertex_count)
+    return smooth | (at_creases & (mesh.sharp == 1) & ~several_fans)
+
+
 def measure_pushes(rings: RingMeasures, blocks: Blocks) -> Float[np.ndarray, "V 3"]:
     """Return d_v of the prior at s = 1."""
     pushes = np.empty((len(rings.valence), 3))
     weight = limit_ring_weight(np.arange(int(rings.valence.max(initial=0)) + 1))
-    smooth = rings.smooth.astype(np.int32)
-    args = rings.means, rings.fields, rings.valence, smooth, weight
+    ringed = rings.ringed.astype(np.int32)
+    args = rings.means, rings.fields, rings.valence, ringed, weight
     blocks.run(len(pushes), prior_pushes.over(*args, ROWS, pushes))
     return pushes

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Bool
 
 from pns_common.formula.correction import where_open
 from pns_common.formula.gate import gate_of
 from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.vertex_correction import correct, correct_scale_free, look_around
+from pns_common.fused.learned.rings import RingMeasures
 from pns_common.fused.learned.surroundings import Surroundings
 from pns_common.fused.learned.vertex_prior import priors_at
 from pns_common.fused.levels.additions import Additions
@@ -15,10 +17,17 @@ from pns_common.rules.learned import LearnedVertexRule
 from pns_common.rules.scale_free import ScaleFreeVertexRule
 
 
+def rule_vertices(
+    rule: LearnedVertexRule | ScaleFreeVertexRule, rings: RingMeasures
+) -> Bool[np.ndarray, " V"]:
+    """Return the vertices that a rule may move: darts by the scale-free one alone."""
+    return rings.smooth if isinstance(rule, LearnedVertexRule) else rings.ringed
+
+
 def add_at_vertices(
     rule: LearnedVertexRule | ScaleFreeVertexRule, level: Surroundings, to: Additions
 ) -> None:
-    """Add what a rule wants at vertices with one closed ring; ``to`` has rows for old vertices.
+    """Add what a rule wants at its vertices with a closed ring; ``to`` has rows for old ones.
 
     At the others it adds nothing.
 
@@ -26,8 +35,9 @@ def add_at_vertices(
         ModelError: the network returned something that is not finite, or of another shape.
     """
     rings, operator = level.rings, rule.operator
-    vertices = np.flatnonzero(rings.smooth).astype(np.int32)
-    to.clear_rows(np.flatnonzero(~rings.smooth).astype(np.int32), level.blocks)
+    may_move = rule_vertices(rule, rings)
+    vertices = np.flatnonzero(may_move).astype(np.int32)
+    to.clear_rows(np.flatnonzero(~may_move).astype(np.int32), level.blocks)
     around, out = (rings.means, rings.fields), (to.displacement, to.ratio, to.gate, to.envelope)
     look = look_around.over(*around, vertices, ROWS)
     if isinstance(rule, LearnedVertexRule):

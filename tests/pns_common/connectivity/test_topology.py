@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 
 from pns_common import Mesh
+from pns_common.connectivity.creases import with_creases
 from pns_common.connectivity.topology import (
     EdgeClass,
     build_topology,
@@ -13,7 +14,15 @@ from pns_common.connectivity.topology import (
     split,
     stable_sort,
 )
-from tests.support.meshes import bow_tie, icosphere, manifolds, one_way_pair, soups, three_pages
+from tests.support.meshes import (
+    bow_tie,
+    grid,
+    icosphere,
+    manifolds,
+    one_way_pair,
+    soups,
+    three_pages,
+)
 
 
 def slow_edges(faces):
@@ -102,6 +111,21 @@ def test_vertices_with_several_fans_are_found(mesh):
     marked = multi_fan_vertices(build_topology(mesh.faces, len(mesh.vertices)))
     expected = [slow_fans(mesh.faces, v) > 1 for v in range(len(mesh.vertices))]
     np.testing.assert_array_equal(marked, expected)
+
+
+def test_a_closed_ring_may_have_one_crease_that_ends_there():
+    faces = grid(5)[1]
+    plain = build_topology(faces, 25)
+    inner = [6, 7, 8, 11, 12, 13, 16, 17, 18]
+    assert np.flatnonzero(plain.smooth_vertices).tolist() == inner
+    assert plain.ringed_vertices is plain.smooth_vertices
+    creased = with_creases(plain, np.array([[10, 11], [11, 12], [12, 13], [7, 8]]))
+    assert np.flatnonzero(creased.smooth_vertices).tolist() == [6, 16, 17, 18]
+    # 13, 7 and 8 are darts; 11 and 12 lie between two, 10 on the boundary.
+    assert np.flatnonzero(creased.ringed_vertices).tolist() == [6, 7, 8, 13, 16, 17, 18]
+    # Where no ring closes one sharp edge may end, too: two faces that both run along it.
+    pair = build_topology(*one_way_pair()[1:], len(one_way_pair()[0]))
+    assert not pair.ringed_vertices.any()
 
 
 def test_two_closed_fans_on_one_vertex_are_two():

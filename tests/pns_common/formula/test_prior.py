@@ -1,7 +1,9 @@
 """The prior's pushes: on a regular solid by hand, and 0 where Loop shrinks nothing."""
 
 import numpy as np
+import pytest
 
+from pns_common import Creases, Mesh, load_model, pns, refine
 from pns_common.connectivity.topology import build_topology
 from pns_common.formula.prior import clear_normals, normal_pushes
 from pns_common.geometry.frames import face_normals
@@ -30,6 +32,19 @@ def test_planes_and_boundaries_are_not_pushed():
     made = pushes(points, faces)
     assert made[4, 2] > 0
     assert not np.delete(made, 4, axis=0).any()
+
+
+@pytest.mark.parametrize("degrees", [90, 120])
+def test_where_a_crease_ends_in_a_fold_no_dent_is_left(degrees):
+    """Left to Loop, the vertex there is taken in twice as far as those beside it."""
+    points, faces = grid(11)
+    half, y = np.radians(degrees) / 2, points[:, 1]
+    folded = np.stack([points[:, 0], y * np.cos(half), -np.abs(y) * np.sin(half)], axis=1)
+    row = 11 * np.arange(11) + 5
+    creases = Creases(np.stack([row[:5], row[1:6]], axis=1), levels=2)
+    made = refine(Mesh(folded, faces), pns(load_model()), 3, creases=creases, limit=True)
+    below = -made.mesh.vertices[row, 2]
+    assert below[5] < max(below[4], below[6])
 
 
 def test_a_mesh_turned_over_is_pushed_the_same_way():
