@@ -135,6 +135,7 @@ export class Session {
       if (this.source !== source) this.show(source);
       await this.complete(ours, signal);
     });
+    await this.compare(request, prepare);
   }
 
   /** Refine anew: the file that is on its way, or else the one that is there. */
@@ -156,6 +157,14 @@ export class Session {
         throw error;
       }
     });
+    await this.compare(order, prepare);
+  }
+
+  /** What came after a result, and came to nothing, may have ended Loop's side of it. */
+  private async compare(after: Request, prepare: Prepare): Promise<void> {
+    const { ours } = this;
+    if (!ours || this.refining || after.asked === ours.asked) return;
+    if (!this.loop && ours.asked.settings.model !== LOOP) await this.again(ours.asked, prepare);
   }
 
   /**

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
 import { choose, downloaded, hold, noBrowser, settled } from "./support/browser.mjs";
-import { positions } from "./support/glb.mjs";
+import { broken, positions } from "./support/glb.mjs";
 import { example, number, part, PART_FACES, studio, TETRAHEDRON } from "./support/studio.mjs";
 
 describe("jobs of the page", { skip: noBrowser, timeout: 900_000 }, () => {
@@ -18,6 +18,35 @@ describe("jobs of the page", { skip: noBrowser, timeout: 900_000 }, () => {
     await page.locator("#legend", { hasText: "Distance to Loop" }).waitFor({ timeout: 5000 });
     await page.selectOption("#pair", "loop");
     assert.match(await page.textContent("#label-left"), /^Loop/);
+  });
+
+  for (const [what, other, leave] of [
+    ["cancelled", example, (page) => page.click("#cancel")],
+    ["refused", { ...example, name: "nan.glb", buffer: broken(part) }, (page) => page.click("#problem-close")],
+  ]) {
+    test(`Loop’s side comes after all where a second file that ended it is ${what}`, async () => {
+      const page = await visit({ hash: "#levels=1&look=distance", expected: [422] });
+      const release = await hold(page, (body, url) => /scheme=loop/.test(url) || body?.equals(part));
+      await choose(page, TETRAHEDRON);
+      await page.locator("#work-text", { hasText: "Loop’s side" }).waitFor();
+      await choose(page, other);
+      if (other === example) await page.locator("#levels", { hasText: number(4 * PART_FACES) }).waitFor({ state: "attached" });
+      await leave(page);
+      release();
+      await page.locator("#legend", { hasText: "Distance to Loop" }).waitFor({ timeout: 5000 });
+      await settled(page);
+      assert.equal(await page.textContent("#file-name"), "tetrahedron.obj");
+    });
+  }
+
+  test("Loop’s side that is cancelled itself stays so", async () => {
+    const page = await visit({ hash: "#levels=1&look=distance" });
+    await hold(page, (_, url) => /scheme=loop/.test(url));
+    await choose(page, TETRAHEDRON);
+    await page.locator("#work-text", { hasText: "Loop’s side" }).waitFor();
+    await page.click("#cancel");
+    await page.waitForTimeout(500);
+    assert.ok(await page.isHidden("#work"));
   });
 
   test("settings that change while a second file is on its way are for that file", async () => {
