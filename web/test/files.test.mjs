@@ -370,10 +370,11 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     const levels = await page.textContent("#levels");
     const { json, bin } = read(part);
     json.accessors[json.meshes[0].primitives[0].indices].count = 2;
-    await choose(page, { name: "short.glb", mimeType: "", buffer: write({ json, bin }) });
+    json.meshes[0].primitives[0].targets = [{ POSITION: json.meshes[0].primitives[0].attributes.POSITION }];
+    await choose(page, { name: "short.glb", mimeType: "", buffer: moving(write({ json, bin }), 1) });
     await page.locator("#problem").waitFor();
     assert.ok(await page.isVisible("#welcome"));
-    assert.ok(await page.isHidden("#label-left"));
+    for (const part of ["#label-left", "#timeline", "#morphs"]) assert.ok(await page.isHidden(part), part);
     assert.equal(await page.textContent("#levels"), levels);
   });
 

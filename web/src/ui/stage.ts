@@ -153,7 +153,10 @@ export class Stage {
     dispose(model);
     if (this.shown.ours?.model === model) this.shown.ours = null;
     if (this.shown.loop?.model === model) this.shown.loop = null;
-    if (this.shown.source?.model === model) this.shown.source = null;
+    if (this.shown.source?.model !== model) return;
+    this.shown.source = null;
+    // Another file brings its own.
+    element("timeline").hidden = element("morphs").hidden = true;
   }
 
   /** The diagonal of the model's box. */
