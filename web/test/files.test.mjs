@@ -270,7 +270,7 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.match(await page.textContent("#notice-text"), /part\.glb is opened.* triangle\.obj too.*Not used: notes\.txt/);
     assert.deepEqual(await namesListed(page), ["part.glb (1 of 2)", "triangle.obj (2 of 2)"]);
     await page.selectOption("#file", "1");
-    await page.locator("#label-left", { hasText: "1 faces" }).waitFor();
+    await page.locator("#label-left", { hasText: "1 face" }).waitFor();
     await settled(page);
     assert.ok(await page.isHidden("#notice"));
     assert.equal(await page.inputValue("#file"), "1");
@@ -285,7 +285,7 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await page.locator("#problem").waitFor();
     await page.selectOption("#file", "1");
     await settled(page);
-    assert.match(await page.textContent("#label-left"), /\D1 faces/);
+    assert.match(await page.textContent("#label-left"), /\D1 face$/);
     assert.ok(await page.isHidden("#problem"));
   });
 

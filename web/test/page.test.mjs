@@ -65,6 +65,23 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.deepEqual(cells, ["90°", "90°"]);
   });
 
+  test("of a sheet in a plane no turn is told, and what is said of planes holds for its bent boundary", async () => {
+    // Thirds and sevenths: float32 rounds each place.
+    const places = Array.from({ length: 25 }, (_, i) => [Math.floor(i / 5) + (i % 3) / 7, (i % 5) + (i % 2) / 3]);
+    const squares = [0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13].map((i) => `f ${i + 1} ${i + 2} ${i + 7} ${i + 6}`);
+    const lines = [...places.map(([x, y]) => `v ${x} ${y} ${0.7 * x - 0.3 * y}`), ...squares];
+    const page = await visit({ hash: "#levels=1&look=dihedral" });
+    await drop(page, Buffer.from(lines.join("\n")), "sheet.obj");
+    await settled(page);
+    const cells = await page.$$eval("#statistics tr:has(th:text-is('Sharpest edge')) td", (cells) =>
+      cells.map(({ textContent }) => textContent));
+    for (const cell of cells) assert.match(cell, /^(0|<\u00a00\.01)°$/);
+    assert.equal(await page.textContent("#legend-high"), "0°");
+    const certified = await page.textContent("#statements");
+    assert.doesNotMatch(certified, /more than 0\u00a0/);
+    assert.match(certified, /Planes stay plane.*but for boundaries and creases that bend within their plane/);
+  });
+
   test("where streams cannot be iterated over, as in Safari, a file is refined all the same", async () => {
     const page = await visit();
     await page.addInitScript(() => {

@@ -1,11 +1,12 @@
 /** The sharpest turn of the surface at each vertex. */
 
 import { Vector3, type BufferGeometry } from "three";
+import { FLAT } from "../report/format";
 import type { Model } from "../view/model";
 import type { Field } from "./distance";
 import { corners, weld } from "./weld";
 
-/** The largest angle, in degrees, between two faces that share an edge at the vertex. */
+/** The largest angle, in degrees, between two faces that share an edge at the vertex; 0 where they lie flat. */
 export function dihedrals(model: Model): Field {
   const values = model.meshes.map((mesh) => ofGeometry(mesh.geometry));
   // Not Math.max(...): hundreds of thousands of arguments are too many.
@@ -40,6 +41,7 @@ function ofGeometry(geometry: BufferGeometry): Float32Array {
       }
       ac.fromArray(normals, other);
       const angle = (2 * Math.asin(Math.min(ab.distanceTo(ac) / 2, 1)) * 180) / Math.PI;
+      if (angle < FLAT) continue;
       sharpest[p] = Math.max(sharpest[p]!, angle);
       sharpest[q] = Math.max(sharpest[q]!, angle);
     }

@@ -1,6 +1,6 @@
 /** What the report proves of this result, in words. */
 
-import { length, percent, count, type Unit } from "./format";
+import { counted, length, percent, type Unit } from "./format";
 import { largestRatio, type Report } from "./report";
 
 export interface Statement {
@@ -70,17 +70,18 @@ function nearness(report: Report, lengths: Lengths): Statement[] {
 function folds(report: Report): Statement {
   const turned = report.levels.reduce((sum, level) => sum + level.flipped_faces, 0);
   const guarded = report.levels.reduce((sum, level) => sum + (level.guarded ?? 0), 0);
-  const kept = guarded ? ` The guard shortened ${count(guarded)} corrections to keep it so.` : "";
+  const kept = guarded ? ` The guard shortened ${counted(guarded, "correction")} to keep it so.` : "";
   return turned
     ? {
         holds: false,
-        text: `${count(turned)} faces turned over`,
-        note: "A face points away from where Loop’s would: look at the wireframe there.",
+        text: `${counted(turned, "face")} turned over`,
+        note: "A face points away from where Loop’s (by the same creases) would: look at the wireframe there.",
       }
     : {
         holds: true,
-        text: "No fold",
-        note: `No face turned against its counterpart by Loop, at any level.${kept}`,
+        // Loop itself may fold one, where what it refines is narrow.
+        text: "No face turned over",
+        note: `None points away from its counterpart by Loop (by the same creases), at any level.${kept}`,
       };
 }
 
@@ -88,9 +89,10 @@ function planes(report: Report): Statement {
   const active = Math.max(...report.levels.map((level) => level.gate.active));
   return {
     holds: true,
-    text: "Planes untouched",
+    text: "Planes stay plane",
     note:
-      "The gate of each correction is shut where neighbouring faces are level; " +
-      `it stood more than ${percent(0.01)} open on at most ${percent(active)} of the edges of a level.`,
+      "Where neighbouring faces are level the gate of each correction is shut: they are Loop’s, but for boundaries " +
+      "and creases that bend within their plane. " +
+      `It stood more than ${percent(0.01)} open on at most ${percent(active)} of the edges of a level.`,
   };
 }

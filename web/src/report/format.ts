@@ -9,10 +9,18 @@ const METRIC: [number, string][] = [
   [1e-9, "nm"],
 ];
 
+/** Degrees: where faces turn by less, positions in float32 may not tell it from nothing. */
+export const FLAT = 0.01;
+
 export type Unit = "metre" | "unit";
 
 export function count(value: number): string {
   return value.toLocaleString("en-US");
+}
+
+/** A number of things. */
+export function counted(value: number, thing: string): string {
+  return `${count(value)} ${thing}${value === 1 ? "" : "s"}`;
 }
 
 /** A number and its unit, which no end of a line parts. */
@@ -40,6 +48,11 @@ export function percent(share: number): string {
   if (share === 0) return measure(0, "%");
   const value = 100 * share;
   return measure(value < 0.01 ? "<\u00a00.01" : figure(value), "%");
+}
+
+/** An angle in degrees. */
+export function angle(degrees: number): string {
+  return degrees > 0 && degrees < FLAT ? `<\u00a0${FLAT}°` : `${figure(degrees)}°`;
 }
 
 export function bytes(value: number): string {

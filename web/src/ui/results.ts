@@ -2,7 +2,7 @@
 
 import type { Comparison } from "../validate/compare";
 import { certificate, type Lengths } from "../report/certificate";
-import { bytes, count, figure, seconds } from "../report/format";
+import { angle, bytes, count, figure, seconds } from "../report/format";
 import type { Surface } from "../measure/surface";
 import type { Report } from "../report/report";
 import { element, make } from "./dom";
@@ -47,7 +47,6 @@ export function showStatistics(
 ): void {
   const last = report.levels.at(-1);
   const { surface } = before;
-  const angle = (degrees: number): string => `${figure(degrees)}°`;
   const rows: [string, string, string][] = [
     ["Faces", count(before.faces), count(report.totals.faces)],
     ["Vertices in the file", count(before.vertices), count(report.totals.vertices)],

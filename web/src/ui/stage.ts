@@ -2,7 +2,7 @@
 
 import { Box3, type Mesh } from "three";
 import { cividis } from "../measure/cividis";
-import { count, type Unit } from "../report/format";
+import { counted, type Unit } from "../report/format";
 import type { Result, Source } from "../session";
 import { LOOP } from "../settings";
 import { colour, HEATS, needsFull, type Heat, type Legend } from "../view/heat";
@@ -271,9 +271,9 @@ export class Stage {
   /** What stands over the left side and the right; `loop` is given where it takes the left. */
   private labels(loop: Result | null): [Label | null, Label | null] {
     const { source, ours } = this.shown;
-    const of = ({ report }: Result): string => `${count(report.totals.faces)} faces`;
+    const of = ({ report }: Result): string => counted(report.totals.faces, "face");
     const text = ours ? `${ours.report.model ?? "Loop"} · ${of(ours)}` : "";
-    const before = source && { title: "Before", text: `${count(source.opened.faces)} faces` };
+    const before = source && { title: "Before", text: counted(source.opened.faces, "face") };
     const after = ours && { title: "After", text };
     if (this.layout === "overlay" || this.layout === "single") return [null, after ?? before];
     if (loop && ours) return [{ title: "Loop", text: of(loop) }, { title: "Ours", text }];

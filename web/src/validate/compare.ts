@@ -1,6 +1,7 @@
 /** What the validator says of the result that it did not say of the input. */
 
 import type { Message, Outcome } from "gltf-validator";
+import { counted } from "../report/format";
 
 export interface Finding {
   code: string;
@@ -51,5 +52,5 @@ function words({ issues }: Outcome): string {
 }
 
 function named(number: number, name: string): string {
-  return number ? `${number} ${name}${number > 1 ? "s" : ""}` : "";
+  return number ? counted(number, name) : "";
 }

@@ -4,7 +4,7 @@ import { BufferAttribute } from "three";
 import type { Result } from "../session";
 import { dihedrals } from "../measure/dihedral";
 import { distances, type Field } from "../measure/distance";
-import { figure, length, percent, type Unit } from "../report/format";
+import { angle, figure, length, percent, type Unit } from "../report/format";
 import { largestGate, largestRatio, learnedLevels } from "../report/report";
 import { LOOP } from "../settings";
 import { heatRange } from "./looks";
@@ -116,7 +116,7 @@ function legendOf(heat: Heat, max: number, { report }: Result, unit: Unit): Lege
       return {
         title: "Dihedral angle",
         low: "0°",
-        high: `${figure(max)}°`,
+        high: angle(max),
         end: max,
         note: "The largest turn between faces at each vertex.",
       };
