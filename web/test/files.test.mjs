@@ -227,6 +227,7 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     ["text.glb", Buffer.from("hello"), /This is no glTF: it is neither a GLB nor JSON/],
     ["null.gltf", Buffer.from("null"), /This is no glTF: it is neither a GLB nor JSON with an asset/],
     ["half.gltf", Buffer.from('{"asset":{"version":"2.0"},"meshes":[{}]}'), /cannot be shown.*cannot be read: something that has to be in it is not/],
+    ["old.gltf", Buffer.from('{"asset":{"version":"1.0"}}'), /cannot be read: Unsupported asset\. glTF versions >=2\.0 are supported/],
     ["cut.glb", part.subarray(0, 9000), /cannot be shown.*cannot be read: it ends too early/],
     ["text.txt", Buffer.from("hello"), /^No mesh among these files/],
   ]) {

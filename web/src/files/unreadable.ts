@@ -11,5 +11,6 @@ export function unreadable(what: string, error: unknown): Problem {
 export function why(error: unknown): string {
   if (error instanceof RangeError) return "it ends too early";
   if (error instanceof TypeError) return "something that has to be in it is not";
-  return (error as Error).message;
+  // Whose reader it was is no help.
+  return (error as Error).message.replace(/^THREE\.\w+: /, "");
 }
