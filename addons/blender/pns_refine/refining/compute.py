@@ -76,7 +76,12 @@ def compute(
     positions = refine_positions(
         mesh, scheme, steps, limit=choice.limit, progress=bar.within("positions")
     )
-    distance = _distance_from_loop(mesh, choice, steps, positions, bar)
+    plain = steps
+    if lines.named is not None and len(lines.named):
+        # Loop alone knows of no lines.
+        own = all_creases(snapshot, choice.crease_angle)
+        plain = level_steps(mesh.faces, len(mesh.vertices), choice.levels, *own)
+    distance = _distance_from_loop(mesh, choice, plain, positions, bar)
 
     ratio, gate = _where_it_acted(mesh, scheme, steps, positions, bar)
 

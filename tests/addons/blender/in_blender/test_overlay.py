@@ -10,8 +10,9 @@ from mathutils import Matrix
 from scene import cube, evaluated, grid, numbers, points_of, refined
 
 
-def test_the_distance_is_that_from_loop():
-    obj = grid(6)
+@pytest.mark.parametrize("make", [lambda: grid(6), cube], ids=["smooth", "with lines"])
+def test_the_distance_is_that_from_loop(make):
+    obj = make()
     new, loop = refined(obj), refined(obj, scheme="LOOP")
     expected = np.linalg.norm(points_of(new.data) - points_of(loop.data), axis=1)
     distances = numbers(new.data.attributes["pns_distance"].data, "value").ravel()

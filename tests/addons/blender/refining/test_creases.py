@@ -161,6 +161,15 @@ def test_the_report_of_a_mixture_adds_up():
 
 
 @pytest.mark.parametrize("limit", [False, True])
+@pytest.mark.parametrize("shape", [cube(), cube(0.4), grid(4)])
+def test_the_distance_is_that_to_what_loop_makes_of_the_same_mesh(shape, limit):
+    made = compute(shape, Choice(load_model(DEFAULT_MODEL), 2, limit=limit))
+    by_loop = compute(shape, Choice(None, 2, limit=limit)).points
+    np.testing.assert_allclose(made.distance, np.linalg.norm(made.points - by_loop, axis=1))
+    assert 0 < made.distance.max() <= made.report["limit_distance"] * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("limit", [False, True])
 @pytest.mark.parametrize("levels", [1, 2, 3])
 def test_lines_make_the_operators_report_and_limits_of_all_that_moves(levels, limit):
     shape, model = cube(), load_model(DEFAULT_MODEL)
