@@ -99,7 +99,7 @@ def rescale(obj: bpy.types.Object) -> None:
 
 def hide(obj: bpy.types.Object) -> None:
     """Take the overlay away, and its nodes and material when nothing has them any more."""
-    modifier, material = obj.modifiers.get(MODIFIER), _material(obj)
+    modifier, material = _modifier(obj), _material(obj)
     if modifier is None:
         return
     group = modifier.node_group
@@ -161,9 +161,18 @@ def _group(material: bpy.types.Material) -> bpy.types.NodeTree:
     return group
 
 
+def _modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
+    """Return the modifier of an object's overlay, whatever its user calls it."""
+    return next((m for m in obj.modifiers if m.type == "NODES" and _paints(m.node_group)), None)
+
+
+def _paints(group: bpy.types.NodeTree | None) -> bool:
+    return group is not None and group.name.startswith(GROUP) and PAINT in group.nodes
+
+
 def _material(obj: bpy.types.Object) -> bpy.types.Material | None:
     """Return the material of an object's overlay."""
-    modifier = obj.modifiers.get(MODIFIER)
-    if modifier is None or modifier.node_group is None:
+    modifier = _modifier(obj)
+    if modifier is None:
         return None
     return modifier.node_group.nodes[PAINT].inputs["Material"].default_value

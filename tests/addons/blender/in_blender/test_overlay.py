@@ -52,6 +52,28 @@ def test_changing_the_overlay_leaves_one():
     assert len(bpy.data.materials) == 1
 
 
+def test_an_overlay_under_another_name_is_followed():
+    new = refined(grid(4))
+    bpy.ops.object.pns_overlay(shown="pns_gate")
+    new.modifiers[0].name = "Colours"
+    bpy.ops.object.pns_overlay(shown="pns_ratio")
+    assert overlay.current(new) == "pns_ratio"
+    assert len(new.modifiers) == 1
+    new.modifiers[0].name = "Colours"
+    bpy.ops.object.pns_overlay(shown="NONE")
+    assert not new.modifiers
+
+
+def test_a_modifier_of_its_user_s_own_is_no_overlay():
+    new = refined(grid(4))
+    own = new.modifiers.new(overlay.MODIFIER, "NODES")
+    own.node_group = bpy.data.node_groups.new("own", "GeometryNodeTree")
+    assert overlay.current(new) is None
+    bpy.ops.object.pns_overlay(shown="pns_ratio")
+    bpy.ops.object.pns_overlay(shown="NONE")
+    assert [m.node_group.name for m in new.modifiers] == ["own"]
+
+
 def test_an_object_that_was_not_refined_has_none():
     cube()
     with pytest.raises(RuntimeError, match="Refine the object first"):
