@@ -105,7 +105,10 @@ class Refining(Settings):
             for obj in placed:
                 obj.select_set(True)
             if placed:
-                context.view_layer.objects.active = placed[-1]
+                layer = context.view_layer
+                layer.objects.active = dict(zip(objects, placed, strict=True)).get(
+                    layer.objects.active, placed[-1]
+                )
         faces = sum(len(refined.mesh.polygons) for refined in made.values())
         self.report({"INFO"}, f"{faces:,} faces; what is kept and what not: sidebar, PNS")
 

@@ -151,6 +151,16 @@ def test_a_model_file_may_be_named_from_the_files_folder(tmp_path):
         bpy.ops.object.pns_refine(model_file="//none.onnx")
 
 
+def test_of_several_the_copy_of_the_active_one_is_active():
+    objects = [cube("first"), grid(2, "second"), grid(3, "third")]
+    for obj in objects:
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = objects[1]
+    assert bpy.ops.object.pns_refine() == {"FINISHED"}
+    assert bpy.context.object.name == "second refined"
+    assert len(bpy.context.selected_objects) == 3
+
+
 def test_objects_that_share_a_mesh_share_the_result():
     obj = cube()
     twin = obj.copy()
