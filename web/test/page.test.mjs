@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { describe, test } from "node:test";
 import axe from "axe-core";
 import { choose, columns, downloaded, launch, noBrowser, open, picture, settled } from "./support/browser.mjs";
-import { moving, positions, report } from "./support/glb.mjs";
+import { bare, moving, positions, report } from "./support/glb.mjs";
 import { serve } from "./support/server.mjs";
 import { example, number, part, PART_FACES, same, studio } from "./support/studio.mjs";
 
@@ -63,6 +63,24 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     const cells = await page.$$eval("#statistics tr:has(th:text-is('Sharpest edge')) td", (cells) =>
       cells.map(({ textContent }) => textContent));
     assert.deepEqual(cells, ["90°", "90°"]);
+  });
+
+  test("edges between materials are among the sharpest", async () => {
+    const tetrahedron = bare();
+    const { primitives } = tetrahedron.meshes[0];
+    // The face that is slanted has a material of its own.
+    tetrahedron.accessors[1].count = 9;
+    tetrahedron.accessors.push({ ...tetrahedron.accessors[1], byteOffset: 18, count: 3 });
+    tetrahedron.materials = [{}, {}];
+    primitives.push({ ...primitives[0], indices: 2, material: 1 });
+    const page = await visit({ hash: "#levels=1&look=dihedral" });
+    await drop(page, Buffer.from(JSON.stringify(tetrahedron)), "two.gltf");
+    await settled(page);
+    const [before, after] = await page.$$eval("#statistics tr:has(th:text-is('Sharpest edge')) td", (cells) =>
+      cells.map(({ textContent }) => textContent));
+    assert.equal(before, "125°");
+    // That which the report gives, over the whole surface.
+    assert.equal(await page.textContent("#legend-high"), after);
   });
 
   test("of a sheet in a plane no turn is told, and what is said of planes holds for its bent boundary", async () => {

@@ -1,7 +1,7 @@
 /** What the surface of a file is before refinement, counted as the service's report counts it after. */
 
 import type { BufferGeometry, Mesh } from "three";
-import { corners, weld } from "./weld";
+import { corners, surfaces, weld } from "./weld";
 
 export interface Surface {
   vertices: number;
@@ -13,13 +13,8 @@ export interface Surface {
 
 /** The meshes of a file, each counted once however many nodes show it. */
 export function surfaceOf(meshes: Mesh[]): Surface {
-  const parts = new Map<unknown, Set<BufferGeometry>>();
-  for (const { geometry, userData } of meshes) {
-    const part = (userData.pnsMesh as number | undefined) ?? geometry;
-    parts.set(part, (parts.get(part) ?? new Set()).add(geometry));
-  }
   const sum = { vertices: 0, boundary: 0, irregular: 0 };
-  for (const geometries of parts.values()) count([...geometries], sum);
+  for (const geometries of surfaces(meshes)) count(geometries, sum);
   return sum;
 }
 

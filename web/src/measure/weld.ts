@@ -1,6 +1,16 @@
 /** Vertices at the same place as one: the seams of a file are no edges of its surface. */
 
-import type { BufferGeometry } from "three";
+import type { BufferGeometry, Mesh } from "three";
+
+/** The meshes of a file, once however many nodes show them, each as the geometries of its primitives. */
+export function surfaces(meshes: Mesh[]): BufferGeometry[][] {
+  const parts = new Map<unknown, Set<BufferGeometry>>();
+  for (const { geometry, userData } of meshes) {
+    const part = (userData.pnsMesh as number | undefined) ?? geometry;
+    parts.set(part, (parts.get(part) ?? new Set()).add(geometry));
+  }
+  return [...parts.values()].map((geometries) => [...geometries]);
+}
 
 /** For each vertex of some geometries, one after another, the first one in its place. */
 export function weld(geometries: BufferGeometry[]): Uint32Array {
