@@ -284,6 +284,8 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.deepEqual(short, []);
     const edges = await page.$$eval(".more select", (selects) => selects.map((select) => select.getBoundingClientRect().left));
     assert.equal(new Set(edges).size, 1, String(edges));
+    await page.selectOption("#crease", "angle");
+    assert.ok(await page.$eval(".with-unit", (number) => number.scrollWidth <= number.clientWidth), "a unit stands aside");
   });
 
   test("nothing behind them is seen through the tools, the timeline, the legend and the labels", async () => {
