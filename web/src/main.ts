@@ -100,9 +100,9 @@ const session = new Session({
     announce(`Refined. ${showCertificate(ours.report, lengths(ours, loop))}`);
   },
   idle: hideProgress,
-  failed: (error, again) => {
+  failed: (error, again, upload) => {
     retry = again;
-    showProblem(error);
+    showProblem(error, upload?.name);
   },
   cleared: () => {
     document.body.classList.add("empty");

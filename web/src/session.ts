@@ -61,7 +61,8 @@ export interface Listener {
   refined(ours: Result): void;
   compared(loop: Result | null): void;
   idle(): void;
-  failed(error: unknown, again: Again): void;
+  /** `upload` is the file that is at fault. */
+  failed(error: unknown, again: Again, upload: Upload | null): void;
   discarded(model: Model): void;
   /** The refinement of a file was cancelled. */
   stopped(upload: Upload): void;
@@ -272,7 +273,7 @@ export class Session {
         // Where it was ended, another may be under way.
         if (this.refining === request) this.refining = null;
       }
-    });
+    }, request.upload);
   }
 
   private end(...kinds: Kind[]): void {
@@ -283,15 +284,15 @@ export class Session {
     }
   }
 
-  /** Run a task beside what is under way. */
-  private async run(kind: Kind, again: Again, task: Task): Promise<void> {
+  /** Run a task beside what is under way; `upload` is what may be at fault. */
+  private async run(kind: Kind, again: Again, task: Task, upload: Upload | null = null): Promise<void> {
     const controller = new AbortController();
     const { signal } = controller;
     this.underWay.set(controller, kind);
     try {
       await task(signal);
     } catch (error) {
-      if (!signal.aborted && !isAbort(error)) this.listener.failed(error, again);
+      if (!signal.aborted && !isAbort(error)) this.listener.failed(error, again, isTheFiles(error) ? upload : null);
     } finally {
       if (this.underWay.delete(controller) && !this.underWay.size) this.listener.idle();
     }

@@ -211,7 +211,7 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await page.locator("#problem").waitFor();
     assert.equal(await page.textContent("#problem-title"), "The glTF breaks its own promises");
     assert.match(await page.textContent("#problem-detail"), /NaN/);
-    assert.match(await page.textContent("#problem-pointer"), /\/accessors\/\d/);
+    assert.match(await page.textContent("#problem-pointer"), /^in broken\.glb, at \/accessors\/\d/);
     assert.equal(await page.textContent("#label-right"), label);
     assert.equal(await page.textContent("#file-name"), "part.glb");
     await choose(page, { name: "text.txt", mimeType: "", buffer: Buffer.from("hello") });

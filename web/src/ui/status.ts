@@ -84,14 +84,17 @@ export function announce(text: string): void {
   element("announce").textContent = text;
 }
 
-export function showProblem(error: unknown): void {
+/** `file` is the name of the one that is at fault: another may be shown. */
+export function showProblem(error: unknown, file = ""): void {
   const problem = problemFrom(error);
   if (!problem) console.error(error);
   element("problem-title").textContent = problem?.title ?? "The page failed";
   element("problem-detail").textContent = problem?.message ?? String(error);
   const pointer = problem?.pointer ?? problem?.parameter ?? "";
-  element("problem-pointer").textContent = pointer ? `at ${pointer}` : "";
-  element("problem-pointer").hidden = !pointer;
+  const isNamed = !file || problem?.message.includes(file);
+  const place = [isNamed ? "" : `in ${file}`, pointer && `at ${pointer}`].filter(Boolean).join(", ");
+  element("problem-pointer").textContent = place;
+  element("problem-pointer").hidden = !place;
   element("key-form").hidden = problem?.status !== 401;
   // Busy, slow, or gone, it or the job alone: the same may work in a moment.
   element("problem-again").hidden = !problem || (problem.status < 500 && ![0, 404, 408, 409, 429].includes(problem.status));
