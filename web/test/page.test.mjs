@@ -482,8 +482,10 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     test(`axe finds no serious fault (${colorScheme})`, async () => {
       const page = await visit({ colorScheme, hash: "#levels=1" });
       assert.deepEqual(await faultsOf(page), []);
-      // It leaves out what stands in an empty field.
-      assert.ok((await contrastOfPlaceholder(page)) >= 4.5);
+      // It leaves out what stands in an empty field, and how one choice is told from the others.
+      assert.ok((await contrast(page, ["#budget", "color", "::placeholder"], ["#budget", "backgroundColor"])) >= 4.5);
+      const chosen = [".segments input:checked + span", "backgroundColor"];
+      assert.ok((await contrast(page, chosen, [".segments", "backgroundColor"])) >= 3);
       await choose(page, { ...example, buffer: moving(part, 1) });
       await settled(page);
       await unfold(page);
@@ -645,16 +647,17 @@ async function faultsOf(page) {
     .map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html.slice(0, 120)).join(" | ")}`);
 }
 
-/** WCAG's contrast of what stands in the field of the budget. */
-function contrastOfPlaceholder(page) {
-  return page.$eval("#budget", (field) => {
-    const luminance = (colour) => {
+/** WCAG's contrast of two colours: each a selector, a property, and what pseudo-element has it. */
+function contrast(page, ...colours) {
+  return page.evaluate((colours) => {
+    const luminance = ([selector, property, pseudo]) => {
+      const colour = getComputedStyle(document.querySelector(selector), pseudo)[property];
       const [r, g, b] = colour.match(/\d+/g).map((part) => part / 255).map((x) => (x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4));
       return 0.2126 * r + 0.7152 * g + 0.0722 * b;
     };
-    const [text, sheet] = [getComputedStyle(field, "::placeholder").color, getComputedStyle(field).backgroundColor].map(luminance);
-    return (Math.max(text, sheet) + 0.05) / (Math.min(text, sheet) + 0.05);
-  });
+    const [one, other] = colours.map(luminance);
+    return (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
+  }, colours);
 }
 
 function largestDistance(ours, loop) {
