@@ -136,7 +136,7 @@ export class Session {
       if (this.source !== source) this.show(source);
       await this.complete(ours, signal);
     });
-    await this.compare(request, prepare);
+    await this.makeUp(request, prepare);
   }
 
   /** Refine anew: the file that is on its way, or else the one that is there. */
@@ -158,14 +158,16 @@ export class Session {
         throw error;
       }
     });
-    await this.compare(order, prepare);
+    await this.makeUp(order, prepare);
   }
 
-  /** What came after a result, and came to nothing, may have ended Loop's side of it. */
-  private async compare(after: Request, prepare: Prepare): Promise<void> {
-    const { ours } = this;
-    if (!ours || this.refining || after.asked === ours.asked) return;
-    if (!this.loop && ours.asked.settings.model !== LOOP) await this.again(ours.asked, prepare);
+  /** What came to nothing may have ended what makes up the file that is shown: its result, or Loop's side of it. */
+  private async makeUp(after: Request, prepare: Prepare): Promise<void> {
+    const { source, ours, loop } = this;
+    if (this.refining) return;
+    if (source && !ours && after.upload !== source.upload) return this.take(source.upload, prepare);
+    if (!ours || loop || ours.asked.settings.model === LOOP || after.asked === ours.asked) return;
+    await this.again(ours.asked, prepare);
   }
 
   /**

@@ -39,6 +39,21 @@ describe("jobs of the page", { skip: noBrowser, timeout: 900_000 }, () => {
     });
   }
 
+  test("a first file is refined after all where a second one that ended it is cancelled", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    const release = await hold(page);
+    await choose(page, TETRAHEDRON);
+    await page.locator("#label-left", { hasText: "4 faces" }).waitFor();
+    await choose(page, example);
+    await page.locator("#levels", { hasText: number(4 * PART_FACES) }).waitFor({ state: "attached" });
+    await page.click("#cancel");
+    release();
+    await page.locator("#label-right", { hasText: "16 faces" }).waitFor({ timeout: 5000 });
+    await settled(page);
+    assert.equal(await page.textContent("#file-name"), "tetrahedron.obj");
+    assert.match(await page.textContent("#notice-text"), /^part\.glb: cancelled/);
+  });
+
   test("Loop’s side that is cancelled itself stays so", async () => {
     const page = await visit({ hash: "#levels=1&look=distance" });
     await hold(page, (_, url) => /scheme=loop/.test(url));
