@@ -6,9 +6,10 @@ that of a mitre goes towards the frame's middle, over the inner rim, and in a si
 uneven triangles it goes over a narrow one. Such an edge is kept straight as the lines are, which no
 one sees in a plane: its vertex stays at its middle, and those of the next level too.
 
-Both of its ends are such vertices, or one is, and all around the other lies in the plane. None ends
-where a line bends: one crease more would make a corner of a round rim. Where the mask's vertex is
-the edge's middle anyway, as in a parallelogram, nothing is held: a box has no such edges.
+Both of its ends are such vertices; or one is, and all around the other lies in the plane, and three
+such edges end there, so that it stays too. None ends where a line bends: one crease more would make
+a corner of a round rim. Between two that stay the mask's vertex may be the edge's middle anyway, as
+in a parallelogram, and nothing is held: a box has no such edges.
 """
 
 from __future__ import annotations
@@ -47,13 +48,15 @@ def with_held_edges(
     first, second = (stays[ends] for ends in mesh.edges.T)
     rows = np.flatnonzero((first | second) & ~is_sharp)
     rows = rows[turn_cosines(normals, mesh, rows) > cosine_of(PLANE)]
-    rows = rows[slides(points, mesh, rows)]
-    one_alone = ~(first & second)[rows]
-    ends = mesh.edges[rows[one_alone]]
+    both = (first & second)[rows]
+    between, from_line = rows[both], rows[~both]
+    between = between[slides(points, mesh, between)]
+    ends = mesh.edges[from_line]
     others = np.where(stays[ends[:, 0]], ends[:, 1], ends[:, 0])
-    held = np.ones(len(rows), dtype=bool)
-    held[one_alone] = in_planes(normals, mesh, is_sharp, others)[others]
-    return np.sort(np.concatenate([lines, rows[held].astype(lines.dtype)]))
+    held = np.bincount(others, minlength=mesh.vertex_count) >= CORNER
+    held &= in_planes(normals, mesh, is_sharp, others)
+    rows = np.concatenate([between, from_line[held[others]]])
+    return np.sort(np.concatenate([lines, rows.astype(lines.dtype)]))
 
 
 def staying(
