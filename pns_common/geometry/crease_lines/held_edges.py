@@ -8,8 +8,8 @@ one sees in a plane: its vertex stays at its middle, and those of the next level
 
 Both of its ends are such vertices; or one is, and all around the other lies in the plane, and three
 such edges end there, so that it stays too. None ends where a line bends: one crease more would make
-a corner of a round rim. Between two that stay the mask's vertex may be the edge's middle anyway, as
-in a parallelogram, and nothing is held: a box has no such edges.
+a corner of a round rim. Where the mask's vertices are the edges' middles anyway nothing is held, as
+in a box, whose sides are parallelograms, and in a regular fan.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ def with_held_edges(
     first, second = (stays[ends] for ends in mesh.edges.T)
     rows = np.flatnonzero((first | second) & ~is_sharp)
     rows = rows[turn_cosines(normals, mesh, rows) > cosine_of(PLANE)]
-    both = (first & second)[rows]
-    between, from_line = rows[both], rows[~both]
-    between = between[slides(points, mesh, between)]
+    both, moved = (first & second)[rows], slides(points, mesh, rows)
+    between, from_line = rows[both & moved], rows[~both]
     ends = mesh.edges[from_line]
     others = np.where(stays[ends[:, 0]], ends[:, 1], ends[:, 0])
     held = np.bincount(others, minlength=mesh.vertex_count) >= CORNER
+    held &= marked(others[moved[~both]], mesh.vertex_count)
     held &= in_planes(normals, mesh, is_sharp, others)
     rows = np.concatenate([between, from_line[held[others]]])
     return np.sort(np.concatenate([lines, rows.astype(lines.dtype)]))
