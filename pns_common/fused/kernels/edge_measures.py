@@ -22,8 +22,8 @@ from pns_common.fused.kernels.vectors import between, cross, difference, dot, ro
 from pns_common.geometry.thin_faces import OF_ALTITUDES
 
 # What is held of TOGETHER edges, a row of numbers each: the spoke, the normals to its left and to
-# its right, the smaller area of both faces, the wider shape of both, and 1 where the edge is
-# interior, else 0; then what is made of them in their place.
+# its right, the smaller area of both faces, the wider shape of both, or a wide one, and 1 where the
+# edge is interior, else 0; then what is made of them in their place.
 SPOKE, LEFT, RIGHT, LEAST, SHAPE, INNER, HELD = 0, 3, 6, 9, 10, 11, 12
 LENGTH, NETWORK_LENGTH, JUMP, BEND = 0, 1, 2, 3
 
@@ -36,9 +36,8 @@ def _shape(points, starts, f, area):
     return area / (longest if longest > 0 else 1.0)
 
 
-def _measure(held, altitudes):
+def _measure(held, altitudes, of_shape):
     """Put h, ℓ, x and s in place of what they are made of, without a branch: it runs on vectors."""
-    of_shape = OF_ALTITUDES * altitudes
     for lane in range(TOGETHER):
         spoke, inner = kept(held, SPOKE, lane), held[INNER * TOGETHER + lane] > 0
         n, m = kept(held, LEFT, lane), kept(held, RIGHT, lane)
@@ -88,6 +87,7 @@ def measure_edges(
         altitudes: α, infinite where the network speaks in units of h whatever the faces.
         held: (HELD TOGETHER,) overwritten: of some edges, one beside the other.
     """
+    of_shape = OF_ALTITUDES * altitudes
     for first in range(natural(begin), end, TOGETHER):
         count = min(TOGETHER, end - first)
         for lane in range(TOGETHER):
@@ -104,10 +104,13 @@ def measure_edges(
             keep(held, RIGHT, lane, row(normals, g))
             left, right = areas[f, AREA], areas[g, AREA]
             held[LEAST * TOGETHER + lane] = min(left, right)
-            shapes = _shape(points, starts, f, left), _shape(points, starts, g, right)
-            held[SHAPE * TOGETHER + lane] = max(shapes[0], shapes[1])
+            shape = _shape(points, starts, f, left)
+            # Beside a wide face it does not matter how thin the other is.
+            if of_shape * shape < 1:
+                shape = max(shape, _shape(points, starts, g, right))
+            held[SHAPE * TOGETHER + lane] = shape
             held[INNER * TOGETHER + lane] = 1.0 if inner else 0.0
-        _measure(held, altitudes)
+        _measure(held, altitudes, of_shape)
         for lane in range(count):
             lengths[first + lane] = held[LENGTH * TOGETHER + lane]
             network_lengths[first + lane] = held[NETWORK_LENGTH * TOGETHER + lane]

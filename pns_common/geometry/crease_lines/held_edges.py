@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import dot, marked, segment_sum, unit
+from pns_common.base.arrays import dot, gather, marked, segment_sum, unit
 from pns_common.connectivity.topology import EdgeClass, vertices_across
 from pns_common.geometry.crease_lines.going_on import CORNER
 from pns_common.geometry.crease_lines.turns import Edges, cosine_of, turn_cosines
@@ -45,10 +45,12 @@ def with_held_edges(
         return lines
     is_sharp = is_line | (mesh.edge_class != EdgeClass.INTERIOR)
     stays = staying(points, mesh, np.flatnonzero(is_line), np.flatnonzero(is_sharp))
-    first, second = (stays[ends] for ends in mesh.edges.T)
-    rows = np.flatnonzero((first | second) & ~is_sharp)
+    rows = np.flatnonzero(end_at(stays, mesh) & ~is_sharp)
     rows = rows[turn_cosines(normals, mesh, rows) > cosine_of(PLANE)]
-    both, moved = (first & second)[rows], slides(points, mesh, rows)
+    moved = slides(points, mesh, rows)
+    if not moved.any():
+        return lines
+    both = stays[mesh.edges[rows]].all(axis=1)
     between, from_line = rows[both & moved], rows[~both]
     ends = mesh.edges[from_line]
     others = np.where(stays[ends[:, 0]], ends[:, 1], ends[:, 0])
@@ -69,16 +71,28 @@ def staying(
 
     ``sharp`` are all edges that are not smooth, boundaries too.
     """
-    ends = mesh.edges[lines]
+    ends = gather(mesh.edges, lines)
     on_lines, meet = (
-        np.bincount(mesh.edges[rows].reshape(-1), minlength=mesh.vertex_count)
+        np.bincount(gather(mesh.edges, rows).reshape(-1), minlength=mesh.vertex_count)
         for rows in (lines, sharp)
     )
-    along = unit(points[ends[:, 1]] - points[ends[:, 0]])
+    stays = (on_lines > 0) & (meet >= CORNER)
+    # Lines are few: sums are of the vertices on them alone.
+    at = np.flatnonzero(on_lines)
+    number = np.empty(mesh.vertex_count, dtype=np.int64)
+    number[at] = np.arange(len(at))
+    along = unit(gather(points, ends[:, 1]) - gather(points, ends[:, 0]))
     # As in going_on: ‖u + v‖² = 2 + 2 u · v of two that meet.
-    away = segment_sum(np.concatenate([along, -along]), ends.T.reshape(-1), mesh.vertex_count)
-    straight = (on_lines == 2) & (dot(away, away) < 2 - 2 * cosine_of(STRAIGHT))
-    return (straight & (meet == 2)) | ((on_lines > 0) & (meet >= CORNER))
+    away = segment_sum(np.concatenate([along, -along]), gather(number, ends.T.reshape(-1)), len(at))
+    straight = dot(away, away) < 2 - 2 * cosine_of(STRAIGHT)
+    stays[at] |= straight & (on_lines[at] == 2) & (meet[at] == 2)
+    return stays
+
+
+def end_at(marks: Bool[np.ndarray, " V"], mesh: Edges) -> Bool[np.ndarray, " E"]:
+    """Return which edges have an end that is marked."""
+    # One end of all after the other: for numpy that is half the work of rows of two.
+    return np.logical_or(*(gather(marks, ends) for ends in mesh.edges.T))
 
 
 def slides(
@@ -100,7 +114,7 @@ def in_planes(
 ) -> Bool[np.ndarray, " V"]:
     """Return which of the vertices that are asked for have one plane around them, and no line."""
     inside = marked(asked, mesh.vertex_count)
-    rows = np.flatnonzero(inside[mesh.edges[:, 0]] | inside[mesh.edges[:, 1]])
+    rows = np.flatnonzero(end_at(inside, mesh))
     bent = is_sharp[rows]
     bent[~bent] = turn_cosines(normals, mesh, rows[~bent]) <= cosine_of(PLANE)
     inside[mesh.edges[rows[bent]]] = False
