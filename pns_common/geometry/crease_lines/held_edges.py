@@ -23,10 +23,11 @@ from pns_common.geometry.crease_lines.going_on import CORNER
 from pns_common.geometry.crease_lines.turns import Edges, cosine_of, turn_cosines
 
 # Two faces that turn by less, in degrees, lie in one plane: far above what single precision does to
-# one, far below what a fine mesh of something round turns by.
-PLANE = 0.1
+# one, far below what a fine mesh of something round turns by. Neither this nor the next is an angle
+# that circles are cut into: where many edges turn by it rounding would decide.
+PLANE = 0.101
 # A line that turns by less at a vertex, in degrees, runs straight there.
-STRAIGHT = 0.5
+STRAIGHT = 0.505
 # Loop's 3/8 (a + b) + 1/8 (c + d) is 1/8 of c + d − a − b from an edge's middle; so far, as a share
 # of the edge, may it go.
 NEAR = 0.01

@@ -101,6 +101,14 @@ def test_where_the_rims_are_round_nothing_is_held():
     assert not held(frame(24, 0.2), WITH_GENTLE)
 
 
+@pytest.mark.parametrize(("sides", "are_straight"), [(712, False), (720, True)])
+def test_where_they_are_cut_into_half_degrees_all_is_held_however_it_is_turned(sides, are_straight):
+    mesh = frame(sides, 0.2)
+    turned = Mesh(mesh.vertices @ rotation(np.random.default_rng(0)).T, mesh.faces)
+    assert held(mesh) == held(turned)
+    assert mitres(sides) & held(mesh) == (mitres(sides) if are_straight else set())
+
+
 def test_where_loop_stays_at_the_middle_there_are_none():
     assert len(crease_lines(box(4, 2, 0.1))) == 12
 
