@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
-from urllib.parse import unquote
+from urllib.parse import quote
 
 _SCHEME = "data:"
 _BASE64 = re.compile(r"data:[^,]*;base64,", re.IGNORECASE)
@@ -24,6 +24,9 @@ def data_of(uri: str) -> memoryview:
     head = _BASE64.match(uri)
     if head is None:
         raise ValueError("it is not base64")
-    # Some writers spell +, / and = by their numbers, as a URI may spell any letter.
-    encoded = unquote(uri[head.end() :])
+    encoded = uri[head.end() :]
+    # Some writers spell these by their numbers. Not unquote: it takes 180 bytes for each `%`.
+    for letter in "+/=":
+        spelt = quote(letter, safe="")
+        encoded = encoded.replace(spelt, letter).replace(spelt.lower(), letter)
     return memoryview(base64.b64decode(encoded + "=" * (-len(encoded) % 4), validate=True))

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 import tracemalloc
 from urllib.parse import quote
 
@@ -144,13 +145,32 @@ def test_buffers_in_data_uris_are_read_and_joined():
     ]
 
 
-def test_a_data_uri_may_spell_its_letters_by_numbers():
+@pytest.mark.parametrize("case", [str, str.lower])
+def test_a_data_uri_may_spell_its_letters_by_numbers(case):
     tree, binary = files.document([octahedron()])
-    spelt = quote(base64.b64encode(binary), safe="")
-    assert "%" in spelt
+    # What lies behind the buffer's length is not read.
+    behind = b"\xfb\xef\xbe\xff" * 6
+    spelt = quote(base64.b64encode(binary + behind[: 22 - len(binary) % 3]), safe="")
+    assert {"%2B", "%2F", "%3D"} <= set(re.findall("%..", spelt))
+    spelt = re.sub("%..", lambda found: case(found[0]), spelt)
     tree["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{spelt}"
     result = refine(json.dumps(tree).encode(), media="gltf")
     assert result.glb == refine(files.glb([octahedron()])).glb
+
+
+@pytest.mark.parametrize("step", ["%", "%2B", "%41"])
+def test_a_data_uri_of_numbers_takes_what_any_text_does(step):
+    tree, _ = files.document([octahedron()])
+    tree["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{step * 2**20}"
+    body = json.dumps(tree).encode()
+    tracemalloc.start()
+    try:
+        with pytest.raises(GltfError):
+            refine(body, media="gltf")
+        used = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert used < 6 * len(body)
 
 
 def test_a_buffer_without_bytes_is_refused():
