@@ -130,14 +130,16 @@ def test_a_worker_that_rests_gives_back_what_its_job_has_freed(
     run(scenario)
 
 
-def test_a_worker_that_cannot_give_back_serves_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_that_cannot_give_back_serves_on(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     monkeypatch.setattr(pools, "WATCH_SECONDS", 0.05)
     monkeypatch.setattr(pools.worker, "give_back", jobs.fault)
 
     async def scenario() -> None:
         async with workers() as pool:
             process = await pool.run(jobs.pid)
-            await asyncio.sleep(0.2)
+            await until(lambda: "keeps what its jobs have freed" in caplog.text)
             assert await pool.run(jobs.pid) == process
 
     run(scenario)
