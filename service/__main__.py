@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from types import FrameType
 
@@ -25,7 +26,9 @@ def main() -> None:
 
 
 def _end(number: int, _: FrameType | None) -> None:
-    raise SystemExit(128 + number)
+    # As the system would. Of imports that may fail some catch whatever is raised in them, trimesh's
+    # of its own parts: the program went on without what was just being imported.
+    os._exit(128 + number)
 
 
 if __name__ == "__main__":
