@@ -10,7 +10,7 @@ from jaxtyping import Int, UInt8
 
 from .obj_text import with_line_feeds
 from .ply.header import ply_header
-from .text_pieces import pieces_from_end, without
+from .text_pieces import COMMENT, pieces_from_end, without
 
 # Of what tells no counts, and will hardly be read.
 BYTES_PER_FACE = 30
@@ -18,7 +18,6 @@ BYTES_PER_FACE = 30
 WORDS_PER_STL_FACE = 21
 STL_HEADER, STL_FACE = 84, 50
 
-_COMMENT = re.compile(rb"#[^\n]*")
 # Nothing that was passed over is tried again: to remember it would take a hundred times its size.
 _OFF_COUNTS = re.compile(
     rb"(?:\xef\xbb\xbf)?\s*+(?:ST)?C?N?OFF\b(?:\s++|#[^\n]*+\n)*+\d{1,18}\s++(\d{1,18})\b"
@@ -36,7 +35,7 @@ def count_triangles(data: bytes, kind: str) -> int:
     """
     if kind == "obj":
         # A line that goes on in the next is one; of the same length, nothing is moved.
-        text = without(_COMMENT, with_line_feeds(data))
+        text = without(COMMENT, with_line_feeds(data))
         text = text.replace(b"\\\n", b"  ").replace(b"\\\r\n", b"   ")
         pieces = map(_lines, pieces_from_end(text))
         return sum(_triangles(piece.words[piece.firsts == _FACE]) for piece in pieces)

@@ -17,12 +17,12 @@ from ..errors import UnreadableError
 from .fans import fans
 from .indexed_triangles import NUMBER, IndexedTriangles
 from .text_numbers import reals, whole
+from .text_pieces import COMMENT
 from .unsupported import SIDES
 
 # Lines whose words are held at the same time.
 BLOCK = 2**14
 
-_COMMENT = re.compile(rb"#[^\n]*")
 _HEADER = re.compile(rb"(?:\xef\xbb\xbf)?\s*((?:ST)?C?N?)OFF\b")
 _COUNTS = re.compile(rb"\s*(\d{1,18})\s+(\d{1,18})(?:[ \t]+\d+)?[ \t]*\r?\n")
 
@@ -36,7 +36,7 @@ def read_off(data: bytes) -> IndexedTriangles:
     Raises:
         UnreadableError: not a text OFF file, or one without faces.
     """
-    text = _COMMENT.sub(b"", data)
+    text = COMMENT.sub(b"", data)
     header = _HEADER.match(text)
     counts = _COUNTS.match(text, header.end() if header else 0)
     if header is None or counts is None:

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 # What is looked at in one go.
 PIECE = 2**18
+# Of OBJ and OFF: it ends with its line, also with a backslash at its end.
+COMMENT = re.compile(rb"#[^\n]*")
 
 
 def without(pattern: re.Pattern[bytes], text: bytes) -> bytes:

@@ -11,6 +11,7 @@ import numpy as np
 from .counted import STL_HEADER
 from .ply.header import LONGEST
 from .ply.textured_text import CORNER_UV
+from .text_pieces import COMMENT, without
 
 # A line's end to begin with is looked for at once, its beginning at each letter.
 _OBJ_STATEMENT = re.compile(rb"\n[ \t]*(vt|vn|usemtl|g|o|s|l|p|vp|curv|surf)[ \t]")
@@ -68,7 +69,7 @@ class ObjFaces(NamedTuple):
 
 def faces_of_obj(data: bytes) -> ObjFaces:
     """Count the faces that an OBJ lists, and the vertices that none of them names."""
-    text = _OBJ_CONTINUED.sub(b" ", data)
+    text = _OBJ_CONTINUED.sub(b" ", without(COMMENT, data))
     starts = np.array([match.start() for match in _OBJ_VERTEX.finditer(text)], dtype=np.int64)
     lines = list(_OBJ_FACE.finditer(text))
     words = np.array(_OBJ_REFERENCE.findall(b"\n".join(line[1] for line in lines)), dtype=bytes)

@@ -351,6 +351,7 @@ def test_names_in_old_encodings_are_no_obstacle(kind: str) -> None:
     [
         ("off", b"OFF\n3 2 0\n" + TRIANGLE + b"3 0 1 2\n2 0 1\n", 0),
         ("obj", POLYGONS["obj"] + b"f 1 2 # a side\r\nf 1 \\\n 2 3\n", 3),
+        ("obj", POLYGONS["obj"] + b"# C:\\a\\\r\nf 1 2 # C:\\\nf 1 2 3\n", 3),
     ],
 )
 def test_faces_of_two_vertices_are_counted(kind: str, data: bytes, split: int) -> None:
