@@ -16,8 +16,9 @@ with theirs.
 - The fold guard then halves displacements round after round, and a round reaches a child's ring. It
   reaches nowhere through a face that no scales in [0, 1] could fold (see exact.py). One ring for it
   is two of children: the outermost, whose neighbours are not known, and one to spare.
-- Crease lines are looked for on the control mesh alone, before its level: whether an edge is of
-  one is read of edges up to ``ROUNDS`` farther along, and of the faces beside these.
+- Crease lines are looked for on the control mesh alone, before its level: whether an edge of f is
+  of one is read of edges up to ``ROUNDS`` farther along, whose faces lie within as many rings, and
+  of the faces that touch these.
 
 Splitting turns a ring into two rings of children: all faces within two rings of f's children lie
 in children of faces within one ring of f (each has a corner at, or on an edge from, a corner of f).
@@ -39,12 +40,11 @@ from pns_common.schemes import Scheme
 LOOP_REACH, FIELDS_REACH = 1, 2
 # Rings for the fold guard, where nothing is known yet of how far it goes.
 GUARD_RINGS = 1
-# A ring for each round, two for the sides of the farthest edge, one for the faces beside those, and
-# one for edges that are held, which begin on lines.
-LINES_REACH = ROUNDS + 4
-# With gentler lines the rounds are gone through twice, and faces are read across the edges of those
-# beside, which may be like.
-GENTLE_REACH = 2 * ROUNDS + 5
+# A ring for each round, one for the sides of the farthest edge, which touch its faces, and one for
+# edges that are held, which begin on lines.
+LINES_REACH = ROUNDS + 2
+# With gentler lines the rounds are gone through twice. What may be like an edge touches its faces.
+GENTLE_REACH = 2 * ROUNDS + 2
 
 
 class ThinHaloError(PnsError):

@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from pns_common import Mesh, ParameterError, load_model, loop, pns, refine
+from pns_common import Mesh, ParameterError, crease_lines, load_model, loop, pns, refine
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.ring_features import RING_FEATURE_SETS
-from pns_common.pieces.halo import halo_rings, reach
+from pns_common.pieces.halo import LINES_REACH, halo_rings, reach
 from pns_common.runtimes.onnx_model import bundled_models, model_from_bytes
 from tests.support.meshes import bumpy_sphere
 from tests.support.networks import (
@@ -68,6 +69,32 @@ def test_a_level_reads_as_far_as_its_reach_and_no_farther(name):
     at_vertex = (faces == 0).any(axis=1)
     assert not (parents & ~adjacent(faces, at_vertex, reach(scheme, 0))).any()
     assert (parents & ~adjacent(faces, at_vertex, reach(scheme, 0) - 1)).any()
+
+
+def dented_bend():
+    """A sheet folded along a straight line, in uneven columns; there is a dent in the line."""
+    columns, far = np.arange(12), np.arange(7) - 3
+    x = columns + columns % 2 / 2
+    along, across = np.tile(x, 7), np.repeat(far, 12)
+    points = np.stack([along, np.minimum(across, 0), -np.maximum(across, 0)], axis=1)
+    points[3 * 12 + 8, 2] = -0.8
+    here = (np.arange(6)[:, None] * 12 + columns[:-1]).reshape(-1)
+    corners = here, here + 1, here + 13, here, here + 13, here + 12
+    return Mesh(points, np.stack(corners, axis=1).reshape(-1, 3))
+
+
+def test_a_held_edge_is_known_within_the_reach_of_lines_and_no_nearer():
+    mesh, face, edge = dented_bend(), [37, 38, 50], [38, 50]
+    at_face = (mesh.faces == face).all(axis=1)
+    assert at_face.sum() == 1
+
+    def is_held(rings):
+        near = Mesh(mesh.vertices, mesh.faces[adjacent(mesh.faces, at_face, rings)])
+        return edge in crease_lines(near, 66.0).tolist()
+
+    whole = edge in crease_lines(mesh, 66.0).tolist()
+    assert is_held(LINES_REACH) == whole
+    assert is_held(LINES_REACH - 1) != whole
 
 
 def test_a_scheme_of_unknown_rules_has_no_known_reach():
