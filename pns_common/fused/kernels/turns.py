@@ -16,6 +16,7 @@ from pns_common.fused.kernels.compiled import (
 )
 from pns_common.fused.kernels.edges import INTERIOR
 from pns_common.fused.kernels.vectors import between, dot, row
+from pns_common.geometry.crease_lines.turns import CLEARLY
 
 
 def normals_beside(normals, half_edges, edge_class, e):
@@ -37,8 +38,8 @@ def turn_cosine(normals, half_edges, edge_class, e):
 
 
 def half(cosine):
-    """Return cos(t / 2) of cos t."""
-    return math.sqrt((1 + max(cosine, -1.0)) / 2)
+    """Return cos(t / 2) of cos t, and a little more."""
+    return math.sqrt((1 + max(cosine, -1.0)) / 2) + CLEARLY
 
 
 def rises(points, normals, faces, edges, half_edges, e):

@@ -11,6 +11,10 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.arrays import dot
 from pns_common.connectivity.topology import EdgeClass
 
+# Cosines this near to each other are alike: one edge may turn by just half of another, as 45 of 90
+# degrees, and rounding would decide. Beside 180 degrees it takes a root of what is rounded.
+CLEARLY = 1e-6
+
 
 @runtime_checkable
 class Edges(Protocol):
@@ -80,8 +84,8 @@ def turn_cosines(
 
 
 def half(cosine: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-    """Return cos(t / 2) of cos t."""
-    return np.sqrt((1 + np.maximum(cosine, -1.0)) / 2)
+    """Return cos(t / 2) of cos t, and a little more: what is above turns clearly less than half."""
+    return np.sqrt((1 + np.maximum(cosine, -1.0)) / 2) + CLEARLY
 
 
 def rises(
