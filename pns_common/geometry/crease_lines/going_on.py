@@ -10,7 +10,7 @@ from pns_common.connectivity.topology import EdgeClass
 from pns_common.geometry.crease_lines.turns import Edges
 
 # So many times what does not go on is dropped.
-ROUNDS = 3
+ROUNDS = 5
 # So many lines that meet are a corner.
 CORNER = 3
 
