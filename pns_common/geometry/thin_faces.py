@@ -1,6 +1,6 @@
 """Thin faces: the lengths in which a network speaks beside them, and the h of the bound there.
 
-    ℓ_e = min(h, α a) min(1, 2 α t)²     a the lower of both faces' altitudes over the edge, t the
+    ℓ_e = min(h, α a) min(1, 3 α t)²     a the lower of both faces' altitudes over the edge, t the
                                          larger of their lowest altitudes over longest sides
     ℓ_v = root mean square of ℓ_e over the spokes of an old vertex
     h̄   = the longest edge of both faces
@@ -11,7 +11,7 @@ a right angle; in units of min(h, α a) it turns them no further than on faces a
 
 Rows of thin faces, as of a hose of few sides and many rings, turn like that in every row: ripples,
 which bend the more the thinner the rows are. So less is asked where both faces are thin, longer
-than 2 α of their altitudes, and next to nothing where they are very thin: the prior alone is
+than 3 α of their altitudes, and next to nothing where they are very thin: the prior alone is
 smooth. A sliver between other faces makes no row, and asks as before.
 
 And a short edge between two long ones has to go where these go: ρ of its own h would hold it back,
@@ -31,7 +31,7 @@ from pns_common.geometry.frames import EdgeFrames, EdgeStencil
 from pns_common.geometry.rings import Rings, root
 
 # So many times α is what a face that is not thin may be long, in altitudes.
-OF_ALTITUDES = 2.0
+OF_ALTITUDES = 3.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,7 +162,7 @@ class PlainMesh:
         areas = [np.linalg.norm(self.area(*edge, self.across[edge])) for edge in edges]
         longest = [self.longest_of(*edge, self.across[edge]) for edge in edges]
         shape = max(area / side**2 for area, side in zip(areas, longest, strict=True))
-        return min(h, altitudes * min(areas) / h) * min(1, 2 * altitudes * shape) ** 2
+        return min(h, altitudes * min(areas) / h) * min(1, 3 * altitudes * shape) ** 2
 
     def length_at(self, v, altitudes):
         """ℓ_v."""

@@ -36,7 +36,7 @@ def test_lengths_are_those_of_their_definition(mesh):
             )
             longest = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=-1).max(axis=1)
             shape = (areas / longest**2).max()
-            expected = min(expected, ALTITUDES * areas.min()) * min(1, 2 * ALTITUDES * shape) ** 2
+            expected = min(expected, ALTITUDES * areas.min()) * min(1, 3 * ALTITUDES * shape) ** 2
         assert length * lengths.at_edges[number] == pytest.approx(expected, rel=1e-12, abs=rounding)
     for vertex in range(len(mesh.vertices)):
         around = lengths.at_edges[np.nonzero(topology.edges == vertex)[0]]
@@ -80,7 +80,7 @@ def test_on_thin_faces_neither_the_altitudes_nor_the_bound_suffice_alone():
 def test_rows_of_thin_faces_have_no_ripples(mesh):
     """With answers in units of altitudes alone they bend four times as much as Loop's."""
     ours, theirs = (refine(Mesh(*mesh), scheme, 2).mesh for scheme in (pns(load_model()), loop()))
-    assert bending(ours) < 1.05 * bending(theirs)
+    assert bending(ours) < 1.15 * bending(theirs)
 
 
 @pytest.mark.parametrize(("wide", "share"), [(2.0, 1.0), (0.5, 0.5625)])
@@ -89,7 +89,7 @@ def test_beside_one_thin_face_all_that_its_altitudes_allow_is_asked_for(wide, sh
     points = np.array([[0, 0, 0], [4, 0, 0], [2, wide, 0], [2, 0, 0.5]])
     topology = build_topology(np.array([[0, 1, 2], [1, 0, 3]]), 4)
     rings = Rings(topology, points, face_normals(points, topology.faces))
-    assert network_lengths(rings, 3.0).at_edges[topology.interior[0]] == 1.5 * share
+    assert network_lengths(rings, 2.0).at_edges[topology.interior[0]] == share
 
 
 def test_a_wide_bound_leaves_quasi_interpolation_whole_on_thin_faces():

@@ -34,8 +34,8 @@ def test_edges_of_a_tent(way):
     np.testing.assert_allclose(bends[INNER], np.sqrt(8) / 3)
     assert not bends[~INNER].any()
     assert not jumps[~INNER].any()
-    # The altitude of √3 over √2: .7 of it, and of .3 less, since √3/2 · 2 · .3 is less than 1.
-    for altitudes, share in ((0.7, 1.0), (0.3, 0.27)):
+    # The altitude of √3 over √2: .7 of it, and of .3 less, since √3/2 · 3 · .3 is less than 1.
+    for altitudes, share in ((0.7, 1.0), (0.3, 0.6075)):
         _, network_lengths, *_ = measured(way, altitudes)
         np.testing.assert_allclose(network_lengths[INNER], altitudes * share * np.sqrt(3 / 2))
         np.testing.assert_array_equal(network_lengths[~INNER], lengths[~INNER])
