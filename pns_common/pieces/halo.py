@@ -40,11 +40,11 @@ from pns_common.schemes import Scheme
 LOOP_REACH, FIELDS_REACH = 1, 2
 # Rings for the fold guard, where nothing is known yet of how far it goes.
 GUARD_RINGS = 1
-# A ring for each round, one for the sides of the farthest edge, which touch its faces, and one for
-# edges that are held, which begin on lines.
-LINES_REACH = ROUNDS + 2
+# A ring for each round, one for the sides of the farthest edge, which touch its faces, and two for
+# edges that are held: they begin on lines, and so do others that end where they do.
+LINES_REACH = ROUNDS + 3
 # With gentler lines the rounds are gone through twice. What may be like an edge touches its faces.
-GENTLE_REACH = 2 * ROUNDS + 2
+GENTLE_REACH = 2 * ROUNDS + 3
 
 
 class ThinHaloError(PnsError):

@@ -72,19 +72,24 @@ def test_a_level_reads_as_far_as_its_reach_and_no_farther(name):
 
 
 def dented_bend():
-    """A sheet folded along a straight line, in uneven columns; there is a dent in the line."""
-    columns, far = np.arange(12), np.arange(7) - 3
-    x = columns + columns % 2 / 2
-    along, across = np.tile(x, 7), np.repeat(far, 12)
+    """A sheet folded along a straight line, in uneven columns, with a dent in the line.
+
+    Beside the line two vertices are one, 68, in which three edges end that begin on it.
+    """
+    columns, far = np.arange(16), np.arange(7) - 3
+    along, across = np.tile(columns + (columns % 2 == 0) / 2, 7), np.repeat(far, 16)
     points = np.stack([along, np.minimum(across, 0), -np.maximum(across, 0)], axis=1)
-    points[3 * 12 + 8, 2] = -0.8
-    here = (np.arange(6)[:, None] * 12 + columns[:-1]).reshape(-1)
-    corners = here, here + 1, here + 13, here, here + 13, here + 12
-    return Mesh(points, np.stack(corners, axis=1).reshape(-1, 3))
+    points[3 * 16 + 11, 2] = -0.8
+    points[68] = points[68:70].mean(axis=0)
+    here = (np.arange(6)[:, None] * 16 + columns[:-1]).reshape(-1)
+    corners = here, here + 1, here + 17, here, here + 17, here + 16
+    faces = np.stack(corners, axis=1).reshape(-1, 3)
+    faces[faces == 69] = 68
+    return Mesh(points, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
 
 
 def test_a_held_edge_is_known_within_the_reach_of_lines_and_no_nearer():
-    mesh, face, edge = dented_bend(), [37, 38, 50], [38, 50]
+    mesh, face, edge = dented_bend(), [51, 68, 67], [51, 68]
     at_face = (mesh.faces == face).all(axis=1)
     assert at_face.sum() == 1
 
