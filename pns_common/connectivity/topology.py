@@ -65,7 +65,7 @@ class Topology:
     def smooth_vertices(self) -> Bool[np.ndarray, " V"]:
         """Vertices with one closed ring of interior edges: those that a learned rule may move."""
         used = marked(self.edges.reshape(-1), self.vertex_count)
-        return used & (sharp_edge_count(self) == 0) & ~multi_fan_vertices(self)
+        return used & (sharp_edge_count(self) == 0) & ~self.several_fans
 
     @cached_property
     def ringed_vertices(self) -> Bool[np.ndarray, " V"]:
@@ -73,9 +73,14 @@ class Topology:
         creases = self.edges[self.edge_class == EdgeClass.CREASE]
         if len(creases) == 0:
             return self.smooth_vertices
-        ends = np.bincount(creases.reshape(-1), minlength=self.vertex_count)
-        darts = (ends == 1) & (sharp_edge_count(self) == 1) & ~multi_fan_vertices(self)
+        at_creases = marked(creases.reshape(-1), self.vertex_count)
+        darts = at_creases & (sharp_edge_count(self) == 1) & ~self.several_fans
         return self.smooth_vertices | darts
+
+    @cached_property
+    def several_fans(self) -> Bool[np.ndarray, " V"]:
+        """Whether the faces of each vertex form more than one fan: walked once, asked thrice."""
+        return multi_fan_vertices(self)
 
     @cached_property
     def valence(self) -> Int[np.ndarray, " V"]:

@@ -15,7 +15,6 @@ from pns_common.connectivity.topology import (
     EdgeClass,
     Topology,
     build_topology,
-    multi_fan_vertices,
     split,
 )
 from pns_common.geometry.child_faces import ChildFaces, child_faces
@@ -90,7 +89,7 @@ def array_steps(
     topology = with_creases(build_topology(faces, len(points)), creases.named)
     topology = with_crease_lines(topology, points, normals, creases)
     while True:
-        several_fans = multi_fan_vertices(topology) if depth == 0 else None
+        several_fans = topology.several_fans if depth == 0 else None
         control = ControlLevel(points, topology, normals, reference_length, blocks, depth)
         # What overflows under an absurd budget is for the caller to find.
         with np.errstate(over="ignore", invalid="ignore"):

@@ -10,7 +10,6 @@ from jaxtyping import Bool, Float, Int
 from pns_common.connectivity.topology import (
     EdgeClass,
     Topology,
-    multi_fan_vertices,
     next_corner,
     sharp_edge_count,
 )
@@ -80,8 +79,7 @@ def _edge_rule(level: ControlLevel) -> Placement:
 
 def _extraordinary(topology: Topology, valence: Int[np.ndarray, " V"]) -> Bool[np.ndarray, " V"]:
     """Return whether a vertex has one closed fan of a valence other than 6 (a star needs three)."""
-    closed = (sharp_edge_count(topology) == 0) & ~multi_fan_vertices(topology)
-    return closed & (valence >= 3) & (valence != REGULAR_VALENCE)
+    return topology.smooth_vertices & (valence >= 3) & (valence != REGULAR_VALENCE)
 
 
 def _twins(topology: Topology) -> Int[np.ndarray, " H"]:

@@ -9,7 +9,7 @@ import trimesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pns_common.connectivity.topology import EdgeClass, build_topology, multi_fan_vertices
+from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.errors import MeshError
 from pns_common.mesh import Mesh, clean
 from pns_common.refine import refine
@@ -121,7 +121,7 @@ def is_manifold(mesh: Mesh) -> bool:
     topology = build_topology(mesh.faces, len(mesh.vertices))
     regular = bool((topology.edge_class != EdgeClass.IRREGULAR).all())
     used = len(np.unique(mesh.faces)) == len(mesh.vertices)
-    return regular and used and not multi_fan_vertices(topology).any()
+    return regular and used and not topology.several_fans.any()
 
 
 def read_mesh(path: Path) -> Mesh:

@@ -57,7 +57,7 @@ def with_held_edges(
     others = np.where(stays[ends[:, 0]], ends[:, 1], ends[:, 0])
     held = np.bincount(others, minlength=mesh.vertex_count) >= CORNER
     held &= marked(others[moved[~both]], mesh.vertex_count)
-    held &= in_planes(normals, mesh, is_sharp, others)
+    held = in_planes(normals, mesh, is_sharp, np.flatnonzero(held))
     rows = np.concatenate([between, from_line[held[others]]])
     return np.sort(np.concatenate([lines, rows.astype(lines.dtype)]))
 
