@@ -46,8 +46,11 @@ _work = _Work()
 
 @cache
 def kernels_available() -> bool:
-    """Return whether kernels can be compiled here, and kept."""
-    return find_spec("numba") is not None and cache_folder() is not None
+    """Return whether kernels can be compiled here, and kept.
+
+    Not on Windows, where calls and object files are of another kind: nobody has run them there.
+    """
+    return sys.platform != "win32" and find_spec("numba") is not None and cache_folder() is not None
 
 
 def load_kernels() -> bool:

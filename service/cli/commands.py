@@ -34,6 +34,7 @@ from .parameters import (
     WorkersOption,
     options_of,
 )
+from .systems import check_posix
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -137,6 +138,7 @@ def batch(
     ] = False,
 ) -> None:
     """Refine a library of files; what was done is not done again when it runs again."""
+    check_posix("batch")
     from rich.console import Console
 
     from ..scale.batch import Batch, batch_work, run_batch
@@ -196,7 +198,7 @@ def large(
     ] = None,
 ) -> None:
     """Refine one mesh larger than memory, part by part; a run that was stopped goes on."""
-
+    check_posix("large")
     from rich.console import Console
 
     from ..scale.engines.named import engine_of
@@ -247,6 +249,7 @@ def serve(
     ] = None,
 ) -> None:
     """Serve HTTP; every other setting is an environment variable PNS_…."""
+    check_posix("serve")
     from ..http.server import serve as run
     from ..settings import Settings
 
