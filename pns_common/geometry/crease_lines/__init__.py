@@ -54,6 +54,7 @@ from pns_common.geometry.crease_lines.going_on import go_on, may_end
 from pns_common.geometry.crease_lines.held_edges import with_held_edges
 from pns_common.geometry.crease_lines.sides import between_sides
 from pns_common.geometry.crease_lines.turns import (
+    CLEARLY,
     Edges,
     cosine_of,
     edges_beyond,
@@ -131,8 +132,10 @@ def with_gentler(
 
     ``going_on`` returns them of some edges.
     """
-    is_sharp = turn_cosines(normals, mesh, alone) < cosine
-    in_hollow = is_sharp & rises(points, normals, mesh, alone)
+    turns = turn_cosines(normals, mesh, alone)
+    is_sharp = turns < cosine
+    # Of two faces that lie on each other neither rises: rounding would decide.
+    in_hollow = is_sharp & (turns > CLEARLY - 1) & rises(points, normals, mesh, alone)
     by_themselves = going_on(alone[is_sharp])
     return going_on(alone[~in_hollow | np.isin(alone, by_themselves)])
 

@@ -18,7 +18,15 @@ from tests.support.crease_lines import (
     lines,
     normals_of,
 )
-from tests.support.meshes import block, bumpy_sphere, grid, manifolds, rotation, soups
+from tests.support.meshes import (
+    block,
+    bumpy_sphere,
+    folded_sheet,
+    grid,
+    manifolds,
+    rotation,
+    soups,
+)
 from train.data.primitives import box, cone, cylinder, globe, icosphere, l_block, tetrahedron, torus
 
 ROUND = {
@@ -123,6 +131,15 @@ def test_lines_do_not_depend_on_where_a_mesh_lies_nor_on_its_numbers(mesh, seed,
     for creases in (SHARP_ALONE, WITH_GENTLE):
         expected = {tuple(sorted(order[list(pair)])) for pair in lines(mesh, creases)}
         assert lines(renumbered, creases) == expected
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_rim_of_a_sheet_with_two_sides_is_no_hollow_however_it_is_turned(seed):
+    """Its faces turn by 180 degrees there: of which one rises above the other rounding decides."""
+    points, faces = folded_sheet(13)
+    turned = Mesh(points @ rotation(np.random.default_rng(seed)).T, faces)
+    assert len(lines(turned)) == 8
+    assert lines(turned, WITH_GENTLE) == lines(turned)
 
 
 def test_lines_become_creases_beside_those_that_are_there():
