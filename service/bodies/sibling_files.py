@@ -43,10 +43,14 @@ ALONE = SiblingFiles(lambda name: None)
 
 @dataclass
 class Opened:
-    """The siblings that a document names, each opened once."""
+    """The siblings that a document names, each opened once.
+
+    `size` is their bytes, as often as they were asked for: so often they may be written.
+    """
 
     siblings: SiblingFiles
     files: dict[str, File | None] = field(default_factory=dict)
+    size: int = 0
 
     def open(self, uri: str) -> File | None:
         """Open the file behind a URI; None where it did not come, or the URI leads elsewhere."""
@@ -56,16 +60,13 @@ class Opened:
         if name not in self.files:
             found = (self.siblings.find(spelling) for spelling in _spellings(name))
             self.files[name] = next((file for file in found if file is not None), None)
-        return self.files[name]
+        file = self.files[name]
+        self.size += 0 if file is None else len(file.content)
+        return file
 
     def name_of(self, uri: str) -> str | None:
         """Return the name among what came that a URI leads to; None where it leads elsewhere."""
         return safe_name(uri, self.siblings.folder)
-
-    @property
-    def size(self) -> int:
-        """Bytes of all that was opened."""
-        return sum(len(file.content) for file in self.files.values() if file is not None)
 
     @property
     def unused(self) -> list[str]:

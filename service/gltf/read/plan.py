@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
+from typing import Any
 
 from ...errors import UnrefinableError, check_limit
 from ...options import BYTES_PER_INPUT_BYTE, Limits
 from .accessors import element_size
+from .json_text import encode
 from .modes import SURFACES, triangle_count
 from .schema import Document, Primitive
 
@@ -99,6 +103,25 @@ def check_decoded(decoded: int, size: int, limits: Limits) -> None:
 def check_memory(needed: int, limits: Limits) -> None:
     """Check bytes that work will take, before it takes them. Raises LimitError."""
     check_limit("memory", needed, limits.max_memory_bytes, f"the work would take {needed} bytes")
+
+
+def repeated_text(tree: dict[str, Any], document: Document) -> int:
+    """Return the bytes of JSON that are written again for each primitive that shares an accessor.
+
+    Each gets accessors of its own, and these the name and the extras of the shared one.
+    """
+    uses = Counter(
+        chain.from_iterable(
+            (primitive.indices, *(index for _, index in primitive.named))
+            for mesh in document.meshes
+            for primitive in mesh.primitives
+        )
+    )
+    return sum(
+        (count - 1) * len(encode(tree["accessors"][index]))
+        for index, count in uses.items()
+        if count > 1 and index is not None
+    )
 
 
 def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, levels: int) -> int:

@@ -20,7 +20,7 @@ from .container import Container, read_container
 from .images import embed_images
 from .index_references import unknown_extensions
 from .json_text import decode_object, decoded_size
-from .plan import MeshPlan, check_cost, plan
+from .plan import MeshPlan, check_cost, plan, repeated_text
 from .schema import Document, view
 from .spare import Spare, spare
 from .vertex_numbers import leave_out_vertex_numbers
@@ -80,6 +80,7 @@ def read_upload(
     if ranges or len(buffers) > stored:
         document = view(tree)
     check_references(document, buffers)
+    repeated = repeated_text(tree, document)
     draco_views = decode_primitives(tree, document, buffers, size, limits)
     if draco_views:
         document = view(tree)
@@ -103,7 +104,7 @@ def read_upload(
     refuse_features(document)
     plans = plan(document)
     size += sum(len(buffer) for buffer in buffers[stored:])
-    size += decoded_size(container.text) // BYTES_PER_INPUT_BYTE
+    size += repeated + decoded_size(container.text) // BYTES_PER_INPUT_BYTE
     check_cost(document, plans, size, levels, limits, bytes_per_face)
     leavable = spare(original, draco_views, ranges, unknown)
     return Upload(container, tree, document, buffers, plans, changes, leavable)

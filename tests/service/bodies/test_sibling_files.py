@@ -68,9 +68,9 @@ def beside(**contents):
     )
 
 
-def refine(text, siblings):
+def refine(text, siblings, **limits):
     options = Options(scheme="loop")
-    return subdivide_gltf(text, "gltf", options, None, Limits(), siblings=siblings)
+    return subdivide_gltf(text, "gltf", options, None, Limits(**limits), siblings=siblings)
 
 
 @pytest.mark.parametrize("step", ["%41", "a/", "a"])
@@ -85,6 +85,17 @@ def test_a_uri_without_end_takes_what_any_text_does(step):
     assert used < 6 * len(text)
     (told,) = [change for change in refined.report["changes"] if change["pointer"] == "/images/0"]
     assert len(told["what"]) < 10_000
+
+
+def test_a_file_is_predicted_as_often_as_buffers_name_it():
+    text, content = external()
+    tree = json.loads(text)
+    tree["buffers"] *= 100
+    content = content.ljust(2**20, b"\0")
+    tree["buffers"][0]["byteLength"] = len(content)
+    with pytest.raises(LimitError) as refusal:
+        refine(json.dumps(tree).encode(), beside(box__bin=content), max_memory_bytes=100 * 2**20)
+    assert refusal.value.limit == "memory"
 
 
 @pytest.mark.parametrize(("uri", "name"), SAFE)

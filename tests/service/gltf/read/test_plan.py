@@ -108,3 +108,16 @@ def test_what_moves_a_mesh_is_predicted_where_it_moves_nothing(whose):
     tree["nodes"], tree["skins"] = [{"mesh": 0, "skin": 0}, {}], [{"joints": [1]}]
     data = files.pack(tree, binary)
     refuse_what_it_takes(data, "glb", LOOP)
+
+
+@pytest.mark.parametrize("what", ["name", "extras"])
+@pytest.mark.parametrize("whose", ["primitives", "targets"])
+def test_what_a_shared_accessor_says_is_predicted_as_often_as_it_is_written(what, whose):
+    tree, binary = files.document([octahedron()])
+    tree["accessors"][0][what] = "a" * 2**17
+    (mesh,) = tree["meshes"]
+    if whose == "primitives":
+        mesh["primitives"] *= 100
+    else:
+        mesh["primitives"][0]["targets"] = [{"POSITION": 0}] * 100
+    refuse_what_it_takes(files.pack(tree, binary), "glb", LOOP)
