@@ -54,15 +54,15 @@ def quality(media: str, accept: str) -> float:
 
     A coding in Accept-Encoding reads as one.
     """
+    ranges = (media, f"{media.partition('/')[0]}/*", "*/*")
     wanted: dict[str, float] = {}
-    for entry in accept.split(","):
-        pattern, *parameters = (part.strip().lower() for part in entry.split(";"))
-        weight = next((weighted[1] for p in parameters if (weighted := _WEIGHT.fullmatch(p))), "1")
-        wanted[pattern] = float(weight)
-    for pattern in (media, f"{media.partition('/')[0]}/*", "*/*"):
-        if pattern in wanted:
-            return wanted[pattern]
-    return 0.0
+    for entry in accept.lower().split(","):
+        pattern, *parameters = entry.split(";")
+        # Of many thousands in a head hardly any is one of these.
+        if (pattern := pattern.strip()) in ranges:
+            weights = (_WEIGHT.fullmatch(parameter.strip()) for parameter in parameters)
+            wanted[pattern] = next((float(weight[1]) for weight in weights if weight), 1.0)
+    return next((wanted[pattern] for pattern in ranges if pattern in wanted), 0.0)
 
 
 def sniff(data: bytes) -> str:
