@@ -15,12 +15,22 @@ from service.http.watch.journal import GONE
 from service.settings import Settings
 from service.workers.catalogue import ModelEntry
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "service.md").read_text()
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "service.md").read_text()
+DOCKERFILE = (ROOT / "Dockerfile").read_text()
 
 
 @pytest.mark.parametrize("name", sorted(Settings.model_fields))
 def test_every_setting_is_on_the_page(name):
     assert f"`PNS_{name.upper()}`" in PAGE
+
+
+@pytest.mark.parametrize(("name", "value"), re.findall(r"PNS_([A-Z_]+)=(\S+)", DOCKERFILE))
+def test_what_the_container_has_otherwise_is_on_the_page(name, value):
+    default = Settings.model_fields[name.lower()].default
+    (row,) = re.findall(rf"^\|[^|]*`PNS_{name}`.*", PAGE, re.MULTILINE)
+    container = re.findall(r"\(container: ([^)]*)\)", row)
+    assert value == str(default) or value in container[0].split(", ")
 
 
 def test_the_list_of_models_has_the_fields_of_the_example():
