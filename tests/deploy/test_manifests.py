@@ -4,8 +4,11 @@ import json
 import re
 import shutil
 import subprocess
+import sys
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from ipaddress import ip_address, ip_network
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -56,6 +59,37 @@ def test_probes_ask_what_the_service_answers():
     }
     ports = {port["name"]: port["containerPort"] for port in CONTAINER["ports"]}
     assert ports == {"http": 8000, "metrics": 9000}
+
+
+@pytest.mark.parametrize(("status", "healthy"), [(200, True), (503, False)])
+@pytest.mark.parametrize("where", ["image", "compose"])
+def test_the_health_check_asks_the_container_and_no_proxy(where, status, healthy):
+    """Docker names the proxy that it is told of in the environment of its containers."""
+
+    class Service(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(status if self.path == asked else 404)
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+
+        def log_message(self, *_):
+            pass
+
+    if where == "image":
+        asked = "/healthz"
+        (text,) = re.findall(r"^HEALTHCHECK.*\\\n +CMD (.*)$", DOCKERFILE, re.MULTILINE)
+        python, *arguments = json.loads(text)
+    else:
+        asked = "/readyz"
+        _, python, *arguments = COMPOSE["services"]["service"]["healthcheck"]["test"]
+    assert python == "python"
+    with HTTPServer(("127.0.0.1", 0), Service) as server:
+        Thread(target=server.handle_request, daemon=True).start()
+        port = str(server.server_port)
+        arguments = [argument.replace("8000", port) for argument in arguments]
+        environment = {"PNS_PORT": port, "http_proxy": "http://127.0.0.1:9"}
+        done = subprocess.run([sys.executable, *arguments], env=environment, check=False)
+    assert (done.returncode == 0) is healthy
 
 
 @pytest.mark.parametrize("where", ["kubernetes", "compose"])
