@@ -32,17 +32,29 @@ def go_on(
     for _ in range(ROUNDS):
         at = ends[left].T.reshape(-1)
         count = np.bincount(at, minlength=mesh.vertex_count)
-        # Of two that meet, u and v away from there: ‖u + v‖² = 2 + 2 u · v, 0 where they are
-        # straight. Two numbers have one sum in either order.
-        away = np.concatenate([along[left], -along[left]])
-        total = segment_sum(away, at, mesh.vertex_count)
-        straight = (count == 2) & (dot(total, total) < 2 - 2 * cosine)
+        straight = runs_straight(along[left], at, count, cosine)
         on = at_rim | straight | (count >= CORNER)
         going_on = left & on[ends].all(axis=1)
         if (going_on == left).all():
             break
         left = going_on
     return left
+
+
+def runs_straight(
+    along: Float[np.ndarray, "N 3"],
+    at: Int[np.ndarray, " 2*N"],
+    count: Int[np.ndarray, " V"],
+    cosine: float,
+) -> Bool[np.ndarray, " V"]:
+    """Return at which vertices just two edges meet, nearly straight.
+
+    ``at`` are the starts of all edges and then their ends, ``count`` how many meet at each vertex.
+    """
+    # u and v away from there: ‖u + v‖² = 2 + 2 u · v, 0 where they are straight. Two numbers have
+    # one sum in either order.
+    away = segment_sum(np.concatenate([along, -along]), at, len(count))
+    return (count == 2) & (dot(away, away) < 2 - 2 * cosine)
 
 
 def may_end(mesh: Edges, normals: Float[np.ndarray, "F 3"]) -> Bool[np.ndarray, " V"]:

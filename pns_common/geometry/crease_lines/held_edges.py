@@ -17,9 +17,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import dot, gather, marked, segment_sum, unit
+from pns_common.base.arrays import dot, gather, marked, unit
 from pns_common.connectivity.topology import EdgeClass, vertices_across
-from pns_common.geometry.crease_lines.going_on import CORNER
+from pns_common.geometry.crease_lines.going_on import CORNER, runs_straight
 from pns_common.geometry.crease_lines.turns import Edges, cosine_of, turn_cosines
 
 # Two faces that turn by less, in degrees, lie in one plane: far above what single precision does to
@@ -83,10 +83,9 @@ def staying(
     number = np.empty(mesh.vertex_count, dtype=np.int64)
     number[at] = np.arange(len(at))
     along = unit(gather(points, ends[:, 1]) - gather(points, ends[:, 0]))
-    # As in going_on: ‖u + v‖² = 2 + 2 u · v of two that meet.
-    away = segment_sum(np.concatenate([along, -along]), gather(number, ends.T.reshape(-1)), len(at))
-    straight = dot(away, away) < 2 - 2 * cosine_of(STRAIGHT)
-    stays[at] |= straight & (on_lines[at] == 2) & (meet[at] == 2)
+    places = gather(number, ends.T.reshape(-1))
+    straight = runs_straight(along, places, on_lines[at], cosine_of(STRAIGHT))
+    stays[at] |= straight & (meet[at] == 2)
     return stays
 
 
