@@ -14,7 +14,7 @@ from pns_common.fused.kernels.compiled import (
     natural,
 )
 from pns_common.fused.kernels.edges import INTERIOR
-from pns_common.fused.kernels.turns import half, rises, turn_cosine
+from pns_common.fused.kernels.turns import clearly_half, rises, turn_cosine
 from pns_common.fused.kernels.vectors import between, cross, dot
 from pns_common.geometry.crease_lines.edge_rows import (
     TIMES_ITS_OWN,
@@ -103,7 +103,7 @@ def mark_alone(
                 sharper |= (found == SHARPER) << h
                 if side == e or edge_class[side] != INTERIOR:
                     continue
-                if not turn_cosine(normals, half_edges, edge_class, side) > half(turn):
+                if not turn_cosine(normals, half_edges, edge_class, side) > clearly_half(turn):
                     continue
                 first = half_edges[side, 0] // 3
                 beyond = half_edges[side, 1] // 3 if first == f else first

@@ -13,7 +13,7 @@ from pns_common.fused.kernels.compiled import (
     kernel,
     natural,
 )
-from pns_common.fused.kernels.turns import half, turn_cosine
+from pns_common.fused.kernels.turns import clearly_half, turn_cosine
 
 
 def is_flat(normals, face_edges, half_edges, edge_class, f, e):
@@ -23,7 +23,7 @@ def is_flat(normals, face_edges, half_edges, edge_class, f, e):
         other = face_edges[f, k]
         if other != e:
             flattest = max(flattest, turn_cosine(normals, half_edges, edge_class, other))
-    return flattest > half(turn_cosine(normals, half_edges, edge_class, e))
+    return flattest > clearly_half(turn_cosine(normals, half_edges, edge_class, e))
 
 
 def is_side(normals, face_edges, half_edges, edge_class, is_sharp, f):

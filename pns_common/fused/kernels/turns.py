@@ -37,7 +37,7 @@ def turn_cosine(normals, half_edges, edge_class, e):
     return dot(n, m) if dot(n, n) > 0 and dot(m, m) > 0 else 1.0
 
 
-def half(cosine):
+def clearly_half(cosine):
     """Return cos(t / 2) of cos t, and a little more."""
     return math.sqrt((1 + max(cosine, -1.0)) / 2) + CLEARLY
 

@@ -9,7 +9,13 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.base.arrays import cross, dot
 from pns_common.connectivity.topology import EdgeClass
-from pns_common.geometry.crease_lines.turns import Edges, cosine_of, half, rises, turn_cosines
+from pns_common.geometry.crease_lines.turns import (
+    Edges,
+    clearly_half,
+    cosine_of,
+    rises,
+    turn_cosines,
+)
 
 # Degrees beyond which an edge of an edged mesh need not stand alone: between the turns of a hexagon
 # and a heptagon.
@@ -48,7 +54,7 @@ def _stand_alone(
     flat: Int[np.ndarray, " N"],
 ) -> Bool[np.ndarray, " N"]:
     turn = turn_cosines(normals, mesh, flat)
-    gentle = half(turn)[:, None]
+    gentle = clearly_half(turn)[:, None]
     has_like, has_sharper = (np.empty((2, len(flat)), dtype=bool) for _ in range(2))
     for side, face in enumerate((mesh.half_edges[flat] // 3).T):
         sides = mesh.face_edges[face]

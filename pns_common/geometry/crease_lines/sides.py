@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.base.arrays import marked
-from pns_common.geometry.crease_lines.turns import Edges, half, turn_cosines
+from pns_common.geometry.crease_lines.turns import Edges, clearly_half, turn_cosines
 
 
 def between_sides(
@@ -38,7 +38,7 @@ def are_flat(
     theirs = mesh.face_edges[faces]
     cosines = turn_cosines(normals, mesh, theirs)
     cosines[theirs == edges[..., None]] = -1.0
-    return cosines.max(axis=-1) > half(turn_cosines(normals, mesh, edges))
+    return cosines.max(axis=-1) > clearly_half(turn_cosines(normals, mesh, edges))
 
 
 def are_sides(

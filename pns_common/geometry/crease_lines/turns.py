@@ -83,7 +83,7 @@ def turn_cosines(
     return cosines
 
 
-def half(cosine: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+def clearly_half(cosine: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
     """Return cos(t / 2) of cos t, and a little more: what is above turns clearly less than half."""
     return np.sqrt((1 + np.maximum(cosine, -1.0)) / 2) + CLEARLY
 
