@@ -13,6 +13,7 @@ from ..errors import ServiceError
 from ..gltf.read.container import read_container
 from ..gltf.read.json_text import BOM, check_size, json_items
 from ..gltf.read.modes import SURFACES, TRIANGLES
+from ..gltf.read.plan import joint_sets
 from ..meshfiles.counted import count_triangles
 from ..options import Limits
 from .costs import Cost, cost_of
@@ -68,7 +69,7 @@ def cost_of_gltf(
     for mesh in counts.meshes:
         # What moves the vertices of one primitive moves all of a mesh's, those of others by 0.
         targets = max((len(primitive.targets) for primitive in mesh.primitives), default=0)
-        sets = max(map(_joint_sets, mesh.primitives), default=0)
+        sets = max((joint_sets(primitive.attributes) for primitive in mesh.primitives), default=0)
         for primitive in mesh.primitives:
             triangles = _triangles(primitive, counts.accessors)
             faces += triangles
@@ -99,15 +100,11 @@ def _unusual(primitive: _Primitive, targets: int, sets: int) -> int:
 
     Morph targets' too: each has positions, of zeros where it names none.
     """
-    own = _joint_sets(primitive)
+    own = joint_sets(primitive.attributes)
     further = max(len(primitive.attributes) - USUAL_ATTRIBUTES, 0)
     further += max(own - 1, 0) * VALUES_PER_FURTHER_SET + (sets - own) * VALUES_PER_EMPTY_SET
     further += sum(len(target.keys() - {"POSITION"}) for target in primitive.targets)
     return further + targets
-
-
-def _joint_sets(primitive: _Primitive) -> int:
-    return sum(name.startswith("JOINTS_") for name in primitive.attributes)
 
 
 def _triangles(primitive: _Primitive, accessors: list[_Accessor]) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -131,7 +131,7 @@ def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, l
         primitives = [document.meshes[mesh.mesh].primitives[number] for number in mesh.primitives]
         # What moves the vertices of one moves all of a mesh's, those of others by 0.
         targets = max(len(primitive.targets) for primitive in primitives)
-        sets = max(map(_joint_sets, primitives))
+        sets = max(joint_sets(primitive.attributes) for primitive in primitives)
         for primitive in primitives:
             sizes = (element_size(document.accessors[index]) for _, index in primitive.named)
             # As they are written: at multiples of four bytes.
@@ -149,8 +149,9 @@ def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, l
     return total
 
 
-def _joint_sets(primitive: Primitive) -> int:
-    return sum(name.startswith("JOINTS_") for name in primitive.attributes)
+def joint_sets(attributes: Iterable[str]) -> int:
+    """Return how many sets of joints are among a primitive's attributes."""
+    return sum(name.startswith("JOINTS_") for name in attributes)
 
 
 def _refined_vertices(faces: int, vertices: int, levels: int) -> int:
