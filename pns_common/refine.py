@@ -178,7 +178,7 @@ def refine(
     return Refinement(
         mesh=Mesh.of_refined(points, made.faces),
         make_report=Deferred(
-            lambda: report_of(scheme, length(), made.several_fans, made.reports, kept_back())
+            lambda: report_of(scheme, length(), made.multi_fan_vertices, made.reports, kept_back())
         ),
         ratio=made.ratio,
         gate=made.gate,
@@ -189,7 +189,7 @@ def refine(
 def report_of(
     scheme: Scheme,
     reference_length: float,
-    several_fans: int,
+    multi_fan_vertices: int,
     levels: list[LevelReport],
     limit_shift: float = 0.0,
 ) -> Report:
@@ -201,7 +201,7 @@ def report_of(
         "model_hash": scheme.model_hash,
         "reference_length": reference_length,
         "prior_strength": scheme.prior_strength,
-        "multi_fan_vertices": several_fans,
+        "multi_fan_vertices": multi_fan_vertices,
         **limit_distances(levels, limit_shift),
         "levels": levels,
     }
@@ -225,10 +225,10 @@ def refine_arrays(
     """
     steps = array_steps(mesh.vertices, mesh.faces, creases, scheme, reference_length, blocks)
     reports: list[LevelReport] = []
-    several_fans, last = 0, None
+    multi_fan_vertices, last = 0, None
     for last in islice(steps, levels):
-        if last.several_fans is not None:
-            several_fans = int(last.several_fans.sum())
+        if last.multi_fan_vertices is not None:
+            multi_fan_vertices = int(last.multi_fan_vertices.sum())
         check_coordinates(np.abs(last.placed.points).max())
         reports.append(level_report(last.topology, last.placed, last.children, last.crease_shift))
         after_level()
@@ -236,7 +236,7 @@ def refine_arrays(
     placed, topology = last.placed, last.topology
     ratio = np.concatenate([placed.vertices.ratio, placed.edges.ratio])
     gate = np.concatenate([placed.vertices.gate, placed.edges.gate])
-    looked_at = Deferred(lambda: LevelsReport(reports, several_fans))
+    looked_at = Deferred(lambda: LevelsReport(reports, multi_fan_vertices))
     return RefinedLevels(placed.points, last.faces, ratio, gate, looked_at, lambda: topology)
 
 

@@ -113,9 +113,9 @@ def refine_parts(
     return PartsRefinement(
         mesh=Mesh.of_refined(points, made.faces),
         reports=[
-            report_of(fitted, float(length), several_fans, reports, float(back))
-            for fitted, length, several_fans, reports, back in zip(
-                schemes, lengths, made.several_fans, made.reports, kept_back, strict=True
+            report_of(fitted, float(length), multi_fan_vertices, reports, float(back))
+            for fitted, length, multi_fan_vertices, reports, back in zip(
+                schemes, lengths, made.multi_fan_vertices, made.reports, kept_back, strict=True
             )
         ],
         ratio=made.ratio,

@@ -65,7 +65,7 @@ class Topology:
     def smooth_vertices(self) -> Bool[np.ndarray, " V"]:
         """Vertices with one closed ring of interior edges: those that a learned rule may move."""
         used = marked(self.edges.reshape(-1), self.vertex_count)
-        return used & (sharp_edge_count(self) == 0) & ~self.several_fans
+        return used & (sharp_edge_count(self) == 0) & ~self.multi_fan_vertices
 
     @cached_property
     def ringed_vertices(self) -> Bool[np.ndarray, " V"]:
@@ -74,13 +74,27 @@ class Topology:
         if len(creases) == 0:
             return self.smooth_vertices
         at_creases = marked(creases.reshape(-1), self.vertex_count)
-        darts = at_creases & (sharp_edge_count(self) == 1) & ~self.several_fans
+        darts = at_creases & (sharp_edge_count(self) == 1) & ~self.multi_fan_vertices
         return self.smooth_vertices | darts
 
     @cached_property
-    def several_fans(self) -> Bool[np.ndarray, " V"]:
-        """Whether the faces of each vertex form more than one fan: walked once, asked thrice."""
-        return multi_fan_vertices(self)
+    def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
+        """Vertices whose faces form more than one fan (bow-ties among them): asked thrice.
+
+        A fan is a run of corners joined across interior edges: an open fan has one join fewer than
+        corners, a closed one as many. Closed fans are told apart by pointer doubling.
+        """
+        corner_count = np.bincount(self.faces.reshape(-1), minlength=self.vertex_count)
+        following = across_from_corners(self, np.flatnonzero(self.half_edges[:, 0] >= 0))
+        corners = np.arange(len(following))
+        label, hop = corners.copy(), following.copy()
+        for _ in range(int(corner_count.max()).bit_length()):
+            ahead = np.where(hop >= 0, hop, corners)
+            label = np.minimum(label, label[ahead])
+            hop = np.where(hop >= 0, hop[ahead], -1)
+        leaders = ((hop >= 0) & (label == corners)) | (following < 0)
+        fans = np.bincount(self.faces.reshape(-1)[leaders], minlength=self.vertex_count)
+        return fans > 1
 
     @cached_property
     def valence(self) -> Int[np.ndarray, " V"]:
@@ -210,25 +224,6 @@ def sharp_edge_count(topology: Topology) -> Int[np.ndarray, " V"]:
     """Return for each vertex the number of edges at it that are not interior."""
     sharp = topology.edges[topology.edge_class != EdgeClass.INTERIOR]
     return np.bincount(sharp.reshape(-1), minlength=topology.vertex_count)
-
-
-def multi_fan_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
-    """Return the vertices whose faces form more than one fan (bow-ties among them).
-
-    A fan is a run of corners joined across interior edges: an open fan has one join fewer than
-    corners, a closed one as many. Closed fans are told apart by pointer doubling.
-    """
-    corner_count = np.bincount(topology.faces.reshape(-1), minlength=topology.vertex_count)
-    following = across_from_corners(topology, np.flatnonzero(topology.half_edges[:, 0] >= 0))
-    corners = np.arange(len(following))
-    label, hop = corners.copy(), following.copy()
-    for _ in range(int(corner_count.max()).bit_length()):
-        ahead = np.where(hop >= 0, hop, corners)
-        label = np.minimum(label, label[ahead])
-        hop = np.where(hop >= 0, hop[ahead], -1)
-    leaders = ((hop >= 0) & (label == corners)) | (following < 0)
-    fans = np.bincount(topology.faces.reshape(-1)[leaders], minlength=topology.vertex_count)
-    return fans > 1
 
 
 def stable_sort(

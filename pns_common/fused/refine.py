@@ -69,7 +69,7 @@ def refine_fused(
 
 def _look(control: FusedLevel, reports: Sequence[Callable[[], LevelReport]]) -> LevelsReport:
     """Make the report of all levels."""
-    return LevelsReport([report() for report in reports], int(control.several_fans.sum()))
+    return LevelsReport([report() for report in reports], int(control.multi_fan_vertices.sum()))
 
 
 def _checked_step(

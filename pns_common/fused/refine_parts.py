@@ -34,7 +34,7 @@ from pns_common.schemes import Scheme
 class RefinedParts:
     """The last level's mesh with its diagnostics, and for each part the reports of all levels.
 
-    ``several_fans`` counts, for each part, control vertices with more than one fan.
+    ``multi_fan_vertices`` counts, for each part, control vertices with more than one fan.
     ``split_topology`` is of the mesh that the last level split, built where it is asked for.
     """
 
@@ -43,7 +43,7 @@ class RefinedParts:
     ratio: Float[np.ndarray, " V"]
     gate: Float[np.ndarray, " V"]
     reports: list[list[LevelReport]]
-    several_fans: list[int]
+    multi_fan_vertices: list[int]
     split_topology: Callable[[], Topology]
 
 
@@ -120,7 +120,7 @@ def refine_parts_fused(
     count = len(part_faces) - 1
     of_vertex[mesh.faces] = np.repeat(np.arange(count), np.diff(part_faces))[:, None]
     parts = _Parts(part_faces, part_faces, of_vertex)
-    several_fans = np.bincount(of_vertex[level.several_fans], minlength=count)
+    multi_fan_vertices = np.bincount(of_vertex[level.multi_fan_vertices], minlength=count)
 
     reports: list[list[LevelReport]] = [[] for _ in range(count)]
     points, step = mesh.vertices, None
@@ -140,7 +140,7 @@ def refine_parts_fused(
         ratio=np.concatenate([step.vertices.ratio, step.edges.ratio]),
         gate=np.concatenate([step.vertices.gate, step.edges.gate]),
         reports=reports,
-        several_fans=several_fans.tolist(),
+        multi_fan_vertices=multi_fan_vertices.tolist(),
         split_topology=level.topology,
     )
 

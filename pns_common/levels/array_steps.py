@@ -34,14 +34,14 @@ class ArrayStep:
         control: the points that it split.
         topology: the connectivity that it split, creases marked.
         placed: what the rules placed.
-        several_fans: of the control mesh the vertices with more than one fan; None later.
+        multi_fan_vertices: of the control mesh the vertices with more than one fan; None later.
         blocks: how row-wise work is divided.
     """
 
     control: Float[np.ndarray, "V 3"]
     topology: Topology
     placed: LevelStep
-    several_fans: Bool[np.ndarray, " V"] | None
+    multi_fan_vertices: Bool[np.ndarray, " V"] | None
     blocks: Blocks
 
     @cached_property
@@ -89,12 +89,12 @@ def array_steps(
     topology = with_creases(build_topology(faces, len(points)), creases.named)
     topology = with_crease_lines(topology, points, normals, creases)
     while True:
-        several_fans = topology.several_fans if depth == 0 else None
+        multi_fan_vertices = topology.multi_fan_vertices if depth == 0 else None
         control = ControlLevel(points, topology, normals, reference_length, blocks, depth)
         # What overflows under an absurd budget is for the caller to find.
         with np.errstate(over="ignore", invalid="ignore"):
             placed = level_step(control, scheme)
-        step = ArrayStep(points, topology, placed, several_fans, blocks)
+        step = ArrayStep(points, topology, placed, multi_fan_vertices, blocks)
         yield step
         points, faces, normals = placed.points, step.faces, step.children.normals
         depth += 1

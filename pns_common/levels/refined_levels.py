@@ -24,7 +24,7 @@ class LevelsReport:
     """The report of each level, and how many vertices of the control mesh have several fans."""
 
     levels: list[LevelReport]
-    several_fans: int
+    multi_fan_vertices: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +49,9 @@ class RefinedLevels:
         return self.looked_at().levels
 
     @property
-    def several_fans(self) -> int:
+    def multi_fan_vertices(self) -> int:
         """Vertices of the control mesh whose faces form more than one fan."""
-        return self.looked_at().several_fans
+        return self.looked_at().multi_fan_vertices
 
 
 def check_coordinates(largest: float) -> None:

@@ -70,7 +70,7 @@ class RefinedPiece:
             piece, in the order of the edges.
         own_vertices: the vertices that are this piece's to write, and no other's.
         tallies: of each level.
-        several_fans: own vertices of the control mesh whose faces form more than one fan.
+        multi_fan_vertices: own vertices of the control mesh whose faces form more than one fan.
     """
 
     points: Float[np.ndarray, "W 3"]
@@ -78,7 +78,7 @@ class RefinedPiece:
     openers: list[Int[np.ndarray, "..."]]
     own_vertices: Bool[np.ndarray, " W"]
     tallies: list[LevelTally]
-    several_fans: int
+    multi_fan_vertices: int
 
 
 def refine_piece(
@@ -99,7 +99,7 @@ def refine_piece(
     own_vertices = np.zeros(0, dtype=bool)
     openers: list[Int[np.ndarray, "..."]] = []
     tallies: list[LevelTally] = []
-    several_fans = 0
+    multi_fan_vertices = 0
     step = None
     for level, step in zip(
         range(levels), steps_of(piece, scheme, levels, length, blocks), strict=False
@@ -109,8 +109,8 @@ def refine_piece(
             own_vertices = first_at_own(links, own)
             for _ in range(lines_reach(piece.creases)):
                 exact = shrunk(exact, links.faces, rim)
-            assert links.several_fans is not None
-            several_fans = int((links.several_fans & own_vertices).sum())
+            assert links.multi_fan_vertices is not None
+            multi_fan_vertices = int((links.multi_fan_vertices & own_vertices).sum())
         own_edges = own[links.first // 3]
         for _ in range(reach(scheme, level)):
             exact = shrunk(exact, links.faces, rim)
@@ -128,7 +128,9 @@ def refine_piece(
         own = np.repeat(own, 4)
         rim = np.zeros(len(step.points), dtype=bool)
     assert step is not None  # levels ≥ 1
-    return RefinedPiece(step.points, step.children, openers, own_vertices, tallies, several_fans)
+    return RefinedPiece(
+        step.points, step.children, openers, own_vertices, tallies, multi_fan_vertices
+    )
 
 
 def steps_of(

@@ -24,7 +24,7 @@ class Links:
     Attributes:
         first, second: of each edge its first half-edge, and its second where it is interior or a
             crease, else −1; half-edge 3 f + i is of face f.
-        several_fans: of the control mesh the vertices with more than one fan; None later.
+        multi_fan_vertices: of the control mesh the vertices with more than one fan; None later.
     """
 
     vertex_count: int
@@ -33,7 +33,7 @@ class Links:
     interior: Int[np.ndarray, " I"]
     first: Int[np.ndarray, " E"]
     second: Int[np.ndarray, " E"]
-    several_fans: Bool[np.ndarray, " V"] | None
+    multi_fan_vertices: Bool[np.ndarray, " V"] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def steps_by_arrays(
 ) -> Iterator[Step]:
     """Yield the steps of ``array_steps``, with what is asked of them here."""
     for step in array_steps(points, faces, creases, scheme, length, blocks):
-        links, loop = _links(step.topology, step.several_fans), step.placed.loop_points
+        links, loop = _links(step.topology, step.multi_fan_vertices), step.placed.loop_points
         kept = step.placed if step.placed.learned else None
         yield Step(
             links, step.control, step.placed.points, step.faces, kept, loop, loop is not None
@@ -110,7 +110,7 @@ def steps_by_kernels(
             interior=mesh.interior,
             first=mesh.half_edges[:, 0],
             second=mesh.half_edges[:, 1],
-            several_fans=level.several_fans if depth == 0 else None,
+            multi_fan_vertices=level.multi_fan_vertices if depth == 0 else None,
         )
         children = split_mesh_faces(mesh, np.int32, blocks)
         yield Step(links, level.points, made, children, placed, loop, may_flip)
@@ -118,7 +118,7 @@ def steps_by_kernels(
         level = next_level(level, made, blocks, sharp=creases.sharp_at(depth))
 
 
-def _links(topology: Topology, several_fans: Bool[np.ndarray, " V"] | None) -> Links:
+def _links(topology: Topology, multi_fan_vertices: Bool[np.ndarray, " V"] | None) -> Links:
     return Links(
         vertex_count=topology.vertex_count,
         faces=topology.faces,
@@ -126,5 +126,5 @@ def _links(topology: Topology, several_fans: Bool[np.ndarray, " V"] | None) -> L
         interior=topology.interior,
         first=first_places(topology.face_edges.reshape(-1), len(topology.edges)),
         second=topology.half_edges[:, 1],
-        several_fans=several_fans,
+        multi_fan_vertices=multi_fan_vertices,
     )

@@ -35,7 +35,7 @@ def assert_same_bits(left, right):
         assert (a.dtype, a.shape) == (b.dtype, b.shape)
         assert a.tobytes() == b.tobytes(), (name, np.abs(a - b).max())
     assert json.dumps(left.reports) == json.dumps(right.reports)
-    assert left.several_fans == right.several_fans
+    assert left.multi_fan_vertices == right.multi_fan_vertices
 
 
 def assert_kernels_agree(mesh, levels, creases=None, scheme=None, length=1.0):

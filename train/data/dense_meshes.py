@@ -121,7 +121,7 @@ def is_manifold(mesh: Mesh) -> bool:
     topology = build_topology(mesh.faces, len(mesh.vertices))
     regular = bool((topology.edge_class != EdgeClass.IRREGULAR).all())
     used = len(np.unique(mesh.faces)) == len(mesh.vertices)
-    return regular and used and not topology.several_fans.any()
+    return regular and used and not topology.multi_fan_vertices.any()
 
 
 def read_mesh(path: Path) -> Mesh:

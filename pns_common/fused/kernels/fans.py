@@ -1,4 +1,4 @@
-"""Fans of corners around vertices, with the counts of ``topology.multi_fan_vertices``."""
+"""Fans of corners around vertices, with the counts of ``Topology.multi_fan_vertices``."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def count_corners(faces, reach, begin, end, corner, count):
 
 
 @kernel(SIZE, INDICES, INTEGERS_2, CLASSES, INDEX, INDEX, INDEX, SIZE, SIZE, SIZE, FLAGS_OUT)
-def several_fans(
-    face_edges, half_edges, edge_class, corner, count, sharp, plain, begin, end, several
+def mark_multi_fan(
+    face_edges, half_edges, edge_class, corner, count, sharp, plain, begin, end, multi_fan
 ):
     """Mark the vertices begin … end − 1 that have corners outside the fan of their ``corner``.
 
@@ -66,7 +66,7 @@ def several_fans(
             cannot be another.
     """
     for v in range(begin, end):
-        several[v] = False
+        multi_fan[v] = False
         if count[v] == 0:
             continue
         start = corner[v]
@@ -96,5 +96,5 @@ def several_fans(
                     break
                 h = twin
                 seen += 1
-        several[v] = seen != count[v]
+        multi_fan[v] = seen != count[v]
     return 0

@@ -67,7 +67,7 @@ def added_by_rules(
     Raises:
         ModelError: a network returned something that is not finite, or of another shape.
     """
-    of_level = level.points, level.mesh, level.faces, level.several_fans
+    of_level = level.points, level.mesh, level.faces, level.multi_fan_vertices
     of_scheme = _altitudes(scheme), _prior_strength(scheme) if strength is None else strength
     whole = Surroundings(*of_level, length, blocks, curves, *of_scheme)
     part = bent_part(whole) if _adds_nothing_in_planes(scheme) else None
@@ -82,7 +82,7 @@ def _evaluated_on(part: BentPart, scheme: Scheme, whole: Surroundings) -> AddedB
     quiet = whole.blocks.unheard()
     of_vertices = part.vertices.spread(made.vertices, to.vertices, quiet)
     of_edges = part.edges.spread(made.edges, to.edges, quiet)
-    ringed = ringed_vertices(whole.mesh, whole.several_fans, quiet)
+    ringed = ringed_vertices(whole.mesh, whole.multi_fan_vertices, quiet)
     vertices = replace(to.vertices, corrected=ringed)
     return replace(to, vertices=vertices, moved=np.concatenate([of_vertices, of_edges]))
 

@@ -166,7 +166,7 @@ def _of_part(whole: Surroundings, mesh: MeshEdges, vertices: Int[np.ndarray, " n
         points=points,
         mesh=mesh,
         faces=FaceMeasures(points, mesh.faces, whole.faces.blocks),
-        several_fans=whole.several_fans[vertices],
+        multi_fan_vertices=whole.multi_fan_vertices[vertices],
         reference_length=_at(vertices, whole.reference_length),
         curves=curves,
         prior_strength=_at(vertices, whole.prior_strength),

@@ -66,7 +66,7 @@ def measure_rings(
     mesh: MeshEdges,
     at_faces: FaceMeasures,
     at_edges: EdgeMeasures,
-    several_fans: Bool[np.ndarray, " V"],
+    multi_fan_vertices: Bool[np.ndarray, " V"],
     blocks: Blocks,
 ) -> RingMeasures:
     """Look around every vertex of a level."""
@@ -86,31 +86,33 @@ def measure_rings(
 
     by_owner.run(count, around)
     by_owner.run(count, mean_neighbours.over(*along, fields, valence, ROWS, means))
-    smooth = _smooth(valence > 0, mesh, several_fans)
-    return RingMeasures(fields, means, valence, smooth, _with_darts(smooth, mesh, several_fans))
+    smooth = _smooth(valence > 0, mesh, multi_fan_vertices)
+    return RingMeasures(
+        fields, means, valence, smooth, _with_darts(smooth, mesh, multi_fan_vertices)
+    )
 
 
 def ringed_vertices(
-    mesh: MeshEdges, several_fans: Bool[np.ndarray, " V"], blocks: Blocks
+    mesh: MeshEdges, multi_fan_vertices: Bool[np.ndarray, " V"], blocks: Blocks
 ) -> Bool[np.ndarray, " V"]:
     """Return the vertices with one closed ring, and darts, without a look at the rings."""
     used = np.zeros(mesh.vertex_count, dtype=bool)
     blocks.run(len(mesh.faces), mark_referenced.over(mesh.faces, ROWS, used))
-    return _with_darts(_smooth(used, mesh, several_fans), mesh, several_fans)
+    return _with_darts(_smooth(used, mesh, multi_fan_vertices), mesh, multi_fan_vertices)
 
 
 def _smooth(
-    used: Bool[np.ndarray, " V"], mesh: MeshEdges, several_fans: Bool[np.ndarray, " V"]
+    used: Bool[np.ndarray, " V"], mesh: MeshEdges, multi_fan_vertices: Bool[np.ndarray, " V"]
 ) -> Bool[np.ndarray, " V"]:
     """Return the same of those that have an edge."""
-    smooth = used & ~several_fans
+    smooth = used & ~multi_fan_vertices
     if len(mesh.sharp):
         smooth &= mesh.sharp == 0
     return smooth
 
 
 def _with_darts(
-    smooth: Bool[np.ndarray, " V"], mesh: MeshEdges, several_fans: Bool[np.ndarray, " V"]
+    smooth: Bool[np.ndarray, " V"], mesh: MeshEdges, multi_fan_vertices: Bool[np.ndarray, " V"]
 ) -> Bool[np.ndarray, " V"]:
     """Return the same with the vertices where one crease ends (``topology.ringed_vertices``)."""
     if len(mesh.sharp) == 0:
@@ -118,7 +120,7 @@ def _with_darts(
     sharp = mesh.sharp_edges
     creases = mesh.edges[sharp[mesh.edge_class[sharp] == EdgeClass.CREASE]]
     at_creases = marked(creases.reshape(-1), mesh.vertex_count)
-    return smooth | (at_creases & (mesh.sharp == 1) & ~several_fans)
+    return smooth | (at_creases & (mesh.sharp == 1) & ~multi_fan_vertices)
 
 
 def measure_pushes(rings: RingMeasures, blocks: Blocks) -> Float[np.ndarray, "V 3"]:

@@ -36,7 +36,7 @@ class Surroundings:
     points: Float[np.ndarray, "V 3"]
     mesh: MeshEdges
     faces: FaceMeasures
-    several_fans: Bool[np.ndarray, " V"]
+    multi_fan_vertices: Bool[np.ndarray, " V"]
     reference_length: float | Float[np.ndarray, " V"]
     blocks: Blocks
     curves: CurveMoves = NO_RULE
@@ -63,7 +63,7 @@ class Surroundings:
     @cached_property
     def rings(self) -> RingMeasures:
         """The rings of all vertices."""
-        around = self.points, self.mesh, self.faces, self.edges, self.several_fans
+        around = self.points, self.mesh, self.faces, self.edges, self.multi_fan_vertices
         made = measure_rings(*around, self.blocks)
         # Nothing else reads them: an eighth of all memory.
         self.faces.forget_areas()

@@ -44,7 +44,7 @@ class FusedLevel:
         return cls(points, mesh, blocks, FaceMeasures(points, mesh.faces, blocks.unheard()))
 
     @cached_property
-    def several_fans(self) -> Bool[np.ndarray, " V"]:
+    def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
         """Whether the faces of each vertex form more than one fan."""
         return multi_fan_vertices(self.mesh, self.blocks.unheard())
 

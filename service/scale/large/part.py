@@ -146,7 +146,7 @@ def _refine(
         "halo": len(cut.faces) - len(own),
         "rings": rings,
         "box": box,
-        "several_fans": made.several_fans,
+        "multi_fan_vertices": made.multi_fan_vertices,
         "levels": [tally.as_dict() for tally in made.tallies],
     }
 

@@ -284,7 +284,7 @@ def _report(
         "model_hash": scheme.model_hash,
         "reference_length": length,
         "prior_strength": scheme.prior_strength,
-        "multi_fan_vertices": sum(part["several_fans"] for part in done),
+        "multi_fan_vertices": sum(part["multi_fan_vertices"] for part in done),
         **reduced,
         **read,
     }

@@ -10,7 +10,6 @@ from pns_common.connectivity.topology import (
     EdgeClass,
     build_topology,
     children_across,
-    multi_fan_vertices,
     split,
     stable_sort,
 )
@@ -108,7 +107,7 @@ def slow_fans(faces, vertex):
 def test_vertices_with_several_fans_are_found(mesh):
     if any(len(set(face)) < 3 for face in mesh.faces.tolist()):
         return
-    marked = multi_fan_vertices(build_topology(mesh.faces, len(mesh.vertices)))
+    marked = build_topology(mesh.faces, len(mesh.vertices)).multi_fan_vertices
     expected = [slow_fans(mesh.faces, v) > 1 for v in range(len(mesh.vertices))]
     np.testing.assert_array_equal(marked, expected)
 
@@ -131,7 +130,7 @@ def test_a_closed_ring_may_have_one_crease_that_ends_there():
 def test_two_closed_fans_on_one_vertex_are_two():
     vertices, faces = icosphere(0)
     both = np.concatenate([faces, np.where(faces == 0, 0, faces + len(vertices))])
-    marked = multi_fan_vertices(build_topology(both, 2 * len(vertices)))
+    marked = build_topology(both, 2 * len(vertices)).multi_fan_vertices
     assert np.flatnonzero(marked).tolist() == [0]
 
 

@@ -24,7 +24,7 @@ def test_nobody_looks_at_the_levels_before_the_report_is_read(monkeypatch):
     made = refine_fused(MESH, scheme, 3, 1.0, NO_CREASES, Blocks(1), lambda: None)
     assert looks == []
     assert made.reports == by_arrays(MESH, 3, scheme=scheme).reports
-    assert (len(looks), made.several_fans) == (3, 0)
+    assert (len(looks), made.multi_fan_vertices) == (3, 0)
 
 
 def test_each_level_is_told_once_when_it_ends():

@@ -42,7 +42,7 @@ def test_each_part_is_what_it_is_alone(scheme):
         for part, length, strength in zip(PARTS, LENGTHS.tolist(), STRENGTHS, strict=True)
     ]
     assert made.reports == [part.reports for part in alone]
-    assert made.several_fans == [0, 1]
+    assert made.multi_fan_vertices == [0, 1]
     corners = np.concatenate([part.points[part.faces] for part in alone])
     np.testing.assert_array_equal(made.points[made.faces], corners)
     gates = np.concatenate([part.gate[part.faces] for part in alone])

@@ -38,8 +38,8 @@ def test_the_next_step_is_given_the_normals_of_the_children():
 
 def test_fans_are_counted_in_the_control_mesh_alone():
     first, second = steps(loop(), 2, *bow_tie())
-    assert first.several_fans.tolist() == [True, False, False, False, False]
-    assert second.several_fans is None
+    assert first.multi_fan_vertices.tolist() == [True, False, False, False, False]
+    assert second.multi_fan_vertices is None
 
 
 def test_creases_are_followed():

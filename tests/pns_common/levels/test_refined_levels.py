@@ -25,7 +25,7 @@ def test_the_levels_are_looked_at_once_and_not_before_they_are_asked_for():
 
     def look():
         looks.append(1)
-        return LevelsReport([], several_fans=3)
+        return LevelsReport([], multi_fan_vertices=3)
 
     made = RefinedLevels(
         np.zeros((4, 3)),
@@ -36,4 +36,4 @@ def test_the_levels_are_looked_at_once_and_not_before_they_are_asked_for():
         lambda: build_topology(TETRAHEDRON, 4),
     )
     assert looks == []
-    assert (made.several_fans, made.reports, looks) == (3, [], [1])
+    assert (made.multi_fan_vertices, made.reports, looks) == (3, [], [1])

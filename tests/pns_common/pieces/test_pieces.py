@@ -49,7 +49,7 @@ def assert_pieces_are_the_whole(mesh, owner, scheme, levels, creases=None, lines
         written[piece.children] += 1
     assert (written == 1).all()
     assert_report_is_the_whole(reduced_report([p.refined.tallies for p in made]), whole.report)
-    fans = sum(piece.refined.several_fans for piece in made)
+    fans = sum(piece.refined.multi_fan_vertices for piece in made)
     assert fans == whole.report["multi_fan_vertices"]
 
 

@@ -29,7 +29,14 @@ def test_compiled_steps_are_the_others(mesh, scheme):
         np.testing.assert_array_equal(compiled.children, plain.children)
         assert (compiled.placed is None) == (plain.placed is None)
         assert (compiled.loop is None) == (plain.loop is None)
-        for name in ("vertex_count", "faces", "edge_class", "interior", "first", "several_fans"):
+        for name in (
+            "vertex_count",
+            "faces",
+            "edge_class",
+            "interior",
+            "first",
+            "multi_fan_vertices",
+        ):
             ours, theirs = getattr(compiled.links, name), getattr(plain.links, name)
             np.testing.assert_array_equal(ours, theirs)
         paired = plain.links.second >= 0

@@ -5,7 +5,7 @@ import pytest
 
 from pns_common import Mesh
 from pns_common.connectivity.creases import crease_classes
-from pns_common.fused.kernels.fans import count_corners, several_fans
+from pns_common.fused.kernels.fans import count_corners, mark_multi_fan
 from tests.support.kernels import WAYS, edges_built
 from tests.support.meshes import bow_tie, icosphere, one_way_pair
 from tests.support.stars import star
@@ -33,12 +33,12 @@ def told(way, points, faces, creases=None):
     np.testing.assert_array_equal(corners, np.bincount(faces.reshape(-1), minlength=count))
     used = np.flatnonzero(corners)
     np.testing.assert_array_equal(faces.reshape(-1)[corner[used]], used)
-    several = np.ones(count, dtype=bool)
-    WAYS[way](several_fans)(
+    multi_fan = np.ones(count, dtype=bool)
+    WAYS[way](mark_multi_fan)(
         *(mesh.face_edges, mesh.half_edges, kinds, corner, corners, mesh.sharp),
-        *(int(mesh.plain), 0, count, several),
+        *(int(mesh.plain), 0, count, multi_fan),
     )
-    return np.flatnonzero(several).tolist()
+    return np.flatnonzero(multi_fan).tolist()
 
 
 @pytest.mark.parametrize("way", WAYS)

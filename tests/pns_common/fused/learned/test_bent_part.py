@@ -93,7 +93,7 @@ def test_each_vertex_may_have_its_own_unit_of_length(mesh):
 
 def surroundings(mesh):
     level = control_level(mesh.vertices, mesh.faces, NO_CREASES, Blocks(1))
-    of_level = level.points, level.mesh, level.faces, level.several_fans
+    of_level = level.points, level.mesh, level.faces, level.multi_fan_vertices
     return Surroundings(*of_level, 1.0, Blocks(1), NO_RULE)
 
 

@@ -6,7 +6,6 @@ import pytest
 from pns_common import Mesh
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.topology import build_topology
-from pns_common.connectivity.topology import multi_fan_vertices as by_doubling
 from pns_common.fused.levels.fans import multi_fan_vertices
 from tests.support.kernels import assert_kernels_agree, by_kernels, edges_built
 from tests.support.meshes import bow_tie, icosphere, one_way_pair, three_pages
@@ -28,14 +27,14 @@ def test_fans_that_close_around_one_vertex_are_told_apart(rims, loose):
     # Before the others: a walk begins at a vertex's last corner.
     faces = np.concatenate([np.insert(ends, 0, 0, axis=1), *faces])
     points = np.random.default_rng(0).standard_normal((faces.max() + 1, 3))
-    assert by_kernels(Mesh(points, faces), 1).several_fans == (len(rims) + loose > 1)
+    assert by_kernels(Mesh(points, faces), 1).multi_fan_vertices == (len(rims) + loose > 1)
     assert_kernels_agree(Mesh(points, faces), 2)
 
 
 @pytest.mark.parametrize("shape", [bow_tie, three_pages, one_way_pair, icosphere])
 def test_each_vertex_is_told_as_pointer_doubling_tells_it(shape):
     mesh = Mesh(*shape())
-    expected = by_doubling(build_topology(mesh.faces, len(mesh.vertices)))
+    expected = build_topology(mesh.faces, len(mesh.vertices)).multi_fan_vertices
     for rows in (3, 1000):
-        several = multi_fan_vertices(edges_built(mesh), Blocks(2, rows))
-        np.testing.assert_array_equal(several, expected)
+        marked = multi_fan_vertices(edges_built(mesh), Blocks(2, rows))
+        np.testing.assert_array_equal(marked, expected)
