@@ -17,11 +17,8 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.base.arrays import dot, marked
 from pns_common.fused.where_loaded.interior_edges import interior_edges
+from pns_common.geometry.crease_lines.turns import IN_ONE_PLANE
 from pns_common.geometry.frames import face_normals
-
-# Faces that turn by no more than this, in radians, lie in one plane: far above what single
-# precision does to one, far below what shading shows of an edge.
-IN_ONE_PLANE = math.radians(0.1)
 
 
 def flat_borders(
@@ -66,5 +63,5 @@ def _inside_planes(
     of_vertex[corner] = normal
     inside &= of_vertex.any(axis=1)
     chord = normal - of_vertex[corner]
-    inside[corner[dot(chord, chord) > IN_ONE_PLANE**2]] = False
+    inside[corner[dot(chord, chord) > math.radians(IN_ONE_PLANE) ** 2]] = False
     return inside

@@ -20,13 +20,10 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.arrays import dot, gather, marked, unit
 from pns_common.connectivity.topology import EdgeClass, vertices_across
 from pns_common.geometry.crease_lines.going_on import CORNER, runs_straight
-from pns_common.geometry.crease_lines.turns import Edges, cosine_of, turn_cosines
+from pns_common.geometry.crease_lines.turns import IN_ONE_PLANE, Edges, cosine_of, turn_cosines
 
-# Two faces that turn by less, in degrees, lie in one plane: far above what single precision does to
-# one, far below what a fine mesh of something round turns by. Neither this nor the next is an angle
-# that circles are cut into: where many edges turn by it rounding would decide.
-PLANE = 0.101
-# A line that turns by less at a vertex, in degrees, runs straight there.
+# A line that turns by less at a vertex, in degrees, runs straight there: no angle that circles are
+# cut into, as IN_ONE_PLANE is none.
 STRAIGHT = 0.505
 # Loop's 3/8 (a + b) + 1/8 (c + d) is 1/8 of c + d − a − b from an edge's middle; so far, as a share
 # of the edge, may it go.
@@ -47,7 +44,7 @@ def with_held_edges(
     is_sharp = is_line | (mesh.edge_class != EdgeClass.INTERIOR)
     stays = staying(points, mesh, np.flatnonzero(is_line), np.flatnonzero(is_sharp))
     rows = np.flatnonzero(end_at(stays, mesh) & ~is_sharp)
-    rows = rows[turn_cosines(normals, mesh, rows) > cosine_of(PLANE)]
+    rows = rows[turn_cosines(normals, mesh, rows) > cosine_of(IN_ONE_PLANE)]
     moved = slides(points, mesh, rows)
     if not moved.any():
         return lines
@@ -116,6 +113,6 @@ def in_planes(
     inside = marked(asked, mesh.vertex_count)
     rows = np.flatnonzero(end_at(inside, mesh))
     bent = is_sharp[rows]
-    bent[~bent] = turn_cosines(normals, mesh, rows[~bent]) <= cosine_of(PLANE)
+    bent[~bent] = turn_cosines(normals, mesh, rows[~bent]) <= cosine_of(IN_ONE_PLANE)
     inside[mesh.edges[rows[bent]]] = False
     return inside

@@ -14,6 +14,10 @@ from pns_common.connectivity.topology import EdgeClass
 # Cosines this near to each other are alike: one edge may turn by just half of another, as 45 of 90
 # degrees, and rounding would decide. Beside 180 degrees it takes a root of what is rounded.
 CLEARLY = 1e-6
+# Two faces that turn by less, in degrees, lie in one plane: far above what single precision does to
+# one, far below what shading shows of an edge. It is no angle that circles are cut into: where many
+# edges turn by it rounding would decide.
+IN_ONE_PLANE = 0.101
 
 
 @runtime_checkable

@@ -8,8 +8,7 @@ import pytest
 from pns_common import load_model
 from pns_common.connectivity.topology import build_topology
 from pns_common.crease_lines import LINES, named_on
-from pns_common.geometry.crease_lines.held_edges import PLANE
-from pns_common.geometry.crease_lines.turns import cosine_of, edges_beyond
+from pns_common.geometry.crease_lines.turns import IN_ONE_PLANE, cosine_of, edges_beyond
 from pns_common.geometry.frames import face_normals
 from service.gltf.read.primitives import read_primitive
 from service.gltf.read.upload import read_upload
@@ -161,7 +160,7 @@ def test_artists_shade_hard_what_the_shape_shows_to_be_a_line():
 
 def edges_that_turn(mesh):
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    normals, cosine = face_normals(mesh.vertices, mesh.faces), cosine_of(PLANE)
+    normals, cosine = face_normals(mesh.vertices, mesh.faces), cosine_of(IN_ONE_PLANE)
     return topology.edges[edges_beyond(normals, topology, topology.interior, cosine)]
 
 
