@@ -1,27 +1,17 @@
 /** The page: what the user does goes to the session, what comes of it to the stage and the panel. */
 
+import { certify, describe } from "./account";
 import { json, request, type Limits, type ModelEntry } from "./api/client";
-import { fileProblem, isAbort } from "./api/problem";
-import { chosen, dropped } from "./files/dropped";
+import { fileProblem } from "./api/problem";
 import type { Opened } from "./files/open";
 import { uploadsOf, type Dropped, type PathedFile, type Upload } from "./files/upload";
-import { dihedrals } from "./measure/dihedral";
-import { distances, largestLength, rounding } from "./measure/distance";
-import { surfaceOf } from "./measure/surface";
-import type { Lengths } from "./report/certificate";
 import { bytes, listed } from "./report/format";
-import { Session, type Again, type Result, type Source } from "./session";
-import { DEFAULTS, fromHash, toHash, type Asked, type Compression, type Diagnostics, type Settings } from "./settings";
-import { debounced, element, input, save, select } from "./ui/dom";
+import { Session, type Again, type Result } from "./session";
+import { DEFAULTS, fromHash, toHash, type Asked, type Settings } from "./settings";
+import { debounced, element } from "./ui/dom";
+import { bindDownloads } from "./ui/downloads";
+import { bindFiles } from "./ui/file-input";
 import { FileList } from "./ui/file-list";
-import {
-  showCertificate,
-  showChanges,
-  showStatistics,
-  showTimings,
-  showValidation,
-  type Before,
-} from "./ui/results";
 import { SettingsForm } from "./ui/settings-form";
 import { Stage } from "./ui/stage";
 import {
@@ -36,19 +26,14 @@ import {
   showProblem,
   showProgress,
 } from "./ui/status";
-import { compare } from "./validate/compare";
-import { validate } from "./validate/validate";
 import { dispose, type Model } from "./view/model";
 
-let validation = new AbortController();
 /** Another try at what failed last. */
 let retry: Again = () => {};
 /** Files that are chosen count up: the last of them counts, however long the others take to come. */
 let choices = 0;
 /** The result whose values at vertices are on their way. */
 let awaiting: Result | null = null;
-/** Of the file that is shown. */
-let facts: { source: Source; before: Before } | null = null;
 
 const stage = new Stage(() => void fetchValues(), remember);
 
@@ -85,19 +70,14 @@ const session = new Session({
   stopped: ({ name }) => showNotice(`${name}: cancelled`, true),
   refined: (ours) => {
     stage.refine(ours, session.loop);
-    const milliseconds = performance.now() - ours.began;
-    describe(ours);
-    showTimings([
-      ...ours.timings.map(([name, ms]): [string, number] => [STAGES[name] ?? name, ms / 1000]),
-      ["From request to picture", milliseconds / 1000],
-    ]);
-    void validateBoth(ours);
+    document.body.classList.add("refined");
+    if (session.source) describe(ours, session.source, stage);
   },
   compared: (loop) => {
     const { ours } = session;
     if (!ours) return;
     stage.refine(ours, loop);
-    announce(`Refined. ${showCertificate(ours.report, lengths(ours, loop))}`);
+    announce(`Refined. ${certify(ours, loop, stage)}`);
   },
   idle: hideProgress,
   failed: (error, again, upload) => {
@@ -113,18 +93,6 @@ const session = new Session({
   },
   discarded: (model) => stage.discard(model),
 });
-
-const STAGES: Record<string, string> = {
-  read: "Service: reading",
-  weld: "Service: welding",
-  refine: "Service: refining",
-  attributes: "Service: attributes",
-  write: "Service: writing",
-  upload: "Upload",
-  queue: "Queue",
-  total: "Service: in all",
-  opening: "Opening the result",
-};
 
 const given = fromHash(location.hash);
 const changed = debounced(300, () => {
@@ -208,58 +176,6 @@ function restore(wanted: Settings): void {
   void session.again(form.asked, prepare);
 }
 
-/** Everything that the report and the file say, before Loop's side has come. */
-function describe(ours: Result): void {
-  document.body.classList.add("refined");
-  const { source } = session;
-  if (!source) return;
-  showCertificate(ours.report, lengths(ours, null));
-  if (facts?.source !== source) facts = { source, before: before(source) };
-  const sharpest = (): number => dihedrals(ours.model).max;
-  showStatistics(facts.before, ours.report, ours.bytes.byteLength, sharpest);
-  showChanges(ours.report);
-}
-
-function lengths({ model, report }: Result, loop: Result | null): Lengths {
-  const ofMesh = new Map(report.meshes.map((mesh) => [mesh.index, mesh]));
-  const measured = loop && distances(model, loop.model);
-  return {
-    proved: largestLength(model, (index) => ofMesh.get(index)?.limit_distance ?? 0) ?? 0,
-    allowed: largestLength(model, (index) => ofMesh.get(index)?.limit_distance_bound),
-    measured: measured && measured.max,
-    rounding: rounding(model),
-    size: stage.size,
-    unit: stage.unit,
-  };
-}
-
-/** What is told of the file itself; it stays the same however often it is refined. */
-function before({ upload, opened, model }: Source): Before {
-  const geometries = new Set(model.meshes.map(({ geometry }) => geometry));
-  const vertices = [...geometries].reduce((n, g) => n + g.getAttribute("position").count, 0);
-  return {
-    faces: opened.faces,
-    vertices,
-    bytes: upload.bytes,
-    surface: surfaceOf(model.meshes),
-    sharpest: dihedrals(model).max,
-  };
-}
-
-async function validateBoth(ours: Result): Promise<void> {
-  validation.abort();
-  const { signal } = (validation = new AbortController());
-  showValidation("Looking at both files…");
-  try {
-    const gltf = session.source?.opened.gltf;
-    const result = await validate({ bytes: ours.bytes, neighbours: new Map() }, signal);
-    const first = gltf ? await validate(gltf, signal) : null;
-    showValidation(compare(first, result));
-  } catch (error) {
-    if (!isAbort(error)) showValidation(`The validator could not run: ${(error as Error).message}`);
-  }
-}
-
 /** The values at vertices, which a plain result does not hold: the same job with all diagnostics. */
 async function fetchValues(): Promise<void> {
   const { ours } = session;
@@ -289,55 +205,6 @@ function remember(): void {
   history.replaceState(null, "", hash ? `#${hash}` : location.pathname + location.search);
 }
 
-function resultName(upload: Upload, extension: string): string {
-  return `${upload.name.replace(/\.\w+$/, "")}-refined.${extension}`;
-}
-
-/** What is downloaded is chosen now: another file may be there, or other settings, before the answer is. */
-async function downloadGlb(ours: Result, diagnostics: Diagnostics, compress: Compression): Promise<void> {
-  let content = ours.bytes;
-  if (diagnostics === "full" || compress !== "none") {
-    const again = () => void downloadGlb(ours, diagnostics, compress);
-    const answer = await session.fetch(ours, diagnostics, compress, again);
-    if (!answer) return;
-    content = answer;
-  }
-  save(new Blob([content], { type: "model/gltf-binary" }), resultName(ours.upload, "glb"));
-}
-
-function bindFiles(): void {
-  const files = input("files");
-  for (const id of ["choose", "choose-first"]) {
-    element(id).addEventListener("click", () => files.click());
-  }
-  files.addEventListener("change", () => {
-    if (files.files?.length) void take(chosen(files.files));
-    // The same file may be chosen again.
-    files.value = "";
-  });
-  const takeExample = (): void => void take(example(), takeExample);
-  element("example").addEventListener("click", takeExample);
-  const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
-  document.addEventListener("dragover", (event) => {
-    if (!hasFiles(event)) return;
-    event.preventDefault();
-    document.body.classList.add("dragging");
-  });
-  document.addEventListener("dragleave", (event) => {
-    if (!event.relatedTarget) document.body.classList.remove("dragging");
-  });
-  document.addEventListener("drop", (event) => {
-    // Words may be dropped into a field.
-    if (!event.dataTransfer || !hasFiles(event)) return;
-    event.preventDefault();
-    document.body.classList.remove("dragging");
-    void take(dropped(event.dataTransfer));
-  });
-  document.addEventListener("paste", (event) => {
-    if (event.clipboardData?.files.length) void take(chosen(event.clipboardData.files));
-  });
-}
-
 async function example(): Promise<PathedFile[]> {
   const response = await request(`assets/${EXAMPLE}`);
   const file = new File([await response.arrayBuffer()], "example.glb");
@@ -356,6 +223,8 @@ function bindPanel(): void {
     offered = start();
     retry();
   });
+  const takeExample = (): void => void take(example(), takeExample);
+  element("example").addEventListener("click", takeExample);
   element("reset").addEventListener("click", () => restore({ ...DEFAULTS }));
   // A link that is followed in the page's own tab changes nothing but the part after #.
   addEventListener("hashchange", () => {
@@ -383,20 +252,6 @@ function bindPanel(): void {
     element("share").textContent = copied ? "Copied" : "See address bar";
     setTimeout(() => (element("share").textContent = "Copy link"), 1500);
   });
-  element("download").addEventListener("click", () => {
-    const diagnostics = input("attributes").checked ? "full" : "summary";
-    if (session.ours) void downloadGlb(session.ours, diagnostics, select("compress").value as Compression);
-  });
-  element("download-report").addEventListener("click", () => {
-    if (!session.ours) return;
-    const { upload, report } = session.ours;
-    save(new Blob([JSON.stringify(report, null, 2)], { type: "application/json" }), resultName(upload, "json"));
-  });
-  element("download-picture").addEventListener("click", async () => {
-    const upload = session.source?.upload;
-    if (stage.viewer && upload) save(await stage.viewer.picture(), resultName(upload, "png"));
-  });
-  input("download-picture").disabled = !stage.viewer;
 }
 
 /** What the service offers; the page works with less where it does not say. */
@@ -413,6 +268,7 @@ async function start(): Promise<void> {
   void models;
 }
 
-bindFiles();
+bindFiles((files) => void take(files));
 bindPanel();
+bindDownloads(session, stage);
 let offered = start();

@@ -1,8 +1,7 @@
 /** The stage: which models stand on which side, how they look, and the tools under them. */
 
 import { Box3, type Mesh } from "three";
-import { cividis } from "../measure/cividis";
-import { counted, type Unit } from "../report/format";
+import type { Unit } from "../report/format";
 import type { Result, Source } from "../session";
 import { LOOP } from "../settings";
 import { colour, HEATS, needsFull, type Heat, type Legend } from "../view/heat";
@@ -11,11 +10,14 @@ import { dress, plain, type Look } from "../view/looks";
 import { dispose, extentOf, type Extent, type Model } from "../view/model";
 import { Playback } from "../view/playback";
 import { Viewer, type Layout } from "../view/viewer";
-import { debounced, element, input, make, select } from "./dom";
+import { debounced, element, input, select } from "./dom";
+import { bindKeys } from "./keys";
+import { showLabels } from "./labels";
+import { drawLegendBar, showLegend } from "./legend";
 import { copyMorphs, offerMorphs, Timeline } from "./timeline";
 import { bindWipe } from "./wipe";
 
-export interface Shown {
+interface Shown {
   source: Source | null;
   ours: Result | null;
   loop: Result | null;
@@ -24,18 +26,11 @@ export interface Shown {
 /** What may be drawn over both sides, by the id of its toggle. */
 const LINES = ["edges", "normal-lines"] as const;
 
-/** What stands over a side. */
-interface Label {
-  title: string;
-  text: string;
-}
-
 export class Stage {
   /** null where the browser has no WebGL. */
   readonly viewer: Viewer | null;
   private readonly playback = new Playback();
   private readonly timeline: Timeline;
-  private readonly setWipe: (share: number) => void;
   private shown: Shown = { source: null, ours: null, loop: null };
   private surface: Look = "material";
   private heat: Heat | null = null;
@@ -51,7 +46,7 @@ export class Stage {
   ) {
     this.viewer = startViewer();
     this.timeline = new Timeline(this.playback, () => this.viewer?.invalidate());
-    this.setWipe = bindWipe((share) => {
+    const setWipe = bindWipe((share) => {
       if (!this.viewer) return;
       this.viewer.wipe = share;
       this.viewer.invalidate();
@@ -79,7 +74,7 @@ export class Stage {
     // Tools wrap into more lines where the window is narrow.
     const cover = new ResizeObserver(() => this.cover());
     for (const id of ["canvas", "tools", "timeline"]) cover.observe(element(id));
-    this.bindKeys();
+    bindKeys(this.viewer, this.timeline, setWipe);
     const dark = matchMedia("(prefers-color-scheme: dark)");
     dark.addEventListener("change", () => this.arrange());
     drawLegendBar();
@@ -203,8 +198,9 @@ export class Stage {
     const right = ours?.model ?? null;
     const paper = getComputedStyle(document.body).backgroundColor;
     element("view").dataset.layout = this.layout;
-    this.writeLabels(byLoop ? loop : null);
-    this.showLegend(this.colourResult());
+    showLabels(source, ours, byLoop ? loop : null, this.layout);
+    element("wipe").hidden = !(this.layout === "wipe" && source && ours) || !this.viewer;
+    showLegend(this.colourResult());
     if (!this.viewer) return;
     this.viewer.background(paper);
     const moved = this.viewer.layout !== this.layout;
@@ -244,42 +240,6 @@ export class Stage {
     return colour(this.heat, ours, loop, this.unit);
   }
 
-  private showLegend(legend: Legend | null): void {
-    const figure = element("legend");
-    figure.hidden = !legend;
-    if (!legend) return;
-    figure.dataset.end = String(legend.end);
-    element("legend-title").textContent = legend.title;
-    element("legend-low").textContent = legend.low;
-    element("legend-high").textContent = legend.high;
-    element("legend-note").textContent = legend.note;
-  }
-
-  private writeLabels(loop: Result | null): void {
-    const { source, ours } = this.shown;
-    const [left, right] = this.labels(loop);
-    for (const [side, label] of [["left", left], ["right", right]] as const) {
-      element(`label-${side}`).hidden = !label;
-      element(`label-${side}`).replaceChildren(
-        make("strong", { textContent: label?.title ?? "" }),
-        make("span", { textContent: label?.text ?? "" }),
-      );
-    }
-    element("wipe").hidden = !(this.layout === "wipe" && source && ours) || !this.viewer;
-  }
-
-  /** What stands over the left side and the right; `loop` is given where it takes the left. */
-  private labels(loop: Result | null): [Label | null, Label | null] {
-    const { source, ours } = this.shown;
-    const of = ({ report }: Result): string => counted(report.totals.faces, "face");
-    const text = ours ? `${ours.report.model ?? "Loop"} · ${of(ours)}` : "";
-    const before = source && { title: "Before", text: counted(source.opened.faces, "face") };
-    const after = ours && { title: "After", text };
-    if (this.layout === "overlay" || this.layout === "single") return [null, after ?? before];
-    if (loop && ours) return [{ title: "Loop", text: of(loop) }, { title: "Ours", text }];
-    return [before, after];
-  }
-
   /** Make room for the tools that float over the canvas, however many lines they take. */
   private cover(): void {
     const { bottom } = element("canvas").getBoundingClientRect();
@@ -315,40 +275,6 @@ export class Stage {
       }
     }
   }
-
-  private bindKeys(): void {
-    const turn = Math.PI / 24;
-    const click = (id: string) => () => element(id).click();
-    const layout = (value: string) => () =>
-      document.querySelector<HTMLInputElement>(`input[name="layout"][value="${value}"]`)?.click();
-    const keys: Record<string, () => void> = {
-      ArrowLeft: () => this.viewer?.orbit(-turn, 0),
-      ArrowRight: () => this.viewer?.orbit(turn, 0),
-      ArrowUp: () => this.viewer?.orbit(0, -turn),
-      ArrowDown: () => this.viewer?.orbit(0, turn),
-      "+": () => this.viewer?.zoom(0.9),
-      "=": () => this.viewer?.zoom(0.9),
-      "-": () => this.viewer?.zoom(1 / 0.9),
-      f: click("frame"),
-      w: click("edges"),
-      n: click("normal-lines"),
-      "1": layout("wipe"),
-      "2": layout("side"),
-      "3": layout("overlay"),
-      "4": layout("single"),
-      ",": () => this.setWipe((this.viewer?.wipe ?? 0.5) - 0.05),
-      ".": () => this.setWipe((this.viewer?.wipe ?? 0.5) + 0.05),
-      " ": () => this.timeline.toggle(),
-    };
-    // Letters act only while the canvas has the focus: elsewhere they are typed.
-    element("canvas").addEventListener("keydown", (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
-      const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-      if (!act) return;
-      event.preventDefault();
-      act();
-    });
-  }
 }
 
 function startViewer(): Viewer | null {
@@ -364,14 +290,5 @@ function startViewer(): Viewer | null {
     tell(true);
     canvas.hidden = true;
     return null;
-  }
-}
-
-function drawLegendBar(): void {
-  const bar = element<HTMLCanvasElement>("legend-bar").getContext("2d");
-  if (!bar) return;
-  for (let x = 0; x < 256; x++) {
-    bar.fillStyle = `rgb(${cividis(x / 255).join(" ")})`;
-    bar.fillRect(x, 0, 1, 1);
   }
 }

@@ -1,0 +1,39 @@
+/** What stands over the sides: which mesh, and how many faces. */
+
+import { counted } from "../report/format";
+import type { Result, Source } from "../session";
+import type { Layout } from "../view/viewer";
+import { element, make } from "./dom";
+
+/** What stands over a side. */
+interface Label {
+  title: string;
+  text: string;
+}
+
+/** `loop` is given where it takes the left. */
+export function showLabels(source: Source | null, ours: Result | null, loop: Result | null, layout: Layout): void {
+  const [left, right] = labels(source, ours, loop, layout);
+  for (const [side, label] of [["left", left], ["right", right]] as const) {
+    element(`label-${side}`).hidden = !label;
+    element(`label-${side}`).replaceChildren(
+      make("strong", { textContent: label?.title ?? "" }),
+      make("span", { textContent: label?.text ?? "" }),
+    );
+  }
+}
+
+function labels(
+  source: Source | null,
+  ours: Result | null,
+  loop: Result | null,
+  layout: Layout,
+): [Label | null, Label | null] {
+  const of = ({ report }: Result): string => counted(report.totals.faces, "face");
+  const text = ours ? `${ours.report.model ?? "Loop"} · ${of(ours)}` : "";
+  const before = source && { title: "Before", text: counted(source.opened.faces, "face") };
+  const after = ours && { title: "After", text };
+  if (layout === "overlay" || layout === "single") return [null, after ?? before];
+  if (loop && ours) return [{ title: "Loop", text: of(loop) }, { title: "Ours", text }];
+  return [before, after];
+}
