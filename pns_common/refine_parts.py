@@ -73,19 +73,7 @@ def refine_parts(
     check_reference_length(reference_length)
     check_limit(limit)
     workers = checked_threads(threads)
-    first = _first_vertices(mesh, part_faces)
-    if reference_length == "auto":
-        lengths = np.array(
-            [
-                reference_length_of(
-                    mesh.vertices[first[part] : first[part + 1]],
-                    mesh.faces[part_faces[part] : part_faces[part + 1]] - first[part],
-                )
-                for part in range(len(part_faces) - 1)
-            ]
-        )
-    else:
-        lengths = np.full(len(part_faces) - 1, float(reference_length))
+    lengths = _reference_lengths(mesh, part_faces, reference_length)
     if not kernels_can_serve(mesh, scheme, levels, float(lengths.min())):
         return None
     part_of_face = np.repeat(np.arange(len(lengths)), np.diff(part_faces))
@@ -105,8 +93,7 @@ def refine_parts(
         shift = limit_crease_shift(made.points, made.faces, crease_children(topology))
         if shift is not None:
             part_of = np.empty(len(made.points), dtype=np.int64)
-            of_faces = np.repeat(np.arange(len(lengths)), np.diff(part_faces) * 4**levels)
-            part_of[made.faces] = of_faces[:, None]
+            part_of[made.faces] = np.repeat(part_of_face, 4**levels)[:, None]
             np.maximum.at(kept_back, part_of[shift.vertices], shift.of_vertices)
         points = refined_limit_positions(made.points, topology, blocks)
         normals = refined_limit_normals(made.points, topology, blocks)
@@ -122,6 +109,23 @@ def refine_parts(
         gate=made.gate,
         normals=normals,
     )
+
+
+def _reference_lengths(
+    mesh: Mesh, part_faces: Int[np.ndarray, " Q"], reference_length: float | str
+) -> Float[np.ndarray, " P"]:
+    """Return R of each part."""
+    first = _first_vertices(mesh, part_faces)
+    if reference_length != "auto":
+        return np.full(len(part_faces) - 1, float(reference_length))
+    lengths = [
+        reference_length_of(
+            mesh.vertices[first[part] : first[part + 1]],
+            mesh.faces[part_faces[part] : part_faces[part + 1]] - first[part],
+        )
+        for part in range(len(part_faces) - 1)
+    ]
+    return np.array(lengths)
 
 
 def _first_vertices(mesh: Mesh, part_faces: Int[np.ndarray, " Q"]) -> Int[np.ndarray, " Q"]:
