@@ -1,6 +1,8 @@
 """Blocks of rows on several threads: each block once, whichever thread comes to it."""
 
+import itertools
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -69,16 +71,18 @@ def test_an_error_in_a_block_reaches_the_caller():
 
 @pytest.mark.parametrize("threads", [1, 3])
 def test_after_an_error_no_more_blocks_are_begun(threads):
-    begun = []
+    begun, number = [], itertools.count()
 
-    def refuse(count):
+    def refuse_the_first(count):
         begun.append(count)
-        raise StopRefiningError
+        if next(number) == 0:
+            raise StopRefiningError
+        time.sleep(1e-3)  # the other threads go on
 
     with pytest.raises(StopRefiningError):
-        Blocks(threads, 1, refuse).run(10_000, lambda rows: None)
-    assert len(begun) <= threads
-    begun.clear()
+        Blocks(threads, 1, refuse_the_first).run(10_000, lambda rows: None)
+    assert len(begun) < 5_000
+    begun, number = [], itertools.count()
     with pytest.raises(StopRefiningError):
-        Blocks(threads, 5, refuse).gather(3, lambda rows: (np.zeros(3),))
+        Blocks(threads, 5, refuse_the_first).gather(3, lambda rows: (np.zeros(3),))
     assert begun == [3]
