@@ -8,6 +8,7 @@ from pns_common.base.distinct import distinct_rows
 from pns_common.mesh import repeated_vertex
 
 from ..errors import UnrefinableError
+from ..meshes.far_from_origin import STEPS, faces_too_far
 from ..meshes.weld import canonical_zero
 from ..report import Change
 from .indexed_triangles import IndexedTriangles
@@ -16,7 +17,7 @@ LARGEST = float(np.finfo(np.float32).max)
 
 
 def rounding_changes(triangles: IndexedTriangles) -> list[Change]:
-    """Count the faces that lose their area because float32 cannot tell their corners apart.
+    """Count the faces to which float32 leaves no area, and those to which it leaves few steps.
 
     Raises:
         UnrefinableError: a position beyond the range of float32.
@@ -28,6 +29,11 @@ def rounding_changes(triangles: IndexedTriangles) -> list[Change]:
         repeated_vertex(distinct_rows(rows)[triangles.faces])
         for rows in (canonical_zero(triangles.vertices), rounded)
     )
-    flat = int((after & ~before).sum())
-    text = "faces without an area once positions are rounded to float32"
-    return [Change("", text, flat)] if flat else []
+    rounding = "once positions are rounded to float32"
+    told = {
+        f"faces without an area {rounding}": int((after & ~before).sum()),
+        f"faces too far from the origin {rounding}: fewer than {STEPS} steps to a side": (
+            faces_too_far(triangles.vertices, triangles.faces)
+        ),
+    }
+    return [Change("", what, count) for what, count in told.items() if count]

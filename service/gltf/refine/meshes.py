@@ -202,5 +202,5 @@ def _alone(
         refined=refined,
         copies=control.copies,
         report=report,
-        changes=changes_of_mesh(control, made, pointer),
+        changes=changes_of_mesh(control, made, options.levels, pointer),
     )

@@ -16,9 +16,11 @@ from pns_common.schemes import Scheme
 
 from ...course import Course
 from ...errors import UnrefinableError
+from ...meshes.far_from_origin import STEPS, faces_too_far
 from ...meshes.shape_creases import creases_by_shape
 from ...options import Options
 from ...report import Change
+from ..read.primitives import TrianglePrimitive
 from .common_slots import common_slots
 from .control_mesh import ControlMesh, vertex_rows
 from .drawn_borders import drawn_borders
@@ -113,13 +115,13 @@ def leaves_single_precision(points: Float[np.ndarray, "V 3"]) -> bool:
 
 
 def changes_of_mesh(
-    control: ControlMesh, refined: RefinedMesh | None, pointer: str
+    control: ControlMesh, refined: RefinedMesh | None, levels: int, pointer: str
 ) -> list[Change]:
-    """Return what was joined, dropped or cut in a mesh."""
+    """Return what was joined, dropped or cut in a mesh, and is written too coarsely."""
     changes = [
         change
         for primitive, keep in zip(control.primitives, control.kept, strict=True)
-        for change in changes_of_primitive(primitive.number, keep, pointer)
+        for change in changes_of_primitive(primitive, keep, levels, pointer)
     ]
     (near,) = control.near.tolist()
     cut = 0 if refined is None else len(refined.skin_and_morph.cut)
@@ -136,12 +138,21 @@ def changes_of_vertices(near: int, cut: int, pointer: str) -> list[Change]:
     return changes
 
 
-def changes_of_primitive(number: int, kept: Bool[np.ndarray, " F"], pointer: str) -> list[Change]:
-    """Return what was dropped of one primitive of the mesh at `pointer`."""
-    if kept.all():
-        return []
-    what = "degenerate faces dropped" if kept.any() else "left as it was: no face has an area"
-    return [Change(f"{pointer}/primitives/{number}", what, int((~kept).sum()))]
+def changes_of_primitive(
+    primitive: TrianglePrimitive, kept: Bool[np.ndarray, " F"], levels: int, pointer: str
+) -> list[Change]:
+    """Return what was dropped of a primitive of the mesh at `pointer`, and is too far away."""
+    pointer = f"{pointer}/primitives/{primitive.number}"
+    if not kept.any():
+        return [Change(pointer, "left as it was: no face has an area", len(kept))]
+    dropped = int((~kept).sum())
+    faces = primitive.corners if dropped == 0 else primitive.corners[kept]
+    far = faces_too_far(primitive.attributes["POSITION"], faces, levels)
+    told = {
+        "degenerate faces dropped": dropped,
+        f"faces too far from the origin: a side has fewer than {STEPS} steps of float32": far,
+    }
+    return [Change(pointer, what, count) for what, count in told.items() if count]
 
 
 def _skin_and_morph(

@@ -278,7 +278,9 @@ def _divided(
             changes=[
                 change
                 for primitive, keep in zip(primitives, kept, strict=True)
-                for change in changes_of_primitive(primitive.number, keep[part], pointers[part])
+                for change in changes_of_primitive(
+                    primitive, keep[part], options.levels, pointers[part]
+                )
             ]
             + changes_of_vertices(int(control.near[part]), int(made.cut[part]), pointers[part]),
         )

@@ -46,6 +46,21 @@ def test_a_mesh_without_a_length_is_counted():
     assert totals["zero_reference_lengths"] == 1
 
 
+@pytest.mark.parametrize(("levels", "count"), [(1, 32), (2, 2 * 128)])
+def test_what_float32_is_too_coarse_for_once_it_is_refined_is_told(levels, count):
+    """Sides of the first are 11 steps long at level 1; those of the second 181, and 91 at 2."""
+    far = [
+        octahedron(POSITION=size * octahedron()["POSITION"] + [4.5e6, 0, 0]) for size in (8, 128)
+    ]
+    near = octahedron(POSITION=octahedron()["POSITION"] + [9, 0, 0])
+    told = subdivide(*([shape] for shape in (*far, near)), levels=levels).report["changes"]
+    assert sum(change["count"] for change in told) == count
+    assert [change["pointer"] for change in told] == [
+        f"/meshes/{number}/primitives/0" for number in range(levels)
+    ]
+    assert all("too far from the origin" in change["what"] for change in told)
+
+
 def test_degenerate_faces_are_dropped_and_reported():
     shape = octahedron()
     shape["indices"] = np.concatenate([[[0, 0, 2]], shape["indices"], [[3, 1, 3]]])

@@ -67,10 +67,32 @@ def test_faces_that_rounding_flattens_are_counted() -> None:
     triangles = grid(spacing=0.1, offset=4.5e6)
     x = triangles.vertices.astype(np.float32)[triangles.faces]
     sides = [(x[:, i] == x[:, i - 1]).all(axis=1) for i in range(3)]
-    (change,) = rounding_changes(triangles)
+    change, _ = rounding_changes(triangles)
     assert change.count == np.any(sides, axis=0).sum() > 100
     assert "float32" in change.what
     assert rounding_changes(grid(spacing=0.1, offset=0)) == []
+
+
+@pytest.mark.parametrize(("offset", "told"), [(4.5e6, True), (4e5, True), (1e4, False), (0, False)])
+def test_faces_of_few_steps_of_float32_are_counted(offset: float, told: bool) -> None:
+    """Of a map in metres, which rounding turns by some tenths of a degree."""
+    triangles = grid(spacing=1.1, offset=offset)
+    triangles.vertices[:, 2] = triangles.vertices[:, 0] - offset
+    changes = rounding_changes(triangles)
+    assert [change.count for change in changes] == [len(triangles.faces)] * told
+    assert (turned_by_rounding(triangles) > 0.1) == told
+
+
+def turned_by_rounding(triangles: IndexedTriangles) -> float:
+    """Return the degrees by which rounding to float32 turns the face that it turns most."""
+    exact, rounded = (
+        np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        for vertices in (triangles.vertices, triangles.vertices.astype(np.float32))
+        for p in [vertices.astype(np.float64)[triangles.faces]]
+    )
+    lengths = np.linalg.norm(exact, axis=1) * np.linalg.norm(rounded, axis=1)
+    sine = np.linalg.norm(np.cross(exact, rounded), axis=1) / lengths
+    return float(np.degrees(np.arcsin(sine.max())))
 
 
 def test_positions_beyond_the_range_of_float32_are_refused() -> None:
