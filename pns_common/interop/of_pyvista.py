@@ -14,9 +14,16 @@ def read_pyvista(mesh: Any) -> CarriedMesh:
     """Return the arrays of a PolyData.
 
     Raises:
-        MeshError: it has faces with more corners, or lines or points of their own.
+        MeshError: it has no faces, or some with more corners, or lines or points of their own.
     """
-    if not mesh.is_all_triangles or mesh.n_lines or mesh.n_verts:
+    if not (len(mesh.faces) or mesh.n_strips):
+        raise MeshError("no faces to refine", element="faces")
+    if mesh.n_lines or mesh.n_verts:
+        # To triangulate it leaves the lines.
+        what = f"lines ({mesh.n_lines}) and points ({mesh.n_verts}) of their own beside them"
+        advice = "give pyvista.PolyData(mesh.points, mesh.faces)"
+        raise MeshError(f"{what}; {advice}", element="faces")
+    if not mesh.is_all_triangles:
         raise MeshError("not triangles alone; triangulate() it first", element="faces")
     # Normals are those of the old surface: they are computed again where they are wanted.
     normals = {mesh.point_data.active_normals_name, mesh.cell_data.active_normals_name}

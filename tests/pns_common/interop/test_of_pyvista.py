@@ -40,3 +40,19 @@ class TestPyvista:
     def test_a_plane_of_quadrangles_is_refused_with_what_to_do(self):
         with pytest.raises(MeshError, match="triangulate"):
             subdivide(self.pyvista.Plane())
+
+    def test_lines_and_points_beside_triangles_are_refused_with_what_to_do(self):
+        """To triangulate it does not help: lines are still there."""
+        both = {"lines": [2, 0, 1], "verts": [1, 0]}
+        given = self.pyvista.PolyData(VERTICES, faces=self.mesh().faces, **both)
+        for refused in (given, given.triangulate()):
+            with pytest.raises(MeshError, match=r"lines \(1\)") as told:
+                subdivide(refused)
+        advice = str(told.value).split("give ")[1]
+        followed = eval(advice, {"pyvista": self.pyvista, "mesh": given})
+        assert subdivide(followed, 1, loop()).n_cells == 4 * len(FACES)
+
+    def test_a_cloud_of_points_is_refused_as_one_without_faces(self):
+        for cloud in (self.pyvista.PolyData(), self.pyvista.PolyData(VERTICES)):
+            with pytest.raises(MeshError, match="no faces"):
+                subdivide(cloud)
