@@ -14,6 +14,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from pns_common.connectivity.topology import build_topology
+from pns_common.errors import ParameterError
 from pns_common.features.edge_features import FeatureSet
 from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
 from pns_common.mesh import Mesh
@@ -66,7 +67,13 @@ def quiet_loss(
 def quiet_term(
     meshes: list[Mesh], features: FeatureSet, seed: int
 ) -> Callable[[BoundedNet], Float[Tensor, ""]]:
-    """Return the quiet loss of a network, on features drawn anew at every call."""
+    """Return the quiet loss of a network, on features drawn anew at every call.
+
+    Raises:
+        ParameterError: the features read data of vertices, of which no draw knows.
+    """
+    if features.vertex_fields is not None:
+        raise ParameterError("quiet", features.name, expected="features of an edge, as paper-5")
     support = support_of(meshes, features)
     generator = torch.Generator().manual_seed(seed)
     return lambda network: quiet_loss(network, support, draw_features(support, generator))

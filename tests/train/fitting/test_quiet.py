@@ -5,12 +5,13 @@ import pytest
 import torch
 import trimesh
 
-from pns_common import Mesh, clean, load_model, loop, pns, refine
+from pns_common import Mesh, ParameterError, clean, load_model, loop, pns, refine
 from pns_common.features.edge_features import FEATURE_SETS
 from service.meshes.weld import weld
+from tests.support.meshes import grid
 from tests.support.shared import shared_path
 from train.data.datasets import DATASETS
-from train.fitting.quiet import draw_features, quiet_loss, support_of
+from train.fitting.quiet import draw_features, quiet_loss, quiet_term, support_of
 from train.models.networks import BoundedNet
 
 FEATURES = FEATURE_SETS["paper-5"]
@@ -35,6 +36,12 @@ def test_draws_reach_far_outside_the_training_set(support):
     assert support.high[0] < drawn[:, 0].max() <= 2
     inside = ((drawn >= support.low) & (drawn <= support.high)).all(dim=1)
     assert 0.1 < inside.float().mean() < 0.9
+
+
+@pytest.mark.parametrize("name", ["signed-14", "signed-18"])
+def test_features_that_see_more_than_an_edge_are_refused_by_name(name):
+    with pytest.raises(ParameterError, match=f"quiet.*{name}"):
+        quiet_term([Mesh(*grid())], FEATURE_SETS[name], seed=0)
 
 
 @pytest.mark.parametrize("name", ["Fox", "alien", "RiggedFigure", "low-poly-tree"])
