@@ -24,6 +24,7 @@ from .plan import MeshPlan, check_cost, plan, repeated_text
 from .schema import Document, view
 from .spare import Spare, spare
 from .vertex_numbers import leave_out_vertex_numbers
+from .whole_numbers import lenient_view
 
 Media = Literal["glb", "gltf"]
 
@@ -69,7 +70,7 @@ def read_upload(
     container = read_container(data, media)
     tree = decode_object(container.text, limits)
     refuse_version(tree)
-    document = view(tree)
+    document, changes = lenient_view(tree)
     opened = Opened(siblings)
     buffers = resolve_buffers(document, container.binary, opened)
     original = document
@@ -87,7 +88,7 @@ def read_upload(
         check_references(document, buffers)
     numbered = leave_out_vertex_numbers(tree)
     unknown = unknown_extensions(tree, container.text)
-    changes = _changes_of_buffers(tree.get("buffers", [])[:stored], files, unknown)
+    changes += _changes_of_buffers(tree.get("buffers", [])[:stored], files, unknown)
     changes += numbered
     changes += [
         Change(pointer, what, count)

@@ -18,7 +18,8 @@ from ...gltf.read.checks.references import check_references
 from ...gltf.read.checks.refusals import refuse_version
 from ...gltf.read.json_text import decode_object
 from ...gltf.read.modes import TRIANGLES
-from ...gltf.read.schema import Accessor, Document, Primitive, view
+from ...gltf.read.schema import Accessor, Document, Primitive
+from ...gltf.read.whole_numbers import lenient_view
 from ...options import Limits
 from .arrays import blocks_of
 from .sink import Sink
@@ -72,7 +73,7 @@ def _checked(path: Path) -> tuple[dict[str, Any], Document, list[memoryview]]:
     chunks = container.read_glb(memoryview(memory))
     tree = decode_object(chunks.text, Limits())
     refuse_version(tree)
-    document = view(tree)
+    document, _ = lenient_view(tree)
     if any(part.extensions for part in document.buffer_views):
         raise UnreadableError("compressed buffer views are not read", pointer="/bufferViews")
     buffers = resolve_buffers(document, chunks.binary, Opened(ALONE))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from service.errors import GltfError
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from tests.support.gltf import files
@@ -169,3 +170,36 @@ def test_a_target_that_a_primitive_lacks_moves_it_nowhere():
     assert (pointer, count) == ("/meshes/0", 1)
     assert "morph targets that not all" in words
     assert found(right) == []
+
+
+def with_fractions(value):
+    """Every number as a float, as JSON of programs that have no integers."""
+    if isinstance(value, dict):
+        return {key: with_fractions(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [with_fractions(part) for part in value]
+    return float(value) if isinstance(value, int) else value
+
+
+def test_integers_with_a_fraction_are_read_as_integers():
+    tree, binary = files.document([octahedron()])
+    tree["nodes"][0] |= {"translation": [1, 2, 0.5], "extras": {"size": 3.0}}
+    plain = refine(files.pack(tree, binary))
+    made = refine(files.pack(with_fractions(tree), binary))
+    (change,) = [change for change in made.report["changes"] if "integers" in change["what"]]
+    assert change["pointer"] == "/buffers/0/byteLength"
+    after = files.unpack(made.glb)[0]
+    # In what applications keep nothing is changed, not even how it is spelt.
+    assert isinstance(after["nodes"][0]["extras"]["size"], float)
+    assert after["nodes"] == files.unpack(plain.glb)[0]["nodes"]
+    assert after["accessors"] == files.unpack(plain.glb)[0]["accessors"]
+    assert isinstance(after["nodes"][0]["mesh"], int)
+
+
+@pytest.mark.parametrize("number", [1.5, 2.0**60, -1.0])
+def test_numbers_that_are_no_integers_are_refused_where_they_stand(number):
+    tree, binary = files.document([octahedron()])
+    tree["accessors"][0]["count"] = number
+    with pytest.raises(GltfError) as refused:
+        refine(files.pack(tree, binary))
+    assert refused.value.pointer == "/accessors/0/count"
