@@ -102,7 +102,7 @@ def refine_control_mesh(
     )
     return RefinedMesh(
         refinement,
-        _skin_and_morph(control, control.cleaned, refinement.mesh, options, creases),
+        _skin_and_morph(control, control.cleaned, refinement.mesh, options, creases, course),
         scalars,
         refinement.normals if options.normals == "limit" else None,
     )
@@ -161,6 +161,7 @@ def _skin_and_morph(
     refined: Mesh,
     options: Options,
     creases: Creases,
+    course: Course,
 ) -> SkinAndMorph:
     if not control.skin_and_morph.any:
         return control.skin_and_morph
@@ -168,4 +169,4 @@ def _skin_and_morph(
     faces, count = cleaned.mesh.faces, len(cleaned.mesh.vertices)
     linear = linear_refinement(faces, count, options.levels, creases, limit=options.limit)
     slots = common_slots(control, cleaned, refined.faces, len(refined.vertices))
-    return refine_skin_and_morph(at_vertices, linear, slots)
+    return refine_skin_and_morph(at_vertices, linear, slots, course)

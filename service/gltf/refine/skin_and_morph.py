@@ -15,6 +15,7 @@ from jaxtyping import Float, Int
 from pns_common.base.distinct import as_words, distinct_rows
 from pns_common.masks.linear import ColumnRefinement
 
+from ...course import Course
 from ...meshes.weld import canonical_zero
 from ..read.primitives import TrianglePrimitive
 from .skins import Binding, read_binding, refine_binding
@@ -66,14 +67,20 @@ def read_skin_and_morph(primitives: Sequence[TrianglePrimitive]) -> SkinAndMorph
 
 
 def refine_skin_and_morph(
-    control: SkinAndMorph, linear: ColumnRefinement, slots: Int[np.ndarray, " V"] | None
+    control: SkinAndMorph,
+    linear: ColumnRefinement,
+    slots: Int[np.ndarray, " V"] | None,
+    course: Course,
 ) -> SkinAndMorph:
     """Refine skin and morph; deltas in float32, as they will be written; `slots` as for skins."""
     binding, cut = None, _NONE
     if control.binding is not None:
-        binding, cut = refine_binding(control.binding, linear, slots)
-    deltas = tuple(linear(delta.astype(np.float64)).astype(np.float32) for delta in control.deltas)
-    return SkinAndMorph(binding, deltas, cut)
+        binding, cut = refine_binding(control.binding, linear, slots, course)
+    deltas: list[Float[np.ndarray, "V 3"]] = []
+    for delta in control.deltas:
+        course.reach(1.0)
+        deltas.append(linear(delta.astype(np.float64)).astype(np.float32))
+    return SkinAndMorph(binding, tuple(deltas), cut)
 
 
 def _delta(primitive: TrianglePrimitive, target: int) -> Float[np.ndarray, "N 3"]:

@@ -18,6 +18,7 @@ from pns_common.fused import kernel_blocks
 from pns_common.fused.where_loaded.shares import keep_heaviest, scale_rows, whole_units
 from pns_common.masks.linear import ColumnRefinement
 
+from ...course import Course
 from ..read.primitives import TrianglePrimitive
 from ..read.quantization import as_float
 
@@ -77,11 +78,12 @@ def read_binding(primitives: Sequence[TrianglePrimitive]) -> Binding | None:
 
 
 def refine_binding(
-    binding: Binding, linear: ColumnRefinement, slots: Int[np.ndarray, " V"] | None
+    binding: Binding, linear: ColumnRefinement, slots: Int[np.ndarray, " V"] | None, course: Course
 ) -> tuple[Binding, Int[np.ndarray, " V"]]:
     """Refine the binding; return also which vertices lost a joint for want of slots.
 
-    `slots` are those of each refined vertex; None: all have the binding's.
+    `slots` are those of each refined vertex; None: all have the binding's. `course` may end it
+    between two blocks of joints, of which a small file may have tens of thousands.
     """
     width, blocks = binding.weights.shape[1], kernel_blocks(available_threads())
     bound = binding.weights > 0
@@ -92,6 +94,7 @@ def refine_binding(
     joints = np.zeros((linear.count, width), dtype=np.int32)
     weights, lost = np.zeros((linear.count, width)), np.zeros(linear.count)
     for first in range(0, len(used), COLUMNS):
+        course.reach(1.0)
         names = used[first : first + COLUMNS]
         here = order[starts[first] : starts[first + len(names)]]
         dense = np.zeros((len(bound), len(names)))

@@ -104,7 +104,7 @@ def refine_together(
             control, parts = _smoothed(control, control.cleaned, parts, creases, options)
     with course.stage("refine", shares.refine, shares.attributes):
         try:
-            made = _refined(control, parts, creases, scheme, options)
+            made = _refined(control, parts, creases, scheme, options, course)
         except MeshError:
             # Not to be told whose it is: the halves are asked, down to one.
             if len(meshes) == 1:
@@ -182,6 +182,7 @@ def _refined(
     creases: Creases,
     scheme: Scheme,
     options: Options,
+    course: Course,
 ) -> _Refined | None:
     """Refine the union; None where the compiled kernels cannot.
 
@@ -202,7 +203,7 @@ def _refined(
         return None
     if leaves_single_precision(made.mesh.vertices):
         raise MeshError("refined positions leave the range of float32", element="vertices")
-    skin_and_morph, cut = _skin_and_morph(control, cleaned, parts, creases, made, options)
+    skin_and_morph, cut = _skin_and_morph(control, cleaned, parts, creases, made, options, course)
     scalars = vertex_scalars(made, refined_to, scheme, options)
     refinement = Refinement(made.mesh, Deferred(lambda: made.reports[0]), made.ratio, made.gate)
     normals = made.normals if options.normals == "limit" else None
@@ -216,6 +217,7 @@ def _skin_and_morph(
     creases: Creases,
     made: PartsRefinement,
     options: Options,
+    course: Course,
 ) -> tuple[SkinAndMorph, Int[np.ndarray, " P"]]:
     """Return what follows the refined vertices, and how many of each part lost a joint."""
     if not control.skin_and_morph.any:
@@ -230,7 +232,7 @@ def _skin_and_morph(
     count = len(mesh.vertices)
     linear = linear_refinement(mesh.faces, count, options.levels, creases, limit=options.limit)
     slots = common_slots(control, cleaned, made.mesh.faces, len(made.mesh.vertices))
-    after = refine_skin_and_morph(own, linear, slots)
+    after = refine_skin_and_morph(own, linear, slots, course)
     part_of = np.empty(len(made.mesh.vertices), dtype=np.int64)
     # Descendants lie as their faces do.
     part_of[made.mesh.faces] = np.repeat(

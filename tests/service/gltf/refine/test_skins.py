@@ -6,6 +6,7 @@ import pytest
 from pns_common import Mesh, loop, refine
 from pns_common.base.blocks import Blocks
 from pns_common.masks.shares import whole_units
+from service.course import Course
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from tests.support.gltf import files, validator
@@ -217,3 +218,20 @@ def test_primitives_of_one_and_of_two_sets_move_alike_where_they_meet(copies):
     assert ((rows > 0).sum(axis=1) > 4).any()
     lost = [c for c in result.report["changes"] if "lost their lightest joints" in c["what"]]
     assert [change["count"] >= len(pairs) // 2 for change in lost] == [True] * copies
+
+
+@pytest.mark.parametrize("meshes", [1, 2])
+@pytest.mark.parametrize("what", ["joints", "targets"])
+def test_a_job_can_be_stopped_between_joints_and_between_targets(what, meshes):
+    """A small file may have tens of thousands, of which each takes as long as a coordinate."""
+    told = []
+    for count in (1, 24):
+        if what == "joints":
+            shape = bound(np.arange(24).reshape(6, 4) % count, np.full((6, 4), 0.25))
+        else:
+            shape = octahedron(targets=[{"POSITION": octahedron()["POSITION"]}] * count)
+        data, stages = files.glb(*[[shape]] * meshes), [""]
+        course = Course(begins=stages.append, moves=lambda _, said=stages: said.append(said[-1]))
+        subdivide_gltf(data, "glb", Options(scheme="loop"), None, Limits(), course)
+        told.append(stages.count("refine"))
+    assert told[1] - told[0] >= (24 - 1) // 3
