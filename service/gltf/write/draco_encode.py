@@ -19,6 +19,10 @@ POSITION_BITS, NORMAL_BITS, TEXCOORD_BITS = 16, 10, 14
 # 0 is the fastest, 10 the smallest; 7 is where Draco's own tools stand.
 EFFORT = 7
 
+# Draco may look at each pair of faces around a vertex. So many, around all vertices, take it up to
+# a second; nothing could stop it.
+MOST_PAIRS = 10**9
+
 # Draco's own names of what an attribute is.
 _POSITION, _NORMAL, _TEXCOORD = 0, 1, 3
 _NAMED = {_POSITION: "POSITION", _NORMAL: "NORMAL", _TEXCOORD: "TEXCOORD_0"}
@@ -87,7 +91,10 @@ def can_encode(attributes: dict[str, Shaped[np.ndarray, "N K"]]) -> bool:
 def encode(
     attributes: dict[str, Shaped[np.ndarray, "N K"]], faces: Int[np.ndarray, "F 3"], grid: Grid
 ) -> Encoded | None:
-    """Encode a primitive; None where Draco cannot, or loses a face on the way."""
+    """Encode a primitive; None where Draco cannot, loses a face on the way, or takes too long."""
+    around = np.bincount(faces.reshape(-1))
+    if around @ around > MOST_PAIRS:
+        return None
     others = [name for name in attributes if name not in _NAMED.values()]
     generic = {
         _FIRST_GENERIC + number: np.ascontiguousarray(attributes[name])

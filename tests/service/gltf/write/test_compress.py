@@ -167,6 +167,21 @@ def test_meshes_too_small_for_dracos_grid_stay_uncompressed():
     assert whats == ["not compressed: Draco cannot hold it"]
 
 
+def test_a_vertex_of_too_many_faces_stays_uncompressed_under_draco(monkeypatch):
+    """Of 40,000 faces around one edge Draco took seconds; it grows with their square."""
+
+    def encode(*_, **__):
+        pytest.fail("it is left to Draco")
+
+    monkeypatch.setattr(DracoPy, "encode", encode)
+    count = 40_000
+    points = np.random.default_rng(0).normal(size=(count + 2, 3))
+    faces = np.stack([np.zeros(count), np.ones(count), np.arange(2, count + 2)], axis=1).astype(int)
+    packed = refine(files.glb([{"POSITION": points, "indices": faces}]), "draco", levels=1)
+    whats = [change["what"] for change in packed.report["changes"]]
+    assert whats == ["not compressed: Draco cannot hold it"]
+
+
 def test_seams_between_primitives_do_not_open_on_dracos_grid():
     # A sheet cut in two: the halves have different extents, and one grid.
     x, y = np.meshgrid(np.linspace(0, 1, 9) ** 2, np.linspace(0, 0.7, 5), indexing="ij")
