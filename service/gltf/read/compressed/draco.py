@@ -59,15 +59,16 @@ def decode_primitives(
         LimitError: decoding would take more memory than allowed.
     """
     views: list[int] = []
+    held = size + sum(len(buffer) for buffer in buffers)
     for mesh_number, mesh in enumerate(document.meshes):
         for place, primitive in enumerate(mesh.primitives):
             if EXTENSION in primitive.extensions:
                 pointer = f"/meshes/{mesh_number}/primitives/{place}"
-                held = size + sum(len(buffer) for buffer in buffers)
                 decoded = _decode(document, buffers, primitive, pointer, held, limits)
                 entry = tree["meshes"][mesh_number]["primitives"][place]
                 entry_view = entry["extensions"][EXTENSION]["bufferView"]
                 _store(tree, buffers, entry, decoded)
+                held += sum(values.nbytes for values in decoded.values())
                 views.append(entry_view)
     withdraw(tree, EXTENSION)
     return views

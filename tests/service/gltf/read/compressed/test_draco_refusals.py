@@ -1,12 +1,16 @@
 """What a file promises of its Draco data and does not keep is told at its place."""
 
+import json
+
 import DracoPy
 import numpy as np
 import pytest
 
 from service.errors import GltfError, LimitError
-from service.gltf.read.compressed.draco import SLACK
+from service.gltf.read.compressed.draco import SLACK, decode_primitives
 from service.gltf.read.compressed.draco_header import read_header
+from service.gltf.read.schema import view
+from service.options import Limits
 from tests.fuzz.seeds import draco
 from tests.service.gltf.read.refused import refine
 from tests.support.gltf import files
@@ -117,6 +121,26 @@ def test_a_decoder_that_takes_more_than_was_counted_meets_a_limit(monkeypatch):
     assert caught.value.limit == "memory"
     # Of a box, hardly more than what the allocator may reserve.
     assert SLACK < caught.value.allowed < SLACK + 2**20
+
+
+def test_what_was_decoded_is_counted_once_and_not_for_each_primitive():
+    """A scene of 8,000 primitives took four times as long to read."""
+
+    class Counted(list):
+        counts = 0
+
+        def __iter__(self):
+            Counted.counts += 1
+            return super().__iter__()
+
+    tree, packed = draco()
+    primitive = json.dumps(tree["meshes"][0]["primitives"][0])
+    tree["meshes"][0]["primitives"] = [json.loads(primitive) for _ in range(20)]
+    stored, content = files.unpack(files.pack(tree, packed))
+    buffers = Counted([memoryview(content)])
+    views = decode_primitives(stored, view(stored), buffers, len(content), Limits())
+    assert len(views) > 20
+    assert Counted.counts == 1
 
 
 def test_metadata_nest_so_deep_and_no_deeper():
