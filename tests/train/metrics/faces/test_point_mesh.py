@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, refine
-from tests.support.meshes import bent, bumpy_sphere, grid, manifolds
+from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, rotation
 from train.metrics.faces.point_mesh import face_tree, moved, nearest
 
 
@@ -86,18 +86,24 @@ def test_the_nearest_point_lies_inside_on_a_side_or_at_a_corner(point, distance)
 
 @pytest.mark.parametrize("turn", range(6))
 def test_of_equally_near_faces_the_lowest_is_named(turn):
-    """Above the vertices, the edges' middles and the faces' of an octahedron in any numbering."""
+    """Above the vertices, the edges' middles and the faces' of an octahedron in any numbering.
+
+    Where it is turned, rounding says which are nearer.
+    """
     points = np.concatenate([np.eye(3), -np.eye(3)])
     faces = np.array([[i, j, k] for i in (0, 3) for j in (1, 4) for k in (2, 5)])
     inward = np.linalg.det(points[faces]) < 0
     faces[inward] = faces[inward][:, ::-1]
-    faces = faces[np.random.default_rng(turn).permutation(len(faces))]
+    rng = np.random.default_rng(turn)
+    faces = faces[rng.permutation(len(faces))]
+    turned = points @ rotation(rng).T + [4, -8, 2]
     ends = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
     for corners in (np.arange(6)[:, None], ends, faces):
-        above = 1.5 * points[corners].mean(axis=1)
         belongs = np.array([[np.isin(own, face).all() for face in faces] for own in corners])
-        closest = nearest(face_tree(Mesh(points, faces)), above)
-        np.testing.assert_array_equal(closest.face, belongs.argmax(axis=1))
+        for at in (points, turned):
+            above = 1.5 * at[corners].mean(axis=1) - 0.5 * at.mean(axis=0)
+            closest = nearest(face_tree(Mesh(at, faces)), above)
+            np.testing.assert_array_equal(closest.face, belongs.argmax(axis=1))
 
 
 @pytest.mark.parametrize("turn", range(4))
