@@ -8,8 +8,9 @@ from onnx import TensorProto, helper
 from benchmarks.memory import peak_mib, reset_peak
 from pns_common import ModelError
 from pns_common.models.contract import CALL_ROWS, LARGEST_CALL
-from pns_common.runtimes.numpy_network import open_network
-from pns_common.runtimes.onnx_model import load_model, model_from_bytes
+from pns_common.runtimes import call_shapes
+from pns_common.runtimes.numpy_network import network, open_network
+from pns_common.runtimes.onnx_model import bundled_models, load_model, model_from_bytes
 from pns_common.runtimes.onnx_session import open_session
 from tests.support.networks import model_bytes, perceptron_bytes, random_layers
 
@@ -143,9 +144,10 @@ def test_an_old_file_whose_weights_are_inputs_is_taken():
     assert model_from_bytes(proto.SerializeToString(), "old")(np.zeros((2, 5)), 1.0).shape == (2, 3)
 
 
-@pytest.mark.parametrize("name", ["paper"])
+@pytest.mark.parametrize("name", bundled_models())
 def test_bundled_models_stay_far_below_the_limit(name, monkeypatch):
-    monkeypatch.setattr("pns_common.runtimes.call_shapes.LARGEST_CALL", LARGEST_CALL // 4)
+    for runtime in (call_shapes, network):
+        monkeypatch.setattr(runtime, "LARGEST_CALL", LARGEST_CALL // 4)
     load_model(name)
 
 
