@@ -40,11 +40,10 @@ from pns_common.schemes import Scheme
 LOOP_REACH, FIELDS_REACH = 1, 2
 # Rings for the fold guard, where nothing is known yet of how far it goes.
 GUARD_RINGS = 1
-# A ring for each round, one for the sides of the farthest edge, which touch its faces, and two for
-# edges that are held: they begin on lines, and so do others that end where they do.
+# A ring for each round, one for what is read of the farthest edge's surroundings, which touch its
+# faces, and two for edges that are held: they begin on lines, and so do others that end where they
+# do.
 LINES_REACH = ROUNDS + 3
-# With gentler lines the rounds are gone through twice. What may be like an edge touches its faces.
-GENTLE_REACH = 2 * ROUNDS + 3
 
 
 class ThinHaloError(PnsError):
@@ -74,10 +73,7 @@ def halo_rings(
 
 def lines_reach(lines: Creases) -> int:
     """Return how many rings tell which edges are of lines."""
-    if lines.line_angle is None:
-        return 0
-    gentle = lines.edged_angle is not None and lines.edged is not False
-    return GENTLE_REACH if gentle else LINES_REACH
+    return 0 if lines.line_angle is None else LINES_REACH
 
 
 def reach(scheme: Scheme, level: int) -> int:

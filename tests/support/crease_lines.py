@@ -1,6 +1,8 @@
 """Crease lines of small meshes."""
 
-from pns_common import Creases
+import numpy as np
+
+from pns_common import Creases, Mesh
 from pns_common.connectivity.topology import build_topology
 from pns_common.geometry.crease_lines import CREASE_ANGLE, EDGED_ANGLE, line_rows
 from pns_common.geometry.crease_lines.held_edges import with_held_edges
@@ -13,6 +15,21 @@ WITH_GENTLE = Creases(line_angle=CREASE_ANGLE, edged_angle=EDGED_ANGLE)
 CHAMFERED = prism([[0, 0], [2, 0], [2, 1.5], [1.5, 2], [0, 2]])
 # Its ends are one triangle each.
 WEDGE = prism([[0, 0], [2, 0], [0, 1]])
+# A plate on another, and a rib between them; x is along the lower one, y along the corner.
+# fmt: off
+RIB = Mesh(
+    np.array([
+        0, -4, 0, 0, -4, 10, 0, 4, 0, 0, 4, 10, 1, -4, 1, 1, -4, 10, 1, -1, 1, 1, -1, 8, 1, 1, 1,
+        1, 1, 8, 1, 4, 1, 1, 4, 10, 8, -1, 1, 8, 1, 1, 10, -4, 0, 10, -4, 1, 10, 4, 0, 10, 4, 1,
+    ], dtype=float).reshape(-1, 3),
+    np.array([
+        1, 2, 0, 1, 3, 2, 14, 4, 0, 1, 0, 4, 5, 1, 4, 15, 4, 14, 16, 0, 2, 16, 14, 0, 3, 10, 2,
+        16, 2, 10, 17, 16, 10, 11, 10, 3, 3, 1, 5, 11, 3, 5, 9, 8, 10, 9, 10, 11, 7, 4, 6, 5, 7, 9,
+        5, 9, 11, 5, 4, 7, 12, 6, 4, 12, 4, 15, 13, 10, 8, 17, 13, 12, 17, 12, 15, 17, 10, 13,
+        14, 16, 17, 15, 14, 17, 13, 8, 9, 9, 7, 12, 9, 12, 13, 12, 7, 6,
+    ]).reshape(-1, 3),
+)
+# fmt: on
 
 
 def lines(mesh, creases=SHARP_ALONE):

@@ -13,7 +13,7 @@ from pns_common.fused.kernels.going_on import drop_loose_ends
 from pns_common.fused.kernels.sides import mark_between_sides
 from pns_common.fused.kernels.turns import mark_edges_beyond
 from pns_common.fused.levels.mesh_edges import MeshEdges
-from pns_common.geometry.crease_lines import is_edged, with_gentler
+from pns_common.geometry.crease_lines import is_edged
 from pns_common.geometry.crease_lines.edge_rows import PARALLEL, ROW_ANGLE
 from pns_common.geometry.crease_lines.going_on import may_end
 from pns_common.geometry.crease_lines.turns import cosine_of
@@ -41,23 +41,20 @@ def crease_line_rows(
     is_between = np.empty(len(sharp), dtype=bool)
     turning = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, beyond
     blocks.run(len(sharp), mark_between_sides.over(*turning, sharp, ROWS, is_between))
-    between, at_rim = sharp[is_between], may_end(mesh, normals)
-
-    def going_on(rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
-        left = np.ones(len(rows), dtype=bool)
-        met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))
-        drop_loose_ends(points, mesh.edges, rows, at_rim, cosine, *met, left)
-        return rows[left]
-
-    if not gentle:
-        return going_on(between)
-    alone = np.empty(len(between), dtype=bool)
-    around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
-    least = PARALLEL**2, cosine_of(ROW_ANGLE)
-    blocks.run(
-        len(between), mark_alone.over(points, normals, *around, *least, between, ROWS, alone)
-    )
-    return with_gentler(points, normals, mesh, between[alone], cosine, going_on)
+    between = sharp[is_between]
+    if gentle:
+        alone = np.empty(len(between), dtype=bool)
+        around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
+        least = PARALLEL**2, cosine_of(ROW_ANGLE)
+        blocks.run(
+            len(between), mark_alone.over(points, normals, *around, *least, between, ROWS, alone)
+        )
+        between = between[alone]
+    left = np.ones(len(between), dtype=bool)
+    met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))
+    at_rim = may_end(mesh, normals)
+    drop_loose_ends(points, mesh.edges, between, at_rim, cosine, *met, left)
+    return between[left]
 
 
 def edges_beyond(

@@ -19,9 +19,8 @@ and a rim of six corners is a circle, but in edged meshes (below) six sides are 
 A part that is made of plane faces has gentler edges too, chamfers and the plates of a hull. It is
 known by its edges: a mesh is *edged* if at least half of those that turn by more than θ' = 21
 degrees turn by more than θ. (Where sharp rims go round something most edges that turn are on the
-round.) There, edges beyond θ' are lines too with the marks 2 and 3. But those beyond θ in a hollow
-have to go on without gentler ones, as elsewhere (an armpit is round), and those up to 55 degrees
-are lines only if
+round.) There, edges beyond θ' are lines too with the marks 2 and 3, but those up to 55 degrees only
+if
 
 4. *it stands alone*: it is not in a row. Edges in a row have walls on both sides, neither more than
    four times as wide as the other, and across each of these another edge like it, which runs within
@@ -35,14 +34,11 @@ are lines only if
 With them go edges that are held within plane sides, as a frame's mitres (held_edges.py).
 
 What makes a mesh edged are counts, and those of its pieces add up. Turning, moving, scaling or
-renumbering a mesh does not change the answer, nor does mirroring it with its faces turned, but
-where rounding decides. A mesh whose faces are turned over has ridges for hollows, and if it is
-edged it may have other lines.
+renumbering a mesh does not change the answer, nor does mirroring it or turning its faces over, but
+where rounding decides.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -53,14 +49,7 @@ from pns_common.geometry.crease_lines.edge_rows import stand_alone
 from pns_common.geometry.crease_lines.going_on import go_on, may_end
 from pns_common.geometry.crease_lines.held_edges import with_held_edges
 from pns_common.geometry.crease_lines.sides import between_sides
-from pns_common.geometry.crease_lines.turns import (
-    CLEARLY,
-    Edges,
-    cosine_of,
-    edges_beyond,
-    rises,
-    turn_cosines,
-)
+from pns_common.geometry.crease_lines.turns import cosine_of, edges_beyond
 
 # θ in degrees, and at how many levels what is found is sharp: then it is smooth, and by then round
 # within a quarter of an edge.
@@ -108,36 +97,9 @@ def line_rows(
     if len(sharp) == 0:
         return sharp
     between = sharp[between_sides(normals, mesh, sharp)]
-
-    at_rim = may_end(mesh, normals)
-
-    def going_on(rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
-        return rows[go_on(points, mesh, rows, at_rim, cosine)]
-
-    if not gentle:
-        return going_on(between)
-    alone = between[stand_alone(points, normals, mesh, between)]
-    return with_gentler(points, normals, mesh, alone, cosine, going_on)
-
-
-def with_gentler(
-    points: Float[np.ndarray, "V 3"],
-    normals: Float[np.ndarray, "F 3"],
-    mesh: Edges,
-    alone: Int[np.ndarray, " N"],
-    cosine: float,
-    going_on: Callable[[Int[np.ndarray, " N"]], Int[np.ndarray, " M"]],
-) -> Int[np.ndarray, " M"]:
-    """Return the lines of an edged mesh: of edges with marks 1, 2 and 4 those that go on.
-
-    ``going_on`` returns them of some edges.
-    """
-    turns = turn_cosines(normals, mesh, alone)
-    is_sharp = turns < cosine
-    # Of two faces that lie on each other neither rises: rounding would decide.
-    in_hollow = is_sharp & (turns > CLEARLY - 1) & rises(points, normals, mesh, alone)
-    by_themselves = going_on(alone[is_sharp])
-    return going_on(alone[~in_hollow | np.isin(alone, by_themselves)])
+    if gentle:
+        between = between[stand_alone(points, normals, mesh, between)]
+    return between[go_on(points, mesh, between, may_end(mesh, normals), cosine)]
 
 
 def is_edged(sharp: int, bent: int) -> bool:

@@ -12,6 +12,7 @@ from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.geometry.crease_lines import is_edged, with_crease_lines
 from tests.support.crease_lines import (
     CHAMFERED,
+    RIB,
     SHARP_ALONE,
     WEDGE,
     WITH_GENTLE,
@@ -102,14 +103,16 @@ def fold(sign):
     return Mesh(folded, faces)
 
 
-def test_sharp_hollows_of_edged_meshes_go_on_among_sharp_edges_alone():
-    """Where a limb meets a body they do not, and the rim there would fold into it."""
-    edged = replace(WITH_GENTLE, edged=True)
-    assert len(lines(fold(1.0), edged)) == 16
-    assert len(lines(fold(-1.0), edged)) < 8
-    assert len(lines(fold(-1.0))) == len(lines(fold(1.0))) == 0
-    # Hollows that do are lines as ever.
-    assert len(lines(l_block(), edged)) == 22
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_where_sharp_turns_gentle_along_a_fold_an_edged_mesh_has_one_line(sign):
+    """Two pipes meet in such a curve, in a hollow."""
+    assert len(lines(fold(sign), replace(WITH_GENTLE, edged=True))) == 16
+    assert len(lines(fold(sign))) == 0
+
+
+def test_a_rib_between_two_plates_is_sharp_all_around():
+    """Its slope meets both plates by 45 degrees, where its sides and the plates meet by 90."""
+    assert len(lines(RIB, WITH_GENTLE)) == 27
 
 
 @given(
@@ -117,13 +120,18 @@ def test_sharp_hollows_of_edged_meshes_go_on_among_sharp_edges_alone():
     st.integers(0, 99),
     st.floats(0.01, 100),
     st.booleans(),
+    st.booleans(),
 )
-def test_lines_do_not_depend_on_where_a_mesh_lies_nor_on_its_numbers(mesh, seed, scale, mirrored):
+def test_lines_do_not_depend_on_where_a_mesh_lies_nor_on_its_numbers(
+    mesh, seed, scale, mirrored, turned_over
+):
     rng = np.random.default_rng(seed)
     turned = scale * (mesh.vertices @ rotation(rng).T) + rng.standard_normal(3)
     faces = mesh.faces
     if mirrored:
-        turned, faces = turned * [1, 1, -1], faces[:, ::-1]
+        turned = turned * [1, 1, -1]
+    if turned_over:
+        faces = faces[:, ::-1]
     order = rng.permutation(len(turned))
     moved = np.empty_like(turned)
     moved[order] = turned
