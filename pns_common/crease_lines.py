@@ -21,6 +21,7 @@ from pns_common.geometry.crease_lines import (
     is_edged,
     line_rows,
 )
+from pns_common.geometry.crease_lines.edge_rows import stand_alone
 from pns_common.geometry.crease_lines.held_edges import with_held_edges
 from pns_common.geometry.crease_lines.turns import Edges, cosine_of, edges_beyond
 from pns_common.geometry.frames import face_normals
@@ -34,10 +35,10 @@ def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2
     """Return the edges that a mesh shows to be sharp, as pairs of vertices, for ``refine``.
 
     These turn by more than ``angle`` (degrees, between 0 and 180), lie between two sides of a part,
-    and go on at both ends. None: by more than 66 degrees, and where at least half of
-    the edges beyond 21 degrees are beyond 66, by more than 21, but for rows of like ones; so the
-    default model keeps them (geometry/crease_lines). With them go edges within plane sides that
-    begin on them and would fold these sides, as the mitres of a frame.
+    and go on at both ends. None: by more than 66 degrees, and where at least half of the edges
+    beyond 21 degrees that are in no row of like ones are beyond 66, all of these; so the default
+    model keeps them (geometry/crease_lines). With them go edges within plane sides that begin on
+    them and would fold these sides, as the mitres of a frame.
 
     Raises:
         ParameterError: it is no Mesh, or the angle is out of range.
@@ -59,6 +60,7 @@ class _Look:
         normals: unit normals of its faces.
         line_rows: returns the edges of the lines that creases say to look for.
         rows_beyond: returns the interior edges that turn by more than an angle in degrees.
+        alone: returns which of some stand alone.
     """
 
     points: Float[np.ndarray, "V 3"]
@@ -66,6 +68,7 @@ class _Look:
     edges: Edges
     line_rows: Callable[[Creases], Int[np.ndarray, " N"]]
     rows_beyond: Callable[[float], Int[np.ndarray, " N"]]
+    alone: Callable[[Int[np.ndarray, " N"]], Bool[np.ndarray, " N"]]
 
     def sharp(self, lines: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M 2"]:
         """Return the edges of lines, and those held beside them, as pairs of vertices."""
@@ -85,8 +88,9 @@ class _Look:
         """Count as ``turns_of_parts``."""
         assert creases.line_angle is not None
         assert creases.edged_angle is not None
-        beyond = map(self.rows_beyond, (creases.line_angle, creases.edged_angle))
-        first = (self.edges.half_edges[rows, 0] // 3 for rows in beyond)
+        sharp, bent = map(self.rows_beyond, (creases.line_angle, creases.edged_angle))
+        alone = bent[self.alone(bent)]
+        first = (self.edges.half_edges[rows, 0] // 3 for rows in (sharp, alone))
         return np.stack([np.bincount(part_of_face[f], minlength=count) for f in first], axis=1)
 
 
@@ -110,7 +114,8 @@ def _look(
         measured = measured_normals(points, edges.faces, blocks)
 
         def rows_beyond(angle: float) -> Int[np.ndarray, " N"]:
-            return np.flatnonzero(fused.edges_beyond(edges, measured, cosine_of(angle), blocks)[0])
+            beyond, _ = fused.edges_beyond(edges, measured, cosine_of(angle), blocks)
+            return np.flatnonzero(beyond).astype(np.int32)
 
         return _Look(
             points,
@@ -118,6 +123,7 @@ def _look(
             edges,
             lambda creases: fused.crease_line_rows(points, edges, measured, creases, blocks),
             rows_beyond,
+            lambda rows: fused.edges_alone(points, edges, measured, rows, blocks),
         )
     topology = with_creases(build_topology(faces, len(points)), named)
     normals = face_normals(points, faces)
@@ -127,6 +133,7 @@ def _look(
         topology,
         lambda creases: line_rows(points, normals, topology, creases),
         lambda angle: edges_beyond(normals, topology, topology.interior, cosine_of(angle)),
+        lambda rows: stand_alone(points, normals, topology, rows),
     )
 
 
@@ -181,7 +188,7 @@ def turns_of_parts(
     part_of_face: Int[np.ndarray, " F"],
     count: int,
 ) -> Int[np.ndarray, "P 2"]:
-    """Count each part's interior edges that turn by more than θ, and by more than θ'.
+    """Count each part's interior edges that turn by more than θ, and by more than θ' in no row.
 
     An edge is of the part of the first face on it. Those that are named are creases, not interior.
     """

@@ -44,6 +44,9 @@ GUARD_RINGS = 1
 # faces, and two for edges that are held: they begin on lines, and so do others that end where they
 # do.
 LINES_REACH = ROUNDS + 3
+# Rings that tell whether an edge of a face stands alone: what may be like it is an edge of a face
+# that touches that one, and turns against one that touches this.
+ROWS_REACH = 2
 
 
 class ThinHaloError(PnsError):

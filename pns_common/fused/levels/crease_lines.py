@@ -28,33 +28,41 @@ def crease_line_rows(
 ) -> Int[np.ndarray, " N"]:
     """Return the edges of the lines to look for; ``normals`` are the faces'."""
     assert creases.line_angle is not None
-    cosine, known, gentle = cosine_of(creases.line_angle), creases.edged, False
+    cosine, known = cosine_of(creases.line_angle), creases.edged
     beyond, found = edges_beyond(mesh, normals, cosine, blocks)
+    sharp, alone = np.flatnonzero(beyond).astype(np.int32), np.ones(found, dtype=bool)
     # Without an edge beyond θ no mesh is edged.
     if creases.edged_angle is not None and (found if known is None else known):
-        bent, more = edges_beyond(mesh, normals, cosine_of(creases.edged_angle), blocks)
-        gentle = is_edged(found, more) if known is None else known
-        beyond, found = (bent, more) if gentle else (beyond, found)
-    if not found:
-        return np.zeros(0, dtype=np.int32)
-    sharp = np.flatnonzero(beyond).astype(np.int32)
+        bent, _ = edges_beyond(mesh, normals, cosine_of(creases.edged_angle), blocks)
+        rows = np.flatnonzero(bent).astype(np.int32)
+        bent_alone = edges_alone(points, mesh, normals, rows, blocks)
+        if known or is_edged(found, int(np.count_nonzero(bent_alone))):
+            beyond, sharp, alone = bent, rows, bent_alone
+    if not len(sharp):
+        return sharp
     is_between = np.empty(len(sharp), dtype=bool)
     turning = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, beyond
     blocks.run(len(sharp), mark_between_sides.over(*turning, sharp, ROWS, is_between))
-    between = sharp[is_between]
-    if gentle:
-        alone = np.empty(len(between), dtype=bool)
-        around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
-        least = PARALLEL**2, cosine_of(ROW_ANGLE)
-        blocks.run(
-            len(between), mark_alone.over(points, normals, *around, *least, between, ROWS, alone)
-        )
-        between = between[alone]
+    between, at_rim = sharp[is_between & alone], may_end(mesh, normals)
     left = np.ones(len(between), dtype=bool)
     met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))
-    at_rim = may_end(mesh, normals)
     drop_loose_ends(points, mesh.edges, between, at_rim, cosine, *met, left)
     return between[left]
+
+
+def edges_alone(
+    points: Float[np.ndarray, "V 3"],
+    mesh: MeshEdges,
+    normals: Float[np.ndarray, "F 3"],
+    rows: Int[np.ndarray, " N"],
+    blocks: Blocks,
+) -> Bool[np.ndarray, " N"]:
+    """Return which interior edges turn far or are in no row."""
+    alone = np.empty(len(rows), dtype=bool)
+    around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
+    least = PARALLEL**2, cosine_of(ROW_ANGLE)
+    blocks.run(len(rows), mark_alone.over(points, normals, *around, *least, rows, ROWS, alone))
+    return alone
 
 
 def edges_beyond(

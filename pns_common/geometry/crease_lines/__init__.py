@@ -16,10 +16,8 @@ is what lies around:
 θ of 66 degrees lies between the turns of a hexagon and a pentagon: tubes of six sides stay round,
 and a rim of six corners is a circle, but in edged meshes (below) six sides are edges.
 
-A part that is made of plane faces has gentler edges too, chamfers and the plates of a hull. It is
-known by its edges: a mesh is *edged* if at least half of those that turn by more than θ' = 21
-degrees turn by more than θ. (Where sharp rims go round something most edges that turn are on the
-round.) There, edges beyond θ' are lines too with the marks 2 and 3, but those up to 55 degrees only
+A part that is made of plane faces has gentler edges too, chamfers and the plates of a hull. There,
+edges beyond θ' = 21 degrees are lines too with the marks 2 and 3, but those up to 55 degrees only
 if
 
 4. *it stands alone*: it is not in a row. Edges in a row have walls on both sides, neither more than
@@ -30,6 +28,10 @@ if
    stays round, as a barrel does, where its walls are quads cut in two. So does a fillet of three
    pieces or more, whose arc begins and ends with half the turn of those between. But chamfers of a
    bar that are a fifth as wide as its sides are no row.
+
+Such a part is known by its edges: a mesh is *edged* if at least half of those beyond θ' that stand
+alone turn by more than θ. Those in rows are on something round, as a pipe, a hole or a fillet of
+the part is, and say nothing of the others.
 
 With them go edges that are held within plane sides, as a frame's mitres (held_edges.py).
 
@@ -55,7 +57,8 @@ from pns_common.geometry.crease_lines.turns import cosine_of, edges_beyond
 # within a quarter of an edge.
 CREASE_ANGLE, CREASE_LEVELS = 66.0, 2
 # θ' in degrees, of edged meshes, between the turns of tubes of 17 and 18 sides: where many edges
-# turn by θ' itself, rounding decides. And of how many beyond it one turns by more than θ there.
+# turn by θ' itself, rounding decides. And of how many beyond it that stand alone one turns by more
+# than θ there.
 EDGED_ANGLE, EDGED_ONE_IN = 21.0, 2
 
 
@@ -88,20 +91,18 @@ def line_rows(
     assert creases.line_angle is not None
     cosine = cosine_of(creases.line_angle)
     sharp = edges_beyond(normals, mesh, mesh.interior, cosine)
-    gentle = False
-    if creases.edged_angle is not None:
+    alone = np.ones(len(sharp), dtype=bool)
+    if creases.edged_angle is not None and creases.edged is not False:
         bent = edges_beyond(normals, mesh, mesh.interior, cosine_of(creases.edged_angle))
-        known = creases.edged
-        gentle = is_edged(len(sharp), len(bent)) if known is None else known
-        sharp = bent if gentle else sharp
+        bent_alone = stand_alone(points, normals, mesh, bent)
+        if creases.edged or is_edged(len(sharp), int(bent_alone.sum())):
+            sharp, alone = bent, bent_alone
     if len(sharp) == 0:
         return sharp
-    between = sharp[between_sides(normals, mesh, sharp)]
-    if gentle:
-        between = between[stand_alone(points, normals, mesh, between)]
+    between = sharp[between_sides(normals, mesh, sharp) & alone]
     return between[go_on(points, mesh, between, may_end(mesh, normals), cosine)]
 
 
-def is_edged(sharp: int, bent: int) -> bool:
-    """Return whether a mesh with so many edges beyond θ, and beyond θ', is edged."""
-    return sharp > 0 and EDGED_ONE_IN * sharp >= bent
+def is_edged(sharp: int, alone: int) -> bool:
+    """Return whether a mesh is edged with so many edges beyond θ, and beyond θ' in no row."""
+    return sharp > 0 and EDGED_ONE_IN * sharp >= alone

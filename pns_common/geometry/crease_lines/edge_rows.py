@@ -38,7 +38,7 @@ def stand_alone(
     mesh: Edges,
     flat: Int[np.ndarray, " N"],
 ) -> Bool[np.ndarray, " N"]:
-    """Return which edges, beside flat sides, turn far or are in no row."""
+    """Return which interior edges turn far or are in no row."""
     alone = np.empty(len(flat), dtype=bool)
     # A dozen others are looked at for each: not for all at once.
     for start in range(0, len(flat), AT_ONCE):

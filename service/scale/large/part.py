@@ -21,6 +21,7 @@ from pns_common.fused import kernel_blocks, load_kernels
 from pns_common.geometry.sharp_edges import edges_sharper_than
 from pns_common.geometry.side_lengths import SideLengths
 from pns_common.pieces import Piece, RefinedPiece, ThinHaloError, halo_rings, refine_piece
+from pns_common.pieces.halo import ROWS_REACH
 from pns_common.schemes import Scheme
 
 from ...errors import LimitError, NoModelError, UnrefinableError
@@ -112,7 +113,8 @@ def run_part(task: PartTask) -> PartDone:
     mesh, adjacency = open_mesh(Path(task.mesh)), Adjacency.open(work)
     own = Parts.open(work, task.parts).own(task.part)
     if task.stage == COUNT:
-        piece = cutout(mesh, adjacency, own, 1).piece
+        rings = max(_COUNT_RINGS[name] for name in task.counts)
+        piece = cutout(mesh, adjacency, own, rings).piece
         counted: dict[str, Any] = {name: _COUNTS[name](task, piece) for name in task.counts}
         with replacing(file) as temporary, temporary.open("wb") as stream:
             np.savez(stream, **counted)
@@ -163,6 +165,7 @@ def _turns(task: PartTask, piece: Piece) -> Int[np.ndarray, " 2"]:
 
 
 _COUNTS = {EDGES: _edges, TURNS: _turns}
+_COUNT_RINGS = {EDGES: 1, TURNS: ROWS_REACH}
 
 
 def _surely_refined(

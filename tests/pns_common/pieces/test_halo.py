@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pns_common import Mesh, ParameterError, crease_lines, load_model, loop, pns, refine
+from pns_common import Creases, Mesh, ParameterError, crease_lines, load_model, loop, pns, refine
+from pns_common.crease_lines import turns_of_parts
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.ring_features import RING_FEATURE_SETS
-from pns_common.pieces.halo import LINES_REACH, halo_rings, reach
+from pns_common.pieces.halo import LINES_REACH, ROWS_REACH, halo_rings, reach
 from pns_common.runtimes.onnx_model import bundled_models, model_from_bytes
 from tests.support.meshes import bumpy_sphere
 from tests.support.networks import (
@@ -20,6 +21,7 @@ from tests.support.networks import (
 )
 from tests.support.pieces import adjacent
 from tests.support.schemes import along_normal
+from train.data.primitives import cylinder
 
 SCHEMES = {"loop": loop(), **{name: pns(load_model(name)) for name in bundled_models()}}
 
@@ -100,6 +102,22 @@ def test_a_held_edge_is_known_within_the_reach_of_lines_and_no_nearer():
     whole = edge in crease_lines(mesh, 66.0).tolist()
     assert is_held(LINES_REACH) == whole
     assert is_held(LINES_REACH - 1) != whole
+
+
+def test_the_reach_of_rows_tells_what_turns_alone_and_no_nearer_one():
+    mesh, lines = cylinder(12, rows=4), Creases(line_angle=66.0, edged_angle=21.0)
+    owner = np.digitize(mesh.vertices[mesh.faces].mean(axis=1) @ [1, 2, 3], [-1, 0, 1])
+
+    def counted(rings):
+        total = np.zeros(2, dtype=np.int64)
+        for part in range(4):
+            near = adjacent(mesh.faces, owner == part, rings)
+            own = (owner[near] == part).astype(np.int64)
+            total += turns_of_parts(mesh.vertices, mesh.faces[near], lines, own, 2)[1]
+        return total.tolist()
+
+    assert counted(ROWS_REACH) == [24, 24]  # the rims; the walls' 36 are in rows
+    assert counted(ROWS_REACH - 1) != [24, 24]
 
 
 def test_a_scheme_of_unknown_rules_has_no_known_reach():

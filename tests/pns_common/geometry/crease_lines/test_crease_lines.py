@@ -81,6 +81,16 @@ def test_a_mesh_is_edged_where_half_of_its_turns_are_sharp():
         assert len(lines(pleat(30), replace(WITH_GENTLE, edged=edged))) == count
 
 
+def test_what_is_in_rows_does_not_make_a_part_round():
+    """A chamfered bar beside a pipe: of 146 edges that turn 45 are sharp, and two stand alone."""
+    pipe = cylinder(16, rows=6)
+    faces = np.concatenate([CHAMFERED.faces, pipe.faces + len(CHAMFERED.vertices)])
+    both = Mesh(np.concatenate([CHAMFERED.vertices, pipe.vertices + 5]), faces)
+    assert len(lines(both, WITH_GENTLE)) == 15 + 32
+    # Of a pipe by itself nothing else is sharp.
+    assert len(lines(pipe, WITH_GENTLE)) == 32
+
+
 @pytest.mark.parametrize("degrees", [30, -30])
 def test_gentle_folds_of_edged_meshes_are_lines_on_ridges_and_in_hollows(degrees):
     assert len(lines(pleat(degrees), replace(WITH_GENTLE, edged=True))) == 4
