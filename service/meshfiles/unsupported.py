@@ -107,4 +107,5 @@ def of_ply(data: bytes, elements: dict[str, Any], *, has_uv: bool) -> dict[str, 
                 counts[f"{element} property {name}"] = int(content["length"])
     if textures := len(_PLY_TEXTURE.findall(data[:LONGEST].partition(b"\nend_header")[0])):
         counts["names of textures"] = textures
-    return counts
+    # Some programs declare elements that they have none of.
+    return {name: count for name, count in counts.items() if count}

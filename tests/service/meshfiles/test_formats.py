@@ -167,6 +167,13 @@ def test_a_texture_that_did_not_come_is_no_stack_trace(caplog: pytest.LogCapture
     assert not caplog.records
 
 
+@pytest.mark.parametrize("count", [0, 1])
+def test_elements_that_a_ply_has_none_of_are_not_told(count: int) -> None:
+    edge = b"element edge %d\nproperty int vertex1\nend_header" % count
+    data = POLYGONS["ply"].replace(b"end_header", edge) + b"0\n" * count
+    assert formats.read(data, "ply").unsupported == ({"element edge": 1} if count else {})
+
+
 @pytest.mark.parametrize("kind", POLYGONS)
 def test_polygons_are_split_and_counted(kind: str) -> None:
     mesh_file = formats.read(POLYGONS[kind], kind)
