@@ -22,7 +22,7 @@ if
 
 4. *it stands alone*: it is not in a row. Edges in a row have walls on both sides, neither more than
    four times as wide as the other, and across each of these another edge like it, which runs within
-   20 degrees of parallel and turns the same way, with a quarter to three times its 1 − cos t; one
+   19.5 degrees of parallel and turns the same way, with a quarter to three times its 1 − cos t; one
    that goes on from its end is not beside it. A row ends where walls of one width, to a tenth, meet
    a sharper edge, whichever way that turns. A row is a tube or an arc: one of seven sides or more
    stays round, as a barrel does, where its walls are quads cut in two. So does a fillet of three

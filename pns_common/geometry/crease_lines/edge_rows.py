@@ -20,10 +20,11 @@ from pns_common.geometry.crease_lines.turns import (
 # Degrees beyond which an edge of an edged mesh need not stand alone: between the turns of a hexagon
 # and a heptagon.
 ROW_ANGLE = 55.0
-# Others are like an edge within 20 degrees of parallel, and where their 1 − cos t is at most so
-# many times its own, and its own so many times theirs: of 45 degrees 30 and 60 are like, and 90 is
-# not. Half as many degrees are always like: their 1 − cos t is more than a quarter.
-PARALLEL, TIMES_ITS_OWN, TIMES_THEIRS = math.cos(math.radians(20)), 3.0, 4.0
+# Others are like an edge within 19.5 degrees of parallel (rims of 18 and 36 sides have some at 20,
+# and rounding would decide), and where their 1 − cos t is at most so many times its own, and its
+# own so many times theirs: of 45 degrees 30 and 60 are like, and 90 is not. Half as many degrees
+# are always like: their 1 − cos t is more than a quarter.
+PARALLEL, TIMES_ITS_OWN, TIMES_THEIRS = math.cos(math.radians(19.5)), 3.0, 4.0
 # How many times as wide as the other the wider of an edge's walls may be: in a row four times, as
 # where a simplifier made one wall of some, and where it ends they are those of one arc, no plates.
 # Walls that are just four times as wide, or eleven tenths, are in it: else rounding would decide.

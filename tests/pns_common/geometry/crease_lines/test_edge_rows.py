@@ -157,3 +157,28 @@ def test_there_is_nothing_across_the_edge_of_a_sheet():
         np.concatenate([sheet, sheet + np.array([9, 0, 0])]), np.concatenate([faces, faces + 6])
     )
     assert lines(mesh, replace(WITH_GENTLE, edged=True)) == {(2, 3), (8, 9)}
+
+
+def test_edges_of_a_rim_of_36_sides_are_in_no_row_however_it_is_turned():
+    """Two of them run at 20 degrees, across the flat side that they are edges of."""
+    mesh, edged = chamfered_shaft(36), replace(WITH_GENTLE, edged=True)
+    for seed in range(6):
+        turned = Mesh(mesh.vertices @ rotation(np.random.default_rng(seed)).T, mesh.faces)
+        assert len(lines(turned, edged)) == 3 * 36
+
+
+def chamfered_shaft(sides):
+    """A cylinder with a chamfer below; each of its flat sides is a fan from one corner."""
+    angle = np.arange(sides) * 2 * np.pi / sides
+    rings = [[r * np.cos(angle), r * np.sin(angle), 0 * angle + z] for r, z in RINGS]
+    here, after = np.arange(sides), np.roll(np.arange(sides), -1)
+    faces = [np.stack([0 * here[2:], here[2:], here[1:-1]], axis=1)]
+    for ring in range(2):
+        a, b = here + ring * sides, after + ring * sides
+        faces += [np.stack([a, b, b + sides], axis=1), np.stack([a, b + sides, a + sides], axis=1)]
+    faces.append(2 * sides + faces[0][:, [0, 2, 1]])
+    return Mesh(np.concatenate([np.stack(ring, axis=1) for ring in rings]), np.concatenate(faces))
+
+
+# Radius and height.
+RINGS = (0.95, 0.0), (1.0, 0.05), (1.0, 2.0)
