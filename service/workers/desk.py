@@ -144,7 +144,10 @@ class Desk:
     async def _serve(self, job: Job) -> None:
         waiting = self.turns.join(job.client, MEASURING_SECONDS, counted=False)
         async with self._turn(waiting, job) as turn:
-            cost = job.cost = await self._call(turn, job, self._measure)
+            cost = await self._call(turn, job, self._measure)
+        # None runs longer, whatever it says of itself: nobody else is to wait for that.
+        most = self._job_seconds / self._slowness.factor
+        cost = job.cost = replace(cost, seconds=min(cost.seconds, most))
         try:
             with self._paid(job, cost):
                 job.waiting = self.turns.join(job.client, cost.seconds)

@@ -210,3 +210,26 @@ def test_nobody_pays_for_the_end_of_anothers_worker() -> None:
         assert desk.turns.join("a", 0.0).tag[0] < 0.2
 
     run(scenario)
+
+
+def test_what_a_job_says_of_itself_keeps_nobody_waiting_for_longer_than_it_may_run() -> None:
+    async def scenario() -> None:
+        now, turns, predicted = cast(Workers, AtOnce()), Turns(1, 1, 1.0), list[float]()
+
+        def begun(work: Work) -> Done:
+            predicted.append(turns.backlog())
+            return Done({}, None)
+
+        desk = Desk(
+            {Lane.ANY: now, Lane.SHORT: now},
+            turns,
+            FacesBudget(),
+            run=begun,
+            measure=lambda work: Cost(4, 1, 1e9),
+            job_seconds=30,
+        )
+        with MemoryFile() as answer:
+            await desk.serve(job_of(b"", answer))
+        assert predicted == [30.0]
+
+    run(scenario)
