@@ -100,6 +100,16 @@ def test_what_many_attributes_carry_is_no_short_job(place: str) -> None:
     assert cost(files.pack(tree, binary)).seconds > 10 > 0.2 > few
 
 
+def test_the_places_of_sparse_accessors_are_gone_through_each_time() -> None:
+    """Ten million, named a hundred times, take seconds, and may lie in a file beside the JSON."""
+    tree, binary = files.document([octahedron()])
+    (primitive,) = tree["meshes"][0]["primitives"]
+    primitive["attributes"] |= {f"_A{number}": len(tree["accessors"]) for number in range(100)}
+    few = cost(files.pack(tree, binary)).seconds
+    tree["accessors"].append({"count": 10**7, "sparse": {"count": 10**7}})
+    assert cost(files.pack(tree, binary)).seconds > 3 > 0.1 > few
+
+
 def test_every_value_of_the_json_and_every_array_costs_something() -> None:
     tree, binary = files.document([octahedron()])
     plain = cost(files.pack(tree, binary)).seconds
