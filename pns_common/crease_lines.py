@@ -36,9 +36,10 @@ def crease_lines(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2
 
     These turn by more than ``angle`` (degrees, between 0 and 180), lie between two sides of a part,
     and go on at both ends. None: by more than 66 degrees, and where at least half of the edges
-    beyond 21 degrees that are in no row of like ones are beyond 66, all of these; so the default
-    model keeps them (geometry/crease_lines). With them go edges within plane sides that begin on
-    them and would fold these sides, as the mitres of a frame.
+    beyond 21 degrees that are in no row of like ones are beyond 66, all of these, and elsewhere
+    those beside plane sides that were cut finely; so the default model keeps them
+    (geometry/crease_lines). With them go edges within plane sides that begin on them and would fold
+    these sides, as the mitres of a frame.
 
     Raises:
         ParameterError: it is no Mesh, or the angle is out of range.

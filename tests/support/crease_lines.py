@@ -7,7 +7,7 @@ from pns_common.connectivity.topology import build_topology
 from pns_common.geometry.crease_lines import CREASE_ANGLE, EDGED_ANGLE, line_rows
 from pns_common.geometry.crease_lines.held_edges import with_held_edges
 from pns_common.geometry.frames import face_normals
-from tests.support.meshes import prism
+from tests.support.meshes import grid, prism
 
 SHARP_ALONE = Creases(line_angle=CREASE_ANGLE)
 WITH_GENTLE = Creases(line_angle=CREASE_ANGLE, edged_angle=EDGED_ANGLE)
@@ -52,3 +52,25 @@ def _pairs(mesh, creases):
 
 def normals_of(mesh):
     return face_normals(mesh.vertices, mesh.faces)
+
+
+def pleat(degrees, cells=4):
+    """A sheet of so many by so many cells, folded once along its middle row."""
+    points, faces = grid(cells + 1)
+    half, y = np.radians(degrees) / 2, points[:, 1]
+    folded = np.stack([points[:, 0], y * np.cos(half), -np.abs(y) * np.sin(half)], axis=1)
+    return Mesh(folded, faces)
+
+
+def tube(sides, across, rows=4):
+    """An open tube of plane walls, each of so many quads across, all cut the same way."""
+    corners = 2 * np.pi * np.arange(sides) / sides
+    corners = np.stack([np.cos(corners), np.sin(corners)], axis=1)
+    way = (np.arange(across) / across)[:, None]
+    around = corners[:, None] * (1 - way) + np.roll(corners, -1, axis=0)[:, None] * way
+    count, heights = sides * across, np.linspace(0, 2, rows + 1)
+    rim = np.tile(around.reshape(-1, 2), (rows + 1, 1))
+    i, j = (axis.ravel() for axis in np.mgrid[:rows, :count])
+    a, b = i * count + j, i * count + (j + 1) % count
+    faces = np.stack([a, b, b + count, a, b + count, a + count], axis=1).reshape(-1, 3)
+    return Mesh(np.c_[rim, np.repeat(heights, count)], faces)

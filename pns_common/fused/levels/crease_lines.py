@@ -10,13 +10,15 @@ from pns_common.connectivity.creases import Creases
 from pns_common.fused.kernels.compiled import ROWS
 from pns_common.fused.kernels.edge_rows import mark_alone
 from pns_common.fused.kernels.going_on import drop_loose_ends
+from pns_common.fused.kernels.plane_sides import mark_beside_level_faces
 from pns_common.fused.kernels.sides import mark_between_sides
 from pns_common.fused.kernels.turns import mark_edges_beyond
 from pns_common.fused.levels.mesh_edges import MeshEdges
 from pns_common.geometry.crease_lines import is_edged
 from pns_common.geometry.crease_lines.edge_rows import PARALLEL, ROW_ANGLE
 from pns_common.geometry.crease_lines.going_on import may_end
-from pns_common.geometry.crease_lines.turns import cosine_of
+from pns_common.geometry.crease_lines.plane_sides import beside_planes
+from pns_common.geometry.crease_lines.turns import IN_ONE_PLANE, cosine_of
 
 
 def crease_line_rows(
@@ -28,26 +30,82 @@ def crease_line_rows(
 ) -> Int[np.ndarray, " N"]:
     """Return the edges of the lines to look for; ``normals`` are the faces'."""
     assert creases.line_angle is not None
-    cosine, known = cosine_of(creases.line_angle), creases.edged
-    beyond, found = edges_beyond(mesh, normals, cosine, blocks)
-    sharp, alone = np.flatnonzero(beyond).astype(np.int32), np.ones(found, dtype=bool)
+    cosine = cosine_of(creases.line_angle)
+    if creases.edged_angle is None:
+        rows, _ = sharp_rows(mesh, normals, cosine, blocks)
+    else:
+        gentle = cosine_of(creases.edged_angle)
+        rows = with_gentler(points, mesh, normals, (cosine, gentle), creases.edged, blocks)
+    left = np.ones(len(rows), dtype=bool)
+    if len(rows):
+        met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))
+        at_rim = may_end(mesh, normals)
+        drop_loose_ends(points, mesh.edges, rows, at_rim, cosine, *met, left)
+    return rows[left]
+
+
+def sharp_rows(
+    mesh: MeshEdges, normals: Float[np.ndarray, "F 3"], cosine: float, blocks: Blocks
+) -> tuple[Int[np.ndarray, " N"], int]:
+    """Return the edges with marks 1 and 2, and how many have the first."""
+    sharp, found = edges_beyond(mesh, normals, cosine, blocks)
+    rows = np.flatnonzero(sharp).astype(np.int32)
+    return rows[between_sides(mesh, normals, rows, sharp, blocks)], found
+
+
+def with_gentler(
+    points: Float[np.ndarray, "V 3"],
+    mesh: MeshEdges,
+    normals: Float[np.ndarray, "F 3"],
+    cosines: tuple[float, float],
+    known: bool | None,
+    blocks: Blocks,
+) -> Int[np.ndarray, " N"]:
+    """Return the edges with all marks but the third, of θ and θ'; ``known``: if it is edged."""
+    cosine, gentle = cosines
+    bent, more = edges_beyond(mesh, normals, gentle, blocks)
+    rows = np.flatnonzero(bent).astype(np.int32)
+    if not more:
+        return rows  # as of most fine meshes
+    lines, found = sharp_rows(mesh, normals, cosine, blocks)
     # Without an edge beyond θ no mesh is edged.
-    if creases.edged_angle is not None and (found if known is None else known):
-        bent, _ = edges_beyond(mesh, normals, cosine_of(creases.edged_angle), blocks)
-        rows = np.flatnonzero(bent).astype(np.int32)
-        bent_alone = edges_alone(points, mesh, normals, rows, blocks)
-        if known or is_edged(found, int(np.count_nonzero(bent_alone))):
-            beyond, sharp, alone = bent, rows, bent_alone
-    if not len(sharp):
-        return sharp
-    is_between = np.empty(len(sharp), dtype=bool)
-    turning = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, beyond
-    blocks.run(len(sharp), mark_between_sides.over(*turning, sharp, ROWS, is_between))
-    between, at_rim = sharp[is_between & alone], may_end(mesh, normals)
-    left = np.ones(len(between), dtype=bool)
-    met = np.zeros(mesh.vertex_count, dtype=np.int32), np.zeros((mesh.vertex_count, 3))
-    drop_loose_ends(points, mesh.edges, between, at_rim, cosine, *met, left)
-    return between[left]
+    if known is None and found:
+        alone = edges_alone(points, mesh, normals, rows, blocks)
+        known = is_edged(found, int(np.count_nonzero(alone)))
+    if not known:
+        rows = rows[beside_level_faces(mesh, normals, rows, blocks)]
+        rows = rows[beside_planes(normals, mesh, rows)]
+    rows = rows[between_sides(mesh, normals, rows, bent, blocks)]
+    rows = rows[edges_alone(points, mesh, normals, rows, blocks)]
+    return rows if known else np.union1d(lines, rows)
+
+
+def between_sides(
+    mesh: MeshEdges,
+    normals: Float[np.ndarray, "F 3"],
+    rows: Int[np.ndarray, " N"],
+    sharp: Bool[np.ndarray, " E"],
+    blocks: Blocks,
+) -> Bool[np.ndarray, " N"]:
+    """Return at which of some edges that are sharp two sides of a part meet."""
+    between = np.empty(len(rows), dtype=bool)
+    turning = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
+    blocks.run(len(rows), mark_between_sides.over(*turning, rows, ROWS, between))
+    return between
+
+
+def beside_level_faces(
+    mesh: MeshEdges,
+    normals: Float[np.ndarray, "F 3"],
+    rows: Int[np.ndarray, " N"],
+    blocks: Blocks,
+) -> Bool[np.ndarray, " N"]:
+    """Return which interior edges may lie beside a plane side, as few do: the others do not."""
+    level = np.empty(len(rows), dtype=bool)
+    turning = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class
+    mark = mark_beside_level_faces.over(*turning, cosine_of(IN_ONE_PLANE), rows, ROWS, level)
+    blocks.run(len(rows), mark)
+    return level
 
 
 def edges_alone(

@@ -33,6 +33,9 @@ Such a part is known by its edges: a mesh is *edged* if at least half of those b
 alone turn by more than θ. Those in rows are on something round, as a pipe, a hole or a fillet of
 the part is, and say nothing of the others.
 
+Sides that were cut finely tell of themselves that they are plane (plane_sides.py): beside one an
+edge beyond θ' is a line with the marks 2, 3 and 4 in any mesh.
+
 With them go edges that are held within plane sides, as a frame's mitres (held_edges.py).
 
 What makes a mesh edged are counts, and those of its pieces add up. Turning, moving, scaling or
@@ -50,6 +53,7 @@ from pns_common.connectivity.topology import Topology
 from pns_common.geometry.crease_lines.edge_rows import stand_alone
 from pns_common.geometry.crease_lines.going_on import go_on, may_end
 from pns_common.geometry.crease_lines.held_edges import with_held_edges
+from pns_common.geometry.crease_lines.plane_sides import beside_planes
 from pns_common.geometry.crease_lines.sides import between_sides
 from pns_common.geometry.crease_lines.turns import cosine_of, edges_beyond
 
@@ -91,16 +95,16 @@ def line_rows(
     assert creases.line_angle is not None
     cosine = cosine_of(creases.line_angle)
     sharp = edges_beyond(normals, mesh, mesh.interior, cosine)
-    alone = np.ones(len(sharp), dtype=bool)
-    if creases.edged_angle is not None and creases.edged is not False:
+    rows = sharp[between_sides(normals, mesh, sharp)]
+    if creases.edged_angle is not None:
         bent = edges_beyond(normals, mesh, mesh.interior, cosine_of(creases.edged_angle))
-        bent_alone = stand_alone(points, normals, mesh, bent)
-        if creases.edged or is_edged(len(sharp), int(bent_alone.sum())):
-            sharp, alone = bent, bent_alone
-    if len(sharp) == 0:
-        return sharp
-    between = sharp[between_sides(normals, mesh, sharp) & alone]
-    return between[go_on(points, mesh, between, may_end(mesh, normals), cosine)]
+        alone, known = stand_alone(points, normals, mesh, bent), creases.edged
+        gentle = bent[alone & between_sides(normals, mesh, bent)]
+        if is_edged(len(sharp), int(alone.sum())) if known is None else known:
+            rows = gentle
+        else:
+            rows = np.union1d(rows, gentle[beside_planes(normals, mesh, gentle)])
+    return rows[go_on(points, mesh, rows, may_end(mesh, normals), cosine)]
 
 
 def is_edged(sharp: int, alone: int) -> bool:

@@ -20,6 +20,7 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.arrays import dot, gather, marked, unit
 from pns_common.connectivity.topology import EdgeClass, vertices_across
 from pns_common.geometry.crease_lines.going_on import CORNER, runs_straight
+from pns_common.geometry.crease_lines.plane_sides import end_at, in_planes
 from pns_common.geometry.crease_lines.turns import IN_ONE_PLANE, Edges, cosine_of, turn_cosines
 
 # A line that turns by less at a vertex, in degrees, runs straight there: no angle that circles are
@@ -86,12 +87,6 @@ def staying(
     return stays
 
 
-def end_at(marks: Bool[np.ndarray, " V"], mesh: Edges) -> Bool[np.ndarray, " E"]:
-    """Return which edges have an end that is marked."""
-    # One end of all after the other: for numpy that is half the work of rows of two.
-    return np.logical_or(*(gather(marks, ends) for ends in mesh.edges.T))
-
-
 def slides(
     points: Float[np.ndarray, "V 3"], mesh: Edges, rows: Int[np.ndarray, " N"]
 ) -> Bool[np.ndarray, " N"]:
@@ -101,18 +96,3 @@ def slides(
     a, b, c, d = (points[column] for column in (*ends.T, *across.T))
     off, along = ((c + d) - (a + b)) / 8, b - a
     return dot(off, off) > NEAR**2 * dot(along, along)
-
-
-def in_planes(
-    normals: Float[np.ndarray, "F 3"],
-    mesh: Edges,
-    is_sharp: Bool[np.ndarray, " E"],
-    asked: Int[np.ndarray, " N"],
-) -> Bool[np.ndarray, " V"]:
-    """Return which of the vertices that are asked for have one plane around them, and no line."""
-    inside = marked(asked, mesh.vertex_count)
-    rows = np.flatnonzero(end_at(inside, mesh))
-    bent = is_sharp[rows]
-    bent[~bent] = turn_cosines(normals, mesh, rows[~bent]) <= cosine_of(IN_ONE_PLANE)
-    inside[mesh.edges[rows[bent]]] = False
-    return inside

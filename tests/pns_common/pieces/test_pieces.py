@@ -17,6 +17,7 @@ from pns_common.pieces import (
     reduced_report,
 )
 from pns_common.runtimes.onnx_model import bundled_models
+from tests.support.crease_lines import tube
 from tests.support.meshes import bent, grid, manifolds, soups
 from tests.support.networks import random_model, scale_free_model, vertex_model
 from tests.support.pieces import pieces_refined
@@ -119,6 +120,19 @@ def test_pieces_find_the_lines_of_the_whole():
     owner = (mesh.vertices[mesh.faces].mean(axis=1)[:, :2] // 0.3) @ [1, 20]
     assert_pieces_are_the_whole(mesh, owner, loop(), 3, lines=lines)
     assert len(crease_lines(mesh)) > 100
+
+
+def test_pieces_find_the_edges_between_walls_that_were_cut_finely():
+    """Half way up the walls are no longer plane, and their edges lose as many as are dropped."""
+    mesh, rng = tube(8, across=3, rows=24), np.random.default_rng(0)
+    moved = mesh.vertices + 0.01 * rng.standard_normal(mesh.vertices.shape)
+    mesh = Mesh(np.where(mesh.vertices[:, 2:] > 1, moved, mesh.vertices), mesh.faces)
+    lines = Creases(line_angle=66.0, levels=2, edged_angle=21.0)
+    assert 8 * 5 < len(crease_lines(mesh)) < 8 * 12
+    for seed in range(3):
+        owner = np.random.default_rng(seed).integers(0, 6, 24 * 2)
+        owner = np.repeat(owner, len(mesh.faces) // len(owner))
+        assert_pieces_are_the_whole(mesh, owner, loop(), 2, lines=lines)
 
 
 def test_pieces_of_an_edged_mesh_find_its_gentler_lines():

@@ -12,6 +12,7 @@ from pns_common.fused.levels.crease_lines import crease_line_rows
 from pns_common.fused.levels.face_measures import face_normals
 from pns_common.geometry.crease_lines import line_rows
 from pns_common.geometry.frames import face_normals as array_normals
+from tests.support.crease_lines import pleat, tube
 from tests.support.kernels import edges_built
 from tests.support.meshes import block, manifolds, soups
 
@@ -47,3 +48,11 @@ def test_they_find_those_of_a_noisy_block(closed):
     found = found_by_kernels(mesh, creases, Blocks(2, 7))
     np.testing.assert_array_equal(found, expected_lines(mesh, creases))
     assert len(found) > 20
+
+
+@pytest.mark.parametrize("edged", [None, True, False])
+@pytest.mark.parametrize("mesh", [pleat(30), tube(8, across=3), tube(8, across=1)])
+def test_they_find_those_beside_plane_sides(mesh, edged):
+    creases = Creases(line_angle=66.0, edged_angle=21.0, edged=edged)
+    found = found_by_kernels(mesh, creases, Blocks(2, 7))
+    np.testing.assert_array_equal(found, expected_lines(mesh, creases))
