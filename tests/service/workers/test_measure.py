@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 
 import numpy as np
@@ -41,6 +42,14 @@ def test_a_text_with_a_byte_order_mark_is_the_same() -> None:
     plain = cost_of_gltf(text, "gltf", 1, Limits())
     marked = cost_of_gltf(b"\xef\xbb\xbf" + text, "gltf", 1, Limits())
     assert plain.faces == marked.faces == 32
+
+
+def test_integers_with_a_fraction_count_as_integers() -> None:
+    tree, _ = files.document([octahedron()])
+    text = re.sub(r": (\d+)(?=[,}])", r": \1.0", files.json.dumps(tree))
+    assert '"count": 24.0' in text
+    measured = cost_of_gltf(text.encode(), "gltf", 1, Limits())
+    assert (measured.faces, measured.primitives) == (32, 1)
 
 
 @pytest.mark.parametrize(
