@@ -22,7 +22,8 @@ class Creases:
         named: pairs of vertices.
         line_angle: θ in degrees of the crease lines that the mesh shows
             (geometry/crease_lines); None: none are looked for.
-        edged_angle: θ' of gentler lines of edged meshes, in degrees below θ; None: there are none.
+        edged_angle: θ' of gentler lines, of edged meshes and beside plane sides, in degrees
+            below θ; None: there are none.
         edged: whether it is an edged mesh, where that is known of the whole; None: that is seen.
         levels: at how many levels they are sharp, and smooth from then on (semi-sharp creases,
             DeRose, Kass and Truong 1998); None: for good. Where they are sharp at the last level,

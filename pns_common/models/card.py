@@ -70,8 +70,8 @@ class ModelCard:
         crease_angle: θ of the crease lines that are kept where no creases are named, degrees
             between 0 and 180; None looks for none.
         crease_levels: at how many levels they are sharp, at least 1; with ``crease_angle``.
-        edged_crease_angle: θ' < θ of those of edged meshes, degrees (geometry/crease_lines);
-            None keeps none between the two.
+        edged_crease_angle: θ' < θ of those of edged meshes, and beside plane sides, degrees
+            (geometry/crease_lines); None keeps none between the two.
     """
 
     format: int

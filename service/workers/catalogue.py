@@ -74,8 +74,9 @@ class ModelEntry(BaseModel):
         description="at how many levels these lines are sharp; null: there are none"
     )
     edged_crease_angle: float | None = Field(
-        description="of those of a mesh at least half of whose turns are that sharp, in degrees;"
-        " null: the same"
+        description="of those of a mesh at least half of whose turns are that sharp, rows of like"
+        " ones apart, and of those beside plane sides that were cut finely, in degrees; null: the"
+        " same"
     )
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")
