@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.base.blocks import Blocks
 from pns_common.connectivity.creases import Creases
-from pns_common.fused.kernels.compiled import ROWS
+from pns_common.fused.kernels.compiled import ROWS, Kernel
 from pns_common.fused.kernels.edge_rows import mark_alone
 from pns_common.fused.kernels.going_on import drop_loose_ends
 from pns_common.fused.kernels.plane_sides import mark_beside_level_faces
@@ -32,7 +32,8 @@ def crease_line_rows(
     assert creases.line_angle is not None
     cosine = cosine_of(creases.line_angle)
     if creases.edged_angle is None:
-        rows, _ = sharp_rows(mesh, normals, cosine, blocks)
+        sharp, _ = edges_beyond(mesh, normals, cosine, blocks)
+        rows = sharp_between_sides(mesh, normals, sharp, blocks)
     else:
         gentle = cosine_of(creases.edged_angle)
         rows = with_gentler(points, mesh, normals, (cosine, gentle), creases.edged, blocks)
@@ -42,15 +43,6 @@ def crease_line_rows(
         at_rim = may_end(mesh, normals)
         drop_loose_ends(points, mesh.edges, rows, at_rim, cosine, *met, left)
     return rows[left]
-
-
-def sharp_rows(
-    mesh: MeshEdges, normals: Float[np.ndarray, "F 3"], cosine: float, blocks: Blocks
-) -> tuple[Int[np.ndarray, " N"], int]:
-    """Return the edges with marks 1 and 2, and how many have the first."""
-    sharp, found = edges_beyond(mesh, normals, cosine, blocks)
-    rows = np.flatnonzero(sharp).astype(np.int32)
-    return rows[between_sides(mesh, normals, rows, sharp, blocks)], found
 
 
 def with_gentler(
@@ -67,17 +59,25 @@ def with_gentler(
     rows = np.flatnonzero(bent).astype(np.int32)
     if not more:
         return rows  # as of most fine meshes
-    lines, found = sharp_rows(mesh, normals, cosine, blocks)
-    # Without an edge beyond θ no mesh is edged.
-    if known is None and found:
-        alone = edges_alone(points, mesh, normals, rows, blocks)
-        known = is_edged(found, int(np.count_nonzero(alone)))
-    if not known:
-        rows = rows[beside_level_faces(mesh, normals, rows, blocks)]
-        rows = rows[beside_planes(normals, mesh, rows)]
-    rows = rows[between_sides(mesh, normals, rows, bent, blocks)]
+    sharp, found = edges_beyond(mesh, normals, cosine, blocks)
     rows = rows[edges_alone(points, mesh, normals, rows, blocks)]
-    return rows if known else np.union1d(lines, rows)
+    if is_edged(found, len(rows)) if known is None else known:
+        return rows[between_sides(mesh, normals, rows, bent, blocks)]
+    rows = rows[beside_level_faces(mesh, normals, rows, blocks)]
+    rows = rows[beside_planes(normals, mesh, rows)]
+    rows = rows[between_sides(mesh, normals, rows, bent, blocks)]
+    return np.union1d(sharp_between_sides(mesh, normals, sharp, blocks), rows)
+
+
+def sharp_between_sides(
+    mesh: MeshEdges,
+    normals: Float[np.ndarray, "F 3"],
+    sharp: Bool[np.ndarray, " E"],
+    blocks: Blocks,
+) -> Int[np.ndarray, " N"]:
+    """Return those of all sharp edges at which two sides of a part meet."""
+    rows = np.flatnonzero(sharp).astype(np.int32)
+    return rows[between_sides(mesh, normals, rows, sharp, blocks)]
 
 
 def between_sides(
@@ -87,11 +87,9 @@ def between_sides(
     sharp: Bool[np.ndarray, " E"],
     blocks: Blocks,
 ) -> Bool[np.ndarray, " N"]:
-    """Return at which of some edges that are sharp two sides of a part meet."""
-    between = np.empty(len(rows), dtype=bool)
-    turning = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
-    blocks.run(len(rows), mark_between_sides.over(*turning, rows, ROWS, between))
-    return between
+    """Return at which of some of the sharp edges two sides of a part meet."""
+    around = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, sharp
+    return _marked(mark_between_sides, around, rows, blocks)
 
 
 def beside_level_faces(
@@ -101,11 +99,8 @@ def beside_level_faces(
     blocks: Blocks,
 ) -> Bool[np.ndarray, " N"]:
     """Return which interior edges may lie beside a plane side, as few do: the others do not."""
-    level = np.empty(len(rows), dtype=bool)
-    turning = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class
-    mark = mark_beside_level_faces.over(*turning, cosine_of(IN_ONE_PLANE), rows, ROWS, level)
-    blocks.run(len(rows), mark)
-    return level
+    around = normals, mesh.face_edges, mesh.half_edges, mesh.edge_class, cosine_of(IN_ONE_PLANE)
+    return _marked(mark_beside_level_faces, around, rows, blocks)
 
 
 def edges_alone(
@@ -116,11 +111,21 @@ def edges_alone(
     blocks: Blocks,
 ) -> Bool[np.ndarray, " N"]:
     """Return which interior edges turn far or are in no row."""
-    alone = np.empty(len(rows), dtype=bool)
     around = mesh.faces, mesh.edges, mesh.face_edges, mesh.half_edges, mesh.edge_class
     least = PARALLEL**2, cosine_of(ROW_ANGLE)
-    blocks.run(len(rows), mark_alone.over(points, normals, *around, *least, rows, ROWS, alone))
-    return alone
+    return _marked(mark_alone, (points, normals, *around, *least), rows, blocks)
+
+
+def _marked(
+    mark: Kernel,
+    around: tuple[np.ndarray | float, ...],
+    rows: Int[np.ndarray, " N"],
+    blocks: Blocks,
+) -> Bool[np.ndarray, " N"]:
+    """Return which edges a kernel marks, of what it reads around them."""
+    marks = np.empty(len(rows), dtype=bool)
+    blocks.run(len(rows), mark.over(*around, rows, ROWS, marks))
+    return marks
 
 
 def edges_beyond(
