@@ -43,10 +43,10 @@ def count_bends(
 
     `crease_edges` are the counts in the parts' reports at the first level. They stand for the lines
     that the operator found: these have no names here, and all bend. Nothing is counted where no
-    edge is sharp. Without `part_of_face` the mesh is one part.
+    sharp edges are asked for. Without `part_of_face` the mesh is one part.
     """
     count = len(crease_edges)
-    if not any(crease_edges):
+    if creases.named is None and creases.line_angle is None:
         return [NO_BENDS] * count
     edges, half_edges = interior_edges(mesh.faces, len(mesh.vertices))
     faces = half_edges // 3
