@@ -85,7 +85,7 @@ MODELS ?= paper signed general
 models: $(DEV)/.ready
 	set -e; for recipe in $(MODELS); do \
 	  $(DEV)/bin/python train/run.py train --recipe $$recipe; \
-	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors; \
+	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors --install; \
 	done
 
 # Honest and hostile clients at one service: SOAK='--minutes 1440' for a day.

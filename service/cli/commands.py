@@ -276,6 +276,20 @@ def info(
 
 
 @app.command()
+def doctor() -> None:
+    """Show versions, models, memory and settings, and refine an example; 1 if anything is wrong."""
+    from ..doctor import findings
+
+    well = True
+    for finding in findings():
+        mark = "ok  " if finding.well else "FAIL"
+        typer.echo(printable(f"{mark} {finding.name:<12} {finding.text}"))
+        well = well and finding.well
+    if not well:
+        raise typer.Exit(FAILURE)
+
+
+@app.command()
 def example(
     output: Annotated[Path, typer.Argument(metavar="OUT.glb", help="file to write")],
 ) -> None:

@@ -21,7 +21,7 @@ from ..bodies.media import GLTF_KINDS, KINDS
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..bodies.uploads import Sent
 from ..course import Course
-from ..errors import InvalidParameter
+from ..errors import InvalidParameter, ServiceError
 from ..gltf.read.upload import read_upload
 from ..gltf.subdivide import make_scheme, subdivide_gltf
 from ..options import Limits, Options
@@ -70,8 +70,15 @@ def convert(
     data = source.read_bytes()
     # Loop needs none, but one that is named and does not exist is a mistake to be told.
     loaded = load_model(model) if options.scheme == "pns" or model is not None else None
-    with _progress(console) as course:
-        written = converted(data, kind, target, options, loaded, limits, course, folder_of(source))
+    try:
+        with _progress(console) as course:
+            written = converted(
+                data, kind, target, options, loaded, limits, course, folder_of(source)
+            )
+    except ServiceError as error:
+        if not isinstance(error, InvalidParameter):
+            error.file = str(source)
+        raise
     replace_file(output, written.content)
     if report_file is not None:
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)

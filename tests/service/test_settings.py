@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from service.settings import Settings
 
 EXAMPLES = {
+    "ignore_unknown": ("true", True),
     "host": ("0.0.0.0", "0.0.0.0"),
     "port": ("8080", 8080),
     "prefix": ("/tools/pns", "/tools/pns"),
