@@ -195,3 +195,21 @@ def test_a_misspelt_setting_is_refused(
     with pytest.raises(ValidationError) as refused:
         Settings()
     assert text in str(refused.value)
+
+
+def test_another_programs_variable_passes_where_it_is_said_to(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("PNS_FOO", "1")
+    with pytest.raises(ValidationError, match="PNS_FOO: unset it, or set PNS_IGNORE_UNKNOWN=1"):
+        Settings()
+    monkeypatch.setenv("PNS_IGNORE_UNKNOWN", "1")
+    assert Settings().ignore_unknown
+
+
+@pytest.mark.parametrize("name", ["PNS_BODDY", "PNS_JOB_FOO"])
+def test_what_resembles_a_setting_never_passes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PNS_IGNORE_UNKNOWN", "1")
+    monkeypatch.setenv(name, "1")
+    with pytest.raises(ValidationError, match=name):
+        Settings()
