@@ -95,7 +95,7 @@ def measure(laboratory: Laboratory) -> Spending:
     """Return what each interior edge of the instance spends."""
     instance = hard_instance()
     mesh, surface = instance.mesh, ridge_of(instance)
-    refined = refine(mesh, laboratory.scheme(paper()), reference_length=PAPER_UNITS)
+    refined = refine(mesh, laboratory.scheme(paper()), 1, reference_length=PAPER_UNITS)
     topology = build_topology(mesh.faces, len(mesh.vertices))
     vertex = len(mesh.vertices) + topology.interior
     ends = mesh.vertices[topology.edges[topology.interior]]
