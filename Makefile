@@ -19,7 +19,7 @@ HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.
 PROCESSES ?= 2
 PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
-.PHONY: bench bench-answers scale image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
+.PHONY: prose bench bench-answers scale image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
 
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
@@ -39,6 +39,11 @@ lint: $(DEV)/.ready
 	$(DEV)/bin/ruff format --check .
 	$(DEV)/bin/pyright
 	$(DEV)/bin/lint-imports
+	$(DEV)/bin/python docs/prose.py
+
+# Docstrings that open with no verb, and sentences of more than 40 words: no more than docs/prose.json allows.
+prose: $(DEV)/.ready
+	$(DEV)/bin/python docs/prose.py
 
 # Once, where two test processes and every service that they start would each compile them.
 kernels: $(DEV)/.ready
