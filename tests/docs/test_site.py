@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS.glob("*.md")])
+PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS.rglob("*.md")])
 PYTHON = re.compile(r"```python\n(.*?)```", re.DOTALL)
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
 
@@ -36,11 +36,23 @@ def test_the_site_has_every_page_in_its_menu(site):
             r'toctree-l1[^"]*"><a class="[^"]*" href="([^"]+)"', (site / "index.html").read_text()
         )
     )
-    assert menu == {f"{page.stem}.html" for page in DOCS.glob("*.md")} - {"index.html"}
+    pages = {str(page.relative_to(DOCS).with_suffix(".html")) for page in DOCS.rglob("*.md")}
+    assert menu == pages - {"index.html"}
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: page.stem)
+def test_a_page_is_read_in_ten_minutes(page):
+    assert len(page.read_text().split()) <= 1500
+
+
+def test_the_readme_is_read_in_five_and_has_no_greek_before_its_picture():
+    text = (ROOT / "README.md").read_text()
+    assert len(text.split()) <= 900
+    assert not re.search("[α-ωΑ-Ω]", text.partition("![")[0])
 
 
 def test_the_site_loads_nothing_from_elsewhere(site):
-    for page in site.glob("*.html"):
+    for page in site.rglob("*.html"):
         loaded = re.findall(
             r"<(?:script|img|link)\b[^>]*?\b(?:src|href)=\"([^\"]+)\"", page.read_text()
         )
@@ -51,7 +63,7 @@ def test_the_site_loads_nothing_from_elsewhere(site):
 def test_every_public_name_is_on_the_api_page(site):
     import pns_common
 
-    page = (site / "api.html").read_text()
+    page = (site / "reference" / "python.html").read_text()
     assert {name for name in pns_common.__all__ if f'id="pns_common.{name}"' not in page} == set()
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from pns_common import pyvista, refine, subdivide
-from pns_common.arguments import DEFAULT_LEVELS
 from service.http.parameters import Parameters
 from service.options import DEFAULTS
 
 ROOT = Path(__file__).resolve().parents[2]
+DEFAULT_LEVELS = 2
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
     ids=lambda door: door.__qualname__,
 )
 def test_python_refines_by_two_levels(door):
-    assert inspect.signature(door).parameters["levels"].default == DEFAULT_LEVELS == 2
+    assert inspect.signature(door).parameters["levels"].default == DEFAULT_LEVELS
 
 
 def test_the_command_and_http_refine_as_deep_as_python():
