@@ -11,7 +11,7 @@ from pns_common.schemes import Model, Scheme, loop, pns
 
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..course import Course
-from ..errors import InvalidParameter, NoModelError
+from ..errors import NoModelError
 from ..options import Limits, Options
 from ..report import Change, MeshResult, build_report
 from .read.checks.nodes import mesh_instances
@@ -119,18 +119,12 @@ def make_scheme(options: Options, model: Model | None) -> Scheme:
 
     Raises:
         NoModelError: the learned scheme without a model.
-        InvalidParameter: a strength for the prior of a model that has none.
     """
     if options.scheme == "loop":
         return loop()
     if model is None:
         raise NoModelError("no model is loaded; scheme=loop needs none")
-    strength = options.prior_strength
-    if strength is not None and model.card.prior_strength is None:
-        raise InvalidParameter(
-            "prior_strength", f"the model {model.name} has no prior: leave prior_strength out"
-        )
-    return pns(model, options.budget, strength)
+    return pns(model, options.budget)
 
 
 def _changes_of_container(upload: Upload, options: Options) -> list[Change]:

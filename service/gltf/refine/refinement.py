@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 
 from pns_common.base.extent import extent
 from pns_common.connectivity.creases import NO_CREASES, Creases
-from pns_common.crease_lines import NO_PAIRS, named_on_parts
+from pns_common.crease_lines import named_on_parts
 from pns_common.errors import MeshError
 from pns_common.fused.where_loaded.linear import linear_refinement
 from pns_common.mesh import Cleaned, Mesh
@@ -23,12 +23,10 @@ from ...report import Change
 from ..read.primitives import TrianglePrimitive
 from .common_slots import common_slots
 from .control_mesh import ControlMesh, vertex_rows
-from .drawn_borders import drawn_borders
 from .face_parts import part_of_face
 from .hard_edges import hard_edges
 from .parts import Parts
 from .refined_primitives import RefinedMesh
-from .shaded_edges import shaded_edges
 from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
 from .where_acted import vertex_scalars
 
@@ -48,18 +46,9 @@ def creases_of(
     creases = creases_by_shape(cleaned.mesh, options, scheme)
     if creases.line_angle is None:
         return creases
-    part = part_of_face(control, cleaned, parts)
-    hard = smooth = borders = NO_PAIRS
-    if options.crease == "auto":
-        hard, smooth = shaded_edges(control, cleaned, *part)
-        # No line ends or goes on by what is drawn beside it.
-        borders = drawn_borders(control, cleaned)
-    shown = len(hard) + len(smooth) + len(borders) > 0
-    known = control.skin_and_morph.any or options.normals != "keep" or options.uv == "smooth"
-    if not (shown or known):
+    if not (control.skin_and_morph.any or options.normals != "keep" or options.uv == "smooth"):
         return creases
-    lines = named_on_parts(cleaned.mesh, creases, *part, smooth)
-    return lines.with_named(hard).with_named(borders)
+    return named_on_parts(cleaned.mesh, creases, *part_of_face(control, cleaned, parts))
 
 
 def refine_control_mesh(

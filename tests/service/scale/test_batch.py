@@ -338,7 +338,6 @@ def test_failures_are_those_of_this_run(tmp_path):
         {"source": "{tmp_path}/empty"},
         {"destination": "{tmp_path}/in/a.obj/out"},
         {"destination": "{tmp_path}/in/a.obj"},
-        {"model": "paper", "options": Options(prior_strength=1.0)},
     ],
 )
 def test_what_cannot_be_used_is_told_before_anything_runs(tmp_path, changes):
