@@ -76,8 +76,14 @@ def _further_rows(card: ModelCard) -> dict[str, Any]:
         "network scale τ": card.network_scale,
         "fold angle θ": card.fold_angle,
         "boundary strength b": card.boundary_strength,
+        "side gates": card.side_gates,
+        "network altitudes α": card.network_altitudes,
+        "wide bound": card.wide_bound,
         "crease prior": card.crease_prior,
+        "tip strength a": card.tip_strength,
+        "even prior strength s₁": card.even_prior_strength,
         "crease angle θ": card.crease_angle,
+        "edged crease angle θ'": card.edged_crease_angle,
         "crease levels": card.crease_levels,
     }
     return {name: value for name, value in rows.items() if value is not None}

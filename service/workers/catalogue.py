@@ -48,14 +48,35 @@ class ModelEntry(BaseModel):
     boundary_strength: float | None = Field(
         description="b of the boundaries' own prior; null where they are Loop's"
     )
+    side_gates: bool | None = Field(
+        description="whether an edge's gate reads the sides of its two faces; null: the faces alone"
+    )
+    network_altitudes: float | None = Field(
+        description="the longest that the network's unit may be, in altitudes of an edge's thinner "
+        "face; null: edge lengths alone"
+    )
+    wide_bound: bool | None = Field(
+        description="whether h of an edge's bound is the longest edge of both faces; null: its own"
+    )
     crease_prior: bool | None = Field(
         description="whether the boundaries' prior acts at creases too; null: creases are Loop's"
+    )
+    tip_strength: float | None = Field(
+        description="how much of Loop's own move is given back at tips; null: none"
+    )
+    even_prior_strength: float | None = Field(
+        description="s of the prior where a mesh is even; null: `prior_strength` for any mesh"
     )
     crease_angle: float | None = Field(
         description="of the crease lines that `crease=auto` keeps, in degrees; null: none"
     )
     crease_levels: int | None = Field(
         description="at how many levels these lines are sharp; null: there are none"
+    )
+    edged_crease_angle: float | None = Field(
+        description="of those of a mesh at least half of whose turns are that sharp, rows of like"
+        " ones apart, and of those beside plane sides that were cut finely, in degrees; null: the"
+        " same"
     )
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")
