@@ -21,9 +21,9 @@ from ..bodies.media import GLTF_KINDS, KINDS
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..course import Course
 from ..errors import InvalidParameter
-from ..gltf.read.extras import REPORT_KEY
 from ..gltf.read.upload import read_upload
 from ..gltf.subdivide import make_scheme, subdivide_gltf
+from ..gltf.write.storage import REPORT_KEY
 from ..options import Limits, Options
 from ..printable import printable
 from ..report import Change

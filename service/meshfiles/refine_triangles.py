@@ -19,7 +19,7 @@ from pns_common.schemes import Scheme
 from ..course import Course
 from ..errors import InvalidParameter, UnrefinableError, check_limit
 from ..gltf.read.plan import BYTES_FOR_LIMIT, BYTES_PER_FACE, check_memory
-from ..gltf.refine.refined_primitives import refined_ids
+from ..gltf.refine.control_mesh import refined_ids
 from ..meshes.barycentric_grid import barycentric_grid
 from ..meshes.shape_creases import creases_by_shape
 from ..meshes.split_connectivity import split_connectivity
@@ -121,7 +121,7 @@ def _with_corners(
 ) -> IndexedTriangles:
     """Cut the refined mesh open again where texture coordinates differ."""
     points, grid = refinement.mesh.vertices, barycentric_grid(options.levels)
-    ids = refined_ids(welded, cleaned, refinement, grid)
+    ids = refined_ids(welded, cleaned, refinement.mesh, grid)
     if mesh_file.uv is None:
         return IndexedTriangles(points, ids[:, grid.faces.reshape(-1)].reshape(-1, 3))
     faces = mesh_file.faces[cleaned.representative >= 0]
