@@ -22,7 +22,7 @@ from .writer import Writer, describe
 
 # Of the two extensions for meshopt, the one that all readers support.
 MESHOPT = "EXT_meshopt_compression"
-# Peak bytes of encoding a refined face: at least 1.2 times what was measured (609 and 58) on 200,000
+# Peak bytes of encoding a refined face: at least 1.2 times what was measured (609, 58) on 200,000
 # faces that share no vertex, with normals and UVs.
 BYTES_PER_FACE = {"none": 0, "draco": 750, "meshopt": 80}
 
