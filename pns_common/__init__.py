@@ -22,7 +22,6 @@ Where to read, each room seeing only those above it:
     fused/          the same compiled: each module names the one whose bits it has
     runtimes/       what runs a model file: onnx_model.py loads it, and finds who does
     arguments.py    what may be asked; refine.py all levels, refine_parts.py many meshes at once,
-                    pieces/ one mesh in pieces
     interop/        meshes of other libraries
 """
 

@@ -10,11 +10,13 @@ import numpy as np
 from jaxtyping import Int
 
 from pns_common.connectivity.creases import Creases
-from pns_common.fused.where_loaded.interior_edges import interior_edges
 from pns_common.geometry.frames import face_normals
 from pns_common.geometry.sharp_edges import turn_by_more
 from pns_common.levels.diagnostics import LevelReport
 from pns_common.mesh import Mesh
+from pns_common.refine import Report
+
+from .meshes.connectivity import interior_edges
 
 # Plane faces in single precision turn by less.
 BENT = math.radians(0.5)
@@ -36,16 +38,16 @@ NO_BENDS = Bends()
 def count_bends(
     mesh: Mesh,
     creases: Creases,
-    crease_edges: Sequence[int],
+    reports: Sequence[Report],
     part_of_face: Int[np.ndarray, " F"] | None = None,
 ) -> list[Bends]:
     """Count the bent edges of each part of a mesh, and the sharp ones among them.
 
-    `crease_edges` are the counts in the parts' reports at the first level. They stand for the lines
-    that the operator found: these have no names here, and all bend. Nothing is counted where no
-    sharp edges are asked for. Without `part_of_face` the mesh is one part.
+    `reports` are the operator's, one for each part; without `part_of_face` there is one. Nothing is
+    counted where no sharp edges are asked for. Edges that the operator finds have no names here;
+    their number stands in the report, and all of them bend.
     """
-    count = len(crease_edges)
+    count = len(reports)
     if creases.named is None and creases.line_angle is None:
         return [NO_BENDS] * count
     edges, half_edges = interior_edges(mesh.faces, len(mesh.vertices))
@@ -54,7 +56,7 @@ def count_bends(
     part = np.zeros(len(edges), dtype=np.int64)
     if part_of_face is not None:
         part = part_of_face[faces[:, 0]]
-    sharp = list(crease_edges)
+    sharp = [report["levels"][0]["edges"].get("crease", 0) for report in reports]
     if creases.named is not None and len(creases.named):
         named = bent & np.isin(_codes(edges), _codes(creases.named))
         sharp = np.bincount(part[named], minlength=count).tolist()

@@ -10,9 +10,8 @@ from typing import Literal, get_args
 from .errors import InvalidParameter, check_choice
 
 MAX_LEVELS = 6
-# The library's (pns_common/arguments.py, pns_common/formula/prior_strength.py), without its import.
+# The library's, without its import (tests hold them equal).
 DEFAULT_LEVELS = 2
-MAX_PRIOR_STRENGTH = 100.0
 
 SchemeName = Literal["pns", "loop"]
 Diagnostics = Literal["summary", "full", "none"]
@@ -32,9 +31,8 @@ BYTES_PER_INPUT_BYTE = 4
 class Options:
     """One request's parameters, valid once constructed: the command line's and HTTP's too.
 
-    `budget` is the dimensionless C (None: the model's own); `prior_strength` is s of the prior
-    (None: what each mesh calls for); `reference_length` is a length in the mesh's local
-    coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
+    `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
+    mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
     vertices on the limit surface. Raises InvalidParameter.
     """
 
@@ -49,7 +47,6 @@ class Options:
     weld_tolerance: float = 0.0
     compress: Compression = "none"
     limit: bool = False
-    prior_strength: float | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.levels <= MAX_LEVELS:
@@ -65,11 +62,6 @@ class Options:
             raise InvalidParameter("normals", "normals=limit needs limit=true: they stand there")
         if self.budget is not None and not (math.isfinite(self.budget) and self.budget >= 0):
             raise InvalidParameter("budget", "budget must be a finite number, zero or more")
-        strength = self.prior_strength
-        if strength is not None and not 0 <= strength <= MAX_PRIOR_STRENGTH:
-            raise InvalidParameter(
-                "prior_strength", f"prior_strength must be 0 to {MAX_PRIOR_STRENGTH:g}"
-            )
         if self.reference_length != "auto" and not (
             math.isfinite(self.reference_length) and self.reference_length > 0
         ):

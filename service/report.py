@@ -163,7 +163,6 @@ def _mesh(result: MeshResult) -> dict[str, Any]:
         "index": result.index,
         "instances": result.instances,
         "reference_length": 0.0 if report is None else report["reference_length"],
-        "prior_strength": None if report is None else report["prior_strength"],
         "multi_fan_vertices": 0 if report is None else report["multi_fan_vertices"],
         "learned_levels": 0 if report is None else report["learned_levels"],
         "limit_distance": 0.0 if report is None else report["limit_distance"],

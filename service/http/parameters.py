@@ -12,7 +12,6 @@ from ..options import (
     CREASE_PATTERN,
     DEFAULTS,
     MAX_LEVELS,
-    MAX_PRIOR_STRENGTH,
     MAX_WELD_TOLERANCE,
     Compression,
     Diagnostics,
@@ -59,20 +58,12 @@ class Parameters(BaseModel):
     model: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
         default=None,
         description="a name from `GET /models`; empty: the service's default. `scheme=loop` has no "
-        "use for it, for `budget` or for `prior_strength`: they are checked and nothing else",
+        "use for it or for `budget`: both are checked and then have no effect",
     )
     budget: Annotated[
         Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,
         BeforeValidator(_empty_is_absent),
     ] = Field(default=DEFAULTS.budget, description="C, dimensionless; empty: the model's own")
-    prior_strength: Annotated[
-        Annotated[float, Field(ge=0, le=MAX_PRIOR_STRENGTH, allow_inf_nan=False)] | None,
-        BeforeValidator(_empty_is_absent),
-    ] = Field(
-        default=DEFAULTS.prior_strength,
-        description="s of the model's prior, the same for every mesh; empty: as each mesh calls "
-        "for. A model without a prior refuses it",
-    )
     reference_length: Annotated[
         Literal["auto"] | Annotated[float, Field(gt=0, allow_inf_nan=False)],
         BeforeValidator(_length),

@@ -8,14 +8,13 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.base.arrays import marked
-from pns_common.base.distinct import as_words, distinct_rows, number_by_first_appearance
 from pns_common.connectivity.creases import Creases, pair_keys
 from pns_common.connectivity.topology import EdgeClass, Topology, split
 from pns_common.masks.linear import level_topologies
 from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 
 from ..options import Options
+from .arrays import as_words, distinct_rows, marked, number_by_first_appearance
 from .split_connectivity import SplitConnectivity
 
 # How C corners at vertices (C,) of the mesh to refine spread their texture coordinates (C, 2) over

@@ -7,9 +7,9 @@ from itertools import pairwise, product
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.distinct import distinct_rows
 from pns_common.geometry.reference_length import measure_reference_length
 
+from .arrays import distinct_rows
 from .weld import Weld, weld_by_label
 
 # Cells are counted in int64; a tolerance below this part of the largest coordinate joins nothing

@@ -20,7 +20,7 @@ from ..advice import advice_on, count_bends
 from ..course import Course
 from ..errors import InvalidParameter, UnrefinableError, check_limit
 from ..gltf.read.plan import BYTES_FOR_LIMIT, BYTES_PER_FACE, check_memory
-from ..gltf.refine.refined_primitives import refined_ids
+from ..gltf.refine.control_mesh import refined_ids
 from ..meshes.barycentric_grid import barycentric_grid
 from ..meshes.shape_creases import creases_by_shape
 from ..meshes.split_connectivity import split_connectivity
@@ -87,8 +87,8 @@ def refine_triangles(
         "zero_reference_lengths": int(report["reference_length"] == 0),
     }
     report["dropped"] = dropped(int((~proper).sum()), _unused_vertices(mesh_file, welded, cleaned))
-    first, *_ = levels = refinement.report["levels"]
-    (bends,) = count_bends(cleaned.mesh, creases, [first["edges"].get("crease", 0)])
+    (bends,) = count_bends(cleaned.mesh, creases, [refinement.report])
+    levels = refinement.report["levels"]
     report["changes"] = [asdict(change) for change in changes]
     report["advice"] = advice_on(levels, bends)
     report["levels"] = levels
@@ -125,7 +125,7 @@ def _with_corners(
 ) -> IndexedTriangles:
     """Cut the refined mesh open again where texture coordinates differ."""
     points, grid = refinement.mesh.vertices, barycentric_grid(options.levels)
-    ids = refined_ids(welded, cleaned, refinement, grid)
+    ids = refined_ids(welded, cleaned, refinement.mesh, grid)
     if mesh_file.uv is None:
         return IndexedTriangles(points, ids[:, grid.faces.reshape(-1)].reshape(-1, 3))
     faces = mesh_file.faces[cleaned.representative >= 0]

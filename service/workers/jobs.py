@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from ..course import Course
 from ..errors import LimitError, NoModelError, check_limit
-from ..gltf.read.memory_cap import memory_cap
+from ..memory_cap import memory_cap
 from ..options import Limits, Options
 from . import memory_file
 from .costs import Cost

@@ -59,7 +59,7 @@ def joined(meshes: list[Mesh]) -> tuple[Mesh, np.ndarray]:
 
 
 @needs_kernels
-@pytest.mark.parametrize("name", ["paper", "full", "general", None])
+@pytest.mark.parametrize("name", ["paper", "general", None])
 @pytest.mark.parametrize(("levels", "reference_length"), [(1, 1.0), (3, "auto")])
 def test_each_part_is_what_it_is_alone(
     name: str | None, levels: int, reference_length: float | str

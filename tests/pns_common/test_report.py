@@ -56,7 +56,7 @@ def bump_in_a_plane(width):
     return Mesh(np.stack([*far, z], axis=1), faces)
 
 
-@pytest.mark.parametrize("model", ["full", "paper"])
+@pytest.mark.parametrize("model", ["paper"])
 def test_what_lies_in_a_plane_is_allowed_nothing_however_large_its_faces_are(model):
     scheme = pns(load_model(model))
     bounds = [

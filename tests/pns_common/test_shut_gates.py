@@ -21,7 +21,7 @@ WHERE = (
 )
 MODELS = {
     "paper": load_model("paper"),
-    "full": load_model("full"),
+    "signed": load_model("signed"),
     "format 3": scale_free_model(0),
     "format 3, sides": scale_free_model(3, 20.0, side_gates=True),
 }
