@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections import Counter
 from collections.abc import AsyncIterator
@@ -12,7 +13,8 @@ from pathlib import Path
 from fastapi import Request
 
 from ..bodies import media
-from ..errors import InvalidParameter, MediaTypeError, check_limit
+from ..bodies.gzipped import decoder
+from ..errors import InvalidParameter, check_limit
 from ..request_ids import REQUEST_ID
 from ..workers.job import Job
 from ..workers.jobs import Work
@@ -54,8 +56,7 @@ async def taken_in(
     check_limit("levels", options.levels, settings.levels, f"levels is {options.levels}")
     content_type = request.headers.get("content-type", "")
     media.of_request(content_type)
-    if request.headers.get("content-encoding", "identity").lower() != "identity":
-        raise MediaTypeError("a compressed body (Content-Encoding) is not supported")
+    decoded = decoder(request.headers.get("content-encoding", ""), int(settings.body))
     client = client_of(request, settings)
     # It would be sent for nothing.
     service.desk.turns.check_room(client.id)
@@ -66,9 +67,12 @@ async def taken_in(
         with ExitStack() as files:
             body = files.enter_context(MemoryFile())
             async with service.admission.upload(), counted.arriving():
-                async for piece in request.stream():
-                    counted.grow(len(piece))
-                    body.append(piece)
+                async for received in request.stream():
+                    for piece in decoded.pieces(received):
+                        counted.grow(len(piece))
+                        body.append(piece)
+                        await asyncio.sleep(0)
+                decoded.end()
             page = files.enter_context(ProgressPage())
             answer = files.enter_context(MemoryFile(wanted.folder)) if wanted.answer else None
             report = files.enter_context(MemoryFile(wanted.folder)) if wanted.report else None

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # What a page of another origin may send, beside what any may: all that is read here.
 TAKEN = (
-    *("Authorization", "Content-Type", "If-None-Match"),
+    *("Authorization", "Content-Encoding", "Content-Type", "If-None-Match"),
     *("Traceparent", "Tracestate", "X-Request-ID"),
 )
 # What it may read of an answer beside its body.

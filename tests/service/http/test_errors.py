@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import threading
 from collections.abc import Iterator
 
@@ -193,9 +194,29 @@ def test_415_for_another_content_type(client: TestClient, kind: str) -> None:
     assert_problem(answer, 415, "unsupported-media-type")
 
 
-def test_415_for_a_compressed_body(client: TestClient) -> None:
-    answer = post(client, b"x", **{"Content-Encoding": "gzip"})
+def test_a_gzip_body_is_taken_for_what_it_decompresses_to(client: TestClient) -> None:
+    body = bytes(2**20)
+    answer = post(client, gzip.compress(body), **{"Content-Encoding": "gzip"})
+    assert answer.content == body
+
+
+def test_415_for_another_content_encoding(client: TestClient) -> None:
+    answer = post(client, b"x", **{"Content-Encoding": "br"})
     assert_problem(answer, 415, "unsupported-media-type")
+
+
+def test_413_for_a_gzip_body_that_decompresses_to_more_than_a_body_may_have(
+    client: TestClient,
+) -> None:
+    bomb = gzip.compress(bytes(2**20 + 1))
+    assert_problem(post(client, bomb, **{"Content-Encoding": "gzip"}), 413, "limit-exceeded")
+
+
+@pytest.mark.parametrize(
+    "body", [b"text", gzip.compress(b"cut")[:-1], gzip.compress(b"one") + b"more"]
+)
+def test_400_for_a_body_that_is_no_whole_gzip(client: TestClient, body: bytes) -> None:
+    assert_problem(post(client, body, **{"Content-Encoding": "gzip"}), 400, "unreadable")
 
 
 @pytest.mark.parametrize("path", ["/jobs/", "/models/", "/subdivide/"])
