@@ -15,6 +15,8 @@ from pns_common.errors import ParameterError
 from pns_common.schemes import Scheme
 
 HIGHEST_LEVELS = 16
+# One level shows little.
+DEFAULT_LEVELS = 2
 # No refinement takes less for a face that it makes: 65 were measured, by Loop and with levels of
 # Loop after learned ones.
 LEAST_BYTES_PER_FACE = 60

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.arguments import (
+    DEFAULT_LEVELS,
     check_limit,
     check_progress,
     check_reference_length,
@@ -106,7 +107,7 @@ class Refinement:
 def refine(
     mesh: Mesh,
     scheme: Scheme,
-    levels: SupportsIndex = 1,
+    levels: SupportsIndex = DEFAULT_LEVELS,
     reference_length: float | str = "auto",
     *,
     limit: bool = False,
@@ -119,7 +120,8 @@ def refine(
     Args:
         mesh: the control mesh.
         scheme: ``loop()``, ``pns(model)`` or any other.
-        levels: number of steps, 1 … 16; fewer where the result cannot fit into the memory here.
+        levels: number of steps, 1 … 16, by default 2; fewer where the result cannot fit into the
+            memory here.
         reference_length: R, the unit of length of the budget: the largest curvature that the
             budget C can represent is 8 C / R. "auto" measures the mesh; 1 is the paper's absolute
             unit. It is fixed here for all levels: pass the first call's R when calling again.

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.arguments import (
+    DEFAULT_LEVELS,
     check_limit,
     check_reference_length,
     check_scheme,
@@ -44,7 +45,7 @@ def refine_parts(
     mesh: Mesh,
     part_faces: Int[np.ndarray, " Q"],
     scheme: Scheme,
-    levels: SupportsIndex = 1,
+    levels: SupportsIndex = DEFAULT_LEVELS,
     reference_length: float | str = "auto",
     *,
     limit: bool = False,

@@ -9,7 +9,7 @@ from typing import Any, SupportsIndex, TypeVar, cast
 
 import numpy as np
 
-from pns_common.arguments import checked_levels
+from pns_common.arguments import DEFAULT_LEVELS, checked_levels
 from pns_common.errors import ParameterError
 from pns_common.interop.carried import CarriedMesh, refine_carried
 from pns_common.interop.of_meshio import read_meshio, write_meshio
@@ -45,7 +45,7 @@ ADAPTERS = MappingProxyType(
 
 def subdivide(
     mesh: AnyMesh,
-    levels: SupportsIndex = 1,
+    levels: SupportsIndex = DEFAULT_LEVELS,
     scheme: Scheme | None = None,
     **options: Any,
 ) -> AnyMesh:
@@ -57,7 +57,7 @@ def subdivide(
             Those of a library keep texture coordinates, colours and other data, interpolated
             linearly; their vertices at the same position are one vertex of the surface. A pair and
             a ``Mesh`` are refined as they are.
-        levels: number of steps, 1 … 16.
+        levels: number of steps, 1 … 16, by default 2.
         scheme: None for ``pns(load_model())``.
         options: further arguments of ``refine``: ``reference_length``, ``creases``, …
 

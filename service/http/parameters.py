@@ -91,8 +91,9 @@ class Parameters(BaseModel):
     )
     normals: NormalRule = Field(
         default=DEFAULTS.normals,
-        description="`keep`: hard edges of the file stay hard, and what has no normals "
-        "stays without; `smooth`: new ones everywhere, smooth but across creases; "
+        description="`auto`: hard edges of the file stay hard, and a mesh without normals gets "
+        "new ones, smooth but across sharp edges; `keep`: a mesh without normals stays without; "
+        "`smooth`: new ones everywhere, smooth but across sharp edges; "
         "`limit`: the same, and exactly those of the limit surface (with `limit=true`)",
     )
     crease: str = Field(

@@ -12,6 +12,7 @@ from jaxtyping import Bool
 from pns_common.refine import Report
 from pns_common.schemes import Scheme
 
+from ...advice import NO_BENDS, Bends, count_bends
 from ...course import Course
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
@@ -24,7 +25,7 @@ from ..stage_shares import StageShares, stage_shares
 from .control_mesh import control_mesh
 from .refined_primitives import RefinedPrimitive, refined_primitives
 from .refinement import changes_of_mesh, creases_of, refine_control_mesh
-from .smooth_normals import with_smooth_normals
+from .smooth_normals import with_normal_rule, with_smooth_normals
 from .together import GROUP_FACES, MOST_FACES, refine_together
 from .union import kind_of
 
@@ -41,6 +42,7 @@ class MeshOutcome:
         copies: faces that follow another with the same vertices.
         report: the operator's; None where no face was left.
         changes: what was joined, dropped or cut.
+        bends: bent edges, and the sharp ones among them.
     """
 
     index: int
@@ -50,6 +52,7 @@ class MeshOutcome:
     copies: int
     report: Report | None
     changes: list[Change]
+    bends: Bends = NO_BENDS
 
     @property
     def degenerate(self) -> int:
@@ -159,6 +162,7 @@ def _together(
                     copies=part.copies,
                     report=part.report,
                     changes=part.changes,
+                    bends=part.bends,
                 )
     return outcomes
 
@@ -178,6 +182,7 @@ def _alone(
     course: Course,
     shares: StageShares,
 ) -> MeshOutcome:
+    options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options.weld_tolerance, options.weld_unit)
         creases = creases_of(control, options, scheme)
@@ -190,6 +195,10 @@ def _alone(
         made = refine_control_mesh(control, creases, scheme, options, pointer, course)
         # Read here, since the levels' tables are kept until it is.
         report = None if made is None else made.refinement.report
+        bends = NO_BENDS
+        if report is not None and control.cleaned is not None:
+            sharp = report["levels"][0]["edges"].get("crease", 0)
+            (bends,) = count_bends(control.cleaned.mesh, creases, [sharp])
     refined: list[RefinedPrimitive] = []
     with course.stage("attributes", shares.attributes, shares.write):
         if made is not None and control.cleaned is not None:
@@ -203,4 +212,5 @@ def _alone(
         copies=control.copies,
         report=report,
         changes=changes_of_mesh(control, made, options.levels, pointer),
+        bends=bends,
     )

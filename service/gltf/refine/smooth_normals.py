@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from pns_common.fused.where_loaded.corner_normals import angle_weighted_normals
 from pns_common.fused.where_loaded.smooth_fans import smooth_fans
 from pns_common.mesh import Cleaned
 
+from ...options import Options
 from ..constants import FLOAT
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
@@ -40,6 +42,14 @@ def with_smooth_normals(
         )
         start = stop
     return primitives
+
+
+def with_normal_rule(options: Options, primitives: Sequence[TrianglePrimitive]) -> Options:
+    """Return the options with `normals=auto` decided: smooth for a mesh without any normals."""
+    if options.normals != "auto":
+        return options
+    given = any("NORMAL" in primitive.attributes for primitive in primitives)
+    return replace(options, normals="keep" if given else "smooth")
 
 
 def with_normal_accessor(accessors: dict[str, Accessor], count: int) -> dict[str, Accessor]:

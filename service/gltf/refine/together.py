@@ -22,6 +22,7 @@ from pns_common.refine import Refinement, Report
 from pns_common.refine_parts import PartsRefinement, refine_parts
 from pns_common.schemes import Scheme
 
+from ...advice import NO_BENDS, Bends, count_bends
 from ...course import Course
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
@@ -31,6 +32,7 @@ from ..read.primitives import TrianglePrimitive
 from ..stage_shares import StageShares
 from .common_slots import common_slots
 from .control_mesh import ControlMesh, control_mesh, slices, vertex_rows
+from .face_parts import part_of_face
 from .local_joints import local_joints
 from .parts import Parts
 from .refined_primitives import RefinedMesh, RefinedPrimitive, refined_primitives
@@ -41,7 +43,7 @@ from .refinement import (
     leaves_single_precision,
 )
 from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
-from .smooth_normals import with_normal_accessor, with_smooth_normals
+from .smooth_normals import with_normal_accessor, with_normal_rule, with_smooth_normals
 from .union import divided, joined
 from .where_acted import vertex_scalars
 
@@ -61,6 +63,7 @@ class Part:
         copies: faces that follow another with the same vertices.
         report: the operator's.
         changes: what was joined, dropped or cut.
+        bends: bent edges, and the sharp ones among them.
     """
 
     refined: list[RefinedPrimitive]
@@ -68,6 +71,7 @@ class Part:
     copies: int
     report: Report
     changes: list[Change]
+    bends: Bends = NO_BENDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +97,7 @@ def refine_together(
     (alone, it is told why), or there are no kernels that could serve.
     """
     primitives, parts = joined(meshes)
+    options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options.weld_tolerance, options.weld_unit, parts)
     able = _able(control, parts)
@@ -124,7 +129,13 @@ def refine_together(
     with course.stage("attributes", shares.attributes, shares.write):
         grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
         pieces = refined_primitives(control, control.cleaned, made.mesh, grid, blend, course)
-        return [*_divided(control, control.cleaned, parts, made, pieces, meshes, pointers, options)]
+        sharp = [report["levels"][0]["edges"].get("crease", 0) for report in made.reports]
+        of_face, _ = part_of_face(control, control.cleaned, parts)
+        bends = count_bends(control.cleaned.mesh, creases, sharp, of_face)
+        made_parts = _divided(
+            control, control.cleaned, parts, made, pieces, meshes, pointers, options
+        )
+        return [replace(part, bends=own) for part, own in zip(made_parts, bends, strict=True)]
 
 
 def _able(control: ControlMesh, parts: Parts) -> Bool[np.ndarray, " P"]:

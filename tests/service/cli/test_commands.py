@@ -155,9 +155,14 @@ def test_a_gltf_is_read_with_the_files_of_its_own_folder(pns: Any, tmp_path: Pat
 
 @pytest.mark.parametrize("compress", ["draco", "meshopt"])
 def test_compressed_files_are_written_and_read(pns: Any, part_file: Path, compress: str) -> None:
-    assert pns("subdivide", "part.glb", "-o", "packed.glb", "--compress", compress).code == 0
+    assert (
+        pns(
+            "subdivide", "part.glb", "-o", "packed.glb", "--levels", "1", "--compress", compress
+        ).code
+        == 0
+    )
     assert tree_of(part_file.with_name("packed.glb"))["extensionsRequired"]
-    done = pns("subdivide", "packed.glb", "-o", "again.obj")
+    done = pns("subdivide", "packed.glb", "-o", "again.obj", "--levels", "1")
     assert done.code == 0
     assert f"{16 * FACES:,} faces" in done.err
 

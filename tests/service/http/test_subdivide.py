@@ -94,7 +94,7 @@ def test_files_beside_the_document_come_as_parts_or_in_an_archive(
         "/subdivide", content=packed.getvalue(), headers={"Content-Type": "application/zip"}
     )
     in_form = client.post("/subdivide", files={"file": ("part.zip", packed.getvalue())})
-    assert report_of(in_parts)["totals"]["faces"] == 4 * FACES
+    assert report_of(in_parts)["totals"]["faces"] == 16 * FACES
     assert in_parts.content == raw.content == in_form.content
 
     missing = client.post("/subdivide", files={"file": ("part.gltf", text)})
@@ -169,7 +169,7 @@ def test_other_mesh_formats_come_back_as_the_glb_that_their_glb_gives(
     triangles = example_part()
     content = formats.write(triangles, kind)
     raw = client.post("/subdivide", content=content, headers={"Content-Type": f"model/{kind}"})
-    assert report_of(raw)["totals"]["faces"] == 4 * FACES
+    assert report_of(raw)["totals"]["faces"] == 16 * FACES
     assert report_of(raw)["levels"][0]["edges"]["boundary"] == 0
     form = client.post("/subdivide", files={"file": (f"part.{kind.upper()}", content)})
     assert form.content == raw.content
@@ -188,7 +188,7 @@ def test_what_a_conversion_loses_is_in_the_report(client: TestClient) -> None:
         ("vertices dropped that no face uses", 1),
         ("not used by the document: quad.mtl", 1),
     }
-    assert report["totals"]["faces"] == 8
+    assert report["totals"]["faces"] == 32
 
 
 @pytest.mark.parametrize(
