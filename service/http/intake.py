@@ -86,6 +86,7 @@ async def taken_in(
                     page=page.file.name,
                     content_type=content_type,
                     options=options,
+                    target=parameters.format,
                     model=parameters.model,
                     limits=settings.job_limits(),
                     answer_bytes=None if wanted.folder is None else int(settings.result_bytes),

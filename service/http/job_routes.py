@@ -70,7 +70,9 @@ def router(service: Service) -> APIRouter:
 
     @routes.get("/jobs/{job_id}/result", response_class=Response, **documentation.RESULT)
     async def read_job_result(request: Request, job_id: str) -> Response:
-        return _result(service, request, job_id, answer_type(request))
+        job = _entry(service, request, job_id).job
+        kind = answer_type(request, media.MEDIA_TYPES[job.work.target])
+        return _result(service, request, job_id, kind)
 
     @routes.get("/jobs/{job_id}/report", response_class=Response, **documentation.JOB_REPORT)
     async def read_job_report(request: Request, job_id: str) -> Response:

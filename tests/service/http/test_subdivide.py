@@ -13,13 +13,15 @@ import msgspec
 import pytest
 from fastapi.testclient import TestClient
 
+from service.bodies.media import MEDIA_TYPES, Kind
 from service.gltf.read.container import read_glb
 from service.http.app import create_app
 from service.meshfiles import formats
+from service.meshfiles.convert import converted
 from service.meshfiles.example import part as example_part
 from service.meshfiles.example import part_glb
 from service.meshfiles.triangles_glb import as_gltf_json
-from service.options import Limits
+from service.options import Limits, Options
 from service.settings import Settings
 from service.workers.jobs import hold_model
 from tests.support.stand_in_models import CountedModel
@@ -267,3 +269,27 @@ def test_limit_moves_the_vertices_and_leaves_the_report(client: TestClient, part
     assert plain.content != limit.content
     refused = client.post("/subdivide?limit=perhaps", content=part, headers=GLB)
     assert refused.status_code == 422
+
+
+@pytest.mark.parametrize("target", ["gltf", "obj", "ply", "stl", "off"])
+def test_an_answer_in_another_format_is_what_the_command_writes(
+    client: TestClient, target: Kind
+) -> None:
+    query = f"levels=1&scheme=loop&format={target}"
+    answer = client.post(f"/subdivide?{query}", content=part_glb(), headers=GLB)
+    written = converted(part_glb(), "glb", target, Options(levels=1, scheme="loop"), None, Limits())
+    assert answer.content == written.content
+    assert answer.headers["content-type"] == MEDIA_TYPES[target]
+
+
+def test_a_job_keeps_its_format(client: TestClient) -> None:
+    query = "levels=1&scheme=loop&format=off"
+    job = client.post(f"/jobs?{query}", content=part_glb(), headers=GLB)
+    result = f"{job.headers['location']}/result"
+    for _ in range(600):
+        answer = client.get(result)
+        if answer.status_code == 200:
+            break
+        time.sleep(0.05)
+    assert answer.content.startswith(b"OFF")
+    assert answer.headers["content-type"] == "model/off"
