@@ -57,10 +57,11 @@ function closeness(report: Report, lengths: Lengths): Promised {
   // Without this remark the two numbers would seem to disagree.
   const rounded = measured !== null && measured > most ? `, to ${length(rounding, unit)} by the file’s own rounding` : "";
   const apart = measured === null ? "" : ` Measured between the refined vertices: ${length(measured, unit)}${rounded}.`;
+  const sharp = report.levels.some(({ edges }) => edges.crease) ? ", kept sharp edges included" : "";
   return {
     holds: (measured === null || measured <= most + rounding) && used <= 1 + 1e-12,
     title: "Stays close",
-    text: `No point is farther from the classic smooth surface than ${lengthOf(proved, size, unit)}.`,
+    text: `No point is farther from the classic smooth surface than ${lengthOf(proved, size, unit)}${sharp}.`,
     mathematics:
       `Every point of the limit surface is within ${length(proved, unit)} of Loop’s.${bound}${apart} ` +
       "Each vertex may leave its place by Loop’s rule by C h² / R at most, whatever the model says; " +

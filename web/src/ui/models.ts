@@ -3,7 +3,7 @@
 import { LOOP } from "../settings";
 
 const SENTENCES: Record<string, string> = {
-  general: "For scans, parts and characters of any size: corrects once, keeps what is meant to be sharp.",
+  general: "Recommended. For scans, parts and characters of any size.",
   "general-quad": "As general, for meshes of four-sided faces.",
   signed: "The published method with better features, trained on ridges. For comparison.",
   paper: "The published method to the letter, trained on ridges. For comparison.",

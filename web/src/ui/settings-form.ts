@@ -102,18 +102,19 @@ export class SettingsForm {
     select("levels").replaceChildren(
       ...this.levels().map((level) => {
         const faces = this.faces ? ` · ${count(this.predicted(level))} faces` : "";
-        return option(String(level), `${level}${faces}`, this.refusal(level) !== "");
+        const isClosed = this.refusal(level) !== "";
+        return option(String(level), isClosed ? `${level} · too many faces` : `${level}${faces}`, isClosed);
       }),
     );
     select("levels").value = String(settings.levels);
     const closed = this.levels().find((level) => this.refusal(level));
-    element("levels-note").textContent = closed
+    element("levels-note").textContent = closed && this.wanted.levels >= closed
       ? `${closed} and more: ${this.refusal(closed)} of this service`
       : "";
     const bundled = this.models.map((model) =>
-      option(model.default ? "" : model.name, model.name + (model.default ? " (recommended)" : "")),
+      option(model.default ? "" : model.name, model.name),
     );
-    if (!bundled.length) bundled.push(option("", "recommended"));
+    if (!bundled.length) bundled.push(option("", "default"));
     select("model").replaceChildren(...bundled, option(LOOP, "classic (Loop)"));
     select("model").value = settings.model;
     // Before the list is there, a link may name a model of it.

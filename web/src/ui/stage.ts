@@ -135,7 +135,7 @@ export class Stage {
     this.shown = { ...this.shown, ours, loop };
     for (const result of [fresh ? ours : null, news]) {
       if (!result) continue;
-      if (this.shown.source?.opened.json === null) plain(result.model.meshes);
+      if (!result.json.materials?.length && this.shown.source?.opened.json === null) plain(result.model.meshes);
       this.adopt(result.model);
       if (this.shown.source) copyMorphs(this.shown.source.model, result.model);
     }
