@@ -6,7 +6,7 @@ import { distances, largestLength, rounding } from "./measure/distance";
 import { surfaceOf } from "./measure/surface";
 import type { Lengths } from "./report/promises";
 import type { Result } from "./result";
-import type { Source } from "./session";
+import type { Source } from "./tasks";
 import {
   showAdvice,
   showChanges,

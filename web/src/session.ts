@@ -1,66 +1,15 @@
 /** A file, its refinement, and the tasks under way. Touches no element of the page. */
 
-import { type Answer, type Progress, refine } from "./api/jobs";
+import { refine, type Answer } from "./api/jobs";
 import { isAbort, Problem } from "./api/problem";
-import { open, type Opened } from "./files/open";
+import { open } from "./files/open";
 import { parseGltf } from "./files/gltf";
 import { Unreadable } from "./files/unreadable";
 import { bodyOf, type Upload } from "./files/upload";
 import { resultOf, shownIn, type Order, type Result } from "./result";
 import { asLoop, DEFAULTS, LOOP, query, type Asked, type Writing } from "./settings";
+import { EMPTY, type Again, type Kind, type Listener, type Prepare, type Shown, type Source, type Task, type Work } from "./tasks";
 import { isFinite, modelOf, type Model } from "./view/model";
-
-export interface Source {
-  upload: Upload;
-  opened: Opened;
-  model: Model;
-}
-
-/** Turns an opened file into what is asked for it. Rejects where the service would refuse it. */
-export type Prepare = (upload: Upload, opened: Opened, signal: AbortSignal) => Promise<Asked>;
-
-/** Another try at what failed. */
-export type Again = () => void;
-
-/** Openings replace each other, and so do refinements; values at vertices belong to the result that is shown. */
-type Kind = "opening" | "refinement" | "values" | "download";
-
-export interface Work {
-  kind: Kind;
-  /** The file that may be at fault; null where it was refined before. */
-  upload: Upload | null;
-  again: Again;
-}
-
-type Task = (signal: AbortSignal) => Promise<void>;
-
-/** What is on the stage. */
-interface Shown {
-  source: Source | null;
-  ours: Result | null;
-  loop: Result | null;
-}
-
-const EMPTY: Shown = { source: null, ours: null, loop: null };
-
-export interface Listener {
-  progress(progress: Progress, what: string): void;
-  /** A file takes the stage. */
-  opened(source: Source): void;
-  refined(ours: Result): void;
-  compared(loop: Result | null): void;
-  /** Other settings were refused or cancelled: the result before them stays. */
-  stayed(ours: Result): void;
-  /** What failed or was cancelled is asked for again. */
-  renewed(asked: Asked): void;
-  idle(): void;
-  failed(error: unknown, work: Work): void;
-  /** The user cancelled the work on a file; `again` starts it anew. */
-  stopped(upload: Upload, again: Again): void;
-  /** No file is left on the stage. */
-  cleared(): void;
-  discarded(model: Model): void;
-}
 
 export class Session {
   private shown: Shown = EMPTY;
@@ -103,19 +52,20 @@ export class Session {
     const again = (): void => void this.take(upload, prepare);
     this.end("opening");
     this.listener.progress({ step: "open", share: null }, "");
-    let order: Order | null = null;
+    let refined: Promise<void> | null = null;
     await this.run({ kind: "opening", upload, again }, async (signal) => {
       const source = await this.open(upload, signal);
       try {
-        order = { upload, asked: await prepare(upload, source.opened, signal), began };
+        const order = { upload, asked: await prepare(upload, source.opened, signal), began };
+        this.end("refinement", "values");
+        this.show(source, order);
+        refined = this.refineShown(order);
       } catch (error) {
         this.listener.discarded(source.model);
         throw error;
       }
-      this.end("refinement", "values");
-      this.show(source);
     });
-    if (order) await this.refineShown(order);
+    await refined;
   }
 
   /** Refine the file that is shown with other settings. */
@@ -188,6 +138,16 @@ export class Session {
         throw error;
       }
     });
+    await this.makeUp(order);
+  }
+
+  /** Refine what an order ended that was then refused or cancelled itself: the file before it, or the comparison. */
+  private async makeUp({ asked }: Order): Promise<void> {
+    const { order, ours, loop } = this.shown;
+    const missing = ours ?? order;
+    const isRefining = [...this.underWay.values()].some(({ kind }) => kind === "refinement");
+    if (!missing || missing.asked === asked || isRefining) return;
+    if (!ours || (!loop && ours.asked.settings.model !== LOOP)) await this.refineShown(missing);
   }
 
   private async complete(order: Order, signal: AbortSignal): Promise<void> {
@@ -220,19 +180,19 @@ export class Session {
     return refine(bodyOf(upload), asked, signal, (progress) => this.listener.progress(progress, what));
   }
 
-  private show(source: Source): void {
-    // A file that was never refined leaves nothing to go back to.
-    if (this.ours) {
+  private show(source: Source, order: Order): void {
+    // Of several files that came too soon after each other the first stays to go back to.
+    if (this.ours || !this.before.source) {
       this.forget();
       this.before = this.shown;
     } else {
       this.drop(this.shown);
     }
-    this.shown = { source, ours: null, loop: null };
+    this.shown = { source, order, ours: null, loop: null };
     this.listener.opened(source);
   }
 
-  /** Leave the stage to what was there before, if the service refused the file or its settings. */
+  /** Go back to what was there before, if the service refused the file or its settings. */
   private giveUp(error: unknown): void {
     if (this.ours) this.listener.stayed(this.ours);
     if (this.ours || !isTheFiles(error)) return;
@@ -240,11 +200,9 @@ export class Session {
     this.before = EMPTY;
     this.shown = before;
     this.drop(shown);
-    if (!before.source || !before.ours) {
-      this.listener.cleared();
-      return;
-    }
-    this.listener.opened(before.source);
+    if (before.source) this.listener.opened(before.source);
+    else this.listener.cleared();
+    if (!before.ours) return;
     this.listener.refined(before.ours);
     this.listener.compared(before.loop);
     this.listener.stayed(before.ours);

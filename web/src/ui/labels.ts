@@ -2,7 +2,7 @@
 
 import { counted } from "../report/format";
 import type { Result } from "../result";
-import type { Source } from "../session";
+import type { Source } from "../tasks";
 import type { Layout } from "../view/viewer";
 import { element, make } from "./dom";
 

@@ -1,6 +1,6 @@
 /** Buttons of the header and the panel. */
 
-import type { Again } from "../session";
+import type { Again } from "../tasks";
 import { announce, bindNotice, bindProblem } from "./status";
 import { element } from "./dom";
 

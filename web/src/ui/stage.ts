@@ -3,7 +3,7 @@
 import { Box3, type Mesh } from "three";
 import type { Unit } from "../report/format";
 import type { Result } from "../result";
-import type { Source } from "../session";
+import type { Source } from "../tasks";
 import { LOOP } from "../settings";
 import { colour, HEATS, needsFull, type Heat, type Legend } from "../view/heat";
 import { removeLines } from "../view/lines";
