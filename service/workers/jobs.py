@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from ..bodies.encodings import IDENTITY, decoded
 from ..course import Course
 from ..errors import LimitError, NoModelError, check_limit
 from ..gltf.read.memory_cap import memory_cap
@@ -39,7 +40,8 @@ class Work:
 
     `answer` and `report` are what the worker fills, None what nobody wants; together they may hold
     `answer_bytes`. `page` is where it tells how far it is. `model` is the name of one of the
-    worker's models; None: the served one. `request_id` stands in what the worker logs.
+    worker's models; None: the served one. `request_id` stands in what the worker logs. A body with
+    an `encoding` unpacks to `body_bytes` at most.
     """
 
     body: FileName
@@ -52,6 +54,8 @@ class Work:
     limits: Limits
     answer_bytes: int | None = None
     request_id: str | None = None
+    encoding: str = IDENTITY
+    body_bytes: int = 64 * 1024**2
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +83,8 @@ def subdivide(work: Work) -> Done:
     from ..gltf.subdivide import subdivide_gltf
     from ..meshfiles.to_gltf import as_gltf
 
-    reporter = Reporter(work.page)
-    with job_memory(work.limits):
-        body = uploads.sent(memory_file.read(work.body), work.content_type, work.limits)
+    with Reporter(work.page) as reporter, job_memory(work.limits):
+        body = uploads.sent(_body_of(work), work.content_type, work.limits)
         sent = as_gltf(body, work.options, work.limits)
         model = _MODELS.get(work.model) if work.options.scheme == "pns" else None
         done = subdivide_gltf(
@@ -117,18 +120,24 @@ def measure(work: Work) -> Cost:
 
     glance = replace(work.limits, max_memory_bytes=min(work.limits.max_memory_bytes, GLANCE_BYTES))
     with job_memory(work.limits):
-        body = memory_file.read(work.body)
+        body = _body_of(work)
         try:
             sent = uploads.sent(body, work.content_type, glance)
+            levels, learned = work.options.levels, _learned_levels(work)
+            of_kind = cost_of_gltf if sent.kind in ("glb", "gltf") else cost_of_other
+            return of_kind(sent.data, sent.kind, levels, work.limits, learned)
         except LimitError as error:
+            # An archive may be too large to be unpacked for a glance.
             if error.limit != "archive-bytes":
                 raise
-            # Too large to be unpacked for a glance: it is taken for the largest that may come.
-            return replace(cost_of(work.limits.max_faces, 1, len(body)), most=True)
-        levels, learned = work.options.levels, _learned_levels(work)
-        if sent.kind in ("glb", "gltf"):
-            return cost_of_gltf(sent.data, sent.kind, levels, work.limits, learned)
-        return cost_of_other(sent.data, sent.kind, levels, work.limits, learned)
+        except ArithmeticError:
+            # Counts that no number holds.
+            pass
+        return replace(cost_of(work.limits.max_faces, 1, len(body)), most=True)
+
+
+def _body_of(work: Work) -> bytes:
+    return decoded(memory_file.read(work.body), work.encoding, work.body_bytes)
 
 
 def _learned_levels(work: Work) -> int:
