@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import time
 from collections import Counter
 from collections.abc import AsyncIterator
@@ -13,7 +12,7 @@ from pathlib import Path
 from fastapi import Request
 
 from ..bodies import media
-from ..bodies.gzipped import decoder
+from ..bodies.encodings import encoding_of
 from ..errors import InvalidParameter, check_limit
 from ..request_ids import REQUEST_ID
 from ..workers.job import Job
@@ -56,7 +55,7 @@ async def taken_in(
     check_limit("levels", options.levels, settings.levels, f"levels is {options.levels}")
     content_type = request.headers.get("content-type", "")
     media.of_request(content_type)
-    decoded = decoder(request.headers.get("content-encoding", ""), int(settings.body))
+    encoding = encoding_of(request.headers.get("content-encoding", ""))
     client = client_of(request, settings)
     # It would be sent for nothing.
     service.desk.turns.check_room(client.id)
@@ -67,12 +66,9 @@ async def taken_in(
         with ExitStack() as files:
             body = files.enter_context(MemoryFile())
             async with service.admission.upload(), counted.arriving():
-                async for received in request.stream():
-                    for piece in decoded.pieces(received):
-                        counted.grow(len(piece))
-                        body.append(piece)
-                        await asyncio.sleep(0)
-                decoded.end()
+                async for piece in request.stream():
+                    counted.grow(len(piece))
+                    body.append(piece)
             page = files.enter_context(ProgressPage())
             answer = files.enter_context(MemoryFile(wanted.folder)) if wanted.answer else None
             report = files.enter_context(MemoryFile(wanted.folder)) if wanted.report else None
@@ -91,6 +87,8 @@ async def taken_in(
                     limits=settings.job_limits(),
                     answer_bytes=None if wanted.folder is None else int(settings.result_bytes),
                     request_id=REQUEST_ID.get(),
+                    encoding=encoding,
+                    body_bytes=int(settings.body),
                 ),
                 body=body,
                 answer=answer,
@@ -101,6 +99,8 @@ async def taken_in(
             )
             # From here on they are the job's.
             files.pop_all()
+            # Also where its work never begins.
+            held.callback(job.close)
         yield job
 
 

@@ -125,9 +125,11 @@ async def _hand_in(service: Service, request: Request, parameters: Parameters) -
         folder=result_folder(settings),
         patience=settings.queue_seconds + settings.job_seconds,
     )
+    client = client_of(request, settings)
+    service.book.check_room(client.networks)
     async with AsyncExitStack() as held:
         job = await held.enter_async_context(taken_in(service, request, parameters, wanted))
-        entry = service.book.add(job, owner_of(client_of(request, settings)))
+        entry = service.book.add(job, owner_of(client), client.networks)
         entry.task = asyncio.create_task(_work(service, job, held.pop_all()))
     try:
         await unless_gone(request.receive, job.accepted.wait())
@@ -194,6 +196,7 @@ def _result(service: Service, request: Request, job_id: str, kind: str) -> Respo
     answer, report = job.results
     file = report if kind == media.JSON else answer
     file.hold()
+    sent = job.fetched.set if file is answer else lambda: None
     held = ExitStack()
     held.callback(file.release)
     return FileAnswer(
@@ -207,7 +210,7 @@ def _result(service: Service, request: Request, job_id: str, kind: str) -> Respo
             "Vary": "Accept",
             "Cache-Control": "no-store",
         },
-        sent=job.fetched.set,
+        sent=sent,
     )
 
 

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from ..bodies.encodings import IDENTITY, decoded
 from ..bodies.media import Kind
 from ..course import Course
 from ..errors import LimitError, NoModelError, check_limit
@@ -42,8 +43,8 @@ class Work:
 
     `answer` and `report` are what the worker fills, None what nobody wants; together they may hold
     `answer_bytes`. `page` is where it tells how far it is. `model` is the name of one of the
-    worker's models; None: the served one. `request_id` stands in what the worker logs. `target` is
-    the kind of file to answer with.
+    worker's models; None: the served one. `request_id` stands in what the worker logs. A body with
+    an `encoding` unpacks to `body_bytes` at most. `target` is the kind of file to answer with.
     """
 
     body: FileName
@@ -57,6 +58,8 @@ class Work:
     target: Kind = "glb"
     answer_bytes: int | None = None
     request_id: str | None = None
+    encoding: str = IDENTITY
+    body_bytes: int = 64 * 1024**2
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +85,8 @@ def subdivide(work: Work) -> Done:
 
     from ..bodies import uploads
 
-    reporter = Reporter(work.page)
-    with job_memory(work.limits):
-        sent = uploads.sent(memory_file.read(work.body), work.content_type, work.limits)
+    with Reporter(work.page) as reporter, job_memory(work.limits):
+        sent = uploads.sent(_body_of(work), work.content_type, work.limits)
         model = _MODELS.get(work.model) if work.options.scheme == "pns" else None
         course = Course(begins=reporter.stage, moves=reporter.reach)
         written = _refined(work, sent, model, course)
@@ -137,18 +139,24 @@ def measure(work: Work) -> Cost:
 
     glance = replace(work.limits, max_memory_bytes=min(work.limits.max_memory_bytes, GLANCE_BYTES))
     with job_memory(work.limits):
-        body = memory_file.read(work.body)
+        body = _body_of(work)
         try:
             sent = uploads.sent(body, work.content_type, glance)
+            levels, learned = work.options.levels, _learned_levels(work)
+            of_kind = cost_of_gltf if sent.kind in ("glb", "gltf") else cost_of_other
+            return of_kind(sent.data, sent.kind, levels, work.limits, learned)
         except LimitError as error:
+            # An archive may be too large to be unpacked for a glance.
             if error.limit != "archive-bytes":
                 raise
-            # Too large to be unpacked for a glance: it is taken for the largest that may come.
-            return replace(cost_of(work.limits.max_faces, 1, len(body)), most=True)
-        levels, learned = work.options.levels, _learned_levels(work)
-        if sent.kind in ("glb", "gltf"):
-            return cost_of_gltf(sent.data, sent.kind, levels, work.limits, learned)
-        return cost_of_other(sent.data, sent.kind, levels, work.limits, learned)
+        except ArithmeticError:
+            # Counts that no number holds.
+            pass
+        return replace(cost_of(work.limits.max_faces, 1, len(body)), most=True)
+
+
+def _body_of(work: Work) -> bytes:
+    return decoded(memory_file.read(work.body), work.encoding, work.body_bytes)
 
 
 def _learned_levels(work: Work) -> int:
