@@ -15,7 +15,6 @@ export interface GltfJson {
   extensionsUsed?: string[];
   accessors?: { count: number }[];
   nodes?: { children?: number[] }[];
-  materials?: unknown[];
   meshes?: {
     name?: string;
     extras?: { targetNames?: string[] };

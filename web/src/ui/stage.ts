@@ -135,7 +135,9 @@ export class Stage {
     this.shown = { ...this.shown, ours, loop };
     for (const result of [fresh ? ours : null, news]) {
       if (!result) continue;
-      if (!result.json.materials?.length && this.shown.source?.opened.json === null) plain(result.model.meshes);
+      // Materials without names are the service's own: both sides are to look alike.
+      const isNamed = ({ material }: Mesh): boolean => [material].flat().some(({ name }) => name);
+      if (this.shown.source?.opened.json === null) plain(result.model.meshes.filter((mesh) => !isNamed(mesh)));
       this.adopt(result.model);
       if (this.shown.source) copyMorphs(this.shown.source.model, result.model);
     }
