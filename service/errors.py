@@ -173,10 +173,9 @@ class JobTimeout(ServiceError):  # noqa: N818
     title = "The job took too long"
 
 
-class WorkerDied(ServiceError):  # noqa: N818
+class WorkerDied(BusyError):  # noqa: N818
     """The worker that held this job ended before it answered (memory, a signal)."""
 
-    status = 500
     code = "worker-died"
     title = "The worker process ended unexpectedly"
 

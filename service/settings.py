@@ -9,7 +9,7 @@ from pydantic import ByteSize, Field, TypeAdapter, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from .options import MAX_LEVELS, Limits
-from .setting_types import Name, Networks, Origins, Place, Seconds, Size
+from .setting_types import Hosts, Name, Networks, Origins, Place, Seconds, Size
 
 MIB = 1024**2
 PREFIX = "PNS_"
@@ -108,11 +108,16 @@ class Settings(BaseSettings):
         description="refined faces that one client may ask for in a minute",
     )
     result_seconds: Seconds = Field(default=900, description="how long the result of a job is kept")
+    promised_seconds: Seconds = Field(
+        default=300, description="how long at least a result stays that nobody has fetched"
+    )
     result_bytes: Size = Field(
         default=ByteSize(1024 * MIB), description="what the results that are kept may take"
     )
     results: int = Field(
-        default=64, gt=0, description="jobs that are kept after their end, with or without a result"
+        default=256,
+        gt=0,
+        description="jobs that are kept after their end, with or without a result",
     )
     result_folder: Place | None = Field(
         default=None, description="where results are kept; none: the system's temporary folder"
@@ -138,6 +143,11 @@ class Settings(BaseSettings):
 
     keys_file: Place | None = Field(
         default=None, description="who may ask: a file of keys' hashes; none: everybody"
+    )
+    hosts: Hosts = Field(
+        default=(),
+        description="names under which the service is asked, with commas, `*.a.example` for any "
+        "below; none: those of loopback where it listens there and no proxy is named, else any",
     )
     cors_origins: Origins = Field(
         default=(), description="origins whose pages may ask, with commas; `*`: any"

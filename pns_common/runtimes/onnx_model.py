@@ -24,10 +24,11 @@ from pns_common.errors import ModelError, ParameterError
 from pns_common.models.card import ModelCard
 from pns_common.models.contract import CALL_ROWS, answer_to, feature_inputs
 from pns_common.models.manifest import check_listed
+from pns_common.models.part_count import check_part_count
 from pns_common.runtimes.tied_network import TiedNetwork, open_tied_network
 
 DEFAULT_MODEL = "general"
-LARGEST_FILE = 64 * 2**20
+LARGEST_FILE = 8 * 2**20
 BUNDLED = resources.files("pns_common") / "models"
 
 __all__ = [
@@ -222,6 +223,7 @@ def model_from_bytes(data: bytes, name: str, runtime: Runtime | None = None) -> 
     Raises:
         ModelError: the file breaks the contract.
     """
+    check_part_count(data, name)
     card, network = (runtime or open_model)(data, name)
     digest = hashlib.sha256(data).hexdigest()
     return OnnxModel(name, card, digest, len(data), data, network)
