@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields
-from types import MappingProxyType, UnionType
+from types import MappingProxyType, NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
 # The metadata key of an ONNX file that holds the card.
@@ -153,7 +153,7 @@ def _check_format(version: object) -> None:
 
 
 def _typed_fields(values: dict[str, Any]) -> dict[str, Any]:
-    """Return a card's fields, each of its type; an integer is accepted for a float."""
+    """Return a card's fields, each of its type."""
     known = {field.name: field for field in fields(ModelCard)}
     unknown = sorted(set(values) - set(known))
     if unknown:
@@ -162,22 +162,27 @@ def _typed_fields(values: dict[str, Any]) -> dict[str, Any]:
     if missing:
         raise ValueError(f"missing fields {', '.join(missing)}")
     hints = get_type_hints(ModelCard)
-    for name, value in values.items():
-        if not any(_is_of(value, kind) for kind in _kinds(hints[name])):
-            raise ValueError(f"{name} of type {type(value).__name__}")
-    return values
+    return {name: _typed(name, value, _kinds(hints[name])) for name, value in values.items()}
+
+
+def _typed(name: str, value: Any, kinds: tuple[Any, ...]) -> Any:
+    """Return a field's value, an integer as a float where that is its type."""
+    accepted = (*kinds, int) if float in kinds else kinds
+    # true and false are integers to Python, and no field is one of them.
+    if isinstance(value, bool) or not isinstance(value, accepted):
+        raise ValueError(f"{name} of type {type(value).__name__}")  # noqa: TRY004
+    if float not in kinds:
+        return value
+    try:
+        return float(value)
+    except OverflowError as error:
+        raise ValueError(f"{name} with more digits than a float holds") from error
 
 
 def _kinds(hint: Any) -> tuple[Any, ...]:
-    """Return the types that a hint allows, containers without their items."""
+    """Return the types that a hint allows beside None, containers without their items."""
     kinds = get_args(hint) if isinstance(hint, UnionType) else (hint,)
-    return tuple(get_origin(kind) or kind for kind in kinds)
-
-
-def _is_of(value: Any, kind: type) -> bool:
-    if isinstance(value, bool):
-        return kind is bool
-    return isinstance(value, (int, float) if kind is float else kind)
+    return tuple(get_origin(kind) or kind for kind in kinds if kind is not NoneType)
 
 
 def _check_fields_of_format(card: ModelCard) -> None:
