@@ -50,14 +50,15 @@ class Level:
         points: (V, 3) vertices.
         topology: connectivity and sharpness.
         base: the base scheme.
-        reference_length: R ≥ 0, the unit of length of the budget; 0 switches corrections off.
+        reference_length: R ≥ 0, the unit of length of the budget; 0 switches corrections off, None
+            where no rule reads it.
         blocks: how work is shared.
     """
 
     points: Float[np.ndarray, "V 3"]
     topology: Topology
     base: BaseScheme
-    reference_length: float
+    reference_length: float | None
     blocks: Blocks
 
     @cached_property

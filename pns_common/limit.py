@@ -31,7 +31,7 @@ tangents so: on curves from k = 6 on (Σ sin(2πj/k) q_j), at corners from k = 3
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -250,15 +250,19 @@ def _tangent_mask(kind: int, k: int) -> Float[np.ndarray, "K1 2"]:
 
 def dart_tangents(valence: int) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " K"]]:
     """Return the even mask (centre first) and the odd one (neighbours alone), the crease at q_0."""
-    angle = 2 * np.pi * np.arange(valence) / valence
-    even = _even_of_few(valence) if valence < MANY else _even_of_many(valence)
+    angle, even = 2 * np.pi * np.arange(valence) / valence, _even(valence)
     odd = np.sin(angle) if valence > 2 else np.zeros(valence)  # noqa: PLR2004
     return even * np.sign(even[1:] @ np.cos(angle)), odd
 
 
-@cache
+@lru_cache(maxsize=64)
+def _even(k: int) -> Float[np.ndarray, " N"]:
+    """Return the second even left eigenvector of a dart's matrix; finding it takes milliseconds."""
+    return _even_of_few(k) if k < MANY else _even_of_many(k)
+
+
 def _even_of_few(k: int) -> Float[np.ndarray, " N"]:
-    """Return the second even left eigenvector of a dart's matrix, for fewer than MANY spokes."""
+    """Return that eigenvector for fewer than MANY spokes, from the matrix."""
     weight = float(beta(np.array([k]))[0])
     matrix = np.zeros((k + 1, k + 1))
     matrix[0, 0], matrix[0, 1:] = 1 - k * weight, weight
@@ -279,7 +283,7 @@ def _even_of_few(k: int) -> Float[np.ndarray, " N"]:
 
 
 def _even_of_many(k: int) -> Float[np.ndarray, " N"]:
-    """Return the second even left eigenvector of a dart's matrix, for MANY spokes and more.
+    """Return that eigenvector for MANY spokes and more: the matrix may be too large.
 
     With weight 1 of p, λ = 3/8 + cos(θ)/4 and t = k θ/2, columns 0 < j < k say
     w_j = c (1 − cos(θ (j − k/2)) / cos t), c = 4 β / (cos θ − 1); that of q_0 says

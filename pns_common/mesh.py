@@ -35,7 +35,6 @@ class Mesh:
     Attributes:
         vertices: (V, 3) float64.
         corners: (H,) int64, the vertices of the faces, face after face.
-        offsets: (F + 1,) int64, where the corners of each face begin.
 
     Raises:
         MeshError: wrong shapes or types, no faces, a face of fewer than three corners, a masked
@@ -43,10 +42,10 @@ class Mesh:
             index out of range; the error names the element.
     """
 
-    __slots__ = ("_faces", "corners", "offsets", "vertices")
+    __slots__ = ("_faces", "_offsets", "corners", "vertices")
     vertices: Float[np.ndarray, "V 3"]
     corners: Int[np.ndarray, " H"]
-    offsets: Int[np.ndarray, " F1"]
+    _offsets: Int[np.ndarray, " F1"] | None
     _faces: Int[np.ndarray, "F N"] | None
 
     def __init__(self, vertices: Any, faces: Any) -> None:
@@ -60,36 +59,42 @@ class Mesh:
             raise MeshError("no faces to refine", element="faces")
         points = np.array(given, dtype=np.float64, order="C")
         _check_coordinates(points)
-        self._keep(points, corners, offsets)
+        degrees = np.diff(offsets)
+        uniform = (degrees == degrees[0]).all()
+        self._keep(points, corners, offsets, int(degrees[0]) if uniform else None)
 
     def _keep(
         self,
         vertices: Float[np.ndarray, "V 3"],
         corners: Int[np.ndarray, " H"],
-        offsets: Int[np.ndarray, " F1"],
+        offsets: Int[np.ndarray, " F1"] | None,
+        degree: int | None,
     ) -> None:
-        for array in (vertices, corners, offsets):
+        """Keep arrays; ``degree`` is that of all faces, which then need no offsets."""
+        for array in (vertices, corners):
             array.flags.writeable = False
-        degree = int(offsets[1]) if len(offsets) > 1 else TRIANGLE
-        uniform = len(corners) == degree * (len(offsets) - 1) and bool(
-            (np.diff(offsets) == degree).all()
-        )
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "corners", corners)
-        object.__setattr__(self, "offsets", offsets)
-        object.__setattr__(self, "_faces", corners.reshape(-1, degree) if uniform else None)
+        faces = None if degree is None else corners.reshape(-1, degree)
+        values = vertices, corners, offsets, faces
+        for name, value in zip(("vertices", "corners", "_offsets", "_faces"), values, strict=True):
+            object.__setattr__(self, name, value)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a Mesh is read-only: {name} cannot be set")
 
-    def __getstate__(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.vertices, self.corners, self.offsets
-
-    def __setstate__(self, state: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
-        self._keep(*state)
+    def __reduce__(self) -> tuple[Any, ...]:
+        degree = None if self._faces is None else self._faces.shape[1]
+        return _kept, (self.vertices, self.corners, self._offsets, degree)
 
     def __repr__(self) -> str:
-        return f"Mesh(vertices={len(self.vertices)}, faces={len(self.offsets) - 1})"
+        count = len(self.offsets) - 1 if self._faces is None else len(self._faces)
+        return f"Mesh(vertices={len(self.vertices)}, faces={count})"
+
+    @property
+    def offsets(self) -> Int[np.ndarray, " F1"]:
+        """Where the corners of each face begin, and where the last ones end: (F + 1,)."""
+        if self._offsets is not None:
+            return self._offsets
+        return np.arange(0, len(self.corners) + 1, self.faces.shape[1])
 
     @property
     def faces(self) -> Int[np.ndarray, "F N"]:
@@ -120,10 +125,19 @@ class Mesh:
     @classmethod
     def of_refined(cls, vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Mesh:
         """Make a mesh of arrays that a refinement made and checked: neither copied nor read."""
-        mesh = object.__new__(cls)
-        offsets = np.arange(0, faces.size + 1, TRIANGLE)
-        mesh._keep(vertices, faces.reshape(-1), offsets)  # noqa: SLF001
-        return mesh
+        return _kept(vertices, faces.reshape(-1), None, TRIANGLE)
+
+
+def _kept(
+    vertices: Float[np.ndarray, "V 3"],
+    corners: Int[np.ndarray, " H"],
+    offsets: Int[np.ndarray, " F1"] | None,
+    degree: int | None,
+) -> Mesh:
+    """Make a mesh of arrays that are known to be right."""
+    mesh = object.__new__(Mesh)
+    mesh._keep(vertices, corners, offsets, degree)  # noqa: SLF001  # pyright: ignore[reportPrivateUsage]
+    return mesh
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,7 +35,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.curves import Curves, curve_prior, curve_pushes, find_curves
-from pns_common.errors import ModelError
+from pns_common.errors import ModelError, ParameterError
 from pns_common.kernels import children, correction, frames, measures
 from pns_common.kernels.connectivity import INTERIOR
 from pns_common.level import Level
@@ -173,7 +173,7 @@ def learned_level(level: Level, rule: Rule) -> Additions:
 
     blocks.run(len(vertices), at_vertices)
     degenerate: int = sum(blocks.run(len(edges), at_edges))
-    made.correct_curves(curves, rule.budget / level.reference_length)
+    made.correct_curves(curves, budget_per_length(level, rule))
     scale = guard_scale(level, x, delta, math.radians(rule.fold_angle), curves)
     made.scale(scale)
     x += delta
@@ -185,11 +185,14 @@ def learned_level(level: Level, rule: Rule) -> Additions:
 
 def prior(level: Level, rule: Rule, curves: Curves) -> Float[np.ndarray, "W 3"]:
     """Return D = S d of every new vertex; 0 at those that the rule does not move."""
-    along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
-    made = level.base.place(pushes(level, rule) + along, level.topology, level.blocks)
-    fixed = np.concatenate([~level.ringed, level.topology.edge_class != INTERIOR])
-    made[fixed] = 0.0
-    made[curves.new_rows] = curve_prior(curves, along)
+    d, along = pushes(level, rule), None
+    if len(curves.rows) and rule.curve_strength:
+        along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
+        d += along
+    made = level.base.place(d, level.topology, level.blocks)
+    made[np.concatenate([~level.ringed, level.topology.edge_class != INTERIOR])] = 0.0
+    if along is not None:
+        made[curves.new_rows] = curve_prior(curves, along)
     return made
 
 
@@ -242,7 +245,7 @@ def edge_inputs(level: Level, rule: Rule, rows: Int[np.ndarray, " N"]) -> Inputs
         features,
         basis,
         gate=gate_of(rule.gate_sharpness * curvature**2),
-        bound=rule.budget / level.reference_length * (length * length),
+        bound=budget_per_length(level, rule) * (length * length),
         reach=rule.network_scale * length,
         weight=1 - mesh.soft[rows] if len(mesh.soft) else np.ones(count),
         degenerate=degenerate,
@@ -262,11 +265,18 @@ def vertex_inputs(level: Level, rule: Rule, rows: Int[np.ndarray, " N"]) -> Inpu
         features,
         basis,
         gate=gate_of(rule.vertex_gate_sharpness * rings.means[rows, measures.JUMP]),
-        bound=rule.budget / level.reference_length * square,
+        bound=budget_per_length(level, rule) * square,
         reach=rule.network_scale * np.sqrt(square),
         weight=1 - sharp.weights[rows, 1] if sharp is not None and soft else np.ones(count),
         degenerate=np.zeros(count, dtype=bool),
     )
+
+
+def budget_per_length(level: Level, rule: Rule) -> float:
+    """Return C / R."""
+    if not level.reference_length:
+        raise ParameterError("reference_length", level.reference_length, expected="R > 0")
+    return rule.budget / level.reference_length
 
 
 def gate_of(values: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
