@@ -12,7 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from pns_common import Mesh, load_model, loop, pns, refine, subdivide
-from pns_common.base.whole_file import replacing
+from pns_common.files import replacing
 
 FOLDER = Path(__file__).with_name("gallery")
 VIEW = np.array([0.35, -0.72, 0.6])  # from the part towards the eye, y up

@@ -9,14 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.connectivity.creases import Creases
-from pns_common.geometry.frames import face_normals
-from pns_common.geometry.sharp_edges import turn_by_more
-from pns_common.levels.diagnostics import LevelReport
+from pns_common.creases import Creases, edge_cosines
 from pns_common.mesh import Mesh
-from pns_common.refine import Report
-
-from .meshes.connectivity import interior_edges
+from pns_common.report import LevelReport
+from pns_common.topology import EdgeClass, build_topology
 
 # Plane faces in single precision turn by less.
 BENT = math.radians(0.5)
@@ -36,31 +32,23 @@ NO_BENDS = Bends()
 
 
 def count_bends(
-    mesh: Mesh,
-    creases: Creases,
-    reports: Sequence[Report],
-    part_of_face: Int[np.ndarray, " F"] | None = None,
+    mesh: Mesh, creases: Creases, parts: int = 1, part_of_face: Int[np.ndarray, " F"] | None = None
 ) -> list[Bends]:
     """Count the bent edges of each part of a mesh, and the sharp ones among them.
 
-    `reports` are the operator's, one for each part; without `part_of_face` there is one. Nothing is
-    counted where no sharp edges are asked for. Edges that the operator finds have no names here;
-    their number stands in the report, and all of them bend.
+    Without `part_of_face` the mesh is one part. Nothing is counted where no sharp edges are asked
+    for.
     """
-    count = len(reports)
-    if creases.named is None and creases.line_angle is None:
-        return [NO_BENDS] * count
-    edges, half_edges = interior_edges(mesh.faces, len(mesh.vertices))
-    faces = half_edges // 3
-    bent = turn_by_more(face_normals(mesh.vertices, mesh.faces), faces, BENT)
-    part = np.zeros(len(edges), dtype=np.int64)
+    if creases.named is None:
+        return [NO_BENDS] * parts
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    bent = np.flatnonzero(edge_cosines(mesh.vertices, topology) < math.cos(BENT))
+    sharp = creases.applied(mesh.vertices, topology).edge_class[bent] == EdgeClass.CREASE
+    part = np.zeros(len(bent), dtype=np.int64)
     if part_of_face is not None:
-        part = part_of_face[faces[:, 0]]
-    sharp = [report["levels"][0]["edges"].get("crease", 0) for report in reports]
-    if creases.named is not None and len(creases.named):
-        named = bent & np.isin(_codes(edges), _codes(creases.named))
-        sharp = np.bincount(part[named], minlength=count).tolist()
-    return list(map(Bends, np.bincount(part[bent], minlength=count).tolist(), sharp))
+        part = part_of_face[topology.half_edges[bent, 0] // 3]
+    counts = (np.bincount(part[chosen], minlength=parts).tolist() for chosen in (..., sharp))
+    return [Bends(*each) for each in zip(*counts, strict=True)]
 
 
 def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
@@ -84,8 +72,3 @@ def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
     if levels[-1]["normal_jump_max"] < BENT and not edges.get("crease"):
         return ["the shape is flat: refining adds faces and rounds outlines, nothing else"]
     return []
-
-
-def _codes(pairs: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, " N"]:
-    low, high = np.sort(pairs.astype(np.int64), axis=1).T
-    return low << 32 | high

@@ -51,7 +51,7 @@ def _package(name: str) -> Finding:
 
 
 def _machine() -> Finding:
-    from pns_common.base.memory import memory_here
+    from pns_common.memory import memory_here
 
     bytes_here = memory_here()
     size = "unknown" if bytes_here is None else f"{bytes_here / 2**30:.1f} GiB"
@@ -72,12 +72,12 @@ def _settings() -> str:
 
 
 def _kernels() -> str:
-    from pns_common.fused import load_kernels
+    from pns_common.warming import kernels_are_cached, warm_up
 
-    began = time.perf_counter()
-    if not load_kernels():
-        raise RuntimeError("numba is not installed, or no folder can be written to keep them in")
-    return f"ready after {time.perf_counter() - began:.1f} s"
+    began, kept = time.perf_counter(), kernels_are_cached()
+    warm_up(lambda _: None)
+    seconds = f"{time.perf_counter() - began:.1f} s"
+    return f"loaded in {seconds}" if kept else f"compiled in {seconds}"
 
 
 def _providers() -> str:
@@ -88,7 +88,7 @@ def _providers() -> str:
 
 def _models() -> str:
     from pns_common import load_model
-    from pns_common.runtimes.onnx_model import bundled_models
+    from pns_common.model.file import bundled_models
 
     loaded = [load_model(name) for name in bundled_models()]
     return ", ".join(f"{model.name} {model.hash[:8]}" for model in loaded)

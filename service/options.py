@@ -21,7 +21,7 @@ Compression = Literal["none", "draco", "meshopt"]
 # A weld further than a hundredth of R is a different tool: it would take features away.
 MAX_WELD_TOLERANCE = 0.01
 # `angle:` is followed by degrees.
-CREASE_PATTERN = r"auto|off|lines|normals|angle:\d{1,3}(\.\d{1,6})?"
+CREASE_PATTERN = r"auto|off|normals|angle:\d{1,3}(\.\d{1,6})?"
 
 # The upload, its decoded JSON, and its bytes again in the answer.
 BYTES_PER_INPUT_BYTE = 4
@@ -71,7 +71,7 @@ class Options:
         if not re.fullmatch(CREASE_PATTERN, self.crease) or not (self.crease_angle or 0) <= math.pi:
             raise InvalidParameter(
                 "crease",
-                "crease must be 'auto', 'off', 'lines', 'normals' or 'angle:' and 0 to 180 degrees",
+                "crease must be 'auto', 'off', 'normals' or 'angle:' and 0 to 180 degrees",
             )
         if not 0 <= self.weld_tolerance <= MAX_WELD_TOLERANCE:
             raise InvalidParameter(

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, astuple, dataclass
 from typing import Any
 
-from pns_common.levels.diagnostics import EdgeCounts, GateSummary, LevelReport, RatioSummary
-from pns_common.refine import Report
+from pns_common.report import EdgeCounts, GateSummary, LevelReport, RatioSummary, Report
 from pns_common.schemes import Scheme
 
 from .advice import Bends, advice_on

@@ -193,7 +193,7 @@ def info(
     ] = None,
 ) -> None:
     """List the bundled models; with a name or a file, show what that model says of itself."""
-    from pns_common.runtimes.onnx_model import bundled_models, load_model
+    from pns_common.model.file import bundled_models, load_model
 
     from ..model_info import print_model, print_models
 
@@ -222,7 +222,7 @@ def example(
     output: Annotated[Path, typer.Argument(metavar="OUT.glb", help="file to write")],
 ) -> None:
     """Write a small mechanical part with ridges, fillets and UVs, to try the other commands on."""
-    from pns_common.base.whole_file import replace_file
+    from pns_common.files import replace_file
 
     from ..errors import InvalidParameter
     from ..meshfiles.example import part_glb

@@ -69,9 +69,9 @@ NormalsOption = Annotated[
 CreaseOption = Annotated[
     str,
     typer.Option(
-        metavar="auto|lines|off|normals|angle:DEG",
-        help="edges to keep sharp; auto: the lines that the mesh shows, hard edges of what is "
-        "shaded smooth, and borders of materials on flat sides, if the model asks for them",
+        metavar="auto|off|normals|angle:DEG",
+        help="edges to keep sharp; auto: with general those beyond 40 degrees that are connected "
+        "to one beyond 60, at two levels; normals: those that a glTF's normals make hard",
     ),
 ]
 WeldOption = Annotated[

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
-from pns_common.schemes import Model, Scheme, loop, pns
+from pns_common.model.session import Model
+from pns_common.schemes import Scheme, loop, pns
 
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..course import Course

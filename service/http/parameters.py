@@ -91,11 +91,10 @@ class Parameters(BaseModel):
     crease: str = Field(
         default=DEFAULTS.crease,
         pattern=f"^({CREASE_PATTERN})$",
-        description="edges to keep sharp: `lines` (those that the mesh shows: sharp, flat on both "
-        "sides, and going on), `auto` (where the model's card asks for them, these, the hard "
-        "edges of what is shaded smooth, and borders of primitives on flat sides), `off`, "
-        "`normals` (where the two sides carry different normals) or `angle:` and degrees (where "
-        "the faces meet at more)",
+        description="edges to keep sharp: `auto` (for models of format 4, as `general`: edges "
+        "beyond 40 degrees that are connected to one beyond 60, at as many levels as the card "
+        "says), `off`, `normals` (edges whose two sides carry different normals) or `angle:` and "
+        "degrees (edges whose faces meet at more)",
     )
     weld_tolerance: float = Field(
         default=DEFAULTS.weld_tolerance,

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from pns_common import load_model
-from pns_common.base.whole_file import replace_file
-from pns_common.schemes import Model
+from pns_common.files import replace_file
+from pns_common.model.session import Model
 
 from ..bodies.folder import folder_of
 from ..bodies.media import GLTF_KINDS, KINDS

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.connectivity.disjoint_union import disjoint_faces
+from pns_common.rows import disjoint_faces
 
 from ..errors import UnrefinableError
 from ..gltf.constants import SURFACES, TRIANGLES

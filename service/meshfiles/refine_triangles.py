@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.distinct import distinct_rows, number_by_first_appearance
-from pns_common.connectivity.creases import Creases
-from pns_common.crease_lines import named_on
+from pns_common.creases import Creases
 from pns_common.errors import MeshError
 from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
-from pns_common.refine import Refinement, refine
+from pns_common.refinement import Refinement, refine
+from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import Scheme
 
 from ..advice import advice_on, count_bends
@@ -58,9 +57,6 @@ def refine_triangles(
         raise UnrefinableError("no face has three different vertices")
     cleaned = clean(Mesh(welded.points, welded.faces))
     creases = creases_by_shape(cleaned.mesh, options, scheme)
-    if options.uv == "smooth":
-        # By name: texture coordinates have the same.
-        creases = named_on(cleaned.mesh, creases)
     refinement = refine(
         cleaned.mesh,
         scheme,
@@ -87,7 +83,7 @@ def refine_triangles(
         "zero_reference_lengths": int(report["reference_length"] == 0),
     }
     report["dropped"] = dropped(int((~proper).sum()), _unused_vertices(mesh_file, welded, cleaned))
-    (bends,) = count_bends(cleaned.mesh, creases, [refinement.report])
+    (bends,) = count_bends(cleaned.mesh, creases)
     levels = refinement.report["levels"]
     report["changes"] = [asdict(change) for change in changes]
     report["advice"] = advice_on(levels, bends)

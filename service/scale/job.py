@@ -15,7 +15,7 @@ from ..options import Limits, Options
 from .same_model import check_same_model
 
 if TYPE_CHECKING:
-    from pns_common.schemes import Model
+    from pns_common.model.session import Model
 
     from ..bodies.sibling_files import SiblingFiles
     from .places import Place

@@ -6,6 +6,7 @@ imports this module to name its jobs, and never runs them.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -24,12 +25,13 @@ from .models import Models
 from .progress import Reporter
 
 if TYPE_CHECKING:
-    from pns_common.schemes import Model
+    from pns_common.model.session import Model
 
     from ..bodies.uploads import Sent
     from ..meshfiles.convert import Written
     from .catalogue import Catalogue
 
+log = logging.getLogger("pns.service")
 
 # What an archive may take to be measured; others wait meanwhile.
 GLANCE_BYTES = 128 * 1024**2
@@ -198,13 +200,13 @@ _MODELS = Models()
 
 def warm_up(model: Model | str | None) -> None:
     """Import and load what the first request would otherwise wait for. Raises NoModelError."""
-    from pns_common.fused import load_kernels
+    from pns_common import warm_up as compile_kernels
 
     from ..gltf import subdivide  # noqa: F401
     from ..meshfiles import to_gltf  # noqa: F401
     from ..meshfiles.formats import load_readers
 
-    load_kernels()
+    compile_kernels(log.info)
     load_readers()
     hold_model(model)
 

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int, Shaped
 
+from pns_common.rows import as_words, distinct_rows, marked, number_by_first_appearance
+
 from ...errors import GltfError, UnsupportedFeature
-from ...meshes.arrays import as_words, distinct_rows, marked, number_by_first_appearance
 from ..constants import FAN, FLOAT, TRIANGLES
 from .accessors import dequantised, read, read_rows
 from .schema import Accessor, Document

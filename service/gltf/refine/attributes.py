@@ -12,16 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from pns_common.grid import rounded_rows
+from pns_common.normals import perpendicular_tangents
+from pns_common.parallel import Blocks, available_threads
+
 from ...course import Course
-from ...meshes.arrays import slices
 from ...meshes.barycentric_grid import BarycentricGrid
-from ...meshes.kernels import in_blocks, perpendicular_tangents
-from ...meshes.split_connectivity import SplitConnectivity, rounded_rows, split_connectivity
+from ...meshes.split_connectivity import SplitConnectivity, blocks_of, split_connectivity
 from ...meshes.uv_charts import UvBlend
 from ..read.primitives import TrianglePrimitive, distinct_corners
 from ..read.schema import Accessor
 from .columns import SkinAndMorph, skin_attributes
-from .control_mesh import ControlMesh, refined_ids
+from .control_mesh import ControlMesh, refined_ids, slices
 from .mesh_refine import RefinedMesh
 from .normals import Shading, safe_unit, shade
 
@@ -127,7 +129,7 @@ def _refined_primitive(
         row=row,
         vertex=control.cleaned.vertex_map[welded[row]],
         connectivity=own,
-        positions=rounded_rows(refined.mesh.vertices, vertex),
+        positions=rounded_rows(refined.mesh.vertices, vertex, blocks_of(grid)),
         normals=normals,
         exact_normals=exact,
         skin_and_morph=refined.skin_and_morph.take(vertex),
@@ -205,9 +207,7 @@ def _tangents(
     """Return unit tangents, perpendicular to the normals if there are any."""
     if normals is None:
         return safe_unit(directions)
-    made, exact = np.empty(directions.shape), normals.astype(np.float64)
-    in_blocks(len(made), perpendicular_tangents, directions, exact, made)
-    return made
+    return perpendicular_tangents(directions, normals, Blocks(available_threads()))
 
 
 def _in_type_of(

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.connectivity.creases import Creases
-from pns_common.fused.where_loaded.linear import linear_refinement
-from pns_common.masks.linear import ColumnRefinement
+from pns_common.columns import ColumnRefinement
+from pns_common.parallel import Blocks, available_threads
+from pns_common.rows import as_words, distinct_rows
+from pns_common.topology import Topology
+from pns_common.weights import keep_heaviest, scale_rows, whole_units
 
 from ...course import Course
-from ...meshes.arrays import as_words, distinct_rows
-from ...meshes.kernels import in_blocks, keep_heaviest, scale_rows, whole_units
 from ...meshes.weld import canonical_zero
 from ...options import Options
 from ..read.accessors import as_float
@@ -131,7 +131,7 @@ def read_binding(primitives: Sequence[TrianglePrimitive]) -> Binding | None:
         joints.append(np.hstack([*names, padding.astype(np.int64)]))
         weights.append(np.hstack([*parts, padding]))
     binding = Binding(*_distinct_joints(np.concatenate(joints), np.concatenate(weights)))
-    in_blocks(len(binding.weights), scale_rows, binding.weights)
+    scale_rows(binding.weights, Blocks(available_threads()))
     return binding
 
 
@@ -162,19 +162,20 @@ def _distinct_joints(
 def refined_skin_and_morph(
     control: ControlMesh,
     refined_faces: Int[np.ndarray, "G 3"],
-    creases: Creases,
+    topologies: Sequence[Topology],
     options: Options,
     course: Course,
     parts: Parts | None = None,
 ) -> tuple[SkinAndMorph, Int[np.ndarray, " P"]]:
-    """Refine skin and morph; return also the number of vertices of each part that lost a joint."""
+    """Refine skin and morph; return also the number of vertices of each part that lost a joint.
+
+    `topologies` are those of the meshes that were refined, level by level.
+    """
     if not control.skin_and_morph.any:
-        return control.skin_and_morph, np.zeros(len(control.near), dtype=np.int64)
+        return control.skin_and_morph, np.zeros(1, dtype=np.int64)
     mesh, rows = control.mesh, control.vertex_rows()
     before = control.skin_and_morph.take(rows)
-    linear = linear_refinement(
-        mesh.faces, len(mesh.vertices), options.levels, creases, limit=options.limit
-    )
+    linear = ColumnRefinement(topologies, limit=options.limit, blocks=Blocks(available_threads()))
     slots = _common_slots(control, refined_faces, linear.count)
     if parts is None:
         after = _refined(before, linear, slots, course)
@@ -219,7 +220,7 @@ def _refined_binding(
     `slots` are those of each refined vertex; None: all have the binding's. The course is reported
     between blocks of joints, of which a small file may have tens of thousands.
     """
-    width = binding.weights.shape[1]
+    width, blocks = binding.weights.shape[1], Blocks(available_threads())
     bound = binding.weights > 0
     used, column = np.unique(binding.joints[bound], return_inverse=True)
     row, value = np.nonzero(bound)[0], binding.weights[bound]
@@ -233,12 +234,12 @@ def _refined_binding(
         here = order[starts[first] : starts[first + len(names)]]
         dense = np.zeros((len(bound), len(names)))
         dense[row[here], column[here] - first] = value[here]
-        in_blocks(len(weights), keep_heaviest, linear(dense), names, joints, weights, lost)
+        keep_heaviest(linear(dense), names, joints, weights, lost, blocks)
     if slots is not None:
         beyond = np.arange(width) >= slots[:, None]
         lost += np.where(beyond, weights, 0).sum(axis=1)
         joints[beyond], weights[beyond] = 0, 0
-    in_blocks(len(weights), scale_rows, weights)
+    scale_rows(weights, blocks)
     return Binding(joints, weights), np.flatnonzero(lost > NOTHING)
 
 
@@ -251,11 +252,9 @@ def skin_attributes(
     if not sets:
         return attributes
     width = SLOTS * len(sets)
-    weights = np.ascontiguousarray(binding.weights[:, :width])
     dtype = primitive.attributes[f"WEIGHTS_{sets[0]}"].dtype
     total_units = FLOAT_UNITS if dtype.kind == "f" else int(np.iinfo(dtype).max)
-    units = np.empty(weights.shape, dtype=np.int32)
-    in_blocks(len(weights), whole_units, weights, total_units, units)
+    units = whole_units(binding.weights[:, :width], total_units, Blocks(available_threads()))
     joints = np.where(units > 0, binding.joints[:, :width], 0)
     # Joints of another primitive may reach across a common edge.
     wide = np.uint16 if joints.max(initial=0) > np.iinfo(np.uint8).max else np.uint8

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
+from pns_common.grid import index_type, take_points
 from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
+from pns_common.rows import distinct_rows, dot, norm, unit
 
-from ...meshes.arrays import distinct_rows, dot, norm, slices, unit
 from ...meshes.barycentric_grid import BarycentricGrid
-from ...meshes.kernels import index_type
-from ...meshes.split_connectivity import take_points
+from ...meshes.split_connectivity import blocks_of
 from ...meshes.weld import Weld, weld
 from ...meshes.weld_tolerance import WHOLE, weld_within
 from ..read.primitives import TrianglePrimitive
@@ -130,12 +131,6 @@ class ControlMesh:
         of_face[place[place >= 0]] = of_kept[place >= 0]
         return of_face
 
-    def part_of_face(self, parts: Parts | None) -> tuple[Int[np.ndarray, " F"], int]:
-        """Return the part of each face of the mesh to refine, and the number of parts."""
-        if parts is None:
-            return np.zeros(len(self.mesh.faces), dtype=np.int64), 1
-        return self.of_cleaned(parts.of_face[np.concatenate(self.kept)]), parts.count
-
     def vertex_rows(self) -> Int[np.ndarray, " V"]:
         """Return the first row of each vertex of the mesh to refine."""
         used = np.flatnonzero(self.weld.vertex_of >= 0)[::-1]
@@ -225,6 +220,12 @@ def joined_normals(
     return labels
 
 
+def slices(lengths: Sequence[int]) -> list[slice]:
+    """Return consecutive slices of the given lengths."""
+    ends = np.cumsum([0, *lengths]).tolist()
+    return [slice(start, end) for start, end in pairwise(ends)]
+
+
 def _rows_of(primitives: Sequence[TrianglePrimitive]) -> list[slice]:
     return slices([len(primitive.attributes["POSITION"]) for primitive in primitives])
 
@@ -256,7 +257,7 @@ def refined_ids(
     proper = cleaned.representative >= 0
     leader = cleaned.representative[proper]
     corners = refined.faces.reshape(len(cleaned.mesh.faces), -1)
-    ids = take_points(corners, grid.slot, np.dtype(index_type(len(refined.vertices))))
+    ids = take_points(corners, grid.slot, index_type(len(refined.vertices)), blocks_of(grid))
     if not np.array_equal(leader, np.arange(len(leader))):
         ids = np.take(ids, leader, axis=0)
     copies = np.flatnonzero(cleaned.face_map[proper] < 0)

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.connectivity.creases import NO_CREASES, Creases
-from pns_common.crease_lines import named_on_parts
+from pns_common.columns import level_topologies
+from pns_common.creases import NO_CREASES, Creases
 from pns_common.errors import MeshError
-from pns_common.masks.linear import level_topologies
 from pns_common.mesh import Mesh
-from pns_common.refine import Report, refine
-from pns_common.refine_parts import refine_parts
+from pns_common.parallel import Blocks, available_threads
+from pns_common.refinement import Refinement, refine, refine_many
+from pns_common.report import Report
+from pns_common.rows import disjoint_faces, extent
 from pns_common.schemes import Scheme
+from pns_common.topology import split_faces
 
 from ...course import Course
 from ...errors import UnrefinableError
-from ...meshes.arrays import extent
 from ...meshes.far_from_origin import STEPS, faces_too_far
 from ...meshes.shape_creases import creases_by_shape
 from ...options import Options
@@ -31,30 +30,6 @@ from .control_mesh import ControlMesh, Parts
 from .new_normals import hard_edges
 
 RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
-
-
-class Made(Protocol):
-    """A refined mesh, and what the last level did at each of its vertices."""
-
-    @property
-    def mesh(self) -> Mesh:
-        """The refined mesh."""
-        ...
-
-    @property
-    def ratio(self) -> Float[np.ndarray, " V"]:
-        """Proximity ratio."""
-        ...
-
-    @property
-    def gate(self) -> Float[np.ndarray, " V"]:
-        """Gate γ."""
-        ...
-
-    @property
-    def normals(self) -> Float[np.ndarray, "V 3"] | None:
-        """Normals of the limit surface, if the vertices lie on it."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,23 +53,18 @@ class RefinedMesh:
     limit_normals: Float[np.ndarray, "V 3"] | None
 
 
-def creases_of(
-    control: ControlMesh, options: Options, scheme: Scheme, parts: Parts | None = None
-) -> Creases:
-    """Return the edges of the mesh to refine that the options keep sharp.
-
-    They are named if others than the operator need them; otherwise the operator finds them.
-    """
+def creases_of(control: ControlMesh, options: Options, scheme: Scheme) -> Creases:
+    """Return the edges of the mesh to refine that the options keep sharp, by name."""
     if control.is_empty:
         return NO_CREASES
     if options.crease == "normals":
         return Creases(hard_edges(control))
-    creases = creases_by_shape(control.mesh, options, scheme)
-    if creases.line_angle is None:
-        return creases
-    if not (control.skin_and_morph.any or options.normals != "keep" or options.uv == "smooth"):
-        return creases
-    return named_on_parts(control.mesh, creases, *control.part_of_face(parts))
+    return creases_by_shape(control.mesh, options, scheme)
+
+
+def sharp_after(creases: Creases, levels: int) -> Int[np.ndarray, "N 2"] | None:
+    """Return the named edges that are sharp at the last level."""
+    return creases.named if creases.sharp_at(levels - 1) else None
 
 
 def refined_mesh(
@@ -110,13 +80,12 @@ def refined_mesh(
     Raises:
         UnrefinableError: refined positions leave the range of float32.
     """
-    mesh, length = control.mesh, options.reference_length
     try:
         made = refine(
-            mesh,
+            control.mesh,
             scheme,
             options.levels,
-            length,
+            options.reference_length,
             limit=options.limit,
             creases=creases,
             progress=lambda done, total: course.reach(done / total),
@@ -124,17 +93,12 @@ def refined_mesh(
         _check_range(made.mesh)
     except MeshError as error:
         raise UnrefinableError(str(error), pointer=pointer) from error
+    faces, levels = made.mesh.faces, made.topologies
     return RefinedMesh(
         made.mesh,
-        # Read now: until then the tables of the levels are kept.
         [made.report],
-        *refined_skin_and_morph(control, made.mesh.faces, creases, options, course),
-        _scalars(
-            made,
-            lambda levels: refine(mesh, scheme, levels, length, creases=creases),
-            scheme,
-            options,
-        ),
+        *refined_skin_and_morph(control, faces, levels, options, course),
+        _scalars(made, options),
         made.normals if options.normals == "limit" else None,
     )
 
@@ -146,32 +110,73 @@ def refined_union(
     scheme: Scheme,
     options: Options,
     course: Course,
-) -> RefinedMesh | None:
-    """Refine the parts of a union, each to the bits that it has alone; None without kernels.
+) -> RefinedMesh:
+    """Refine the parts of a union, each to the bits that it has alone.
 
     Raises:
-        MeshError: refined positions of a part leave the range of float32.
+        MeshError: a part cannot be refined, or its positions leave the range of float32.
     """
-    faces = parts.count_faces(control.cleaned.face_map >= 0)
-    union, of_parts, length = control.mesh, np.cumsum([0, *faces]), options.reference_length
-    made = refine_parts(
-        union, of_parts, scheme, options.levels, length, limit=options.limit, creases=creases
+    counts = parts.count_faces(control.cleaned.face_map >= 0)
+    made = refine_many(
+        _jobs(control.mesh, counts, creases),
+        scheme,
+        options.levels,
+        options.reference_length,
+        limit=options.limit,
     )
-    if made is None:
-        return None
-    _check_range(made.mesh)
+    for each in made:
+        _check_range(each.mesh)
+    faces = disjoint_faces((each.mesh.faces, len(each.mesh.vertices)) for each in made)
+    scalars = [_scalars(each, options) for each in made]
+    normals = [each.normals for each in made if each.normals is not None]
     return RefinedMesh(
-        made.mesh,
-        made.reports,
-        *refined_skin_and_morph(control, made.mesh.faces, creases, options, course, parts),
-        _scalars(
-            made,
-            lambda levels: refine_parts(union, of_parts, scheme, levels, length, creases=creases),
-            scheme,
-            options,
-        ),
-        made.normals if options.normals == "limit" else None,
+        Mesh.of_refined(np.concatenate([each.mesh.vertices for each in made]), faces),
+        [each.report for each in made],
+        *_skin_and_morph_of_union(control, parts, faces, creases, options, course),
+        {name: np.concatenate([each[name] for each in scalars]) for name in scalars[0]},
+        np.concatenate(normals) if options.normals == "limit" else None,
     )
+
+
+def _skin_and_morph_of_union(
+    control: ControlMesh,
+    parts: Parts,
+    faces: Int[np.ndarray, "G 3"],
+    creases: Creases,
+    options: Options,
+    course: Course,
+) -> tuple[SkinAndMorph, Int[np.ndarray, " P"]]:
+    """Refine skin and morph of a union whose refined faces are given."""
+    if not control.skin_and_morph.any:
+        return control.skin_and_morph, np.zeros(parts.count, dtype=np.int64)
+    blocks, mesh = Blocks(available_threads()), control.mesh
+    levels = level_topologies(
+        mesh.faces, len(mesh.vertices), options.levels, creases, blocks=blocks
+    )
+    own = split_faces(levels[-1], blocks, np.int64)
+    refined, cut = refined_skin_and_morph(control, own, levels, options, course, parts)
+    # Refining the union orders its faces like refining the parts, but numbers vertices otherwise.
+    vertex = np.empty(int(faces.max()) + 1, dtype=np.int64)
+    vertex[faces] = own
+    return refined.take(vertex), cut
+
+
+def _jobs(
+    union: Mesh, counts: Int[np.ndarray, " P"], creases: Creases
+) -> list[tuple[Mesh, Creases]]:
+    """Return the parts of a union, whose faces and vertices follow each other, with creases."""
+    named = np.zeros((0, 2), dtype=np.int64) if creases.named is None else creases.named
+    ends = np.cumsum(counts)
+    vertex_ends = 1 + np.maximum.reduceat(union.faces.max(axis=1), np.append(0, ends[:-1]))
+    named = named[np.argsort(named[:, 0], kind="stable")]
+    crease_ends = np.searchsorted(named[:, 0], vertex_ends)
+    jobs: list[tuple[Mesh, Creases]] = []
+    face, vertex, crease = 0, 0, 0
+    for face_end, vertex_end, crease_end in zip(ends, vertex_ends, crease_ends, strict=True):
+        mesh = Mesh(union.vertices[vertex:vertex_end], union.faces[face:face_end] - vertex)
+        jobs.append((mesh, replace(creases, named=named[crease:crease_end] - vertex)))
+        face, vertex, crease = face_end, vertex_end, crease_end
+    return jobs
 
 
 def _check_range(mesh: Mesh) -> None:
@@ -181,22 +186,20 @@ def _check_range(mesh: Mesh) -> None:
         raise MeshError("refined positions leave the range of float32")
 
 
-def _scalars(
-    made: Made, again: Callable[[int], Made | None], scheme: Scheme, options: Options
-) -> dict[str, Float[np.ndarray, " W"]]:
-    """Return ratio and gate for `diagnostics=full`; otherwise nothing.
+def _scalars(made: Refinement, options: Options) -> dict[str, Float[np.ndarray, " V"]]:
+    """Return ratio and gate of the last learned level for `diagnostics=full`; otherwise nothing.
 
-    They are those of the last learned level, for which `again` refines once more to fewer levels.
     A vertex that a later level puts on an edge has the mean of its ends.
     """
     if options.diagnostics != "full":
         return {}
-    learned = scheme.learned_levels or options.levels
-    acted = again(learned) if learned < options.levels else None
-    if acted is None:
+    learned = [depth for depth, step in enumerate(made.steps) if step.added is not None]
+    if not learned:
         return {RATIO: made.ratio, GATE: made.gate}
-    values = np.stack([acted.ratio, acted.gate], axis=1)
-    for topology in level_topologies(acted.mesh.faces, len(values), options.levels - learned):
+    added = made.steps[learned[-1]].added
+    assert added is not None
+    values = np.stack([added.ratio, added.gate], axis=1)
+    for topology in made.topologies[learned[-1] + 1 :]:
         values = np.concatenate([values, values[topology.edges].mean(axis=1)])
     return {RATIO: values[:, 0], GATE: values[:, 1]}
 

@@ -10,8 +10,8 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Bool
 
-from pns_common.levels.progress import LEARNED_COST
-from pns_common.refine import Report
+from pns_common.progress import LEARNED_COST
+from pns_common.report import Report
 from pns_common.schemes import Scheme
 
 from ...advice import NO_BENDS, Bends, count_bends
@@ -25,7 +25,13 @@ from ..read.primitives import TrianglePrimitive, read_primitive
 from ..read.upload import Upload
 from .attributes import RefinedPrimitive, refined_primitives
 from .control_mesh import control_mesh
-from .mesh_refine import changes_of_primitive, changes_of_vertices, creases_of, refined_mesh
+from .mesh_refine import (
+    changes_of_primitive,
+    changes_of_vertices,
+    creases_of,
+    refined_mesh,
+    sharp_after,
+)
 from .new_normals import with_normal_rule, with_smooth_normals
 from .together import StageShares, kind_of, refine_together
 
@@ -203,7 +209,7 @@ def _alone(
         control = control_mesh(primitives, options.weld_tolerance, options.weld_unit)
         creases = creases_of(control, options, scheme)
         if options.normals != "keep" and not control.is_empty:
-            primitives = with_smooth_normals(control, creases.left_after(options.levels))
+            primitives = with_smooth_normals(control, sharp_after(creases, options.levels))
             control = control.with_new_normals(primitives)
     pointer, made = f"/meshes/{plan.mesh}", None
     with course.stage("refine", shares.refine, shares.attributes):
@@ -228,5 +234,5 @@ def _alone(
         copies=control.copies,
         report=None if made is None else made.reports[0],
         changes=changes + changes_of_vertices(near, cut, pointer),
-        bends=NO_BENDS if made is None else count_bends(control.mesh, creases, made.reports)[0],
+        bends=NO_BENDS if made is None else count_bends(control.mesh, creases)[0],
     )

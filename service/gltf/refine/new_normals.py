@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ...meshes.arrays import marked
-from ...meshes.connectivity import interior_edges, next_corner, smooth_fans
+from pns_common.normals import smooth_fans
+from pns_common.rows import marked
+from pns_common.topology import build_topology
+
 from ...options import Options
 from ..constants import FLOAT
 from ..read.primitives import TrianglePrimitive
@@ -30,14 +32,20 @@ def hard_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
     of_vertex = np.empty(len(control.mesh.vertices), dtype=label.dtype)
     of_vertex[vertex] = label
     several = marked(vertex[of_vertex[vertex] != label], len(of_vertex))
-    edges, half_edges = interior_edges(faces, len(of_vertex))
+    topology = build_topology(faces, len(of_vertex))
+    edges, half_edges = topology.edges[topology.interior], topology.half_edges[topology.interior]
     asked = np.flatnonzero(several[edges].all(axis=1))
     hard = np.ones(len(asked), dtype=bool)
     there, back = half_edges[asked].T
-    for corners, facing in ((there, next_corner(back)), (next_corner(there), back)):
+    for corners, facing in ((there, _next_corner(back)), (_next_corner(there), back)):
         first, second = label[corners], label[facing]
         hard &= (first != NO_NORMAL) & (second != NO_NORMAL) & (first != second)
     return edges[asked[hard]].astype(np.int64)
+
+
+def _next_corner(corners: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+    """Return the corner after each corner 3 f + i of its triangle."""
+    return np.where(corners % 3 < 2, corners + 1, corners - 2)
 
 
 def _labels_of_faces(control: ControlMesh) -> Int[np.ndarray, "P 3"]:

@@ -15,21 +15,24 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from pns_common.base.blocks import BLOCK_ROWS, Blocks, available_threads, nobody_listens
-from pns_common.fused.where_loaded.corner_normals import angle_weighted_normals
+from pns_common.grid import rounded_rows
+from pns_common.normals import ONE_TRIANGLE, angle_weighted_normals
+from pns_common.parallel import Blocks, available_threads, no_progress
+from pns_common.rows import cross, dot, marked, norm, number_by_first_appearance, unit
+from pns_common.topology import build_topology
 
 from ...course import Course
-from ...meshes.arrays import cross, dot, norm, number_by_first_appearance, slices, unit
 from ...meshes.barycentric_grid import BarycentricGrid
-from ...meshes.connectivity import interior_edges
-from ...meshes.kernels import NO_DIRECTION
-from ...meshes.split_connectivity import SplitConnectivity, rounded_rows, split_connectivity
+from ...meshes.split_connectivity import SplitConnectivity, blocks_of, split_connectivity
 from .columns import SkinAndMorph
-from .control_mesh import ControlMesh
+from .control_mesh import ControlMesh, slices
 
 # Share of the progress that finding groups takes.
 GROUPING = 0.25
-ONE_TRIANGLE = np.array([[0, 1, 2]])
+# Triangles in a block of work.
+BLOCK_TRIANGLES = 8192
+# A sum of unit normals times angles below this has no direction.
+NO_DIRECTION = 1e-9
 # Cosines of the angles from given to computed normals up to which nothing is the author's own, and
 # from which everything is. Exporters average the normals of faces by angle, by area or alike: on
 # real meshes 9 of 10 averages lie within 10° of each other, 99 of 100 within 17°. At borders a
@@ -48,15 +51,15 @@ def corner_normals(
     groups: Int[np.ndarray, "F T"],
     count: int,
     triangles: Int[np.ndarray, "D 3"] = ONE_TRIANGLE,
-    before: Callable[[int], None] = nobody_listens,
+    before: Callable[[int], None] = no_progress,
 ) -> Float[np.ndarray, "G 3"]:
     """Return the unit normal of each group of corners: the angle-weighted sum of face normals.
 
     Each face has T points and consists of D `triangles` of them. Groups without area have zeros.
     `before` is called with the number of faces of each block of work.
     """
-    rows = max(BLOCK_ROWS // len(triangles), 1)
-    blocks = Blocks(available_threads(), rows, before)
+    rows = max(BLOCK_TRIANGLES // len(triangles), 1)
+    blocks = Blocks(available_threads(), before, rows)
     return angle_weighted_normals(points, faces, groups, count, blocks, triangles)
 
 
@@ -256,12 +259,8 @@ def _own_shares_at_border(
 
 def _border_vertices(control: ControlMesh) -> Bool[np.ndarray, " V"]:
     """Return the vertices of edges that are not interior."""
-    faces, count = control.mesh.faces, len(control.mesh.vertices)
-    edges, _ = interior_edges(faces, count)
-    # A vertex inside has as many interior edges as faces.
-    ends, around = (np.bincount(each.reshape(-1), minlength=count) for each in (edges, faces))
-    at_border: Bool[np.ndarray, " V"] = ends != around
-    return at_border
+    topology = build_topology(control.mesh.faces, len(control.mesh.vertices))
+    return marked(topology.edges[topology.sharp_edges].reshape(-1), topology.vertex_count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,7 +284,7 @@ class Shading:
 
     def rounded(self, group: Int[np.ndarray, " N"]) -> Float32[np.ndarray, "N 3"]:
         """Return the normals at rest of vertices in given groups, in single precision."""
-        return rounded_rows(self.rest, group)
+        return rounded_rows(self.rest, group, blocks_of(self.groups.connectivity.grid))
 
     def under_targets(
         self, group: Int[np.ndarray, " N"]

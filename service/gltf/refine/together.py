@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.connectivity.creases import Creases
+from pns_common.creases import Creases
 from pns_common.errors import MeshError
-from pns_common.refine import Report
+from pns_common.report import Report
+from pns_common.rows import disjoint_faces
 from pns_common.schemes import Scheme
 
 from ...advice import NO_BENDS, Bends, count_bends
 from ...course import Course
-from ...meshes.arrays import disjoint_faces, slices
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
 from ...options import Options
@@ -30,13 +30,14 @@ from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
 from .attributes import Columns, RefinedPrimitive, refined_primitives
 from .columns import COLUMNS, skin_sets
-from .control_mesh import ControlMesh, Parts, control_mesh
+from .control_mesh import ControlMesh, Parts, control_mesh, slices
 from .mesh_refine import (
     RefinedMesh,
     changes_of_primitive,
     changes_of_vertices,
     creases_of,
     refined_union,
+    sharp_after,
 )
 from .new_normals import with_normal_accessor, with_normal_rule, with_smooth_normals
 
@@ -136,7 +137,7 @@ def refine_together(
     if control.is_empty or not able.all():
         return _chosen(able, meshes, pointers, scheme, options, course, shares)
     with course.stage("weld", shares.weld, shares.refine):
-        creases = creases_of(control, options, scheme, parts)
+        creases = creases_of(control, options, scheme)
         if options.normals != "keep":
             control, parts = _smoothed(control, parts, creases, options)
     with course.stage("refine", shares.refine, shares.attributes):
@@ -152,13 +153,11 @@ def refine_together(
                 for each in (half, ~half)
             )
             return [one or other for one, other in zip(first, second, strict=True)]
-    if made is None:
-        return [None] * len(meshes)
     with course.stage("attributes", shares.attributes, shares.write):
         grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
         pieces = refined_primitives(control, made, grid, blend, course)
         part_of_face, _ = control.part_of_face(parts)
-        bends = count_bends(control.mesh, creases, made.reports, part_of_face)
+        bends = count_bends(control.mesh, creases, len(meshes), part_of_face)
         cut = _divided(control, parts, made, pieces, meshes, pointers, options)
         return [replace(part, bends=own) for part, own in zip(cut, bends, strict=True)]
 
@@ -198,7 +197,7 @@ def _smoothed(
     control: ControlMesh, parts: Parts, creases: Creases, options: Options
 ) -> tuple[ControlMesh, Parts]:
     """Return the union with new normals, which split vertices into more rows."""
-    primitives = with_smooth_normals(control, creases.left_after(options.levels))
+    primitives = with_smooth_normals(control, sharp_after(creases, options.levels))
     of_row = np.concatenate(
         [
             parts.of_row[share][primitive.rows]

@@ -11,8 +11,9 @@ import meshopt
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from pns_common.rows import extent
+
 from ...course import Course
-from ...meshes.arrays import extent
 from ...report import Change
 from ..read.compressed import DRACO
 from ..read.extensions import declare

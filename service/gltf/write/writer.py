@@ -10,8 +10,9 @@ from typing import Any, Self
 import numpy as np
 from jaxtyping import Int, Shaped
 
+from pns_common.rows import extent
+
 from ...course import Course
-from ...meshes.arrays import extent
 from ...report import Change
 from ..constants import (
     ARRAY_BUFFER,
