@@ -118,9 +118,7 @@ def limit_normals(
     mesh, around = topology, find_sectors(topology)
     kind = np.zeros(len(around.first), dtype=np.int64)
     if around.opened:
-        kind[: around.opened] = np.minimum(
-            mesh.sharp_count[around.vertex[: around.opened]], CORNER
-        )
+        kind[: around.opened] = np.minimum(mesh.sharp_count[around.vertex[: around.opened]], CORNER)
     at, weights = _tangent_masks(kind, around.size)
     sectors = np.empty((len(around.first), 3))
     read = points, *_walked(mesh), around.first, around.size, at, weights, kind == CORNER
@@ -233,7 +231,7 @@ def _tangent_mask(kind: int, k: int) -> Float[np.ndarray, "K1 2"]:
         angle = 2 * np.pi * np.arange(k) / k
         mask[:k, 0] = np.cos(angle)
         # Of two corners, those of a fold, sin(π) in floats would be a direction made of rounding.
-        mask[:k, 1] = np.sin(angle) if k != 2 else 0.0  # noqa: PLR2004
+        mask[:k, 1] = np.sin(angle) if k != 2 else 0.0
     elif kind == DART:
         even, odd = dart_tangents(k)
         mask[:k, 0], mask[:k, 1] = even[1:], odd
@@ -251,7 +249,7 @@ def _tangent_mask(kind: int, k: int) -> Float[np.ndarray, "K1 2"]:
 def dart_tangents(valence: int) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " K"]]:
     """Return the even mask (centre first) and the odd one (neighbours alone), the crease at q_0."""
     angle, even = 2 * np.pi * np.arange(valence) / valence, _even(valence)
-    odd = np.sin(angle) if valence > 2 else np.zeros(valence)  # noqa: PLR2004
+    odd = np.sin(angle) if valence > 2 else np.zeros(valence)
     return even * np.sign(even[1:] @ np.cos(angle)), odd
 
 

@@ -1,0 +1,51 @@
+"""A meshio.Mesh comes back as one, with all that it carries."""
+
+import numpy as np
+import pytest
+
+from pns_common import MeshError, subdivide
+from tests.support.split_data import FACES, SCHEME, UV, VERTICES, same_surface, split_uv
+
+
+class TestMeshio:
+    meshio = pytest.importorskip("meshio")
+
+    def test_the_surface_its_blocks_and_their_data(self):
+        blocks = [("triangle", FACES[:50]), ("triangle", FACES[50:])]
+        part = [np.zeros(50), np.ones(len(FACES) - 50)]
+        given = self.meshio.Mesh(
+            VERTICES, blocks, {"uv": UV}, {"part": part}, field_data={"skin": [1, 2]}
+        )
+        refined = subdivide(given, 2, SCHEME)
+        assert isinstance(refined, self.meshio.Mesh)
+        same_surface(refined.points, np.concatenate([block.data for block in refined.cells]))
+        assert [len(block.data) for block in refined.cells] == [800, 16 * (len(FACES) - 50)]
+        assert [set(values) for values in refined.cell_data["part"]] == [{0.0}, {1.0}]
+        np.testing.assert_allclose(refined.point_data["uv"], split_uv(UV), atol=1e-12)
+        assert refined.field_data == given.field_data
+
+    def test_sets_of_points_and_cells_are_kept(self):
+        blocks = [("triangle", FACES[:50]), ("triangle", FACES[50:])]
+        given = self.meshio.Mesh(
+            VERTICES,
+            blocks,
+            point_sets={"pins": [0, 3]},
+            cell_sets={"wall": [np.array([1, 4]), None], "rim": [[], [0]]},
+            info={"unit": "mm"},
+        )
+        refined = subdivide(given, 1, SCHEME)
+        assert refined.point_sets == {"pins": [0, 3]}
+        assert refined.info == {"unit": "mm"}
+        wall, none = refined.cell_sets["wall"]
+        assert wall.tolist() == [4, 5, 6, 7, 16, 17, 18, 19]
+        assert len(none) == 0
+        assert [part.tolist() for part in refined.cell_sets["rim"]] == [[], [0, 1, 2, 3]]
+
+    def test_a_plane_mesh_stays_plane(self):
+        given = self.meshio.Mesh(np.array([[0.0, 0], [1, 0], [0, 1]]), [("triangle", [[0, 1, 2]])])
+        assert subdivide(given, 2).points.shape == (15, 2)
+
+    @pytest.mark.parametrize("cells", [[("quad", [[0, 1, 2, 3]])], []])
+    def test_other_cells_are_refused_by_name(self, cells):
+        with pytest.raises(MeshError, match=r"cells of type (quad|none)"):
+            subdivide(self.meshio.Mesh(np.eye(4)[:, :3], cells))

@@ -1,0 +1,58 @@
+"""A pyvista.PolyData comes back as one, with all that it carries."""
+
+import numpy as np
+import pytest
+
+from pns_common import MeshError, loop, subdivide
+from tests.support.split_data import FACES, SCHEME, UV, VERTICES, same_surface, split_uv
+
+
+class TestPyvista:
+    pyvista = pytest.importorskip("pyvista")
+
+    def mesh(self):
+        mesh = self.pyvista.PolyData.from_regular_faces(VERTICES, FACES)
+        mesh.point_data["x"] = VERTICES[:, 0]
+        mesh.point_data["velocity"] = VERTICES
+        mesh.cell_data["part"] = np.arange(len(FACES))
+        mesh.field_data["made by"] = ["a test"]
+        mesh.active_texture_coordinates = UV
+        return mesh
+
+    def test_the_surface_and_its_data(self):
+        given = self.mesh()
+        given.set_active_scalars("x")
+        refined = subdivide(given, 2, SCHEME)
+        same_surface(refined.points, refined.regular_faces)
+        data = split_uv(VERTICES)
+        np.testing.assert_allclose(refined["velocity"], data, atol=1e-12)
+        np.testing.assert_allclose(refined["x"], data[:, 0], atol=1e-12)
+        np.testing.assert_array_equal(refined["part"], np.repeat(np.arange(len(FACES)), 16))
+        np.testing.assert_allclose(refined.active_texture_coordinates, split_uv(UV), atol=1e-6)
+        assert refined.active_scalars_name == "x"
+        assert list(refined.field_data["made by"]) == ["a test"]
+
+    def test_normals_of_the_old_surface_are_left_out(self):
+        refined = subdivide(self.mesh().compute_normals(), 1, loop())
+        assert "Normals" not in refined.point_data
+        assert "Normals" not in refined.cell_data
+
+    def test_a_plane_of_quadrangles_is_refused_with_what_to_do(self):
+        with pytest.raises(MeshError, match="triangulate"):
+            subdivide(self.pyvista.Plane())
+
+    def test_lines_and_points_beside_triangles_are_refused_with_what_to_do(self):
+        """To triangulate it does not help: lines are still there."""
+        both = {"lines": [2, 0, 1], "verts": [1, 0]}
+        given = self.pyvista.PolyData(VERTICES, faces=self.mesh().faces, **both)
+        for refused in (given, given.triangulate()):
+            with pytest.raises(MeshError, match=r"lines \(1\)") as told:
+                subdivide(refused)
+        advice = str(told.value).split("give ")[1]
+        followed = eval(advice, {"pyvista": self.pyvista, "mesh": given})
+        assert subdivide(followed, 1, loop()).n_cells == 4 * len(FACES)
+
+    def test_a_cloud_of_points_is_refused_as_one_without_faces(self):
+        for cloud in (self.pyvista.PolyData(), self.pyvista.PolyData(VERTICES)):
+            with pytest.raises(MeshError, match="no faces"):
+                subdivide(cloud)

@@ -1,0 +1,50 @@
+"""What `subdivide` is given, it gives back: each kind of mesh with the library that made it."""
+
+import subprocess
+import sys
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh, ParameterError, load_model, pns, refine, subdivide
+from tests.support.split_data import FACES, SCHEME, VERTICES, same_surface
+
+
+def test_a_mesh():
+    refined = subdivide(Mesh(VERTICES, FACES), 2, SCHEME)
+    assert isinstance(refined, Mesh)
+    same_surface(refined.vertices, refined.faces)
+
+
+class Surface(NamedTuple):
+    vertices: Any
+    faces: Any
+
+
+@pytest.mark.parametrize("given", [(VERTICES, FACES), [VERTICES, FACES], Surface(VERTICES, FACES)])
+def test_a_pair_of_arrays(given):
+    refined = subdivide(given, 2, SCHEME)
+    assert type(refined) is type(given)
+    same_surface(*refined)
+    refined[0][0] = 0  # the caller's own
+
+
+def test_the_scheme_is_the_default_model_where_none_is_given():
+    vertices, _ = subdivide((VERTICES, FACES), reference_length=1)
+    expected = refine(Mesh(VERTICES, FACES), pns(load_model()), reference_length=1)
+    np.testing.assert_array_equal(vertices, expected.mesh.vertices)
+
+
+@pytest.mark.parametrize("mesh", [None, "part.glb", (VERTICES, FACES, FACES), VERTICES])
+def test_other_things_are_refused_with_the_kinds_that_there_are(mesh):
+    with pytest.raises(
+        ParameterError, match=r"trimesh\.Trimesh.*; of a scene or a file, its meshes"
+    ):
+        subdivide(mesh)
+
+
+def test_the_library_imports_none_of_the_others():
+    code = "import sys, pns_common; print(*{name.partition('.')[0] for name in sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not set(done.stdout.split()) & {"trimesh", "pyvista", "meshio", "open3d", "vtk"}
