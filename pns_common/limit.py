@@ -4,8 +4,9 @@ A limit mask is a left eigenvector of the local subdivision matrix for its eigen
 number of sharp edges (boundary, irregular, crease) at a vertex:
 
     none       (1 − w_k) p + w_k (mean of the neighbours)      w_k of ``loop.limit_ring_weight``
-    one        (a dart) p + Σ w_j q_j over 1 + Σ w_j, with w_j = β_k + 3/8 w_j + 1/8 (both beside it)
-               on smooth spokes, 0 counted for the sharp one; w_s = β_k + w_s / 2 + 1/8 (both beside)
+    one        (a dart) p + Σ w_j q_j, over 1 + Σ w_j
+               smooth spokes: w_j = β_k + 3/8 w_j + 1/8 (those beside it, but for the sharp one)
+               the sharp one: w_s = β_k + 1/2 w_s + 1/8 (both beside it)
     two        (4 p + the two neighbours along the curve) / 6
     more       p, which never moves
 

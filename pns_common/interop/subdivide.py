@@ -64,17 +64,18 @@ def subdivide(
         ParameterError: it is a mesh of none of these kinds; and as ``refine``.
         MeshError: it has other cells than triangles; and as ``refine`` and ``Mesh``.
     """
-    scheme = pns(load_model()) if scheme is None else scheme
     given: Any = mesh
+    is_pair = isinstance(given, (tuple, list)) and len(cast(Sequence[Any], given)) == 2
+    adapter = None if is_pair or isinstance(mesh, Mesh) else _adapter(mesh)
+    scheme = pns(load_model()) if scheme is None else scheme
     if isinstance(mesh, Mesh):
         return cast(AnyMesh, refine(mesh, scheme, levels, **options).mesh)
-    if isinstance(given, (tuple, list)) and len(cast(Sequence[Any], given)) == 2:
+    if adapter is None:
         vertices, faces = cast(tuple[Any, Any], given)
         refined = refine(Mesh(vertices, faces), scheme, levels, **options).mesh
         # A tuple with names takes its values one by one, but for this.
         make: Any = getattr(type(mesh), "_make", type(mesh))
         return make((np.array(refined.vertices), np.array(refined.faces)))
-    adapter = _adapter(mesh)
     carried, _ = refine_carried(adapter.read(mesh), scheme, levels, options)
     return adapter.write(carried, mesh)
 

@@ -81,7 +81,7 @@ def measure_triangles(points, faces, triangles, begin, end, normals, angles):
 
 @kernel
 def add_corners(normals, angles, groups, triangles, total):
-    """Add the normals of triangles, times their angles, to the groups of their corners, in order."""
+    """Add normals of triangles, times their angles, to the groups of their corners, in order."""
     count = triangles.shape[0]
     for f in range(groups.shape[0]):
         for d in range(count):
