@@ -270,7 +270,14 @@ def test_wide_layers_are_accepted_up_to_the_limit_and_no_further():
     [
         (doubled("features", 1, 40), {}),
         (doubled("seed", 0, 40), {"seed": np.zeros(2)}),
-        ([node("Transpose", ["features"], ["t"]), node("Gemm", ["features", "t"], ["p"])], {}),
+        (
+            [
+                node("Transpose", ["features"], ["columns"]),
+                *doubled("columns", 1, 3),
+                node("MatMul", ["features", "twice2"], ["product"]),
+            ],
+            {},
+        ),
         (
             [node("Add", ["column", "row"], ["table"])],
             {"column": np.zeros((30_000, 1)), "row": np.zeros((1, 30_000))},
