@@ -17,7 +17,8 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from train.loop_masks import Connectivity, limit_weight, loop_mask
+from train.connectivity import Connectivity
+from train.loop_masks import limit_weight, loop_mask
 
 # Below these a face has no area (of its squared sides), faces are antiparallel (1 + cosine), a
 # mean normal has no direction (its length), and a side's logarithm is cut off.
@@ -258,10 +259,34 @@ class Step:
         """x' = x0 + s δ."""
         return self.base + self.scale[:, None] * self.displacement
 
+    @property
+    def ratio(self) -> Float[Tensor, " W"]:
+        """The proximity ratio s ‖δ‖ / ρ; 0 where ρ is 0."""
+        length = root(dot(self.displacement, self.displacement))
+        return self.scale * ratio(length, self.envelope)
+
+
+def on_edges(
+    points: Float[Tensor, "V 3"],
+    mesh: Connectivity,
+    displacement: Float[Tensor, "E 3"],
+    envelope: Float[Tensor, " E"],
+    gate: Float[Tensor, " E"],
+) -> Step:
+    """Return Loop's step with something added to edge vertices."""
+    none = points.new_zeros(mesh.vertex_count)
+    return Step(
+        loop_mask(mesh)(points),
+        torch.cat([torch.zeros_like(points), displacement]),
+        torch.cat([none, envelope]),
+        torch.cat([none, gate]),
+        points.new_ones(mesh.vertex_count + len(mesh.edges)),
+    )
+
 
 @dataclass(frozen=True)
 class PaperRule:
-    """The operator of format 1: C / R, c, its features, and the network at budget 1."""
+    """The operator of format 1: C, c, its features, and the network at budget 1."""
 
     network: Network
     budget: float
@@ -269,7 +294,9 @@ class PaperRule:
     features: Callable[[Surroundings, EdgeReading, Frames], Tensor] = paper_5
     first_face: bool = True
 
-    def __call__(self, points: Float[Tensor, "V 3"], mesh: Connectivity) -> Step:
+    def __call__(
+        self, points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float = 1.0
+    ) -> Step:
         """Take one step; old vertices are Loop's."""
         around = Surroundings(mesh, points)
         edges = read_edges(around, first_face=self.first_face)
@@ -278,16 +305,9 @@ class PaperRule:
         gate = (1 - mesh.sharpness) * torch.tanh(self.gate_sharpness * frames.curvature**2)
         eta = self.network(self.features(around, edges, frames)[interior])
         local = torch.zeros_like(edges.a).index_put((interior,), shortened(eta, gate.new_ones(())))
-        envelope = self.budget * frames.length**2 * interior
+        envelope = self.budget / reference_length * frames.length**2 * interior
         turned = (frames.axes @ local[:, :, None])[:, :, 0]
-        none = points.new_zeros(mesh.vertex_count)
-        return Step(
-            loop_mask(mesh)(points),
-            torch.cat([torch.zeros_like(points), (envelope * gate)[:, None] * turned]),
-            torch.cat([none, envelope]),
-            torch.cat([none, gate]),
-            points.new_ones(mesh.vertex_count + len(mesh.edges)),
-        )
+        return on_edges(points, mesh, (envelope * gate)[:, None] * turned, envelope, gate)
 
 
 @dataclass(frozen=True)
@@ -296,7 +316,7 @@ class GeneralRule:
 
     Attributes:
         edge_network, vertex_network: answer z, shortened to length 1 here.
-        budget: C / R.
+        budget: C.
         gate_sharpness, vertex_gate_sharpness: c and c_v.
         prior_strength: s.
         network_scale: τ.
@@ -312,7 +332,9 @@ class GeneralRule:
     network_scale: float
     fold_angle: float
 
-    def __call__(self, points: Float[Tensor, "V 3"], mesh: Connectivity) -> Step:
+    def __call__(
+        self, points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float = 1.0
+    ) -> Step:
         """Take the learned step."""
         around, masks, one = Surroundings(mesh, points), loop_mask(mesh), points.new_ones(())
         prior = masks(self.prior_strength * pushes(around))
@@ -331,7 +353,8 @@ class GeneralRule:
         pulled = root(around.square) * (ring_vectors(around) @ weights[:, :, None])[:, :, 0]
         asked = prior + self.network_scale * torch.cat([pulled, turned])
         squares = torch.cat([around.square[:, 0] * ringed, frames.length**2 * interior])
-        envelope, gate = self.budget * squares, torch.cat([vertex_gate, edge_gate])
+        envelope = self.budget / reference_length * squares
+        gate = torch.cat([vertex_gate, edge_gate])
         base, displacement = masks(points), gate[:, None] * shortened(asked, envelope)
         scale = fold_guard(mesh.split(), base, displacement, self.fold_angle)
         return Step(base, displacement, envelope, gate, scale)
