@@ -149,7 +149,7 @@ class _Steps:
             before, made = Surroundings(after, step.base), Surroundings(after, step.points)
             opposed = int((dot(before.normals, made.normals) < 0).sum())
             ratio = float(step.ratio.max())
-            figures.append(LevelFigures(len(after.faces), ratio, normal_jump(made), opposed))
+            figures.append(LevelFigures(len(after.faces), ratio, largest_turn(made), opposed))
             points, level = step.points, after
         points = limit_mask(level)(points) if limit else points
         refined = Mesh(points.numpy(), level.faces.numpy())
@@ -175,7 +175,7 @@ def crease_children(mesh: Connectivity) -> Int[np.ndarray, "N 2"]:
     return halves.reshape(-1, 2).numpy()
 
 
-def normal_jump(around: Surroundings) -> float:
+def largest_turn(around: Surroundings) -> float:
     """Return the largest angle between faces that share an interior edge, radians.
 
     Faces without area have no normal, and turn from none.

@@ -6,13 +6,13 @@ import numpy as np
 
 from pns_common.formula.curve_prior import on_boundary
 from pns_common.mesh import Mesh
-from pns_common.refine import refine
-from pns_common.schemes import Scheme, loop
+from pns_common.schemes import loop
 from train.certificates.bodies import Body, random_motion
 from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import departure
 from train.certificates.subject import Subject
+from train.refining import AnyScheme, refine
 
 LEVELS = 2
 
@@ -44,15 +44,13 @@ def _aligned(subject: Subject, flat: Sequence[Body], seed: int) -> Certificate:
     return Certificate("T3", "affine reproduction, axis-aligned", value, 0.0, 0.0, place)
 
 
-def _off_loop(scheme: Scheme, mesh: Mesh, axis: int) -> float:
+def _off_loop(scheme: AnyScheme, mesh: Mesh, axis: int) -> float:
     """Return how far planar refinements are from Loop's; but for boundaries where these move.
 
     These stay in the plane: there the coordinate across it is compared, everything else at the
     first level.
     """
-    refined, base = (
-        refine(mesh, rules, LEVELS, 1.0, threads=1).mesh.vertices for rules in (scheme, loop())
-    )
+    refined, base = (refine(mesh, rules, LEVELS, 1.0).mesh.vertices for rules in (scheme, loop()))
     if not scheme.moves_boundaries:
         return float(np.abs(refined - base).max())
     across = (axis + 2) % 3

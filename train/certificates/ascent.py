@@ -20,16 +20,17 @@ from pns_common.features.ring_features import RING_10
 from pns_common.formula.correction import curvature_gate
 from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.formula.vertex_operator import VertexOperator
-from pns_common.geometry.frames import face_normals
 from pns_common.levels.step import LevelStep, level_step
 from pns_common.masks.limit import refined_limit_positions
 from pns_common.mesh import Mesh
 from pns_common.rules.control_level import control_level
 from pns_common.rules.scale_free_form import ScaleFreeForm
-from pns_common.schemes import Scheme, loop, scale_free_scheme
+from pns_common.schemes import loop, scale_free_scheme
 from train.certificates.learned_once import largest_turn
 from train.models.networks import unit_correction
 from train.models.tied import TiedNet
+from train.refining import AnyScheme
+from train.vectors import face_normals
 
 RATE = 0.03
 GATE_SHARPNESS, VERTEX_GATE_SHARPNESS = 1e6, 1e3
@@ -93,7 +94,7 @@ def ascend(
 
 
 def promises(
-    step: LevelStep, topology: Topology, scheme: Scheme, points: Float[Tensor, "V 3"]
+    step: LevelStep, topology: Topology, scheme: AnyScheme, points: Float[Tensor, "V 3"]
 ) -> tuple[float, float, float, float]:
     """Measure turn, displacement, limit and overshoot, each over what is allowed."""
     base = level_step(control_level(points.detach(), topology), loop()).points.numpy()

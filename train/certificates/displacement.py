@@ -13,13 +13,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common.mesh import Mesh
-from pns_common.refine import refine
 from train.certificates.bodies import Body
 from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import rounding
 from train.certificates.subject import Subject
 from train.certificates.trials import NO_CREASES, trials
+from train.refining import refine
 
 # Faces up to which a mesh is refined further.
 LARGEST = 20_000
@@ -52,7 +52,7 @@ def _one_step(
 ) -> tuple[float, str, Mesh]:
     """Refine once; return the largest ratio, at which vertex, and the refined mesh."""
     scheme = subject.scheme
-    refined = refine(mesh, scheme, 1, 1.0, creases=creases, threads=1).mesh
+    refined = refine(mesh, scheme, 1, 1.0, creases=creases).mesh
     ratio, place = worst_ratio(
         mesh,
         refined.vertices,

@@ -8,12 +8,12 @@ from jaxtyping import Bool, Float
 from pns_common.connectivity.topology import Topology, build_topology
 from pns_common.geometry.frames import edge_stencil, face_normals
 from pns_common.mesh import Mesh
-from pns_common.schemes import Scheme
 from train.certificates.bodies import Body, random_motion
 from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import step
 from train.certificates.subject import Subject
+from train.refining import AnyScheme
 
 EXACT = 1e-12
 # Of the envelope C h² / R: a feature's last single precision bit may turn with the mesh.
@@ -38,7 +38,7 @@ def equivariance(subject: Subject, bodies: Sequence[Body], seed: int) -> list[Ce
 
 
 def _certify(
-    subject: Subject, scheme: Scheme, bodies: Sequence[Body], seed: int, how: str, single: float
+    subject: Subject, scheme: AnyScheme, bodies: Sequence[Body], seed: int, how: str, single: float
 ) -> Certificate:
     rng = np.random.default_rng(seed)
     measured, left_out = [], 0
@@ -55,7 +55,7 @@ def _certify(
 
 
 def discrepancy(
-    scheme: Scheme, mesh: Mesh, turn: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, "3"]
+    scheme: AnyScheme, mesh: Mesh, turn: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, "3"]
 ) -> tuple[Float[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
     """Return ‖S(gM) − g S(M)‖ at each new vertex, and which vertices the theorem speaks of."""
     still = step(scheme, mesh)

@@ -14,15 +14,15 @@ from jaxtyping import Float, Int
 from pns_common.connectivity.creases import Creases
 from pns_common.connectivity.topology import split
 from pns_common.mesh import Mesh
-from pns_common.refine import refine
 from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
-from pns_common.schemes import Scheme, loop
+from pns_common.schemes import loop
 from train.certificates.bodies import Body
 from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import rounding, step
 from train.certificates.subject import Subject
 from train.certificates.trials import trials
+from train.refining import AnyScheme, refine
 
 # Child faces that Loop makes flatter than this, in squared edge lengths, have no direction.
 FLAT = 1e-9
@@ -78,8 +78,8 @@ def limit_distance(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> C
     measured = []
     for trial in trials(subject, bodies, seed):
         creases = Creases(trial.creases, levels=1) if len(trial.creases) else "auto"
-        ours = refine(trial.mesh, subject.scheme, 2, 1.0, limit=True, creases=creases, threads=1)
-        theirs = refine(trial.mesh, loop(), 2, 1.0, limit=True, threads=1)
+        ours = refine(trial.mesh, subject.scheme, 2, 1.0, limit=True, creases=creases)
+        theirs = refine(trial.mesh, loop(), 2, 1.0, limit=True)
         apart = np.linalg.norm(ours.mesh.vertices - theirs.mesh.vertices, axis=1).max()
         stated, bound = (ours.report[key] for key in ("limit_distance", "limit_distance_bound"))
         assert stated is not None
@@ -105,8 +105,7 @@ def smoothness_class(subject: Subject, bodies: Sequence[Body]) -> Certificate:
     measured = []
     for body in bodies:
         last, after = (
-            refine(body.mesh, subject.scheme, count, 1.0, threads=1).mesh
-            for count in (first, first + 1)
+            refine(body.mesh, subject.scheme, count, 1.0).mesh for count in (first, first + 1)
         )
         expected = plain_loop(last.vertices, last.faces).positions
         extent = np.ptp(last.vertices, axis=0).max()
@@ -136,7 +135,7 @@ def resolution_independence(subject: Subject, bodies: Sequence[Body]) -> Certifi
     return Certificate("scale", "resolution independence", value, high=SAME, where=place)
 
 
-def unbounded(scheme: Scheme) -> Scheme:
+def unbounded(scheme: AnyScheme) -> AnyScheme:
     """Return the scheme with a budget that nothing reaches, where its rules say how to."""
     vertices, edges = scheme.vertex_rule, scheme.edge_rule
     if not (isinstance(vertices, ScaleFreeVertexRule) and isinstance(edges, ScaleFreeEdgeRule)):

@@ -11,7 +11,8 @@ from pns_common.levels.step import level_step
 from pns_common.mesh import Mesh
 from pns_common.rules.control_level import control_level
 from pns_common.rules.placement import Placement
-from pns_common.schemes import Scheme, loop
+from pns_common.schemes import loop
+from train.refining import AnyScheme
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +32,7 @@ class Step:
 
 
 def step(
-    scheme: Scheme,
+    scheme: AnyScheme,
     mesh: Mesh,
     reference_length: float = 1.0,
     creases: Int[np.ndarray, "N 2"] | None = None,
@@ -48,7 +49,7 @@ def step(
     )
 
 
-def departure(scheme: Scheme, mesh: Mesh, reference_length: float = 1.0) -> Step:
+def departure(scheme: AnyScheme, mesh: Mesh, reference_length: float = 1.0) -> Step:
     """Return a step whose displacement is recomputed from the positions and Loop's.
 
     The difference of positions sees everything; where it is below their rounding, what the scheme

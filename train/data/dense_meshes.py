@@ -12,9 +12,9 @@ from scipy.sparse.csgraph import connected_components
 from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.errors import MeshError
 from pns_common.mesh import Mesh, clean
-from pns_common.refine import refine
 from pns_common.schemes import loop
 from train.data.parts import CAD_PARTS
+from train.refining import refine
 
 # .npz: arrays `vertices` and `faces`.
 FORMATS = (".glb", ".gltf", ".npz", ".obj", ".off", ".ply", ".stl")
@@ -85,7 +85,7 @@ def dense_asset(path: Path) -> DenseMesh | LeftOut:
         return LeftOut(path.name, error.reason)
     kind = CONTROL if path.stem.endswith(CONTROL_ENDING) else ASSET
     if kind == CONTROL:
-        part = refine(part, loop(), CONTROL_LEVELS, threads=1).mesh
+        part = refine(part, loop(), CONTROL_LEVELS).mesh
     if not is_manifold(part):
         return LeftOut(path.name, "its largest part is no manifold")
     if len(part.faces) < FEWEST_FACES:

@@ -7,7 +7,6 @@ import numpy as np
 import torch
 
 from pns_common.levels.step import level_step
-from pns_common.schemes import Scheme
 from train.data.pairs.pair_stream import pair_stream
 from train.data.pairs.references import Pair
 from train.fitting.ahead import ahead
@@ -22,6 +21,7 @@ from train.models.from_recipe import (
 )
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe, ToLimit
+from train.refining import AnyScheme
 
 # Share of the steps in which the learning rate rises.
 WARM_UP = 0.1
@@ -55,7 +55,7 @@ def fit_to_limit(
     return network, vertex_network, tuple(losses)
 
 
-def limit_measures(batch: LimitBatch, scheme: Scheme) -> LimitMeasures:
+def limit_measures(batch: LimitBatch, scheme: AnyScheme) -> LimitMeasures:
     """Take one level of a scheme, and measure the limit of Loop after it."""
     return measure(batch, level_step(batch.level, scheme).points)
 

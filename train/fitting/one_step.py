@@ -16,7 +16,7 @@ from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
 from pns_common.rules.control_level import control_level
 from pns_common.rules.learned import LearnedEdgeRule, LearnedVertexRule
 from pns_common.rules.loop import loop_vertex_rule
-from pns_common.schemes import Scheme
+from train.refining import AnyScheme
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ def refine_once(
         loop_vertex_rule if vertex_operator is None else LearnedVertexRule(vertex_operator, budget)
     )
     step = level_step(
-        control_level(points, topology), Scheme("step", old, LearnedEdgeRule(operator, budget))
+        control_level(points, topology), AnyScheme("step", old, LearnedEdgeRule(operator, budget))
     )
     moved = step.vertices.corrected
     return Step(

@@ -7,14 +7,15 @@ Whatever the weights, an edge vertex stays in the ball of radius C h² γ round 
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.base.arrays import norm
 from pns_common.formula.correction import curvature_gate
 from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
-from pns_common.schemes import ControlLevel, Placement, Scheme, loop_edge_rule, loop_vertex_rule
+from pns_common.schemes import ControlLevel, Placement, loop_edge_rule, loop_vertex_rule
 from train.data.datasets import Dataset, Instance
 from train.metrics.evaluation import compare_with_loop
 from train.metrics.one_step import Improvement
+from train.refining import AnyScheme
 from train.surfaces.implicit import Surface, signed_distance
+from train.vectors import norm
 
 # What the limit is known for; a normal error has no such bound.
 DISTANCE_METRICS = ("distance_near", "distance", "hausdorff_near", "hausdorff")
@@ -51,7 +52,7 @@ def best_in_balls(
     return best
 
 
-def oracle(surface: Surface, budget: float, gate_sharpness: float) -> Scheme:
+def oracle(surface: Surface, budget: float, gate_sharpness: float) -> AnyScheme:
     """Return the scheme that knows the surface and puts each edge vertex where it is best."""
     gate = curvature_gate(gate_sharpness)
 
@@ -70,7 +71,7 @@ def oracle(surface: Surface, budget: float, gate_sharpness: float) -> Scheme:
         ratio[interior] = norm(moved) / np.where(envelope > 0, envelope, 1)
         return Placement(base.loop, displacement, ratio, gamma, base.degenerate)
 
-    return Scheme("limit", loop_vertex_rule, edge_rule, budget=budget)
+    return AnyScheme("limit", loop_vertex_rule, edge_rule, budget=budget)
 
 
 def envelope_limit(
@@ -78,7 +79,7 @@ def envelope_limit(
 ) -> dict[str, Improvement]:
     """Return the improvement over Loop that no member of the class can pass, in per cent."""
 
-    def best(instance: Instance) -> Scheme:
+    def best(instance: Instance) -> AnyScheme:
         return oracle(instance.surface, budget, gate_sharpness)
 
     improvements = compare_with_loop(best, dataset)

@@ -10,10 +10,10 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from pns_common.base.arrays import cross, dot, norm, unit
 from pns_common.connectivity.topology import Topology
 from pns_common.geometry.frames import edge_stencil, face_normals
 from train.surfaces.implicit import Surface, signed_distance
+from train.vectors import dot, norm, unit
 
 # Vertices whose distance from the feature (|y'| on a ridge) is below this are near it.
 NEAR_FEATURE = 0.3
@@ -84,7 +84,7 @@ def normal_error(
     """
     fan = unit(fan_normal(coarse, topology, inserted))
     target = unit(_distance_gradient(surface, inserted))
-    return np.arctan2(norm(cross(fan, target)), dot(fan, target))
+    return np.arctan2(norm(np.cross(fan, target)), dot(fan, target))
 
 
 def fan_normal(
@@ -109,7 +109,7 @@ def fan_normal(
     ]
     fan = np.zeros_like(inserted)
     for first, second, outward in triangles:
-        area = cross(first - inserted, second - inserted)
+        area = np.cross(first - inserted, second - inserted)
         fan += np.where(dot(area, outward)[:, None] < 0, -area, area)
     return fan
 

@@ -15,10 +15,11 @@ from pns_common.formula.correction import curvature_gate
 from pns_common.formula.edge_operator import EdgeOperator
 from pns_common.formula.vertex_operator import VertexOperator
 from pns_common.rules.scale_free import ScaleFreeForm
-from pns_common.schemes import Scheme, scale_free_scheme
+from pns_common.schemes import scale_free_scheme
 from train.models.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_correction
 from train.models.recipe import Recipe, ToLimit, VertexRule
 from train.models.tied import TiedNet
+from train.refining import AnyScheme
 
 # Usual sizes of features, by kind, on simplified meshes; others are about 1. Tied networks read
 # features in these units, so that training sees all of them from the start.
@@ -101,7 +102,9 @@ def vertex_rule_operator(rule: VertexRule, network: BoundedNet) -> VertexOperato
     return VertexOperator(features, unit_correction(network), rule.gate_sharpness)
 
 
-def recipe_scheme(recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet | None) -> Scheme:
+def recipe_scheme(
+    recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet | None
+) -> AnyScheme:
     """Return the scheme that a scale-free recipe trains, differentiable in its networks' weights.
 
     s is that of training. What the card says of thin faces acts in use alone: a network that is

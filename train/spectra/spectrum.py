@@ -15,8 +15,7 @@ from pns_common.base.arrays import marked
 from pns_common.errors import ParameterError
 from pns_common.geometry.side_lengths import SideLengths
 from pns_common.mesh import Mesh
-from pns_common.refine import refine
-from pns_common.schemes import Scheme
+from train.refining import AnyScheme, refine
 from train.spectra import stars
 from train.spectra.star_symmetry import Subspace, keeps_blocks, symmetry_blocks
 from train.spectra.stars import Star
@@ -65,7 +64,7 @@ def reif_gap(size: Float[np.ndarray, " M"]) -> float:
     return float(size[TANGENT_COUNT - 1] - size[TANGENT_COUNT])
 
 
-def of_regular_mesh(scheme: Scheme) -> Scheme:
+def of_regular_mesh(scheme: AnyScheme) -> AnyScheme:
     """Return a scheme as it is on a large regular mesh, of which a star is a spot.
 
     What is measured of a mesh as a whole is that mesh's, as R is, however the star is lifted.
@@ -73,7 +72,7 @@ def of_regular_mesh(scheme: Scheme) -> Scheme:
     return scheme.fitted(lambda: REGULAR)
 
 
-def closed_star(scheme: Scheme, valence: int) -> Callable[[float], Star]:
+def closed_star(scheme: AnyScheme, valence: int) -> Callable[[float], Star]:
     """Return the stars, by lift, on which a scheme maps the inner rings to themselves.
 
     Two rings suffice where an edge sees its two faces and a vertex its neighbours; a scheme that
@@ -91,11 +90,11 @@ def closed_star(scheme: Scheme, valence: int) -> Callable[[float], Star]:
         refined = []
         for star in (alone, wider):
             mesh = Mesh(star.mesh.vertices + noise[: len(star.mesh.vertices)], star.mesh.faces)
-            refined.append(refine(mesh, scheme, 1, 1.0, threads=1).mesh.vertices[star.refined])
+            refined.append(refine(mesh, scheme, 1, 1.0).mesh.vertices[star.refined])
         outside = noise[: len(alone.mesh.vertices)].copy()
         outside[len(alone.inner) :] *= -1
         mesh = Mesh(alone.mesh.vertices + outside, alone.mesh.faces)
-        refined.append(refine(mesh, scheme, 1, 1.0, threads=1).mesh.vertices[alone.refined])
+        refined.append(refine(mesh, scheme, 1, 1.0).mesh.vertices[alone.refined])
         if max(np.abs(positions - refined[0]).max() for positions in refined) < 1e-12:
             return build
     raise ParameterError("scheme", scheme.name, expected="a rule that sees at most four rings")
@@ -134,7 +133,7 @@ def refined_inner(
     return refined[rows].reshape(copies, -1)
 
 
-def jacobian(scheme: Scheme, star: Star, step: float = STEP) -> Float[np.ndarray, "M M"]:
+def jacobian(scheme: AnyScheme, star: Star, step: float = STEP) -> Float[np.ndarray, "M M"]:
     """Differentiate one step of a scheme, inner rings to inner rings in all coordinates.
 
     By central differences on the scheme itself, in double precision: any scheme will do, and
@@ -142,7 +141,7 @@ def jacobian(scheme: Scheme, star: Star, step: float = STEP) -> Float[np.ndarray
     """
     step, scheme = step * SPOKE, of_regular_mesh(scheme)
     mesh, count = perturbed_stars(star, step)
-    refined = refine(mesh, scheme, levels=1, reference_length=1.0, threads=1).mesh.vertices
+    refined = refine(mesh, scheme, levels=1, reference_length=1.0).mesh.vertices
     moved = refined_inner(star, refined, 2 * count)
     return (moved[:count] - moved[count:]).T / (2 * step)
 
@@ -245,7 +244,7 @@ def continued_spectrum(matrix: Float[np.ndarray, "L L"], before: Spectrum) -> Sp
     return replace(spectrum, tangent=marked(np.concatenate(tangents), len(spectrum.values)))
 
 
-def follow_lift(scheme: Scheme, valence: int, lifts: Sequence[float]) -> list[Spectrum]:
+def follow_lift(scheme: AnyScheme, valence: int, lifts: Sequence[float]) -> list[Spectrum]:
     """Follow the spectrum of a star while its centre is lifted; the first lift is 0.
 
     Between two lifts they are followed in smaller strides.

@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.mesh import Mesh
-from pns_common.refine import refine
 from train.data.pairs.faceted import sampled
 from train.data.pairs.references import LATHE, Pair
+from train.refining import refine
 from train.surfaces.quasi_interpolation import n1
 from train.surfaces.solids import random_rotation
 
@@ -48,7 +48,7 @@ def lathe_pair(rng: np.random.Generator) -> Pair:
     if sides >= ROUND:
         fine = turned(outline, sides * -(-FINE // sides), np.array([True, True]))
     elif tips.any():
-        fine = refine(coarse, n1(), FINE_LEVELS, threads=1).mesh
+        fine = refine(coarse, n1(), FINE_LEVELS).mesh
     turn = random_rotation(rng)
     surface = sampled(fine.vertices @ turn, fine.faces, rng)
     return Pair(LATHE, Mesh(coarse.vertices @ turn, coarse.faces), surface)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from train.ablations.feature_groups import Choice, features_scheme, fit_features, named
+from train.ablations.feature_groups import Choice, features_method, fit_features, named
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
@@ -87,7 +87,7 @@ def _row(laboratory: Laboratory, recipe: Recipe, choice: Choice) -> Row:
 
     held_out = laboratory.dataset("ridge-held-out")
     network = fit_features(recipe, choice.features, on_step)
-    scheme = features_scheme(recipe, choice.features, network)
+    scheme = features_method(recipe, choice.features, network)
     improvements = compare_with_loop(scheme, held_out)
     return Row(
         budget=recipe.budget,

@@ -5,7 +5,6 @@ from itertools import islice
 
 import numpy as np
 
-from pns_common.refine import Refinement, refine
 from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import loop, pns
 from train.data.simplifiers import SIMPLIFIERS, simplified
@@ -16,6 +15,7 @@ from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.metrics.decimation import gain
 from train.metrics.surface_distance import moved, prepared, surface_errors
+from train.refining import Refined, refine
 
 # Symbol, field of the card, values.
 SWEPT: tuple[tuple[str, str, tuple[float, ...]], ...] = (
@@ -99,11 +99,11 @@ def run(laboratory: Laboratory) -> Outcome:
             coarse = simplified(original.mesh, SIMPLIFIERS[SIMPLIFIER], size)
             if coarse is None:
                 continue
-            plain = refine(coarse, loop(), levels, threads=1)
+            plain = refine(coarse, loop(), levels)
             loops = prepared(plain.mesh, samples)
             reference = surface_errors(true, loops)
             for key, scheme in schemes.items():
-                refined = refine(coarse, scheme, levels, threads=1)
+                refined = refine(coarse, scheme, levels)
                 errors = surface_errors(true, moved(loops, refined.mesh.vertices))
                 results[key].append(_result(gain(reference, errors), refined, plain))
     rows = [
@@ -115,7 +115,7 @@ def run(laboratory: Laboratory) -> Outcome:
     return Outcome((swept_table,), notes=(NOTE,))
 
 
-def _result(gains: dict[str, float], refined: Refinement, plain: Refinement) -> Result:
+def _result(gains: dict[str, float], refined: Refined, plain: Refined) -> Result:
     jump, of_loop = (each.report["levels"][-1]["normal_jump_max"] for each in (refined, plain))
     learned = [level for level in refined.report["levels"] if "guarded" in level]
     guarded, vertices = (sum(level[key] for level in learned) for key in ("guarded", "vertices"))

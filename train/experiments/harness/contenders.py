@@ -8,16 +8,17 @@ from dataclasses import replace
 
 from pns_common.connectivity.creases import NO_CREASES
 from pns_common.runtimes.onnx_model import load_model
-from pns_common.schemes import Scheme, loop, pns
+from pns_common.schemes import loop, pns
 from train.baselines.butterfly import modified_butterfly
 from train.baselines.controls import flat, nc
+from train.refining import AnyScheme
 from train.surfaces.quasi_interpolation import n1, q1
 
 LOOP, OURS = "Loop", "PNS"
 LOOP_CREASED, N1_CREASED, OURS_SMOOTH = "Loop, creases", "N1, creases", "PNS, no creases"
 
 
-def contenders() -> dict[str, Scheme]:
+def contenders() -> dict[str, AnyScheme]:
     """Return all schemes by the names of the tables, Loop first and ours last."""
     ours = pns(load_model())
     return {

@@ -8,13 +8,13 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure as Drawing
 
 from pns_common.connectivity.topology import build_topology
-from pns_common.refine import refine
 from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import SEQUENTIAL, panels
 from train.experiments.paper.methods import PAPER_UNITS, hard_instance, ridge_of
 from train.models.recipes import paper
+from train.refining import refine
 from train.surfaces.implicit import Ridge
 
 PARALLEL = 0.9
