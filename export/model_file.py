@@ -11,8 +11,8 @@ import msgspec
 from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, Parity, check_parity
 from pns_common.base.whole_file import replace_file
-from pns_common.models.card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
-from pns_common.runtimes.onnx_model import model_from_bytes
+from pns_common.model.card import DEFAULT_FORMAT, PAPER_FORMAT, ModelCard
+from pns_common.model.file import model_from_bytes
 from train.models.checkpoint import Checkpoint
 from train.models.networks import BoundedNet
 
@@ -99,10 +99,10 @@ def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:
     facts = {"recipe": RECORDED.get(name, name), **recipe, **recipe.pop("training")}
     facts["machine"] = checkpoint.machine
     facts["distilled"] = msgspec.to_builtins(checkpoint.distilled)
-    # In the order of the first models' cards; what a recipe leaves out its card does not mention.
+    # In the order of the first models' cards, without what a recipe leaves out.
     given = {name: facts[name] for name in ORDER if facts.get(name) is not None}
     return ModelCard(
-        format=FORMAT if vertex is None else VERTEX_FORMAT if form is None else SCALE_FREE_FORMAT,
+        format=PAPER_FORMAT if form is None else DEFAULT_FORMAT,
         training=given,
         metrics=checkpoint.metrics,
         **on_card,

@@ -12,7 +12,7 @@ from pns_common.errors import ModelError, PnsError
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.ring_features import RING_FEATURE_SETS
 from pns_common.features.symmetry import Feature
-from pns_common.runtimes.onnx_model import OnnxModel
+from pns_common.model.session import OnnxModel
 from train.models.networks import BoundedNet
 
 # Largest difference allowed, as a fraction of the budget and of the row's largest feature.

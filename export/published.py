@@ -4,7 +4,7 @@ from pathlib import Path
 
 from export.model_file import Exported, write_model
 from pns_common.errors import ModelError
-from pns_common.models.card import FORMAT, ModelCard
+from pns_common.model.card import PAPER_FORMAT, ModelCard
 from train.models.published import GATE_SHARPNESS, is_operator, load_published, published_budget
 
 SOURCE = "https://github.com/ugail/Proximity-Preserving-Neural-Subdivision"
@@ -30,7 +30,7 @@ def export_published(published: Path, folder: Path) -> dict[Path, Exported]:
     written: dict[Path, Exported] = {}
     for name, network in networks.items():
         card = ModelCard(
-            format=FORMAT,
+            format=PAPER_FORMAT,
             features="paper-5",
             gate_sharpness=GATE_SHARPNESS,
             budget=published_budget(name),

@@ -107,9 +107,7 @@ def recipe_scheme(
 ) -> AnyScheme:
     """Return the scheme that a scale-free recipe trains, differentiable in its networks' weights.
 
-    s is that of training. What the card says of thin faces acts in use alone: a network that is
-    trained with it asks for more beside them, and is rougher there. Creases and tips came after the
-    weights, and act in use alone as well.
+    s is that of training. Creases act in use alone.
 
     Raises:
         ParameterError: the recipe is not scale-free, or has no vertex rule.
@@ -122,9 +120,8 @@ def recipe_scheme(
         plan.trained_strength,
         form.network_scale,
         form.fold_angle,
-        form.learned_levels,
-        boundary_strength=form.boundary_strength or 0.0,
-        side_gates=form.side_gates or False,
+        learned_levels=1,
+        boundary_strength=form.boundary_strength,
     )
     edges = recipe_operator(recipe, network)
     return scale_free_scheme(edges, vertex_rule_operator(rule, vertex_network), numbers)

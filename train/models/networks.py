@@ -19,18 +19,9 @@ RAW_COORDINATES = "raw-12"
 INPUT_COUNT: Mapping[str, int] = MappingProxyType({**FEATURE_COUNT, RAW_COORDINATES: 12})
 
 
-class Smoothstep(nn.Module):
-    """x S(x) with S the smoothstep from 0 at −2 to 1 at 2, as in pns_common.fused.kernels."""
-
-    def forward(self, x: Float[Tensor, "..."]) -> Float[Tensor, "..."]:
-        """Return x S(x)."""
-        t = x.clamp(-2, 2)
-        return x * (1 / 2 + t * (3 / 8 - 1 / 32 * (t * t)))
-
-
 ACTIVATIONS: Mapping[str, Callable[[], nn.Module]] = MappingProxyType(
     # nn.GELU is the exact one, x Φ(x) with erf, unless told otherwise.
-    {"gelu": nn.GELU, "smoothstep": Smoothstep, "tanh": nn.Tanh}
+    {"gelu": nn.GELU, "silu": nn.SiLU, "tanh": nn.Tanh}
 )
 
 

@@ -59,40 +59,23 @@ class VertexRule:
 
 @dataclass(frozen=True, slots=True)
 class ScaleFree:
-    """What makes a recipe's rule scale-free (format 3), as on the card.
+    """What makes a recipe's rule scale-free (format 4), as on the card.
 
     Attributes:
-        prior_strength: s.
+        base: the base scheme, "loop" or "catmull-clark".
+        prior_strength: s, in use; training has a strength of its own.
+        boundary_strength: of the prior along boundary and crease curves.
         network_scale: τ, in edge lengths.
         fold_angle: θ, degrees.
-        learned_levels: K; training sees the first.
-        boundary_strength: b of the boundary's prior; None leaves boundaries to Loop.
-        side_gates: whether an edge's gate reads the sides of its two faces too.
-        network_altitudes: α, the longest that τ's unit may be, in altitudes; None for no limit. As
-            the next, it acts in use, and not in training.
-        wide_bound: whether h of an edge's bound is the longest edge of its two faces.
-        crease_prior: whether the boundary's prior acts at creases too, in use; training sees none.
-        tip_strength: a, how much of Loop's own move is given back at tips; in use alone, too.
-        even_prior_strength: s of even meshes (formula/prior_strength.py), in use; training has one.
-        crease_angle: θ in degrees of the crease lines that are kept in use; training sees none.
-        crease_levels: at how many levels these are sharp.
-        edged_crease_angle: θ' of those of edged meshes.
+        sharpness_levels: at how many levels sharp edges stay sharp, in use; training sees none.
     """
 
+    base: str
     prior_strength: float
+    boundary_strength: float
     network_scale: float
     fold_angle: float
-    learned_levels: int
-    boundary_strength: float | None = None
-    side_gates: bool | None = None
-    network_altitudes: float | None = None
-    wide_bound: bool | None = None
-    crease_prior: bool | None = None
-    tip_strength: float | None = None
-    even_prior_strength: float | None = None
-    crease_angle: float | None = None
-    crease_levels: int | None = None
-    edged_crease_angle: float | None = None
+    sharpness_levels: int
 
 
 class OneStep(msgspec.Struct, frozen=True, tag=True):
@@ -142,7 +125,7 @@ class Recipe:
     Attributes:
         features: name of the feature set, as on the model card.
         hidden: widths of the hidden layers.
-        activation: "gelu", "smoothstep" or "tanh", between layers.
+        activation: "gelu", "silu" or "tanh", between layers.
         budget: C, in the paper's units (the reference length is 1).
         gate_sharpness: c of the gate tanh(c x²).
         training: what is trained on, and how.
@@ -151,7 +134,7 @@ class Recipe:
         seed: of the initial weights and of the batches.
         orientation: as on the model card; "symmetric" keeps the stencil's symmetries.
         vertex: the learned rule for old vertices; None leaves them to Loop.
-        scale_free: the rule of format 3; None is the paper's.
+        scale_free: the rule of format 4; None is the paper's.
     """
 
     name: str

@@ -6,7 +6,6 @@ from types import MappingProxyType
 
 import msgspec
 
-from pns_common.geometry.crease_lines import CREASE_ANGLE, CREASE_LEVELS, EDGED_ANGLE
 from train.models.recipe import (
     LimitWeights,
     LossWeights,
@@ -96,8 +95,8 @@ def general(seed: int = 0) -> Recipe:
     return Recipe(
         name="general",
         features="signed-18",
-        hidden=(48, 48),
-        activation="smoothstep",
+        hidden=(32, 32),
+        activation="silu",
         budget=10.0,
         gate_sharpness=1e7,
         training=ToLimit(
@@ -129,20 +128,12 @@ def general(seed: int = 0) -> Recipe:
         orientation="symmetric",
         vertex=VertexRule("ring-10", hidden=(32, 32), gate_sharpness=1e4),
         scale_free=ScaleFree(
+            base="loop",
             prior_strength=0.85,
+            boundary_strength=1.0,
             network_scale=0.4,
             fold_angle=75.0,
-            learned_levels=1,
-            boundary_strength=1.0,
-            side_gates=True,
-            network_altitudes=3.0,
-            wide_bound=True,
-            crease_prior=True,
-            tip_strength=1.0,
-            even_prior_strength=1.1,
-            crease_angle=CREASE_ANGLE,
-            crease_levels=CREASE_LEVELS,
-            edged_crease_angle=EDGED_ANGLE,
+            sharpness_levels=2,
         ),
     )
 

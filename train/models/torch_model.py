@@ -2,7 +2,8 @@
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import safetensors.torch
@@ -13,7 +14,7 @@ from pns_common.errors import ModelError
 from pns_common.models.card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
 from train.models.checkpoint import joined_state
 from train.models.networks import BoundedNet, unit_correction
-from train.models.recipe import Recipe
+from train.models.recipe import Recipe, ScaleFree
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +90,12 @@ def recipe_model(
         metrics={},
         vertex_features=None if rule is None else rule.features,
         vertex_gate_sharpness=None if rule is None else rule.gate_sharpness,
-        **({} if form is None else asdict(form)),
+        **({} if form is None else _format_3(form)),
     )
     return TorchModel(recipe.name, card, network, vertex_network)
+
+
+def _format_3(form: ScaleFree) -> dict[str, Any]:
+    """Return the fields of a card for the operator that reads format 3."""
+    names = ("prior_strength", "boundary_strength", "network_scale", "fold_angle")
+    return {"learned_levels": 1, **{name: getattr(form, name) for name in names}}

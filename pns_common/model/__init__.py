@@ -1,0 +1,1 @@
+"""Model files: what a model says of itself, how its file is checked, and who runs it."""

@@ -1,0 +1,193 @@
+"""The model card: what a model file says of itself, as JSON in its metadata.
+
+Format 1 is the paper's operator: one network for edges, at every level. Format 4 is the default's:
+networks for edges and for old vertices, a prior and a fold guard, at level 0 alone. Formats 2 and 3
+were never released.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, fields
+from types import MappingProxyType, NoneType, UnionType
+from typing import Any, get_args, get_origin, get_type_hints
+
+# The metadata key of an ONNX file that holds the card.
+CARD_KEY = "pns_card"
+PAPER_FORMAT, DEFAULT_FORMAT = 1, 4
+RETIRED_FORMATS = (2, 3)
+
+# How many columns each feature set has.
+EDGE_FEATURES: Mapping[str, int] = MappingProxyType({"paper-5": 5, "signed-18": 18})
+VERTEX_FEATURES: Mapping[str, int] = MappingProxyType({"ring-10": 10})
+ORIENTATIONS = ("first-face", "symmetric")
+BASES = ("loop", "catmull-clark")
+# A prior of strength 1 is full quasi-interpolation; far beyond it squares leave the floats.
+HIGHEST_STRENGTH = 100.0
+MOST_SHARPNESS_LEVELS = 16
+
+
+@dataclass(frozen=True)
+class ModelCard:
+    """What a model file says of itself. Fields after ``metrics`` belong to format 4 alone.
+
+    Attributes:
+        format: Version of the file format, 1 or 4.
+        features: Name of the feature set that the edge network reads.
+        gate_sharpness: c of the edge gate γ = tanh(c x²).
+        budget: C that the model was trained at, and the default.
+        orientation: How (a, b, c, d) are ordered: "first-face" or "symmetric".
+        training: Recipe, seed and everything else that fixes the training; no dates.
+        metrics: Measured on held-out data.
+        base: Base scheme, "loop" or "catmull-clark".
+        vertex_features: Name of the feature set that the vertex network reads.
+        vertex_gate_sharpness: c_v of the vertex gate γ_v = tanh(c_v x_v).
+        prior_strength: s of the prior D, 0 … 100; 1 is full quasi-interpolation.
+        boundary_strength: Strength of the prior along boundary and crease curves, 0 … 100.
+        network_scale: τ, the longest vector that the network may ask for, in edge lengths.
+        fold_angle: θ of the fold guard, between 0 and 90 degrees.
+        sharpness_levels: At how many levels sharp edges stay sharp, 0 … 16.
+    """
+
+    format: int
+    features: str
+    gate_sharpness: float
+    budget: float
+    orientation: str
+    training: dict[str, Any]
+    metrics: dict[str, Any]
+    base: str | None = None
+    vertex_features: str | None = None
+    vertex_gate_sharpness: float | None = None
+    prior_strength: float | None = None
+    boundary_strength: float | None = None
+    network_scale: float | None = None
+    fold_angle: float | None = None
+    sharpness_levels: int | None = None
+
+    def to_json(self) -> str:
+        """Return the card as JSON, keys in the order of the attributes, without fields of None."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        given = {name: value for name, value in values.items() if value is not None}
+        return json.dumps(given, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+    @staticmethod
+    def from_json(text: str) -> ModelCard:
+        """Read a card.
+
+        Raises:
+            ValueError: it is not JSON, its format is retired or unknown, a field is missing,
+                unknown or of the wrong type, or a value is outside its range.
+        """
+        values = _json_object(text)
+        _check_format(values.get("format"))
+        card = ModelCard(**_typed_fields(values))
+        _check_fields_of_format(card)
+        for name, (accepts, expected) in _RANGES.items():
+            value = getattr(card, name)
+            if value is not None and not accepts(value):
+                raise ValueError(f"{name} {value!r}, not {expected}")
+        return card
+
+
+FORMAT_4_FIELDS = tuple(field.name for field in fields(ModelCard) if field.default is None)
+
+Range = tuple[Callable[[Any], bool], str]
+
+
+def _one_of(names: tuple[str, ...] | Mapping[str, int]) -> Range:
+    return names.__contains__, f"one of {', '.join(names)}"
+
+
+_POSITIVE: Range = (lambda value: math.isfinite(value) and value > 0, "a finite number > 0")
+_STRENGTH: Range = (
+    lambda value: 0 <= value <= HIGHEST_STRENGTH,
+    f"a number from 0 to {HIGHEST_STRENGTH:g}",
+)
+_RANGES: Mapping[str, Range] = MappingProxyType(
+    {
+        "features": _one_of(EDGE_FEATURES),
+        "gate_sharpness": _POSITIVE,
+        "budget": _POSITIVE,
+        "orientation": _one_of(ORIENTATIONS),
+        "base": _one_of(BASES),
+        "vertex_features": _one_of(VERTEX_FEATURES),
+        "vertex_gate_sharpness": _POSITIVE,
+        "prior_strength": _STRENGTH,
+        "boundary_strength": _STRENGTH,
+        "network_scale": _POSITIVE,
+        "fold_angle": (lambda value: 0 < value < 90, "between 0 and 90 degrees"),
+        "sharpness_levels": (
+            lambda value: 0 <= value <= MOST_SHARPNESS_LEVELS,
+            f"from 0 to {MOST_SHARPNESS_LEVELS}",
+        ),
+    }
+)
+
+
+def _json_object(text: str) -> dict[str, Any]:
+    """Read the object that a text of JSON holds. Raises ValueError."""
+
+    def refuse(word: str) -> None:
+        raise ValueError(f"{word}, which is no number of JSON")
+
+    try:
+        value: Any = json.loads(text, parse_constant=refuse)
+    except RecursionError as error:
+        raise ValueError("nested too deep") from error
+    match value:
+        case dict():
+            return dict(value)  # pyright: ignore[reportUnknownArgumentType]
+        case _:
+            raise ValueError(f"{type(value).__name__}, not an object")
+
+
+def _check_format(version: object) -> None:
+    """Check the format before all else. Raises ValueError."""
+    if version in RETIRED_FORMATS:
+        raise ValueError(f"format {version}, which was never released: export the model anew")
+    if version not in (PAPER_FORMAT, DEFAULT_FORMAT):
+        raise ValueError(f"format {version}")
+
+
+def _typed_fields(values: dict[str, Any]) -> dict[str, Any]:
+    """Return a card's fields, each of its type."""
+    known = {field.name: field for field in fields(ModelCard)}
+    unknown = sorted(set(values) - set(known))
+    if unknown:
+        raise ValueError(f"unknown fields {', '.join(unknown)}")
+    missing = [n for n, f in known.items() if f.default is MISSING and n not in values]
+    if missing:
+        raise ValueError(f"missing fields {', '.join(missing)}")
+    hints = get_type_hints(ModelCard)
+    return {name: _typed(name, value, _kinds(hints[name])) for name, value in values.items()}
+
+
+def _typed(name: str, value: Any, kinds: tuple[Any, ...]) -> Any:
+    """Return a field's value, an integer as a float where that is its type."""
+    accepted = (*kinds, int) if float in kinds else kinds
+    # true and false are integers to Python, and no field is one of them.
+    if isinstance(value, bool) or not isinstance(value, accepted):
+        raise ValueError(f"{name} of type {type(value).__name__}")  # noqa: TRY004
+    if float not in kinds:
+        return value
+    try:
+        return float(value)
+    except OverflowError as error:
+        raise ValueError(f"{name} with more digits than a float holds") from error
+
+
+def _kinds(hint: Any) -> tuple[Any, ...]:
+    """Return the types that a hint allows beside None, containers without their items."""
+    kinds = get_args(hint) if isinstance(hint, UnionType) else (hint,)
+    return tuple(get_origin(kind) or kind for kind in kinds if kind is not NoneType)
+
+
+def _check_fields_of_format(card: ModelCard) -> None:
+    """Check that the fields of format 4 stand there and only there. Raises ValueError."""
+    for name in FORMAT_4_FIELDS:
+        if (getattr(card, name) is None) == (card.format == DEFAULT_FORMAT):
+            problem = "missing" if card.format == DEFAULT_FORMAT else "unknown"
+            raise ValueError(f"{problem} field {name} in format {card.format}")

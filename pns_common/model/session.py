@@ -1,0 +1,205 @@
+"""A model as the operator calls it: a card, and networks that onnxruntime runs.
+
+Rows go to onnxruntime in chunks of ``CHUNK_ROWS``, counted from row 0 of the call, on sessions of
+one thread, one session for each calling thread. A row's bits depend on the row alone, not on the
+chunk it stands in, on its neighbours or on the number of threads.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float, Float32
+
+from pns_common.errors import ModelError, ParameterError
+from pns_common.model.card import EDGE_FEATURES, VERTEX_FEATURES, ModelCard
+
+# Rows of one call of onnxruntime. Fewer cost more calls, more leave the processor's cache.
+CHUNK_ROWS = 8192
+# Chunks are padded to a multiple: onnxruntime multiplies a single row in another order.
+ROW_MULTIPLE = 16
+CPU = ("CPUExecutionProvider",)
+
+
+@runtime_checkable
+class Model(Protocol):
+    """Networks with a card; every answer is a vector of norm ≤ budget."""
+
+    @property
+    def card(self) -> ModelCard:
+        """What the model says of itself."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """How reports call it."""
+        ...
+
+    @property
+    def hash(self) -> str:
+        """The sha256 of the model file."""
+        ...
+
+    def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
+        """Return η of format 1 or z of format 4 in edge frames, (N, 3)."""
+        ...
+
+    def vertex_correction(self, features: Float[np.ndarray, "N L"], budget: float) -> np.ndarray:
+        """Return the weights of the ring vectors of old vertices, (N, 3); format 4 alone."""
+        ...
+
+
+@dataclass(frozen=True)
+class Network:
+    """One network of a model file: the input that it reads, its columns, and its output's."""
+
+    given: str
+    columns: int
+    answer: str
+    answer_columns: int
+
+
+def networks(card: ModelCard) -> tuple[Network, ...]:
+    """Return the networks that a file with this card holds."""
+    edges = Network("features", EDGE_FEATURES[card.features], "correction", 3)
+    if card.vertex_features is None:
+        return (edges,)
+    columns = VERTEX_FEATURES[card.vertex_features]
+    return edges, Network("vertex_features", columns, "vertex_correction", 3)
+
+
+class OnnxModel:
+    """A checked model file, run by onnxruntime.
+
+    Attributes:
+        name: Bundled name, or the file's name without its ending.
+        card: What the file says of itself.
+        hash: sha256 of the file's bytes.
+        size: The file's size in bytes.
+        providers: Execution providers of onnxruntime that run it, preferred first.
+    """
+
+    def __init__(
+        self, name: str, card: ModelCard, digest: str, data: bytes, providers: Sequence[str] = CPU
+    ):
+        """Open a file that ``file.check_file`` has checked.
+
+        Raises:
+            ParameterError: a provider is not available here.
+            ModelError: onnxruntime cannot run the graph.
+        """
+        self.name, self.card, self.hash, self.size = name, card, digest, len(data)
+        self._data, self._wanted = data, tuple(providers)
+        self._networks = {network.given: network for network in networks(card)}
+        self._sessions = threading.local()
+        self.providers: tuple[str, ...] = tuple(self._session().get_providers())
+
+    def __repr__(self) -> str:
+        return f"OnnxModel(name={self.name!r}, hash={self.hash!r})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # A session cannot travel to another process; the file's bytes can.
+        return OnnxModel, (self.name, self.card, self.hash, self._data, self._wanted)
+
+    def __call__(
+        self, features: Float[np.ndarray, "N K"], budget: float
+    ) -> Float32[np.ndarray, "N 3"]:
+        """Return corrections for features of edges and a dimensionless budget.
+
+        Raises:
+            ModelError: the graph fails, or an answer is not finite or of another shape.
+        """
+        return self._answers("features", features, budget)
+
+    def vertex_correction(
+        self, features: Float[np.ndarray, "N L"], budget: float
+    ) -> Float32[np.ndarray, "N 3"]:
+        """Return weights of the ring vectors of old vertices.
+
+        Raises:
+            ModelError: the model has no vertex network, the graph fails, or an answer is not
+                finite or of another shape.
+        """
+        return self._answers("vertex_features", features, budget)
+
+    def _answers(self, given: str, features: np.ndarray, budget: float) -> np.ndarray:
+        network = self._networks.get(given)
+        if network is None:
+            raise ModelError(self.name, expected=f"a network that reads {given}", found="none")
+        session = self._session()
+        inputs = self._unread_inputs(budget)
+        answers = np.empty((len(features), network.answer_columns), dtype=np.float32)
+        for start in range(0, len(features), CHUNK_ROWS):
+            chunk = features[start : start + CHUNK_ROWS]
+            inputs[given] = _padded(chunk)
+            answer = self._run(session, network.answer, inputs)
+            if answer.shape != (len(inputs[given]), network.answer_columns):
+                expected = f"{network.answer} of {network.answer_columns} columns, a row for each"
+                raise ModelError(self.name, expected=expected, found=f"shape {answer.shape}")
+            answers[start : start + CHUNK_ROWS] = answer[: len(chunk)]
+        if not np.isfinite(answers).all():
+            expected = f"finite numbers in {network.answer}"
+            raise ModelError(self.name, expected=expected, found="NaN or infinity")
+        return answers
+
+    def _unread_inputs(self, budget: float) -> dict[str, np.ndarray]:
+        """Return the budget, and one row for each input of features: onnxruntime asks for all."""
+        rows = {
+            network.given: np.zeros((1, network.columns), dtype=np.float32)
+            for network in self._networks.values()
+        }
+        return {**rows, "budget": np.asarray(budget, dtype=np.float32)}
+
+    def _run(self, session: Any, output: str, inputs: Mapping[str, np.ndarray]) -> np.ndarray:
+        try:
+            (answer,) = session.run([output], dict(inputs))
+        except Exception as error:  # onnxruntime's errors share no base below Exception
+            raise ModelError(
+                self.name, expected="a graph that runs to its end", found=_first_line(error)
+            ) from error
+        return np.asarray(answer)
+
+    def _session(self) -> Any:
+        """Return the calling thread's session."""
+        session = getattr(self._sessions, "session", None)
+        if session is None:
+            session = self._sessions.session = _open_session(self._data, self.name, self._wanted)
+        return session
+
+
+def _padded(rows: Float[np.ndarray, "N K"]) -> Float32[np.ndarray, "M K"]:
+    """Return rows in single precision, with rows of zeros up to a multiple of ROW_MULTIPLE."""
+    missing = -len(rows) % ROW_MULTIPLE
+    if not missing:
+        return np.ascontiguousarray(rows, dtype=np.float32)
+    padded = np.zeros((len(rows) + missing, rows.shape[1]), dtype=np.float32)
+    padded[: len(rows)] = rows
+    return padded
+
+
+def _open_session(data: bytes, name: str, providers: Sequence[str]) -> Any:
+    import onnxruntime  # pyright: ignore[reportMissingTypeStubs]  # lazy: half of the import time
+
+    runtime: Any = onnxruntime
+    available = runtime.get_available_providers()
+    if not providers or any(provider not in available for provider in providers):
+        expected = f"some of {', '.join(available)}"
+        raise ParameterError("providers", tuple(providers), expected=expected)
+    options = runtime.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    try:
+        return runtime.InferenceSession(data, options, providers=list(providers))
+    except Exception as error:  # onnxruntime's errors share no base below Exception
+        raise ModelError(
+            name, expected="a graph that onnxruntime runs", found=_first_line(error)
+        ) from error
+
+
+def _first_line(error: Exception) -> str:
+    return [*str(error).splitlines(), type(error).__name__][0]

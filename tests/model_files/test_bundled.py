@@ -1,0 +1,75 @@
+"""A bundled model is the one that was bundled, to the last bit."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from pns_common import ModelError
+from pns_common.model import file as model_file
+from pns_common.model.file import BUNDLED, MANIFEST, bundled_models, load_model, write_manifest
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A copy of the bundled files, in their place."""
+    for entry in BUNDLED.iterdir():
+        if entry.is_file():
+            (tmp_path / entry.name).write_bytes(entry.read_bytes())
+    monkeypatch.setattr(model_file, "BUNDLED", tmp_path)
+    return tmp_path
+
+
+def test_every_bundled_model_is_listed():
+    listed = [line.split()[1] for line in (BUNDLED / MANIFEST).read_text().splitlines()]
+    assert listed == [f"{name}.onnx" for name in bundled_models()]
+
+
+def test_sha256sum_agrees():
+    command = ["sha256sum", "--check", "--strict", MANIFEST]
+    subprocess.run(command, cwd=Path(str(BUNDLED)), check=True, capture_output=True)
+
+
+@pytest.mark.parametrize("name", bundled_models())
+def test_every_bundled_model_loads(name):
+    assert load_model(name).name == name
+
+
+def test_the_default_is_bundled_and_of_format_4():
+    assert load_model().name in bundled_models()
+    assert load_model().card.format == 4
+
+
+@pytest.mark.parametrize("name", bundled_models())
+def test_a_flipped_bit_is_refused_wherever_it_is(package, name):
+    path = package / f"{name}.onnx"
+    whole = path.read_bytes()
+    for place in (0, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        with pytest.raises(ModelError, match=MANIFEST):
+            load_model(name)
+    path.write_bytes(whole)
+    assert load_model(name).name == name
+
+
+def test_without_its_hash_no_bundled_model_is_loaded(package):
+    (package / MANIFEST).write_text("")
+    with pytest.raises(ModelError, match="not listed"):
+        load_model("paper")
+    (package / MANIFEST).unlink()
+    with pytest.raises(ModelError, match="beside the bundled models"):
+        load_model("paper")
+
+
+def test_a_file_of_ones_own_needs_no_hash(package):
+    (package / MANIFEST).unlink()
+    assert load_model(package / "paper.onnx").name == "paper"
+
+
+def test_a_new_manifest_lists_what_is_there(package):
+    (package / "paper.onnx").rename(package / "mine.onnx")
+    write_manifest(package)
+    assert load_model("mine").name == "mine"
+    assert sorted(
+        entry.name for entry in package.iterdir() if entry.suffix not in (".py", ".onnx")
+    ) == [MANIFEST]

@@ -1,0 +1,115 @@
+"""A card is read back as it was written, and a wrong one is refused by name."""
+
+import json
+from dataclasses import fields
+
+import pytest
+
+from pns_common.model.card import FORMAT_4_FIELDS, ModelCard
+from tests.support.model_files import DEFAULT_CARD, PAPER_CARD
+
+
+def changed(card, **changes):
+    """A card as JSON with some fields changed; None leaves a field out."""
+    values = json.loads(card.to_json()) | changes
+    return json.dumps({name: value for name, value in values.items() if value is not None})
+
+
+@pytest.mark.parametrize("card", [PAPER_CARD, DEFAULT_CARD], ids=["1", "4"])
+def test_a_card_reads_back_as_it_was_written(card):
+    assert ModelCard.from_json(card.to_json()) == card
+
+
+def test_format_1_knows_no_field_of_format_4():
+    assert list(json.loads(PAPER_CARD.to_json())) == [
+        *("format", "features", "gate_sharpness", "budget", "orientation", "training", "metrics")
+    ]
+
+
+def test_the_default_has_at_most_ten_fields_more_and_a_sentence_for_each():
+    assert len(FORMAT_4_FIELDS) <= 10
+    described = {
+        line.split(":")[0].strip() for line in ModelCard.__doc__.splitlines() if ": " in line
+    }
+    assert {field.name for field in fields(ModelCard)} <= described
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_retired_format_is_refused_by_name_before_anything_else(version):
+    text = json.dumps({"format": version, "tip_strength": 1.0})
+    with pytest.raises(ValueError, match=f"format {version}, which was never released"):
+        ModelCard.from_json(text)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("tip_strength", "network_altitudes", "wide_bound", "even_prior_strength"),
+        *("side_gates", "edged_crease_angle", "learned_levels", "crease_prior"),
+    ],
+)
+def test_a_retired_field_is_refused_by_name(name):
+    with pytest.raises(ValueError, match=f"unknown fields {name}"):
+        ModelCard.from_json(changed(DEFAULT_CARD, **{name: 1.0}))
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"format": 5}, "format 5"),
+        ({"format": "4"}, "format 4"),
+        ({"format": None}, "format None"),
+        ({"base": "doo-sabin"}, "base 'doo-sabin', not one of loop, catmull-clark"),
+        ({"features": "signed-99"}, "features 'signed-99', not one of paper-5, signed-18"),
+        ({"vertex_features": "ring-99"}, "vertex_features 'ring-99', not one of ring-10"),
+        ({"orientation": "left"}, "orientation 'left', not one of first-face, symmetric"),
+        ({"gate_sharpness": 0.0}, "gate_sharpness 0.0, not a finite number > 0"),
+        ({"vertex_gate_sharpness": -1}, "vertex_gate_sharpness -1.0, not a finite number > 0"),
+        ({"budget": 0}, "budget 0.0, not a finite number > 0"),
+        ({"budget": 10**400}, "budget with more digits than a float holds"),
+        ({"budget": True}, "budget of type bool"),
+        ({"network_scale": 0.0}, "network_scale 0.0, not a finite number > 0"),
+        ({"prior_strength": -0.5}, "prior_strength -0.5, not a number from 0 to 100"),
+        ({"prior_strength": 1e150}, "prior_strength 1e.150, not a number from 0 to 100"),
+        ({"boundary_strength": 100.1}, "boundary_strength 100.1, not a number from 0 to 100"),
+        ({"fold_angle": 90.0}, "fold_angle 90.0, not between 0 and 90 degrees"),
+        ({"sharpness_levels": 17}, "sharpness_levels 17, not from 0 to 16"),
+        ({"sharpness_levels": 1.5}, "sharpness_levels of type float"),
+        ({"training": []}, "training of type list"),
+        ({"metrics": None}, "missing fields metrics"),
+        *(({name: None}, f"missing field {name} in format 4") for name in FORMAT_4_FIELDS),
+    ],
+)
+def test_a_wrong_field_is_named(changes, says):
+    with pytest.raises(ValueError, match=says):
+        ModelCard.from_json(changed(DEFAULT_CARD, **changes))
+
+
+def test_a_field_of_format_4_is_refused_in_format_1():
+    with pytest.raises(ValueError, match="unknown field fold_angle in format 1"):
+        ModelCard.from_json(changed(PAPER_CARD, fold_angle=75.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("{", "Expecting"),
+        ("[]", "not an object"),
+        ('{"format": NaN}', "no number"),
+        ("[" * 100_000, "nested"),
+    ],
+)
+def test_what_is_no_object_of_json_is_refused(text, says):
+    with pytest.raises(ValueError, match=says):
+        ModelCard.from_json(text)
+
+
+@pytest.mark.parametrize("name", ["base", "fold_angle", "budget"])
+def test_null_is_no_value(name):
+    text = json.dumps(json.loads(DEFAULT_CARD.to_json()) | {name: None})
+    with pytest.raises(ValueError, match=f"{name} of type NoneType"):
+        ModelCard.from_json(text)
+
+
+def test_an_integer_is_accepted_for_a_float():
+    assert ModelCard.from_json(changed(DEFAULT_CARD, budget=2)).budget == 2

@@ -1,0 +1,160 @@
+"""What a model answers depends on a row alone; what breaks is an error of the model."""
+
+import pickle
+import subprocess
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from onnx import TensorProto, helper
+
+from pns_common import ModelError, ParameterError
+from pns_common.model.file import model_from_bytes
+from pns_common.model.session import CHUNK_ROWS, CPU, Model
+from tests.support.model_files import (
+    default_bytes,
+    default_model,
+    float64_perceptron,
+    model_bytes,
+    paper_bytes,
+    paper_model,
+    random_layers,
+)
+
+node = helper.make_node
+CUT = {"from": np.array([0]), "to": np.array([3]), "axis": np.array([1])}
+PASS = [node("Slice", ["features", "from", "to", "axis"], ["three"])]
+
+
+def rows(count, width=5, seed=0):
+    return np.random.default_rng(seed).uniform(-2, 2, (count, width))
+
+
+@pytest.mark.parametrize("budget", [0.0, 0.5, 1e3])
+def test_answers_are_those_of_the_network_in_double_precision(budget):
+    features = rows(700)
+    expected = budget * float64_perceptron(random_layers(0))(features)
+    answers = paper_model(0)(features, budget)
+    assert answers.dtype == np.float32
+    np.testing.assert_allclose(answers, expected, rtol=0, atol=2e-6 * budget)
+    assert np.linalg.norm(answers, axis=1).max() <= budget * (1 + 1e-6)
+
+
+def test_each_network_answers_its_own_features():
+    model = default_model(3, scale=1.0)
+    edges, vertices = rows(50, 18), rows(50, 10)
+    for answers, features, seed in (
+        (model(edges, 1.0), edges, 3),
+        (model.vertex_correction(vertices, 1.0), vertices, 4),
+    ):
+        layers = random_layers(seed, (features.shape[1], 16, 3), 1.0)
+        np.testing.assert_allclose(answers, float64_perceptron(layers)(features), atol=2e-6)
+
+
+def test_a_rows_bits_depend_on_nothing_but_the_row():
+    """Not on how many rows there are, nor on where in a chunk it stands."""
+    for ask, width in ((paper_model(0), 5), (default_model(0).vertex_correction, 10)):
+        features = rows(2 * CHUNK_ROWS + 17, width)
+        whole = ask(features, 1.0)
+        for count in (1, 2, 3, 5, 8, 15, 16, 17, 31, 100, CHUNK_ROWS - 1, CHUNK_ROWS + 1):
+            for start in (0, 1, CHUNK_ROWS - 3, len(features) - count):
+                part = slice(start, start + count)
+                np.testing.assert_array_equal(ask(features[part], 1.0), whole[part])
+        assert ask(features[:0], 1.0).shape == (0, 3)
+
+
+def test_threads_share_a_model_and_change_nothing():
+    model, features = default_model(0), rows(3 * CHUNK_ROWS, 18)
+    whole = model(features, 1.0)
+    starts = range(0, len(features), 1000)
+    with ThreadPoolExecutor(4) as pool:
+        parts = list(pool.map(lambda start: model(features[start : start + 1000], 1.0), starts))
+    np.testing.assert_array_equal(np.concatenate(parts), whole)
+
+
+def test_each_thread_has_a_session_of_its_own_and_keeps_it():
+    model, seen = paper_model(0), {}
+
+    def ask(number):
+        sessions = [model._session() for _ in range(2)]
+        seen[number] = sessions[0]
+        assert sessions[0] is sessions[1]
+
+    threads = [threading.Thread(target=ask, args=(number,)) for number in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len({id(session) for session in [*seen.values(), model._session()]}) == 4
+
+
+@pytest.mark.parametrize("make", [paper_bytes, default_bytes])
+def test_a_model_travels_to_another_process(make):
+    model = model_from_bytes(make(0), "mine")
+    copy = pickle.loads(pickle.dumps(model))
+    assert isinstance(copy, Model)
+    assert (copy.name, copy.hash, copy.card, copy.size, copy.providers) == (
+        *("mine", model.hash, model.card, model.size, CPU),
+    )
+    features = rows(9, 5 if make is paper_bytes else 18)
+    np.testing.assert_array_equal(copy(features, 0.5), model(features, 0.5))
+
+
+def test_a_model_without_a_vertex_network_says_so():
+    with pytest.raises(ModelError, match="vertex_features"):
+        paper_model(0).vertex_correction(rows(1, 10), 1.0)
+
+
+@pytest.mark.parametrize("providers", [(), ("NoSuchExecutionProvider",)])
+def test_a_provider_that_is_not_there_is_refused(providers):
+    with pytest.raises(ParameterError, match="CPUExecutionProvider"):
+        model_from_bytes(paper_bytes(), "mine", providers)
+
+
+def test_answers_that_are_not_finite_are_refused():
+    divide = node("Div", ["three", "zero"], ["correction"])
+    model = model_from_bytes(model_bytes([*PASS, divide], CUT | {"zero": np.zeros(())}), "nan")
+    with pytest.raises(ModelError, match="finite"):
+        model(rows(3), 1.0)
+
+
+def test_a_graph_that_breaks_off_is_refused():
+    """It keeps the contract and reads rows that there are not."""
+    nodes = [
+        node("Slice", ["features", "zero", "one", "axis"], ["first"]),
+        node("Slice", ["features", "zero", "three", "axis"], ["answer"]),
+        node("Squeeze", ["first", "axis"], ["flat"]),
+        node("Add", ["flat", "far"], ["beyond"]),
+        node("Cast", ["beyond"], ["rows"], to=TensorProto.INT64),
+        node("Gather", ["answer", "rows"], ["correction"]),
+    ]
+    whole = {name: np.array([i]) for name, i in (("zero", 0), ("one", 1), ("three", 3))}
+    data = model_bytes(nodes, whole | {"axis": whole["one"], "far": np.full(1, 1e6)})
+    with pytest.raises(ModelError, match="runs to its end"):
+        model_from_bytes(data, "breaks")(rows(3), 1.0)
+
+
+def test_answers_of_another_shape_are_refused():
+    """Of a chunk of CHUNK_ROWS the shape is right, of fewer rows it is not."""
+    nodes = [
+        *PASS,
+        node("Concat", ["three"] * 16, ["wide"], axis=0),
+        node("Slice", ["wide", "from", "rows", "first"], ["cut"]),
+        node("Identity", ["cut"], ["correction"]),
+    ]
+    weights = CUT | {"rows": np.array([CHUNK_ROWS]), "first": np.array([0])}
+    model = model_from_bytes(model_bytes(nodes, weights), "longer")
+    assert model(rows(CHUNK_ROWS), 1.0).shape == (CHUNK_ROWS, 3)
+    with pytest.raises(ModelError, match="a row for each"):
+        model(rows(3), 1.0)
+
+
+def test_onnxruntime_is_imported_with_the_first_model():
+    code = (
+        "import sys, pns_common.model.file as f;"
+        "assert not {'onnx', 'onnxruntime'} & set(sys.modules);"
+        "f.load_model('paper'); assert 'onnxruntime' in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
