@@ -18,7 +18,9 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from train.connectivity import Connectivity
+from train.curve_rule import Curves
 from train.loop_masks import limit_weight, loop_mask
+from train.tensors import dot, ratio, root, shortened, unit
 
 # Below these a face has no area (of its squared sides), faces are antiparallel (1 + cosine), a
 # mean normal has no direction (its length), and a side's logarithm is cut off.
@@ -28,36 +30,6 @@ ROUNDS, LEAST_AREA = 30, 1e-3
 
 # Features (N, K) -> local vectors (N, 3).
 Network = Callable[[Tensor], Tensor]
-
-
-def dot(u: Tensor, v: Tensor) -> Tensor:
-    """Return the inner products of the last axis."""
-    return (u * v).sum(dim=-1)
-
-
-def root(square: Tensor) -> Tensor:
-    """Return the square root, with gradient 0 at 0."""
-    positive = square > 0
-    return torch.where(positive, torch.where(positive, square, 1.0).sqrt(), 0.0)
-
-
-def ratio(values: Tensor, by: Tensor) -> Tensor:
-    """Return values / by, and 0 where `by` is 0."""
-    positive = by > 0
-    return torch.where(positive, values / torch.where(positive, by, 1.0), 0.0)
-
-
-def unit(vectors: Tensor, shortest: Tensor | float = 0.0) -> Tensor:
-    """Return vectors longer than `shortest` at length 1, and 0 in place of others."""
-    length = root(dot(vectors, vectors))
-    kept = torch.where(length > shortest, length, 0.0)
-    return ratio(vectors, kept[..., None])
-
-
-def shortened(vectors: Float[Tensor, "N 3"], longest: Tensor) -> Float[Tensor, "N 3"]:
-    """Return Π_ρ: vectors longer than `longest` shortened to it."""
-    length = root(dot(vectors, vectors))
-    return vectors * torch.where(length > longest, ratio(longest, length), 1.0)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,6 +291,7 @@ class GeneralRule:
         budget: C.
         gate_sharpness, vertex_gate_sharpness: c and c_v.
         prior_strength: s.
+        boundary_strength: of the prior along boundaries and creases.
         network_scale: τ.
         fold_angle: θ, degrees.
     """
@@ -329,6 +302,7 @@ class GeneralRule:
     gate_sharpness: float
     vertex_gate_sharpness: float
     prior_strength: float
+    boundary_strength: float
     network_scale: float
     fold_angle: float
 
@@ -337,26 +311,32 @@ class GeneralRule:
     ) -> Step:
         """Take the learned step."""
         around, masks, one = Surroundings(mesh, points), loop_mask(mesh), points.new_ones(())
-        prior = masks(self.prior_strength * pushes(around))
+        curves = Curves(mesh, points)
+        of_curves = self.boundary_strength * curves.pushes(self.vertex_gate_sharpness)
+        prior, along = masks(self.prior_strength * pushes(around) + of_curves), masks(of_curves)
         edges = read_edges(around, first_face=False)
         frames = edge_frames(edges, first_face=False)
-        interior, ringed = mesh.paired & (mesh.sharpness < 1), mesh.ringed
+        interior, blend = mesh.paired & (mesh.sharpness < 1), mesh.sharpest[0][:, 1]
+        ringed = mesh.ringed & (blend < 1)
         edge_gate = (1 - mesh.sharpness) * torch.tanh(self.gate_sharpness * frames.curvature**2)
         z = shortened(self.edge_network(signed_18(around, edges, frames)[interior]), one)
         local = torch.zeros_like(edges.a).index_put((interior,), z)
         turned = frames.length[:, None] * (frames.axes @ local[:, :, None])[:, :, 0]
-        smooth = (1 - mesh.sharpest[0][:, 1]) * ringed
         jump = around.mean(around.turns[0])[:, 0]
-        vertex_gate = smooth * torch.tanh(self.vertex_gate_sharpness * jump)
+        vertex_gate = (1 - blend) * ringed * torch.tanh(self.vertex_gate_sharpness * jump)
         z = shortened(self.vertex_network(ring_10(around)[ringed]), one)
         weights = torch.zeros_like(points).index_put((ringed,), z)
         pulled = root(around.square) * (ring_vectors(around) @ weights[:, :, None])[:, :, 0]
         asked = prior + self.network_scale * torch.cat([pulled, turned])
         squares = torch.cat([around.square[:, 0] * ringed, frames.length**2 * interior])
+        # On curves there is neither gate nor network.
+        on_curve, gate = curves.moved, torch.cat([vertex_gate, edge_gate])
+        squares = torch.where(on_curve, curves.squares, squares)
         envelope = self.budget / reference_length * squares
-        gate = torch.cat([vertex_gate, edge_gate])
-        base, displacement = masks(points), gate[:, None] * shortened(asked, envelope)
-        scale = fold_guard(mesh.split(), base, displacement, self.fold_angle)
+        share = torch.where(on_curve, 1.0 * on_curve, gate)[:, None]
+        displacement = share * shortened(torch.where(on_curve[:, None], along, asked), envelope)
+        base, alone = masks(points), curves.of_boundary
+        scale = fold_guard(mesh.split(), base, displacement, self.fold_angle, alone)
         return Step(base, displacement, envelope, gate, scale)
 
 
@@ -365,25 +345,37 @@ def fold_guard(
     base: Float[Tensor, "W 3"],
     displacement: Float[Tensor, "W 3"],
     angle: float,
+    of_boundary: Bool[Tensor, " W"],
 ) -> Float[Tensor, " W"]:
     """Return s: halved at the corners of all faces that turn by more than `angle`, until none do.
 
-    Gradients stop here.
+    Vertices `of_boundary` are halved only by faces that they would fold by themselves, so that two
+    meshes still meet there. Gradients stop here.
     """
     base, displacement, scale = base.detach(), displacement.detach(), torch.ones(len(base)).double()
-    before, cosine = _area_vectors(faces, base), math.cos(math.radians(angle))
+    halvings = 0
+    while True:
+        folded = faces[_turned(faces, base, scale[:, None] * displacement, angle)]
+        by_itself = torch.where(of_boundary, scale, 0.0)[:, None] * displacement
+        alone = _turned(folded, base, by_itself, angle)
+        corners = folded[alone[:, None] | ~of_boundary[folded]]
+        corners = corners[scale[corners] > 0]
+        if len(corners) == 0:
+            return scale
+        scale[corners] = scale[corners] / 2 if halvings < ROUNDS else 0.0
+        halvings += 1
+
+
+def _turned(
+    faces: Int[Tensor, "C 3"], base: Float[Tensor, "W 3"], added: Float[Tensor, "W 3"], angle: float
+) -> Bool[Tensor, " C"]:
+    """Return whether a face with area turned by more than an angle, or lost nearly all its area."""
+    before, after = (_area_vectors(faces, points) for points in (base, base + added))
     sides = [base[faces[:, corner]] - base[faces[:, 0]] for corner in (1, 2)]
     least = NO_AREA * (dot(sides[0], sides[0]) + dot(sides[1], sides[1]))
-    has_area = dot(before, before) > least**2
-    for halvings in range(ROUNDS + 3):
-        after = _area_vectors(faces, base + scale[:, None] * displacement)
-        old, new = dot(before, before), dot(after, after)
-        kept = (dot(before, after) >= cosine * (old * new).sqrt()) & (new >= LEAST_AREA**2 * old)
-        folded = faces[has_area & ~kept].reshape(-1)
-        if len(folded) == 0:
-            break
-        scale[folded] = scale[folded] / 2 if halvings < ROUNDS else 0.0
-    return scale
+    old, new, cosine = dot(before, before), dot(after, after), math.cos(math.radians(angle))
+    kept = (dot(before, after) >= cosine * (old * new).sqrt()) & (new >= LEAST_AREA**2 * old)
+    return (old > least**2) & ~kept
 
 
 def _area_vectors(faces: Int[Tensor, "C 3"], points: Float[Tensor, "W 3"]) -> Tensor:

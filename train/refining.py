@@ -21,7 +21,8 @@ from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import Scheme, pns
 from train.connectivity import Connectivity, connect
 from train.loop_masks import limit_mask, loop_mask
-from train.reference import Step, Surroundings, dot, root
+from train.reference import Step, Surroundings
+from train.tensors import dot, root
 
 # Points of a level, its connectivity, and R.
 Rule = Callable[[Float[Tensor, "V 3"], Connectivity, float], Step]

@@ -27,9 +27,9 @@ from train.reference import (
     on_edges,
     paper_5,
     read_edges,
-    shortened,
 )
 from train.refining import Method
+from train.tensors import shortened
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,9 @@ from torch import Tensor
 from train.baselines.placement import midpoints, placed_edges
 from train.connectivity import Connectivity
 from train.loop_masks import limit_weight, loop_mask
-from train.reference import Step, Surroundings, dot, edge_frames, read_edges, shortened, unit
+from train.reference import Step, Surroundings, edge_frames, read_edges
 from train.refining import Method, loop_rule
+from train.tensors import dot, shortened, unit
 
 CLIPPED_STRENGTH = 0.6
 # C of NC, in units of R.

@@ -13,9 +13,10 @@ from train.baselines.placement import placed_edges
 from train.connectivity import Connectivity, connect
 from train.data.datasets import Dataset
 from train.loop_masks import loop_mask
-from train.reference import Step, Surroundings, dot, edge_frames, read_edges
+from train.reference import Step, Surroundings, edge_frames, read_edges
 from train.refining import Method
 from train.surfaces.implicit import signed_distance, unit_normal
+from train.tensors import dot
 
 
 def normal_displacement(scalar: float) -> Method:

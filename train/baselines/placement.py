@@ -6,7 +6,8 @@ from torch import Tensor
 
 from train.connectivity import Connectivity
 from train.loop_masks import loop_mask
-from train.reference import Step, dot
+from train.reference import Step
+from train.tensors import dot
 
 # The C of the envelope that methods without a budget are measured against.
 COMPARED_BUDGET = 0.5

@@ -10,8 +10,9 @@ from torch import Tensor
 
 from train.baselines.placement import midpoints, placed_edges
 from train.connectivity import Connectivity
-from train.reference import Step, Surroundings, dot, unit
+from train.reference import Step, Surroundings
 from train.refining import Method
+from train.tensors import dot, unit
 
 
 def pn_triangles() -> Method:

@@ -13,8 +13,9 @@ from torch import Tensor
 
 from train.baselines.placement import midpoints, placed_edges
 from train.connectivity import Connectivity
-from train.reference import Step, Surroundings, unit
+from train.reference import Step, Surroundings
 from train.refining import Method
+from train.tensors import unit
 
 # Of the normal equations in ring units, so of squared condition: below it a direction is not seen.
 SMALLEST_SINGULAR = 1e-10
