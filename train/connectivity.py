@@ -29,7 +29,7 @@ class Connectivity:
             −1 unless it has exactly two faces that run through it in opposite directions.
         sharpness: w of each edge in [0, 1]; 1 where `half_edges` is −1.
         boundary: whether an edge has one face; with neither one nor `half_edges` it is irregular.
-        ringed: whether all edges of a vertex have two faces, and these make one fan.
+        fans: how many fans the faces around each vertex make.
     """
 
     vertex_count: int
@@ -39,7 +39,7 @@ class Connectivity:
     half_edges: Int[Tensor, "E 2"]
     sharpness: Float[Tensor, " E"]
     boundary: Bool[Tensor, " E"]
-    ringed: Bool[Tensor, " V"]
+    fans: Int[Tensor, " V"]
 
     @property
     def paired(self) -> Bool[Tensor, " E"]:
@@ -79,6 +79,14 @@ class Connectivity:
     def rims(self) -> Int[Tensor, " S"]:
         """Vertices at which spokes end."""
         return self.edges.flip(1).reshape(-1)
+
+    @cached_property
+    def ringed(self) -> Bool[Tensor, " V"]:
+        """Whether all edges of a vertex have two faces, and these make one fan."""
+        open_ends = torch.bincount(
+            self.edges[~self.paired].reshape(-1), minlength=self.vertex_count
+        )
+        return (self.fans == 1) & (open_ends == 0)
 
     @cached_property
     def valence(self) -> Int[Tensor, " V"]:
@@ -146,7 +154,6 @@ def connect(
     joined = sparse.coo_array((np.ones(len(joins[0])), joins), shape=(len(starts), len(starts)))
     _, fan = connected_components(joined, directed=False)
     _, of_fan = np.unique(fan, return_index=True)
-    open_ends = np.bincount(edges[~paired].reshape(-1), minlength=vertex_count)
     fans = np.bincount(starts[of_fan], minlength=vertex_count)
     return Connectivity(
         vertex_count,
@@ -156,5 +163,5 @@ def connect(
         torch.from_numpy(half_edges),
         torch.from_numpy(np.where(is_named | ~paired, 1.0, 0.0)),
         torch.from_numpy(boundary),
-        torch.from_numpy((fans == 1) & (open_ends == 0)),
+        torch.from_numpy(fans),
     )

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
 import torch
 from jaxtyping import Bool, Float, Int
@@ -177,6 +178,9 @@ def signed_18(around: Surroundings, edges: EdgeReading, frames: Frames) -> Float
         ],
         dim=1,
     )
+
+
+EDGE_FEATURES = MappingProxyType({"paper-5": paper_5, "signed-18": signed_18})
 
 
 def ring_10(around: Surroundings) -> Float[Tensor, "V 10"]:

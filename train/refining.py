@@ -13,11 +13,10 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from pns_common import Mesh, load_model
 from pns_common.crease_lines import named_on
-from pns_common.mesh import Mesh
 from pns_common.refine import reference_length_of
 from pns_common.refine import refine as refine_by_library
-from pns_common.runtimes.onnx_model import load_model
 from pns_common.schemes import Scheme, pns
 from train.connectivity import Connectivity, connect
 from train.loop_masks import limit_mask, loop_mask

@@ -1,18 +1,34 @@
 """Networks over the signed features less one group, or over the paper's and one group more."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from pns_common.features import (
+    FEATURE_SETS,
+    HALF_TURN,
+    MIRROR,
+    TURN_OVER,
+    Feature,
+    Symmetries,
+    symmetries,
+)
 from train.data.batch import Batch
 from train.fitting.trainer import OnStep, optimise, step_loss
-from train.models.feature_sets import GROUPS, PAPER_GROUPS, FeatureSet
 from train.models.networks import BoundedNet, SymmetricNet, unit_correction
 from train.models.recipe import Recipe
 from train.reference import EdgeReading, Frames, PaperRule, Surroundings, signed_18
 from train.refining import Method
+
+# Features that belong together, in the order of the columns.
+GROUPS: Mapping[str, tuple[Feature, ...]] = MappingProxyType(
+    {group.name: group.features for group in FEATURE_SETS["signed-18"].groups}
+)
+PAPER_GROUPS = tuple(group.name for group in FEATURE_SETS["paper-5"].groups)
 
 
 @dataclass(frozen=True)
@@ -23,9 +39,15 @@ class Choice:
     groups: tuple[str, ...]
 
     @property
-    def features(self) -> FeatureSet:
+    def features(self) -> tuple[Feature, ...]:
         """The features of the groups."""
-        return FeatureSet(self.title, tuple(each for name in self.groups for each in GROUPS[name]))
+        return tuple(each for name in self.groups for each in GROUPS[name])
+
+    @property
+    def symmetries(self) -> Symmetries:
+        """Their group; it has no turn-over where no feature has a sign."""
+        signed = any(feature.turn_over < 0 for feature in self.features)
+        return symmetries(self.features, [HALF_TURN, MIRROR, *([TURN_OVER] if signed else [])])
 
     def columns(
         self, around: Surroundings, edges: EdgeReading, frames: Frames
@@ -51,8 +73,7 @@ def fit_features(recipe: Recipe, choice: Choice, on_step: OnStep) -> BoundedNet:
 
     def initial(recipe: Recipe) -> BoundedNet:
         generator = torch.Generator().manual_seed(recipe.seed)
-        group = choice.features.symmetries
-        return SymmetricNet(group, recipe.hidden, recipe.activation, generator)
+        return SymmetricNet(choice.symmetries, recipe.hidden, recipe.activation, generator)
 
     def loss(network: BoundedNet, batch: Batch) -> Float[Tensor, ""]:
         return step_loss(recipe, batch, _rule(recipe, choice, network)(batch.points, batch.mesh))

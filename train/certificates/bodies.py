@@ -9,9 +9,8 @@ from jaxtyping import Float, Int
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
-from pns_common.errors import MeshError
+from pns_common import Mesh, MeshError, clean
 from pns_common.geometry.reference_length import measure_reference_length
-from pns_common.mesh import Mesh, clean
 from train.data.datasets import draw_ridges
 from train.data.grid import grid_faces, jittered_grid
 from train.spectra.stars import star

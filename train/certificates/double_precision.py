@@ -16,7 +16,7 @@ from onnx import NodeProto, TensorProto, numpy_helper
 from onnx.reference import ReferenceEvaluator
 from onnx.reference.op_run import OpRun
 
-from pns_common.errors import ModelError
+from pns_common import ModelError
 from pns_common.models.card import ModelCard
 from pns_common.models.contract import feature_inputs
 from pns_common.runtimes.onnx_model import BUNDLED, OnnxModel, bundled_models

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pns_common.schemes import loop
+from pns_common import loop
 from train.certificates.certificate import Certificate, worst
 from train.certificates.subject import Subject
 from train.refining import AnyScheme, refine
@@ -15,7 +15,6 @@ from train.spectra.spectrum import (
     jacobian,
     loop_eigenvalue,
     loop_gap,
-    of_regular_mesh,
     perturbed_stars,
     refined_inner,
     reif_gap,
@@ -40,7 +39,7 @@ def planar_spectrum(subject: Subject, valences: Sequence[int]) -> list[Certifica
     """Certify T8 for each valence: the derivative, the tangent eigenvalues and the Reif gap."""
     deviations, tangents, gaps = [], [], []
     flat, finest = FLAT, EIGENVALUE
-    if subject.scheme.guard is not None:
+    if subject.learned_once is not None:
         flat, finest = SHARPER_FLAT, SHARPER_EIGENVALUE
     for valence in valences:
         place = f"k = {valence}"
@@ -76,7 +75,7 @@ def derivative_of_departure(scheme: AnyScheme, valence: int) -> float:
     mesh, count = perturbed_stars(star, step)
     refined, base = (
         refined_inner(star, refine(mesh, rule, 1, 1.0).mesh.vertices, 2 * count)
-        for rule in (of_regular_mesh(scheme), loop())
+        for rule in (scheme, loop())
     )
     return float(np.abs(refined - base).max()) / step
 

@@ -22,8 +22,8 @@ def regular_smoothness(subject: Subject, seed: int) -> Certificate:
     The value is the fall of the largest face-normal jump from the last level but one to the last,
     in powers of two; 1 for Loop.
     """
-    report = refine(bumpy_torus(seed), subject.scheme, LEVELS, 1.0).report
-    jumps = np.array([level["normal_jump_max"] for level in report["levels"]])
+    refined = refine(bumpy_torus(seed), subject.scheme, LEVELS, 1.0)
+    jumps = np.array([level.normal_jump for level in refined.levels])
     order = float(np.log2(jumps[-2] / jumps[-1])) if jumps[-1] > 0 else np.inf
     where = f"bumpy torus, level {LEVELS}: largest jump {np.degrees(jumps[-1]):.1f}°"
     name = "normals settle in regular regions"

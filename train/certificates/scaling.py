@@ -9,9 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.connectivity.topology import split
-from pns_common.mesh import Mesh
-from pns_common.schemes import loop
+from pns_common import Mesh, loop
 from train.certificates.bodies import Body
 from train.certificates.certificate import Certificate, farthest
 from train.certificates.step import step
@@ -47,7 +45,7 @@ def distance_from_loop(scheme: AnyScheme, mesh: Mesh) -> float:
 def normals_from_loop(scheme: AnyScheme, mesh: Mesh) -> float:
     """Return ‖n − n_Loop‖ over all faces of the refined mesh."""
     ours, base = step(scheme, mesh), step(loop(), mesh)
-    faces = split(ours.topology)
+    faces = ours.level.split().numpy()
     apart = face_normals(ours.positions, faces) - face_normals(base.positions, faces)
     return float(np.linalg.norm(apart, axis=1).max())
 
@@ -67,7 +65,7 @@ def _slope(
     measure: Measure,
 ) -> Certificate:
     low, high = expected - tolerance, expected + tolerance
-    scales = SCALES if subject.scheme.guard is None else SMALLER_SCALES
+    scales = SCALES if subject.learned_once is None else SMALLER_SCALES
     slopes = []
     for body in bodies:
         values = np.array(

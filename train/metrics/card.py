@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from pns_common.schemes import loop
+from pns_common import loop
 from train.data.datasets import Dataset, ridge_held_out, saddle_held_out, sphere_ridge_held_out
 from train.metrics.evaluation import compare_with_loop
 from train.metrics.one_step import Improvement, improvement

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import fast_simplification
 import numpy as np
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.data.dense_meshes import DenseMesh, is_manifold, largest_part
 from train.data.simplifiers import AGGRESSIVENESS
 from train.metrics.surface_distance import (

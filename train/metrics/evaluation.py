@@ -5,11 +5,11 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.connectivity.topology import build_topology
-from pns_common.schemes import loop
+from pns_common import Scheme, loop
+from train.connectivity import connect
 from train.data.datasets import Dataset, Instance
 from train.metrics.one_step import METRICS, Errors, Improvement, improvement, one_step_errors
-from train.refining import AnyScheme, refine
+from train.refining import AnyScheme, Method, Smooth, refine
 
 # For each metric its value on every instance of a data set.
 ErrorTable = Mapping[str, Float[np.ndarray, " N"]]
@@ -35,10 +35,6 @@ def compare_with_loop(scheme: AnyScheme | SchemeOf, dataset: Dataset) -> dict[st
 def _instance_errors(scheme: AnyScheme, instance: Instance) -> Errors:
     mesh = instance.mesh
     refined = refine(mesh, scheme, levels=1, reference_length=1.0).mesh
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    return one_step_errors(
-        instance.surface,
-        mesh.vertices,
-        topology,
-        refined.vertices[topology.vertex_count + topology.interior],
-    )
+    level = connect(mesh.faces, len(mesh.vertices))
+    inserted = refined.vertices[level.vertex_count + level.interior.numpy()]
+    return one_step_errors(instance.surface, mesh.vertices, level, inserted)

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.vectors import dot, norm, unit
 
 # Faces with twice their area below this share of their squared sides are left out.

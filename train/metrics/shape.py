@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.refining import Refined
 from train.surfaces.implicit import Surface, signed_distance, unit_normal
 from train.vectors import dot, face_normals, norm

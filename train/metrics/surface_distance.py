@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.metrics.faces import point_mesh
 from train.metrics.faces.point_mesh import FaceTree, distances, face_tree, nearest
 from train.vectors import dot, face_normals, norm

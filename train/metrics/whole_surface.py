@@ -6,11 +6,12 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from pns_common.mesh import Mesh
-from pns_common.schemes import loop
+from pns_common import Mesh, loop
+from train.connectivity import connect
 from train.data.datasets import Dataset, Instance
 from train.metrics.shape import face_normal_error, nearest_points
-from train.refining import AnyScheme, refine
+from train.reference import Surroundings
+from train.refining import AnyScheme, largest_turn, refine
 from train.surfaces.implicit import signed_distance
 
 PAPER_UNITS = 1.0

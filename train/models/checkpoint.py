@@ -12,8 +12,8 @@ import safetensors.torch
 from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
+from pns_common import ModelError
 from pns_common.base.whole_file import replace_file
-from pns_common.errors import ModelError
 from train.models.from_recipe import initial_network, initial_vertex_network
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe

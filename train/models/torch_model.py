@@ -10,7 +10,7 @@ import safetensors.torch
 import torch
 from jaxtyping import Float
 
-from pns_common.errors import ModelError
+from pns_common import ModelError
 from pns_common.models.card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
 from train.models.checkpoint import joined_state
 from train.models.networks import BoundedNet, unit_correction

@@ -7,8 +7,7 @@ roughened. Their surface is Loop's own: they were drawn with its shrinking in vi
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.mesh import Mesh
-from pns_common.schemes import loop
+from pns_common import Mesh, loop
 from train.data.pairs.faceted import block
 from train.data.pairs.grid import vertex_normals
 from train.data.pairs.references import AUTHORED, Pair, Reference

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pns_common.schemes import loop
+from pns_common import loop
 from train.data.pairs.references import Pair, Reference
 from train.data.stream import random_instance
 from train.refining import refine

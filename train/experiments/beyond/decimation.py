@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from pns_common.schemes import loop
+from pns_common import loop
 from train.baselines.butterfly import modified_butterfly
 from train.data.dense_meshes import (
     ASSET,

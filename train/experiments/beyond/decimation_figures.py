@@ -10,7 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.data.dense_meshes import CAD
 from train.experiments.harness.experiment import Figure
 from train.experiments.harness.render import ASPECT, CENTRE, HALF_WIDTH, Camera, shaded_image

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.data.dense_meshes import CONTROL_ENDING, asset_files, read_mesh
 from train.data.primitives import PRIMITIVES, TRIANGULATED_QUADS
 from train.experiments.beyond.models import model_files

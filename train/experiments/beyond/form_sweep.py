@@ -5,8 +5,7 @@ from itertools import islice
 
 import numpy as np
 
-from pns_common.runtimes.onnx_model import load_model
-from pns_common.schemes import loop, pns
+from pns_common import load_model, loop, pns
 from train.data.simplifiers import SIMPLIFIERS, simplified
 from train.experiments.beyond.models import models_and_assets
 from train.experiments.beyond.real_meshes import LEAST_REDUCTION, dense_files

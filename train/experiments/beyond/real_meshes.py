@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.data.dense_meshes import DenseMesh, asset_meshes, cad_meshes
 from train.data.simplifiers import SIMPLIFIERS, simplified
 from train.experiments.beyond.models import models_and_assets

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.errors import MeshError
-from pns_common.mesh import Mesh
+from pns_common import Mesh, MeshError
 from train.data.dense_meshes import read_mesh
 from train.data.primitives import PRIMITIVES
 from train.experiments.beyond.models import model_files

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pns_common.connectivity.topology import build_topology
-from pns_common.mesh import Mesh
+from pns_common import Mesh
+from train.connectivity import connect
 from train.data.primitives import globe, icosphere, tetrahedron
 from train.experiments.beyond.models import model_files
 from train.experiments.harness.contenders import LOOP, contenders
@@ -67,7 +67,7 @@ def run(laboratory: Laboratory) -> Outcome:
 def _rows(name: str, mesh: Mesh, levels: int) -> list[Row]:
     while len(mesh.faces) * 4**levels > MOST_FACES:
         levels -= 1
-    edges = build_topology(mesh.faces, len(mesh.vertices)).edges
+    edges = connect(mesh.faces, len(mesh.vertices)).edges.numpy()
     ends = mesh.vertices[edges]
     spacing = float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).mean())
     ball = SphereRidge(radius=1.0, amplitude=0.0, sharpness=1.0, angle=0.3)

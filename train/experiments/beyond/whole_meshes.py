@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.connectivity.topology import EdgeClass, build_topology
-from pns_common.errors import MeshError
-from pns_common.mesh import Mesh
+from pns_common import Mesh, MeshError
+from train.connectivity import connect
 from train.data.dense_meshes import asset_files, read_mesh
 from train.data.primitives import PRIMITIVES
 from train.experiments.beyond.models import models_and_assets
@@ -128,8 +127,7 @@ def rows_of(
     box = np.concatenate([mesh.vertices, reference.points])
     low, high = box.min(axis=0), box.max(axis=0)
     diagonal = float(np.linalg.norm(high - low)) or 1.0
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    closed = bool((topology.edge_class == EdgeClass.INTERIOR).all())
+    closed = bool(connect(mesh.faces, len(mesh.vertices)).paired.all())
     rows: list[Row] = []
     for method, surface in surfaces.items():
         beyond = np.maximum(low - surface.points, surface.points - high).max(initial=0)

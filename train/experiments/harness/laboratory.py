@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from pns_common.schemes import pns
+from pns_common import pns
 from train.ablations.variants import PNS, Variant, fit_variant
 from train.data.datasets import DATASETS, Dataset
 from train.experiments.harness.sources import code_of, sources_of

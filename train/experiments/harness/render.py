@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.experiments.harness.style import SEQUENTIAL
 from train.vectors import face_normals
 

@@ -6,8 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pns_common.mesh import Mesh
-from pns_common.schemes import loop, pns
+from pns_common import Mesh, loop, pns
 from train.ablations.variants import VARIANTS, variant_method, variant_recipe
 from train.data.datasets import Dataset
 from train.data.grid import grid_faces, jittered_grid

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Drawing
 from trimesh import Trimesh
 from trimesh.intersections import mesh_plane
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table

@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 from typing import cast
 
-from pns_common.mesh import Mesh
-from pns_common.schemes import loop
+from pns_common import Mesh, loop
 from train.ablations.variants import UNCONSTRAINED, variant_method, variant_recipe
 from train.baselines.butterfly import modified_butterfly
 from train.baselines.curvature_adaptive import curvature_adaptive

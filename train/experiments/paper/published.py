@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from pns_common.schemes import pns
+from pns_common import pns
 from train.ablations.variants import (
     UNCONSTRAINED,
     WITHOUT_BOUND,

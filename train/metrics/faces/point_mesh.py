@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common import Mesh
 from pns_common.base.blocks import Blocks
 from pns_common.fused.levels.mesh_edges import build_edges
-from pns_common.mesh import Mesh
 from train.metrics.faces import face_boxes
 from train.metrics.faces.face_boxes import FaceBoxes
 from train.metrics.faces.nearest_face import search
