@@ -11,13 +11,11 @@ from typing import Any, Literal
 import numpy as np
 import torch
 from jaxtyping import Float, Int
+from pns_common.reference_length import measure_reference_length
 from torch import Tensor
 
-from pns_common import Mesh, load_model
-from pns_common.crease_lines import named_on
-from pns_common.refine import reference_length_of
-from pns_common.refine import refine as refine_by_library
-from pns_common.schemes import Scheme, pns
+from pns_common import Mesh, Scheme, load_model, sharp_edges
+from pns_common import refine as refine_by_library
 from train.connectivity import Connectivity, connect
 from train.loop_masks import limit_mask, loop_mask
 from train.reference import Step, Surroundings
@@ -106,7 +104,7 @@ def refine(
     if isinstance(scheme, Method):
         length = reference_length
         if length == "auto":
-            length = reference_length_of(mesh.vertices, mesh.faces)
+            length = measure_reference_length(mesh.vertices, mesh.faces.reshape(-1))
         sharp_levels: int | None = None
         if isinstance(creases, str):
             creases, sharp_levels = found_creases(mesh) if scheme.keeps_creases else (None, None)
@@ -124,8 +122,7 @@ def refine(
 
 def found_creases(mesh: Mesh) -> tuple[Int[np.ndarray, "N 2"] | None, int | None]:
     """Return the creases that the default model keeps on a mesh, and at how many levels."""
-    found = named_on(mesh, pns(load_model()).creases)
-    return found.named, found.levels
+    return sharp_edges(mesh), load_model().card.sharpness_levels
 
 
 @dataclass(frozen=True, eq=False)

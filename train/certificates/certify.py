@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pns_common import ModelError, PnsError
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL, load_model
+from pns_common.model.file import DEFAULT_MODEL, load_model
 from train.certificates.affine import affine_reproduction
 from train.certificates.bodies import Body, flat_bodies, spiky_sphere, synthetic_bodies
 from train.certificates.certificate import Certificate

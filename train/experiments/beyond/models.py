@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from pns_common import loop, pns
-from pns_common.runtimes.onnx_model import BUNDLED, DEFAULT_MODEL, bundled_models, load_model
+from pns_common.model.file import BUNDLED, DEFAULT_MODEL, bundled_models, load_model
 from train.data.datasets import Dataset
 from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
