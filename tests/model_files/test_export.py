@@ -15,8 +15,7 @@ from export.model_file import export_model, write_model
 from export.onnx_graph import OPSET, model_bytes
 from export.parity import BUDGETS, TOLERANCE, ParityError, check_parity
 from pns_common import ModelError
-from pns_common.features.edge_features import FEATURE_SETS
-from pns_common.features.ring_features import RING_10
+from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS
 from pns_common.model.file import ALLOWED_OPERATORS, load_model, model_from_bytes
 from tests.support.model_files import DEFAULT_CARD, PAPER_CARD
 from train.models.checkpoint import Checkpoint, save_checkpoint
@@ -25,7 +24,7 @@ from train.models.networks import BoundedNet
 from train.models.recipes import general, paper
 from train.models.tied import TiedNet
 
-EDGES, VERTICES = FEATURE_SETS["signed-18"].symmetries, RING_10.symmetries
+EDGES, VERTICES = FEATURE_SETS["signed-18"].symmetries, RING_FEATURE_SETS["ring-10"].symmetries
 SINGLE = 2e-6
 
 
