@@ -4,8 +4,12 @@ With `--install` it writes the bundled model of the recipe instead, which is tra
 `--published DIR` it writes a model file for each of the author's PNS networks.
 """
 
+import sys
 from pathlib import Path
 from typing import Annotated
+
+# Started as a file, Python looks for packages beside it and not in the checkout.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import typer
 from rich.console import Console
@@ -14,7 +18,7 @@ from rich.markup import escape
 from export.model_file import Exported, export_model
 from export.published import export_published
 from pns_common.errors import ParameterError, PnsError
-from pns_common.models.manifest import write_manifest
+from pns_common.model.file import write_manifest
 from train.models.checkpoint import load_checkpoint
 from train.models.recipe import Recipe
 from train.models.recipes import RECIPES

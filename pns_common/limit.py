@@ -4,8 +4,9 @@ A limit mask is a left eigenvector of the local subdivision matrix for its eigen
 number of sharp edges (boundary, irregular, crease) at a vertex:
 
     none       (1 − w_k) p + w_k (mean of the neighbours)      w_k of ``loop.limit_ring_weight``
-    one        (a dart) p + Σ w_j q_j over 1 + Σ w_j, with w_j = β_k + 3/8 w_j + 1/8 (both beside it)
-               on smooth spokes, 0 counted for the sharp one; w_s = β_k + w_s / 2 + 1/8 (both beside)
+    one        (a dart) p + Σ w_j q_j, over 1 + Σ w_j
+               smooth spokes: w_j = β_k + 3/8 w_j + 1/8 (those beside it, but for the sharp one)
+               the sharp one: w_s = β_k + 1/2 w_s + 1/8 (both beside it)
     two        (4 p + the two neighbours along the curve) / 6
     more       p, which never moves
 
@@ -118,9 +119,7 @@ def limit_normals(
     mesh, around = topology, find_sectors(topology)
     kind = np.zeros(len(around.first), dtype=np.int64)
     if around.opened:
-        kind[: around.opened] = np.minimum(
-            mesh.sharp_count[around.vertex[: around.opened]], CORNER
-        )
+        kind[: around.opened] = np.minimum(mesh.sharp_count[around.vertex[: around.opened]], CORNER)
     at, weights = _tangent_masks(kind, around.size)
     sectors = np.empty((len(around.first), 3))
     read = points, *_walked(mesh), around.first, around.size, at, weights, kind == CORNER
@@ -233,7 +232,7 @@ def _tangent_mask(kind: int, k: int) -> Float[np.ndarray, "K1 2"]:
         angle = 2 * np.pi * np.arange(k) / k
         mask[:k, 0] = np.cos(angle)
         # Of two corners, those of a fold, sin(π) in floats would be a direction made of rounding.
-        mask[:k, 1] = np.sin(angle) if k != 2 else 0.0  # noqa: PLR2004
+        mask[:k, 1] = np.sin(angle) if k != 2 else 0.0
     elif kind == DART:
         even, odd = dart_tangents(k)
         mask[:k, 0], mask[:k, 1] = even[1:], odd
@@ -251,7 +250,7 @@ def _tangent_mask(kind: int, k: int) -> Float[np.ndarray, "K1 2"]:
 def dart_tangents(valence: int) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " K"]]:
     """Return the even mask (centre first) and the odd one (neighbours alone), the crease at q_0."""
     angle, even = 2 * np.pi * np.arange(valence) / valence, _even(valence)
-    odd = np.sin(angle) if valence > 2 else np.zeros(valence)  # noqa: PLR2004
+    odd = np.sin(angle) if valence > 2 else np.zeros(valence)
     return even * np.sign(even[1:] @ np.cos(angle)), odd
 
 

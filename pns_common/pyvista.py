@@ -11,14 +11,14 @@ from typing import Any
 
 import pyvista
 
-from pns_common.arguments import DEFAULT_LEVELS
 from pns_common.interop.subdivide import subdivide
+from pns_common.refinement import DEFAULT_LEVELS
 from pns_common.schemes import Scheme, loop
 
 
 @pyvista.register_dataset_accessor("pns", pyvista.PolyData)
 class PnsAccessor:
-    """What PNS makes of a PolyData of triangles; point, cell and field data are kept."""
+    """Refines a PolyData of triangles; point, cell and field data are kept."""
 
     def __init__(self, mesh: pyvista.PolyData):
         self._mesh = mesh

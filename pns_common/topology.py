@@ -62,8 +62,8 @@ class Topology:
         face_of_corner: (H,); (0,) where all faces are triangles.
         edges: (E, 2) endpoints a < b.
         corner_edges: (H,) the edge that leaves each corner.
-        half_edges: (E, 2) an edge's first half-edge and its second: −1 where there is none, −2 where
-            there are more than two.
+        half_edges: (E, 2) an edge's first half-edge and its second: −1 where there is none, −2
+            where there are more than two.
         edge_class: (E,) EdgeClass values.
         soft: (E,) sharpness w in [0, 1] of interior edges; (0,) where it is 0 at all of them. Other
             edges have w = 1.
@@ -196,9 +196,7 @@ class Topology:
         if len(rows) == 0:
             return self
         classes = self.edge_class.copy()
-        classes[rows] = np.where(
-            classes[rows] == kernels.INTERIOR, kernels.CREASE, classes[rows]
-        )
+        classes[rows] = np.where(classes[rows] == kernels.INTERIOR, kernels.CREASE, classes[rows])
         return replace(self, edge_class=classes)
 
     def with_sharpness(self, sharpness: Float[np.ndarray, " E"]) -> Topology:
@@ -212,7 +210,9 @@ class Topology:
         classes = np.where(self.edge_class == kernels.CREASE, kernels.INTERIOR, self.edge_class)
         return replace(self, edge_class=classes.astype(np.int8), soft=NO_WEIGHTS)
 
-    def rows_of(self, pairs: Int[np.ndarray, "N 2"], name: str = "creases") -> Int[np.ndarray, " N"]:
+    def rows_of(
+        self, pairs: Int[np.ndarray, "N 2"], name: str = "creases"
+    ) -> Int[np.ndarray, " N"]:
         """Return the edges that pairs of vertices name.
 
         Raises:
@@ -237,7 +237,9 @@ class Topology:
         lost = np.flatnonzero(~found)
         if len(lost):
             row = int(lost[0])
-            raise ParameterError(f"{name}[{row}]", pairs[row].tolist(), expected="an edge of the mesh")
+            raise ParameterError(
+                f"{name}[{row}]", pairs[row].tolist(), expected="an edge of the mesh"
+            )
         return near[place]
 
 
@@ -354,9 +356,7 @@ def split_faces(
     """Return the triangles of the 1-to-4 split, in the order of ``split_triangles``."""
     faces = np.empty((4 * parent.face_count, TRIANGLE), dtype=dtype)
     read = parent.faces, parent.face_edges, parent.vertex_count
-    blocks.run(
-        parent.face_count, lambda begin, end: kernels.split_faces(*read, begin, end, faces)
-    )
+    blocks.run(parent.face_count, lambda begin, end: kernels.split_faces(*read, begin, end, faces))
     return faces
 
 
@@ -366,9 +366,7 @@ def _halves(parent: Topology, rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M
     return np.stack([ends, np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
 
 
-Numbered = tuple[
-    UInt32[np.ndarray, "E 2"], Int[np.ndarray, "E 2"], UInt32[np.ndarray, " H"], bool
-]
+Numbered = tuple[UInt32[np.ndarray, "E 2"], Int[np.ndarray, "E 2"], UInt32[np.ndarray, " H"], bool]
 
 
 def _number_edges(

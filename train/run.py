@@ -15,8 +15,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from pns_common.errors import ParameterError, PnsError
-from pns_common.schemes import pns
+from pns_common import ParameterError, PnsError, pns
 from train.certificates.command import certify_command
 from train.experiments.command import reproduce_command
 from train.fitting.determinism import machine_fingerprint

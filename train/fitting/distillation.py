@@ -18,11 +18,8 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
-from pns_common.errors import ParameterError
-from pns_common.mesh import Mesh
-from pns_common.models.card import ModelCard
-from pns_common.refine import refine
-from pns_common.schemes import loop, pns
+from pns_common import Mesh, ParameterError, loop, pns, refine
+from pns_common.model.card import ModelCard
 from train.data.pairs.pair_stream import pair_stream
 from train.data.primitives import box, globe, icosphere, tetrahedron, torus
 from train.fitting.determinism import deterministic

@@ -5,11 +5,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.arrays import cross, dot, norm
-from pns_common.geometry.frames import face_normals
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.metrics.faces import point_mesh
 from train.metrics.faces.point_mesh import FaceTree, distances, face_tree, nearest
+from train.vectors import dot, face_normals, norm
 
 SEED = 0
 
@@ -80,7 +79,7 @@ def surface_samples(
     over two refinements of one mesh then differ by their surfaces, and hardly by the draw.
     """
     a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
-    upto = np.cumsum(norm(cross(b - a, c - a)))
+    upto = np.cumsum(norm(np.cross(b - a, c - a)))
     place = (np.arange(count) + rng.random(count)) / count * upto[-1]
     face = np.searchsorted(upto, place, side="right").clip(max=len(upto) - 1)
     u, v = rng.random((2, count, 1))
@@ -105,7 +104,7 @@ def _one_way(source: Surface, target: Surface) -> SurfaceErrors:
     """Measure from one surface to the other, in the surfaces' own unit."""
     closest = nearest(target.tree, source.points)
     here, there = source.normals[source.faces], target.normals[closest.face]
-    angle = np.arctan2(norm(cross(here, there)), dot(here, there))
+    angle = np.arctan2(norm(np.cross(here, there)), dot(here, there))
     at_vertices = distances(target.tree, source.tree.vertices)
     return SurfaceErrors(
         mean=float(closest.distance.mean()),

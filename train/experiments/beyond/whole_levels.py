@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from itertools import islice
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.experiments.beyond.models import models_and_assets
 from train.experiments.beyond.whole_meshes import (
     MORE,

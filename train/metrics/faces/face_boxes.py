@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numba import njit
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 
 # Eight float64 fill the widest register.
 WIDE = 8

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.arrays import cross, dot
+from pns_common import Mesh
 from pns_common.base.blocks import Blocks
 from pns_common.fused.levels.mesh_edges import build_edges
-from pns_common.mesh import Mesh
 from train.metrics.faces import face_boxes
 from train.metrics.faces.face_boxes import FaceBoxes
 from train.metrics.faces.nearest_face import search
+from train.vectors import dot
 
 # Barycentric coordinates up to here are none.
 ON_BORDER = 1e-9
@@ -95,10 +95,11 @@ def _barycentric(
 ) -> Float[np.ndarray, "P 3"]:
     """Return the coordinates of points in their triangles; 1 where a triangle has no area."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    normal = cross(b - a, c - a)
+    normal = np.cross(b - a, c - a)
     square = dot(normal, normal)
     parts = [
-        dot(cross(end - start, points - start), normal) for start, end in ((b, c), (c, a), (a, b))
+        dot(np.cross(end - start, points - start), normal)
+        for start, end in ((b, c), (c, a), (a, b))
     ]
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.stack(parts, axis=1) / square[:, None]
