@@ -314,11 +314,11 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         made = build_topology(faces, vertex_count, blocks)
         if not inherit:
             return made
-        made = made.with_creases(made.rows_of(_halves(parent, creases)))
+        made = made.with_creases(made.rows_of(halves_of(parent, creases)))
         if len(soft):
             rows = np.flatnonzero(soft)
             sharpness = np.zeros(len(made.edges))
-            sharpness[made.rows_of(_halves(parent, rows))] = np.repeat(soft[rows], 2)
+            sharpness[made.rows_of(halves_of(parent, rows))] = np.repeat(soft[rows], 2)
             made = made.with_sharpness(sharpness)
         return made
     source = parent if inherit else parent.without_creases()
@@ -365,7 +365,7 @@ def split_faces(
     return faces
 
 
-def _halves(parent: Topology, rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M 2"]:
+def halves_of(parent: Topology, rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M 2"]:
     """Return the halves of edges, as vertex pairs of the split mesh."""
     ends, middle = parent.edges[rows].astype(np.int64), parent.vertex_count + rows.astype(np.int64)
     return np.stack([ends, np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
