@@ -4,8 +4,9 @@ A limit mask is a left eigenvector of the local subdivision matrix for its eigen
 number of sharp edges (boundary, irregular, crease) at a vertex:
 
     none       (1 − w_k) p + w_k (mean of the neighbours)      w_k of ``loop.limit_ring_weight``
-    one        (a dart) p + Σ w_j q_j over 1 + Σ w_j, with w_j = β_k + 3/8 w_j + 1/8 (both beside it)
-               on smooth spokes, 0 counted for the sharp one; w_s = β_k + w_s / 2 + 1/8 (both beside)
+    one        (a dart) p + Σ w_j q_j, over 1 + Σ w_j
+               smooth spokes: w_j = β_k + 3/8 w_j + 1/8 (those beside it, but for the sharp one)
+               the sharp one: w_s = β_k + 1/2 w_s + 1/8 (both beside it)
     two        (4 p + the two neighbours along the curve) / 6
     more       p, which never moves
 
@@ -31,7 +32,7 @@ tangents so: on curves from k = 6 on (Σ sin(2πj/k) q_j), at corners from k = 3
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -118,9 +119,7 @@ def limit_normals(
     mesh, around = topology, find_sectors(topology)
     kind = np.zeros(len(around.first), dtype=np.int64)
     if around.opened:
-        kind[: around.opened] = np.minimum(
-            mesh.sharp_count[around.vertex[: around.opened]], CORNER
-        )
+        kind[: around.opened] = np.minimum(mesh.sharp_count[around.vertex[: around.opened]], CORNER)
     at, weights = _tangent_masks(kind, around.size)
     sectors = np.empty((len(around.first), 3))
     read = points, *_walked(mesh), around.first, around.size, at, weights, kind == CORNER
@@ -233,7 +232,7 @@ def _tangent_mask(kind: int, k: int) -> Float[np.ndarray, "K1 2"]:
         angle = 2 * np.pi * np.arange(k) / k
         mask[:k, 0] = np.cos(angle)
         # Of two corners, those of a fold, sin(π) in floats would be a direction made of rounding.
-        mask[:k, 1] = np.sin(angle) if k != 2 else 0.0  # noqa: PLR2004
+        mask[:k, 1] = np.sin(angle) if k != 2 else 0.0
     elif kind == DART:
         even, odd = dart_tangents(k)
         mask[:k, 0], mask[:k, 1] = even[1:], odd
@@ -250,15 +249,19 @@ def _tangent_mask(kind: int, k: int) -> Float[np.ndarray, "K1 2"]:
 
 def dart_tangents(valence: int) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " K"]]:
     """Return the even mask (centre first) and the odd one (neighbours alone), the crease at q_0."""
-    angle = 2 * np.pi * np.arange(valence) / valence
-    even = _even_of_few(valence) if valence < MANY else _even_of_many(valence)
-    odd = np.sin(angle) if valence > 2 else np.zeros(valence)  # noqa: PLR2004
+    angle, even = 2 * np.pi * np.arange(valence) / valence, _even(valence)
+    odd = np.sin(angle) if valence > 2 else np.zeros(valence)
     return even * np.sign(even[1:] @ np.cos(angle)), odd
 
 
-@cache
+@lru_cache(maxsize=64)
+def _even(k: int) -> Float[np.ndarray, " N"]:
+    """Return the second even left eigenvector of a dart's matrix; finding it takes milliseconds."""
+    return _even_of_few(k) if k < MANY else _even_of_many(k)
+
+
 def _even_of_few(k: int) -> Float[np.ndarray, " N"]:
-    """Return the second even left eigenvector of a dart's matrix, for fewer than MANY spokes."""
+    """Return that eigenvector for fewer than MANY spokes, from the matrix."""
     weight = float(beta(np.array([k]))[0])
     matrix = np.zeros((k + 1, k + 1))
     matrix[0, 0], matrix[0, 1:] = 1 - k * weight, weight
@@ -279,7 +282,7 @@ def _even_of_few(k: int) -> Float[np.ndarray, " N"]:
 
 
 def _even_of_many(k: int) -> Float[np.ndarray, " N"]:
-    """Return the second even left eigenvector of a dart's matrix, for MANY spokes and more.
+    """Return that eigenvector for MANY spokes and more: the matrix may be too large.
 
     With weight 1 of p, λ = 3/8 + cos(θ)/4 and t = k θ/2, columns 0 < j < k say
     w_j = c (1 − cos(θ (j − k/2)) / cos t), c = 4 β / (cos θ − 1); that of q_0 says

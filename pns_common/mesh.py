@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,7 +34,6 @@ class Mesh:
     Attributes:
         vertices: (V, 3) float64.
         corners: (H,) int64, the vertices of the faces, face after face.
-        offsets: (F + 1,) int64, where the corners of each face begin.
 
     Raises:
         MeshError: wrong shapes or types, no faces, a face of fewer than three corners, a masked
@@ -43,10 +41,10 @@ class Mesh:
             index out of range; the error names the element.
     """
 
-    __slots__ = ("_faces", "corners", "offsets", "vertices")
+    __slots__ = ("_faces", "_offsets", "corners", "vertices")
     vertices: Float[np.ndarray, "V 3"]
     corners: Int[np.ndarray, " H"]
-    offsets: Int[np.ndarray, " F1"]
+    _offsets: Int[np.ndarray, " F1"] | None
     _faces: Int[np.ndarray, "F N"] | None
 
     def __init__(self, vertices: Any, faces: Any) -> None:
@@ -60,36 +58,42 @@ class Mesh:
             raise MeshError("no faces to refine", element="faces")
         points = np.array(given, dtype=np.float64, order="C")
         _check_coordinates(points)
-        self._keep(points, corners, offsets)
+        degrees = np.diff(offsets)
+        uniform = (degrees == degrees[0]).all()
+        self._keep(points, corners, offsets, int(degrees[0]) if uniform else None)
 
     def _keep(
         self,
         vertices: Float[np.ndarray, "V 3"],
         corners: Int[np.ndarray, " H"],
-        offsets: Int[np.ndarray, " F1"],
+        offsets: Int[np.ndarray, " F1"] | None,
+        degree: int | None,
     ) -> None:
-        for array in (vertices, corners, offsets):
+        """Keep arrays; ``degree`` is that of all faces, which then need no offsets."""
+        for array in (vertices, corners):
             array.flags.writeable = False
-        degree = int(offsets[1]) if len(offsets) > 1 else TRIANGLE
-        uniform = len(corners) == degree * (len(offsets) - 1) and bool(
-            (np.diff(offsets) == degree).all()
-        )
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "corners", corners)
-        object.__setattr__(self, "offsets", offsets)
-        object.__setattr__(self, "_faces", corners.reshape(-1, degree) if uniform else None)
+        faces = None if degree is None else corners.reshape(-1, degree)
+        values = vertices, corners, offsets, faces
+        for name, value in zip(("vertices", "corners", "_offsets", "_faces"), values, strict=True):
+            object.__setattr__(self, name, value)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a Mesh is read-only: {name} cannot be set")
 
-    def __getstate__(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.vertices, self.corners, self.offsets
-
-    def __setstate__(self, state: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
-        self._keep(*state)
+    def __reduce__(self) -> tuple[Any, ...]:
+        degree = None if self._faces is None else self._faces.shape[1]
+        return _kept, (self.vertices, self.corners, self._offsets, degree)
 
     def __repr__(self) -> str:
-        return f"Mesh(vertices={len(self.vertices)}, faces={len(self.offsets) - 1})"
+        count = len(self.offsets) - 1 if self._faces is None else len(self._faces)
+        return f"Mesh(vertices={len(self.vertices)}, faces={count})"
+
+    @property
+    def offsets(self) -> Int[np.ndarray, " F1"]:
+        """Where the corners of each face begin, and where the last ones end: (F + 1,)."""
+        if self._offsets is not None:
+            return self._offsets
+        return np.arange(0, len(self.corners) + 1, self.faces.shape[1])
 
     @property
     def faces(self) -> Int[np.ndarray, "F N"]:
@@ -120,10 +124,19 @@ class Mesh:
     @classmethod
     def of_refined(cls, vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Mesh:
         """Make a mesh of arrays that a refinement made and checked: neither copied nor read."""
-        mesh = object.__new__(cls)
-        offsets = np.arange(0, faces.size + 1, TRIANGLE)
-        mesh._keep(vertices, faces.reshape(-1), offsets)  # noqa: SLF001
-        return mesh
+        return _kept(vertices, faces.reshape(-1), None, TRIANGLE)
+
+
+def _kept(
+    vertices: Float[np.ndarray, "V 3"],
+    corners: Int[np.ndarray, " H"],
+    offsets: Int[np.ndarray, " F1"] | None,
+    degree: int | None,
+) -> Mesh:
+    """Make a mesh of arrays that are known to be right."""
+    mesh = object.__new__(Mesh)
+    mesh._keep(vertices, corners, offsets, degree)  # pyright: ignore[reportPrivateUsage]
+    return mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,10 +229,11 @@ def repeated_vertex(faces: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
 
 def _polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return corners and offsets of faces of any degree. Raises MeshError."""
-    if isinstance(faces, Sequence) and len({np.size(face) for face in faces}) > 1:
-        degrees = [np.size(face) for face in faces]
-        corners = np.concatenate([_array(face, "faces").reshape(-1) for face in faces])
-        offsets = np.concatenate([[0], np.cumsum(degrees)])
+    rows: list[Any] = list(faces) if isinstance(faces, list | tuple) else []  # pyright: ignore[reportUnknownArgumentType]
+    degrees = [int(np.size(face)) for face in rows]
+    if len(set(degrees)) > 1:
+        corners = np.concatenate([_array(face, "faces").reshape(-1) for face in rows])
+        offsets: np.ndarray = np.concatenate([[0], np.cumsum(degrees)])
     else:
         given = _array(faces, "faces")
         if given.size == 0:
@@ -227,7 +241,7 @@ def _polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
         if given.ndim != 2:
             raise MeshError(f"shape {given.shape}, expected (F, 3)", element="faces")
         corners = given.reshape(-1)
-        offsets = np.arange(0, corners.size + 1, given.shape[1])
+        offsets = np.arange(0, corners.size + 1, int(given.shape[1]))
     if corners.dtype.kind not in "iu":
         raise MeshError(f"type {corners.dtype}, expected integers", element="faces")
     few = np.flatnonzero(np.diff(offsets) < TRIANGLE)
@@ -246,9 +260,7 @@ def _check_indices(corners: np.ndarray, offsets: np.ndarray, vertex_count: int) 
     outside = np.flatnonzero((corners < 0) | (corners >= vertex_count))
     worst = int(np.searchsorted(offsets, outside[0], side="right")) - 1
     face = corners[offsets[worst] : offsets[worst + 1]].tolist()
-    raise MeshError(
-        f"indices {face}, expected 0 … {vertex_count - 1}", element="face", index=worst
-    )
+    raise MeshError(f"indices {face}, expected 0 … {vertex_count - 1}", element="face", index=worst)
 
 
 def _check_coordinates(vertices: Float[np.ndarray, "V 3"]) -> None:

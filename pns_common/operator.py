@@ -35,7 +35,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.curves import Curves, curve_prior, curve_pushes, find_curves
-from pns_common.errors import ModelError
+from pns_common.errors import ModelError, ParameterError
 from pns_common.kernels import children, correction, frames, measures
 from pns_common.kernels.connectivity import INTERIOR
 from pns_common.level import Level
@@ -173,7 +173,7 @@ def learned_level(level: Level, rule: Rule) -> Additions:
 
     blocks.run(len(vertices), at_vertices)
     degenerate: int = sum(blocks.run(len(edges), at_edges))
-    made.correct_curves(curves, rule.budget / level.reference_length)
+    made.correct_curves(curves, budget_per_length(level, rule))
     scale = guard_scale(level, x, delta, math.radians(rule.fold_angle), curves)
     made.scale(scale)
     x += delta
@@ -185,11 +185,14 @@ def learned_level(level: Level, rule: Rule) -> Additions:
 
 def prior(level: Level, rule: Rule, curves: Curves) -> Float[np.ndarray, "W 3"]:
     """Return D = S d of every new vertex; 0 at those that the rule does not move."""
-    along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
-    made = level.base.place(pushes(level, rule) + along, level.topology, level.blocks)
-    fixed = np.concatenate([~level.ringed, level.topology.edge_class != INTERIOR])
-    made[fixed] = 0.0
-    made[curves.new_rows] = curve_prior(curves, along)
+    d, along = pushes(level, rule), None
+    if len(curves.rows) and rule.curve_strength:
+        along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
+        d += along
+    made = level.base.place(d, level.topology, level.blocks)
+    made[np.concatenate([~level.ringed, level.topology.edge_class != INTERIOR])] = 0.0
+    if along is not None:
+        made[curves.new_rows] = curve_prior(curves, along)
     return made
 
 
@@ -204,9 +207,7 @@ def pushes(level: Level, rule: Rule) -> Float[np.ndarray, "V 3"]:
     assert level.base.limit_weight is not None
     weight = level.base.limit_weight(np.arange(int(rings.valence.max(initial=0)) + 1))
     read = rings.means, rings.fields, rings.valence, level.ringed, weight, rule.prior_strength
-    level.blocks.run(
-        len(made), lambda begin, end: measures.normal_pushes(*read, begin, end, made)
-    )
+    level.blocks.run(len(made), lambda begin, end: measures.normal_pushes(*read, begin, end, made))
     sharp = level.topology.sharpest
     if sharp is not None and len(level.topology.soft):
         made *= 1 - sharp.weights[:, 1:2]
@@ -242,7 +243,7 @@ def edge_inputs(level: Level, rule: Rule, rows: Int[np.ndarray, " N"]) -> Inputs
         features,
         basis,
         gate=gate_of(rule.gate_sharpness * curvature**2),
-        bound=rule.budget / level.reference_length * (length * length),
+        bound=budget_per_length(level, rule) * (length * length),
         reach=rule.network_scale * length,
         weight=1 - mesh.soft[rows] if len(mesh.soft) else np.ones(count),
         degenerate=degenerate,
@@ -262,11 +263,18 @@ def vertex_inputs(level: Level, rule: Rule, rows: Int[np.ndarray, " N"]) -> Inpu
         features,
         basis,
         gate=gate_of(rule.vertex_gate_sharpness * rings.means[rows, measures.JUMP]),
-        bound=rule.budget / level.reference_length * square,
+        bound=budget_per_length(level, rule) * square,
         reach=rule.network_scale * np.sqrt(square),
         weight=1 - sharp.weights[rows, 1] if sharp is not None and soft else np.ones(count),
         degenerate=np.zeros(count, dtype=bool),
     )
+
+
+def budget_per_length(level: Level, rule: Rule) -> float:
+    """Return C / R."""
+    if not level.reference_length:
+        raise ParameterError("reference_length", level.reference_length, expected="R > 0")
+    return rule.budget / level.reference_length
 
 
 def gate_of(values: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
@@ -356,7 +364,7 @@ class _Rows:
         return cls(prior, *np.zeros((3, len(prior))))
 
     @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """All four, in the order of the kernels."""
         return self.displacement, self.ratio, self.gate, self.bound
 
@@ -368,9 +376,7 @@ class _Rows:
     def correct_curves(self, curves: Curves, budget_per_length: float) -> None:
         """Put Π_ρ(D) in place of D on curves."""
         bound = budget_per_length * curves.squares
-        correction.correct_curves(
-            curves.new_rows, bound, self.displacement, self.ratio, self.bound
-        )
+        correction.correct_curves(curves.new_rows, bound, self.displacement, self.ratio, self.bound)
 
     def scale(self, by: Float[np.ndarray, " W"]) -> None:
         """Put s δ in place of δ."""

@@ -15,7 +15,7 @@ from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import loop as kernels
 from pns_common.level import Level
 from pns_common.limit import limit_normals, limit_positions, limit_shift
-from pns_common.memory import memory_here
+from pns_common.memory import keep_freed_memory, memory_here
 from pns_common.mesh import LARGEST_COORDINATE, Mesh, check_is_mesh
 from pns_common.operator import Additions, learned_level
 from pns_common.parallel import Blocks, available_threads, no_progress
@@ -38,6 +38,8 @@ DEFAULT_LEVELS, HIGHEST_LEVELS = 2, 16
 LEAST_BYTES_PER_FACE = 60
 # Half-edges are numbered in 32 bits.
 LARGEST_INDEX = 2**31 - 1
+
+keep_freed_memory()
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +69,7 @@ class Refinement:
         normals: (V, 3) exact normals of the limit surface, on creases the mean of both sides';
             None unless vertices were put on it.
         steps: the levels, from which the report is made when it is first read.
-        scheme, reference_length, limit_shift: for the report.
+        scheme, limit_shift: for the report.
     """
 
     mesh: Mesh
@@ -76,8 +78,15 @@ class Refinement:
     normals: Float[np.ndarray, "V 3"] | None
     steps: Sequence[Step] = field(repr=False)
     scheme: Scheme = field(repr=False)
-    reference_length: float = field(repr=False)
     limit_shift: float = field(repr=False)
+
+    @cached_property
+    def reference_length(self) -> float:
+        """R, the unit of length of the budget."""
+        first = self.steps[0].level
+        if first.reference_length is not None:
+            return first.reference_length
+        return measure_reference_length(first.points, first.topology.corners)
 
     @cached_property
     def report(self) -> Report:
@@ -145,7 +154,7 @@ def refine(
         expected = "a Scheme, as loop() or pns(load_model())"
         raise ParameterError("scheme", type(scheme), expected=expected)
     count = levels_that_fit(levels, len(mesh.faces))
-    length = _reference_length(mesh, reference_length)
+    length = _reference_length(mesh, reference_length, measured=scheme.rule is not None)
     if not is_bool(limit):
         raise ParameterError("limit", limit, expected="True or False")
     kept = chosen_creases(creases, scheme.creases)
@@ -179,7 +188,6 @@ def refine(
         normals=normals,
         steps=steps,
         scheme=scheme,
-        reference_length=length,
         limit_shift=shift,
     )
 
@@ -201,7 +209,7 @@ def control_level(
     blocks = Blocks(_threads(threads))
     kept = chosen_creases(creases, scheme.creases)
     topology = kept.applied(mesh.vertices, mesh.topology(blocks))
-    length = _reference_length(mesh, reference_length)
+    length = _reference_length(mesh, reference_length, measured=True)
     return Level(mesh.vertices, topology, scheme.base, length, blocks)
 
 
@@ -216,7 +224,9 @@ def refine_many(
 ) -> list[Refinement]:
     """Refine meshes one after the other, each with its own creases; None: no edge."""
     return [
-        refine(mesh, scheme, levels, reference_length, limit=limit, creases=creases, threads=threads)
+        refine(
+            mesh, scheme, levels, reference_length, limit=limit, creases=creases, threads=threads
+        )
         for mesh, creases in jobs
     ]
 
@@ -224,7 +234,7 @@ def refine_many(
 def _step(level: Level, scheme: Scheme, depth: int) -> Step:
     """Refine one level."""
     added = None
-    if scheme.acts_at(depth) and level.reference_length > 0 and scheme.rule is not None:
+    if scheme.acts_at(depth) and level.reference_length and scheme.rule is not None:
         # An absurd budget overflows, which is caught just below.
         with np.errstate(over="ignore", invalid="ignore"):
             added = learned_level(level, scheme.rule)
@@ -232,7 +242,8 @@ def _step(level: Level, scheme: Scheme, depth: int) -> Step:
     else:
         points = level.base.place(level.points, level.topology, level.blocks)
     _check_coordinates(points, level.blocks)
-    return Step(level, points, added)
+    kept = Level(level.points, level.topology, level.base, level.reference_length, level.blocks)
+    return Step(kept, points, added)  # without measurements, which are most of the memory
 
 
 def crease_shift(level: Level, placed: Float[np.ndarray, "W 3"]) -> float | None:
@@ -277,9 +288,12 @@ def levels_that_fit(given: SupportsIndex, faces: int) -> int:
     return levels
 
 
-def _reference_length(mesh: Mesh, given: float | str) -> float:
+def _reference_length(mesh: Mesh, given: float | str, *, measured: bool) -> float | None:
+    """Return R; None where it is to be measured only if the report asks for it."""
     # An array compares with a word element by element.
     if isinstance(given, str) and given == "auto":
+        if not measured:
+            return None
         return measure_reference_length(mesh.vertices, mesh.faces.reshape(-1))
     if not (is_number(given) and float(given) > 0):
         raise ParameterError("reference_length", given, expected='"auto" or a number > 0')

@@ -62,8 +62,8 @@ class Topology:
         face_of_corner: (H,); (0,) where all faces are triangles.
         edges: (E, 2) endpoints a < b.
         corner_edges: (H,) the edge that leaves each corner.
-        half_edges: (E, 2) an edge's first half-edge and its second: −1 where there is none, −2 where
-            there are more than two.
+        half_edges: (E, 2) an edge's first half-edge and its second: −1 where there is none, −2
+            where there are more than two.
         edge_class: (E,) EdgeClass values.
         soft: (E,) sharpness w in [0, 1] of interior edges; (0,) where it is 0 at all of them. Other
             edges have w = 1.
@@ -196,9 +196,7 @@ class Topology:
         if len(rows) == 0:
             return self
         classes = self.edge_class.copy()
-        classes[rows] = np.where(
-            classes[rows] == kernels.INTERIOR, kernels.CREASE, classes[rows]
-        )
+        classes[rows] = np.where(classes[rows] == kernels.INTERIOR, kernels.CREASE, classes[rows])
         return replace(self, edge_class=classes)
 
     def with_sharpness(self, sharpness: Float[np.ndarray, " E"]) -> Topology:
@@ -212,7 +210,9 @@ class Topology:
         classes = np.where(self.edge_class == kernels.CREASE, kernels.INTERIOR, self.edge_class)
         return replace(self, edge_class=classes.astype(np.int8), soft=NO_WEIGHTS)
 
-    def rows_of(self, pairs: Int[np.ndarray, "N 2"], name: str = "creases") -> Int[np.ndarray, " N"]:
+    def rows_of(
+        self, pairs: Int[np.ndarray, "N 2"], name: str = "creases"
+    ) -> Int[np.ndarray, " N"]:
         """Return the edges that pairs of vertices name.
 
         Raises:
@@ -237,7 +237,9 @@ class Topology:
         lost = np.flatnonzero(~found)
         if len(lost):
             row = int(lost[0])
-            raise ParameterError(f"{name}[{row}]", pairs[row].tolist(), expected="an edge of the mesh")
+            raise ParameterError(
+                f"{name}[{row}]", pairs[row].tolist(), expected="an edge of the mesh"
+            )
         return near[place]
 
 
@@ -265,15 +267,17 @@ def build_topology(
     face_of_corner = NO_FACES
     if not triangles:
         face_of_corner = np.repeat(np.arange(len(degrees), dtype=np.uint32), degrees)
-    edges, half_edges, corner_edges = _number_edges(corners, offsets, vertex_count)
-    repeats = np.empty(len(offsets) - 1, dtype=bool)
-    repeating = kernels.mark_repeats(corners, offsets, repeats)
+    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count)
+    repeats, repeating = np.zeros(0, dtype=bool), False
+    # A triangle that names a vertex twice has an edge from a vertex to itself.
+    if not triangles or bool((edges[:, 0] == edges[:, 1]).any()):
+        repeats = np.empty(len(offsets) - 1, dtype=bool)
+        repeating = kernels.mark_repeats(corners, offsets, repeats)
     edge_class = np.empty(len(edges), dtype=np.int8)
     known = corners, face_of_corner, repeats if repeating else repeats[:0], half_edges
     blocks.run(
         len(edges), lambda begin, end: kernels.classify_edges(*known, begin, end, edge_class)
     )
-    plain = triangles and not repeating and not kernels.has_twin_faces(corner_edges, half_edges)
     return Topology(
         vertex_count,
         corners,
@@ -284,7 +288,7 @@ def build_topology(
         half_edges,
         edge_class,
         NO_WEIGHTS,
-        plain,
+        plain and triangles and not repeating,
     )
 
 
@@ -352,9 +356,7 @@ def split_faces(
     """Return the triangles of the 1-to-4 split, in the order of ``split_triangles``."""
     faces = np.empty((4 * parent.face_count, TRIANGLE), dtype=dtype)
     read = parent.faces, parent.face_edges, parent.vertex_count
-    blocks.run(
-        parent.face_count, lambda begin, end: kernels.split_faces(*read, begin, end, faces)
-    )
+    blocks.run(parent.face_count, lambda begin, end: kernels.split_faces(*read, begin, end, faces))
     return faces
 
 
@@ -364,26 +366,31 @@ def _halves(parent: Topology, rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M
     return np.stack([ends, np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
 
 
+Numbered = tuple[UInt32[np.ndarray, "E 2"], Int[np.ndarray, "E 2"], UInt32[np.ndarray, " H"], bool]
+
+
 def _number_edges(
     corners: UInt32[np.ndarray, " H"], offsets: Int[np.ndarray, " F1"], vertex_count: int
-) -> tuple[UInt32[np.ndarray, "E 2"], Int[np.ndarray, "E 2"], UInt32[np.ndarray, " H"]]:
-    """Return edges, their half-edges, and the edge of each corner."""
+) -> Numbered:
+    """Return edges, their half-edges, the edge of each corner, and whether triangles are plain."""
     count = len(corners)
-    head = np.full(vertex_count, -1, dtype=np.int32)
-    low, high, corner_edges = (np.empty(count, dtype=np.uint32) for _ in range(3))
-    following, half_edges = np.empty(count, np.int32), np.empty((count, 2), np.int32)
+    head, low = np.full(vertex_count, -1, dtype=np.int32), np.empty(count, dtype=np.uint32)
+    links, corner_edges = np.empty((count, 4), np.int32), np.empty(count, np.uint32)
+    plain = np.ones(1, dtype=np.int8)
     made = kernels.number_edges(
-        corners, offsets, STEPS * count, head, low, high, following, half_edges, corner_edges
+        corners, offsets, STEPS * count, head, low, links, corner_edges, plain
     )
     if made == kernels.TOO_LONG:
         return _sort_edges(corners, offsets, vertex_count)
-    edges = np.stack([low[:made], high[:made]], axis=1)
-    return edges, half_edges[:made].copy(), corner_edges
+    edges = np.empty((made, 2), dtype=np.uint32)
+    edges[:, 0], edges[:, 1] = low[:made], links[:made, kernels.HIGH]
+    half_edges = links[:made, kernels.FIRST :].copy()
+    return edges, half_edges, corner_edges, bool(plain[0])
 
 
 def _sort_edges(
     corners: UInt32[np.ndarray, " H"], offsets: Int[np.ndarray, " F1"], vertex_count: int
-) -> tuple[UInt32[np.ndarray, "E 2"], Int[np.ndarray, "E 2"], UInt32[np.ndarray, " H"]]:
+) -> Numbered:
     """Return what ``_number_edges`` does, by sorting: for vertices of thousands of edges."""
     following = np.arange(1, len(corners) + 1)
     following[offsets[1:] - 1] = offsets[:-1]
@@ -400,8 +407,11 @@ def _sort_edges(
     second = in_runs[np.minimum(starts + 1, len(keys) - 1)]
     second = np.where(count == 1, kernels.NONE, np.where(count == 2, second, kernels.SEVERAL))
     half_edges = np.stack([first, second], axis=1)[order].astype(np.int32)
-    edges = np.sort(pairs[first[order]], axis=1)
-    return edges, half_edges, number[group]
+    # Two triangles with two edges in common have all three.
+    corner_edges = number[group]
+    sides = np.sort(corner_edges[: 3 * (len(corners) // 3)].reshape(-1, 3), axis=1)
+    plain = len(np.unique(_keys(sides[:, :2], len(order)))) == len(sides)
+    return np.sort(pairs[first[order]], axis=1), half_edges, corner_edges, plain
 
 
 def _keys(pairs: Int[np.ndarray, "N 2"], vertex_count: int) -> Int[np.ndarray, " N"]:

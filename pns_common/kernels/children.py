@@ -32,7 +32,7 @@ def child_corners(faces, face_edges, vertex_count, f, i):
         return faces[f, 0], ab, ca
     if i == 1:
         return faces[f, 1], bc, ab
-    if i == 2:  # noqa: PLR2004
+    if i == 2:
         return faces[f, 2], ca, bc
     return ab, bc, ca
 
@@ -72,7 +72,18 @@ def _folds(p, q, r, cosine):
 
 @kernel
 def mark_folds(
-    loop, displacement, scale, shared, changed, cosine, faces, face_edges, vertex_count, begin, end, to
+    loop,
+    displacement,
+    scale,
+    shared,
+    changed,
+    cosine,
+    faces,
+    face_edges,
+    vertex_count,
+    begin,
+    end,
+    to,
 ):
     """Mark the corners of folded children of triangles begin … end − 1 whose s is not 0 yet.
 
@@ -84,7 +95,7 @@ def mark_folds(
             were. (0,): all are tested.
         to: flags, False on entry; threads may write the same True at once.
     """
-    for f in range(begin, end):
+    for f in range(max(begin, 0), end):
         for i in range(4):
             u, v, w = child_corners(faces, face_edges, vertex_count, f, i)
             if len(changed) and not (changed[u] or changed[v] or changed[w]):
@@ -109,7 +120,7 @@ def mark_folds(
 @kernel
 def child_normals(points, faces, face_edges, vertex_count, begin, end, normals):
     """Write the unit normals of the children 4 f … 4 f + 3 of triangles begin … end − 1."""
-    for f in range(begin, end):
+    for f in range(max(begin, 0), end):
         for i in range(4):
             a, b, c = child_corners(faces, face_edges, vertex_count, f, i)
             normal, _, _ = normal_and_area(row(points, a), row(points, b), row(points, c))
@@ -144,7 +155,7 @@ def _starting(h):
 def largest_chord_inside(normals, begin, end):
     """Return the largest squared chord between a middle child and its neighbours."""
     largest = 0.0
-    for f in range(begin, end):
+    for f in range(max(begin, 0), end):
         for i in range(3):
             largest = max(largest, _squared_chord(normals, 4 * f + 3, 4 * f + i))
     return largest
@@ -154,7 +165,7 @@ def largest_chord_inside(normals, begin, end):
 def largest_chord_across(normals, half_edges, edge_class, begin, end):
     """Return the largest squared chord across the halves of interior edges begin … end − 1."""
     largest = 0.0
-    for e in range(begin, end):
+    for e in range(max(begin, 0), end):
         if edge_class[e] == INTERIOR:
             there, back = half_edges[e, 0], half_edges[e, 1]
             largest = max(largest, _squared_chord(normals, _starting(there), _following(back)))
@@ -166,7 +177,7 @@ def largest_chord_across(normals, half_edges, edge_class, begin, end):
 def opposed_normals(normals, others, begin, end):
     """Count the rows whose normals oppose each other."""
     count = 0
-    for f in range(begin, end):
+    for f in range(max(begin, 0), end):
         count += dot(row(normals, f), row(others, f)) < 0
     return count
 

@@ -23,53 +23,83 @@ def skipped_block(rows, reach, block, begin, end):
 
     ``reach`` has the smallest and the largest vertex of each block.
     """
-    first = SKIPPED_ROWS * block
+    first = max(SKIPPED_ROWS * block, 0)
     last = min(first + SKIPPED_ROWS, rows.shape[0])
     inside = reach[block, 1] >= begin and reach[block, 0] < end
     return first, last - first if inside else 0
 
 
-@kernel
-def number_edges(corners, offsets, most_steps, head, low, high, following, half_edges, corner_edges):
-    """Number the edges of a face list; return how many there are.
+# Columns of a link: the edge's higher vertex, the next link of the chain, its half-edges.
+HIGH, NEXT, FIRST, SECOND = 0, 1, 2, 3
 
-    Each vertex keeps a chain of the edges whose lower end it is. A vertex that is the lower end of k
-    edges takes k² / 2 steps; beyond ``most_steps`` in all, return TOO_LONG.
+
+@kernel
+def number_edges(corners, offsets, most_steps, head, low, links, corner_edges, plain):
+    """Assign a number to each edge of a face list; return how many there are.
+
+    Each vertex keeps a chain of the edges whose lower end it is. A vertex that is the lower end of
+    k edges takes k² / 2 steps; beyond ``most_steps`` in all, return TOO_LONG.
 
     Args:
         corners: (H,) vertices of the faces, face after face.
         offsets: (F + 1,) where the corners of each face begin.
         head: (V,) first edge of each vertex's chain; −1 on entry.
-        low, high: (H,) out: ends of each edge.
-        following: (H,) out: the next edge of the chain, or −1.
-        half_edges: (H, 2) out: an edge's first half-edge; its second, NONE or SEVERAL.
+        low: (H,) out: lower end of each edge.
+        links: (H, 4) out: HIGH, NEXT, FIRST, SECOND of each edge; SECOND is NONE or SEVERAL where
+            an edge has one half-edge or more than two.
         corner_edges: (H,) out: the edge that leaves each corner.
+        plain: (1,) out, for triangles: 1 if no face names a vertex twice and no two faces have the
+            same three vertices, as far as is known; else 0.
     """
     count, steps = 0, 0
+    plain[0] = 1
     for f in range(offsets.shape[0] - 1):
         first, stop = offsets[f], offsets[f + 1]
+        fresh = False
         for h in range(first, stop):
             start, end = corners[h], corners[h + 1 if h + 1 < stop else first]
             a, b = (start, end) if start < end else (end, start)
+            if a == b:
+                plain[0] = 0
             e = head[a]
-            while e >= 0 and high[e] != b:
-                e = following[e]
+            while e >= 0 and links[e, HIGH] != b:
+                e = links[e, NEXT]
                 steps += 1
             if e < 0:
                 e = count
                 count += 1
-                low[e], high[e] = a, b
-                following[e] = head[a]
-                half_edges[e, 0], half_edges[e, 1] = h, NONE
+                fresh = True
+                low[e] = a
+                links[e, HIGH], links[e, NEXT], links[e, FIRST] = b, head[a], h
+                links[e, SECOND] = NONE
                 head[a] = e
-            elif half_edges[e, 1] == NONE:
-                half_edges[e, 1] = h
+            elif links[e, SECOND] == NONE:
+                links[e, SECOND] = h
             else:
-                half_edges[e, 1] = SEVERAL
+                links[e, SECOND] = SEVERAL
             corner_edges[h] = e
         if steps > most_steps:
             return TOO_LONG
+        # A face whose vertices are those of an earlier one brings no edge.
+        if not fresh and plain[0] == 1 and _may_have_twin(corner_edges, links, f):
+            plain[0] = 0
     return count
+
+
+@inlined
+def _may_have_twin(corner_edges, links, f):
+    """Return whether an earlier triangle may have the edges of triangle f; True if not known."""
+    for i in range(3):
+        e = corner_edges[3 * f + i]
+        if links[e, SECOND] >= 0:
+            g = 3 * (links[e, FIRST] // 3)
+            other = corner_edges[3 * f + (i + 1 if i < 2 else 0)]
+            return (
+                corner_edges[g] == other
+                or corner_edges[g + 1] == other
+                or corner_edges[g + 2] == other
+            )
+    return True
 
 
 @kernel
@@ -96,7 +126,7 @@ def classify_edges(corners, face_of_corner, repeats, half_edges, begin, end, edg
         face_of_corner: (H,); (0,) for triangles.
         repeats: (F,) flags of such faces; (0,) if there are none.
     """
-    for e in range(begin, end):
+    for e in range(max(begin, 0), end):
         first, second = half_edges[e, 0], half_edges[e, 1]
         kind = IRREGULAR
         if not _in_repeating_face(face_of_corner, repeats, first):
@@ -112,34 +142,6 @@ def _in_repeating_face(face_of_corner, repeats, h):
     if len(repeats) == 0:
         return False
     return repeats[face_of_corner[h] if len(face_of_corner) else h // 3]
-
-
-@kernel
-def has_twin_faces(corner_edges, half_edges):
-    """Return whether two triangles may have the same three vertices; True if not known."""
-    for f in range(corner_edges.shape[0] // 3):
-        if _may_have_twin(corner_edges, half_edges, f):
-            return True
-    return False
-
-
-@inlined
-def _may_have_twin(corner_edges, half_edges, f):
-    """Return whether the one other face on an edge of triangle f has another edge of f too."""
-    unknown = True
-    for i in range(3):
-        e = corner_edges[3 * f + i]
-        first, second = half_edges[e, 0], half_edges[e, 1]
-        if second == NONE:
-            return False
-        if second >= 0 and unknown:
-            unknown = False
-            g = second // 3 if first // 3 == f else first // 3
-            other = corner_edges[3 * f + (i + 1 if i < 2 else 0)]
-            a, b, c = corner_edges[3 * g], corner_edges[3 * g + 1], corner_edges[3 * g + 2]
-            if not (a == other or b == other or c == other):
-                return False
-    return True
 
 
 @kernel
@@ -205,7 +207,7 @@ def count_corners(corners, reach, begin, end, corner, count):
 
     ``reach`` is that of blocks of 3 × SKIPPED_ROWS corners.
     """
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         count[v] = 0
     for block in range(reach.shape[0]):
         if reach[block, 1] < begin or reach[block, 0] >= end:
@@ -235,7 +237,7 @@ def mark_multi_fan(
 
     Creases divide no fan. ``corner`` and ``count`` come from ``count_corners``.
     """
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         multi_fan[v] = False
         if count[v] == 0:
             continue
@@ -275,7 +277,7 @@ def mark_multi_fan(
 @kernel
 def split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
     """Write the children 4 f … 4 f + 3 of triangles begin … end − 1."""
-    for f in range(begin, end):
+    for f in range(max(begin, 0), end):
         for i in range(3):
             middle = vertex_count + face_edges[f, i]
             before = i - 1 if i > 0 else 2
@@ -300,12 +302,12 @@ def _opened_before(half_edges, face):
 
 @kernel
 def number_halves(faces, face_edges, edges, half_edges, begin, end, halves):
-    """Number both children of the edges that first appear in faces begin … end − 1.
+    """Assign numbers to both children of the edges that first appear in faces begin … end − 1.
 
     ``halves`` (E, 2), out: the child at the lower endpoint, and at the higher.
     """
     following = 3 * begin + 2 * _opened_before(half_edges, begin)
-    for f in range(begin, end):
+    for f in range(max(begin, 0), end):
         for i in range(3):
             before = i - 1 if i > 0 else 2
             leaving, entering, vertex = face_edges[f, i], face_edges[f, before], faces[f, i]
@@ -357,14 +359,16 @@ def split_edges(
     """Write the edges of the children of triangles begin … end − 1."""
     to = to_edges, to_half_edges, to_class
     following = 3 * begin + 2 * _opened_before(half_edges, begin)
-    for f in range(begin, end):
+    for f in range(max(begin, 0), end):
         for i in range(3):
             before, after = i - 1 if i > 0 else 2, i + 1 if i < 2 else 0
             leaving, entering, vertex = face_edges[f, i], face_edges[f, before], faces[f, i]
             out_of = halves[leaving, 0 if vertex < faces[f, after] else 1]
             into = halves[entering, 0 if vertex < faces[f, before] else 1]
             if half_edges[leaving, 0] == 3 * f + i:
-                _write_half(leaving, vertex, out_of, faces, vertex_count, half_edges, edge_class, to)
+                _write_half(
+                    leaving, vertex, out_of, faces, vertex_count, half_edges, edge_class, to
+                )
                 following += 1
             inner = following
             following += 1

@@ -64,7 +64,7 @@ def correct_by_equation_1(
 
     Row 0 of ``eta``, ``frames``, ``gate`` and ``bound`` (C h² / R) is that of rows[begin].
     """
-    for i in range(begin, end):
+    for i in range(max(begin, 0), end):
         here = i - begin
         turned = combined(in_ball(row(eta, here)), frames, here)
         size = bound[here] * gate[here]
@@ -75,7 +75,20 @@ def correct_by_equation_1(
 
 @kernel
 def correct_by_prior(
-    rows, first, begin, end, z, basis, reach, gate, bound, weight, displacement, ratio, gates, bounds
+    rows,
+    first,
+    begin,
+    end,
+    z,
+    basis,
+    reach,
+    gate,
+    bound,
+    weight,
+    displacement,
+    ratio,
+    gates,
+    bounds,
 ):
     """Write δ = w γ Π_ρ(D + τ h F z), ‖z‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
 
@@ -87,7 +100,7 @@ def correct_by_prior(
         weight: w, 1 but at soft edges.
         displacement: in: D; out: δ.
     """
-    for i in range(begin, end):
+    for i in range(max(begin, 0), end):
         here, at = i - begin, first + rows[i]
         asked = combined(in_ball(row(z, here)), basis, here)
         wanted = (
@@ -116,7 +129,7 @@ def correct_curves(rows, bound, displacement, ratio, bounds):
 def add_displacement(displacement, begin, end, points):
     """Add δ to rows begin … end − 1; return the largest ‖δ‖²."""
     largest = 0.0
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         delta = row(displacement, v)
         for k in range(3):
             points[v, k] += delta[k]

@@ -59,7 +59,19 @@ def label_sectors(corner_edges, half_edges, edge_class, of_corner, first, size):
 
 @kernel
 def sector_normals(
-    points, corners, corner_edges, half_edges, edge_class, first, size, at, masks, outwards, begin, end, to
+    points,
+    corners,
+    corner_edges,
+    half_edges,
+    edge_class,
+    first,
+    size,
+    at,
+    masks,
+    outwards,
+    begin,
+    end,
+    to,
 ):
     """Write the unit normals of the limit surface in sectors begin … end − 1.
 
@@ -132,7 +144,18 @@ def dart_weight(decay, size, j):
 
 @kernel
 def sum_darts(
-    points, corners, corner_edges, half_edges, edge_class, first, size, opened, rows, decay, sums, total
+    points,
+    corners,
+    corner_edges,
+    half_edges,
+    edge_class,
+    first,
+    size,
+    opened,
+    rows,
+    decay,
+    sums,
+    total,
 ):
     """Add the weighted spokes of darts, but for the sharp edge's own share, in units of β.
 

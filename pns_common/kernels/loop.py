@@ -26,18 +26,20 @@ def opposite(faces, half_edge):
 def place_edges(points, faces, edges, half_edges, edge_class, soft, begin, end, placed):
     """Write the vertices of edges begin … end − 1: Loop's if interior, else the midpoint.
 
-    An edge of sharpness w gets (1 − w) Loop's + w the midpoint (mathematics: soft creases). ``soft``
-    is (0,) where no interior edge is soft.
+    An edge of sharpness w gets (1 − w) Loop's + w the midpoint. ``soft`` is (0,) where no interior
+    edge is soft.
     """
-    for e in range(begin, end):
+    for e in range(max(begin, 0), end):
         a, b = edges[e, 0], edges[e, 1]
         if edge_class[e] == INTERIOR:
             c, d = opposite(faces, half_edges[e, 0]), opposite(faces, half_edges[e, 1])
-            w = soft[e] if len(soft) else 0.0
             for k in range(3):
                 ends, sides = points[a, k] + points[b, k], points[c, k] + points[d, k]
-                smooth = EDGE_ENDPOINT * ends + EDGE_OPPOSITE * sides
-                placed[e, k] = (1 - w) * smooth + w * (MIDPOINT * ends) if w > 0 else smooth
+                placed[e, k] = EDGE_ENDPOINT * ends + EDGE_OPPOSITE * sides
+            if len(soft) and soft[e] > 0:
+                for k in range(3):
+                    middle = MIDPOINT * (points[a, k] + points[b, k])
+                    placed[e, k] = (1 - soft[e]) * placed[e, k] + soft[e] * middle
         else:
             for k in range(3):
                 placed[e, k] = MIDPOINT * (points[a, k] + points[b, k])
@@ -46,7 +48,7 @@ def place_edges(points, faces, edges, half_edges, edge_class, soft, begin, end, 
 @kernel
 def sum_rings(points, edges, reach, begin, end, sums, valence):
     """Write the sums of neighbours, and the valences, of vertices begin … end − 1."""
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         valence[v] = 0
         for k in range(3):
             sums[v, k] = 0.0
@@ -70,7 +72,7 @@ def blend_rings(points, valence, beta, begin, end, sums):
 
     ``beta``: Loop's weight of one neighbour, for each valence that occurs.
     """
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         weight = beta[valence[v]]
         centre = 1 - valence[v] * weight
         for k in range(3):
@@ -134,7 +136,7 @@ def blend_sharp(points, rows, weights, neighbours, centre, side, placed):
 def largest_coordinate(points, begin, end):
     """Return the largest absolute coordinate of rows begin … end − 1; NaN where one is."""
     largest = 0.0
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         for k in range(3):
             size = abs(points[v, k])
             if not size <= largest:

@@ -10,7 +10,16 @@ import math
 
 from pns_common.kernels import inlined, kernel
 from pns_common.kernels.connectivity import INTERIOR, skipped_block
-from pns_common.kernels.vectors import between, cross, difference, dot, norm, normal_and_area, root, row
+from pns_common.kernels.vectors import (
+    between,
+    cross,
+    difference,
+    dot,
+    norm,
+    normal_and_area,
+    root,
+    row,
+)
 
 # Columns of a vertex's means over its spokes: umbrella vector, squared length, x, signed bend and
 # its square, length, pull; then over its neighbours: opening, umbrella height, mean x.
@@ -31,7 +40,7 @@ def measure_faces(points, faces, begin, end, normals, areas):
 
     ``areas`` is (F, 4), or (0, 4) where it is not wanted.
     """
-    for f in range(begin, end):
+    for f in range(max(begin, 0), end):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         normal, vector, length = normal_and_area(row(points, a), row(points, b), row(points, c))
         for k in range(3):
@@ -50,7 +59,7 @@ def measure_edges(
 
     x and the sine are 0 where an edge is not interior. The sine is positive at ridges.
     """
-    for e in range(begin, end):
+    for e in range(max(begin, 0), end):
         spoke = between(points, edges[e, 0], edges[e, 1])
         square = dot(spoke, spoke)
         length = root(square)
@@ -72,7 +81,7 @@ def measure_edges(
 @kernel
 def mean_normals(faces, reach, areas, begin, end, fields):
     """Write area-weighted mean normals of vertices begin … end − 1 into ``fields`` (V, 4)."""
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         for k in range(FIELDS):
             fields[v, k] = 0.0
     for block in range(reach.shape[0]):
@@ -83,7 +92,7 @@ def mean_normals(faces, reach, areas, begin, end, fields):
                 if begin <= v < end:
                     for k in range(FIELDS):
                         fields[v, k] += areas[f, k]
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         area = fields[v, AREA]
         for k in range(3):
             fields[v, k] = fields[v, k] / area if area > 0 else 0.0
@@ -109,7 +118,7 @@ def mean_spokes(points, edges, reach, jumps, bends, sharp, begin, end, means, va
     The umbrella height is u · m / h_v; 0 where a sharp edge ends. ``sharp`` counts the sharp edges
     at each vertex, (0,) where there are none.
     """
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         valence[v] = 0
         for k in range(MEANS):
             means[v, k] = 0.0
@@ -130,7 +139,7 @@ def mean_spokes(points, edges, reach, jumps, bends, sharp, begin, end, means, va
                 valence[b] += 1
                 back = -spoke[0], -spoke[1], -spoke[2]
                 _add_spoke(means, b, back, square, jumps[e], bends[e], length)
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         for k in range(OPENING):
             means[v, k] = means[v, k] / max(valence[v], 1)
         reach_of_ring = root(means[v, SQUARE])
@@ -157,7 +166,7 @@ def mean_neighbours(points, edges, reach, fields, valence, begin, end, means):
                 means[b, OPENING] += opening
                 means[b, NEAR_HEIGHT] += fields[a, HEIGHT]
                 means[b, NEAR_JUMP] += means[a, JUMP]
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         for k in range(OPENING, MEANS):
             means[v, k] = means[v, k] / max(valence[v], 1)
 
@@ -165,7 +174,7 @@ def mean_neighbours(points, edges, reach, fields, valence, begin, end, means):
 @kernel
 def vertex_features(means, fields, rows, begin, end, features):
     """Write the features ``ring-10`` of vertices rows[begin:end]; row 0 is the first of them."""
-    for i in range(begin, end):
+    for i in range(max(begin, 0), end):
         v = rows[i]
         normal, umbrella, reach = row(fields, v), row(means, v), root(means[v, SQUARE])
         features[i - begin, 0] = means[v, JUMP]
@@ -188,7 +197,7 @@ def _quotient(value, by):
 @kernel
 def ring_basis(means, fields, rows, begin, end, basis):
     """Write mean normal, umbrella and pull in units of h_v, of vertices rows[begin:end]: (N, 9)."""
-    for i in range(begin, end):
+    for i in range(max(begin, 0), end):
         v = rows[i]
         reach = root(means[v, SQUARE])
         for k in range(3):
@@ -206,7 +215,7 @@ def normal_pushes(means, fields, valence, ringed, weight, strength, begin, end, 
         weight: w_k, the weight of the neighbours in Loop's limit mask, for each valence.
         strength: s.
     """
-    for v in range(begin, end):
+    for v in range(max(begin, 0), end):
         mean = row(fields, v)
         agreement = norm(mean)
         clear = agreement if agreement > CLEAR_NORMAL else CLEAR_NORMAL
