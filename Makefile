@@ -190,7 +190,7 @@ $(CLIENTS)/.ready: requirements/clients.txt
 
 $(INTEROP)/.ready: pyproject.toml setup.py constraints.txt requirements/interop.txt
 	$(PYTHON) -m venv $(INTEROP)
-	$(INTEROP)/bin/python -m pip install --quiet --editable '.[fast]' --requirement requirements/interop.txt
+	$(INTEROP)/bin/python -m pip install --quiet --editable . --requirement requirements/interop.txt
 	touch $@
 
 $(DEV)/.ready: pyproject.toml setup.py constraints.txt

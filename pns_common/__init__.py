@@ -1,39 +1,60 @@
-"""Proximity-Preserving Neural Subdivision: the operator, in numpy.
+"""Proximity-Preserving Neural Subdivision: the operator and its models.
 
     from pns_common import Mesh, load_model, pns, refine
 
     refined = refine(Mesh(vertices, faces), pns(load_model()), levels=2)
     refined.mesh.vertices, refined.mesh.faces, refined.report
 
-Where to read, each room seeing only those above it:
+Where to read:
 
-    base/           arrays of any backend, row blocks, whole files; errors.py beside it
-    mesh.py         the control mesh; connectivity/ what follows from its faces: topology.py (split)
-    geometry/       what is measured on it: frames.py F, rings.py, thin_faces.py ℓ, crease_lines/
-    masks/          Loop: stencils.py one step's masks, limit/ those of the limit surface
-    features/       φ, what the networks read of an edge and of a vertex's ring
-    formula/        correction.py (edges) and vertex_operator.py (old vertices); side_gate.py γ,
-                    prior.py D, tips.py, curve_prior.py, fold_guard.py G
-    models/         what a model says of itself: card.py, contract.py; the bundled files
-    rules/          control_level.py what a rule sees, placement.py what it answers; loop.py,
-                    learned.py (the paper's), scale_free.py (the default's), curves.py
-    schemes.py      a rule for old vertices and one for edges
-    levels/         step.py one level in formulas, array_steps.py one after the other; the report
-    fused/          the same compiled: each module names the one whose bits it has
-    runtimes/       what runs a model file: onnx_model.py loads it, and finds who does
-    arguments.py    what may be asked; refine.py all levels, refine_parts.py many meshes at once,
-                    pieces/ one mesh in pieces
+    operator        the formula, top to bottom; start here
+    schemes/        base schemes, one file each: masks and split; and what ``pns`` makes of a model
+    mesh, topology  faces of any degree; edges, classes, sharpness, splits
+    level           measurements that the operator reads; curves, creases beside it
+    limit, columns  the limit surface; masks on attribute columns
+    kernels/        compiled loops over elements
+    model/          card, file, session: what a model is, and onnxruntime, which runs it
+    refinement      all levels; report beside it
     interop/        meshes of other libraries
+
+Names are imported when they are first used: ``import pns_common`` loads no compiler.
 """
 
-from pns_common.connectivity.creases import Creases
-from pns_common.crease_lines import crease_lines
-from pns_common.errors import MeshError, ModelError, ParameterError, PnsError
-from pns_common.interop.subdivide import subdivide
-from pns_common.mesh import Mesh, clean
-from pns_common.refine import Refinement, refine
-from pns_common.runtimes.onnx_model import load_model
-from pns_common.schemes import Scheme, loop, pns
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pns_common.creases import Creases, sharp_edges
+    from pns_common.errors import MeshError, ModelError, ParameterError, PnsError
+    from pns_common.interop.subdivide import subdivide
+    from pns_common.mesh import Mesh, clean
+    from pns_common.model.file import load_model
+    from pns_common.refinement import Refinement, refine, refine_many
+    from pns_common.schemes import Scheme, loop, pns
+    from pns_common.version import VERSION as __version__  # noqa: N811
+    from pns_common.warming import warm_up
+
+_HOMES = {
+    "Creases": "creases",
+    "Mesh": "mesh",
+    "MeshError": "errors",
+    "ModelError": "errors",
+    "ParameterError": "errors",
+    "PnsError": "errors",
+    "Refinement": "refinement",
+    "Scheme": "schemes",
+    "clean": "mesh",
+    "load_model": "model.file",
+    "loop": "schemes",
+    "pns": "schemes",
+    "refine": "refinement",
+    "refine_many": "refinement",
+    "sharp_edges": "creases",
+    "subdivide": "interop.subdivide",
+    "warm_up": "warming",
+}
 
 __all__ = [
     "Creases",
@@ -44,11 +65,28 @@ __all__ = [
     "PnsError",
     "Refinement",
     "Scheme",
+    "__version__",
     "clean",
-    "crease_lines",
     "load_model",
     "loop",
     "pns",
     "refine",
+    "refine_many",
+    "sharp_edges",
     "subdivide",
+    "warm_up",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return import_module("pns_common.version").VERSION
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

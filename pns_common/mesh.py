@@ -1,89 +1,142 @@
-"""The control mesh: vertices and faces, validated once so that every kernel may trust them."""
+"""The control mesh: vertices and faces, validated once so that every loop may trust them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.base.arrays import marked
-from pns_common.base.extent import extent
 from pns_common.errors import MeshError, ParameterError
+from pns_common.parallel import Blocks
+from pns_common.topology import Topology, build_topology
 
 # Fourth powers of lengths (squared cross products) must neither overflow nor vanish in float64.
 LARGEST_COORDINATE = 1e75
 SMALLEST_EXTENT = 1e-70
+TRIANGLE = 3
 
 
-@dataclass(frozen=True, eq=False)
 class Mesh:
-    """A triangle mesh: ``vertices`` (V, 3) float64 and ``faces`` (F, 3) int64, both read-only.
+    """A polygon mesh: vertices, and faces of any degree, anticlockwise seen from outside.
 
-    Both are copies: of arrays of any real or whole type, in any order in memory, or of lists that
-    make such arrays. Faces run anticlockwise, seen from outside.
+    Both are kept as read-only copies: of arrays of any real or whole type, or of lists that make
+    such arrays. No mesh is refused for its topology: boundaries, irregular edges, several
+    components, bow-ties and isolated vertices are all allowed. Coordinates reach from −1e75 to
+    1e75, and their extent is at least 1e-70 or exactly 0.
 
-    No mesh is refused for its topology: boundaries, irregular edges, several components, bow-ties
-    and isolated vertices are all allowed. Coordinates reach from −1e75 to 1e75, and their extent is
-    at least 1e-70 or exactly 0.
+    Args:
+        vertices: (V, 3) real numbers.
+        faces: (F, 3) triangles, (F, n) polygons of n corners, or a list of polygons of any degrees;
+            whole numbers.
+
+    Attributes:
+        vertices: (V, 3) float64.
+        corners: (H,) int64, the vertices of the faces, face after face.
 
     Raises:
-        MeshError: wrong shapes or types, no faces, a masked number, a NaN, infinite or huge
-            coordinate, an extent too small to compute with, or an index out of range; the error
-            names the element.
+        MeshError: wrong shapes or types, no faces, a face of fewer than three corners, a masked
+            number, a NaN, infinite or huge coordinate, an extent too small to compute with, or an
+            index out of range; the error names the element.
     """
 
+    __slots__ = ("_faces", "_offsets", "corners", "vertices")
     vertices: Float[np.ndarray, "V 3"]
-    faces: Int[np.ndarray, "F 3"]
+    corners: Int[np.ndarray, " H"]
+    _offsets: Int[np.ndarray, " F1"] | None
+    _faces: Int[np.ndarray, "F N"] | None
 
-    def __post_init__(self) -> None:
-        vertices, faces = _array(self.vertices, "vertices"), _array(self.faces, "faces")
-        if vertices.ndim != 2 or vertices.shape[1] != 3:
-            raise MeshError(f"shape {vertices.shape}, expected (V, 3)", element="vertices")
-        if vertices.dtype.kind not in "fiu":
-            raise MeshError(f"type {vertices.dtype}, expected real numbers", element="vertices")
-        # Before the cast: an index of 2⁶⁴ − 1 would become −1.
-        check_faces(faces, len(vertices))
-        if len(faces) == 0:
+    def __init__(self, vertices: Any, faces: Any) -> None:
+        given = _array(vertices, "vertices")
+        if given.ndim != 2 or given.shape[1] != TRIANGLE:
+            raise MeshError(f"shape {given.shape}, expected (V, 3)", element="vertices")
+        if given.dtype.kind not in "fiu":
+            raise MeshError(f"type {given.dtype}, expected real numbers", element="vertices")
+        corners, offsets = _polygons(faces, len(given))
+        if len(corners) == 0:
             raise MeshError("no faces to refine", element="faces")
-        vertices, faces = _frozen(vertices, np.float64), _frozen(faces, np.int64)
-        low, high = extent(vertices)
-        # Written so that NaN fails it too.
-        if not ((low >= -LARGEST_COORDINATE) & (high <= LARGEST_COORDINATE)).all():
-            fits = (np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1)
-            worst = int(np.argmin(fits))
-            coordinates = vertices[worst].tolist()
-            raise MeshError(
-                f"coordinates {coordinates}, expected finite numbers up to {LARGEST_COORDINATE:g}",
-                element="vertex",
-                index=worst,
-            )
-        widest = (high - low).max()
-        if 0 < widest < SMALLEST_EXTENT:
-            raise MeshError(
-                f"extent {widest:g}, expected at least {SMALLEST_EXTENT:g}: scale the mesh up",
-                element="vertices",
-            )
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "faces", faces)
+        points = np.array(given, dtype=np.float64, order="C")
+        _check_coordinates(points)
+        degrees = np.diff(offsets)
+        uniform = (degrees == degrees[0]).all()
+        self._keep(points, corners, offsets, int(degrees[0]) if uniform else None)
+
+    def _keep(
+        self,
+        vertices: Float[np.ndarray, "V 3"],
+        corners: Int[np.ndarray, " H"],
+        offsets: Int[np.ndarray, " F1"] | None,
+        degree: int | None,
+    ) -> None:
+        """Keep arrays; ``degree`` is that of all faces, which then need no offsets."""
+        for array in (vertices, corners):
+            array.flags.writeable = False
+        faces = None if degree is None else corners.reshape(-1, degree)
+        values = vertices, corners, offsets, faces
+        for name, value in zip(("vertices", "corners", "_offsets", "_faces"), values, strict=True):
+            object.__setattr__(self, name, value)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a Mesh is read-only: {name} cannot be set")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        degree = None if self._faces is None else self._faces.shape[1]
+        return _kept, (self.vertices, self.corners, self._offsets, degree)
 
     def __repr__(self) -> str:
-        return f"Mesh(vertices={len(self.vertices)}, faces={len(self.faces)})"
+        count = len(self.offsets) - 1 if self._faces is None else len(self._faces)
+        return f"Mesh(vertices={len(self.vertices)}, faces={count})"
 
-    def __setstate__(self, state: dict[str, np.ndarray]) -> None:
-        """Take what a copy or a pickle holds: its arrays may be written to, a mesh's may not."""
-        for name, array in state.items():
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+    @property
+    def offsets(self) -> Int[np.ndarray, " F1"]:
+        """Where the corners of each face begin, and where the last ones end: (F + 1,)."""
+        if self._offsets is not None:
+            return self._offsets
+        return np.arange(0, len(self.corners) + 1, self.faces.shape[1])
+
+    @property
+    def faces(self) -> Int[np.ndarray, "F N"]:
+        """Vertices of each face, (F, 3) for triangles.
+
+        Raises:
+            MeshError: the faces have different degrees; ``polygons`` lists them.
+        """
+        if self._faces is None:
+            raise MeshError("faces of different degrees, expected all alike", element="faces")
+        return self._faces
+
+    @property
+    def polygons(self) -> list[Int[np.ndarray, " N"]]:
+        """Vertices of each face."""
+        return np.split(self.corners, self.offsets[1:-1])
+
+    @property
+    def triangles(self) -> bool:
+        """Whether all faces are triangles."""
+        return self._faces is not None and self._faces.shape[1] == TRIANGLE
+
+    def topology(self, blocks: Blocks | None = None) -> Topology:
+        """Return the mesh's edges; ``blocks`` shares the work among threads."""
+        faces = self.faces if self.triangles else (self.corners, self.offsets)
+        return build_topology(faces, len(self.vertices), blocks)
 
     @classmethod
     def of_refined(cls, vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Mesh:
-        """Make a mesh of arrays that a refinement step made and checked: not copied, not read."""
-        mesh = object.__new__(cls)
-        for name, array in (("vertices", vertices), ("faces", faces)):
-            array.flags.writeable = False
-            object.__setattr__(mesh, name, array)
-        return mesh
+        """Make a mesh of arrays that a refinement made and checked: neither copied nor read."""
+        return _kept(vertices, faces.reshape(-1), None, TRIANGLE)
+
+
+def _kept(
+    vertices: Float[np.ndarray, "V 3"],
+    corners: Int[np.ndarray, " H"],
+    offsets: Int[np.ndarray, " F1"] | None,
+    degree: int | None,
+) -> Mesh:
+    """Make a mesh of arrays that are known to be right."""
+    mesh = object.__new__(Mesh)
+    mesh._keep(vertices, corners, offsets, degree)  # pyright: ignore[reportPrivateUsage]
+    return mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +179,8 @@ def clean(mesh: Mesh) -> Cleaned:
     face_map[proper[is_leader]] = number[is_leader]
 
     kept = np.take(mesh.faces, proper[is_leader], axis=0)
-    used = marked(kept.reshape(-1), len(mesh.vertices))
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[kept] = True
     vertex_map = np.where(used, np.cumsum(used) - 1, -1)
     same = len(kept) == len(mesh.faces) and used.all()
     return Cleaned(
@@ -152,31 +206,83 @@ def check_is_mesh(given: object) -> None:
 
 
 def check_faces(faces: np.ndarray, vertex_count: int) -> None:
-    """Refuse what are no faces of so many vertices; there may be none.
+    """Check triangles of so many vertices; there may be none.
 
     Raises:
         MeshError: wrong shape or type, or an index out of range.
     """
-    if faces.ndim != 2 or faces.shape[1] != 3:
+    if faces.ndim != 2 or faces.shape[1] != TRIANGLE:
         raise MeshError(f"shape {faces.shape}, expected (F, 3)", element="faces")
     if len(faces) == 0:  # an empty list has no integers
         return
     if faces.dtype.kind not in "iu":
         raise MeshError(f"type {faces.dtype}, expected integers", element="faces")
-    if not (faces.min() >= 0 and faces.max() < vertex_count):
-        inside = ((faces >= 0) & (faces < vertex_count)).all(axis=1)
-        worst = int(np.argmin(inside))
-        raise MeshError(
-            f"indices {faces[worst].tolist()}, expected 0 … {vertex_count - 1}",
-            element="face",
-            index=worst,
-        )
+    offsets = np.arange(0, faces.size + 1, TRIANGLE)
+    _check_indices(faces.reshape(-1), offsets, vertex_count)
 
 
 def repeated_vertex(faces: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
-    """Return whether a face names a vertex twice."""
+    """Return whether a triangle names a vertex twice."""
     a, b, c = faces.T
     return (a == b) | (b == c) | (c == a)
+
+
+def _polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return corners and offsets of faces of any degree. Raises MeshError."""
+    rows: list[Any] = list(faces) if isinstance(faces, list | tuple) else []  # pyright: ignore[reportUnknownArgumentType]
+    degrees = [int(np.size(face)) for face in rows]
+    if len(set(degrees)) > 1:
+        corners = np.concatenate([_array(face, "faces").reshape(-1) for face in rows])
+        offsets: np.ndarray = np.concatenate([[0], np.cumsum(degrees)])
+    else:
+        given = _array(faces, "faces")
+        if given.size == 0:
+            return np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64)
+        if given.ndim != 2:
+            raise MeshError(f"shape {given.shape}, expected (F, 3)", element="faces")
+        corners = given.reshape(-1)
+        offsets = np.arange(0, corners.size + 1, int(given.shape[1]))
+    if corners.dtype.kind not in "iu":
+        raise MeshError(f"type {corners.dtype}, expected integers", element="faces")
+    few = np.flatnonzero(np.diff(offsets) < TRIANGLE)
+    if len(few):
+        count = int(np.diff(offsets)[few[0]])
+        reason = f"{count} corners, expected at least 3"
+        raise MeshError(reason, element="face", index=int(few[0]))
+    # Before the cast: an index of 2⁶⁴ − 1 would become −1.
+    _check_indices(corners, offsets, vertex_count)
+    return np.array(corners, dtype=np.int64), offsets.astype(np.int64)
+
+
+def _check_indices(corners: np.ndarray, offsets: np.ndarray, vertex_count: int) -> None:
+    if corners.min() >= 0 and corners.max() < vertex_count:
+        return
+    outside = np.flatnonzero((corners < 0) | (corners >= vertex_count))
+    worst = int(np.searchsorted(offsets, outside[0], side="right")) - 1
+    face = corners[offsets[worst] : offsets[worst + 1]].tolist()
+    raise MeshError(f"indices {face}, expected 0 … {vertex_count - 1}", element="face", index=worst)
+
+
+def _check_coordinates(vertices: Float[np.ndarray, "V 3"]) -> None:
+    # One column at a time: numpy reduces a contiguous column many times faster than rows of three.
+    columns = [np.ascontiguousarray(vertices[:, k]) for k in range(3)]
+    low, high = (np.array([reduce(column) for column in columns]) for reduce in (np.min, np.max))
+    # Written so that NaN fails it too.
+    if not ((low >= -LARGEST_COORDINATE) & (high <= LARGEST_COORDINATE)).all():
+        fits = (np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1)
+        worst = int(np.argmin(fits))
+        raise MeshError(
+            f"coordinates {vertices[worst].tolist()}, expected finite numbers up to "
+            f"{LARGEST_COORDINATE:g}",
+            element="vertex",
+            index=worst,
+        )
+    widest = (high - low).max()
+    if 0 < widest < SMALLEST_EXTENT:
+        raise MeshError(
+            f"extent {widest:g}, expected at least {SMALLEST_EXTENT:g}: scale the mesh up",
+            element="vertices",
+        )
 
 
 def _first_alike(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Int[np.ndarray, " F"]:
@@ -206,10 +312,3 @@ def _array(values: object, element: str) -> np.ndarray:
         raise MeshError(
             "rows of different lengths, expected three numbers each", element=element
         ) from error
-
-
-def _frozen(values: np.ndarray, dtype: np.typing.DTypeLike) -> np.ndarray:
-    """Return a read-only C-contiguous copy that no caller can change behind the mesh's back."""
-    copy = np.array(values, dtype=np.dtype(dtype), order="C")
-    copy.flags.writeable = False
-    return copy

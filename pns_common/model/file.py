@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from pns_common.errors import ModelError, ParameterError
 from pns_common.model.card import CARD_KEY, ModelCard
@@ -71,7 +71,7 @@ def load_model(
     source = DEFAULT_MODEL if source is None else source
     if not isinstance(source, str | os.PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise ParameterError("source", source, expected="a bundled name, a path, or None")
-    if isinstance(source, str) and source in bundled_models():
+    if _is_bundled(source):
         data = (BUNDLED / f"{source}.onnx").read_bytes()
         _check_listed(BUNDLED, source, data)
         return model_from_bytes(data, source, providers)
@@ -81,6 +81,15 @@ def load_model(
         raise ModelError(str(path), expected=f"a file or a bundled name ({names})", found="none")
     _check_size(path.stat().st_size, str(path))
     return model_from_bytes(path.read_bytes(), path.stem, providers)
+
+
+def model_name(source: str | os.PathLike[str]) -> str:
+    """Return what the model of a source is called: the bundled name itself, or the file's stem."""
+    return source if _is_bundled(source) else Path(source).stem
+
+
+def _is_bundled(source: str | os.PathLike[str]) -> TypeGuard[str]:
+    return isinstance(source, str) and source in bundled_models()
 
 
 def bundled_models() -> list[str]:

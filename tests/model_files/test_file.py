@@ -20,6 +20,7 @@ from pns_common.model.file import (
     check_file,
     load_model,
     model_from_bytes,
+    model_name,
 )
 from pns_common.model.session import CHUNK_ROWS
 from tests.support.model_files import (
@@ -270,7 +271,14 @@ def test_wide_layers_are_accepted_up_to_the_limit_and_no_further():
     [
         (doubled("features", 1, 40), {}),
         (doubled("seed", 0, 40), {"seed": np.zeros(2)}),
-        ([node("Transpose", ["features"], ["t"]), node("Gemm", ["features", "t"], ["p"])], {}),
+        (
+            [
+                node("Transpose", ["features"], ["columns"]),
+                *doubled("columns", 1, 3),
+                node("MatMul", ["features", "twice2"], ["product"]),
+            ],
+            {},
+        ),
         (
             [node("Add", ["column", "row"], ["table"])],
             {"column": np.zeros((30_000, 1)), "row": np.zeros((1, 30_000))},
@@ -365,10 +373,13 @@ def test_a_bundled_name_wins_over_a_file_and_a_path_is_a_file(tmp_path, monkeypa
 
 
 def test_a_file_is_called_by_its_stem(tmp_path):
-    path = tmp_path / "mine.onnx"
-    path.write_bytes(GOOD)
-    model = load_model(path)
-    assert (model.name, model.card, model.size) == ("mine", PAPER_CARD, len(GOOD))
+    for file in ("mine.onnx", "mine"):
+        path = tmp_path / file
+        path.write_bytes(GOOD)
+        model = load_model(str(path))
+        assert (model.name, model.card, model.size) == ("mine", PAPER_CARD, len(GOOD))
+        assert model_name(path) == "mine"
+    assert model_name("paper") == model_name(Path("other/paper.onnx")) == "paper"
 
 
 def test_a_file_that_is_not_there_lists_the_bundled_names():

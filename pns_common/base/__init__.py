@@ -1,1 +1,0 @@
-"""What knows no geometry: arrays of any backend, work in row blocks, whole files."""

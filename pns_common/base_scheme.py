@@ -1,0 +1,43 @@
+"""A base scheme: what is left when nothing is learned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.parallel import Blocks
+from pns_common.topology import Topology
+
+Place = Callable[[Float[np.ndarray, "V K"], Topology, Blocks], Float[np.ndarray, "W K"]]
+
+
+class Split(Protocol):
+    """Split every face; ``inherit``: whether the halves of sharp edges stay sharp."""
+
+    def __call__(self, parent: Topology, blocks: Blocks, *, inherit: bool = True) -> Topology:
+        """Return the topology of the split mesh."""
+        ...
+
+
+@dataclass(frozen=True)
+class BaseScheme:
+    """A linear subdivision scheme. Its masks have rows ≥ 0 that sum to 1.
+
+    Attributes:
+        name: its name in reports and on model cards.
+        place: applies the masks of one level to any columns: rows of old vertices, then new ones.
+        split: splits the faces.
+        limit_weight: of a smooth vertex of valence k, the weight of its neighbours' mean in the
+            limit mask; the learned rule's prior is made of it. None for schemes without one.
+    """
+
+    name: str
+    place: Place = field(repr=False)
+    split: Split = field(repr=False)
+    limit_weight: Callable[[Int[np.ndarray, " N"]], Float[np.ndarray, " N"]] | None = field(
+        default=None, repr=False
+    )

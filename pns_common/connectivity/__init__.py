@@ -1,1 +1,0 @@
-"""What follows from the faces alone: edges and stencils, creases, orders, unions."""

@@ -1,0 +1,196 @@
+"""Edges that stay sharp: named by the caller, or found by their angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.errors import ParameterError
+from pns_common.mesh import Mesh, check_is_mesh
+from pns_common.normals import face_normals
+from pns_common.parameters import is_number, is_whole
+from pns_common.topology import Topology, build_topology
+
+# ``crease=auto``: edges that turn by more than ANGLE degrees and are connected, by such edges, to
+# one that turns by more than SEED.
+ANGLE, SEED = 40.0, 60.0
+HALF_TURN = 180
+
+
+@dataclass(frozen=True, eq=False)
+class Creases:
+    """Edges of a control mesh that are kept sharp.
+
+    Attributes:
+        named: (N, 2) pairs of vertices; None for none.
+        angle: find edges that turn by more than this, in degrees; None: find none.
+        seed: of these, keep those that are connected by such edges to one that turns by more than
+            this, in degrees; None: keep all.
+        levels: at how many levels the edges are sharp (semi-sharp creases, DeRose, Kass and Truong
+            1998); None: at all. Edges that are sharp at the last level count as sharp for good in
+            limits.
+
+    Raises:
+        ParameterError: pairs that are no pairs of whole numbers, an angle outside 0 … 180, a seed
+            below the angle, or levels below 1.
+    """
+
+    named: Int[np.ndarray, "N 2"] | None = None
+    angle: float | None = None
+    seed: float | None = None
+    levels: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.named is not None:
+            object.__setattr__(self, "named", as_pairs(self.named))
+        angle, seed, levels = self.angle, self.seed, self.levels
+        if angle is not None and not (is_number(angle) and 0 < angle < HALF_TURN):
+            raise ParameterError("angle", angle, expected="degrees between 0 and 180")
+        if seed is not None and not (is_number(seed) and (angle or 0) <= seed < HALF_TURN):
+            raise ParameterError("seed", seed, expected="degrees, from the angle to below 180")
+        if levels is not None and not (is_whole(levels) and levels >= 1):
+            raise ParameterError("levels", levels, expected="a whole number, at least 1")
+
+    def with_named(self, pairs: Int[np.ndarray, "N 2"]) -> Creases:
+        """Return a copy with further pairs of vertices named."""
+        if len(pairs) == 0:
+            return self
+        named = pairs if self.named is None else np.concatenate([pairs, self.named])
+        return replace(self, named=named)
+
+    def sharp_at(self, depth: int) -> bool:
+        """Return whether the edges are sharp at a level; level 0 refines the control mesh."""
+        return self.levels is None or depth < self.levels
+
+    def applied(self, points: Float[np.ndarray, "V 3"], topology: Topology) -> Topology:
+        """Return the topology with these edges as creases.
+
+        Raises:
+            ParameterError: a named pair is no edge of the mesh.
+        """
+        if self.named is not None and len(self.named):
+            topology = topology.with_creases(topology.rows_of(self.named))
+        if self.angle is not None:
+            topology = topology.with_creases(self.found(points, topology))
+        return topology
+
+    def found(self, points: Float[np.ndarray, "V 3"], topology: Topology) -> Int[np.ndarray, " N"]:
+        """Return the interior edges that are found by their angle."""
+        if self.angle is None:
+            return np.zeros(0, dtype=np.int64)
+        cosine = edge_cosines(points, topology)
+        rows = np.flatnonzero(cosine < np.cos(np.radians(self.angle)))
+        if self.seed is None or len(rows) == 0:
+            return rows
+        seeds = cosine[rows] < np.cos(np.radians(self.seed))
+        return rows[_connected(topology.edges[rows].astype(np.int64), seeds)]
+
+
+AUTOMATIC = Creases(angle=ANGLE, seed=SEED)
+NO_CREASES = Creases()
+
+
+def sharp_edges(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2"]:
+    """Return the edges of a mesh that its shape shows to be sharp, as pairs of vertices.
+
+    Args:
+        mesh: a mesh of triangles.
+        angle: edges that turn by more than so many degrees. None: those that turn by more than 40
+            and are connected by such edges to one that turns by more than 60.
+
+    Raises:
+        ParameterError: it is no Mesh, or the angle is out of range.
+    """
+    check_is_mesh(mesh)
+    creases = AUTOMATIC if angle is None else Creases(angle=angle)
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    return topology.edges[creases.found(mesh.vertices, topology)].astype(np.int64)
+
+
+def chosen_creases(
+    given: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None, automatic: Creases
+) -> Creases:
+    """Return the creases that an argument asks for; "auto": those of the scheme.
+
+    Raises:
+        ParameterError: another word, or no pairs of whole numbers.
+    """
+    if isinstance(given, str):
+        if given != "auto":
+            raise ParameterError("creases", given, expected='"auto", None or pairs of vertices')
+        return automatic
+    return given if isinstance(given, Creases) else Creases(given)
+
+
+def edge_cosines(points: Float[np.ndarray, "V 3"], topology: Topology) -> Float[np.ndarray, " E"]:
+    """Return n1 · n2 of interior edges; 1 at other edges and beside faces without area."""
+    normals = face_normals(points, topology.faces)
+    cosine = np.ones(len(topology.edges))
+    rows = topology.interior
+    sides = topology.half_edges[rows] // 3
+    n, m = normals[sides[:, 0]], normals[sides[:, 1]]
+    known = n.any(axis=1) & m.any(axis=1)
+    cosine[rows] = np.where(known, np.einsum("ij,ij->i", n, m), 1.0)
+    return cosine
+
+
+def _connected(
+    edges: Int[np.ndarray, "N 2"], seeds: Bool[np.ndarray, " N"]
+) -> Bool[np.ndarray, " N"]:
+    """Return the edges that a path of edges connects to a seed."""
+    vertices, ends = np.unique(edges, return_inverse=True)
+    ends = ends.reshape(edges.shape)
+    label = np.arange(len(vertices))
+    while True:
+        least = np.minimum(label[ends[:, 0]], label[ends[:, 1]])
+        lower = label.copy()
+        np.minimum.at(lower, ends[:, 0], least)
+        np.minimum.at(lower, ends[:, 1], least)
+        lower = lower[lower]
+        if (lower == label).all():
+            break
+        label = lower
+    seeded = np.zeros(len(vertices), dtype=bool)
+    seeded[label[ends[seeds, 0]]] = True
+    return seeded[label[ends[:, 0]]]
+
+
+def as_pairs(creases: Any) -> Int[np.ndarray, "N 2"]:
+    """Return a copy of creases as rows of two whole numbers, whatever they number.
+
+    Raises:
+        ParameterError: they are something else.
+    """
+    # numpy would read what lies under the mask.
+    if np.ma.is_masked(creases):
+        raise ParameterError("creases.mask", True, expected="no masked values")
+    try:
+        pairs = np.asarray(creases)
+    except ValueError as error:  # rows differ in length
+        row = next(row for row, pair in enumerate(creases) if not _is_pair(pair))
+        raise ParameterError(f"creases[{row}]", creases[row], expected="two vertices") from error
+    if pairs.size == 0 and pairs.ndim in (1, 2):
+        # An empty list has no integers to tell it from one of floats.
+        return np.zeros((0, 2), dtype=np.int64)
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        expected = "(N, 2): a row of two vertices for each edge"
+        raise ParameterError("creases.shape", pairs.shape, expected=expected)
+    if pairs.dtype.kind not in "iu":
+        expected = "whole numbers of an integer type"
+        raise ParameterError("creases.dtype", str(pairs.dtype), expected=expected)
+    # Before the cast: 2⁶⁴ − 1 would become −1.
+    huge = np.flatnonzero((pairs > np.iinfo(np.int64).max).any(axis=1))
+    if len(huge):
+        row = int(huge[0])
+        raise ParameterError(f"creases[{row}]", pairs[row].tolist(), expected="two vertices")
+    return pairs.astype(np.int64)
+
+
+def _is_pair(row: Any) -> bool:
+    try:
+        return np.shape(row) == (2,)
+    except ValueError:  # it holds rows that differ in length
+        return False

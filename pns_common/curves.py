@@ -1,0 +1,110 @@
+"""Curves: boundaries and creases, which become cubic B-splines, and the prior along them.
+
+A B-spline runs inside the bends of its polygon: the limit of a vertex p between a and b is
+p + (a + b − 2 p) / 6. Pushing p the other way, across the curve, undoes that:
+
+    d_p = −γ_p (u − (u · t) t) / 3        u = (a + b) / 2 − p, t the direction from a to b
+
+with γ_p = tanh(c_v x_p) f(x_p), x_p = 1 − cos of the turning angle at p: 0 where the curve is
+straight, and 0 at corners of a right angle or more. Nothing here reads the surface beside the
+curve, so two meshes that share a boundary and R move it alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.kernels import connectivity
+from pns_common.kernels.loop import CURVE_CENTRE, CURVE_NEIGHBOUR, MIDPOINT
+from pns_common.topology import Topology
+
+# f falls from 1 where a curve turns by 60 degrees to 0 at 90.
+BEND, CORNER = 1 / 2, 1.0
+TWO = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """The curves of a mesh.
+
+    Attributes:
+        movable: (V,) vertices on exactly two edges of curves and on no irregular edge.
+        rows: their numbers.
+        sides: (N, 2) the two neighbours of each along the curve.
+        a, b: (N, 3) from each to these.
+        ends: (K, 2) ends of the curve edges that end at a movable vertex.
+        new_rows: (N + K,) new vertices on curves, rows of the refined mesh: movable vertices, then
+            the vertices of these edges.
+        squares: their h²: mean square of both spokes; square of the edge's length.
+        shared: (W,) new vertices that a boundary alone places.
+    """
+
+    movable: Bool[np.ndarray, " V"]
+    rows: Int[np.ndarray, " N"]
+    sides: Int[np.ndarray, "N 2"]
+    a: Float[np.ndarray, "N 3"]
+    b: Float[np.ndarray, "N 3"]
+    ends: Int[np.ndarray, "K 2"]
+    new_rows: Int[np.ndarray, " M"]
+    squares: Float[np.ndarray, " M"]
+    shared: Bool[np.ndarray, " W"]
+
+
+def find_curves(points: Float[np.ndarray, "V 3"], mesh: Topology) -> Curves:
+    """Find the curves of a mesh."""
+    count, kinds, sharp = mesh.vertex_count, mesh.edge_class, mesh.sharpest
+    shared = np.zeros(count + len(mesh.edges), dtype=bool)
+    movable = np.zeros(count, dtype=bool)
+    if sharp is None or len(mesh.sharp_edges) == 0:
+        rows, pairs, none = np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros((0, 3))
+        return Curves(movable, rows, pairs, none, none, pairs, rows, np.zeros(0), shared)
+    edges = mesh.sharp_edges[kinds[mesh.sharp_edges] != connectivity.IRREGULAR]
+    of_curve = np.bincount(mesh.edges[edges].reshape(-1), minlength=count)
+    movable = (of_curve == TWO) & (mesh.sharp_count == TWO)
+    rows = np.flatnonzero(movable)
+    sides = sharp.neighbours[rows]
+    a, b = (points[sides[:, side]] - points[rows] for side in (0, 1))
+    ends = mesh.edges[edges]
+    moves = movable[ends[:, 0]] | movable[ends[:, 1]]
+    edges, ends = edges[moves].astype(np.int64), ends[moves]
+    along = points[ends[:, 1]] - points[ends[:, 0]]
+    on_boundary = kinds == connectivity.BOUNDARY
+    if on_boundary.any():
+        shared[:count], shared[count:] = movable, on_boundary
+        shared[mesh.edges[mesh.crease_edges].reshape(-1)] = False
+    squares = [(_square(a) + _square(b)) / 2, _square(along)]
+    new_rows = np.concatenate([rows, count + edges])
+    return Curves(movable, rows, sides, a, b, ends, new_rows, np.concatenate(squares), shared)
+
+
+def curve_pushes(curves: Curves, gate_sharpness: float) -> Float[np.ndarray, "V 3"]:
+    """Return d of all vertices, 0 beside curves; ``gate_sharpness`` is c_v."""
+    a, b = curves.a, curves.b
+    turning = 1 + np.einsum("ij,ij->i", _unit(a), _unit(b))
+    fade = np.clip((CORNER - turning) / (CORNER - BEND), 0.0, 1.0)
+    gate = np.tanh(gate_sharpness * turning) * fade
+    along, middle = _unit(b - a), (a + b) / 2
+    off = middle - np.einsum("ij,ij->i", middle, along)[:, None] * along
+    pushes = np.zeros((len(curves.movable), 3))
+    pushes[curves.rows] = -(gate / 3)[:, None] * off
+    return pushes
+
+
+def curve_prior(curves: Curves, pushes: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "M 3"]:
+    """Return D at the new vertices of curves: the curve masks of the base scheme, of ``pushes``."""
+    first, second = (pushes[curves.sides[:, side]] for side in (0, 1))
+    vertices = CURVE_CENTRE * pushes[curves.rows] + CURVE_NEIGHBOUR * (first + second)
+    edges = MIDPOINT * (pushes[curves.ends[:, 0]] + pushes[curves.ends[:, 1]])
+    return np.concatenate([vertices, edges])
+
+
+def _square(v: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
+    return np.einsum("ij,ij->i", v, v)
+
+
+def _unit(v: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
+    length = np.sqrt(_square(v))
+    return v / np.where(length > 0, length, np.inf)[:, None]

@@ -1,1 +1,0 @@
-"""A learned level: what its rules see, what they add, and the guard of it."""

@@ -1,1 +1,0 @@
-"""A level as kernels see it: what it is measured to be, and Loop's step of it."""

@@ -1,1 +1,0 @@
-"""What others ask for by itself: by kernels where they are loaded, else by arrays."""

@@ -1,0 +1,386 @@
+"""Edges of a face list, fans around vertices, and the edges of a split mesh by arithmetic.
+
+Half-edge h starts at corner h; in triangle meshes corner i of face f is 3 f + i. Edges are numbered
+by first appearance over faces.
+"""
+
+from __future__ import annotations
+
+from pns_common.kernels import inlined, kernel
+
+INTERIOR, BOUNDARY, IRREGULAR, CREASE = 0, 1, 2, 3
+# In place of an edge's second half-edge: there is none; there are more than two.
+NONE, SEVERAL = -1, -2
+# Returned by ``number_edges`` in place of a count.
+TOO_LONG = -1
+# Rows of a block that a thread may skip as a whole.
+SKIPPED_ROWS = 1024
+
+
+@inlined
+def skipped_block(rows, reach, block, begin, end):
+    """Return a block's first row and its number of rows; 0 rows if none is in begin … end − 1.
+
+    ``reach`` has the smallest and the largest vertex of each block.
+    """
+    first = max(SKIPPED_ROWS * block, 0)
+    last = min(first + SKIPPED_ROWS, rows.shape[0])
+    inside = reach[block, 1] >= begin and reach[block, 0] < end
+    return first, last - first if inside else 0
+
+
+# Columns of a link: the edge's higher vertex, the next link of the chain, its half-edges.
+HIGH, NEXT, FIRST, SECOND = 0, 1, 2, 3
+
+
+@kernel
+def number_edges(corners, offsets, most_steps, head, low, links, corner_edges, plain):
+    """Assign a number to each edge of a face list; return how many there are.
+
+    Each vertex keeps a chain of the edges whose lower end it is. A vertex that is the lower end of
+    k edges takes k² / 2 steps; beyond ``most_steps`` in all, return TOO_LONG.
+
+    Args:
+        corners: (H,) vertices of the faces, face after face.
+        offsets: (F + 1,) where the corners of each face begin.
+        head: (V,) first edge of each vertex's chain; −1 on entry.
+        low: (H,) out: lower end of each edge.
+        links: (H, 4) out: HIGH, NEXT, FIRST, SECOND of each edge; SECOND is NONE or SEVERAL where
+            an edge has one half-edge or more than two.
+        corner_edges: (H,) out: the edge that leaves each corner.
+        plain: (1,) out, for triangles: 1 if no face names a vertex twice and no two faces have the
+            same three vertices, as far as is known; else 0.
+    """
+    count, steps = 0, 0
+    plain[0] = 1
+    for f in range(offsets.shape[0] - 1):
+        first, stop = offsets[f], offsets[f + 1]
+        fresh = False
+        for h in range(first, stop):
+            start, end = corners[h], corners[h + 1 if h + 1 < stop else first]
+            a, b = (start, end) if start < end else (end, start)
+            if a == b:
+                plain[0] = 0
+            e = head[a]
+            while e >= 0 and links[e, HIGH] != b:
+                e = links[e, NEXT]
+                steps += 1
+            if e < 0:
+                e = count
+                count += 1
+                fresh = True
+                low[e] = a
+                links[e, HIGH], links[e, NEXT], links[e, FIRST] = b, head[a], h
+                links[e, SECOND] = NONE
+                head[a] = e
+            elif links[e, SECOND] == NONE:
+                links[e, SECOND] = h
+            else:
+                links[e, SECOND] = SEVERAL
+            corner_edges[h] = e
+        if steps > most_steps:
+            return TOO_LONG
+        # A face whose vertices are those of an earlier one brings no edge.
+        if not fresh and plain[0] == 1 and _may_have_twin(corner_edges, links, f):
+            plain[0] = 0
+    return count
+
+
+@inlined
+def _may_have_twin(corner_edges, links, f):
+    """Return whether an earlier triangle may have the edges of triangle f; True if not known."""
+    for i in range(3):
+        e = corner_edges[3 * f + i]
+        if links[e, SECOND] >= 0:
+            g = 3 * (links[e, FIRST] // 3)
+            other = corner_edges[3 * f + (i + 1 if i < 2 else 0)]
+            return (
+                corner_edges[g] == other
+                or corner_edges[g + 1] == other
+                or corner_edges[g + 2] == other
+            )
+    return True
+
+
+@kernel
+def mark_repeats(corners, offsets, repeats):
+    """Mark the faces that name a vertex twice; return whether there is one."""
+    found = False
+    for f in range(offsets.shape[0] - 1):
+        repeats[f] = False
+        for h in range(offsets[f], offsets[f + 1]):
+            for other in range(offsets[f], h):
+                if corners[h] == corners[other]:
+                    repeats[f] = found = True
+    return found
+
+
+@kernel
+def classify_edges(corners, face_of_corner, repeats, half_edges, begin, end, edge_class):
+    """Write the classes of edges begin … end − 1.
+
+    An interior edge has two half-edges that run against each other. An edge of a face that names a
+    vertex twice is irregular.
+
+    Args:
+        face_of_corner: (H,); (0,) for triangles.
+        repeats: (F,) flags of such faces; (0,) if there are none.
+    """
+    for e in range(max(begin, 0), end):
+        first, second = half_edges[e, 0], half_edges[e, 1]
+        kind = IRREGULAR
+        if not _in_repeating_face(face_of_corner, repeats, first):
+            if second == NONE:
+                kind = BOUNDARY
+            elif second >= 0 and not _in_repeating_face(face_of_corner, repeats, second):
+                kind = INTERIOR if corners[first] != corners[second] else IRREGULAR
+        edge_class[e] = kind
+
+
+@inlined
+def _in_repeating_face(face_of_corner, repeats, h):
+    if len(repeats) == 0:
+        return False
+    return repeats[face_of_corner[h] if len(face_of_corner) else h // 3]
+
+
+@kernel
+def count_ends(edges, rows, counts):
+    """Count how many of the edges ``rows`` end at each vertex; ``counts`` (V,) is 0 on entry."""
+    for e in rows:
+        counts[edges[e, 0]] += 1
+        counts[edges[e, 1]] += 1
+
+
+# --- fans -----------------------------------------------------------------------------------------
+
+
+@inlined
+def next_corner(h):
+    """Return the next corner of a triangle."""
+    return h + 1 - 3 * (h % 3 == 2)
+
+
+@inlined
+def previous_corner(h):
+    """Return the previous corner of a triangle."""
+    return h - 1 + 3 * (h % 3 == 0)
+
+
+@inlined
+def face_corners(h, offsets, face_of_corner):
+    """Return the first corner of a corner's face, and the first after them."""
+    if len(face_of_corner) == 0:
+        first = h - h % 3
+        return first, first + 3
+    f = face_of_corner[h]
+    return offsets[f], offsets[f + 1]
+
+
+@inlined
+def following_corner(h, offsets, face_of_corner):
+    """Return the next corner of a face of any degree."""
+    first, stop = face_corners(h, offsets, face_of_corner)
+    return h + 1 if h + 1 < stop else first
+
+
+@inlined
+def preceding_corner(h, offsets, face_of_corner):
+    """Return the previous corner of a face of any degree."""
+    first, stop = face_corners(h, offsets, face_of_corner)
+    return h - 1 if h > first else stop - 1
+
+
+@inlined
+def twin(corner_edges, half_edges, edge_class, h):
+    """Return the other half-edge of an interior or crease edge; −1 at other edges."""
+    e = corner_edges[h]
+    if edge_class[e] == BOUNDARY or edge_class[e] == IRREGULAR:
+        return -1
+    first = half_edges[e, 0]
+    return half_edges[e, 1] if first == h else first
+
+
+@kernel
+def count_corners(corners, reach, begin, end, corner, count):
+    """Write the last corner at each vertex begin … end − 1, and how many there are.
+
+    ``reach`` is that of blocks of 3 × SKIPPED_ROWS corners.
+    """
+    for v in range(max(begin, 0), end):
+        count[v] = 0
+    for block in range(reach.shape[0]):
+        if reach[block, 1] < begin or reach[block, 0] >= end:
+            continue
+        first = 3 * SKIPPED_ROWS * block
+        for h in range(first, min(first + 3 * SKIPPED_ROWS, corners.shape[0])):
+            v = corners[h]
+            if begin <= v < end:
+                corner[v] = h
+                count[v] += 1
+
+
+@kernel
+def mark_multi_fan(
+    offsets,
+    face_of_corner,
+    corner_edges,
+    half_edges,
+    edge_class,
+    corner,
+    count,
+    begin,
+    end,
+    multi_fan,
+):
+    """Mark the vertices begin … end − 1 whose corners form more than one fan.
+
+    Creases divide no fan. ``corner`` and ``count`` come from ``count_corners``.
+    """
+    for v in range(max(begin, 0), end):
+        multi_fan[v] = False
+        if count[v] == 0:
+            continue
+        start = corner[v]
+        seen, h = 1, start
+        while seen <= count[v]:
+            h = twin(corner_edges, half_edges, edge_class, h)
+            if h < 0:
+                break
+            h = following_corner(h, offsets, face_of_corner)
+            if h == start:
+                break
+            seen += 1
+        if h < 0:
+            h = start
+            while seen <= count[v]:
+                before = preceding_corner(h, offsets, face_of_corner)
+                h = twin(corner_edges, half_edges, edge_class, before)
+                if h < 0:
+                    break
+                seen += 1
+        multi_fan[v] = seen != count[v]
+
+
+# --- the split of triangles ----------------------------------------------------------------------
+#
+# A parent edge has two children, a parent face three edges inside it. Over the faces (a, ab, ca),
+# (b, bc, ab), (c, ca, bc), (ab, bc, ca) of a parent they appear in this order, the children of an
+# edge only in the first face that it is on:
+#
+#     a–ab  ab–ca  ca–a    b–bc  bc–ab  ab–b    c–ca  ca–bc  bc–c
+#
+# So corner i holds half of the edge that leaves it, the edge that cuts it off, and half of the edge
+# that enters it. This holds where no face names a vertex twice and no two have the same three.
+
+
+@kernel
+def split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
+    """Write the children 4 f … 4 f + 3 of triangles begin … end − 1."""
+    for f in range(max(begin, 0), end):
+        for i in range(3):
+            middle = vertex_count + face_edges[f, i]
+            before = i - 1 if i > 0 else 2
+            to_faces[4 * f + i, 0] = faces[f, i]
+            to_faces[4 * f + i, 1] = middle
+            to_faces[4 * f + i, 2] = vertex_count + face_edges[f, before]
+            to_faces[4 * f + 3, i] = middle
+
+
+@inlined
+def _opened_before(half_edges, face):
+    """Count the edges that first appear in an earlier face; first half-edges ascend."""
+    least, most = 0, half_edges.shape[0]
+    while least < most:
+        middle = (least + most) // 2
+        if half_edges[middle, 0] < 3 * face:
+            least = middle + 1
+        else:
+            most = middle
+    return least
+
+
+@kernel
+def number_halves(faces, face_edges, edges, half_edges, begin, end, halves):
+    """Assign numbers to both children of the edges that first appear in faces begin … end − 1.
+
+    ``halves`` (E, 2), out: the child at the lower endpoint, and at the higher.
+    """
+    following = 3 * begin + 2 * _opened_before(half_edges, begin)
+    for f in range(max(begin, 0), end):
+        for i in range(3):
+            before = i - 1 if i > 0 else 2
+            leaving, entering, vertex = face_edges[f, i], face_edges[f, before], faces[f, i]
+            if half_edges[leaving, 0] == 3 * f + i:
+                halves[leaving, 0 if vertex == edges[leaving, 0] else 1] = following
+                following += 1
+            following += 1
+            if half_edges[entering, 0] == 3 * f + before:
+                halves[entering, 0 if vertex == edges[entering, 0] else 1] = following
+                following += 1
+
+
+@inlined
+def _half_at(h, faces, vertex):
+    """Return the half of a parent's half-edge that is at ``vertex``."""
+    f = h // 3
+    i = h - 3 * f
+    if faces[f, i] == vertex:
+        return 12 * f + 3 * i
+    return 12 * f + 3 * (i + 1 if i < 2 else 0) + 2
+
+
+@inlined
+def _write_half(e, vertex, child, faces, vertex_count, half_edges, edge_class, to):
+    """Write a child of parent edge e: as many half-edges as e, of e's class."""
+    to_edges, to_half_edges, to_class = to
+    to_edges[child, 0], to_edges[child, 1] = vertex, vertex_count + e
+    first, second = half_edges[e, 0], half_edges[e, 1]
+    to_half_edges[child, 0] = _half_at(first, faces, vertex)
+    to_half_edges[child, 1] = second if second < 0 else _half_at(second, faces, vertex)
+    to_class[child] = edge_class[e]
+
+
+@kernel
+def split_edges(
+    faces,
+    face_edges,
+    half_edges,
+    edge_class,
+    halves,
+    vertex_count,
+    begin,
+    end,
+    to_face_edges,
+    to_edges,
+    to_half_edges,
+    to_class,
+):
+    """Write the edges of the children of triangles begin … end − 1."""
+    to = to_edges, to_half_edges, to_class
+    following = 3 * begin + 2 * _opened_before(half_edges, begin)
+    for f in range(max(begin, 0), end):
+        for i in range(3):
+            before, after = i - 1 if i > 0 else 2, i + 1 if i < 2 else 0
+            leaving, entering, vertex = face_edges[f, i], face_edges[f, before], faces[f, i]
+            out_of = halves[leaving, 0 if vertex < faces[f, after] else 1]
+            into = halves[entering, 0 if vertex < faces[f, before] else 1]
+            if half_edges[leaving, 0] == 3 * f + i:
+                _write_half(
+                    leaving, vertex, out_of, faces, vertex_count, half_edges, edge_class, to
+                )
+                following += 1
+            inner = following
+            following += 1
+            if half_edges[entering, 0] == 3 * f + before:
+                _write_half(entering, vertex, into, faces, vertex_count, half_edges, edge_class, to)
+                following += 1
+            source, target = vertex_count + leaving, vertex_count + entering
+            to_edges[inner, 0], to_edges[inner, 1] = min(source, target), max(source, target)
+            to_half_edges[inner, 0] = 12 * f + 3 * i + 1
+            to_half_edges[inner, 1] = 12 * f + 9 + before
+            to_class[inner] = INTERIOR
+            to_face_edges[4 * f + i, 0] = out_of
+            to_face_edges[4 * f + i, 1] = inner
+            to_face_edges[4 * f + i, 2] = into
+            to_face_edges[4 * f + 3, before] = inner

@@ -1,0 +1,137 @@
+"""The bounded correction δ of each new vertex: equation 1 of the paper, and the default's rule."""
+
+from __future__ import annotations
+
+from pns_common.kernels import inlined, kernel
+from pns_common.kernels.vectors import dot, norm, over, row
+
+# Products above this have all their digits.
+NORMAL_NUMBERS = 1e-300
+# By so much less, no rounding makes a vector longer than its bound.
+CLEARLY_SHORTER = 1 - 1e-14
+
+
+@inlined
+def in_ball(z):
+    """Shorten z to length 1, also where it is huge; do not lengthen it."""
+    if dot(z, z) <= 1:
+        return z
+    largest = max(max(abs(z[0]), abs(z[1])), abs(z[2]))
+    length = norm(over(z, largest)) * largest if largest > 1 else norm(z)
+    if length > 1:
+        factor = 1.0 / length
+        return z[0] * factor, z[1] * factor, z[2] * factor
+    return z
+
+
+@inlined
+def shortened(v, longest):
+    """Return Π_ρ v: v shortened to length ρ = ``longest`` if it is longer."""
+    bound = CLEARLY_SHORTER * (longest * longest)
+    if bound > NORMAL_NUMBERS and dot(v, v) <= bound:
+        return v  # no root need be taken
+    length = norm(v)
+    if length > longest:
+        factor = longest / length
+        return v[0] * factor, v[1] * factor, v[2] * factor
+    return v
+
+
+@inlined
+def combined(z, basis, i):
+    """Return F z: the combination of the three rows of a (N, 9) basis."""
+    return (
+        z[0] * basis[i, 0] + z[1] * basis[i, 3] + z[2] * basis[i, 6],
+        z[0] * basis[i, 1] + z[1] * basis[i, 4] + z[2] * basis[i, 7],
+        z[0] * basis[i, 2] + z[1] * basis[i, 5] + z[2] * basis[i, 8],
+    )
+
+
+@inlined
+def _write(at, delta, gate, bound, displacement, ratio, gates, bounds):
+    """Write δ, ‖δ‖ / ρ (0 where ρ is), γ, and ρ where the gate is open."""
+    for k in range(3):
+        displacement[at, k] = delta[k]
+    ratio[at] = norm(delta) / bound if bound > 0 else 0.0
+    gates[at], bounds[at] = gate, bound if gate != 0 else 0.0
+
+
+@kernel
+def correct_by_equation_1(
+    rows, first, begin, end, eta, frames, gate, bound, displacement, ratio, gates, bounds
+):
+    """Write δ = h² γ F η (C / R), ‖η‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
+
+    Row 0 of ``eta``, ``frames``, ``gate`` and ``bound`` (C h² / R) is that of rows[begin].
+    """
+    for i in range(max(begin, 0), end):
+        here = i - begin
+        turned = combined(in_ball(row(eta, here)), frames, here)
+        size = bound[here] * gate[here]
+        delta = size * turned[0], size * turned[1], size * turned[2]
+        at = first + rows[i]
+        _write(at, delta, gate[here], bound[here], displacement, ratio, gates, bounds)
+
+
+@kernel
+def correct_by_prior(
+    rows,
+    first,
+    begin,
+    end,
+    z,
+    basis,
+    reach,
+    gate,
+    bound,
+    weight,
+    displacement,
+    ratio,
+    gates,
+    bounds,
+):
+    """Write δ = w γ Π_ρ(D + τ h F z), ‖z‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
+
+    Row 0 of the arrays from ``z`` to ``weight`` is that of rows[begin].
+
+    Args:
+        reach: τ h, the length that the network may ask for.
+        bound: ρ.
+        weight: w, 1 but at soft edges.
+        displacement: in: D; out: δ.
+    """
+    for i in range(max(begin, 0), end):
+        here, at = i - begin, first + rows[i]
+        asked = combined(in_ball(row(z, here)), basis, here)
+        wanted = (
+            displacement[at, 0] + reach[here] * asked[0],
+            displacement[at, 1] + reach[here] * asked[1],
+            displacement[at, 2] + reach[here] * asked[2],
+        )
+        inside, size = shortened(wanted, bound[here]), weight[here] * gate[here]
+        delta = size * inside[0], size * inside[1], size * inside[2]
+        _write(at, delta, gate[here], bound[here], displacement, ratio, gates, bounds)
+
+
+@kernel
+def correct_curves(rows, bound, displacement, ratio, bounds):
+    """Write δ = Π_ρ(D) at new vertices of curves: ``rows`` of the output, with ρ = ``bound``."""
+    for i in range(len(rows)):
+        at = rows[i]
+        delta = shortened(row(displacement, at), bound[i])
+        for k in range(3):
+            displacement[at, k] = delta[k]
+        ratio[at] = norm(delta) / bound[i] if bound[i] > 0 else 0.0
+        bounds[at] = bound[i]
+
+
+@kernel
+def add_displacement(displacement, begin, end, points):
+    """Add δ to rows begin … end − 1; return the largest ‖δ‖²."""
+    largest = 0.0
+    for v in range(max(begin, 0), end):
+        delta = row(displacement, v)
+        for k in range(3):
+            points[v, k] += delta[k]
+        largest = max(largest, dot(delta, delta))
+    return largest

@@ -1,0 +1,182 @@
+"""Sectors around vertices, and the limits of Loop subdivision that are read along them.
+
+A sector holds the corners around a vertex between two edges that are not interior, anticlockwise;
+or all corners of a closed fan. Its neighbours are q_0 … q_k for k corners: corner j lies between
+q_j and q_{j+1}. In a closed sector q_k = q_0.
+"""
+
+from __future__ import annotations
+
+from pns_common.kernels import inlined, kernel
+from pns_common.kernels.connectivity import INTERIOR, next_corner, previous_corner
+from pns_common.kernels.vectors import between, cross, divisor, dot, norm, over, row
+
+# Tangents that span less than this, of the product of their lengths, span no plane.
+NO_PLANE = 1e-9
+# A sum of unit vectors below this, of the sum of their lengths, is what rounding leaves.
+CANCELLED = 1e-9
+# Of a dart's smooth spoke, in units of β, far from the sharp edge.
+FAR_WEIGHT = 8 / 3
+
+
+@inlined
+def _opposed(corner_edges, half_edges, edge_class, h):
+    """Return the other half-edge of an interior edge; −1 at other edges."""
+    e = corner_edges[h]
+    if edge_class[e] != INTERIOR:
+        return -1
+    first = half_edges[e, 0]
+    return half_edges[e, 1] if first == h else first
+
+
+@kernel
+def label_sectors(corner_edges, half_edges, edge_class, of_corner, first, size):
+    """Number the sectors, open ones first; return how many are open, and how many there are.
+
+    Args:
+        of_corner: (H,) out: the sector of each corner; −1 on entry.
+        first: (H,) out: the first corner of each sector.
+        size: (H,) out: how many corners each sector has.
+    """
+    count, opened = 0, 0
+    for closed in (False, True):
+        for start in range(of_corner.shape[0]):
+            if of_corner[start] >= 0:
+                continue
+            if not closed and _opposed(corner_edges, half_edges, edge_class, start) >= 0:
+                continue
+            h, corners = start, 0
+            while h >= 0 and of_corner[h] < 0:
+                of_corner[h] = count
+                corners += 1
+                h = _opposed(corner_edges, half_edges, edge_class, previous_corner(h))
+            first[count], size[count] = start, corners
+            count += 1
+        if not closed:
+            opened = count
+    return opened, count
+
+
+@kernel
+def sector_normals(
+    points,
+    corners,
+    corner_edges,
+    half_edges,
+    edge_class,
+    first,
+    size,
+    at,
+    masks,
+    outwards,
+    begin,
+    end,
+    to,
+):
+    """Write the unit normals of the limit surface in sectors begin … end − 1.
+
+    Args:
+        first, size: (S,) from ``label_sectors``.
+        at: (S,) where the tangent masks of each sector begin in ``masks``.
+        masks: (M, 2) weights of q_0 … q_k, less p, in both tangents.
+        outwards: (S,) sectors whose normal must agree with the area around the vertex.
+        to: (S, 3) out; 0 without area.
+    """
+    for s in range(begin, end):
+        h, p = first[s], corners[first[s]]
+        u, v, area = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        for j in range(size[s]):
+            before = previous_corner(h)
+            leaving, arriving = (
+                between(points, p, corners[next_corner(h)]),
+                between(points, p, corners[before]),
+            )
+            mask = at[s] + j
+            u = _add(u, masks[mask, 0], leaving)
+            v = _add(v, masks[mask, 1], leaving)
+            area = _add(area, 1.0, cross(leaving, arriving))
+            if j == size[s] - 1:
+                u = _add(u, masks[mask + 1, 0], arriving)
+                v = _add(v, masks[mask + 1, 1], arriving)
+            else:
+                h = _opposed(corner_edges, half_edges, edge_class, before)
+        normal = cross(u, v)
+        if outwards[s] and dot(normal, area) < 0:
+            normal = -normal[0], -normal[1], -normal[2]
+        if not norm(normal) > NO_PLANE * norm(u) * norm(v):
+            normal = area
+        normal = over(normal, divisor(normal))
+        for k in range(3):
+            to[s, k] = normal[k]
+
+
+@inlined
+def _add(sums, weight, v):
+    return sums[0] + weight * v[0], sums[1] + weight * v[1], sums[2] + weight * v[2]
+
+
+@kernel
+def mean_of_sectors(normals, vertices, to, lengths):
+    """Write the unit mean of the normals of each vertex's sectors; 0 where they cancel.
+
+    ``to`` (V, 3) and ``lengths`` (V,) are 0 on entry.
+    """
+    for s in range(normals.shape[0]):
+        v = vertices[s]
+        lengths[v] += norm(row(normals, s))
+        for k in range(3):
+            to[v, k] += normals[s, k]
+    for v in range(to.shape[0]):
+        mean = row(to, v)
+        length = divisor(mean) if norm(mean) > CANCELLED * lengths[v] else 0.0
+        for k in range(3):
+            to[v, k] = mean[k] / length if length > 0 else 0.0
+
+
+@inlined
+def dart_weight(decay, size, j):
+    """Return a dart's weight of q_j in an open sector, in units of β: 0 at both ends.
+
+    It solves 5 w_j = 8 + w_{j−1} + w_{j+1}.
+    """
+    return FAR_WEIGHT * (1 - (decay**j + decay ** (size - j)) / (1 + decay**size))
+
+
+@kernel
+def sum_darts(
+    points,
+    corners,
+    corner_edges,
+    half_edges,
+    edge_class,
+    first,
+    size,
+    opened,
+    rows,
+    decay,
+    sums,
+    total,
+):
+    """Add the weighted spokes of darts, but for the sharp edge's own share, in units of β.
+
+    The sharp edge's weight is 2 (1 + the sum of those beside it / 8).
+
+    Args:
+        opened: how many sectors are open.
+        rows: (N,) the sectors of darts, ascending.
+        decay: ρ with ρ + 1/ρ = 5, below 1.
+        sums: (V, 3) in and out: of the weights times the spokes.
+        total: (V,) in and out: of the weights.
+    """
+    for s in rows:
+        h, p, k = first[s], corners[first[s]], size[s]
+        for j in range(k):
+            weight = FAR_WEIGHT
+            if s < opened:
+                weight = dart_weight(decay, k, j) if j > 0 else dart_weight(decay, k, 1) / 2
+            spoke = between(points, p, corners[next_corner(h)])
+            total[p] += weight
+            for i in range(3):
+                sums[p, i] += weight * spoke[i]
+            if j < k - 1:
+                h = _opposed(corner_edges, half_edges, edge_class, previous_corner(h))

@@ -1,0 +1,146 @@
+"""Loop's masks (Loop 1987; equations 2 and 3 of the paper), with sharp and soft edges.
+
+Sums around a vertex run over its edges in ascending order: each thread owns a range of vertices and
+reads all edges.
+"""
+
+from __future__ import annotations
+
+from pns_common.kernels import inlined, kernel
+from pns_common.kernels.connectivity import INTERIOR, skipped_block
+
+EDGE_ENDPOINT, EDGE_OPPOSITE = 3 / 8, 1 / 8
+MIDPOINT = 1 / 2
+CURVE_CENTRE, CURVE_NEIGHBOUR = 3 / 4, 1 / 8
+
+
+@inlined
+def opposite(faces, half_edge):
+    """Return the vertex of a half-edge's triangle that is not on it."""
+    f = half_edge // 3
+    i = half_edge - 3 * f
+    return faces[f, i - 1 if i > 0 else 2]
+
+
+@kernel
+def place_edges(points, faces, edges, half_edges, edge_class, soft, begin, end, placed):
+    """Write the vertices of edges begin … end − 1: Loop's if interior, else the midpoint.
+
+    An edge of sharpness w gets (1 − w) Loop's + w the midpoint. ``soft`` is (0,) where no interior
+    edge is soft.
+    """
+    for e in range(max(begin, 0), end):
+        a, b = edges[e, 0], edges[e, 1]
+        if edge_class[e] == INTERIOR:
+            c, d = opposite(faces, half_edges[e, 0]), opposite(faces, half_edges[e, 1])
+            for k in range(3):
+                ends, sides = points[a, k] + points[b, k], points[c, k] + points[d, k]
+                placed[e, k] = EDGE_ENDPOINT * ends + EDGE_OPPOSITE * sides
+            if len(soft) and soft[e] > 0:
+                for k in range(3):
+                    middle = MIDPOINT * (points[a, k] + points[b, k])
+                    placed[e, k] = (1 - soft[e]) * placed[e, k] + soft[e] * middle
+        else:
+            for k in range(3):
+                placed[e, k] = MIDPOINT * (points[a, k] + points[b, k])
+
+
+@kernel
+def sum_rings(points, edges, reach, begin, end, sums, valence):
+    """Write the sums of neighbours, and the valences, of vertices begin … end − 1."""
+    for v in range(max(begin, 0), end):
+        valence[v] = 0
+        for k in range(3):
+            sums[v, k] = 0.0
+    for block in range(reach.shape[0]):
+        first, count = skipped_block(edges, reach, block, begin, end)
+        for e in range(first, first + count):
+            a, b = edges[e, 0], edges[e, 1]
+            if begin <= a < end:
+                valence[a] += 1
+                for k in range(3):
+                    sums[a, k] += points[b, k]
+            if begin <= b < end:
+                valence[b] += 1
+                for k in range(3):
+                    sums[b, k] += points[a, k]
+
+
+@kernel
+def blend_rings(points, valence, beta, begin, end, sums):
+    """Turn sums of neighbours into Loop's smooth vertices begin … end − 1 (equation 3).
+
+    ``beta``: Loop's weight of one neighbour, for each valence that occurs.
+    """
+    for v in range(max(begin, 0), end):
+        weight = beta[valence[v]]
+        centre = 1 - valence[v] * weight
+        for k in range(3):
+            sums[v, k] = centre * points[v, k] + weight * sums[v, k]
+
+
+@kernel
+def sharpest_edges(edges, rows, sharpness, weights, neighbours):
+    """Find the three sharpest edges at each vertex, in descending order of sharpness.
+
+    Args:
+        edges: (E, 2).
+        rows: (S,) edges of sharpness above 0, ascending.
+        sharpness: (E,).
+        weights: (V, 3) out; 0 on entry.
+        neighbours: (V, 2) out: the far ends of the two sharpest.
+    """
+    for e in rows:
+        w = sharpness[e]
+        for side in range(2):
+            v, far = edges[e, side], edges[e, 1 - side]
+            if w > weights[v, 0]:
+                weights[v, 2], weights[v, 1], weights[v, 0] = weights[v, 1], weights[v, 0], w
+                neighbours[v, 1], neighbours[v, 0] = neighbours[v, 0], far
+            elif w > weights[v, 1]:
+                weights[v, 2], weights[v, 1], neighbours[v, 1] = weights[v, 1], w, far
+            elif w > weights[v, 2]:
+                weights[v, 2] = w
+
+
+@inlined
+def at_sharpness(smooth, curve, stays, second, third):
+    """Return (1 − w₂) smooth + (w₂ − w₃) curve + w₃ p: exact for weights 0 and 1."""
+    if third >= 1:
+        return stays
+    if second >= 1 and third == 0:
+        return curve
+    return (1 - second) * smooth + (second - third) * curve + third * stays
+
+
+@kernel
+def blend_sharp(points, rows, weights, neighbours, centre, side, placed):
+    """Move the vertices ``rows``, on two or more edges of sharpness above 0.
+
+    The rule of a curve is ``centre`` p + ``side`` (the two neighbours along it). On three sharp
+    edges a vertex stays.
+
+    Args:
+        placed: (V, 3) in and out: where the smooth rule puts the vertices.
+    """
+    for v in rows:
+        a, b = neighbours[v, 0], neighbours[v, 1]
+        for k in range(3):
+            curve = centre * points[v, k] + side * (points[a, k] + points[b, k])
+            placed[v, k] = at_sharpness(
+                placed[v, k], curve, points[v, k], weights[v, 1], weights[v, 2]
+            )
+
+
+@kernel
+def largest_coordinate(points, begin, end):
+    """Return the largest absolute coordinate of rows begin … end − 1; NaN where one is."""
+    largest = 0.0
+    for v in range(max(begin, 0), end):
+        for k in range(3):
+            size = abs(points[v, k])
+            if not size <= largest:
+                largest = size
+                if size != size:
+                    return size
+    return largest

@@ -1,0 +1,225 @@
+"""Measurements of faces, edges and the rings of vertices that the operator reads.
+
+Sums around a vertex run over its faces or edges in ascending order: each thread owns a range of
+vertices and reads all faces or edges.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pns_common.kernels import inlined, kernel
+from pns_common.kernels.connectivity import INTERIOR, skipped_block
+from pns_common.kernels.vectors import (
+    between,
+    cross,
+    difference,
+    dot,
+    norm,
+    normal_and_area,
+    root,
+    row,
+)
+
+# Columns of a vertex's means over its spokes: umbrella vector, squared length, x, signed bend and
+# its square, length, pull; then over its neighbours: opening, umbrella height, mean x.
+UMBRELLA, SQUARE, JUMP, BEND, BEND_SQUARE, LENGTH, PULL = 0, 3, 4, 5, 6, 7, 8
+OPENING, NEAR_HEIGHT, NEAR_JUMP, MEANS = 11, 12, 13, 14
+# Columns of a vertex's fields: mean normal, umbrella height.
+HEIGHT, FIELDS = 3, 4
+# Column of a face's area vector with its length.
+AREA = 3
+# Below this length a mean normal is not scaled to 1; the mean is 1 where all faces agree.
+CLEAR_NORMAL = 1 / 4
+SHORTEST_SQUARE = 1e-300
+
+
+@kernel
+def measure_faces(points, faces, begin, end, normals, areas):
+    """Write unit normals, and twice the area vectors with their lengths, of triangles.
+
+    ``areas`` is (F, 4), or (0, 4) where it is not wanted.
+    """
+    for f in range(max(begin, 0), end):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        normal, vector, length = normal_and_area(row(points, a), row(points, b), row(points, c))
+        for k in range(3):
+            normals[f, k] = normal[k]
+        if len(areas):
+            for k in range(3):
+                areas[f, k] = vector[k]
+            areas[f, AREA] = length
+
+
+@kernel
+def measure_edges(
+    points, normals, corners, edges, half_edges, edge_class, begin, end, lengths, jumps, bends
+):
+    """Write h, x = 1 − n1 · n2 and the signed sine of edges begin … end − 1.
+
+    x and the sine are 0 where an edge is not interior. The sine is positive at ridges.
+    """
+    for e in range(max(begin, 0), end):
+        spoke = between(points, edges[e, 0], edges[e, 1])
+        square = dot(spoke, spoke)
+        length = root(square)
+        lengths[e], jumps[e], bends[e] = length, 0.0, 0.0
+        if edge_class[e] != INTERIOR:
+            continue
+        there, back = half_edges[e, 0], half_edges[e, 1]
+        if corners[there] != edges[e, 0]:
+            there, back = back, there
+        n, m = row(normals, there // 3), row(normals, back // 3)
+        if dot(n, n) > 0 and dot(m, m) > 0:
+            chord = difference(n, m)
+            jumps[e] = dot(chord, chord) / 2
+        if square > 0:
+            direction = spoke[0] / length, spoke[1] / length, spoke[2] / length
+            bends[e] = dot(cross(n, m), direction)
+
+
+@kernel
+def mean_normals(faces, reach, areas, begin, end, fields):
+    """Write area-weighted mean normals of vertices begin … end − 1 into ``fields`` (V, 4)."""
+    for v in range(max(begin, 0), end):
+        for k in range(FIELDS):
+            fields[v, k] = 0.0
+    for block in range(reach.shape[0]):
+        first, count = skipped_block(faces, reach, block, begin, end)
+        for f in range(first, first + count):
+            for i in range(3):
+                v = faces[f, i]
+                if begin <= v < end:
+                    for k in range(FIELDS):
+                        fields[v, k] += areas[f, k]
+    for v in range(max(begin, 0), end):
+        area = fields[v, AREA]
+        for k in range(3):
+            fields[v, k] = fields[v, k] / area if area > 0 else 0.0
+        fields[v, HEIGHT] = 0.0
+
+
+@inlined
+def _add_spoke(means, v, spoke, square, jump, bend, length):
+    for k in range(3):
+        means[v, UMBRELLA + k] += spoke[k]
+        means[v, PULL + k] += jump / 2 * spoke[k]
+    means[v, SQUARE] += square
+    means[v, JUMP] += jump
+    means[v, BEND] += bend
+    means[v, BEND_SQUARE] += bend * bend
+    means[v, LENGTH] += length
+
+
+@kernel
+def mean_spokes(points, edges, reach, jumps, bends, sharp, begin, end, means, valence, fields):
+    """Write means over the spokes of vertices begin … end − 1, and their umbrella heights.
+
+    The umbrella height is u · m / h_v; 0 where a sharp edge ends. ``sharp`` counts the sharp edges
+    at each vertex, (0,) where there are none.
+    """
+    for v in range(max(begin, 0), end):
+        valence[v] = 0
+        for k in range(MEANS):
+            means[v, k] = 0.0
+    for block in range(reach.shape[0]):
+        first, count = skipped_block(edges, reach, block, begin, end)
+        for e in range(first, first + count):
+            a, b = edges[e, 0], edges[e, 1]
+            mine, theirs = begin <= a < end, begin <= b < end
+            if not (mine or theirs):
+                continue
+            spoke = between(points, a, b)
+            square = dot(spoke, spoke)
+            length = math.sqrt(square if square > 0 else SHORTEST_SQUARE)
+            if mine:
+                valence[a] += 1
+                _add_spoke(means, a, spoke, square, jumps[e], bends[e], length)
+            if theirs:
+                valence[b] += 1
+                back = -spoke[0], -spoke[1], -spoke[2]
+                _add_spoke(means, b, back, square, jumps[e], bends[e], length)
+    for v in range(max(begin, 0), end):
+        for k in range(OPENING):
+            means[v, k] = means[v, k] / max(valence[v], 1)
+        reach_of_ring = root(means[v, SQUARE])
+        if reach_of_ring > 0 and (len(sharp) == 0 or sharp[v] == 0):
+            fields[v, HEIGHT] = dot(row(means, v), row(fields, v)) / reach_of_ring
+
+
+@kernel
+def mean_neighbours(points, edges, reach, fields, valence, begin, end, means):
+    """Write means over the neighbours of vertices begin … end − 1: opening, height, mean x."""
+    for block in range(reach.shape[0]):
+        first, count = skipped_block(edges, reach, block, begin, end)
+        for e in range(first, first + count):
+            a, b = edges[e, 0], edges[e, 1]
+            mine, theirs = begin <= a < end, begin <= b < end
+            if not (mine or theirs):
+                continue
+            opening = dot(between(fields, a, b), between(points, a, b))
+            if mine:
+                means[a, OPENING] += opening
+                means[a, NEAR_HEIGHT] += fields[b, HEIGHT]
+                means[a, NEAR_JUMP] += means[b, JUMP]
+            if theirs:
+                means[b, OPENING] += opening
+                means[b, NEAR_HEIGHT] += fields[a, HEIGHT]
+                means[b, NEAR_JUMP] += means[a, JUMP]
+    for v in range(max(begin, 0), end):
+        for k in range(OPENING, MEANS):
+            means[v, k] = means[v, k] / max(valence[v], 1)
+
+
+@kernel
+def vertex_features(means, fields, rows, begin, end, features):
+    """Write the features ``ring-10`` of vertices rows[begin:end]; row 0 is the first of them."""
+    for i in range(max(begin, 0), end):
+        v = rows[i]
+        normal, umbrella, reach = row(fields, v), row(means, v), root(means[v, SQUARE])
+        features[i - begin, 0] = means[v, JUMP]
+        features[i - begin, 1] = means[v, BEND]
+        features[i - begin, 2] = means[v, BEND_SQUARE]
+        features[i - begin, 3] = fields[v, HEIGHT]
+        features[i - begin, 4] = _quotient(dot(umbrella, umbrella), means[v, SQUARE])
+        features[i - begin, 5] = dot(normal, normal)
+        features[i - begin, 6] = means[v, NEAR_HEIGHT]
+        features[i - begin, 7] = _quotient(means[v, OPENING], reach)
+        features[i - begin, 8] = _quotient(means[v, LENGTH], reach)
+        features[i - begin, 9] = means[v, NEAR_JUMP]
+
+
+@inlined
+def _quotient(value, by):
+    return value / by if by > 0 else 0.0
+
+
+@kernel
+def ring_basis(means, fields, rows, begin, end, basis):
+    """Write mean normal, umbrella and pull in units of h_v, of vertices rows[begin:end]: (N, 9)."""
+    for i in range(max(begin, 0), end):
+        v = rows[i]
+        reach = root(means[v, SQUARE])
+        for k in range(3):
+            basis[i - begin, k] = fields[v, k]
+            basis[i - begin, 3 + k] = _quotient(means[v, UMBRELLA + k], reach)
+            basis[i - begin, 6 + k] = _quotient(means[v, PULL + k], reach)
+
+
+@kernel
+def normal_pushes(means, fields, valence, ringed, weight, strength, begin, end, pushes):
+    """Write d_v = −s w_k (u · m̂) m̂ of vertices begin … end − 1: the prior of the operator.
+
+    Args:
+        ringed: (V,) whether the prior acts at a vertex.
+        weight: w_k, the weight of the neighbours in Loop's limit mask, for each valence.
+        strength: s.
+    """
+    for v in range(max(begin, 0), end):
+        mean = row(fields, v)
+        agreement = norm(mean)
+        clear = agreement if agreement > CLEAR_NORMAL else CLEAR_NORMAL
+        normal = mean[0] / clear, mean[1] / clear, mean[2] / clear
+        inwards = weight[valence[v]] * dot(row(means, v), normal) if ringed[v] else 0.0
+        for k in range(3):
+            pushes[v, k] = strength * (-inwards * normal[k])

@@ -1,0 +1,147 @@
+"""One level's mesh before it is refined, with the measurements that the operator reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.base_scheme import BaseScheme
+from pns_common.kernels import connectivity, measures
+from pns_common.normals import NO_AREAS
+from pns_common.parallel import Blocks
+from pns_common.topology import Topology
+
+# Lengths of zero are read as this, so that every logarithm is finite.
+SHORTEST = 1e-150
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeMeasures:
+    """Length h, x = 1 − n1 · n2 and signed sine of every edge; x and sine 0 unless interior."""
+
+    lengths: Float[np.ndarray, " E"]
+    jumps: Float[np.ndarray, " E"]
+    bends: Float[np.ndarray, " E"]
+
+
+@dataclass(frozen=True, eq=False)
+class RingMeasures:
+    """Measurements of the rings of vertices; ``kernels.measures`` names the columns.
+
+    Attributes:
+        fields: (V, 4) area-weighted mean normal, and umbrella height.
+        means: (V, 14) means over spokes and neighbours.
+        valence: (V,) number of edges.
+    """
+
+    fields: Float[np.ndarray, "V 4"]
+    means: Float[np.ndarray, "V M"]
+    valence: Int[np.ndarray, " V"]
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A mesh of triangles before refinement; each measurement is made when it is first read.
+
+    Attributes:
+        points: (V, 3) vertices.
+        topology: connectivity and sharpness.
+        base: the base scheme.
+        reference_length: R ≥ 0, the unit of length of the budget; 0 switches corrections off, None
+            where no rule reads it.
+        blocks: how work is shared.
+    """
+
+    points: Float[np.ndarray, "V 3"]
+    topology: Topology
+    base: BaseScheme
+    reference_length: float | None
+    blocks: Blocks
+
+    @cached_property
+    def faces(self) -> tuple[Float[np.ndarray, "F 3"], Float[np.ndarray, "F 4"]]:
+        """Unit normals, and twice the area vectors with their lengths."""
+        triangles = self.topology.faces
+        normals, areas = np.empty((len(triangles), 3)), np.empty((len(triangles), 4))
+        self.blocks.run(
+            len(triangles),
+            lambda begin, end: measures.measure_faces(
+                self.points, triangles, begin, end, normals, areas
+            ),
+        )
+        return normals, areas
+
+    @property
+    def normals(self) -> Float[np.ndarray, "F 3"]:
+        """Unit normals of the faces; 0 without area."""
+        return self.faces[0]
+
+    @cached_property
+    def edges(self) -> EdgeMeasures:
+        """Lengths and turns of the edges."""
+        mesh, count = self.topology, len(self.topology.edges)
+        made = EdgeMeasures(np.empty(count), np.empty(count), np.empty(count))
+        read = self.points, self.normals, mesh.corners, mesh.edges, mesh.half_edges, mesh.edge_class
+        to = made.lengths, made.jumps, made.bends
+        self.blocks.run(count, lambda begin, end: measures.measure_edges(*read, begin, end, *to))
+        return made
+
+    @cached_property
+    def logs(self) -> Float[np.ndarray, " E"]:
+        """Logarithms of the edges' lengths."""
+        logs, lengths = np.empty(len(self.topology.edges)), self.edges.lengths
+
+        def take(begin: int, end: int) -> None:
+            np.log(np.maximum(lengths[begin:end], SHORTEST), out=logs[begin:end])
+
+        self.blocks.run(len(logs), take)
+        return logs
+
+    @cached_property
+    def rings(self) -> RingMeasures:
+        """Means over the ring of every vertex."""
+        mesh, count, owners = self.topology, len(self.points), self.blocks.owners(len(self.points))
+        fields, means = np.empty((count, measures.FIELDS)), np.empty((count, measures.MEANS))
+        valence = np.empty(count, dtype=np.int32)
+        spokes = self.points, mesh.edges, mesh.edge_reach
+        at_faces = mesh.faces, mesh.corner_reach, self.faces[1]
+        at_edges = self.edges.jumps, self.edges.bends, mesh.sharp_count
+
+        def around(begin: int, end: int) -> None:
+            measures.mean_normals(*at_faces, begin, end, fields)
+            measures.mean_spokes(*spokes, *at_edges, begin, end, means, valence, fields)
+
+        owners.run(count, around)
+        owners.run(
+            count,
+            lambda begin, end: measures.mean_neighbours(
+                *spokes, fields, valence, begin, end, means
+            ),
+        )
+        # Nothing else reads the areas: an eighth of all memory.
+        vars(self)["faces"] = self.normals, NO_AREAS
+        return RingMeasures(fields, means, valence)
+
+    @cached_property
+    def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
+        """Whether the faces of each vertex form more than one fan."""
+        return self.topology.multi_fans(self.blocks.quiet())
+
+    @cached_property
+    def ringed(self) -> Bool[np.ndarray, " V"]:
+        """Vertices with one closed ring of faces: those that a vertex rule may move.
+
+        The end of one crease, a dart, is among them; a vertex on a boundary is not.
+        """
+        mesh = self.topology
+        used = np.zeros(mesh.vertex_count, dtype=bool)
+        used[mesh.corners] = True
+        ringed = used & ~self.multi_fan_vertices
+        if len(mesh.sharp_count):
+            creases = np.zeros(mesh.vertex_count, dtype=np.int32)
+            connectivity.count_ends(mesh.edges, mesh.crease_edges, creases)
+            ringed &= (mesh.sharp_count == 0) | ((mesh.sharp_count == 1) & (creases == 1))
+        return ringed

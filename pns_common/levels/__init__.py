@@ -1,1 +1,0 @@
-"""One step of a scheme, one after the other, and what is told and reported of each."""

@@ -1,0 +1,94 @@
+"""Normals of faces and of groups of corners; tangents at a right angle to them."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.kernels import measures
+from pns_common.kernels import normals as kernels
+from pns_common.parallel import Blocks
+from pns_common.topology import build_topology
+
+NO_AREAS = np.zeros((0, 4))
+# A face that is one triangle.
+ONE_TRIANGLE = np.array([[0, 1, 2]])
+
+
+def face_normals(
+    points: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"], blocks: Blocks | None = None
+) -> Float[np.ndarray, "F 3"]:
+    """Return the unit normals of triangles; 0 for a triangle without area."""
+    normals = np.empty((len(faces), 3))
+    (blocks or Blocks()).run(
+        len(faces),
+        lambda begin, end: measures.measure_faces(points, faces, begin, end, normals, NO_AREAS),
+    )
+    return normals
+
+
+def angle_weighted_normals(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F T"],
+    groups: Int[np.ndarray, "F T"],
+    count: int,
+    blocks: Blocks,
+    triangles: Int[np.ndarray, "D 3"] = ONE_TRIANGLE,
+) -> Float[np.ndarray, "G 3"]:
+    """Return the unit normal of each group of corners; 0 without area, or where all cancel out.
+
+    The faces' own normals are weighted by their angles at the corner (Thürmer and Wüthrich 1998):
+    however a flat side is cut into triangles, it weighs the same.
+
+    Args:
+        points: positions.
+        faces: T points of each face.
+        groups: the group, 0 … count − 1, of each of these.
+        count: number of groups.
+        blocks: how the work is shared.
+        triangles: columns of ``faces`` that each of a face's D triangles has at its corners.
+    """
+    made = len(faces) * len(triangles)
+    normals, angles, total = np.empty((made, 3)), np.empty((made, 2)), np.zeros((count, 3))
+    blocks.run(
+        len(faces),
+        lambda begin, end: kernels.measure_triangles(
+            points, faces, triangles, begin, end, normals, angles
+        ),
+    )
+    kernels.add_corners(normals, angles, groups, triangles, total)
+    blocks.quiet().run(count, lambda begin, end: kernels.scale_to_unit(begin, end, total))
+    return total
+
+
+def smooth_fans(
+    faces: Int[np.ndarray, "F 3"], vertex_count: int, creases: Int[np.ndarray, "N 2"] | None
+) -> Int[np.ndarray, "F 3"]:
+    """Return the smooth fan of each corner, numbered by first appearance.
+
+    A fan is a run of faces around a vertex that follow one another across edges that are neither
+    creases, boundaries nor irregular; its corners can share a normal. ``creases`` are pairs of
+    vertices, each an edge.
+    """
+    topology = build_topology(faces, vertex_count)
+    if creases is not None:
+        topology = topology.with_creases(topology.rows_of(creases))
+    fans = np.empty(3 * len(faces), dtype=np.int64)
+    kernels.join_corners(topology.half_edges, topology.edge_class, fans)
+    return fans.reshape(-1, 3)
+
+
+def perpendicular_tangents(
+    tangents: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"], blocks: Blocks
+) -> Float[np.ndarray, "N 3"]:
+    """Return the tangents' unit projections onto the planes of the unit normals.
+
+    Where a tangent lies along its normal, any perpendicular serves; this takes one from the axis
+    that the normal is farthest from.
+    """
+    made = np.empty(tangents.shape)
+    given = [np.ascontiguousarray(part, dtype=np.float64) for part in (tangents, normals)]
+    blocks.run(
+        len(made), lambda begin, end: kernels.perpendicular_tangents(*given, begin, end, made)
+    )
+    return made

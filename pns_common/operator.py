@@ -1,0 +1,385 @@
+"""The formula: what a learned level adds to the base scheme. Read from top to bottom.
+
+Proximity-preserving neural subdivision is a classical step plus a bounded correction δ at each new
+vertex (H. Ugail, *Proximity-Preserving Neural Subdivision*). The paper's rule, models of format 1:
+
+    q = q0 + δ        δ = h² γ F η(φ)                  ‖η‖ ≤ C / R                  equation 1
+
+The default's rule, models of format 4, acts at the control mesh alone:
+
+    x = x0 + s δ      δ = γ Π_ρ( D + τ h F z(φ) )      ‖z‖ ≤ 1,  ρ = C h² / R
+
+    x0 = S p   the base scheme S applied to the control points p
+    D  = S d   the prior: S applied to pushes d that undo the shrinking of S         ``pushes``
+    F          the edge's frame; at an old vertex three vectors of its ring
+    φ          features of the edge, or of the ring, and z(φ) the network's answer
+    h          the edge's length; at an old vertex the root mean square of its edges
+    γ          the gate, 0 on planes: tanh(c x²) at edges, x = 1 − n1 · n2;
+               tanh(c_v x_v) at old vertices, x_v the mean of x over its edges
+    Π_ρ        shortens to length ρ, whatever the network answers
+    s          the fold guard: no child triangle turns by more than θ                ``guard_scale``
+
+C is the budget, R the mesh's unit of length, τ the share of h that the network may ask for. A soft
+edge of sharpness w is corrected by (1 − w) δ, a sharp one not at all. On a boundary or a crease
+there is no network: δ = Π_ρ(D) along the curve, so that meshes that share it still meet there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import count as rounds_from_0
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.curves import Curves, curve_prior, curve_pushes, find_curves
+from pns_common.errors import ModelError, ParameterError
+from pns_common.kernels import children, correction, frames, measures
+from pns_common.kernels.connectivity import INTERIOR
+from pns_common.level import Level
+
+# Rows of each call of a network: fixed, so that answers do not depend on threads.
+NETWORK_ROWS = 8192
+# After so many halvings s becomes 0.
+ROUNDS = 30
+# The tanh of this and more is 1 in float64.
+SATURATED = 22.0
+EVERYWHERE, NONE_SHARED = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
+
+# Features (N, K) → answers (N, 3).
+Network = Callable[[Float[np.ndarray, "N K"]], Float[np.ndarray, "N 3"]]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Networks and numbers of a learned rule; symbols as at the top of this file.
+
+    Attributes:
+        edge_network: φ → η or z, at unit budget.
+        feature_count: K of φ.
+        symmetric: c lies to the left of a → b, so no numbering matters; else in the lower face.
+        gate_sharpness: c.
+        budget: C.
+        vertex_network: the network of old vertices; None leaves them to the base scheme.
+        vertex_gate_sharpness: c_v.
+        prior_strength: s of d; None for equation 1.
+        curve_strength: strength of d on boundaries and creases.
+        network_scale: τ.
+        fold_angle: θ in degrees, above 0 and below 90; read with a prior alone.
+    """
+
+    edge_network: Network
+    feature_count: int
+    symmetric: bool
+    gate_sharpness: float
+    budget: float
+    vertex_network: Network | None = None
+    vertex_gate_sharpness: float = 1.0
+    prior_strength: float | None = None
+    curve_strength: float = 0.0
+    network_scale: float = 1.0
+    fold_angle: float = 75.0
+
+
+@dataclass(frozen=True, eq=False)
+class Additions:
+    """What a level adds: rows of old vertices first, then of edge vertices.
+
+    Attributes:
+        points: x.
+        base_points: x0 where a child may be flipped; None where the guard excludes that.
+        displacement: s δ.
+        ratio: ‖s δ‖ / ρ ∈ [0, 1]; 0 where ρ is 0.
+        gate: γ.
+        bound: ρ, 0 where the gate is shut.
+        corrected: old vertices that the rule may move; None where it moves none.
+        degenerate: number of interior edges without a frame.
+        scale: s; None without a guard.
+    """
+
+    points: Float[np.ndarray, "W 3"]
+    base_points: Float[np.ndarray, "W 3"] | None
+    displacement: Float[np.ndarray, "W 3"]
+    ratio: Float[np.ndarray, " W"]
+    gate: Float[np.ndarray, " W"]
+    bound: Float[np.ndarray, " W"]
+    corrected: Bool[np.ndarray, " V"] | None
+    degenerate: int
+    scale: Float[np.ndarray, " W"] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """All that surrounds a network at N edges, or N old vertices.
+
+    Attributes:
+        rows: their numbers.
+        features: φ, (N, K).
+        basis: F as rows T, N, B (or the three ring vectors), (N, 9).
+        gate: γ.
+        bound: ρ.
+        reach: τ h.
+        weight: 1, less at soft edges and at vertices on soft curves.
+        degenerate: where there is no frame.
+    """
+
+    rows: Int[np.ndarray, " N"]
+    features: Float[np.ndarray, "N K"]
+    basis: Float[np.ndarray, "N 9"]
+    gate: Float[np.ndarray, " N"]
+    bound: Float[np.ndarray, " N"]
+    reach: Float[np.ndarray, " N"]
+    weight: Float[np.ndarray, " N"]
+    degenerate: Bool[np.ndarray, " N"]
+
+
+def learned_level(level: Level, rule: Rule) -> Additions:
+    """Apply a rule at a level.
+
+    Raises:
+        ModelError: a network's answer is not finite, or has another shape.
+    """
+    mesh, base, blocks = level.topology, level.base, level.blocks.of_rows(NETWORK_ROWS)
+    count, edges = len(level.points), mesh.interior
+    x = base.place(level.points, mesh, level.blocks)  # x0
+    if rule.prior_strength is None:
+        made = _Rows.starting_with(np.zeros((len(x), 3)))
+
+        def by_equation_1(begin: int, end: int) -> int:
+            at = edge_inputs(level, rule, edges[begin:end])
+            read = at.rows, count, 0, len(at.rows), answers(rule.edge_network, at), at.basis
+            correction.correct_by_equation_1(*read, at.gate, at.bound, *made.arrays)
+            return int(at.degenerate.sum())
+
+        degenerate: int = sum(blocks.run(len(edges), by_equation_1))
+        base_points = x.copy()
+        x += made.displacement
+        return Additions(x, base_points, *made.arrays, None, degenerate, None)
+
+    curves, vertices = find_curves(level.points, mesh), np.flatnonzero(level.ringed)
+    delta = prior(level, rule, curves)  # D, to become δ
+    made = _Rows.starting_with(delta)
+
+    def at_vertices(begin: int, end: int) -> None:
+        at = vertex_inputs(level, rule, vertices[begin:end])
+        made.correct(at, answers(rule.vertex_network, at), first=0)
+
+    def at_edges(begin: int, end: int) -> int:
+        at = edge_inputs(level, rule, edges[begin:end])
+        made.correct(at, answers(rule.edge_network, at), first=count)
+        return int(at.degenerate.sum())
+
+    blocks.run(len(vertices), at_vertices)
+    degenerate: int = sum(blocks.run(len(edges), at_edges))
+    made.correct_curves(curves, budget_per_length(level, rule))
+    scale = guard_scale(level, x, delta, math.radians(rule.fold_angle), curves)
+    made.scale(scale)
+    x += delta
+    return Additions(x, None, *made.arrays, level.ringed | curves.movable, degenerate, scale)
+
+
+# --- what surrounds the networks ------------------------------------------------------------------
+
+
+def prior(level: Level, rule: Rule, curves: Curves) -> Float[np.ndarray, "W 3"]:
+    """Return D = S d of every new vertex; 0 at those that the rule does not move."""
+    d, along = pushes(level, rule), None
+    if len(curves.rows) and rule.curve_strength:
+        along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
+        d += along
+    made = level.base.place(d, level.topology, level.blocks)
+    made[np.concatenate([~level.ringed, level.topology.edge_class != INTERIOR])] = 0.0
+    if along is not None:
+        made[curves.new_rows] = curve_prior(curves, along)
+    return made
+
+
+def pushes(level: Level, rule: Rule) -> Float[np.ndarray, "V 3"]:
+    """Return d: how far each vertex is pushed along its normal before S is applied.
+
+    d_v = −s w_k (u_v · m_v) m_v, u_v the mean of its neighbours less itself, m_v its unit normal,
+    w_k the weight of the neighbours in the limit mask of S: quasi-interpolation, by strength s. It
+    is 0 on planes and linear in scale, and 0 on curves, which have their own (curves.py).
+    """
+    rings, made = level.rings, np.empty(level.points.shape)
+    assert level.base.limit_weight is not None
+    weight = level.base.limit_weight(np.arange(int(rings.valence.max(initial=0)) + 1))
+    read = rings.means, rings.fields, rings.valence, level.ringed, weight, rule.prior_strength
+    level.blocks.run(len(made), lambda begin, end: measures.normal_pushes(*read, begin, end, made))
+    sharp = level.topology.sharpest
+    if sharp is not None and len(level.topology.soft):
+        made *= 1 - sharp.weights[:, 1:2]
+    return made
+
+
+def edge_inputs(level: Level, rule: Rule, rows: Int[np.ndarray, " N"]) -> Inputs:
+    """Return what surrounds the network at interior edges."""
+    mesh, count, signed = level.topology, len(rows), rule.feature_count > frames.DIHEDRAL
+    basis, features = np.empty((count, 9)), np.empty((count, rule.feature_count))
+    curvature, degenerate = np.empty(count), np.empty(count, dtype=bool)
+    frames.frames_and_features(
+        level.points,
+        level.normals,
+        level.rings.fields if signed else np.zeros((0, measures.FIELDS)),
+        level.logs,
+        mesh.corners,
+        mesh.edges,
+        mesh.corner_edges,
+        mesh.half_edges,
+        rows,
+        0,
+        count,
+        rule.symmetric,
+        basis,
+        curvature,
+        degenerate,
+        features,
+    )
+    length = level.edges.lengths[rows]
+    return Inputs(
+        rows,
+        features,
+        basis,
+        gate=gate_of(rule.gate_sharpness * curvature**2),
+        bound=budget_per_length(level, rule) * (length * length),
+        reach=rule.network_scale * length,
+        weight=1 - mesh.soft[rows] if len(mesh.soft) else np.ones(count),
+        degenerate=degenerate,
+    )
+
+
+def vertex_inputs(level: Level, rule: Rule, rows: Int[np.ndarray, " N"]) -> Inputs:
+    """Return what surrounds the network at old vertices with a closed ring."""
+    rings, count, sharp = level.rings, len(rows), level.topology.sharpest
+    features, basis = np.empty((count, 10)), np.empty((count, 9))
+    measures.vertex_features(rings.means, rings.fields, rows, 0, count, features)
+    measures.ring_basis(rings.means, rings.fields, rows, 0, count, basis)
+    square = rings.means[rows, measures.SQUARE]
+    soft = sharp is not None and len(level.topology.soft) > 0
+    return Inputs(
+        rows,
+        features,
+        basis,
+        gate=gate_of(rule.vertex_gate_sharpness * rings.means[rows, measures.JUMP]),
+        bound=budget_per_length(level, rule) * square,
+        reach=rule.network_scale * np.sqrt(square),
+        weight=1 - sharp.weights[rows, 1] if sharp is not None and soft else np.ones(count),
+        degenerate=np.zeros(count, dtype=bool),
+    )
+
+
+def budget_per_length(level: Level, rule: Rule) -> float:
+    """Return C / R."""
+    if not level.reference_length:
+        raise ParameterError("reference_length", level.reference_length, expected="R > 0")
+    return rule.budget / level.reference_length
+
+
+def gate_of(values: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+    """Return γ = tanh of values ≥ 0. Where that is 1 to the last bit, tanh is not evaluated."""
+    small = values < SATURATED
+    if 2 * np.count_nonzero(small) > len(values):
+        return np.tanh(values)
+    gates = np.ones_like(values)
+    gates[small] = np.tanh(values[small])
+    return gates
+
+
+def answers(network: Network | None, at: Inputs) -> Float[np.ndarray, "N 3"]:
+    """Return the network's answers; 0 where the gate is shut, for which it is not run.
+
+    Raises:
+        ModelError: an answer is not finite, or has another shape.
+    """
+    made = np.zeros((len(at.rows), 3))
+    is_open = at.gate != 0
+    if network is None or not is_open.any():
+        return made
+    every = is_open.all()
+    asked = at.features if every else at.features[is_open]
+    z = np.asarray(network(asked))
+    if z.dtype.kind not in "fiub":
+        raise ModelError("network", expected="real numbers", found=f"{z.dtype}")
+    if z.shape != (len(asked), 3):
+        raise ModelError("network", expected=f"shape ({len(asked)}, 3)", found=f"{z.shape}")
+    if not np.isfinite(z).all():
+        raise ModelError("network", expected="finite corrections", found="NaN or infinity")
+    made[slice(None) if every else is_open] = z
+    return made
+
+
+# --- the guard ------------------------------------------------------------------------------------
+
+
+def guard_scale(
+    level: Level,
+    base_points: Float[np.ndarray, "W 3"],
+    delta: Float[np.ndarray, "W 3"],
+    angle: float,
+    curves: Curves,
+) -> Float[np.ndarray, " W"]:
+    """Return s ∈ {1, ½, ¼, …, 0} of each new vertex, so that no child triangle folds.
+
+    While a child of x0 + s δ stands at more than ``angle`` (radians, below π/2) to its counterpart
+    in x0, or has less than a thousandth of its area, s of its corners is halved, for all such
+    children at once; after 30 rounds it becomes 0. The rounds know no order of faces, so the guard
+    does not depend on numbering, and a child is tested alone, so it is local. A vertex that a
+    boundary alone places is scaled only by children that it would fold by itself: what two meshes
+    share stays shared.
+    """
+    mesh = level.topology
+    scale, changed = np.ones(len(delta)), EVERYWHERE
+    shared = curves.shared if curves.shared.any() else NONE_SHARED
+    blocks = level.blocks.quiet()
+    for rounds in rounds_from_0():
+        touched = np.zeros(len(delta), dtype=bool)
+        read = base_points, delta, scale, shared, changed, math.cos(angle)
+        of_mesh = mesh.faces, mesh.face_edges, mesh.vertex_count
+        blocks.run(
+            mesh.face_count,
+            lambda begin, end: children.mark_folds(*read, *of_mesh, begin, end, touched),  # noqa: B023
+        )
+        rows = np.flatnonzero(touched)
+        if len(rows) == 0:
+            return scale
+        scale[rows] = scale[rows] / 2 if rounds < ROUNDS else 0.0
+        changed = touched
+    raise AssertionError("a round without folds ends the loop")
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Output arrays of a level: δ (at first D), ‖δ‖ / ρ, γ, ρ of every new vertex."""
+
+    displacement: Float[np.ndarray, "W 3"]
+    ratio: Float[np.ndarray, " W"]
+    gate: Float[np.ndarray, " W"]
+    bound: Float[np.ndarray, " W"]
+
+    @classmethod
+    def starting_with(cls, prior: Float[np.ndarray, "W 3"]) -> _Rows:
+        """Return rows with D, and zeros in the other arrays."""
+        return cls(prior, *np.zeros((3, len(prior))))
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """All four, in the order of the kernels."""
+        return self.displacement, self.ratio, self.gate, self.bound
+
+    def correct(self, at: Inputs, z: Float[np.ndarray, "N 3"], first: int) -> None:
+        """Put δ in place of D at some rows, which count from ``first``."""
+        read = at.rows, first, 0, len(at.rows), z, at.basis, at.reach, at.gate, at.bound, at.weight
+        correction.correct_by_prior(*read, *self.arrays)
+
+    def correct_curves(self, curves: Curves, budget_per_length: float) -> None:
+        """Put Π_ρ(D) in place of D on curves."""
+        bound = budget_per_length * curves.squares
+        correction.correct_curves(curves.new_rows, bound, self.displacement, self.ratio, self.bound)
+
+    def scale(self, by: Float[np.ndarray, " W"]) -> None:
+        """Put s δ in place of δ."""
+        if (by < 1).any():
+            self.displacement[:] *= by[:, None]
+            self.ratio[:] *= by

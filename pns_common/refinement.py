@@ -1,0 +1,322 @@
+"""Apply a scheme to a mesh, level by level: the front door of the operator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal, SupportsIndex
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.creases import Creases, chosen_creases
+from pns_common.errors import MeshError, ParameterError
+from pns_common.kernels import loop as kernels
+from pns_common.level import Level
+from pns_common.limit import limit_normals, limit_positions, limit_shift
+from pns_common.memory import keep_freed_memory, memory_here
+from pns_common.mesh import LARGEST_COORDINATE, Mesh, check_is_mesh
+from pns_common.operator import Additions, learned_level
+from pns_common.parallel import Blocks, available_threads, no_progress
+from pns_common.parameters import is_bool, is_number, is_whole
+from pns_common.progress import Progress
+from pns_common.reference_length import measure_reference_length
+from pns_common.report import (
+    LevelReport,
+    Report,
+    child_angles,
+    level_report,
+    limit_distances,
+    longest,
+)
+from pns_common.schemes import Scheme
+from pns_common.topology import Topology, split_faces
+
+DEFAULT_LEVELS, HIGHEST_LEVELS = 2, 16
+# No refinement takes less for a face that it makes.
+LEAST_BYTES_PER_FACE = 60
+# Half-edges are numbered in 32 bits.
+LARGEST_INDEX = 2**31 - 1
+
+keep_freed_memory()
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One level: the mesh before it, where its vertices went, and what the rule added."""
+
+    level: Level
+    points: Float[np.ndarray, "W 3"]
+    added: Additions | None
+
+    def report(self) -> LevelReport:
+        """Measure and summarise the step."""
+        mesh, blocks = self.level.topology, self.level.blocks.quiet()
+        base_points = None if self.added is None else self.added.base_points
+        angles = child_angles(mesh, self.points, base_points, blocks)
+        return level_report(mesh, self.added, angles, crease_shift(self.level, self.points))
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """A refined mesh, its report, and the last level's diagnostics at each of its vertices.
+
+    Attributes:
+        mesh: the refined mesh.
+        ratio, gate: (V,) proximity ratio and gate of the last level; 0 at old vertices without a
+            vertex rule, and after levels of the base scheme.
+        normals: (V, 3) exact normals of the limit surface, on creases the mean of both sides';
+            None unless vertices were put on it.
+        steps: the levels, from which the report is made when it is first read.
+        scheme, limit_shift: for the report.
+    """
+
+    mesh: Mesh
+    ratio: Float[np.ndarray, " V"]
+    gate: Float[np.ndarray, " V"]
+    normals: Float[np.ndarray, "V 3"] | None
+    steps: Sequence[Step] = field(repr=False)
+    scheme: Scheme = field(repr=False)
+    limit_shift: float = field(repr=False)
+
+    @cached_property
+    def reference_length(self) -> float:
+        """R, the unit of length of the budget."""
+        first = self.steps[0].level
+        if first.reference_length is not None:
+            return first.reference_length
+        return measure_reference_length(first.points, first.topology.corners)
+
+    @cached_property
+    def report(self) -> Report:
+        """Counts and diagnostics; see ``Report``."""
+        levels = [step.report() for step in self.steps]
+        return {
+            "scheme": self.scheme.name,
+            "budget": self.scheme.budget,
+            "model": self.scheme.model,
+            "model_hash": self.scheme.model_hash,
+            "reference_length": self.reference_length,
+            "multi_fan_vertices": int(self.steps[0].level.multi_fan_vertices.sum()),
+            **limit_distances(levels, self.limit_shift),
+            "levels": levels,
+        }
+
+    @property
+    def topologies(self) -> list[Topology]:
+        """The connectivity of each level before it was refined: for ``columns.refine_columns``."""
+        return [step.level.topology for step in self.steps]
+
+    def __repr__(self) -> str:
+        vertices, faces = len(self.mesh.vertices), len(self.mesh.faces)
+        name, levels = self.scheme.name, len(self.steps)
+        return f"Refinement({name!r}, levels={levels}, vertices={vertices}, faces={faces})"
+
+
+def refine(
+    mesh: Mesh,
+    scheme: Scheme,
+    levels: SupportsIndex = DEFAULT_LEVELS,
+    reference_length: float | str = "auto",
+    *,
+    limit: bool = False,
+    creases: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
+    threads: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Refinement:
+    """Refine a mesh. Each level splits every face in four; nothing is renumbered.
+
+    Args:
+        mesh: the control mesh.
+        scheme: ``loop()``, ``pns(model)`` or any other.
+        levels: number of steps, 1 … 16; fewer where the result cannot fit into the memory here.
+        reference_length: R, the unit of length of the budget: the largest curvature that the
+            budget C can represent is 8 C / R. "auto" measures the mesh; 1 is the paper's absolute
+            unit. It is fixed here for all levels: pass the first call's R when calling again.
+        limit: put the last level's vertices where the base scheme would take them if it were
+            applied for ever, and return the limit surface's normals there.
+        creases: edges to keep sharp, as pairs of vertices: for good, boundaries alike (Hoppe et al.
+            1994). "auto": for a model of format 4 the edges that turn by more than 40 degrees and
+            are connected by such edges to one that turns by more than 60, at as many levels as its
+            card says; none for other schemes. None: no edge.
+        threads: worker threads, default all processors; the result does not depend on it.
+        progress: called with (faces made so far, faces made in the end), also inside levels, from
+            any thread, one at a time; an exception that it raises ends the refinement.
+
+    Raises:
+        ParameterError: an argument out of range, or a crease that is no edge.
+        ModelError: the network's answer is not finite, or has another shape.
+        MeshError: the refined coordinates are too large, or not numbers.
+    """
+    check_is_mesh(mesh)
+    if not isinstance(scheme, Scheme):  # pyright: ignore[reportUnnecessaryIsInstance]
+        expected = "a Scheme, as loop() or pns(load_model())"
+        raise ParameterError("scheme", type(scheme), expected=expected)
+    count = levels_that_fit(levels, len(mesh.faces))
+    length = _reference_length(mesh, reference_length, measured=scheme.rule is not None)
+    if not is_bool(limit):
+        raise ParameterError("limit", limit, expected="True or False")
+    kept = chosen_creases(creases, scheme.creases)
+    learned = count if scheme.learned_levels is None else min(count, scheme.learned_levels)
+    told = _progress(len(mesh.faces), count, learned if scheme.rule else 0, limit, progress)
+    blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)
+
+    if not mesh.triangles:
+        raise MeshError("faces of other degrees, expected triangles", element="faces")
+    topology = kept.applied(mesh.vertices, mesh.topology(blocks))
+    points, steps = mesh.vertices, list[Step]()
+    for depth in range(count):
+        if steps:
+            topology = scheme.base.split(topology, blocks, inherit=kept.sharp_at(depth))
+        steps.append(_step(Level(points, topology, scheme.base, length, blocks), scheme, depth))
+        points = steps[-1].points
+        if told:
+            told.level_ends()
+    faces, normals, shift = split_faces(topology, blocks, np.int64), None, 0.0
+    if limit:
+        last = scheme.base.split(topology, blocks)
+        shift = limit_shift(points, last)
+        points, normals = limit_positions(points, last), limit_normals(points, last).vertices
+        if told:
+            told.level_ends()
+    added, nothing = steps[-1].added, np.broadcast_to(0.0, len(points))
+    return Refinement(
+        mesh=Mesh.of_refined(points, faces),
+        ratio=nothing if added is None else added.ratio,
+        gate=nothing if added is None else added.gate,
+        normals=normals,
+        steps=steps,
+        scheme=scheme,
+        limit_shift=shift,
+    )
+
+
+def control_level(
+    mesh: Mesh,
+    scheme: Scheme,
+    reference_length: float | str = "auto",
+    creases: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
+    threads: int | None = None,
+) -> Level:
+    """Return the level that the first step of ``refine`` reads: for training and experiments.
+
+    ``operator.edge_inputs``, ``vertex_inputs``, ``prior`` and ``guard_scale`` take it.
+
+    Raises:
+        ParameterError: an argument out of range, or a crease that is no edge.
+    """
+    blocks = Blocks(_threads(threads))
+    kept = chosen_creases(creases, scheme.creases)
+    topology = kept.applied(mesh.vertices, mesh.topology(blocks))
+    length = _reference_length(mesh, reference_length, measured=True)
+    return Level(mesh.vertices, topology, scheme.base, length, blocks)
+
+
+def refine_many(
+    jobs: Iterable[tuple[Mesh, Creases | None]],
+    scheme: Scheme,
+    levels: SupportsIndex = DEFAULT_LEVELS,
+    reference_length: float | str = "auto",
+    *,
+    limit: bool = False,
+    threads: int | None = None,
+) -> list[Refinement]:
+    """Refine meshes one after the other, each with its own creases; None: no edge."""
+    return [
+        refine(
+            mesh, scheme, levels, reference_length, limit=limit, creases=creases, threads=threads
+        )
+        for mesh, creases in jobs
+    ]
+
+
+def _step(level: Level, scheme: Scheme, depth: int) -> Step:
+    """Refine one level."""
+    added = None
+    if scheme.acts_at(depth) and level.reference_length and scheme.rule is not None:
+        # An absurd budget overflows, which is caught just below.
+        with np.errstate(over="ignore", invalid="ignore"):
+            added = learned_level(level, scheme.rule)
+        points = added.points
+    else:
+        points = level.base.place(level.points, level.topology, level.blocks)
+    _check_coordinates(points, level.blocks)
+    kept = Level(level.points, level.topology, level.base, level.reference_length, level.blocks)
+    return Step(kept, points, added)  # without measurements, which are most of the memory
+
+
+def crease_shift(level: Level, placed: Float[np.ndarray, "W 3"]) -> float | None:
+    """Return the longest way from the smooth rules to the new vertices of creases; None without."""
+    mesh, rows = level.topology, level.topology.crease_edges
+    soft = np.flatnonzero(mesh.soft)
+    if len(rows) == 0 and len(soft) == 0:
+        return None
+    rows = np.concatenate([rows, soft])
+    smooth = level.base.place(level.points, mesh.without_creases(), level.blocks.quiet())
+    vertices = np.unique(mesh.edges[rows])
+    at = np.concatenate([vertices.astype(np.int64), mesh.vertex_count + rows])
+    return longest(placed[at] - smooth[at])
+
+
+def _check_coordinates(points: Float[np.ndarray, "W 3"], blocks: Blocks) -> None:
+    sizes = blocks.quiet().run(
+        len(points), lambda begin, end: kernels.largest_coordinate(points, begin, end)
+    )
+    # Written so that NaN fails it too.
+    if not all(size <= LARGEST_COORDINATE for size in sizes):
+        reason = f"coordinates beyond {LARGEST_COORDINATE:g}, or not numbers, after refinement"
+        raise MeshError(f"{reason}: the budget is too large", element="vertices")
+
+
+def levels_that_fit(given: SupportsIndex, faces: int) -> int:
+    """Return the number of levels as int.
+
+    Raises:
+        ParameterError: it is no whole number from 1 to 16, or so many refined faces cannot fit
+            into the memory here, or cannot be numbered.
+    """
+    if not (is_whole(given) and 1 <= (levels := int(given)) <= HIGHEST_LEVELS):
+        raise ParameterError("levels", given, expected=f"a whole number, 1 … {HIGHEST_LEVELS}")
+    made, there = faces * 4**levels, memory_here()
+    needed = made * LEAST_BYTES_PER_FACE
+    if there is not None and needed > there:
+        sizes = f"{needed / 2**30:,.1f} GiB or more, of the {there / 2**30:,.1f} here"
+        raise ParameterError("levels", levels, expected=f"fewer: {made:,} faces take {sizes}")
+    if 3 * made > LARGEST_INDEX:
+        raise ParameterError("levels", levels, expected=f"fewer: {made:,} faces cannot be numbered")
+    return levels
+
+
+def _reference_length(mesh: Mesh, given: float | str, *, measured: bool) -> float | None:
+    """Return R; None where it is to be measured only if the report asks for it."""
+    # An array compares with a word element by element.
+    if isinstance(given, str) and given == "auto":
+        if not measured:
+            return None
+        return measure_reference_length(mesh.vertices, mesh.faces.reshape(-1))
+    if not (is_number(given) and float(given) > 0):
+        raise ParameterError("reference_length", given, expected='"auto" or a number > 0')
+    return float(given)
+
+
+def _threads(given: int | None) -> int:
+    if given is None:
+        return available_threads()
+    if not (is_whole(given) and given >= 1):
+        raise ParameterError("threads", given, expected="a whole number, at least 1")
+    return int(given)
+
+
+def _progress(
+    faces: int,
+    levels: int,
+    learned_levels: int,
+    limit: bool,
+    tell: Callable[[int, int], None] | None,
+) -> Progress | None:
+    if tell is None:
+        return None
+    if not callable(tell):
+        raise ParameterError("progress", tell, expected="a function of two whole numbers, or None")
+    return Progress(faces, levels, learned_levels, limit, tell)

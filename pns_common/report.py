@@ -1,0 +1,279 @@
+"""The report of a refinement: counts, proximity ratios, gates, turns; data, and no times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NotRequired, TypedDict
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.kernels import children, connectivity
+from pns_common.operator import Additions
+from pns_common.parallel import Blocks
+from pns_common.topology import Topology
+
+# A gate above this counts as active.
+GATE_ACTIVE = 0.01
+
+
+class EdgeCounts(TypedDict):
+    """The edges that a level refined, by class; ``crease`` only where there are some."""
+
+    interior: int
+    boundary: int
+    irregular: int
+    crease: NotRequired[int]
+
+
+class RatioSummary(TypedDict):
+    """Proximity ratio ‖δ‖ R / (C h²) of interior edges or movable vertices; above 1 by rounding."""
+
+    max: float
+    mean: float
+    p99: float
+
+
+class GateSummary(TypedDict):
+    """Gate γ of interior edges, or of movable vertices; ``active`` is the share above 0.01."""
+
+    mean: float
+    max: float
+    active: float
+
+
+class VertexSummary(TypedDict):
+    """The vertex rule: old vertices that it may move, their ratio, and γ_v (0 on curves)."""
+
+    vertices: int
+    proximity_ratio: RatioSummary
+    gate: GateSummary
+
+
+class Distances(TypedDict):
+    """How far a level is from the smooth base scheme; see LevelReport."""
+
+    displacement_max: NotRequired[float]
+    envelope_max: NotRequired[float]
+    crease_shift_max: NotRequired[float]
+
+
+class LevelReport(Distances):
+    """One level: counts of the mesh that it made, and diagnostics of the step that made it.
+
+    ``proximity_ratio``, ``gate`` and ``normal_jump_max`` (the largest angle in radians between the
+    children beside an edge) are those of interior edges, not of creases. ``vertex_rule`` exists
+    where the model moves old vertices. Learned levels alone have ``displacement_max``, the longest
+    δ, and ``envelope_max``, the longest that the budget allows where a gate is open, both in the
+    mesh's units; ``shut``, the number of interior edges and movable vertices whose gate is 0; and,
+    with a fold guard, ``guarded``, the number of vertices that it scaled. With creases,
+    ``crease_shift_max`` is the longest way from where the smooth rules put a vertex of a crease to
+    where it is.
+    """
+
+    vertices: int
+    faces: int
+    edges: EdgeCounts
+    degenerate_frames: int
+    flipped_faces: int
+    proximity_ratio: RatioSummary
+    gate: GateSummary
+    normal_jump_max: float
+    vertex_rule: NotRequired[VertexSummary]
+    shut: NotRequired[int]
+    guarded: NotRequired[int]
+
+
+class LimitDistances(TypedDict):
+    """How far all levels together are from the smooth base scheme; see Report."""
+
+    learned_levels: int
+    limit_distance: float
+    limit_distance_bound: float
+
+
+class Report(LimitDistances):
+    """The report of a refinement. The same input gives the same report.
+
+    ``learned_levels`` counts the levels at which the learned rule acted. ``limit_distance`` is the
+    sum over levels of the longest displacement, in the mesh's units: no vertex, and no point of the
+    limit surface, is farther from where the base scheme would have had it. What creases keep back
+    from the smooth rules counts too. ``limit_distance_bound`` is the sum of the longest that the
+    budget allows.
+    """
+
+    scheme: str
+    budget: float | None
+    model: str | None
+    model_hash: str | None
+    reference_length: float
+    multi_fan_vertices: int
+    levels: list[LevelReport]
+
+
+@dataclass(frozen=True)
+class ChildAngles:
+    """Number of flipped children, and the largest angle between children in radians."""
+
+    flipped: int
+    normal_jump_max: float
+
+
+def child_angles(
+    parent: Topology,
+    points: Float[np.ndarray, "W 3"],
+    base_points: Float[np.ndarray, "W 3"] | None,
+    blocks: Blocks,
+) -> ChildAngles:
+    """Measure the children of a mesh's triangles.
+
+    Args:
+        parent: the mesh that was split.
+        points: vertices of the split mesh.
+        base_points: where the base scheme puts them; None where no child can be flipped.
+        blocks: how work is shared.
+    """
+    normals = _child_normals(parent, points, blocks)
+    inside = blocks.run(
+        parent.face_count,
+        lambda begin, end: children.largest_chord_inside(normals, begin, end),
+    )
+    across = blocks.run(
+        len(parent.edges),
+        lambda begin, end: children.largest_chord_across(
+            normals, parent.half_edges, parent.edge_class, begin, end
+        ),
+    )
+    flipped = 0
+    if base_points is not None:
+        others = _child_normals(parent, base_points, blocks)
+        flipped = sum(
+            blocks.run(
+                len(normals),
+                lambda begin, end: children.opposed_normals(normals, others, begin, end),
+            )
+        )
+    chord = max(*inside, *across, 0.0)
+    return ChildAngles(int(flipped), 2 * math.asin(min(math.sqrt(chord) / 2, 1.0)))
+
+
+def _child_normals(
+    parent: Topology, points: Float[np.ndarray, "W 3"], blocks: Blocks
+) -> Float[np.ndarray, "C 3"]:
+    normals = np.empty((4 * parent.face_count, 3))
+    read = points, parent.faces, parent.face_edges, parent.vertex_count
+    blocks.run(
+        parent.face_count, lambda begin, end: children.child_normals(*read, begin, end, normals)
+    )
+    return normals
+
+
+def level_report(
+    parent: Topology, added: Additions | None, angles: ChildAngles, crease_shift: float | None
+) -> LevelReport:
+    """Summarise the step that refined ``parent``; ``added`` is None for the base scheme."""
+    count = parent.vertex_count
+    none = np.zeros(0)
+    ratio = none if added is None else _of(added.ratio[count:], parent.interior)
+    gate = none if added is None else _of(added.gate[count:], parent.interior)
+    report: LevelReport = {
+        "vertices": count + len(parent.edges),
+        "faces": 4 * parent.face_count,
+        "edges": edge_counts(parent.edge_class),
+        "degenerate_frames": 0 if added is None else added.degenerate,
+        "flipped_faces": angles.flipped,
+        "proximity_ratio": _ratio_summary(ratio),
+        "gate": _gate_summary(gate),
+        "normal_jump_max": angles.normal_jump_max,
+    }
+    if added is not None:
+        shut = _shut(gate)
+        if added.corrected is not None:
+            vertex_gate = _of(added.gate[:count], added.corrected)
+            report["vertex_rule"] = {
+                "vertices": int(added.corrected.sum()),
+                "proximity_ratio": _ratio_summary(_of(added.ratio[:count], added.corrected)),
+                "gate": _gate_summary(vertex_gate),
+            }
+            shut += _shut(vertex_gate)
+        report["displacement_max"] = longest(added.displacement)
+        report["envelope_max"] = float(added.bound.max(initial=0))
+        report["shut"] = shut
+        if added.scale is not None:
+            report["guarded"] = int((added.scale < 1).sum())
+    if crease_shift is not None:
+        report["crease_shift_max"] = crease_shift
+    return report
+
+
+def limit_distances(levels: Sequence[Distances], limit_shift: float = 0.0) -> LimitDistances:
+    """Sum the levels' largest displacements, and what creases keep back.
+
+    The masks of a base scheme, and its limit masks, are non-negative and sum to 1, so a
+    displacement at one level moves no later vertex, and no point of the limit, by more than its own
+    length. ``limit_shift`` is the longest way that creases keep a vertex of the limit surface.
+    """
+    shifts = [level.get("crease_shift_max", 0.0) for level in levels]
+    moved = [level.get("displacement_max", 0.0) for level in levels]
+    allowed = [level.get("envelope_max", 0.0) for level in levels]
+    return {
+        "learned_levels": sum("displacement_max" in level for level in levels),
+        "limit_distance": float(sum(map(max, moved, shifts)) + limit_shift),
+        "limit_distance_bound": float(sum(map(max, allowed, shifts)) + limit_shift),
+    }
+
+
+def longest(displacement: Float[np.ndarray, "W 3"]) -> float:
+    """Return the largest length of N ≥ 0 vectors."""
+    squares = np.einsum("ij,ij->i", displacement, displacement)
+    return math.sqrt(float(squares.max(initial=0)))
+
+
+def edge_counts(edge_class: Int[np.ndarray, " E"]) -> EdgeCounts:
+    """Count the edges of each class."""
+    count = np.bincount(edge_class, minlength=4).tolist()
+    counts: EdgeCounts = {
+        "interior": count[connectivity.INTERIOR],
+        "boundary": count[connectivity.BOUNDARY],
+        "irregular": count[connectivity.IRREGULAR],
+    }
+    if count[connectivity.CREASE]:
+        counts["crease"] = count[connectivity.CREASE]
+    return counts
+
+
+def _of(
+    values: Float[np.ndarray, " N"], rows: Int[np.ndarray, " M"] | Bool[np.ndarray, " N"]
+) -> Float[np.ndarray, " M"]:
+    """Return some of the values; no copy where they are all."""
+    every = rows.all() if rows.dtype == bool else len(rows) == len(values)
+    return values if every else values[rows]
+
+
+def _shut(gate: Float[np.ndarray, " N"]) -> int:
+    return int(np.count_nonzero(gate == 0))
+
+
+def _ratio_summary(ratio: Float[np.ndarray, " N"]) -> RatioSummary:
+    if len(ratio) == 0:
+        return {"max": 0.0, "mean": 0.0, "p99": 0.0}
+    return {"max": float(ratio.max()), "mean": float(ratio.mean()), "p99": _p99(ratio)}
+
+
+def _p99(values: Float[np.ndarray, " N"]) -> float:
+    """Return ``np.percentile(values, 99)`` without its checks, which dominate in small meshes."""
+    position = (len(values) - 1) * 0.99
+    below = int(position)
+    above = min(below + 1, len(values) - 1)
+    ordered = np.partition(values, [below, above])
+    low, high, t = ordered[below], ordered[above], position - below
+    return float(high - (high - low) * (1 - t) if t >= 1 / 2 else low + (high - low) * t)
+
+
+def _gate_summary(gate: Float[np.ndarray, " N"]) -> GateSummary:
+    if len(gate) == 0:
+        return {"mean": 0.0, "max": 0.0, "active": 0.0}
+    active = int(np.count_nonzero(gate > GATE_ACTIVE)) / len(gate)
+    return {"mean": float(gate.mean()), "max": float(gate.max()), "active": active}

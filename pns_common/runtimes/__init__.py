@@ -1,1 +1,0 @@
-"""What runs a model file: a program of our own, onnxruntime, or numpy."""

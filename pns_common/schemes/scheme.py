@@ -1,0 +1,130 @@
+"""A scheme: a base scheme, and the learned rule that adds to it at the first levels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.base_scheme import BaseScheme
+from pns_common.creases import ANGLE, NO_CREASES, SEED, Creases
+from pns_common.errors import ModelError, ParameterError
+from pns_common.features import FEATURE_COUNT
+from pns_common.model.session import Model
+from pns_common.operator import Rule
+from pns_common.parameters import is_number
+from pns_common.schemes.loop import LOOP
+
+PAPER_FORMAT, LEARNED_ONCE = 1, 4
+BASES = {LOOP.name: LOOP}
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """A refinement rule.
+
+    Attributes:
+        name: its name in reports.
+        base: the linear scheme.
+        rule: what is added at learned levels; None: nothing.
+        learned_levels: at so many levels the rule acts, then the base scheme alone. None: at all.
+        creases: the edges that ``creases="auto"`` keeps sharp.
+        budget, model, model_hash: for reports; None without a model.
+    """
+
+    name: str
+    base: BaseScheme = field(default=LOOP, repr=False)
+    rule: Rule | None = field(default=None, repr=False)
+    learned_levels: int | None = 0
+    creases: Creases = field(default=NO_CREASES, repr=False)
+    budget: float | None = None
+    model: str | None = None
+    model_hash: str | None = field(default=None, repr=False)
+
+    def acts_at(self, depth: int) -> bool:
+        """Return whether the rule acts at a level; level 0 refines the control mesh."""
+        if self.rule is None:
+            return False
+        return self.learned_levels is None or depth < self.learned_levels
+
+
+def loop() -> Scheme:
+    """Return the scheme of Loop subdivision (Loop 1987)."""
+    return Scheme("loop")
+
+
+def pns(model: Model, budget: float | None = None) -> Scheme:
+    """Return the scheme of Proximity-Preserving Neural Subdivision with a model.
+
+    Args:
+        model: from ``load_model``, or any object that keeps the Model protocol.
+        budget: C ≥ 0, dimensionless; None takes the one that the model was trained at. With 0 the
+            scheme is the base scheme, bit for bit.
+
+    Raises:
+        ParameterError: the budget is negative or not finite, or this is no model.
+        ModelError: the card names a base scheme that is not known here.
+    """
+    if not isinstance(model, Model):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("model", type(model), expected="a model, as load_model() gives it")
+    card = model.card
+    budget = card.budget if budget is None else budget
+    if not (is_number(budget) and budget >= 0):
+        raise ParameterError("budget", budget, expected="a finite number ≥ 0")
+    budget = float(budget)
+    named = {"budget": budget, "model": model.name, "model_hash": model.hash}
+    rule = Rule(
+        partial(_edges_at_unit_budget, model),
+        FEATURE_COUNT[card.features],
+        card.orientation == "symmetric",
+        card.gate_sharpness,
+        budget,
+    )
+    if card.format == PAPER_FORMAT:
+        return Scheme("pns", rule=rule, learned_levels=None, **named)  # type: ignore[arg-type]
+    if card.base not in BASES:
+        raise ModelError(model.name, expected=f"a base of {sorted(BASES)}", found=repr(card.base))
+    learned = replace(
+        rule,
+        vertex_network=partial(_vertices_at_unit_budget, model),
+        vertex_gate_sharpness=_given(model, "vertex_gate_sharpness"),
+        prior_strength=_given(model, "prior_strength"),
+        curve_strength=_given(model, "boundary_strength"),
+        network_scale=_given(model, "network_scale"),
+        fold_angle=_given(model, "fold_angle"),
+    )
+    creases = Creases(angle=ANGLE, seed=SEED, levels=card.sharpness_levels)
+    return Scheme(
+        "pns",
+        BASES[card.base],
+        learned,
+        learned_levels=1,
+        creases=creases if budget > 0 else NO_CREASES,
+        **named,  # type: ignore[arg-type]
+    )
+
+
+def _given(model: Model, name: str) -> float:
+    """Return a number of a card of format 4. Raises ModelError if the card has none."""
+    value = getattr(model.card, name)
+    if value is None:
+        raise ModelError(model.name, expected=f"{name} on a card of format 4", found="none")
+    return float(value)
+
+
+# At unit budget, scaled in float64 afterwards, so that one file serves every C / R exactly.
+# Functions of the module, so that a scheme can be sent to another process.
+
+
+def _edges_at_unit_budget(
+    model: Model, features: Float[np.ndarray, "N K"]
+) -> Float[np.ndarray, "N 3"]:
+    return model(features, 1.0)
+
+
+def _vertices_at_unit_budget(
+    model: Model, features: Float[np.ndarray, "N K"]
+) -> Float[np.ndarray, "N 3"]:
+    return model.vertex_correction(features, 1.0)

@@ -1,0 +1,426 @@
+"""Connectivity of a mesh: edges, edge classes and sharpness, fans; the split into triangles.
+
+Nothing here knows positions. The orders are part of the result: edges are numbered by first
+appearance over the faces, (a, b), (b, c), … from each face's first corner on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt32
+
+from pns_common.errors import ParameterError
+from pns_common.kernels import connectivity as kernels
+from pns_common.kernels import loop
+from pns_common.parallel import Blocks
+
+# Steps along chains that an edge may take on average; beyond that, sorting is as fast.
+STEPS = 32
+TRIANGLE = 3
+NO_WEIGHTS = np.zeros(0)
+NO_FACES = np.zeros(0, dtype=np.uint32)
+
+
+class EdgeClass(IntEnum):
+    """The rules' view of an edge."""
+
+    INTERIOR = kernels.INTERIOR  # exactly two incident faces, of opposite direction
+    BOUNDARY = kernels.BOUNDARY  # one incident face
+    IRREGULAR = kernels.IRREGULAR  # anything else
+    CREASE = kernels.CREASE  # between two faces like an interior edge, with sharpness 1
+
+
+@dataclass(frozen=True, eq=False)
+class SharpVertices:
+    """The vertices at which the rules of curves and corners act.
+
+    Attributes:
+        rows: vertices on two or more edges of sharpness above 0.
+        weights: (V, 3) the three largest sharpnesses at each vertex, descending.
+        neighbours: (V, 2) the far ends of the two sharpest edges.
+    """
+
+    rows: Int[np.ndarray, " N"]
+    weights: Float[np.ndarray, "V 3"]
+    neighbours: Int[np.ndarray, "V 2"]
+
+
+@dataclass(frozen=True, eq=False)
+class Topology:
+    """Faces of any degree with their edges.
+
+    Half-edge h runs from corner h to the next corner of the same face.
+
+    Attributes:
+        vertex_count: number of vertices, isolated ones included.
+        corners: (H,) vertices of the faces, face after face.
+        offsets: (F + 1,) where the corners of each face begin.
+        face_of_corner: (H,); (0,) where all faces are triangles.
+        edges: (E, 2) endpoints a < b.
+        corner_edges: (H,) the edge that leaves each corner.
+        half_edges: (E, 2) an edge's first half-edge and its second: −1 where there is none, −2
+            where there are more than two.
+        edge_class: (E,) EdgeClass values.
+        soft: (E,) sharpness w in [0, 1] of interior edges; (0,) where it is 0 at all of them. Other
+            edges have w = 1.
+        plain: all faces are triangles, none names a vertex twice, no two have the same vertices.
+    """
+
+    vertex_count: int
+    corners: UInt32[np.ndarray, " H"]
+    offsets: Int[np.ndarray, " F1"]
+    face_of_corner: UInt32[np.ndarray, " C"]
+    edges: UInt32[np.ndarray, "E 2"]
+    corner_edges: UInt32[np.ndarray, " H"]
+    half_edges: Int[np.ndarray, "E 2"]
+    edge_class: Int[np.ndarray, " E"]
+    soft: Float[np.ndarray, " S"]
+    plain: bool
+
+    @property
+    def face_count(self) -> int:
+        """Number of faces."""
+        return len(self.offsets) - 1
+
+    @property
+    def triangles(self) -> bool:
+        """Whether all faces are triangles."""
+        return len(self.face_of_corner) == 0
+
+    @property
+    def faces(self) -> UInt32[np.ndarray, "F 3"]:
+        """Vertices of each triangle. Raises ValueError unless all faces are triangles."""
+        self._need_triangles()
+        return self.corners.reshape(-1, TRIANGLE)
+
+    @property
+    def face_edges(self) -> UInt32[np.ndarray, "F 3"]:
+        """Edges (a, b), (b, c), (c, a) of each triangle; ValueError as for ``faces``."""
+        self._need_triangles()
+        return self.corner_edges.reshape(-1, TRIANGLE)
+
+    def _need_triangles(self) -> None:
+        if not self.triangles:
+            raise ValueError("this mesh has faces that are no triangles")
+
+    @cached_property
+    def interior(self) -> UInt32[np.ndarray, " I"]:
+        """Indices of the interior edges."""
+        return np.flatnonzero(self.edge_class == kernels.INTERIOR).astype(np.uint32)
+
+    @cached_property
+    def sharp_edges(self) -> UInt32[np.ndarray, " S"]:
+        """Indices of the edges that are not interior."""
+        return np.flatnonzero(self.edge_class != kernels.INTERIOR).astype(np.uint32)
+
+    @cached_property
+    def crease_edges(self) -> Int[np.ndarray, " S"]:
+        """Indices of the creases."""
+        sharp = self.sharp_edges
+        return sharp[self.edge_class[sharp] == kernels.CREASE].astype(np.int64)
+
+    @cached_property
+    def sharp_count(self) -> Int[np.ndarray, " V"]:
+        """Number of edges at each vertex that are not interior; (0,) where there is none."""
+        if len(self.sharp_edges) == 0:
+            return np.zeros(0, dtype=np.int32)
+        counts = np.zeros(self.vertex_count, dtype=np.int32)
+        kernels.count_ends(self.edges, self.sharp_edges, counts)
+        return counts
+
+    @cached_property
+    def sharpness(self) -> Float[np.ndarray, " E"]:
+        """Sharpness w of every edge."""
+        if len(self.soft):
+            return np.where(self.edge_class == kernels.INTERIOR, self.soft, 1.0)
+        return (self.edge_class != kernels.INTERIOR).astype(np.float64)
+
+    @cached_property
+    def sharpest(self) -> SharpVertices | None:
+        """The vertices on sharp and soft edges; None where all edges are interior and smooth."""
+        if len(self.sharp_edges) == 0 and len(self.soft) == 0:
+            return None
+        edges = self.sharp_edges
+        if len(self.soft):
+            edges = np.flatnonzero(self.sharpness > 0).astype(np.uint32)
+        weights = np.zeros((self.vertex_count, 3))
+        neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
+        loop.sharpest_edges(self.edges, edges, self.sharpness, weights, neighbours)
+        return SharpVertices(np.flatnonzero(weights[:, 1] > 0), weights, neighbours)
+
+    @cached_property
+    def valence(self) -> Int[np.ndarray, " V"]:
+        """Number of edges at each vertex."""
+        return np.bincount(self.edges.reshape(-1), minlength=self.vertex_count).astype(np.int32)
+
+    @cached_property
+    def edge_reach(self) -> Int[np.ndarray, "B 2"]:
+        """Smallest and largest vertex of each block of edges."""
+        return _reach(self.edges.reshape(-1), 2 * kernels.SKIPPED_ROWS)
+
+    @cached_property
+    def corner_reach(self) -> Int[np.ndarray, "B 2"]:
+        """Smallest and largest vertex of each block of corners."""
+        return _reach(self.corners, TRIANGLE * kernels.SKIPPED_ROWS)
+
+    @cached_property
+    def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
+        """Whether a vertex's faces form more than one fan, as at the knot of a bow-tie."""
+        return self.multi_fans(Blocks())
+
+    def multi_fans(self, blocks: Blocks) -> Bool[np.ndarray, " V"]:
+        """Return ``multi_fan_vertices``, computed on several threads."""
+        corner, count = np.zeros((2, self.vertex_count), dtype=np.int32)
+        marked = np.empty(self.vertex_count, dtype=bool)
+        blocks.owners(self.vertex_count).run(
+            self.vertex_count,
+            lambda begin, end: kernels.count_corners(
+                self.corners, self.corner_reach, begin, end, corner, count
+            ),
+        )
+        fans = self.offsets, self.face_of_corner, self.corner_edges, self.half_edges
+        blocks.run(
+            self.vertex_count,
+            lambda begin, end: kernels.mark_multi_fan(
+                *fans, self.edge_class, corner, count, begin, end, marked
+            ),
+        )
+        return marked
+
+    def with_creases(self, rows: Int[np.ndarray, " N"]) -> Topology:
+        """Return a copy in which the interior edges among ``rows`` are creases."""
+        if len(rows) == 0:
+            return self
+        classes = self.edge_class.copy()
+        classes[rows] = np.where(classes[rows] == kernels.INTERIOR, kernels.CREASE, classes[rows])
+        return replace(self, edge_class=classes)
+
+    def with_sharpness(self, sharpness: Float[np.ndarray, " E"]) -> Topology:
+        """Return a copy with sharpness w of interior edges; those of w = 1 are creases."""
+        made = self.with_creases(np.flatnonzero(sharpness >= 1))
+        soft = np.where(made.edge_class == kernels.INTERIOR, sharpness, 0.0)
+        return replace(made, soft=soft if soft.any() else NO_WEIGHTS)
+
+    def without_creases(self) -> Topology:
+        """Return a copy without creases and soft edges."""
+        classes = np.where(self.edge_class == kernels.CREASE, kernels.INTERIOR, self.edge_class)
+        return replace(self, edge_class=classes.astype(np.int8), soft=NO_WEIGHTS)
+
+    def rows_of(
+        self, pairs: Int[np.ndarray, "N 2"], name: str = "creases"
+    ) -> Int[np.ndarray, " N"]:
+        """Return the edges that pairs of vertices name.
+
+        Raises:
+            ParameterError: a pair is no edge; ``name`` is the argument's.
+        """
+        outside = np.flatnonzero(((pairs < 0) | (pairs >= self.vertex_count)).any(axis=1))
+        if len(outside):
+            row = int(outside[0])
+            expected = f"vertices 0 … {self.vertex_count - 1}"
+            raise ParameterError(f"{name}[{row}]", pairs[row].tolist(), expected=expected)
+        named = np.zeros(self.vertex_count, dtype=bool)
+        named[pairs.reshape(-1)] = True
+        near = np.flatnonzero(named[self.edges[:, 0]] & named[self.edges[:, 1]])
+        keys, asked = (_keys(ends, self.vertex_count) for ends in (self.edges[near], pairs))
+        order = np.argsort(keys, kind="stable")
+        if len(near) == 0:
+            found = np.zeros(len(asked), dtype=bool)
+            place = np.zeros(len(asked), dtype=np.int64)
+        else:
+            place = order[np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)]
+            found = keys[place] == asked
+        lost = np.flatnonzero(~found)
+        if len(lost):
+            row = int(lost[0])
+            raise ParameterError(
+                f"{name}[{row}]", pairs[row].tolist(), expected="an edge of the mesh"
+            )
+        return near[place]
+
+
+def build_topology(
+    faces: Int[np.ndarray, "F 3"] | tuple[Int[np.ndarray, " H"], Int[np.ndarray, " F1"]],
+    vertex_count: int,
+    blocks: Blocks | None = None,
+) -> Topology:
+    """Find the edges of faces and classify them.
+
+    Args:
+        faces: (F, 3) triangles; or (corners, offsets) of faces of any degree ≥ 3.
+        vertex_count: number of vertices.
+        blocks: how the work is shared.
+    """
+    blocks = blocks or Blocks()
+    if isinstance(faces, tuple):
+        corners, offsets = faces[0].astype(np.uint32), faces[1].astype(np.int32)
+        degrees = np.diff(offsets)
+    else:
+        corners = np.ascontiguousarray(faces, dtype=np.uint32).reshape(-1)
+        offsets = np.arange(0, len(corners) + 1, TRIANGLE, dtype=np.int32)
+        degrees = NO_FACES
+    triangles = bool((degrees == TRIANGLE).all())
+    face_of_corner = NO_FACES
+    if not triangles:
+        face_of_corner = np.repeat(np.arange(len(degrees), dtype=np.uint32), degrees)
+    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count)
+    repeats, repeating = np.zeros(0, dtype=bool), False
+    # A triangle that names a vertex twice has an edge from a vertex to itself.
+    if not triangles or bool((edges[:, 0] == edges[:, 1]).any()):
+        repeats = np.empty(len(offsets) - 1, dtype=bool)
+        repeating = kernels.mark_repeats(corners, offsets, repeats)
+    edge_class = np.empty(len(edges), dtype=np.int8)
+    known = corners, face_of_corner, repeats if repeating else repeats[:0], half_edges
+    blocks.run(
+        len(edges), lambda begin, end: kernels.classify_edges(*known, begin, end, edge_class)
+    )
+    return Topology(
+        vertex_count,
+        corners,
+        offsets,
+        face_of_corner,
+        edges,
+        corner_edges,
+        half_edges,
+        edge_class,
+        NO_WEIGHTS,
+        plain and triangles and not repeating,
+    )
+
+
+def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> Topology:
+    """Return the topology of the 1-to-4 split.
+
+    Face f becomes faces 4 f … 4 f + 3 = (a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca). The
+    vertex of edge e is V + e; old vertices keep their numbers.
+
+    Args:
+        parent: a mesh of triangles.
+        blocks: how the work is shared.
+        inherit: whether the halves of creases and soft edges inherit their sharpness.
+    """
+    faces, vertex_count = split_faces(parent, blocks), parent.vertex_count + len(parent.edges)
+    creases, soft = parent.crease_edges, parent.soft
+    if not parent.plain:
+        made = build_topology(faces, vertex_count, blocks)
+        if not inherit:
+            return made
+        made = made.with_creases(made.rows_of(_halves(parent, creases)))
+        if len(soft):
+            rows = np.flatnonzero(soft)
+            sharpness = np.zeros(len(made.edges))
+            sharpness[made.rows_of(_halves(parent, rows))] = np.repeat(soft[rows], 2)
+            made = made.with_sharpness(sharpness)
+        return made
+    source = parent if inherit else parent.without_creases()
+    face_count, edge_count = parent.face_count, len(parent.edges)
+    halves = np.empty((edge_count, 2), dtype=np.uint32)
+    arrays = parent.faces, parent.face_edges
+    blocks.run(
+        face_count,
+        lambda begin, end: kernels.number_halves(
+            *arrays, parent.edges, parent.half_edges, begin, end, halves
+        ),
+    )
+    count = 2 * edge_count + 3 * face_count
+    edges, half_edges = np.empty((count, 2), np.uint32), np.empty((count, 2), np.int32)
+    edge_class, face_edges = np.empty(count, np.int8), np.empty((4 * face_count, 3), np.uint32)
+    read = *arrays, source.half_edges, source.edge_class, halves, parent.vertex_count
+    to = face_edges, edges, half_edges, edge_class
+    blocks.run(face_count, lambda begin, end: kernels.split_edges(*read, begin, end, *to))
+    child_soft = NO_WEIGHTS
+    if inherit and len(soft):
+        child_soft = np.zeros(count)
+        child_soft[halves] = soft[:, None]
+    return Topology(
+        vertex_count,
+        faces.reshape(-1),
+        np.arange(0, faces.size + 1, TRIANGLE, dtype=np.int32),
+        NO_FACES,
+        edges,
+        face_edges.reshape(-1),
+        half_edges,
+        edge_class,
+        child_soft,
+        plain=True,
+    )
+
+
+def split_faces(
+    parent: Topology, blocks: Blocks, dtype: type[np.uint32] | type[np.int64] = np.uint32
+) -> Int[np.ndarray, "C 3"]:
+    """Return the triangles of the 1-to-4 split, in the order of ``split_triangles``."""
+    faces = np.empty((4 * parent.face_count, TRIANGLE), dtype=dtype)
+    read = parent.faces, parent.face_edges, parent.vertex_count
+    blocks.run(parent.face_count, lambda begin, end: kernels.split_faces(*read, begin, end, faces))
+    return faces
+
+
+def _halves(parent: Topology, rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M 2"]:
+    """Return the halves of edges, as vertex pairs of the split mesh."""
+    ends, middle = parent.edges[rows].astype(np.int64), parent.vertex_count + rows.astype(np.int64)
+    return np.stack([ends, np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
+
+
+Numbered = tuple[UInt32[np.ndarray, "E 2"], Int[np.ndarray, "E 2"], UInt32[np.ndarray, " H"], bool]
+
+
+def _number_edges(
+    corners: UInt32[np.ndarray, " H"], offsets: Int[np.ndarray, " F1"], vertex_count: int
+) -> Numbered:
+    """Return edges, their half-edges, the edge of each corner, and whether triangles are plain."""
+    count = len(corners)
+    head, low = np.full(vertex_count, -1, dtype=np.int32), np.empty(count, dtype=np.uint32)
+    links, corner_edges = np.empty((count, 4), np.int32), np.empty(count, np.uint32)
+    plain = np.ones(1, dtype=np.int8)
+    made = kernels.number_edges(
+        corners, offsets, STEPS * count, head, low, links, corner_edges, plain
+    )
+    if made == kernels.TOO_LONG:
+        return _sort_edges(corners, offsets, vertex_count)
+    edges = np.empty((made, 2), dtype=np.uint32)
+    edges[:, 0], edges[:, 1] = low[:made], links[:made, kernels.HIGH]
+    half_edges = links[:made, kernels.FIRST :].copy()
+    return edges, half_edges, corner_edges, bool(plain[0])
+
+
+def _sort_edges(
+    corners: UInt32[np.ndarray, " H"], offsets: Int[np.ndarray, " F1"], vertex_count: int
+) -> Numbered:
+    """Return what ``_number_edges`` does, by sorting: for vertices of thousands of edges."""
+    following = np.arange(1, len(corners) + 1)
+    following[offsets[1:] - 1] = offsets[:-1]
+    pairs = np.stack([corners, corners[following]], axis=1)
+    keys = _keys(pairs, vertex_count)
+    _, first, group, count = np.unique(
+        keys, return_index=True, return_inverse=True, return_counts=True
+    )
+    order = np.argsort(first)
+    number = np.empty(len(order), dtype=np.uint32)
+    number[order] = np.arange(len(order))
+    in_runs = np.argsort(group, kind="stable")
+    starts = np.cumsum(count) - count
+    second = in_runs[np.minimum(starts + 1, len(keys) - 1)]
+    second = np.where(count == 1, kernels.NONE, np.where(count == 2, second, kernels.SEVERAL))
+    half_edges = np.stack([first, second], axis=1)[order].astype(np.int32)
+    # Two triangles with two edges in common have all three.
+    corner_edges = number[group]
+    sides = np.sort(corner_edges[: 3 * (len(corners) // 3)].reshape(-1, 3), axis=1)
+    plain = len(np.unique(_keys(sides[:, :2], len(order)))) == len(sides)
+    return np.sort(pairs[first[order]], axis=1), half_edges, corner_edges, plain
+
+
+def _keys(pairs: Int[np.ndarray, "N 2"], vertex_count: int) -> Int[np.ndarray, " N"]:
+    """Return one number for each pair of vertices, in whichever order."""
+    wide = pairs.astype(np.int64)
+    return wide.min(axis=1) * vertex_count + wide.max(axis=1)
+
+
+def _reach(vertices: UInt32[np.ndarray, " N"], each: int) -> Int[np.ndarray, "B 2"]:
+    starts = np.arange(0, len(vertices), each)
+    ends = np.minimum.reduceat(vertices, starts), np.maximum.reduceat(vertices, starts)
+    return np.stack(ends, axis=1).astype(np.int64)
