@@ -9,11 +9,11 @@ from typing import Any
 
 import msgspec
 import safetensors.torch
-from pns_common.files import replace_file
 from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
 from pns_common import ModelError
+from pns_common.files import replace_file
 from train.models.from_recipe import initial_network, initial_vertex_network
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
