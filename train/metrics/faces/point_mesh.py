@@ -42,4 +42,4 @@ def nearest(tree: FaceTree, points: Float[np.ndarray, "P 3"]) -> Nearest:
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
     square, face, point = tree.boxes.squared_distance(tree.vertices, tree.faces, points)
-    return Nearest(np.sqrt(square), point, face)
+    return Nearest(np.sqrt(square), np.asarray(point), np.asarray(face))
