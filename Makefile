@@ -19,7 +19,7 @@ HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.
 PROCESSES ?= 2
 PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
-.PHONY: bench bench-answers scale image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
+.PHONY: bench bench-answers image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
 
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
@@ -230,13 +230,6 @@ build/bench/node/.ready: benchmarks/peers/package.json
 	cp $< $(@D)
 	cd $(@D) && npm install --ignore-scripts --no-audit --no-fund
 	touch $@
-
-# Growth of `pns large` and `pns batch` with faces, parts, files and rows, and its plot in docs/: ten minutes, 6 GB of
-# disk. What benchmarks/scale.json holds is not measured again. SCALE="--share .01 --results build/scale.json --picture
-# build/scale.png" tries it at a hundredth of all sizes. Runs take place in the environment of `make serve`.
-scale: $(DEV)/.ready $(SERVE)/.ready
-	$(SERVE)/bin/python -m pns_common.fused
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m benchmarks.scale --python $(SERVE)/bin/python $(SCALE)
 
 # One by one: a library without a build for this machine keeps no other away.
 $(PEERS)/.ready: benchmarks/peers/requirements.txt

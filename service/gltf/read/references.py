@@ -1,22 +1,24 @@
-"""Every index in a document points at something that exists, and every range lies inside its bytes.
+"""Check references: each index names an element, each range lies in its bytes, nodes form trees.
 
-Nothing is allocated here, whatever the counts in the file claim.
+Nothing is allocated in proportion to the counts in the file.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ....errors import GltfError
-from ...constants import COMPONENT_TYPES, UNSIGNED_INTEGERS
-from ..accessors import element_size
-from ..json_text import escaped
-from ..schema import Accessor, Document, Material, Primitive, Sparse, TextureInfo
+from ...errors import GltfError
+from ...report import Change
+from ..constants import COMPONENT_TYPES, UNSIGNED_INTEGERS
+from .accessors import element_size
+from .json_text import escaped
+from .schema import Accessor, Document, Material, Primitive, Sparse, TextureInfo
 
 
 def check_references(document: Document, buffers: Sequence[memoryview]) -> None:
-    """Check all references but those of the node tree.
+    """Check all references except those of nodes and scenes.
 
     Raises:
         GltfError: with the JSON pointer of the first reference or range that does not hold.
@@ -43,7 +45,7 @@ def check_references(document: Document, buffers: Sequence[memoryview]) -> None:
 
 
 def refer(index: int | None, targets: Sequence[Any], pointer: str) -> None:
-    """Raise GltfError unless `index` is absent or one of the targets'."""
+    """Raise GltfError if an index is given and no target has it."""
     if index is not None and index >= len(targets):
         raise GltfError(f"index {index}, but there are {len(targets)}", pointer=pointer)
 
@@ -51,7 +53,7 @@ def refer(index: int | None, targets: Sequence[Any], pointer: str) -> None:
 def refer_each(
     indices: Sequence[int | None], targets: Sequence[Any], pointer: str, name: str = ""
 ) -> None:
-    """Raise GltfError unless each is absent or one of the targets'; the first stands at 0/name."""
+    """Raise GltfError for the first index without a target, at `pointer`/number/`name`."""
     count = len(targets)
     for place, index in enumerate(indices):
         if index is not None and index >= count:
@@ -151,3 +153,74 @@ def _check_animations(document: Document) -> None:
         refer_each([each.sampler for each in channels], samplers, pointer, "/sampler")
         nodes = [each.target.node for each in channels]
         refer_each(nodes, document.nodes, pointer, "/target/node")
+
+
+def check_nodes(document: Document) -> list[Change]:
+    """Check the references of nodes and scenes, and that no node is its own ancestor.
+
+    Returns nodes with several parents. They break glTF 2.0 §3.5.2 without consequence here.
+
+    Raises:
+        GltfError: with the JSON pointer of the reference that does not hold.
+    """
+    parents: Counter[int] = Counter()
+    several: list[str] = []
+    for number, node in enumerate(document.nodes):
+        pointer = f"/nodes/{number}"
+        refer(node.mesh, document.meshes, f"{pointer}/mesh")
+        refer(node.skin, document.skins, f"{pointer}/skin")
+        refer(node.camera, document.cameras, f"{pointer}/camera")
+        for place, child in enumerate(node.children):
+            refer(child, document.nodes, f"{pointer}/children/{place}")
+            parents[child] += 1
+            if parents[child] > 1:
+                several.append(f"{pointer}/children/{place}")
+    _check_acyclic(document, parents)
+    refer(document.scene, document.scenes, "/scene")
+    for number, scene in enumerate(document.scenes):
+        for place, root in enumerate(scene.nodes):
+            # Some exporters list children as roots too; their parents place them.
+            refer(root, document.nodes, f"/scenes/{number}/nodes/{place}")
+    if not several:
+        return []
+    return [Change(several[0], "found, and left: nodes with more than one parent", len(several))]
+
+
+def mesh_instances(document: Document) -> list[int]:
+    """Return for each mesh the number of nodes that show it."""
+    counts = [0] * len(document.meshes)
+    for node in document.nodes:
+        if node.mesh is not None:
+            counts[node.mesh] += 1
+    return counts
+
+
+def _check_acyclic(document: Document, parents: Counter[int]) -> None:
+    """Remove nodes without parents until none is left (Kahn 1962); the rest lie on cycles."""
+    left = [parents[number] for number in range(len(document.nodes))]
+    free = [number for number, count in enumerate(left) if count == 0]
+    taken = 0
+    while free:
+        taken += 1
+        for child in document.nodes[free.pop()].children:
+            left[child] -= 1
+            if left[child] == 0:
+                free.append(child)
+    if taken < len(left):
+        node = _on_a_cycle(document, left)
+        raise GltfError(f"node {node} is its own ancestor", pointer=f"/nodes/{node}")
+
+
+def _on_a_cycle(document: Document, left: list[int]) -> int:
+    """Return the first node that a walk from child to parent meets twice."""
+    parent = {
+        child: number
+        for number, node in enumerate(document.nodes)
+        if left[number]
+        for child in node.children
+    }
+    node, seen = next(number for number, count in enumerate(left) if count), set[int]()
+    while node not in seen:
+        seen.add(node)
+        node = parent[node]
+    return node

@@ -1,4 +1,4 @@
-"""A ceiling on the memory that foreign code may take, for decoders that trust their input."""
+"""Cap the memory of a block of code, such as a decoder that trusts its input."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 try:
     import resource
-except ImportError:  # Windows has no such limit; the check of the header still holds there.
+except ImportError:  # Windows has no such limit.
     resource = None  # type: ignore[assignment]
 
 _STATM = Path("/proc/self/statm")
@@ -16,9 +16,9 @@ _STATM = Path("/proc/self/statm")
 
 @contextmanager
 def memory_cap(extra: int) -> Iterator[None]:
-    """Let the process grow by `extra` bytes of address space at most: what asks for more fails.
+    """Let the process grow by at most `extra` bytes of address space; beyond it, MemoryError.
 
-    The code inside sees MemoryError. Linux; elsewhere there is no cap.
+    Linux only; other systems have no cap.
     """
     if resource is None or not _STATM.exists():
         yield
