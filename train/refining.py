@@ -11,11 +11,11 @@ from typing import Any, Literal
 import numpy as np
 import torch
 from jaxtyping import Float, Int
-from pns_common.reference_length import measure_reference_length
 from torch import Tensor
 
 from pns_common import Mesh, Scheme, load_model, sharp_edges
 from pns_common import refine as refine_by_library
+from pns_common.reference_length import measure_reference_length
 from train.connectivity import Connectivity, connect
 from train.loop_masks import limit_mask, loop_mask
 from train.reference import Step, Surroundings

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from jaxtyping import Float, Int
-from pns_common.reference_length import measure_reference_length
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
 from pns_common import Mesh, MeshError, clean
+from pns_common.reference_length import measure_reference_length
 from train.data.datasets import draw_ridges
 from train.data.grid import grid_faces, jittered_grid
 from train.spectra.stars import star

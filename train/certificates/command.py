@@ -4,12 +4,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from pns_common.files import replace_file
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from pns_common import PnsError
+from pns_common.files import replace_file
 from train.certificates.bodies import Body, real_bodies
 from train.certificates.certify import (
     Verdict,

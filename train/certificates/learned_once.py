@@ -76,7 +76,7 @@ def limit_distance(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> C
         assert isinstance(subject.scheme, Scheme)
         ours, theirs = (
             refine_by_library(trial.mesh, scheme, 2, 1.0, limit=True, creases=sharp, threads=1)
-            for scheme, sharp in ((subject.scheme, creases), (loop(), None))
+            for scheme, sharp in ((subject.scheme, creases), (loop(), Creases()))
         )
         apart = np.linalg.norm(ours.mesh.vertices - theirs.mesh.vertices, axis=1).max()
         stated, bound = (ours.report[key] for key in ("limit_distance", "limit_distance_bound"))

@@ -2,32 +2,24 @@
 
     x' = x0 + s γ Π_ρ(D + τ h F z(φ))
 
-All but z is measured once; gradients pass through z, with s of the fold guard held.
+The library measures all but z once; gradients pass through z, with s of the fold guard held.
 """
 
+import math
 from dataclasses import dataclass
 
+import numpy as np
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from torch import Tensor
 
-from pns_common import Mesh
-from train.connectivity import connect
-from train.curve_rule import Curves
-from train.loop_masks import loop_mask
+from pns_common import Mesh, loop, operator
+from pns_common.curves import Curves, find_curves
+from pns_common.level import Level
+from pns_common.refinement import control_level
 from train.models.networks import BoundedNet, unit_correction
-from train.models.recipe import Recipe, ScaleFree, VertexRule, scale_free_parts
-from train.reference import (
-    Surroundings,
-    edge_frames,
-    fold_guard,
-    pushes,
-    read_edges,
-    ring_10,
-    ring_vectors,
-    signed_18,
-)
-from train.tensors import root, shortened
+from train.models.recipe import Recipe, scale_free_parts
+from train.tensors import shortened
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,21 +54,20 @@ class LearnedLevel:
     """A control mesh before its learned level.
 
     Attributes:
+        level, curves: the library's, for its fold guard.
         base: x0, old vertices first.
         on_curves: what is added at boundaries, whatever the networks answer.
         edges, vertices: what surrounds both networks.
-        faces: of the split mesh.
-        of_boundary: new vertices that the boundary alone places.
         pushed: x0 with the whole prior: quasi-interpolation along the normal.
-        fold_angle: θ, degrees.
+        fold_angle: θ, radians.
     """
 
+    level: Level
+    curves: Curves
     base: Float[Tensor, "W 3"]
     on_curves: Float[Tensor, "W 3"]
     edges: Inputs
     vertices: Inputs
-    faces: Int[Tensor, "C 3"]
-    of_boundary: Bool[Tensor, " W"]
     pushed: Float[Tensor, "W 3"]
     fold_angle: float
 
@@ -85,8 +76,10 @@ class LearnedLevel:
         made = self.on_curves
         for part, net in ((self.edges, network), (self.vertices, vertex_network)):
             made = made.index_add(0, part.rows, part.displacement(net))
-        scale = fold_guard(self.faces, self.base, made, self.fold_angle, self.of_boundary)
-        return self.base + scale[:, None] * made
+        scale = operator.guard_scale(
+            self.level, self.base.numpy(), made.detach().numpy(), self.fold_angle, self.curves
+        )
+        return self.base + torch.from_numpy(scale)[:, None] * made
 
 
 def learned_level(mesh: Mesh, recipe: Recipe) -> LearnedLevel:
@@ -96,55 +89,53 @@ def learned_level(mesh: Mesh, recipe: Recipe) -> LearnedLevel:
         ParameterError: the recipe is not scale-free.
     """
     form, vertex_rule, strength = scale_free_parts(recipe)
-    level, points = connect(mesh.faces, len(mesh.vertices)), torch.tensor(mesh.vertices)
-    around, curves, masks = Surroundings(level, points), Curves(level, points), loop_mask(level)
-    of_curves = form.boundary_strength * curves.pushes(vertex_rule.gate_sharpness)
-    prior, base = masks(strength * pushes(around) + of_curves), masks(points)
-    bound = torch.where(curves.moved, recipe.budget * curves.squares, 0.0)
-    return LearnedLevel(
-        base=base,
-        on_curves=shortened(masks(of_curves), bound),
-        edges=_edge_inputs(around, prior, recipe, form),
-        vertices=_vertex_inputs(around, prior, recipe, form, vertex_rule),
-        faces=level.split(),
-        of_boundary=curves.of_boundary,
-        pushed=base + masks(pushes(around)),
+    rule = operator.Rule(
+        edge_network=_not_asked,
+        feature_count=18,
+        symmetric=True,
+        gate_sharpness=recipe.gate_sharpness,
+        budget=recipe.budget,
+        vertex_network=_not_asked,
+        vertex_gate_sharpness=vertex_rule.gate_sharpness,
+        prior_strength=strength,
+        curve_strength=form.boundary_strength,
+        network_scale=form.network_scale,
         fold_angle=form.fold_angle,
     )
-
-
-def _edge_inputs(
-    around: Surroundings, prior: Float[Tensor, "W 3"], recipe: Recipe, form: ScaleFree
-) -> Inputs:
-    edges, mesh = read_edges(around, first_face=False), around.mesh
-    frames, rows = edge_frames(edges, first_face=False), mesh.interior
-    length, curvature = frames.length[rows], frames.curvature[rows]
-    return Inputs(
-        rows=mesh.vertex_count + rows,
-        features=signed_18(around, edges, frames)[rows],
-        axes=frames.axes[rows],
-        gate=torch.tanh(recipe.gate_sharpness * curvature**2),
-        bound=recipe.budget * length**2,
-        reach=form.network_scale * length,
-        prior=prior[mesh.vertex_count + rows],
+    level = control_level(mesh, loop(), 1.0, None, threads=1)
+    topology, count = level.topology, len(mesh.vertices)
+    curves = find_curves(level.points, topology)
+    prior = torch.from_numpy(operator.prior(level, rule, curves))
+    base = level.base.place(level.points, topology, level.blocks)
+    pushed = base + level.base.place(
+        operator.pushes(level, rule) / strength, topology, level.blocks
+    )
+    on_curves, rows = torch.zeros_like(prior), torch.from_numpy(curves.new_rows)
+    bound = recipe.budget * torch.from_numpy(curves.squares)
+    on_curves[rows] = shortened(prior[rows], bound)
+    edges = operator.edge_inputs(level, rule, topology.interior)
+    vertices = operator.vertex_inputs(level, rule, np.flatnonzero(level.ringed))
+    # Without what was measured: this travels between processes.
+    bare = Level(level.points, topology, level.base, 1.0, level.blocks)
+    return LearnedLevel(
+        level=bare,
+        curves=curves,
+        base=torch.from_numpy(base),
+        on_curves=on_curves,
+        edges=_inputs(edges, count, prior),
+        vertices=_inputs(vertices, 0, prior),
+        pushed=torch.from_numpy(pushed),
+        fold_angle=math.radians(form.fold_angle),
     )
 
 
-def _vertex_inputs(
-    around: Surroundings,
-    prior: Float[Tensor, "W 3"],
-    recipe: Recipe,
-    form: ScaleFree,
-    rule: VertexRule,
-) -> Inputs:
-    rows, jump = torch.nonzero(around.mesh.ringed)[:, 0], around.mean(around.turns[0])[:, 0]
-    square = around.square[rows, 0]
-    return Inputs(
-        rows=rows,
-        features=ring_10(around)[rows],
-        axes=ring_vectors(around)[rows],
-        gate=torch.tanh(rule.gate_sharpness * jump[rows]),
-        bound=recipe.budget * square,
-        reach=form.network_scale * root(square),
-        prior=prior[rows],
-    )
+def _inputs(at: operator.Inputs, first: int, prior: Float[Tensor, "W 3"]) -> Inputs:
+    rows = torch.from_numpy(first + at.rows.astype(np.int64))
+    gate = torch.from_numpy(at.weight * at.gate)
+    axes = torch.from_numpy(at.basis).reshape(-1, 3, 3).transpose(1, 2)
+    measured = (torch.from_numpy(each) for each in (at.bound, at.reach))
+    return Inputs(rows, torch.from_numpy(at.features), axes, gate, *measured, prior[rows])
+
+
+def _not_asked(features: np.ndarray) -> np.ndarray:
+    raise AssertionError("what surrounds a network is measured without its answers")

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 
 import numpy as np
-from pns_common.reference_length import measure_reference_length
 
+from pns_common.reference_length import measure_reference_length
 from train.data.pairs.authored import authored_pair
 from train.data.pairs.faceted import faceted_pair
 from train.data.pairs.grid import grid_pair

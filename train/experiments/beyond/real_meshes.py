@@ -17,8 +17,8 @@ from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.metrics.decimation import gain
 from train.metrics.faces.point_mesh import FaceTree, nearest
-from train.metrics.faces.self_intersection import self_intersecting
-from train.metrics.surface_distance import SurfaceErrors, moved, prepared, surface_errors
+from train.metrics.faces.self_intersection import crossing_faces
+from train.metrics.surface_distance import SurfaceErrors, prepared, surface_errors
 from train.metrics.whole_surface import normal_jump
 from train.refining import AnyScheme, refine
 
@@ -132,15 +132,11 @@ def compared(
     level = min(SIZES[coarse.faces], deepest)
     refined = {name: refine(coarse.mesh, scheme, level) for name, scheme in schemes.items()}
     meshes = {name: refinement.mesh for name, refinement in refined.items()}
-    loops = prepared(meshes[LOOP], samples)
     meshes[ON_SURFACE] = on_surface(meshes[LOOP], true.tree)
     rows = []
     for method, mesh in meshes.items():
-        # All have Loop's faces.
-        surface = moved(loops, mesh.vertices)
-        crossing = self_intersecting(surface.tree.boxes)
-        errors = surface_errors(true, surface)
-        rows.append(Measured(coarse, method, errors, normal_jump(mesh), int(crossing.sum())))
+        errors = surface_errors(true, prepared(mesh, samples))
+        rows.append(Measured(coarse, method, errors, normal_jump(mesh), crossing_faces(mesh)))
     return rows
 
 

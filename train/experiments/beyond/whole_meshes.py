@@ -15,8 +15,7 @@ from train.experiments.harness.contenders import LOOP, OURS, contenders
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
-from train.metrics.faces.face_boxes import face_boxes
-from train.metrics.faces.self_intersection import self_intersecting
+from train.metrics.faces.self_intersection import crossing_faces
 from train.metrics.fairness import volume
 from train.refining import AnyScheme, Refined, refine
 
@@ -99,14 +98,9 @@ def measured(refined: Refined) -> Measured:
     return Measured(
         mesh.vertices,
         sum(level.flipped for level in refined.levels),
-        crossing(mesh),
+        crossing_faces(mesh),
         volume(mesh),
     )
-
-
-def crossing(mesh: Mesh) -> int:
-    """Return how many faces cross others."""
-    return int(self_intersecting(face_boxes(mesh)).sum())
 
 
 def rows_of(
@@ -118,7 +112,7 @@ def rows_of(
     control: int,
     limit: bool = False,
 ) -> list[Row]:
-    """Return a row for each method, Loop and N1 among them; `control` is `crossing(mesh)`."""
+    """Return a row for each method, Loop and N1 among them; `control` is `crossing_faces(mesh)`."""
     surfaces = {
         method: measured(refine(mesh, scheme, levels, limit=limit))
         for method, scheme in schemes.items()
@@ -163,7 +157,7 @@ def run(laboratory: Laboratory) -> Outcome:
     for number, (name, mesh) in enumerate(chosen):
         laboratory.progress(f"whole-meshes: {name}", number, len(chosen))
         levels = min(LEVELS, scale.levels)
-        rows += rows_of(name, mesh, levels, schemes, control=crossing(mesh))
+        rows += rows_of(name, mesh, levels, schemes, control=crossing_faces(mesh))
     totals = (_total(method, rows) for method in schemes)
     ours = [row for row in rows if row.method == OURS]
     return Outcome(

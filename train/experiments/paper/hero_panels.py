@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from pns_common.files import replacing
 
+from pns_common.files import replacing
 from train.experiments.harness.laboratory import FULL, Laboratory
 from train.experiments.harness.style import TITLES
 from train.experiments.paper.hero import Panel, panels_of
