@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
-from pns_common.rows import distinct_rows, number_by_first_appearance
 
 from pns_common.creases import Creases
 from pns_common.errors import MeshError
 from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
 from pns_common.refinement import Refinement, refine
+from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import Scheme
 
 from ..course import Course

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from pns_common.rows import marked
 
 from pns_common.normals import smooth_fans
+from pns_common.rows import marked
 from pns_common.topology import build_topology
 
 from ..constants import FLOAT

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Int
-from pns_common.rows import disjoint_faces
 
 from pns_common.creases import Creases
 from pns_common.errors import MeshError
 from pns_common.report import Report
+from pns_common.rows import disjoint_faces
 from pns_common.schemes import Scheme
 
 from ...course import Course
