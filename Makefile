@@ -140,7 +140,7 @@ paper-hero: $(DEV)/.ready $(BLENDER)-5.0/.ready build/blender-site/.ready
 	  -o docs/blender-paper.png --field distance --highest 0.1 --label 'Distance from the ridge' > /dev/null
 
 build/blender-site/.ready: $(DEV)/.ready constraints.txt
-	$(DEV)/bin/python -m pip install --quiet --no-deps --upgrade --target build/blender-site array-api-compat jaxtyping wadler-lindig
+	$(DEV)/bin/python -m pip install --quiet --no-deps --upgrade --target build/blender-site jaxtyping wadler-lindig numba llvmlite onnxruntime
 	touch $@
 
 # The Blender extension: dist/pns_refine-VERSION.zip, packed and validated by Blender's own tool.
@@ -190,7 +190,7 @@ $(CLIENTS)/.ready: requirements/clients.txt
 
 $(INTEROP)/.ready: pyproject.toml setup.py constraints.txt requirements/interop.txt
 	$(PYTHON) -m venv $(INTEROP)
-	$(INTEROP)/bin/python -m pip install --quiet --editable '.[fast]' --requirement requirements/interop.txt
+	$(INTEROP)/bin/python -m pip install --quiet --editable . --requirement requirements/interop.txt
 	touch $@
 
 $(DEV)/.ready: pyproject.toml setup.py constraints.txt

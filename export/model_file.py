@@ -10,7 +10,7 @@ import msgspec
 
 from export.onnx_graph import model_bytes
 from export.parity import TOLERANCE, Parity, check_parity
-from pns_common.base.whole_file import replace_file
+from pns_common.files import replace_file
 from pns_common.model.card import DEFAULT_FORMAT, PAPER_FORMAT, ModelCard
 from pns_common.model.file import model_from_bytes
 from train.models.checkpoint import Checkpoint

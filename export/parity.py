@@ -9,9 +9,7 @@ import torch
 from jaxtyping import Float
 
 from pns_common.errors import ModelError, PnsError
-from pns_common.features.edge_features import FEATURE_SETS
-from pns_common.features.ring_features import RING_FEATURE_SETS
-from pns_common.features.symmetry import Feature
+from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS, Feature
 from pns_common.model.session import OnnxModel
 from train.models.networks import BoundedNet
 

@@ -3,8 +3,12 @@
 With `--published DIR` it makes one model file of each of the author's PNS networks instead.
 """
 
+import sys
 from pathlib import Path
 from typing import Annotated
+
+# Started as a file, Python looks for packages beside it and not in the checkout.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import typer
 from rich.console import Console
@@ -13,7 +17,7 @@ from rich.markup import escape
 from export.model_file import Exported, export_model
 from export.published import export_published
 from pns_common.errors import ParameterError, PnsError
-from pns_common.models.manifest import write_manifest
+from pns_common.model.file import write_manifest
 from train.models.checkpoint import load_checkpoint
 from train.models.recipe import Recipe
 from train.models.recipes import RECIPES

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from pns_common.model.file import load_model
     from pns_common.refinement import Refinement, refine, refine_many
     from pns_common.schemes import Scheme, loop, pns
-    from pns_common.version import VERSION as __version__
+    from pns_common.version import VERSION as __version__  # noqa: N811
     from pns_common.warming import warm_up
 
 _HOMES = {

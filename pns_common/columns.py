@@ -107,7 +107,7 @@ class ColumnRefinement:
     def __call__(self, columns: Real[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
         """Refine columns. Raises ParameterError unless there is one row for each vertex."""
         count = self.topologies[0].vertex_count
-        if columns.ndim != 2 or len(columns) != count:  # noqa: PLR2004
+        if columns.ndim != 2 or len(columns) != count:
             expected = f"({count}, K), a row for each vertex"
             raise ParameterError("columns.shape", columns.shape, expected=expected)
         values = np.asarray(columns, dtype=np.float64)

@@ -77,9 +77,7 @@ class Creases:
             topology = topology.with_creases(self.found(points, topology))
         return topology
 
-    def found(
-        self, points: Float[np.ndarray, "V 3"], topology: Topology
-    ) -> Int[np.ndarray, " N"]:
+    def found(self, points: Float[np.ndarray, "V 3"], topology: Topology) -> Int[np.ndarray, " N"]:
         """Return the interior edges that are found by their angle."""
         if self.angle is None:
             return np.zeros(0, dtype=np.int64)
@@ -196,4 +194,3 @@ def _is_pair(row: Any) -> bool:
         return np.shape(row) == (2,)
     except ValueError:  # it holds rows that differ in length
         return False
-

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pns_common.base_scheme import BaseScheme
 from pns_common.kernels import connectivity, measures
 from pns_common.normals import NO_AREAS
 from pns_common.parallel import Blocks
-from pns_common.base_scheme import BaseScheme
 from pns_common.topology import Topology
 
 # Lengths of zero are read as this, so that every logarithm is finite.
@@ -86,9 +86,7 @@ class Level:
         made = EdgeMeasures(np.empty(count), np.empty(count), np.empty(count))
         read = self.points, self.normals, mesh.corners, mesh.edges, mesh.half_edges, mesh.edge_class
         to = made.lengths, made.jumps, made.bends
-        self.blocks.run(
-            count, lambda begin, end: measures.measure_edges(*read, begin, end, *to)
-        )
+        self.blocks.run(count, lambda begin, end: measures.measure_edges(*read, begin, end, *to))
         return made
 
     @cached_property

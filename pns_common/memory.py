@@ -36,8 +36,8 @@ KEPT, LARGEST_KEPT = 128 * 2**20, 32 * 2**20
 def keep_freed_memory() -> None:
     """Let glibc keep what this process frees, up to 128 MiB; do nothing on other systems.
 
-    By default each call's arrays are new pages, which the system clears: half of the time of a level.
-    A process whose environment sets malloc's options is left as it is.
+    By default each call's arrays are new pages, which the system clears: half of a level's time. A
+    process whose environment sets malloc's options is left as it is.
     """
     given = ("GLIBC_TUNABLES", "MALLOC_TRIM_THRESHOLD_", "MALLOC_MMAP_THRESHOLD_")
     if sys.platform != "linux" or any(name in os.environ for name in given):

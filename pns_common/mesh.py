@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,7 +135,7 @@ def _kept(
 ) -> Mesh:
     """Make a mesh of arrays that are known to be right."""
     mesh = object.__new__(Mesh)
-    mesh._keep(vertices, corners, offsets, degree)  # noqa: SLF001  # pyright: ignore[reportPrivateUsage]
+    mesh._keep(vertices, corners, offsets, degree)  # pyright: ignore[reportPrivateUsage]
     return mesh
 
 
@@ -230,10 +229,11 @@ def repeated_vertex(faces: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
 
 def _polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return corners and offsets of faces of any degree. Raises MeshError."""
-    if isinstance(faces, Sequence) and len({np.size(face) for face in faces}) > 1:
-        degrees = [np.size(face) for face in faces]
-        corners = np.concatenate([_array(face, "faces").reshape(-1) for face in faces])
-        offsets = np.concatenate([[0], np.cumsum(degrees)])
+    rows: list[Any] = list(faces) if isinstance(faces, list | tuple) else []  # pyright: ignore[reportUnknownArgumentType]
+    degrees = [int(np.size(face)) for face in rows]
+    if len(set(degrees)) > 1:
+        corners = np.concatenate([_array(face, "faces").reshape(-1) for face in rows])
+        offsets: np.ndarray = np.concatenate([[0], np.cumsum(degrees)])
     else:
         given = _array(faces, "faces")
         if given.size == 0:
@@ -241,7 +241,7 @@ def _polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
         if given.ndim != 2:
             raise MeshError(f"shape {given.shape}, expected (F, 3)", element="faces")
         corners = given.reshape(-1)
-        offsets = np.arange(0, corners.size + 1, given.shape[1])
+        offsets = np.arange(0, corners.size + 1, int(given.shape[1]))
     if corners.dtype.kind not in "iu":
         raise MeshError(f"type {corners.dtype}, expected integers", element="faces")
     few = np.flatnonzero(np.diff(offsets) < TRIANGLE)
@@ -260,9 +260,7 @@ def _check_indices(corners: np.ndarray, offsets: np.ndarray, vertex_count: int) 
     outside = np.flatnonzero((corners < 0) | (corners >= vertex_count))
     worst = int(np.searchsorted(offsets, outside[0], side="right")) - 1
     face = corners[offsets[worst] : offsets[worst + 1]].tolist()
-    raise MeshError(
-        f"indices {face}, expected 0 … {vertex_count - 1}", element="face", index=worst
-    )
+    raise MeshError(f"indices {face}, expected 0 … {vertex_count - 1}", element="face", index=worst)
 
 
 def _check_coordinates(vertices: Float[np.ndarray, "V 3"]) -> None:

@@ -207,9 +207,7 @@ def pushes(level: Level, rule: Rule) -> Float[np.ndarray, "V 3"]:
     assert level.base.limit_weight is not None
     weight = level.base.limit_weight(np.arange(int(rings.valence.max(initial=0)) + 1))
     read = rings.means, rings.fields, rings.valence, level.ringed, weight, rule.prior_strength
-    level.blocks.run(
-        len(made), lambda begin, end: measures.normal_pushes(*read, begin, end, made)
-    )
+    level.blocks.run(len(made), lambda begin, end: measures.normal_pushes(*read, begin, end, made))
     sharp = level.topology.sharpest
     if sharp is not None and len(level.topology.soft):
         made *= 1 - sharp.weights[:, 1:2]
@@ -366,7 +364,7 @@ class _Rows:
         return cls(prior, *np.zeros((3, len(prior))))
 
     @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """All four, in the order of the kernels."""
         return self.displacement, self.ratio, self.gate, self.bound
 
@@ -378,9 +376,7 @@ class _Rows:
     def correct_curves(self, curves: Curves, budget_per_length: float) -> None:
         """Put Π_ρ(D) in place of D on curves."""
         bound = budget_per_length * curves.squares
-        correction.correct_curves(
-            curves.new_rows, bound, self.displacement, self.ratio, self.bound
-        )
+        correction.correct_curves(curves.new_rows, bound, self.displacement, self.ratio, self.bound)
 
     def scale(self, by: Float[np.ndarray, " W"]) -> None:
         """Put s δ in place of δ."""

@@ -59,7 +59,7 @@ class Blocks:
         return [slice(start, min(start + rows, count)) for start in range(0, count, rows)]
 
     def run(self, count: int, work: Callable[[int, int], T]) -> list[T]:
-        """Call ``work(begin, end)`` for each block of ``count`` rows; return the results in order."""
+        """Call ``work(begin, end)`` for each block of ``count`` rows; return results in order."""
         if 0 < count <= (self.rows or LEAST_ROWS):
             # One block: all else would take as long as its work, in a small mesh.
             self.before(count)

@@ -12,22 +12,23 @@ from typing import Any
 import pyvista
 
 from pns_common.interop.subdivide import subdivide
+from pns_common.refinement import DEFAULT_LEVELS
 from pns_common.schemes import Scheme, loop
 
 
 @pyvista.register_dataset_accessor("pns", pyvista.PolyData)
 class PnsAccessor:
-    """What PNS makes of a PolyData of triangles; point, cell and field data are kept."""
+    """Refines a PolyData of triangles; point, cell and field data are kept."""
 
     def __init__(self, mesh: pyvista.PolyData):
         self._mesh = mesh
 
     def subdivide(
-        self, levels: int = 1, scheme: Scheme | None = None, **options: Any
+        self, levels: int = DEFAULT_LEVELS, scheme: Scheme | None = None, **options: Any
     ) -> pyvista.PolyData:
         """Return the refined mesh; arguments and errors as of ``pns_common.subdivide``."""
         return subdivide(self._mesh, levels, scheme, **options)
 
-    def loop(self, levels: int = 1, **options: Any) -> pyvista.PolyData:
+    def loop(self, levels: int = DEFAULT_LEVELS, **options: Any) -> pyvista.PolyData:
         """Return the mesh refined by Loop's rules alone."""
         return subdivide(self._mesh, levels, loop(), **options)

@@ -224,7 +224,9 @@ def refine_many(
 ) -> list[Refinement]:
     """Refine meshes one after the other, each with its own creases; None: no edge."""
     return [
-        refine(mesh, scheme, levels, reference_length, limit=limit, creases=creases, threads=threads)
+        refine(
+            mesh, scheme, levels, reference_length, limit=limit, creases=creases, threads=threads
+        )
         for mesh, creases in jobs
     ]
 

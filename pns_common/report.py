@@ -263,7 +263,7 @@ def _ratio_summary(ratio: Float[np.ndarray, " N"]) -> RatioSummary:
 
 
 def _p99(values: Float[np.ndarray, " N"]) -> float:
-    """Return ``np.percentile(values, 99)``, without its checks, which take longest in small meshes."""
+    """Return ``np.percentile(values, 99)`` without its checks, which dominate in small meshes."""
     position = (len(values) - 1) * 0.99
     below = int(position)
     above = min(below + 1, len(values) - 1)

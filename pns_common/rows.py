@@ -12,7 +12,7 @@ FOLD = 128
 
 
 def distinct_rows(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
-    """Number rows: equal rows, and only they, share a number; compared bit by bit."""
+    """Return a number for each row: equal rows share it, bit by bit, and only they."""
     words = as_words(rows)
     mixed = _hash(words)
     order = np.argsort(mixed)

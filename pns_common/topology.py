@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
-from pns_common.errors import ParameterError
+from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import connectivity as kernels
 from pns_common.kernels import loop
 from pns_common.parallel import Blocks
@@ -62,8 +62,8 @@ class Topology:
         face_of_corner: (H,); (0,) where all faces are triangles.
         edges: (E, 2) endpoints a < b.
         corner_edges: (H,) the edge that leaves each corner.
-        half_edges: (E, 2) an edge's first half-edge and its second: −1 where there is none, −2 where
-            there are more than two.
+        half_edges: (E, 2) an edge's first half-edge and its second: −1 where there is none, −2
+            where there are more than two.
         edge_class: (E,) EdgeClass values.
         soft: (E,) sharpness w in [0, 1] of interior edges; (0,) where it is 0 at all of them. Other
             edges have w = 1.
@@ -196,9 +196,7 @@ class Topology:
         if len(rows) == 0:
             return self
         classes = self.edge_class.copy()
-        classes[rows] = np.where(
-            classes[rows] == kernels.INTERIOR, kernels.CREASE, classes[rows]
-        )
+        classes[rows] = np.where(classes[rows] == kernels.INTERIOR, kernels.CREASE, classes[rows])
         return replace(self, edge_class=classes)
 
     def with_sharpness(self, sharpness: Float[np.ndarray, " E"]) -> Topology:
@@ -212,7 +210,9 @@ class Topology:
         classes = np.where(self.edge_class == kernels.CREASE, kernels.INTERIOR, self.edge_class)
         return replace(self, edge_class=classes.astype(np.int8), soft=NO_WEIGHTS)
 
-    def rows_of(self, pairs: Int[np.ndarray, "N 2"], name: str = "creases") -> Int[np.ndarray, " N"]:
+    def rows_of(
+        self, pairs: Int[np.ndarray, "N 2"], name: str = "creases"
+    ) -> Int[np.ndarray, " N"]:
         """Return the edges that pairs of vertices name.
 
         Raises:
@@ -237,7 +237,9 @@ class Topology:
         lost = np.flatnonzero(~found)
         if len(lost):
             row = int(lost[0])
-            raise ParameterError(f"{name}[{row}]", pairs[row].tolist(), expected="an edge of the mesh")
+            raise ParameterError(
+                f"{name}[{row}]", pairs[row].tolist(), expected="an edge of the mesh"
+            )
         return near[place]
 
 
@@ -252,6 +254,9 @@ def build_topology(
         faces: (F, 3) triangles; or (corners, offsets) of faces of any degree ≥ 3.
         vertex_count: number of vertices.
         blocks: how the work is shared.
+
+    Raises:
+        MeshError: a face names a vertex that is not there.
     """
     blocks = blocks or Blocks()
     if isinstance(faces, tuple):
@@ -261,6 +266,8 @@ def build_topology(
         corners = np.ascontiguousarray(faces, dtype=np.uint32).reshape(-1)
         offsets = np.arange(0, len(corners) + 1, TRIANGLE, dtype=np.int32)
         degrees = NO_FACES
+    if len(corners) and int(corners.max()) >= vertex_count:  # a kernel would write beyond an array
+        raise MeshError(f"vertex {corners.max()}, expected 0 … {vertex_count - 1}", element="faces")
     triangles = bool((degrees == TRIANGLE).all())
     face_of_corner = NO_FACES
     if not triangles:
@@ -307,11 +314,11 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         made = build_topology(faces, vertex_count, blocks)
         if not inherit:
             return made
-        made = made.with_creases(made.rows_of(_halves(parent, creases)))
+        made = made.with_creases(made.rows_of(halves_of(parent, creases)))
         if len(soft):
             rows = np.flatnonzero(soft)
             sharpness = np.zeros(len(made.edges))
-            sharpness[made.rows_of(_halves(parent, rows))] = np.repeat(soft[rows], 2)
+            sharpness[made.rows_of(halves_of(parent, rows))] = np.repeat(soft[rows], 2)
             made = made.with_sharpness(sharpness)
         return made
     source = parent if inherit else parent.without_creases()
@@ -354,21 +361,17 @@ def split_faces(
     """Return the triangles of the 1-to-4 split, in the order of ``split_triangles``."""
     faces = np.empty((4 * parent.face_count, TRIANGLE), dtype=dtype)
     read = parent.faces, parent.face_edges, parent.vertex_count
-    blocks.run(
-        parent.face_count, lambda begin, end: kernels.split_faces(*read, begin, end, faces)
-    )
+    blocks.run(parent.face_count, lambda begin, end: kernels.split_faces(*read, begin, end, faces))
     return faces
 
 
-def _halves(parent: Topology, rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M 2"]:
+def halves_of(parent: Topology, rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M 2"]:
     """Return the halves of edges, as vertex pairs of the split mesh."""
     ends, middle = parent.edges[rows].astype(np.int64), parent.vertex_count + rows.astype(np.int64)
     return np.stack([ends, np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
 
 
-Numbered = tuple[
-    UInt32[np.ndarray, "E 2"], Int[np.ndarray, "E 2"], UInt32[np.ndarray, " H"], bool
-]
+Numbered = tuple[UInt32[np.ndarray, "E 2"], Int[np.ndarray, "E 2"], UInt32[np.ndarray, " H"], bool]
 
 
 def _number_edges(

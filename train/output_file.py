@@ -3,7 +3,7 @@
 import tempfile
 from pathlib import Path
 
-from pns_common.errors import ParameterError
+from pns_common import ParameterError
 
 
 def prepare_output(path: Path) -> None:

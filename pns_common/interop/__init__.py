@@ -1,1 +1,1 @@
-"""Meshes of other libraries, refined with what they carry; none of these is imported here."""
+"""Meshes of other libraries, refined with their data; none of these libraries is imported."""

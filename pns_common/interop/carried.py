@@ -1,26 +1,30 @@
-"""A mesh with data on its vertices, corners and faces, and what refinement makes of them.
+"""A mesh with data on its vertices, corners and faces, refined with them.
 
 The surface is refined as one: vertices at the same position are joined for it, so that the seam of
-a texture is no boundary. The mesh that comes out has the seams of the one that went in, and its
-data are interpolated linearly along each edge, which leaves them where they were at old vertices.
+a texture is no boundary. The refined mesh has the seams of the given one, and its data are
+interpolated linearly along each edge, which leaves them as they were at old vertices.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.base.distinct import distinct_rows, number_by_first_appearance
-from pns_common.connectivity.creases import Creases, checked_pairs
-from pns_common.connectivity.topology import CHILDREN, split_faces
-from pns_common.fused.where_loaded.face_edges import number_edges
+from pns_common.creases import Creases, as_pairs
+from pns_common.errors import ParameterError
 from pns_common.mesh import Mesh
-from pns_common.refine import Refinement, refine
+from pns_common.parallel import Blocks
+from pns_common.refinement import Refinement, refine
+from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import Scheme
+from pns_common.topology import build_topology, split_faces, split_triangles
+
+# The children of a face, by its corners a, b, c (0, 1, 2) and edge vertices ab, bc, ca (3, 4, 5).
+CHILDREN = np.array([(0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)])
 
 Data = Mapping[str, np.ndarray]
 
@@ -49,7 +53,7 @@ class CarriedMesh:
 
 
 def refine_carried(
-    mesh: CarriedMesh, scheme: Scheme, levels: int, options: Mapping[str, Any]
+    mesh: CarriedMesh, scheme: Scheme, levels: SupportsIndex, options: Mapping[str, Any]
 ) -> tuple[CarriedMesh, Refinement]:
     """Return the refined mesh with its data, and the refinement of the joined surface.
 
@@ -66,18 +70,19 @@ def refine_carried(
         options["creases"] = _renamed(creases, joined)
     refinement = refine(Mesh(given.vertices[first], joined[given.faces]), scheme, levels, **options)
 
-    faces, count = given.faces, len(given.vertices)
+    blocks, topology = Blocks(), build_topology(given.faces, len(given.vertices))
     points, corners, cells = dict(mesh.points), dict(mesh.corners), dict(mesh.cells)
-    for _ in range(levels):
-        edges, face_edges = number_edges(faces, count)
+    for depth in range(len(refinement.steps)):
+        topology = split_triangles(topology, blocks) if depth else topology
         for name, values in points.items():
-            points[name] = np.concatenate([values, between(*_ends(values, edges))])
+            ends = (values[topology.edges[:, side]] for side in (0, 1))
+            points[name] = np.concatenate([values, between(*ends)])
         corners = {name: corner_children(values) for name, values in corners.items()}
-        faces, count = split_faces(faces, face_edges, count), count + len(edges)
-    cells = {name: np.repeat(values, 4**levels, axis=0) for name, values in cells.items()}
+        cells = {name: np.repeat(values, 4, axis=0) for name, values in cells.items()}
+    faces = split_faces(topology, blocks, np.int64)
 
     # Both meshes have their faces in one order, so their corners correspond.
-    surface = np.zeros(count, dtype=np.int64)
+    surface = np.zeros(topology.vertex_count + len(topology.edges), dtype=np.int64)
     surface[: len(joined)] = joined
     surface[faces.reshape(-1)] = refinement.mesh.faces.reshape(-1)
     positions = refinement.mesh.vertices[surface]
@@ -90,7 +95,13 @@ def _renamed(creases: Any, joined: Int[np.ndarray, " V"]) -> Int[np.ndarray, "N 
     Raises:
         ParameterError: they are not pairs of the mesh's vertices.
     """
-    return joined[checked_pairs(creases, len(joined))]
+    pairs, count = as_pairs(creases), len(joined)
+    outside = np.flatnonzero(((pairs < 0) | (pairs >= count)).any(axis=1))
+    if len(outside):
+        row = int(outside[0])
+        expected = f"vertices 0 … {count - 1}"
+        raise ParameterError(f"creases[{row}]", pairs[row].tolist(), expected=expected)
+    return joined[pairs]
 
 
 def join_by_position(
@@ -121,7 +132,3 @@ def between(
     if a.dtype == np.uint8:
         return ((a.astype(np.uint16) + b + 1) // 2).astype(np.uint8)
     return a
-
-
-def _ends(values: np.ndarray, edges: Int[np.ndarray, "E 2"]) -> tuple[np.ndarray, np.ndarray]:
-    return values[edges[:, 0]], values[edges[:, 1]]

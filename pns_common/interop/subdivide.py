@@ -1,4 +1,4 @@
-"""One call for meshes of any library: what comes back is what was given."""
+"""Refine meshes of any library; the result is of the given kind."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any, SupportsIndex, TypeVar, cast
 
 import numpy as np
 
-from pns_common.arguments import checked_levels
 from pns_common.errors import ParameterError
 from pns_common.interop.carried import CarriedMesh, refine_carried
 from pns_common.interop.of_meshio import read_meshio, write_meshio
@@ -17,8 +16,8 @@ from pns_common.interop.of_open3d import read_open3d, write_open3d
 from pns_common.interop.of_pyvista import read_pyvista, write_pyvista
 from pns_common.interop.of_trimesh import read_trimesh, write_trimesh
 from pns_common.mesh import Mesh
-from pns_common.refine import refine
-from pns_common.runtimes.onnx_model import load_model
+from pns_common.model.file import load_model
+from pns_common.refinement import DEFAULT_LEVELS, refine
 from pns_common.schemes import Scheme, pns
 
 AnyMesh = TypeVar("AnyMesh")
@@ -26,13 +25,13 @@ AnyMesh = TypeVar("AnyMesh")
 
 @dataclass(frozen=True)
 class Adapter:
-    """How a library's mesh is taken apart, and how one like it is made."""
+    """Functions that read a library's mesh, and make one like it."""
 
     read: Callable[[Any], CarriedMesh]
     write: Callable[[CarriedMesh, Any], Any]
 
 
-# By package and class: a mesh is known without its library being imported.
+# By package and class, so that a mesh is recognised without importing its library.
 ADAPTERS = MappingProxyType(
     {
         ("trimesh", "Trimesh"): Adapter(read_trimesh, write_trimesh),
@@ -45,7 +44,7 @@ ADAPTERS = MappingProxyType(
 
 def subdivide(
     mesh: AnyMesh,
-    levels: SupportsIndex = 1,
+    levels: SupportsIndex = DEFAULT_LEVELS,
     scheme: Scheme | None = None,
     **options: Any,
 ) -> AnyMesh:
@@ -54,7 +53,7 @@ def subdivide(
     Args:
         mesh: a ``Mesh``; a pair (vertices (V, 3), faces (F, 3)) of arrays; a trimesh ``Trimesh``, a
             pyvista ``PolyData``, a meshio ``Mesh`` or an open3d ``TriangleMesh``, of triangles.
-            Those of a library keep texture coordinates, colours and other data, interpolated
+            Meshes of a library keep texture coordinates, colours and other data, interpolated
             linearly; their vertices at the same position are one vertex of the surface. A pair and
             a ``Mesh`` are refined as they are.
         levels: number of steps, 1 … 16.
@@ -65,18 +64,19 @@ def subdivide(
         ParameterError: it is a mesh of none of these kinds; and as ``refine``.
         MeshError: it has other cells than triangles; and as ``refine`` and ``Mesh``.
     """
-    scheme = pns(load_model()) if scheme is None else scheme
     given: Any = mesh
+    is_pair = isinstance(given, (tuple, list)) and len(cast(Sequence[Any], given)) == 2
+    adapter = None if is_pair or isinstance(mesh, Mesh) else _adapter(mesh)
+    scheme = pns(load_model()) if scheme is None else scheme
     if isinstance(mesh, Mesh):
         return cast(AnyMesh, refine(mesh, scheme, levels, **options).mesh)
-    if isinstance(given, (tuple, list)) and len(cast(Sequence[Any], given)) == 2:
+    if adapter is None:
         vertices, faces = cast(tuple[Any, Any], given)
         refined = refine(Mesh(vertices, faces), scheme, levels, **options).mesh
         # A tuple with names takes its values one by one, but for this.
         make: Any = getattr(type(mesh), "_make", type(mesh))
         return make((np.array(refined.vertices), np.array(refined.faces)))
-    adapter = _adapter(mesh)
-    carried, _ = refine_carried(adapter.read(mesh), scheme, checked_levels(levels), options)
+    carried, _ = refine_carried(adapter.read(mesh), scheme, levels, options)
     return adapter.write(carried, mesh)
 
 
@@ -87,7 +87,7 @@ def _adapter(mesh: object) -> Adapter:
         if known is not None:
             return known
     kinds = ", ".join(f"{package}.{name}" for package, name in ADAPTERS)
-    # As trimesh loads a GLB.
+    # trimesh loads a GLB as a scene.
     others = "of a scene or a file, its meshes one by one"
     expected = f"a Mesh, a pair of arrays, or {kinds}; {others}"
     raise ParameterError("mesh", type(mesh), expected=expected)

@@ -26,8 +26,8 @@ inlined: Any = njit(nogil=True, error_model="numpy", forceinline=True)
 def forget_stale_code() -> None:
     """Delete cached code that is older than any source file of this package.
 
-    numba compares a cached loop with the file that the loop stands in, and not with the files of the
-    functions that the loop calls.
+    numba compares a cached loop with the file that the loop stands in, and not with the files of
+    the functions that the loop calls.
     """
     here = Path(__file__).parent
     newest = max(path.stat().st_mtime for path in here.glob("*.py"))

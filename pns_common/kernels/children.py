@@ -32,7 +32,7 @@ def child_corners(faces, face_edges, vertex_count, f, i):
         return faces[f, 0], ab, ca
     if i == 1:
         return faces[f, 1], bc, ab
-    if i == 2:  # noqa: PLR2004
+    if i == 2:
         return faces[f, 2], ca, bc
     return ab, bc, ca
 
@@ -72,7 +72,18 @@ def _folds(p, q, r, cosine):
 
 @kernel
 def mark_folds(
-    loop, displacement, scale, shared, changed, cosine, faces, face_edges, vertex_count, begin, end, to
+    loop,
+    displacement,
+    scale,
+    shared,
+    changed,
+    cosine,
+    faces,
+    face_edges,
+    vertex_count,
+    begin,
+    end,
+    to,
 ):
     """Mark the corners of folded children of triangles begin … end − 1 whose s is not 0 yet.
 

@@ -35,10 +35,10 @@ HIGH, NEXT, FIRST, SECOND = 0, 1, 2, 3
 
 @kernel
 def number_edges(corners, offsets, most_steps, head, low, links, corner_edges, plain):
-    """Number the edges of a face list; return how many there are.
+    """Assign a number to each edge of a face list; return how many there are.
 
-    Each vertex keeps a chain of the edges whose lower end it is. A vertex that is the lower end of k
-    edges takes k² / 2 steps; beyond ``most_steps`` in all, return TOO_LONG.
+    Each vertex keeps a chain of the edges whose lower end it is. A vertex that is the lower end of
+    k edges takes k² / 2 steps; beyond ``most_steps`` in all, return TOO_LONG.
 
     Args:
         corners: (H,) vertices of the faces, face after face.
@@ -302,7 +302,7 @@ def _opened_before(half_edges, face):
 
 @kernel
 def number_halves(faces, face_edges, edges, half_edges, begin, end, halves):
-    """Number both children of the edges that first appear in faces begin … end − 1.
+    """Assign numbers to both children of the edges that first appear in faces begin … end − 1.
 
     ``halves`` (E, 2), out: the child at the lower endpoint, and at the higher.
     """
@@ -366,7 +366,9 @@ def split_edges(
             out_of = halves[leaving, 0 if vertex < faces[f, after] else 1]
             into = halves[entering, 0 if vertex < faces[f, before] else 1]
             if half_edges[leaving, 0] == 3 * f + i:
-                _write_half(leaving, vertex, out_of, faces, vertex_count, half_edges, edge_class, to)
+                _write_half(
+                    leaving, vertex, out_of, faces, vertex_count, half_edges, edge_class, to
+                )
                 following += 1
             inner = following
             following += 1

@@ -75,7 +75,20 @@ def correct_by_equation_1(
 
 @kernel
 def correct_by_prior(
-    rows, first, begin, end, z, basis, reach, gate, bound, weight, displacement, ratio, gates, bounds
+    rows,
+    first,
+    begin,
+    end,
+    z,
+    basis,
+    reach,
+    gate,
+    bound,
+    weight,
+    displacement,
+    ratio,
+    gates,
+    bounds,
 ):
     """Write δ = w γ Π_ρ(D + τ h F z), ‖z‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
 

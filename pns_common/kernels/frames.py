@@ -98,6 +98,9 @@ def frames_and_features(
             features[to, WINGS], features[to, WINGS + 1] = dot(at_c, t), dot(at_d, t)
             features[to, WINGS + 2], features[to, WINGS + 3] = dot(at_c, side), dot(at_d, side)
         if width > UMBRELLAS:
-            features[to, UMBRELLAS], features[to, UMBRELLAS + 1] = fields[a, HEIGHT], fields[b, HEIGHT]
+            features[to, UMBRELLAS], features[to, UMBRELLAS + 1] = (
+                fields[a, HEIGHT],
+                fields[b, HEIGHT],
+            )
             features[to, UMBRELLAS + 2] = fields[c, HEIGHT]
             features[to, UMBRELLAS + 3] = fields[d, HEIGHT]

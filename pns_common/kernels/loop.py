@@ -26,8 +26,8 @@ def opposite(faces, half_edge):
 def place_edges(points, faces, edges, half_edges, edge_class, soft, begin, end, placed):
     """Write the vertices of edges begin … end − 1: Loop's if interior, else the midpoint.
 
-    An edge of sharpness w gets (1 − w) Loop's + w the midpoint (mathematics: soft creases). ``soft``
-    is (0,) where no interior edge is soft.
+    An edge of sharpness w gets (1 − w) Loop's + w the midpoint. ``soft`` is (0,) where no interior
+    edge is soft.
     """
     for e in range(max(begin, 0), end):
         a, b = edges[e, 0], edges[e, 1]

@@ -10,7 +10,16 @@ import math
 
 from pns_common.kernels import inlined, kernel
 from pns_common.kernels.connectivity import INTERIOR, skipped_block
-from pns_common.kernels.vectors import between, cross, difference, dot, norm, normal_and_area, root, row
+from pns_common.kernels.vectors import (
+    between,
+    cross,
+    difference,
+    dot,
+    norm,
+    normal_and_area,
+    root,
+    row,
+)
 
 # Columns of a vertex's means over its spokes: umbrella vector, squared length, x, signed bend and
 # its square, length, pull; then over its neighbours: opening, umbrella height, mean x.

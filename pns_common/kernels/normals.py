@@ -63,7 +63,11 @@ def measure_triangles(points, faces, triangles, begin, end, normals, angles):
     count = triangles.shape[0]
     for f in range(begin, end):
         for d in range(count):
-            a, b, c = faces[f, triangles[d, 0]], faces[f, triangles[d, 1]], faces[f, triangles[d, 2]]
+            a, b, c = (
+                faces[f, triangles[d, 0]],
+                faces[f, triangles[d, 1]],
+                faces[f, triangles[d, 2]],
+            )
             ab, bc, ca = between(points, a, b), between(points, b, c), between(points, c, a)
             vector = cross(ca, ab)
             twice_area = norm(vector)
@@ -77,7 +81,7 @@ def measure_triangles(points, faces, triangles, begin, end, normals, angles):
 
 @kernel
 def add_corners(normals, angles, groups, triangles, total):
-    """Add the normals of triangles, times their angles, to the groups of their corners, in order."""
+    """Add normals of triangles, times their angles, to the groups of their corners, in order."""
     count = triangles.shape[0]
     for f in range(groups.shape[0]):
         for d in range(count):

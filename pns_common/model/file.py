@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from pns_common.errors import ModelError, ParameterError
 from pns_common.model.card import CARD_KEY, ModelCard
@@ -65,22 +65,31 @@ def load_model(
 
     Raises:
         ParameterError: ``source`` is neither a name nor a path, or a provider is not available.
-        ModelError: there is no such file, it breaks the contract (says which part), or a bundled
-            file is not the one that SHA256SUMS names.
+        ModelError: there is no such file, it breaks the contract (says which part), a bundled
+            file is not the one that SHA256SUMS names, or there is no package onnx to check others.
     """
     source = DEFAULT_MODEL if source is None else source
     if not isinstance(source, str | os.PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise ParameterError("source", source, expected="a bundled name, a path, or None")
-    if isinstance(source, str) and source in bundled_models():
+    if _is_bundled(source):
         data = (BUNDLED / f"{source}.onnx").read_bytes()
-        _check_listed(BUNDLED, source, data)
-        return model_from_bytes(data, source, providers)
+        # Its hash stands for the check, which takes longer than to refine a small mesh.
+        return OnnxModel(source, _listed_hash(BUNDLED, source, data), data, providers)
     path = Path(source)
     if not path.is_file():
         names = ", ".join(bundled_models()) or "none"
         raise ModelError(str(path), expected=f"a file or a bundled name ({names})", found="none")
     _check_size(path.stat().st_size, str(path))
     return model_from_bytes(path.read_bytes(), path.stem, providers)
+
+
+def model_name(source: str | os.PathLike[str]) -> str:
+    """Return what the model of a source is called: the bundled name itself, or the file's stem."""
+    return source if _is_bundled(source) else Path(source).stem
+
+
+def _is_bundled(source: str | os.PathLike[str]) -> TypeGuard[str]:
+    return isinstance(source, str) and source in bundled_models()
 
 
 def bundled_models() -> list[str]:
@@ -97,7 +106,7 @@ def model_from_bytes(data: bytes, name: str, providers: Sequence[str] = CPU) -> 
         ModelError: the file breaks the contract; ``name`` is what the error calls it.
     """
     card = check_file(data, name)
-    return OnnxModel(name, card, hashlib.sha256(data).hexdigest(), data, providers)
+    return OnnxModel(name, hashlib.sha256(data).hexdigest(), data, providers, card)
 
 
 def write_manifest(folder: Path) -> None:
@@ -128,8 +137,8 @@ def check_file(data: bytes, name: str) -> ModelCard:
     return card
 
 
-def _check_listed(folder: Traversable, name: str, data: bytes) -> None:
-    """Check a bundled file against the manifest beside it. Raises ModelError."""
+def _listed_hash(folder: Traversable, name: str, data: bytes) -> str:
+    """Return the hash of a bundled file, which the manifest beside it names. Raises ModelError."""
     path = folder / MANIFEST
     if not path.is_file():
         raise ModelError(name, expected=f"{MANIFEST} beside the bundled models", found="none")
@@ -138,6 +147,7 @@ def _check_listed(folder: Traversable, name: str, data: bytes) -> None:
     found = hashlib.sha256(data).hexdigest()
     if found != wanted:
         raise ModelError(name, expected=f"sha256 {wanted} ({MANIFEST})", found=found)
+    return found
 
 
 def _check_size(size: int, name: str) -> None:
@@ -147,9 +157,12 @@ def _check_size(size: int, name: str) -> None:
 
 def _parsed(data: bytes, name: str) -> ModelProto:
     """Parse a file of bounded size. Raises ModelError."""
-    import onnx  # lazy: an import of 0.2 s
-    from google.protobuf.message import DecodeError
-
+    try:
+        import onnx  # lazy: an import of 0.2 s
+        from google.protobuf.message import DecodeError
+    except ImportError as error:
+        expected = "the package onnx, which checks files that are not bundled"
+        raise ModelError(name, expected=expected, found="none") from error
     _check_size(len(data), name)
     try:
         proto = onnx.load_from_string(data)

@@ -1,1 +1,1 @@
-"""What a model is and says of itself, and the bundled model files."""
+"""The bundled model files."""

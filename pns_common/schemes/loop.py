@@ -23,9 +23,9 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common.base_scheme import BaseScheme
 from pns_common.kernels import loop as kernels
 from pns_common.parallel import Blocks
-from pns_common.base_scheme import BaseScheme
 from pns_common.topology import Topology, split_triangles
 
 KEPT = 64
@@ -73,9 +73,7 @@ def _place_three(
     read = points, topology.faces, topology.edges, topology.half_edges, topology.edge_class
     blocks.run(
         edge_count,
-        lambda begin, end: kernels.place_edges(
-            *read, topology.soft, begin, end, placed[count:]
-        ),
+        lambda begin, end: kernels.place_edges(*read, topology.soft, begin, end, placed[count:]),
     )
     vertices, valence = placed[:count], np.empty(count, dtype=np.int32)
     blocks.owners(count).run(

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 
+from pns_common.base_scheme import BaseScheme
 from pns_common.creases import ANGLE, NO_CREASES, SEED, Creases
 from pns_common.errors import ModelError, ParameterError
 from pns_common.features import FEATURE_COUNT
 from pns_common.model.session import Model
 from pns_common.operator import Rule
 from pns_common.parameters import is_number
-from pns_common.base_scheme import BaseScheme
 from pns_common.schemes.loop import LOOP
 
 PAPER_FORMAT, LEARNED_ONCE = 1, 4
@@ -86,18 +86,14 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         return Scheme("pns", rule=rule, learned_levels=None, **named)  # type: ignore[arg-type]
     if card.base not in BASES:
         raise ModelError(model.name, expected=f"a base of {sorted(BASES)}", found=repr(card.base))
-    learned = Rule(
-        rule.edge_network,
-        rule.feature_count,
-        rule.symmetric,
-        rule.gate_sharpness,
-        budget,
-        partial(_vertices_at_unit_budget, model),
-        card.vertex_gate_sharpness,
-        card.prior_strength,
-        card.boundary_strength,
-        card.network_scale,
-        card.fold_angle,
+    learned = replace(
+        rule,
+        vertex_network=partial(_vertices_at_unit_budget, model),
+        vertex_gate_sharpness=_given(model, "vertex_gate_sharpness"),
+        prior_strength=_given(model, "prior_strength"),
+        curve_strength=_given(model, "boundary_strength"),
+        network_scale=_given(model, "network_scale"),
+        fold_angle=_given(model, "fold_angle"),
     )
     creases = Creases(angle=ANGLE, seed=SEED, levels=card.sharpness_levels)
     return Scheme(
@@ -108,6 +104,14 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         creases=creases if budget > 0 else NO_CREASES,
         **named,  # type: ignore[arg-type]
     )
+
+
+def _given(model: Model, name: str) -> float:
+    """Return a number of a card of format 4. Raises ModelError if the card has none."""
+    value = getattr(model.card, name)
+    if value is None:
+        raise ModelError(model.name, expected=f"{name} on a card of format 4", found="none")
+    return float(value)
 
 
 # At unit budget, scaled in float64 afterwards, so that one file serves every C / R exactly.

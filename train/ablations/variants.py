@@ -1,7 +1,7 @@
 """The operator with one part taken out at a time: which property does each part protect?
 
-Each variant is another function, built from the operator's own kernels; the operator itself has no
-switch for any of this. Source: paper, Structural certification and ablation.
+Each variant is another function; the operator itself has no switch for any of this. Source: paper,
+Structural certification and ablation.
 """
 
 from collections.abc import Callable, Mapping
@@ -9,32 +9,51 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import msgspec
-import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
-from pns_common.features.edge_features import FEATURE_SETS
-from pns_common.formula.correction import Correction, correct, curvature_gate, proximity_ratio
-from pns_common.geometry.frames import (
-    EdgeStencil,
-    edge_frames,
-    edge_stencil,
-    face_normals,
-    rotate,
-)
-from pns_common.schemes import ControlLevel, Placement, Scheme, loop_edge_rule, loop_vertex_rule
+from train.connectivity import Connectivity
 from train.data.batch import Batch
-from train.fitting.one_step import displaced
 from train.fitting.trainer import Fit, OnStep, optimise, step_loss, with_quiet
 from train.models.networks import RAW_COORDINATES, BoundedNet, unit_correction
 from train.models.recipe import Recipe, one_step
+from train.reference import (
+    EdgeReading,
+    Frames,
+    Step,
+    Surroundings,
+    edge_frames,
+    on_edges,
+    paper_5,
+    read_edges,
+)
+from train.refining import Method
+from train.tensors import shortened
 
-# Interior edges, the network, its recipe and C / R to what is added to Loop's edge vertices.
-#
-# The envelope C h² of the answer is the operator's own, also where the variant knows none: it is
-# what the proximity ratio is measured against.
-EdgeCorrection = Callable[[EdgeStencil, BoundedNet, Recipe, float], Correction]
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Interior edges of a mesh, with the operator's envelope C h² / R and gate of all edges.
+
+    The envelope is also that of variants that know none: proximity ratios are measured against it.
+    """
+
+    edges: EdgeReading
+    frames: Frames
+    rows: Int[Tensor, " I"]
+    features: Float[Tensor, "I 5"]
+    envelope: Float[Tensor, " E"]
+    gate: Float[Tensor, " E"]
+
+    def turned(self, local: Float[Tensor, "I 3"]) -> Float[Tensor, "E 3"]:
+        """Return F times local vectors of interior edges, 0 at other edges."""
+        world = (self.frames.axes[self.rows] @ local[:, :, None])[:, :, 0]
+        return torch.zeros_like(self.edges.a).index_copy(0, self.rows, world)
+
+
+# What a variant adds to Loop's edge vertices: from edges, the network, and C / R.
+EdgeCorrection = Callable[[Seen, BoundedNet, float], Float[Tensor, "E 3"]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,73 +63,59 @@ class Variant:
     name: str
     features: str
     correction: EdgeCorrection
+    gated: bool = True
 
 
-def paper_correction(
-    stencil: EdgeStencil, network: BoundedNet, recipe: Recipe, budget: float
-) -> Correction:
+def see(points: Float[Tensor, "V 3"], mesh: Connectivity, recipe: Recipe, budget: float) -> Seen:
+    """Look at the edges of a mesh; `budget` is C / R."""
+    around, rows = Surroundings(mesh, points), mesh.interior
+    edges = read_edges(around, first_face=True)
+    frames = edge_frames(edges, first_face=True)
+    inside = torch.zeros(len(mesh.edges), dtype=torch.float64).index_fill(0, rows, 1.0)
+    gate = inside * torch.tanh(recipe.gate_sharpness * frames.curvature**2)
+    features = paper_5(around, edges, frames)[rows]
+    return Seen(edges, frames, rows, features, budget * inside * frames.length**2, gate)
+
+
+def paper_correction(seen: Seen, network: BoundedNet, budget: float) -> Float[Tensor, "E 3"]:
     """Return the operator's own δ = h² γ F η."""
-    gate = curvature_gate(recipe.gate_sharpness)
-    return correct(stencil, FEATURE_SETS[recipe.features], unit_correction(network), gate, budget)
+    return (seen.envelope * seen.gate)[:, None] * seen.turned(_bounded(seen, network))
 
 
-def without_gate(
-    stencil: EdgeStencil, network: BoundedNet, recipe: Recipe, budget: float
-) -> Correction:
+def without_gate(seen: Seen, network: BoundedNet, budget: float) -> Float[Tensor, "E 3"]:
     """Return δ = h² F η: planar input is no longer left alone."""
-
-    def open_gate(curvature: Float[Tensor, " N"]) -> Float[Tensor, " N"]:
-        return torch.ones_like(curvature)
-
-    return correct(
-        stencil, FEATURE_SETS[recipe.features], unit_correction(network), open_gate, budget
-    )
+    return seen.envelope[:, None] * seen.turned(_bounded(seen, network))
 
 
-def without_square(
-    stencil: EdgeStencil, network: BoundedNet, recipe: Recipe, budget: float
-) -> Correction:
+def without_square(seen: Seen, network: BoundedNet, budget: float) -> Float[Tensor, "E 3"]:
     """Return δ = h γ F η: proximity of first order only.
 
     The published "no h² scaling" variant keeps one power of h: with none, its weights miss their
     published numbers by far.
     """
-    reference, frames = paper_correction(stencil, network, recipe, budget), edge_frames(stencil)
-    eta = unit_correction(network)(FEATURE_SETS[recipe.features](stencil, frames))
-    reach = budget * frames.length * reference.gate
-    return replace(reference, displacement=reach[:, None] * rotate(frames, eta))
+    reach = budget * seen.frames.length * seen.gate
+    return reach[:, None] * seen.turned(_bounded(seen, network))
 
 
-def without_bound(
-    stencil: EdgeStencil, network: BoundedNet, recipe: Recipe, budget: float
-) -> Correction:
+def without_bound(seen: Seen, network: BoundedNet, budget: float) -> Float[Tensor, "E 3"]:
     """Return δ = h² γ F z: the network's answer is not projected onto the ball."""
-    reference, frames = paper_correction(stencil, network, recipe, budget), edge_frames(stencil)
-    z = _raw_output(network, FEATURE_SETS[recipe.features](stencil, frames))
-    reach = frames.length**2 * reference.gate
-    return replace(reference, displacement=reach[:, None] * rotate(frames, z))
+    reach = seen.frames.length**2 * seen.gate
+    return reach[:, None] * seen.turned(_raw_output(network, seen.features))
 
 
-def unconstrained(
-    stencil: EdgeStencil, network: BoundedNet, recipe: Recipe, budget: float
-) -> Correction:
+def unconstrained(seen: Seen, network: BoundedNet, budget: float) -> Float[Tensor, "E 3"]:
     """Return δ = z(a, b, c, d): an offset from raw coordinates, with no structure at all."""
-    frames = edge_frames(stencil)
-    return Correction(
-        displacement=_raw_output(
-            network, torch.cat([stencil.a, stencil.b, stencil.c, stencil.d], dim=-1)
-        ),
-        envelope=budget * frames.length**2,
-        gate=torch.zeros_like(frames.length),
-        degenerate=torch.zeros_like(frames.degenerate),
-    )
+    edges = seen.edges
+    corners = torch.cat([edges.a, edges.b, edges.c, edges.d], dim=1)[seen.rows]
+    offset = _raw_output(network, corners)
+    return torch.zeros_like(edges.a).index_copy(0, seen.rows, offset)
 
 
 PNS = Variant("pns", "paper-5", paper_correction)
 WITHOUT_SQUARE = Variant("no-h2", "paper-5", without_square)
-WITHOUT_GATE = Variant("no-gate", "paper-5", without_gate)
+WITHOUT_GATE = Variant("no-gate", "paper-5", without_gate, gated=False)
 WITHOUT_BOUND = Variant("unbounded", "paper-5", without_bound)
-UNCONSTRAINED = Variant("unconstrained", RAW_COORDINATES, unconstrained)
+UNCONSTRAINED = Variant("unconstrained", RAW_COORDINATES, unconstrained, gated=False)
 
 VARIANTS: Mapping[str, Variant] = MappingProxyType(
     {
@@ -137,60 +142,46 @@ def variant_recipe(recipe: Recipe, variant: Variant) -> Recipe:
     return replace(recipe, name=variant.name)
 
 
+def variant_step(
+    variant: Variant,
+    network: BoundedNet,
+    recipe: Recipe,
+    points: Float[Tensor, "V 3"],
+    mesh: Connectivity,
+    reference_length: float = 1.0,
+) -> Step:
+    """Take one step of a variant, with Loop's vertex rule."""
+    budget = recipe.budget / reference_length
+    seen = see(points, mesh, recipe, budget)
+    made = variant.correction(seen, network, budget)
+    gate = seen.gate if variant.gated else torch.zeros_like(seen.gate)
+    return on_edges(points, mesh, made, seen.envelope, gate)
+
+
 def fit_variant(variant: Variant, recipe: Recipe, on_step: OnStep) -> Fit:
-    """Train a variant; for `PNS` this is the operator's own training, bit for bit."""
+    """Train a variant by a recipe of its own."""
 
     def loss(network: BoundedNet, batch: Batch) -> Float[Tensor, ""]:
-        edges = _edges(batch.points, batch)
-        correction = variant.correction(edges, network, recipe, recipe.budget)
-        ratio = proximity_ratio(correction)
-        step = displaced(batch.points, batch.topology, correction.displacement, ratio)
+        step = variant_step(variant, network, recipe, batch.points, batch.mesh)
         return step_loss(recipe, batch, step)
 
     return optimise(recipe, with_quiet(recipe, loss), on_step)
 
 
-def variant_scheme(variant: Variant, network: BoundedNet, recipe: Recipe) -> Scheme:
-    """Return a variant as a scheme, with Loop's vertex rule; ratios are against its C h²."""
+def variant_method(variant: Variant, network: BoundedNet, recipe: Recipe) -> Method:
+    """Return a variant as a method; ratios are against its C h²."""
 
-    def edge_rule(level: ControlLevel) -> Placement:
-        base, topology = loop_edge_rule(level), level.topology
-        if level.reference_length == 0:
-            return base
-        interior = topology.interior
-        stencil, faces = topology.stencil[interior], topology.edge_faces[interior]
-        stencils = edge_stencil(
-            torch.tensor(level.points), torch.tensor(level.normals), stencil, faces
-        )
-        with torch.no_grad():
-            correction = variant.correction(
-                stencils, network, recipe, recipe.budget / float(level.reference_length)
-            )
-        return Placement(
-            loop=base.loop,
-            displacement=_scattered(correction.displacement.numpy(), interior, len(base.loop)),
-            ratio=_scattered(proximity_ratio(correction).numpy(), interior, len(base.loop)),
-            gate=_scattered(correction.gate.numpy(), interior, len(base.loop)),
-            degenerate=_scattered(correction.degenerate.numpy(), interior, len(base.loop)),
-        )
+    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
+        return variant_step(variant, network, recipe, points, mesh, reference_length)
 
-    return Scheme(variant.name, loop_vertex_rule, edge_rule, budget=recipe.budget)
+    return Method(variant.name, step)
 
 
-def _edges(points: Float[Tensor, "V 3"], batch: Batch) -> EdgeStencil:
-    topology = batch.topology
-    interior = topology.interior
-    normals = face_normals(points, topology.faces)
-    return edge_stencil(points, normals, topology.stencil[interior], topology.edge_faces[interior])
+def _bounded(seen: Seen, network: BoundedNet) -> Float[Tensor, "I 3"]:
+    eta = unit_correction(network)(seen.features)
+    return shortened(eta, torch.ones(len(eta), dtype=torch.float64))
 
 
 def _raw_output(network: BoundedNet, inputs: Float[Tensor, "N K"]) -> Float[Tensor, "N 3"]:
     own = network.linear_layers[0].weight.dtype
     return network.raw(inputs.to(own)).to(inputs.dtype)
-
-
-def _scattered(rows: np.ndarray, indices: np.ndarray, count: int) -> np.ndarray:
-    """Return an array of `count` rows that holds `rows` at `indices` and zeros elsewhere."""
-    whole = np.zeros((count, *rows.shape[1:]), dtype=rows.dtype)
-    whole[indices] = rows
-    return whole

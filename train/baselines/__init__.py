@@ -1,4 +1,4 @@
-"""The methods that PNS is compared with: one scheme each, for `pns_common.refine`.
+"""The methods that PNS is compared with: one `train.refining.Method` each.
 
 Loop and PNS themselves live in `pns_common.schemes`.
 """

@@ -9,21 +9,20 @@ v), m_v the unit normal of the faces at v, weighted by area:
     NC     N1 × 0.6, each vertex's share of it clipped to C h² / R, and at edges gated, as PNS is
 """
 
-import numpy as np
-from jaxtyping import Float
+from collections.abc import Callable
+from dataclasses import replace
 
-from pns_common.base.arrays import norm
-from pns_common.geometry.frames import edge_frames, edge_stencil
-from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
-from pns_common.schemes import (
-    ControlLevel,
-    Placement,
-    Scheme,
-    loop_edge_rule,
-    loop_vertex_rule,
-)
-from train.baselines.placement import kept_vertices, midpoints, placed_edges
-from train.surfaces.quasi_interpolation import added_to, normal_push
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from train.baselines.placement import midpoints, placed_edges
+from train.connectivity import Connectivity
+from train.loop_masks import loop_mask
+from train.reference import Step, Surroundings, edge_frames, read_edges
+from train.refining import Method, loop_rule
+from train.surfaces.quasi_interpolation import full_push, normal_push
+from train.tensors import shortened
 
 CLIPPED_STRENGTH = 0.6
 # C of NC, in units of R.
@@ -31,39 +30,52 @@ CLIPPED_BUDGET = 0.8
 
 GATE = 1e5
 
+Push = Callable[[Float[Tensor, "V 3"], Connectivity], Float[Tensor, "V 3"]]
 
-def flat() -> Scheme:
+
+def flat() -> Method:
     """Return midpoint subdivision: the control mesh itself, with more faces."""
-    return Scheme("flat", kept_vertices, lambda level: placed_edges(level, midpoints(level)))
+
+    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
+        return placed_edges(points, mesh, reference_length, midpoints(points, mesh), points)
+
+    return Method("flat", step)
 
 
-def nc() -> Scheme:
+def q1() -> Method:
+    """Return full quasi-interpolation at the first level, then Loop."""
+    return _pushed("q1", full_push)
+
+
+def n1(*, keeps_creases: bool = False) -> Method:
+    """Return quasi-interpolation along the normal at the first level, then Loop."""
+    return replace(_pushed("n1", normal_push), keeps_creases=keeps_creases)
+
+
+def nc() -> Method:
     """Return 0.6 of N1, gated at edges and clipped to C h² / R at the first level, then Loop."""
 
-    def edge_rule(level: ControlLevel) -> Placement:
-        base, interior = loop_edge_rule(level), level.topology.interior
-        share = loop_edge_vertices(CLIPPED_STRENGTH * normal_push(level), level.topology)[interior]
-        stencil, faces = level.topology.stencil[interior], level.topology.edge_faces[interior]
-        frames = edge_frames(edge_stencil(level.points, level.normals, stencil, faces))
-        gate = np.tanh(GATE * frames.curvature**2)
-        placed = np.zeros_like(base.loop)
-        placed[interior] = gate[:, None] * _clipped(share, frames.length**2, level)
-        return added_to(base, placed)
+    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
+        around = Surroundings(mesh, points)
+        share = loop_mask(mesh)(CLIPPED_STRENGTH * normal_push(points, mesh))
+        frames = edge_frames(read_edges(around, first_face=True), first_face=True)
+        interior = mesh.paired & (mesh.sharpness < 1)
+        gate = torch.where(interior, torch.tanh(GATE * frames.curvature**2), 0.0)
+        squares = torch.cat([around.square[:, 0], frames.length**2])
+        clipped = shortened(share, CLIPPED_BUDGET / reference_length * squares)
+        gates = torch.cat([points.new_ones(len(points)), gate])
+        return replace(
+            loop_rule(points, mesh, reference_length), displacement=gates[:, None] * clipped
+        )
 
-    def vertex_rule(level: ControlLevel) -> Placement:
-        base = loop_vertex_rule(level)
-        share = loop_vertex_vertices(CLIPPED_STRENGTH * normal_push(level), level.topology)
-        return added_to(base, _clipped(share, level.rings.square[:, 0], level))
-
-    return Scheme("nc", vertex_rule, edge_rule, learned_levels=1)
+    return Method("nc", step, learned_levels=1)
 
 
-def _clipped(
-    vectors: Float[np.ndarray, "N 3"], square: Float[np.ndarray, " N"], level: ControlLevel
-) -> Float[np.ndarray, "N 3"]:
-    """Return vectors no longer than C h² / R."""
-    if level.reference_length == 0:
-        return np.zeros_like(vectors)
-    longest = CLIPPED_BUDGET / level.reference_length * square
-    length = norm(vectors)
-    return vectors * (longest / np.maximum(np.maximum(length, longest), 1e-300))[:, None]
+def _pushed(name: str, push: Push) -> Method:
+    """Return Loop on a control mesh whose vertices were pushed once."""
+
+    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
+        pushed = loop_mask(mesh)(push(points, mesh))
+        return replace(loop_rule(points, mesh, reference_length), displacement=pushed)
+
+    return Method(name, step, learned_levels=1)

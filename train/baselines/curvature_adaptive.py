@@ -4,33 +4,30 @@ q = (1 − γ) Loop + γ Butterfly with the operator's own gate γ = tanh(c x²)
 vertices follow Loop's rule, as they do in PNS. Source: paper, Setup, baselines, and metrics.
 """
 
-import numpy as np
+from dataclasses import replace
 
-from pns_common.formula.correction import curvature_gate
-from pns_common.geometry.frames import edge_frames, edge_stencil
-from pns_common.schemes import ControlLevel, Placement, Scheme, loop_edge_rule, loop_vertex_rule
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
 from train.baselines.butterfly import butterfly_edge_vertices
 from train.baselines.placement import placed_edges
+from train.connectivity import Connectivity
+from train.loop_masks import loop_mask
+from train.reference import Step, Surroundings, edge_frames, read_edges
+from train.refining import Method
 
 
-def curvature_adaptive(gate_sharpness: float) -> Scheme:
-    """Return the scheme; boundary and irregular edges are Loop's."""
-    gate = curvature_gate(gate_sharpness)
+def curvature_adaptive(gate_sharpness: float) -> Method:
+    """Return the method; boundary and irregular edges are Loop's."""
 
-    def edge_rule(level: ControlLevel) -> Placement:
-        topology = level.topology
-        interior = topology.interior
-        stencil, faces = topology.stencil[interior], topology.edge_faces[interior]
-        frames = edge_frames(edge_stencil(level.points, level.normals, stencil, faces))
-        gamma = gate(frames.curvature)
-        positions = loop_edge_rule(level).loop.copy()
-        butterfly = butterfly_edge_vertices(level.points, topology)[interior]
-        positions[interior] += gamma[:, None] * (butterfly - positions[interior])
-        placement = placed_edges(level, positions)
-        whole = np.zeros(len(positions))
-        whole[interior] = gamma
-        return Placement(
-            placement.loop, placement.displacement, placement.ratio, whole, placement.degenerate
-        )
+    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
+        around = Surroundings(mesh, points)
+        frames = edge_frames(read_edges(around, first_face=True), first_face=True)
+        gate = torch.where(mesh.paired, torch.tanh(gate_sharpness * frames.curvature**2), 0.0)
+        loop = loop_mask(mesh)(points)[mesh.vertex_count :]
+        edges = loop + gate[:, None] * (butterfly_edge_vertices(points, mesh) - loop)
+        placed = placed_edges(points, mesh, reference_length, edges)
+        return replace(placed, gate=torch.cat([points.new_zeros(len(points)), gate]))
 
-    return Scheme("curvature-adaptive", loop_vertex_rule, edge_rule)
+    return Method("curvature-adaptive", step)

@@ -5,29 +5,29 @@ the paper names this baseline and gives no formula. The push scales with the mes
 not depend on the unit of length.
 """
 
-import numpy as np
+import torch
 from jaxtyping import Float
+from torch import Tensor
 
-from pns_common.base.arrays import dot
-from pns_common.connectivity.topology import Topology, build_topology
-from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
-from pns_common.masks.stencils import loop_edge_vertices
-from pns_common.schemes import ControlLevel, Placement, Scheme, loop_edge_rule, loop_vertex_rule
 from train.baselines.placement import placed_edges
+from train.connectivity import Connectivity, connect
 from train.data.datasets import Dataset
+from train.loop_masks import loop_mask
+from train.reference import Step, Surroundings, edge_frames, read_edges
+from train.refining import Method
 from train.surfaces.implicit import signed_distance, unit_normal
+from train.tensors import dot
 
 
-def normal_displacement(scalar: float) -> Scheme:
-    """Return the scheme with a fitted scalar; boundary and irregular edges are Loop's."""
+def normal_displacement(scalar: float) -> Method:
+    """Return the method with a fitted scalar; boundary and irregular edges are Loop's."""
 
-    def edge_rule(level: ControlLevel) -> Placement:
-        positions = loop_edge_rule(level).loop.copy()
-        push = _unit_push(level.points, level.topology)
-        positions[level.topology.interior] += scalar * push
-        return placed_edges(level, positions)
+    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
+        loop = loop_mask(mesh)(points)[mesh.vertex_count :]
+        edges = loop + scalar * _unit_push(points, mesh)
+        return placed_edges(points, mesh, reference_length, edges)
 
-    return Scheme("normal-displacement", loop_vertex_rule, edge_rule)
+    return Method("normal-displacement", step)
 
 
 def fit_scalar(dataset: Dataset) -> float:
@@ -37,22 +37,18 @@ def fit_scalar(dataset: Dataset) -> float:
     """
     numerator = denominator = 0.0
     for instance in dataset.instances:
-        points = instance.mesh.vertices
-        topology = build_topology(instance.mesh.faces, len(points))
-        start = loop_edge_vertices(points, topology)[topology.interior]
-        gain = dot(_unit_push(points, topology), unit_normal(instance.surface, start))
+        points = torch.tensor(instance.mesh.vertices)
+        mesh = connect(instance.mesh.faces, len(points))
+        start = loop_mask(mesh)(points)[len(points) + mesh.interior]
+        push = _unit_push(points, mesh)[mesh.interior]
+        gain = dot(push, unit_normal(instance.surface, start))
         numerator -= float((gain * signed_distance(instance.surface, start)).sum())
         denominator += float((gain**2).sum())
     return numerator / denominator
 
 
-def _unit_push(points: Float[np.ndarray, "V 3"], topology: Topology) -> Float[np.ndarray, "I 3"]:
-    """Return h N of each interior edge."""
-    interior = topology.interior
-    normals = face_normals(points, topology.faces)
-    frames = edge_frames(
-        edge_stencil(points, normals, topology.stencil[interior], topology.edge_faces[interior])
-    )
-    # A fallback frame knows no normal of the surface.
-    push = frames.length[:, None] * frames.normal
-    return np.where(frames.degenerate[:, None], 0.0, push)
+def _unit_push(points: Float[Tensor, "V 3"], mesh: Connectivity) -> Float[Tensor, "E 3"]:
+    """Return h N of each interior edge; a fallback frame knows no normal of the surface."""
+    frames = edge_frames(read_edges(Surroundings(mesh, points), first_face=True), first_face=True)
+    push = frames.length[:, None] * frames.axes[:, :, 1]
+    return torch.where(frames.degenerate[:, None], 0.0, push)

@@ -7,24 +7,23 @@ fewer than five neighbours takes the solution of least norm.
 """
 
 import numpy as np
+import torch
 from jaxtyping import Float, Int
+from torch import Tensor
 
-from pns_common.schemes import ControlLevel, Placement, Scheme
-from train.baselines.placement import (
-    is_interior,
-    kept_vertices,
-    midpoints,
-    placed_edges,
-)
-from train.surfaces.quasi_interpolation import vertex_normals
+from train.baselines.placement import midpoints, placed_edges
+from train.connectivity import Connectivity
+from train.reference import Step, Surroundings
+from train.refining import Method
+from train.tensors import unit
 
 # Of the normal equations in ring units, so of squared condition: below it a direction is not seen.
 SMALLEST_SINGULAR = 1e-10
 
 
-def quadric_fit() -> Scheme:
-    """Return the scheme. Old vertices stay; boundary and irregular edges take the midpoint."""
-    return Scheme("quadric", kept_vertices, _edge_rule)
+def quadric_fit() -> Method:
+    """Return the method. Old vertices stay; boundary and irregular edges take the midpoint."""
+    return Method("quadric", _step)
 
 
 def quadric_edge_points(
@@ -57,9 +56,12 @@ def quadric_edge_points(
     return placed.reshape(-1, 2, 3).mean(axis=1)
 
 
-def _edge_rule(level: ControlLevel) -> Placement:
-    fitted = quadric_edge_points(level.points, level.topology.edges, vertex_normals(level))
-    return placed_edges(level, np.where(is_interior(level.topology), fitted, midpoints(level)))
+def _step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
+    axes = unit(Surroundings(mesh, points).mean_normal)
+    fitted = quadric_edge_points(points.numpy(), mesh.edges.numpy(), axes.numpy())
+    interior = (mesh.paired & (mesh.sharpness < 1))[:, None]
+    edges = torch.where(interior, torch.from_numpy(fitted), midpoints(points, mesh))
+    return placed_edges(points, mesh, reference_length, edges, points)
 
 
 def _monomials(x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -13,23 +13,18 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.connectivity.topology import Topology, build_topology
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.certificates.affine import TURNED
 from train.certificates.bodies import bumpy_sphere, random_motion
 from train.certificates.displacement import AT_MOST, worst_ratio
 from train.certificates.equivariance import EXACT, well_conditioned
+from train.connectivity import Connectivity, connect
 from train.data.grid import grid_faces, jittered_grid
 from train.fitting.determinism import deterministic
-from train.fitting.one_step import Step, refine_once
-from train.models.from_recipe import (
-    initial_network,
-    initial_vertex_network,
-    recipe_operator,
-    vertex_rule_operator,
-)
+from train.models.from_recipe import initial_network, paper_rule
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
+from train.reference import Step
 
 # Called after each step with the number of steps done and the value found.
 OnStep = Callable[[int, float], None]
@@ -47,7 +42,6 @@ class Attack:
         values: after each step.
         network: the edge weights in the end, double precision.
         mesh: the mesh in the end.
-        vertex_network: likewise, where the recipe has a vertex rule.
     """
 
     name: str
@@ -55,7 +49,6 @@ class Attack:
     values: tuple[float, ...]
     network: BoundedNet
     mesh: Mesh
-    vertex_network: BoundedNet | None = None
 
     @property
     def worst(self) -> float:
@@ -74,29 +67,20 @@ class Operator:
 
     network: BoundedNet
     recipe: Recipe
-    vertex_network: BoundedNet | None = None
 
-    def __call__(self, points: Float[Tensor, "V 3"], topology: Topology) -> Step:
+    def __call__(self, points: Float[Tensor, "V 3"], mesh: Connectivity) -> Step:
         """Refine by one step at reference length 1."""
-        operator = recipe_operator(self.recipe, self.network)
-        vertices = None
-        if self.recipe.vertex is not None and self.vertex_network is not None:
-            vertices = vertex_rule_operator(self.recipe.vertex, self.vertex_network)
-        return refine_once(points, topology, operator, self.recipe.budget, vertices)
+        return paper_rule(self.recipe, self.network)(points, mesh)
 
     @property
     def weights(self) -> list[Tensor]:
         """All that an adversary may change about it."""
-        networks = [net for net in (self.network, self.vertex_network) if net is not None]
-        return [weight for network in networks for weight in network.parameters()]
+        return list(self.network.parameters())
 
 
 def initial_operator(recipe: Recipe) -> Operator:
     """Return the recipe's operator before training, in double precision."""
-    vertices = initial_vertex_network(recipe)
-    return Operator(
-        initial_network(recipe).double(), recipe, None if vertices is None else vertices.double()
-    )
+    return Operator(initial_network(recipe).double(), recipe)
 
 
 def ascend(
@@ -122,13 +106,13 @@ def ascend(
 def proximity_attack(recipe: Recipe, steps: int, on_step: OnStep) -> Attack:
     """Maximise the proximity ratio ‖q − q0‖ / (C h²); it must find 1 and never pass it."""
     operator, mesh = initial_operator(recipe), bumpy_sphere(recipe.seed)
-    topology = build_topology(mesh.faces, len(mesh.vertices))
+    level = connect(mesh.faces, len(mesh.vertices))
     points = torch.tensor(mesh.vertices, requires_grad=True)
 
     def look() -> tuple[Tensor, float]:
-        step = operator(points, topology)
+        step = operator(points, level)
         # A soft maximum: every edge gets a gradient, the leading ones the most.
-        objective = torch.logsumexp(20 * _ratios(step), dim=0)
+        objective = torch.logsumexp(20 * step.ratio[len(points) + level.interior], dim=0)
         control, refined = _mesh(points, mesh), step.points.detach().numpy()
         ratio, _ = worst_ratio(control, refined, recipe.budget)
         return objective, ratio
@@ -143,14 +127,14 @@ def equivariance_attack(recipe: Recipe, steps: int, on_step: OnStep) -> Attack:
     Ill-conditioned frames are left out, as in the certificate.
     """
     operator, mesh = initial_operator(recipe), bumpy_sphere(recipe.seed)
-    topology = build_topology(mesh.faces, len(mesh.vertices))
+    level = connect(mesh.faces, len(mesh.vertices))
     points = torch.tensor(mesh.vertices, requires_grad=True)
     rng = np.random.default_rng(recipe.seed)
 
     def look() -> tuple[Tensor, float]:
         turn, shift = (torch.from_numpy(part) for part in random_motion(rng))
-        moved = operator(points @ turn.T + shift, topology).points
-        apart = moved - (operator(points, topology).points @ turn.T + shift)
+        moved = operator(points @ turn.T + shift, level).points
+        apart = moved - (operator(points, level).points @ turn.T + shift)
         good = np.ones(len(apart), dtype=bool)
         good[len(points) :] = well_conditioned(_mesh(points, mesh))
         kept = apart[torch.from_numpy(good)]
@@ -172,7 +156,7 @@ def affine_attack(
         cap: 0 on an axis-aligned plane, else `TURNED`.
     """
     operator, plane = initial_operator(recipe), jittered_grid(recipe.seed, jitter=0.0).double()
-    topology = build_topology(grid_faces(), len(plane))
+    level = connect(grid_faces(), len(plane))
     normal = torch.from_numpy(turn.copy())
     slide = torch.zeros_like(plane, requires_grad=True)
 
@@ -183,7 +167,7 @@ def affine_attack(
     def look() -> tuple[Tensor, float]:
         points = lay()
         # ‖δ‖ / (C h²), where h² is not zero: the ratio resolves what positions would round away.
-        ratio = _ratios(operator(points, topology))
+        ratio = operator(points, level).ratio
         return (ratio / TURNED).sum(), recipe.budget * float(ratio.detach().max())
 
     values = ascend([slide, *operator.weights], look, steps, on_step)
@@ -191,15 +175,10 @@ def affine_attack(
     return _attack("affine reproduction", cap, values, operator, plane_mesh)
 
 
-def _ratios(step: Step) -> Float[Tensor, " N"]:
-    """Return the proximity ratios of all vertices that a rule may move."""
-    return step.ratio if step.vertex_ratio is None else torch.cat([step.ratio, step.vertex_ratio])
-
-
 def _attack(
     name: str, cap: float, values: tuple[float, ...], operator: Operator, mesh: Mesh
 ) -> Attack:
-    return Attack(name, cap, values, operator.network, mesh, operator.vertex_network)
+    return Attack(name, cap, values, operator.network, mesh)
 
 
 def _mesh(points: Float[Tensor, "V 3"], like: Mesh) -> Mesh:

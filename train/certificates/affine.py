@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 
 import numpy as np
+import torch
 
-from pns_common.formula.curve_prior import on_boundary
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
-from pns_common.schemes import Scheme, loop
+from pns_common import Mesh, loop
 from train.certificates.bodies import Body, random_motion
 from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
-from train.certificates.step import departure
+from train.certificates.step import Step, step
 from train.certificates.subject import Subject
+from train.curve_rule import Curves
+from train.refining import refine
 
 LEVELS = 2
 
@@ -38,42 +38,47 @@ def _aligned(subject: Subject, flat: Sequence[Body], seed: int) -> Certificate:
         for axis, name in enumerate(("z", "x", "y")):
             lifted = body.mesh.vertices + np.array([0, 0, rng.uniform(-1, 1)])
             mesh = Mesh(np.roll(lifted, axis, axis=1), body.mesh.faces)
-            off = _off_loop(subject.scheme, mesh, axis)
+            off = _off_loop(subject, mesh, axis)
             measured.append((off, f"{body.name}, {name} constant"))
     value, place = worst(measured)
     return Certificate("T3", "affine reproduction, axis-aligned", value, 0.0, 0.0, place)
 
 
-def _off_loop(scheme: Scheme, mesh: Mesh, axis: int) -> float:
+def _off_loop(subject: Subject, mesh: Mesh, axis: int) -> float:
     """Return how far planar refinements are from Loop's; but for boundaries where these move.
 
     These stay in the plane: there the coordinate across it is compared, everything else at the
     first level.
     """
     refined, base = (
-        refine(mesh, rules, LEVELS, 1.0, threads=1).mesh.vertices for rules in (scheme, loop())
+        refine(mesh, rules, LEVELS, 1.0, creases=None).mesh.vertices
+        for rules in (subject.scheme, loop())
     )
-    if not scheme.moves_boundaries:
+    if not subject.moves_curves:
         return float(np.abs(refined - base).max())
     across = (axis + 2) % 3
-    first = departure(scheme, mesh)
-    inside = first.displacement[~on_boundary(first.topology)]
+    first, plain = (step(rules, mesh).positions for rules in (subject.scheme, loop()))
+    inside = ~_on_curves(step(subject.scheme, mesh))
     out_of_plane = np.abs(refined[:, across] - base[:, across]).max()
-    return float(max(np.abs(inside).max(initial=0), out_of_plane))
+    return float(max(np.abs(first - plain)[inside].max(initial=0), out_of_plane))
+
+
+def _on_curves(made: Step) -> np.ndarray:
+    curves = Curves(made.level, torch.tensor(made.mesh.vertices))
+    return (curves.moved | curves.of_boundary).numpy()
 
 
 def _turned(subject: Subject, flat: Sequence[Body], seed: int) -> Certificate:
     rng, measured = np.random.default_rng(seed), []
-    scale_free = subject.scheme.guard is not None
     for body in flat:
         turn, _ = random_motion(rng)
         mesh = Mesh(body.mesh.vertices @ turn.T, body.mesh.faces)
-        found_step = departure(subject.scheme, mesh)
-        size = np.linalg.norm(found_step.displacement, axis=1)
-        if subject.scheme.moves_boundaries:
-            size = size[~on_boundary(found_step.topology)]
-        longest = plain_loop(mesh.vertices, mesh.faces).reach.max()
-        measured.append((float(size.max() / longest ** (1 if scale_free else 2)), body.name))
+        made, reach = step(subject.scheme, mesh), plain_loop(mesh.vertices, mesh.faces).reach
+        size = made.added(subject.budget * reach**2)
+        if subject.moves_curves:
+            size = size[~_on_curves(made)]
+        power = 2 if subject.learned_once is None else 1
+        measured.append((float(size.max() / reach.max() ** power), body.name))
     value, place = worst(measured)
-    allowed = TURNED_IN_EDGE_LENGTHS if scale_free else TURNED
+    allowed = TURNED if subject.learned_once is None else TURNED_IN_EDGE_LENGTHS
     return Certificate("T3", "affine reproduction, any plane", value, high=allowed, where=place)

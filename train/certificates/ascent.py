@@ -13,29 +13,22 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.connectivity.topology import Topology, build_topology, split
-from pns_common.features.edge_features import FEATURE_SETS
-from pns_common.features.orientation import SYMMETRIC
-from pns_common.features.ring_features import RING_10
-from pns_common.formula.correction import curvature_gate
-from pns_common.formula.edge_operator import EdgeOperator
-from pns_common.formula.vertex_operator import VertexOperator
-from pns_common.geometry.frames import face_normals
-from pns_common.levels.step import LevelStep, level_step
-from pns_common.masks.limit import refined_limit_positions
-from pns_common.mesh import Mesh
-from pns_common.rules.control_level import control_level
-from pns_common.rules.scale_free_form import ScaleFreeForm
-from pns_common.schemes import Scheme, loop, scale_free_scheme
+from pns_common import Mesh
+from pns_common.features import FEATURE_SETS, RING_10
 from train.certificates.learned_once import largest_turn
+from train.connectivity import Connectivity, connect
+from train.loop_masks import limit_mask
 from train.models.networks import unit_correction
+from train.models.recipe import ScaleFree
 from train.models.tied import TiedNet
+from train.reference import GeneralRule, Step, Surroundings
 
 RATE = 0.03
 GATE_SHARPNESS, VERTEX_GATE_SHARPNESS = 1e6, 1e3
 PEAK = 8
 
-Goal = Callable[[LevelStep, Topology], Tensor]
+# A step, and the connectivity of the mesh that it made.
+Goal = Callable[[Step, Connectivity], Tensor]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +51,13 @@ class Worst:
 
 
 def ascend(
-    goal: Goal, mesh: Mesh, form: ScaleFreeForm, seed: int, steps: int, loudness: float = 1.0
+    goal: Goal,
+    mesh: Mesh,
+    form: ScaleFree,
+    budget: float,
+    seed: int,
+    steps: int,
+    loudness: float = 1.0,
 ) -> Worst:
     """Climb a goal from random weights, `loudness` times their usual size, and from a mesh."""
     generator = torch.Generator().manual_seed(seed)
@@ -67,24 +66,26 @@ def ascend(
     with torch.no_grad():
         for weight in (*edges.parameters(), *vertices.parameters()):
             weight *= loudness
-    scheme = scale_free_scheme(
-        EdgeOperator(
-            FEATURE_SETS["signed-18"],
-            SYMMETRIC,
-            unit_correction(edges),
-            curvature_gate(GATE_SHARPNESS),
-        ),
-        VertexOperator(RING_10, unit_correction(vertices), VERTEX_GATE_SHARPNESS),
-        form,
+    rule = GeneralRule(
+        unit_correction(edges),
+        unit_correction(vertices),
+        budget,
+        GATE_SHARPNESS,
+        VERTEX_GATE_SHARPNESS,
+        form.prior_strength,
+        form.boundary_strength,
+        form.network_scale,
+        form.fold_angle,
     )
-    topology = build_topology(np.array(mesh.faces), len(mesh.vertices))
+    level = connect(np.array(mesh.faces), len(mesh.vertices))
+    after = connect(level.split().numpy(), level.vertex_count + len(level.edges))
     points = torch.tensor(mesh.vertices, requires_grad=True)
     optimiser = torch.optim.Adam([points, *edges.parameters(), *vertices.parameters()], lr=RATE)
     seen: list[tuple[float, ...]] = []
     for _ in range(steps):
-        step = level_step(control_level(points, topology), scheme)
-        value = goal(step, topology)
-        seen.append((*promises(step, topology, scheme, points), value.item()))
+        step = rule(points, level)
+        value = goal(step, after)
+        seen.append((*promises(step, after, form.fold_angle), value.item()))
         optimiser.zero_grad()
         (-value).backward()
         optimiser.step()
@@ -93,45 +94,39 @@ def ascend(
 
 
 def promises(
-    step: LevelStep, topology: Topology, scheme: Scheme, points: Float[Tensor, "V 3"]
+    step: Step, after: Connectivity, fold_angle: float
 ) -> tuple[float, float, float, float]:
     """Measure turn, displacement, limit and overshoot, each over what is allowed."""
-    base = level_step(control_level(points.detach(), topology), loop()).points.numpy()
-    made = step.points.detach().numpy()
-    assert scheme.guard is not None
-    turn = largest_turn(split(topology), base, made) / np.degrees(scheme.guard.angle)
-    apart = np.linalg.norm(made - base, axis=1)
-    rules = (step.vertices, step.edges)
-    envelopes = [rule.envelope for rule in rules if rule.envelope is not None]
-    allowed = torch.cat(envelopes).detach().numpy()
+    base, made = step.base.detach().numpy(), step.points.detach().numpy()
+    turn = largest_turn(after.faces.numpy(), base, made) / fold_angle
+    apart, allowed = np.linalg.norm(made - base, axis=1), step.envelope.detach().numpy()
     rounding = 1e-14 * np.abs(base).max()
     longest = apart.max() + rounding
-    limits = [refined_limit_positions(points, topology) for points in (made, base)]
-    limit = np.linalg.norm(limits[0] - limits[1], axis=1).max() / longest
+    limit = torch.linalg.vector_norm(_limits_apart(step, after).detach(), dim=1).max().item()
     beyond = np.maximum(made - base.max(axis=0), base.min(axis=0) - made).max() / longest
-    return turn, float((apart / (allowed + rounding)).max()), float(limit), float(beyond)
+    share = float((apart / (allowed + rounding)).max())
+    return turn, share, limit / longest, float(beyond)
 
 
-def turning(step: LevelStep, topology: Topology) -> Tensor:
+def turning(step: Step, after: Connectivity) -> Tensor:
     """Climb towards folds: a soft largest chord between the normals of child faces and Loop's."""
-    faces = split(topology)
-    assert step.loop_points is not None
-    apart = face_normals(step.points, faces) - face_normals(step.loop_points, faces)
-    return ((apart**2).sum(dim=1) ** (PEAK // 2)).mean()
+    made, base = (Surroundings(after, points).normals for points in (step.points, step.base))
+    return (((made - base) ** 2).sum(dim=1) ** (PEAK // 2)).mean()
 
 
-def overshooting(step: LevelStep, topology: Topology) -> Tensor:
+def overshooting(step: Step, after: Connectivity) -> Tensor:
     """Climb out of Loop's bounding box."""
-    assert step.loop_points is not None
-    high, low = step.loop_points.amax(dim=0).detach(), step.loop_points.amin(dim=0).detach()
+    high, low = step.base.amax(dim=0).detach(), step.base.amin(dim=0).detach()
     return torch.relu(torch.maximum(step.points - high, low - step.points)).sum()
 
 
-def leaving(step: LevelStep, topology: Topology) -> Tensor:
+def leaving(step: Step, after: Connectivity) -> Tensor:
     """Climb away from Loop's limit surface."""
-    assert step.loop_points is not None
-    limits = [refined_limit_positions(limit, topology) for limit in (step.points, step.loop_points)]
-    return (((limits[0] - limits[1]) ** 2).sum(dim=1) ** (PEAK // 2)).sum()
+    return ((_limits_apart(step, after) ** 2).sum(dim=1) ** (PEAK // 2)).sum()
+
+
+def _limits_apart(step: Step, after: Connectivity) -> Float[Tensor, "W 3"]:
+    return limit_mask(after)(step.points - step.base)
 
 
 GOALS: Mapping[str, Goal] = MappingProxyType(

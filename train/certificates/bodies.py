@@ -9,9 +9,8 @@ from jaxtyping import Float, Int
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
-from pns_common.errors import MeshError
-from pns_common.geometry.reference_length import measure_reference_length
-from pns_common.mesh import Mesh, clean
+from pns_common import Mesh, MeshError, clean
+from pns_common.reference_length import measure_reference_length
 from train.data.datasets import draw_ridges
 from train.data.grid import grid_faces, jittered_grid
 from train.spectra.stars import star
@@ -118,7 +117,9 @@ def _read(path: Path) -> Mesh:
     loaded.merge_vertices(merge_tex=True, merge_norm=True)
     mesh = clean(Mesh(np.asarray(loaded.vertices), np.asarray(loaded.faces))).mesh
     centred = mesh.vertices - mesh.vertices.mean(axis=0)
-    return Mesh(centred / measure_reference_length(mesh.vertices, mesh.faces), mesh.faces)
+    return Mesh(
+        centred / measure_reference_length(mesh.vertices, mesh.faces.reshape(-1)), mesh.faces
+    )
 
 
 def _lay(plane: Float[np.ndarray, "V 2"]) -> Float[np.ndarray, "V 3"]:

@@ -10,8 +10,8 @@ import msgspec
 from rich.markup import escape
 from rich.table import Table
 
-from pns_common.errors import ModelError, PnsError
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL, load_model
+from pns_common import ModelError, PnsError
+from pns_common.model.file import DEFAULT_MODEL, load_model
 from train.certificates.affine import affine_reproduction
 from train.certificates.bodies import Body, flat_bodies, spiky_sphere, synthetic_bodies
 from train.certificates.certificate import Certificate
@@ -121,7 +121,7 @@ def _steps_of_kind(
 
     Schemes that turn into Loop have its spectra; of others lifted stars say more.
     """
-    if subject.scheme.guard is None:
+    if subject.learned_once is None:
         return [Step("stars", "lifted stars", lambda: lifted_stars(subject, valences))]
     rough = (*bodies, Body("spiky sphere", spiky_sphere(seed)))
     return [

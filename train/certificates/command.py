@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from pns_common.base.whole_file import replace_file
-from pns_common.errors import PnsError
+from pns_common import PnsError
+from pns_common.files import replace_file
 from train.certificates.bodies import Body, real_bodies
 from train.certificates.certify import (
     Verdict,

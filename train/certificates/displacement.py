@@ -1,10 +1,10 @@
 """T1, bounded displacement: no vertex leaves Loop's by more than C h² / R.
 
-h is the edge's length at an edge vertex, or the longest edge of its two faces where the scheme says
-so, and the root mean square edge around an old vertex; irregular edges, and the vertices on them,
-are not moved at all, nor are boundaries and creases but by a rule of their own, within the lengths
-of their own edges. The theorem is about what is added to Loop with the same creases: with none, and
-with a quarter of all edges, whichever they are. So no crease lines are looked for.
+h is the edge's length at an edge vertex, and the root mean square edge around an old vertex;
+irregular edges, and the vertices on them, are not moved at all, nor are boundaries and creases but
+by a rule of their own, within the lengths of their own edges. The theorem is about what is added to
+Loop with the same creases: with none, and with a quarter of all edges, whichever they are. So no
+creases are looked for.
 """
 
 from collections.abc import Sequence
@@ -12,14 +12,14 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
+from pns_common import Mesh
 from train.certificates.bodies import Body
 from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import rounding
 from train.certificates.subject import Subject
 from train.certificates.trials import NO_CREASES, trials
+from train.refining import refine
 
 # Faces up to which a mesh is refined further.
 LARGEST = 20_000
@@ -51,15 +51,9 @@ def _one_step(
     subject: Subject, mesh: Mesh, creases: Int[np.ndarray, "N 2"]
 ) -> tuple[float, str, Mesh]:
     """Refine once; return the largest ratio, at which vertex, and the refined mesh."""
-    scheme = subject.scheme
-    refined = refine(mesh, scheme, 1, 1.0, creases=creases, threads=1).mesh
+    refined = refine(mesh, subject.scheme, 1, 1.0, creases=creases).mesh
     ratio, place = worst_ratio(
-        mesh,
-        refined.vertices,
-        subject.budget,
-        creases,
-        moves_curves=scheme.moves_boundaries,
-        wide_bound=scheme.wide_bound,
+        mesh, refined.vertices, subject.budget, creases, moves_curves=subject.moves_curves
     )
     return ratio, place, refined
 
@@ -71,18 +65,15 @@ def worst_ratio(
     creases: Int[np.ndarray, "N 2"] = NO_CREASES,
     *,
     moves_curves: bool = False,
-    wide_bound: bool = False,
 ) -> tuple[float, str]:
     """Return the largest ratio ‖p − p_Loop‖ / (C h² / R) of one step, and at which vertex.
 
     ``curvature`` is C / R; ``moves_curves`` says whether boundaries and creases have a rule of
-    their own, ``wide_bound`` is as in ``Scheme``.
+    their own.
     """
     base = plain_loop(control.vertices, control.faces, creases)
     apart = np.linalg.norm(refined - base.positions, axis=1)
-    reach = base.wide_reach if wide_bound else base.reach
-    if moves_curves:
-        reach = reach + base.curve_reach
+    reach = base.reach + base.curve_reach if moves_curves else base.reach
     ratio = apart / (curvature * reach**2 + rounding(control))
     place = int(np.argmax(ratio))  # numpy's argmax finds a NaN first
     return float(ratio[place]), base.labels[place]

@@ -16,10 +16,10 @@ from onnx import NodeProto, TensorProto, numpy_helper
 from onnx.reference import ReferenceEvaluator
 from onnx.reference.op_run import OpRun
 
-from pns_common.errors import ModelError
-from pns_common.models.card import ModelCard
-from pns_common.models.contract import feature_inputs
-from pns_common.runtimes.onnx_model import BUNDLED, OnnxModel, bundled_models
+from pns_common import ModelError
+from pns_common.model.card import ModelCard
+from pns_common.model.file import BUNDLED, bundled_models
+from pns_common.model.session import OnnxModel, networks
 
 
 class Erf(OpRun):
@@ -42,7 +42,7 @@ class Gelu(OpRun):
 
 @dataclass(frozen=True, eq=False)
 class DoubleModel:
-    """A model file in double precision; it keeps the `Model` protocol of pns_common.schemes."""
+    """A model file in double precision; it keeps the library's `Model` protocol."""
 
     name: str
     card: ModelCard
@@ -65,7 +65,7 @@ class DoubleModel:
         self, output: str, given: str, features: Float[np.ndarray, "N K"], budget: float
     ) -> Float[np.ndarray, "N 3"]:
         # The evaluator wants every input, also those that this output does not need.
-        inputs = {name: np.zeros((1, width)) for name, width in feature_inputs(self.card)}
+        inputs = {each.given: np.zeros((1, each.columns)) for each in networks(self.card)}
         inputs[given] = np.asarray(features, dtype=np.float64)
         inputs["budget"] = np.asarray(budget, dtype=np.float64)
         # A hostile file may overflow or make a NaN; the operator looks at what comes out.

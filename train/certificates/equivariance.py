@@ -5,15 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pns_common.connectivity.topology import Topology, build_topology
-from pns_common.geometry.frames import edge_stencil, face_normals
-from pns_common.mesh import Mesh
-from pns_common.schemes import Scheme
+from pns_common import Mesh
 from train.certificates.bodies import Body, random_motion
 from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import step
 from train.certificates.subject import Subject
+from train.connectivity import connect
+from train.refining import AnyScheme
+from train.vectors import face_normals
 
 EXACT = 1e-12
 # Of the envelope C h² / R: a feature's last single precision bit may turn with the mesh.
@@ -38,7 +38,7 @@ def equivariance(subject: Subject, bodies: Sequence[Body], seed: int) -> list[Ce
 
 
 def _certify(
-    subject: Subject, scheme: Scheme, bodies: Sequence[Body], seed: int, how: str, single: float
+    subject: Subject, scheme: AnyScheme, bodies: Sequence[Body], seed: int, how: str, single: float
 ) -> Certificate:
     rng = np.random.default_rng(seed)
     measured, left_out = [], 0
@@ -55,7 +55,7 @@ def _certify(
 
 
 def discrepancy(
-    scheme: Scheme, mesh: Mesh, turn: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, "3"]
+    scheme: AnyScheme, mesh: Mesh, turn: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, "3"]
 ) -> tuple[Float[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
     """Return ‖S(gM) − g S(M)‖ at each new vertex, and which vertices the theorem speaks of."""
     still = step(scheme, mesh)
@@ -68,20 +68,13 @@ def discrepancy(
 
 def well_conditioned(mesh: Mesh) -> Bool[np.ndarray, " E"]:
     """Mark edges between well-shaped faces, not nearly folded; also others than interior."""
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    interior = topology.interior
-    good = np.ones(len(topology.edges), dtype=bool)
-    shaped = _smallest_sine(mesh) > WELL_SHAPED
-    good[interior] = shaped[topology.edge_faces[interior]].all(axis=1) & _open(mesh, topology)
+    level = connect(mesh.faces, len(mesh.vertices))
+    interior, half_edges = level.interior.numpy(), level.half_edges[level.interior].numpy()
+    faces, normals = half_edges // 3, face_normals(mesh.vertices, mesh.faces)
+    is_open = np.linalg.norm(normals[faces].sum(axis=1), axis=1) > WELL_SHAPED
+    good = np.ones(len(level.edges), dtype=bool)
+    good[interior] = (_smallest_sine(mesh) > WELL_SHAPED)[faces].all(axis=1) & is_open
     return good
-
-
-def _open(mesh: Mesh, topology: Topology) -> Bool[np.ndarray, " I"]:
-    interior = topology.interior
-    normals = face_normals(mesh.vertices, mesh.faces)
-    faces = topology.edge_faces[interior]
-    stencil = edge_stencil(mesh.vertices, normals, topology.stencil[interior], faces)
-    return np.linalg.norm(stencil.n1 + stencil.n2, axis=1) > WELL_SHAPED
 
 
 def _smallest_sine(mesh: Mesh) -> Float[np.ndarray, " F"]:

@@ -10,10 +10,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.connectivity.topology import build_topology
-from pns_common.schemes import pns
+from pns_common import pns
 from train.certificates.adversary import OnStep, Operator, ascend, initial_operator
 from train.certificates.lifted_star import LIFTS
+from train.connectivity import connect
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
 from train.models.torch_model import recipe_model
@@ -68,7 +68,7 @@ def gap_attack(recipe: Recipe, valence: int, steps: int, on_step: OnStep) -> Gap
     the search.
     """
     operator = initial_operator(recipe)
-    scheme = pns(recipe_model(recipe, operator.network, operator.vertex_network))
+    scheme = pns(recipe_model(recipe, operator.network))
     star = closed_star(scheme, valence)(LIFTS[-1])
     sway = torch.zeros(star.mesh.vertices.shape, dtype=torch.float64, requires_grad=True)
     copies = _Copies(star, valence)
@@ -97,11 +97,11 @@ class _Copies:
         mesh, self.count = perturbed_stars(star, self.step)
         copies = mesh.vertices.reshape(2 * self.count, -1, 3)
         self.points = torch.from_numpy(copies.copy())
-        self.topology = build_topology(mesh.faces, len(mesh.vertices))
+        self.level = connect(mesh.faces, len(mesh.vertices))
 
     def jacobian(self, operator: Operator, sway: Float[Tensor, "V 3"]) -> Float[Tensor, "M M"]:
         """Differentiate one step at the star moved by `sway`, by central differences."""
-        refined = operator((self.points + sway).reshape(-1, 3), self.topology).points
+        refined = operator((self.points + sway).reshape(-1, 3), self.level).points
         moved = refined_inner(self.star, refined, 2 * self.count)
         return (moved[: self.count] - moved[self.count :]).T / (2 * self.step)
 

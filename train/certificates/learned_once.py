@@ -1,4 +1,4 @@
-"""Certificates of schemes that correct at their first K levels and are Loop afterwards.
+"""Certificates of schemes that correct at the control mesh and are Loop afterwards.
 
 Fold-free, limit distance, smoothness class and resolution independence: docs/theorems.md proves
 them for the scale-free rule and any weights.
@@ -6,23 +6,19 @@ them for the scale-free rule and any weights.
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.connectivity.creases import Creases
-from pns_common.connectivity.topology import split
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
-from pns_common.rules.scale_free import ScaleFreeEdgeRule, ScaleFreeVertexRule
-from pns_common.schemes import Scheme, loop
+from pns_common import Creases, Mesh, Scheme, loop
+from pns_common import refine as refine_by_library
 from train.certificates.bodies import Body
 from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import rounding, step
 from train.certificates.subject import Subject
 from train.certificates.trials import trials
+from train.refining import AnyScheme, refine
 
 # Child faces that Loop makes flatter than this, in squared edge lengths, have no direction.
 FLAT = 1e-9
@@ -31,8 +27,6 @@ ROUNDING_ANGLE = 1e-5
 
 SAME = 1e-12
 SCALES = (2.0**-12, 2.0**-3, 2.0**5)
-# A budget that no correction reaches.
-UNBOUNDED = 1e15
 
 
 def fold_free(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certificate:
@@ -40,15 +34,16 @@ def fold_free(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certif
 
     The value is the largest turn in degrees.
     """
-    guard = subject.scheme.guard
-    allowed = math.nan if guard is None else math.degrees(guard.angle) + ROUNDING_ANGLE
+    card = subject.learned_once
+    angle = math.nan if card is None or card.fold_angle is None else card.fold_angle
     measured = []
     for trial in trials(subject, bodies, seed):
         base = plain_loop(trial.mesh.vertices, trial.mesh.faces, trial.creases).positions
         made = step(subject.scheme, trial.mesh, creases=trial.creases)
-        measured.append((largest_turn(split(made.topology), base, made.positions), trial.name))
-    angle, place = worst(measured)
-    return Certificate("folds", "fold-free", angle, high=allowed, where=place)
+        faces = made.level.split().numpy()
+        measured.append((largest_turn(faces, base, made.positions), trial.name))
+    turn, place = worst(measured)
+    return Certificate("folds", "fold-free", turn, high=angle + ROUNDING_ANGLE, where=place)
 
 
 def largest_turn(
@@ -78,8 +73,11 @@ def limit_distance(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> C
     measured = []
     for trial in trials(subject, bodies, seed):
         creases = Creases(trial.creases, levels=1) if len(trial.creases) else "auto"
-        ours = refine(trial.mesh, subject.scheme, 2, 1.0, limit=True, creases=creases, threads=1)
-        theirs = refine(trial.mesh, loop(), 2, 1.0, limit=True, threads=1)
+        assert isinstance(subject.scheme, Scheme)
+        ours, theirs = (
+            refine_by_library(trial.mesh, scheme, 2, 1.0, limit=True, creases=sharp, threads=1)
+            for scheme, sharp in ((subject.scheme, creases), (loop(), Creases()))
+        )
         apart = np.linalg.norm(ours.mesh.vertices - theirs.mesh.vertices, axis=1).max()
         stated, bound = (ours.report[key] for key in ("limit_distance", "limit_distance_bound"))
         assert stated is not None
@@ -94,19 +92,18 @@ def limit_distance(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> C
 def smoothness_class(subject: Subject, bodies: Sequence[Body]) -> Certificate:
     """Certify that the rule becomes Loop's: its limits are C² off extraordinary points.
 
-    It does after K levels, or later where it keeps crease lines for longer. The value is the
+    It does after the control mesh, or later where it keeps creases for longer. The value is the
     largest difference from an independent Loop at the level after, in the mesh's extents; NaN for a
     scheme that never stops to correct.
     """
-    name, levels = "smoothness class", subject.scheme.learned_levels
-    if levels is None:
+    name, card = "smoothness class", subject.learned_once
+    if card is None:
         return Certificate("class", name, math.nan, high=SAME, where="corrects at every level")
-    first = max(levels, subject.scheme.creases.levels or 1)
+    first = max(1, card.sharpness_levels or 0)
     measured = []
     for body in bodies:
         last, after = (
-            refine(body.mesh, subject.scheme, count, 1.0, threads=1).mesh
-            for count in (first, first + 1)
+            refine(body.mesh, subject.scheme, count, 1.0).mesh for count in (first, first + 1)
         )
         expected = plain_loop(last.vertices, last.faces).positions
         extent = np.ptp(last.vertices, axis=0).max()
@@ -121,30 +118,20 @@ def resolution_independence(subject: Subject, bodies: Sequence[Body]) -> Certifi
     R stays what it is. A rule in units of h² / R fails: it is right at one resolution alone. The
     value is the largest relative difference.
     """
-    scheme = unbounded(subject.exact)
+    assert subject.unbounded is not None
     measured = []
     for body in bodies:
-        own = step(scheme, body.mesh).displacement
+        own = _displacement(subject.unbounded, body.mesh)
         size = np.abs(own).max()
         if size == 0:
             continue
         for scale in SCALES:
             scaled = Mesh(scale * body.mesh.vertices, body.mesh.faces)
-            apart = step(scheme, scaled).displacement / scale - own
+            apart = _displacement(subject.unbounded, scaled) / scale - own
             measured.append((float(np.abs(apart).max() / size), f"{body.name}, times {scale:g}"))
     value, place = worst(measured) if measured else (0.0, "the scheme is Loop on every mesh")
     return Certificate("scale", "resolution independence", value, high=SAME, where=place)
 
 
-def unbounded(scheme: Scheme) -> Scheme:
-    """Return the scheme with a budget that nothing reaches, where its rules say how to."""
-    vertices, edges = scheme.vertex_rule, scheme.edge_rule
-    if not (isinstance(vertices, ScaleFreeVertexRule) and isinstance(edges, ScaleFreeEdgeRule)):
-        return scheme
-    form = replace(edges.form, budget=UNBOUNDED)
-    curves = None if edges.curves is None else replace(edges.curves, form=form)
-    return replace(
-        scheme,
-        vertex_rule=replace(vertices, form=form, curves=curves),
-        edge_rule=replace(edges, form=form, curves=curves),
-    )
+def _displacement(scheme: AnyScheme, mesh: Mesh) -> Float[np.ndarray, "N 3"]:
+    return step(scheme, mesh).positions - step(loop(), mesh).positions

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.features.edge_features import FEATURE_SETS
-from pns_common.features.ring_features import RING_FEATURE_SETS
-from pns_common.schemes import Model, VertexModel, pns
+from pns_common import pns
+from pns_common.model.card import EDGE_FEATURES, VERTEX_FEATURES
+from pns_common.model.session import Model
 from train.certificates.certificate import Certificate
 from train.metrics.card import MEASURES
 
@@ -28,9 +28,9 @@ POINTS = 0.05
 
 def keeps_its_word(model: Model) -> list[Certificate]:
     """Certify a model's answers at sample features and its card's metrics."""
-    rows = _answers(model, FEATURE_SETS[model.card.features].count, "corrections")
-    if model.card.vertex_features is not None and isinstance(model, VertexModel):
-        count = RING_FEATURE_SETS[model.card.vertex_features].count
+    rows = _answers(model, EDGE_FEATURES[model.card.features], "corrections")
+    if model.card.vertex_features is not None:
+        count = VERTEX_FEATURES[model.card.vertex_features]
         rows += _answers(model.vertex_correction, count, "vertex corrections")
     return [*rows, _metrics(model)]
 

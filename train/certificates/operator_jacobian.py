@@ -1,11 +1,11 @@
-"""The Jacobian of the operator at a star by automatic differentiation through its kernels."""
+"""The Jacobian of the operator at a star by automatic differentiation."""
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.connectivity.topology import build_topology
 from train.certificates.adversary import Operator
+from train.connectivity import connect
 from train.spectra.stars import Star
 
 
@@ -14,12 +14,12 @@ def operator_jacobian(operator: Operator, star: Star) -> Float[Tensor, "M M"]:
 
     The counterpart of `train.spectra.spectrum.jacobian`, which takes differences of any scheme.
     """
-    topology = build_topology(star.mesh.faces, len(star.mesh.vertices))
+    level = connect(star.mesh.faces, len(star.mesh.vertices))
     points, refined = torch.tensor(star.mesh.vertices), torch.from_numpy(star.refined)
     where = (torch.from_numpy(star.inner),)
 
     def inner_to_inner(inner: Float[Tensor, "N 3"]) -> Float[Tensor, " M"]:
-        return operator(points.index_put(where, inner), topology).points[refined].reshape(-1)
+        return operator(points.index_put(where, inner), level).points[refined].reshape(-1)
 
     derivative = torch.autograd.functional.jacobian(inner_to_inner, points[where])
     return derivative.reshape(3 * len(star.inner), -1)

@@ -20,7 +20,6 @@ class PlainLoop:
         reach: the displacement's h there: the edge's length at an interior edge, the root mean
             square length of the edges around an old vertex with interior edges only but for one
             crease that ends there, and 0 where no correction is allowed.
-        wide_reach: the same with the longest edge of both faces at an interior edge.
         curve_reach: the same where a rule for curves may move what lies on them: the length of a
             boundary edge or a crease, and the root mean square of both at a vertex on two of them
             and no other sharp edge; 0 elsewhere.
@@ -29,7 +28,6 @@ class PlainLoop:
 
     positions: Float[np.ndarray, "N 3"]
     reach: Float[np.ndarray, " N"]
-    wide_reach: Float[np.ndarray, " N"]
     curve_reach: Float[np.ndarray, " N"]
     labels: list[str]
 
@@ -53,7 +51,7 @@ def plain_loop(
     neighbours: list[list[int]] = [[] for _ in vertices]
     sharp: list[list[int]] = [[] for _ in vertices]
     curves: list[list[int]] = [[] for _ in vertices]
-    edge_positions, edge_reach, wide_reach, curve_reach = [], [], [], []
+    edge_positions, edge_reach, curve_reach = [], [], []
     labels = [f"vertex {v}" for v in range(len(vertices))]
     for (a, b), sides in opposites.items():
         for vertex, neighbour in ((a, b), (b, a)):
@@ -66,13 +64,10 @@ def plain_loop(
             ends, wings = vertices[a] + vertices[b], vertices[c] + vertices[d]
             edge_positions.append((3 * ends + wings) / 8)
             edge_reach.append(math.dist(vertices[a], vertices[b]))
-            sides_of_faces = ((a, b), (a, c), (b, c), (a, d), (b, d))
-            wide_reach.append(max(math.dist(vertices[i], vertices[j]) for i, j in sides_of_faces))
             curve_reach.append(0.0)
         else:
             edge_positions.append((vertices[a] + vertices[b]) / 2)
             edge_reach.append(0.0)
-            wide_reach.append(0.0)
             is_curve = is_crease or len(sides) == 1
             curve_reach.append(math.dist(vertices[a], vertices[b]) if is_curve else 0.0)
             for vertex, neighbour in ((a, b), (b, a)):
@@ -101,7 +96,6 @@ def plain_loop(
     return PlainLoop(
         positions,
         np.array([*reach, *edge_reach]),
-        np.array([*reach, *wide_reach]),
         np.array([*on_curve, *curve_reach]),
         labels,
     )

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pns_common.refine import refine
-from pns_common.schemes import Scheme, loop
+from pns_common import loop
 from train.certificates.certificate import Certificate, worst
 from train.certificates.subject import Subject
+from train.refining import AnyScheme, refine
 from train.spectra.spectrum import (
     SPOKE,
     TANGENT_COUNT,
@@ -15,7 +15,6 @@ from train.spectra.spectrum import (
     jacobian,
     loop_eigenvalue,
     loop_gap,
-    of_regular_mesh,
     perturbed_stars,
     refined_inner,
     reif_gap,
@@ -40,7 +39,7 @@ def planar_spectrum(subject: Subject, valences: Sequence[int]) -> list[Certifica
     """Certify T8 for each valence: the derivative, the tangent eigenvalues and the Reif gap."""
     deviations, tangents, gaps = [], [], []
     flat, finest = FLAT, EIGENVALUE
-    if subject.scheme.guard is not None:
+    if subject.learned_once is not None:
         flat, finest = SHARPER_FLAT, SHARPER_EIGENVALUE
     for valence in valences:
         place = f"k = {valence}"
@@ -60,13 +59,13 @@ def planar_spectrum(subject: Subject, valences: Sequence[int]) -> list[Certifica
     ]
 
 
-def spectrum(scheme: Scheme, valence: int) -> np.ndarray:
+def spectrum(scheme: AnyScheme, valence: int) -> np.ndarray:
     """Return |λ| of the linearisation at a flat star, largest first, translations left out."""
     matrix = without_translations(jacobian(scheme, closed_star(scheme, valence)(0.0), FINE))
     return np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
 
 
-def derivative_of_departure(scheme: Scheme, valence: int) -> float:
+def derivative_of_departure(scheme: AnyScheme, valence: int) -> float:
     """Return the largest ‖S − S_Loop‖ / ε of a flat star moved by a tiny ε in any inner coordinate.
 
     One-sided: a gate with a kink at flat faces cancels in central differences, and automatic
@@ -75,8 +74,8 @@ def derivative_of_departure(scheme: Scheme, valence: int) -> float:
     star, step = closed_star(scheme, valence)(0.0), TINY * SPOKE
     mesh, count = perturbed_stars(star, step)
     refined, base = (
-        refined_inner(star, refine(mesh, rule, 1, 1.0, threads=1).mesh.vertices, 2 * count)
-        for rule in (of_regular_mesh(scheme), loop())
+        refined_inner(star, refine(mesh, rule, 1, 1.0).mesh.vertices, 2 * count)
+        for rule in (scheme, loop())
     )
     return float(np.abs(refined - base).max()) / step
 

@@ -6,10 +6,10 @@ end by half a level.
 
 import numpy as np
 
-from pns_common.refine import refine
 from train.certificates.bodies import bumpy_torus
 from train.certificates.certificate import Certificate, Kind
 from train.certificates.subject import Subject
+from train.refining import refine
 
 LEVELS = 5
 
@@ -22,8 +22,8 @@ def regular_smoothness(subject: Subject, seed: int) -> Certificate:
     The value is the fall of the largest face-normal jump from the last level but one to the last,
     in powers of two; 1 for Loop.
     """
-    report = refine(bumpy_torus(seed), subject.scheme, LEVELS, 1.0, threads=1).report
-    jumps = np.array([level["normal_jump_max"] for level in report["levels"]])
+    refined = refine(bumpy_torus(seed), subject.scheme, LEVELS, 1.0)
+    jumps = np.array([level.normal_jump for level in refined.levels])
     order = float(np.log2(jumps[-2] / jumps[-1])) if jumps[-1] > 0 else np.inf
     where = f"bumpy torus, level {LEVELS}: largest jump {np.degrees(jumps[-1]):.1f}°"
     name = "normals settle in regular regions"

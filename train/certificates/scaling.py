@@ -9,14 +9,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.connectivity.topology import split
-from pns_common.geometry.frames import face_normals
-from pns_common.mesh import Mesh
-from pns_common.schemes import Scheme, loop
+from pns_common import Mesh, loop
 from train.certificates.bodies import Body
 from train.certificates.certificate import Certificate, farthest
 from train.certificates.step import step
 from train.certificates.subject import Subject
+from train.refining import AnyScheme
+from train.vectors import face_normals
 
 # Powers of two: scaling is exact. Normals need small ones to be in the linear regime.
 SCALES = 2.0 ** -np.arange(4, 11)
@@ -24,7 +23,7 @@ SCALES = 2.0 ** -np.arange(4, 11)
 # A scale-free rule asks for a share of h: the budget, which falls as h², takes over far below.
 SMALLER_SCALES = 2.0 ** -np.arange(18, 25)
 
-Measure = Callable[[Scheme, Mesh], float]
+Measure = Callable[[AnyScheme, Mesh], float]
 
 
 def proximity_slope(subject: Subject, bodies: Sequence[Body]) -> Certificate:
@@ -37,16 +36,16 @@ def normal_variation_slope(subject: Subject, bodies: Sequence[Body]) -> Certific
     return _slope("T6", "normal-variation slope", 1.0, 1e-2, subject, bodies, normals_from_loop)
 
 
-def distance_from_loop(scheme: Scheme, mesh: Mesh) -> float:
+def distance_from_loop(scheme: AnyScheme, mesh: Mesh) -> float:
     """Return ‖S(M) − S_Loop(M)‖ over all new vertices."""
     apart = step(scheme, mesh).positions - step(loop(), mesh).positions
     return float(np.linalg.norm(apart, axis=1).max())
 
 
-def normals_from_loop(scheme: Scheme, mesh: Mesh) -> float:
+def normals_from_loop(scheme: AnyScheme, mesh: Mesh) -> float:
     """Return ‖n − n_Loop‖ over all faces of the refined mesh."""
     ours, base = step(scheme, mesh), step(loop(), mesh)
-    faces = split(ours.topology)
+    faces = ours.level.split().numpy()
     apart = face_normals(ours.positions, faces) - face_normals(base.positions, faces)
     return float(np.linalg.norm(apart, axis=1).max())
 
@@ -66,7 +65,7 @@ def _slope(
     measure: Measure,
 ) -> Certificate:
     low, high = expected - tolerance, expected + tolerance
-    scales = SCALES if subject.scheme.guard is None else SMALLER_SCALES
+    scales = SCALES if subject.learned_once is None else SMALLER_SCALES
     slopes = []
     for body in bodies:
         values = np.array(

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.certificates.bodies import Body
 from train.certificates.certificate import Certificate, Kind, farthest
 from train.certificates.scaling import fitted_slope
@@ -26,7 +26,7 @@ def lipschitz_slope(subject: Subject, bodies: Sequence[Body], seed: int) -> Cert
     A slope well below 1 is a jump: the change does not go to nothing with the move.
     """
     rng, measured = np.random.default_rng(seed), []
-    epsilons = EPSILONS if subject.scheme.guard is None else SMALLER_EPSILONS
+    epsilons = EPSILONS if subject.learned_once is None else SMALLER_EPSILONS
     for body in bodies:
         move = rng.standard_normal(body.mesh.vertices.shape)
         still = step(subject.exact, body.mesh).positions

@@ -3,9 +3,15 @@
 import copy
 from dataclasses import dataclass
 
-from pns_common.schemes import Model, Scheme, pns
+from pns_common import pns
+from pns_common.model.card import DEFAULT_FORMAT, ModelCard
+from pns_common.model.session import Model
 from train.models.networks import BoundedNet
 from train.models.torch_model import TorchModel
+from train.refining import AnyScheme
+
+# A budget that no correction reaches.
+UNBOUNDED = 1e15
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,23 +25,46 @@ class Subject:
             network or it is double already. Slopes and spectra need it: the noise of a single
             precision network drowns small differences.
         budget: C of the envelope C h² / R that the scheme is held to.
+        card: the model's; None without a model.
+        unbounded: `exact` with a budget that nothing reaches; itself without a model.
     """
 
     name: str
-    scheme: Scheme
-    exact: Scheme
+    scheme: AnyScheme
+    exact: AnyScheme
     budget: float
+    card: ModelCard | None = None
+    unbounded: AnyScheme | None = None
 
     @property
     def is_single_precision(self) -> bool:
         """Whether the network runs in single precision."""
         return self.exact is not self.scheme
 
+    @property
+    def learned_once(self) -> ModelCard | None:
+        """The card of a scheme that corrects at the control mesh alone, and is Loop afterwards."""
+        card = self.card
+        return card if card is not None and card.format == DEFAULT_FORMAT else None
+
+    @property
+    def moves_curves(self) -> bool:
+        """Whether boundaries and creases have a rule of their own."""
+        card = self.learned_once
+        return card is not None and bool(card.boundary_strength)
+
 
 def subject_of_model(model: Model, exact: Model, budget: float | None = None) -> Subject:
     """Return the learned operator with a model, and with the same model in double precision."""
     scheme = pns(model, budget)
-    return Subject(model.name, scheme, pns(exact, budget), float(scheme.budget or 0.0))
+    return Subject(
+        model.name,
+        scheme,
+        pns(exact, budget),
+        float(scheme.budget or 0.0),
+        model.card,
+        pns(exact, UNBOUNDED),
+    )
 
 
 def subject_of_network(model: TorchModel, budget: float | None = None) -> Subject:

@@ -7,10 +7,10 @@ from itertools import product
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.connectivity.topology import build_topology
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.certificates.bodies import Body
 from train.certificates.subject import Subject
+from train.connectivity import connect
 
 # Of a mesh's size. A scale-free rule asks for a share of h: only on small meshes is that more than
 # the budget, which falls as h², and something to cut off.
@@ -31,7 +31,7 @@ class Trial:
 def trials(subject: Subject, bodies: Sequence[Body], seed: int) -> Iterator[Trial]:
     """Yield each body as it is, and with creases; and the same where the budget cuts off."""
     rng = np.random.default_rng(seed)
-    sizes = (1.0,) if subject.scheme.guard is None else (1.0, SMALL)
+    sizes = (1.0,) if subject.learned_once is None else (1.0, SMALL)
     for body, size in product(bodies, sizes):
         mesh = Mesh(size * body.mesh.vertices, body.mesh.faces)
         name = body.name if size == 1 else f"{body.name} times {size:g}"
@@ -41,5 +41,5 @@ def trials(subject: Subject, bodies: Sequence[Body], seed: int) -> Iterator[Tria
 
 def drawn_creases(mesh: Mesh, rng: np.random.Generator) -> Int[np.ndarray, "N 2"]:
     """Return a quarter of a mesh's edges, which make darts, curves and corners."""
-    edges = np.unique(build_topology(mesh.faces, len(mesh.vertices)).edges, axis=0)
+    edges = np.unique(connect(mesh.faces, len(mesh.vertices)).edges.numpy(), axis=0)
     return edges[rng.random(len(edges)) < 1 / 4]

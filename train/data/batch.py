@@ -8,8 +8,8 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from pns_common.connectivity.disjoint_union import disjoint_faces
-from pns_common.connectivity.topology import Topology, build_topology, split
+from pns_common import Mesh
+from train.connectivity import Connectivity, connect
 from train.data.datasets import Instance
 from train.surfaces.implicit import Surface
 
@@ -20,7 +20,7 @@ class Batch:
 
     Attributes:
         points: coarse vertices, float64.
-        topology: of the coarse faces.
+        mesh: their connectivity.
         children: faces of the split mesh.
         inserted: the inserted vertex of each interior edge, as an index into the split mesh.
         surface: one surface with the parameters of each inserted vertex's own instance.
@@ -28,37 +28,42 @@ class Batch:
     """
 
     points: Float[Tensor, "V 3"]
-    topology: Topology
-    children: Int[np.ndarray, "N 3"]
-    inserted: Int[np.ndarray, " I"]
+    mesh: Connectivity
+    children: Int[Tensor, "N 3"]
+    inserted: Int[Tensor, " I"]
     surface: Surface
-    face_pairs: Int[np.ndarray, "P 2"]
+    face_pairs: Int[Tensor, "P 2"]
 
 
 def disjoint_union(instances: Sequence[Instance]) -> Batch:
     """Join instances of one surface family."""
-    meshes = [instance.mesh for instance in instances]
-    sizes = [len(mesh.vertices) for mesh in meshes]
-    points = np.concatenate([mesh.vertices for mesh in meshes])
-    faces = disjoint_faces((mesh.faces, len(mesh.vertices)) for mesh in meshes)
-    topology = build_topology(faces, len(points))
-    owner = np.repeat(np.arange(len(instances)), sizes)[topology.stencil[topology.interior, 0]]
+    joined = joined_meshes([instance.mesh for instance in instances])
+    sizes = [len(instance.mesh.vertices) for instance in instances]
+    mesh = connect(joined.faces, len(joined.vertices))
+    owner = np.repeat(np.arange(len(instances)), sizes)[mesh.edges[mesh.interior, 0].numpy()]
     return Batch(
-        points=torch.from_numpy(points),
-        topology=topology,
-        children=split(topology),
-        inserted=topology.vertex_count + topology.interior,
+        points=torch.tensor(joined.vertices),
+        mesh=mesh,
+        children=mesh.split(),
+        inserted=mesh.vertex_count + mesh.interior,
         surface=_surface_of_each([instance.surface for instance in instances], owner),
-        face_pairs=pairs_sharing_a_face(topology),
+        face_pairs=pairs_sharing_a_face(mesh),
     )
 
 
-def pairs_sharing_a_face(topology: Topology) -> Int[np.ndarray, "P 2"]:
-    """Return pairs of interior edges of one face, as positions in `topology.interior`."""
-    position = np.full(len(topology.edges), -1)
-    position[topology.interior] = np.arange(len(topology.interior))
-    pairs = position[topology.face_edges[:, [[0, 1], [1, 2], [2, 0]]]].reshape(-1, 2)
-    return pairs[(pairs >= 0).all(axis=1)]
+def joined_meshes(meshes: Sequence[Mesh]) -> Mesh:
+    """Return meshes side by side as one, in their order."""
+    counts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + first for mesh, first in zip(meshes, counts[:-1], strict=True)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+def pairs_sharing_a_face(mesh: Connectivity) -> Int[Tensor, "P 2"]:
+    """Return pairs of interior edges of one face, as positions in `mesh.interior`."""
+    position = torch.full((len(mesh.edges),), -1)
+    position[mesh.interior] = torch.arange(len(mesh.interior))
+    pairs = position[mesh.face_edges[:, [[0, 1], [1, 2], [2, 0]]]].reshape(-1, 2)
+    return pairs[(pairs >= 0).all(dim=1)]
 
 
 def _surface_of_each(surfaces: Sequence[Surface], owner: Int[np.ndarray, " I"]) -> Surface:

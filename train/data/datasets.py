@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.data.grid import grid_faces, jittered_grid
 from train.surfaces.implicit import Ridge, Saddle, SphereRidge, Surface
 

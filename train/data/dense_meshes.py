@@ -9,12 +9,10 @@ import trimesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pns_common.connectivity.topology import EdgeClass, build_topology
-from pns_common.errors import MeshError
-from pns_common.mesh import Mesh, clean
-from pns_common.refine import refine
-from pns_common.schemes import loop
+from pns_common import Mesh, MeshError, clean, loop
+from train.connectivity import connect
 from train.data.parts import CAD_PARTS
+from train.refining import refine
 
 # .npz: arrays `vertices` and `faces`.
 FORMATS = (".glb", ".gltf", ".npz", ".obj", ".off", ".ply", ".stl")
@@ -85,7 +83,7 @@ def dense_asset(path: Path) -> DenseMesh | LeftOut:
         return LeftOut(path.name, error.reason)
     kind = CONTROL if path.stem.endswith(CONTROL_ENDING) else ASSET
     if kind == CONTROL:
-        part = refine(part, loop(), CONTROL_LEVELS, threads=1).mesh
+        part = refine(part, loop(), CONTROL_LEVELS).mesh
     if not is_manifold(part):
         return LeftOut(path.name, "its largest part is no manifold")
     if len(part.faces) < FEWEST_FACES:
@@ -108,8 +106,8 @@ def welded(mesh: Mesh) -> Mesh:
 
 def largest_part(mesh: Mesh) -> Mesh:
     """Return the part of a mesh with the most faces; parts meet at no interior edge."""
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    first, second = topology.edge_faces[topology.interior].T
+    level = connect(mesh.faces, len(mesh.vertices))
+    first, second = level.half_edges[level.interior].T.numpy() // 3
     count = len(mesh.faces)
     joins = coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
     _, part = connected_components(joins, directed=False)
@@ -118,10 +116,10 @@ def largest_part(mesh: Mesh) -> Mesh:
 
 def is_manifold(mesh: Mesh) -> bool:
     """Return whether all edges are interior or boundary, and all vertices used, with one fan."""
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    regular = bool((topology.edge_class != EdgeClass.IRREGULAR).all())
+    level = connect(mesh.faces, len(mesh.vertices))
+    regular = bool((level.paired | level.boundary).all())
     used = len(np.unique(mesh.faces)) == len(mesh.vertices)
-    return regular and used and not topology.multi_fan_vertices.any()
+    return regular and used and bool((level.fans <= 1).all())
 
 
 def read_mesh(path: Path) -> Mesh:

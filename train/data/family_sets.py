@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.data.datasets import Dataset, Instance, saddle_held_out, sphere_ridge_held_out
 from train.data.grid import grid_faces, jittered_grid
 from train.data.patches import JITTER, rounded_boxes, tori

@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 
 # Points (radius, height) of a lathe's profile, from the lower end of the axis to the upper.
 Profile = Float[np.ndarray, "N 2"]

@@ -7,7 +7,7 @@ onto the surface.
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.data.datasets import Dataset, Instance
 from train.data.grid import grid_faces, jittered_grid
 from train.surfaces.cad import Fillet, RoundedBox, Torus

@@ -6,8 +6,8 @@ from types import MappingProxyType
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.connectivity.topology import build_topology, split
-from pns_common.mesh import Mesh
+from pns_common import Mesh
+from train.connectivity import connect
 
 
 def box(x: float = 1.0, y: float = 1.0, z: float = 1.0) -> Mesh:
@@ -158,9 +158,9 @@ def _outwards(points: Float[np.ndarray, "V 3"], faces: np.ndarray) -> Mesh:
 
 def _split(mesh: Mesh) -> Mesh:
     """Return every face in four, edges at their midpoints laid onto the unit sphere."""
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    middles = mesh.vertices[topology.edges].mean(axis=1)
-    return Mesh(_unit(np.concatenate([mesh.vertices, middles])), split(topology))
+    level = connect(mesh.faces, len(mesh.vertices))
+    middles = mesh.vertices[level.edges.numpy()].mean(axis=1)
+    return Mesh(_unit(np.concatenate([mesh.vertices, middles])), level.split().numpy())
 
 
 def _unit(points: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "V 3"]:

@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Int
 from numpy.typing import ArrayLike
 
-from pns_common.errors import MeshError
-from pns_common.mesh import Mesh, clean
+from pns_common import Mesh, MeshError, clean
 from train.data.dense_meshes import largest_part
 
 # How fast fast-simplification raises its threshold: below its own 7, for better triangles.

@@ -11,7 +11,7 @@ import fast_simplification
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.mesh import Mesh, clean
+from pns_common import Mesh, clean
 from train.data.datasets import Instance
 from train.data.patches import marched
 from train.data.plane_meshes import PlaneMesh, regular_grid, scattered, turned_grid

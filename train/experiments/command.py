@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from pns_common.errors import PnsError
+from pns_common import PnsError
 from train.experiments.at_once import run_each
 from train.experiments.harness.experiment import Experiment
 from train.experiments.harness.laboratory import FULL, Laboratory, silent

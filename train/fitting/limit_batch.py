@@ -9,12 +9,13 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 from torch import Tensor
 
-from pns_common.base.arrays import segment_sum
-from pns_common.connectivity.disjoint_union import disjoint_faces
-from pns_common.connectivity.topology import Topology, build_topology, split
-from pns_common.rules.control_level import ControlLevel, control_level
+from pns_common import Mesh
+from train.connectivity import connect
+from train.data.batch import joined_meshes
 from train.data.pairs.references import AUTHORED, LATHE, SWEPT, Pair
-from train.fitting.limit_maps import LimitMaps, applied, limit_maps, loop_matrix
+from train.fitting.learned_level import LearnedLevel, learned_level
+from train.fitting.limit_maps import LimitMaps, applied, limit_maps
+from train.models.recipe import Recipe
 
 # Levels of Loop between the learned level and the vertices at which the limit is looked at.
 FINER = 1
@@ -46,7 +47,7 @@ class LimitBatch:
 
     Attributes:
         count: N.
-        level: the control meshes.
+        level: the control meshes, and what surrounds the networks there.
         maps: from what one level makes of them to the limit.
         owner: the mesh of each limit vertex.
         area: each limit vertex's share of its mesh's area, summing to 1 a mesh.
@@ -65,7 +66,7 @@ class LimitBatch:
     """
 
     count: int
-    level: ControlLevel
+    level: LearnedLevel
     maps: LimitMaps
     owner: Int[np.ndarray, " M"]
     area: Float[Tensor, " M"]
@@ -95,7 +96,8 @@ class LimitBatch:
         self, values: Float[Tensor, " K"], owner: Int[np.ndarray, " K"]
     ) -> Float[Tensor, " N"]:
         """Return sums over what belongs to each mesh."""
-        return segment_sum(values[:, None], owner, self.count)[:, 0]
+        sums = torch.zeros(self.count, dtype=values.dtype)
+        return sums.index_add(0, torch.from_numpy(owner), values)
 
 
 def _limit(maps: LimitMaps, points: Float[Tensor, "V 3"]) -> LimitSurface:
@@ -104,30 +106,34 @@ def _limit(maps: LimitMaps, points: Float[Tensor, "V 3"]) -> LimitSurface:
     return LimitSurface(applied(maps.position, points), across / length.clamp(min=1e-12))
 
 
-def limit_batch(pairs: Sequence[Pair], rng: np.random.Generator) -> LimitBatch:
-    """Join pairs, each scaled to reference length 1."""
+def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator) -> LimitBatch:
+    """Join pairs, each scaled to reference length 1, for a scale-free recipe."""
     shifts = [np.array([APART * index, 0.0, 0.0]) for index in range(len(pairs))]
     sizes = [len(pair.coarse.vertices) for pair in pairs]
-    points = _joined(pair.coarse.vertices + at for pair, at in zip(pairs, shifts, strict=True))
-    faces = disjoint_faces((pair.coarse.faces, len(pair.coarse.vertices)) for pair in pairs)
-    topology = build_topology(faces, len(points))
-    first = build_topology(split(topology), len(points) + len(topology.edges))
+    apart = [
+        Mesh(pair.coarse.vertices + at, pair.coarse.faces)
+        for pair, at in zip(pairs, shifts, strict=True)
+    ]
+    joined = joined_meshes(apart)
+    level = learned_level(joined, recipe)
+    control = connect(joined.faces, len(joined.vertices))
+    first = connect(control.split().numpy(), len(level.base))
     owner = np.repeat(np.arange(len(pairs)), sizes)
     maps = limit_maps(first, FINER)
-    first_owner = np.concatenate([owner, owner[topology.edges[:, 0]]])
+    first_owner = np.concatenate([owner, owner[control.edges[:, 0].numpy()]])
     owner = first_owner[maps.ancestor]
     fair = limit_maps(first, FAIR)
-    fair_faces = fair.topology.faces[fair.smooth[fair.topology.faces].all(axis=1)]
+    fair_faces = fair.faces[fair.smooth[fair.faces].all(axis=1)]
     fair_edges, fair_sides = _sides(fair_faces)
     fair_owner = first_owner[fair.ancestor]
     kinds = [pair.kind for pair in pairs]
     surface = _joined(pair.surface.points + at for pair, at in zip(pairs, shifts, strict=True))
     from_mesh = np.repeat(np.arange(len(pairs)), [len(pair.surface.points) for pair in pairs])
     back = np.sort(rng.choice(len(surface), min(SEEN_BACK, len(surface)), replace=False))
-    area = _vertex_areas(points, topology, maps)
+    area = _vertex_areas(level.base.numpy(), maps)
     return LimitBatch(
         count=len(pairs),
-        level=control_level(torch.from_numpy(points), topology, reference_length=1.0),
+        level=level,
         maps=maps,
         owner=owner,
         area=_shares(area, owner, len(pairs)),
@@ -160,14 +166,12 @@ def _sides(
     return sides[first], number.reshape(faces.shape)
 
 
-def _vertex_areas(
-    points: Float[np.ndarray, "V 3"], topology: Topology, maps: LimitMaps
-) -> Float[np.ndarray, " M"]:
-    """Return the area of Loop's own limit at each vertex, a third of its faces'."""
-    limit = maps.position @ (loop_matrix(topology) @ points)
-    a, b, c = (limit[maps.topology.faces[:, corner]] for corner in range(3))
+def _vertex_areas(points: Float[np.ndarray, "W 3"], maps: LimitMaps) -> Float[np.ndarray, " M"]:
+    """Return the area of the limit of some points at each vertex, a third of its faces'."""
+    limit = maps.position @ points
+    a, b, c = (limit[maps.faces[:, corner]] for corner in range(3))
     twice = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return np.bincount(maps.topology.faces.reshape(-1), np.repeat(twice / 6, 3), len(limit))
+    return np.bincount(maps.faces.reshape(-1), np.repeat(twice / 6, 3), len(limit))
 
 
 def _shares(

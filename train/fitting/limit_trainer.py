@@ -6,22 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from pns_common.levels.step import level_step
-from pns_common.schemes import Scheme
 from train.data.pairs.pair_stream import pair_stream
 from train.data.pairs.references import Pair
 from train.fitting.ahead import ahead
 from train.fitting.determinism import deterministic
 from train.fitting.limit_batch import LimitBatch, limit_batch
 from train.fitting.limit_loss import LimitMeasures, Standards, limit_loss, measure
-from train.fitting.limit_maps import applied, loop_matrix
-from train.models.from_recipe import (
-    initial_network,
-    initial_vertex_network,
-    recipe_scheme,
-)
+from train.models.from_recipe import initial_network, initial_vertex_network
 from train.models.networks import BoundedNet
-from train.models.recipe import Recipe, ToLimit
+from train.models.recipe import Recipe, ToLimit, scale_free_parts
 
 # Share of the steps in which the learning rate rises.
 WARM_UP = 0.1
@@ -35,8 +28,8 @@ def fit_to_limit(
     """Return the trained networks of a scale-free recipe, and the loss before each step."""
     with deterministic():
         network, vertex_network = initial_network(recipe), initial_vertex_network(recipe)
-        scheme = recipe_scheme(recipe, network, vertex_network)
-        assert vertex_network is not None  # recipe_scheme refuses it
+        scale_free_parts(recipe)
+        assert vertex_network is not None  # a scale-free recipe has one
         weights = [*network.parameters(), *vertex_network.parameters()]
         optimiser = torch.optim.Adam(weights, lr=recipe.learning_rate)
         schedule = torch.optim.lr_scheduler.OneCycleLR(
@@ -44,7 +37,8 @@ def fit_to_limit(
         )
         losses: list[float] = []
         for batch, standards in _batches(recipe, plan):
-            loss = limit_loss(plan.weights, batch, limit_measures(batch, scheme), standards)
+            measures = limit_measures(batch, network, vertex_network)
+            loss = limit_loss(plan.weights, batch, measures, standards)
             optimiser.zero_grad()
             loss.backward()
             torch.nn.utils.clip_grad_norm_(weights, LONGEST_GRADIENT)
@@ -55,20 +49,17 @@ def fit_to_limit(
     return network, vertex_network, tuple(losses)
 
 
-def limit_measures(batch: LimitBatch, scheme: Scheme) -> LimitMeasures:
-    """Take one level of a scheme, and measure the limit of Loop after it."""
-    return measure(batch, level_step(batch.level, scheme).points)
+def limit_measures(
+    batch: LimitBatch, network: BoundedNet, vertex_network: BoundedNet
+) -> LimitMeasures:
+    """Take the learned level, and measure the limit of Loop after it."""
+    return measure(batch, batch.level.points(network, vertex_network))
 
 
 def standards_of(batch: LimitBatch) -> Standards:
     """Return Loop's measures on a batch, and those of quasi-interpolation along the normal."""
-    level = batch.level
     with torch.no_grad():
-        matrix = loop_matrix(level.topology)
-        return Standards(
-            loop=measure(batch, applied(matrix, level.points)),
-            prior=measure(batch, applied(matrix, level.points + level.pushes)),
-        )
+        return Standards(measure(batch, batch.level.base), measure(batch, batch.level.pushed))
 
 
 def _batches(recipe: Recipe, plan: ToLimit) -> Iterator[tuple[LimitBatch, Standards]]:
@@ -112,6 +103,6 @@ def _fresh(
     for pair in pair_stream(recipe.seed):
         waiting.append(pair)
         if sum(len(mesh_pair.coarse.faces) for mesh_pair in waiting) >= plan.faces:
-            batch = limit_batch(waiting, rng)
+            batch = limit_batch(waiting, recipe, rng)
             waiting = []
             yield batch, standards_of(batch)

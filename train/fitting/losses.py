@@ -3,12 +3,12 @@
 Source: paper, Setup, baselines, and metrics.
 """
 
-import numpy as np
+import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from pns_common.base.arrays import dot, gather
 from train.models.recipe import LossWeights
+from train.tensors import dot, unit
 
 
 def distance_loss(distance: Float[Tensor, " I"]) -> Float[Tensor, ""]:
@@ -23,11 +23,9 @@ def normal_loss(
     return (1 - dot(normals, surface_normals)).mean()
 
 
-def fairness_loss(
-    normals: Float[Tensor, "I 3"], pairs: Int[np.ndarray, "P 2"]
-) -> Float[Tensor, ""]:
+def fairness_loss(normals: Float[Tensor, "I 3"], pairs: Int[Tensor, "P 2"]) -> Float[Tensor, ""]:
     """Return L_fair: mean squared difference of normals over pairs of new vertices on one face."""
-    first, second = (gather(normals, side) for side in pairs.T)
+    first, second = normals[pairs].unbind(dim=1)
     return ((first - second) ** 2).sum(dim=-1).mean()
 
 
@@ -45,7 +43,7 @@ def weighted_loss(
     normals: Float[Tensor, "I 3"],
     surface_normals: Float[Tensor, "I 3"],
     ratio: Float[Tensor, " I"],
-    pairs: Int[np.ndarray, "P 2"],
+    pairs: Int[Tensor, "P 2"],
 ) -> Float[Tensor, ""]:
     """Sum the four terms with the recipe's weights."""
     return (
@@ -54,3 +52,10 @@ def weighted_loss(
         + weights.fairness * fairness_loss(normals, pairs)
         + weights.proximity * proximity_loss(ratio)
     )
+
+
+def vertex_normals(points: Float[Tensor, "V 3"], faces: Int[Tensor, "F 3"]) -> Float[Tensor, "V 3"]:
+    """Return unit vertex normals, incident faces weighted by area."""
+    a, b, c = (points[corner] for corner in faces.T)
+    areas = torch.linalg.cross(b - a, c - a).repeat(3, 1)
+    return unit(torch.zeros_like(points).index_add(0, faces.T.reshape(-1), areas))

@@ -8,17 +8,14 @@ meshes and asks for η = 0 there; the further outside, the more.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.connectivity.topology import build_topology
-from pns_common.errors import ParameterError
-from pns_common.features.edge_features import FeatureSet
-from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
-from pns_common.mesh import Mesh
+from pns_common import Mesh, ParameterError
+from train.connectivity import connect
 from train.models.networks import BoundedNet
+from train.reference import Surroundings, edge_frames, paper_5, read_edges
 
 # Half of the draws: a training edge, bent by any curvature x ∈ [0, 2], its shape moved a little.
 # The other half: any curvature, and any shape up to edges e^1.5 times as long as another.
@@ -37,10 +34,9 @@ class Support:
     high: Float[Tensor, " K"]
 
 
-def support_of(meshes: list[Mesh], features: FeatureSet) -> Support:
-    """Return the features at the interior edges of the training meshes."""
-    rows = torch.from_numpy(np.concatenate([_edge_features(mesh, features) for mesh in meshes]))
-    rows = rows.to(torch.float32)
+def support_of(meshes: list[Mesh]) -> Support:
+    """Return the features `paper-5` at the interior edges of the training meshes."""
+    rows = torch.cat([_edge_features(mesh) for mesh in meshes]).to(torch.float32)
     return Support(rows, rows.amin(dim=0), rows.amax(dim=0))
 
 
@@ -65,23 +61,23 @@ def quiet_loss(
 
 
 def quiet_term(
-    meshes: list[Mesh], features: FeatureSet, seed: int
+    meshes: list[Mesh], features: str, seed: int
 ) -> Callable[[BoundedNet], Float[Tensor, ""]]:
     """Return the quiet loss of a network, on features drawn anew at every call.
 
     Raises:
-        ParameterError: the features read data of vertices, of which no draw knows.
+        ParameterError: the features are not `paper-5`: others read data of vertices, which no draw
+            has.
     """
-    if features.vertex_fields is not None:
-        raise ParameterError("quiet", features.name, expected="features of an edge, as paper-5")
-    support = support_of(meshes, features)
+    if features != "paper-5":
+        raise ParameterError("quiet", features, expected="features of an edge, as paper-5")
+    support = support_of(meshes)
     generator = torch.Generator().manual_seed(seed)
     return lambda network: quiet_loss(network, support, draw_features(support, generator))
 
 
-def _edge_features(mesh: Mesh, features: FeatureSet) -> Float[np.ndarray, "I K"]:
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    rows = topology.interior
-    normals = face_normals(mesh.vertices, mesh.faces)
-    at = edge_stencil(mesh.vertices, normals, topology.stencil[rows], topology.edge_faces[rows])
-    return features(at, edge_frames(at))
+def _edge_features(mesh: Mesh) -> Float[Tensor, "I 5"]:
+    level = connect(mesh.faces, len(mesh.vertices))
+    around = Surroundings(level, torch.tensor(mesh.vertices))
+    edges = read_edges(around, first_face=True)
+    return paper_5(around, edges, edge_frames(edges, first_face=True))[level.interior]

@@ -8,18 +8,16 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from pns_common.base.arrays import gather
-from pns_common.features.edge_features import FEATURE_SETS
 from train.data.batch import Batch, disjoint_union
 from train.data.datasets import DATASETS, Instance
 from train.fitting.determinism import deterministic
 from train.fitting.limit_trainer import fit_to_limit
-from train.fitting.losses import weighted_loss
-from train.fitting.one_step import Step, refine_once, vertex_normals
+from train.fitting.losses import vertex_normals, weighted_loss
 from train.fitting.quiet import quiet_term
-from train.models.from_recipe import initial_network, recipe_operator
+from train.models.from_recipe import initial_network, paper_rule
 from train.models.networks import BoundedNet
 from train.models.recipe import OneStep, Recipe, ToLimit, one_step
+from train.reference import Step
 from train.surfaces.implicit import signed_distance, unit_normal
 
 # Called after each step with the number of steps done and the loss.
@@ -57,7 +55,7 @@ def with_quiet(recipe: Recipe, loss: Loss) -> Loss:
     if plan.quiet == 0:
         return loss
     meshes = [instance.mesh for instance in DATASETS[plan.dataset]().instances]
-    quiet = quiet_term(meshes, FEATURE_SETS[recipe.features], recipe.seed)
+    quiet = quiet_term(meshes, recipe.features, recipe.seed)
     return lambda network, batch: loss(network, batch) + plan.quiet * quiet(network)
 
 
@@ -90,21 +88,19 @@ def optimise(
 
 def batch_loss(recipe: Recipe, network: BoundedNet, batch: Batch) -> Float[Tensor, ""]:
     """Refine a batch by one step of the operator and weigh its loss."""
-    operator = recipe_operator(recipe, network)
-    step = refine_once(batch.points, batch.topology, operator, recipe.budget)
-    return step_loss(recipe, batch, step)
+    return step_loss(recipe, batch, paper_rule(recipe, network)(batch.points, batch.mesh))
 
 
 def step_loss(recipe: Recipe, batch: Batch, step: Step) -> Float[Tensor, ""]:
     """Weigh the four loss terms of a refined batch."""
-    inserted = gather(step.points, batch.inserted)
-    normals = gather(vertex_normals(step.points, batch.children), batch.inserted)
+    inserted = step.points[batch.inserted]
+    normals = vertex_normals(step.points, batch.children)[batch.inserted]
     return weighted_loss(
         one_step(recipe).weights,
         distance=signed_distance(batch.surface, inserted),
         normals=normals,
         surface_normals=unit_normal(batch.surface, inserted),
-        ratio=step.ratio,
+        ratio=step.ratio[batch.inserted],
         pairs=batch.face_pairs,
     )
 

@@ -4,17 +4,18 @@ import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from pns_common.schemes import Scheme, loop
+from pns_common import loop
 from train.data.datasets import Dataset, ridge_held_out, saddle_held_out, sphere_ridge_held_out
 from train.metrics.evaluation import compare_with_loop
 from train.metrics.one_step import Improvement, improvement
 from train.metrics.whole_surface import whole_surface
 from train.models.recipe import OneStep, Recipe
+from train.refining import AnyScheme
 
 LEVELS = 4
 
 
-def after_four_levels(scheme: Scheme, held_out: Dataset) -> dict[str, Improvement]:
+def after_four_levels(scheme: AnyScheme, held_out: Dataset) -> dict[str, Improvement]:
     """Compare with Loop on a data set: all vertices, all faces, the largest jump."""
     ours, reference = (whole_surface(rule, held_out, LEVELS) for rule in (scheme, loop()))
     shown = ("distance", "normal", "jump")
@@ -27,7 +28,7 @@ def _without_near(improvements: Mapping[str, Improvement]) -> dict[str, Improvem
 
 
 # One step by the published metrics where nothing else is said.
-MEASURES: Mapping[str, Callable[[Scheme], Mapping[str, Improvement]]] = MappingProxyType(
+MEASURES: Mapping[str, Callable[[AnyScheme], Mapping[str, Improvement]]] = MappingProxyType(
     {
         "ridge-held-out": lambda scheme: compare_with_loop(scheme, ridge_held_out()),
         "ridge-held-out after 4 levels": lambda scheme: after_four_levels(scheme, ridge_held_out()),
@@ -51,7 +52,7 @@ ONE_STEP = ("ridge-held-out",)
 TO_LIMIT = tuple(name for name in MEASURES if name.endswith("levels"))
 
 
-def card_metrics(recipe: Recipe, scheme: Scheme) -> dict[str, Mapping[str, Improvement]]:
+def card_metrics(recipe: Recipe, scheme: AnyScheme) -> dict[str, Mapping[str, Improvement]]:
     """Measure a trained scheme for its card."""
     names = ONE_STEP if isinstance(recipe.training, OneStep) else TO_LIMIT
     return {name: MEASURES[name](scheme) for name in names}

@@ -10,9 +10,7 @@ from dataclasses import dataclass
 import fast_simplification
 import numpy as np
 
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
-from pns_common.schemes import Scheme
+from pns_common import Mesh
 from train.data.dense_meshes import DenseMesh, is_manifold, largest_part
 from train.data.simplifiers import AGGRESSIVENESS
 from train.metrics.surface_distance import (
@@ -21,6 +19,7 @@ from train.metrics.surface_distance import (
     prepared,
     surface_errors,
 )
+from train.refining import AnyScheme, refine
 
 # About 400 vertices on a closed mesh, as in the source.
 COARSE_FACES = 800
@@ -132,7 +131,7 @@ def euler_characteristic(mesh: Mesh) -> int:
 
 def compare(
     pairs: Iterable[Pair],
-    schemes: Mapping[str, Scheme],
+    schemes: Mapping[str, AnyScheme],
     levels: Iterable[int],
     samples: int,
 ) -> list[Row]:
@@ -142,7 +141,7 @@ def compare(
         true = prepared(pair.dense.mesh, samples)
         for method, scheme in schemes.items():
             for level in wanted:
-                refined = refine(pair.coarse, scheme, level, threads=1).mesh
+                refined = refine(pair.coarse, scheme, level).mesh
                 errors = surface_errors(true, prepared(refined, samples))
                 rows.append(Row(pair.dense.name, level, method, errors))
     return rows

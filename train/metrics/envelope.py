@@ -5,15 +5,17 @@ Whatever the weights, an edge vertex stays in the ball of radius C h² γ round 
 """
 
 import numpy as np
+import torch
 from jaxtyping import Float
+from torch import Tensor
 
-from pns_common.base.arrays import norm
-from pns_common.formula.correction import curvature_gate
-from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
-from pns_common.schemes import ControlLevel, Placement, Scheme, loop_edge_rule, loop_vertex_rule
+from train.connectivity import Connectivity
 from train.data.datasets import Dataset, Instance
+from train.loop_masks import loop_mask
 from train.metrics.evaluation import compare_with_loop
 from train.metrics.one_step import Improvement
+from train.reference import Step, Surroundings, edge_frames, on_edges, read_edges
+from train.refining import Method
 from train.surfaces.implicit import Surface, signed_distance
 
 # What the limit is known for; a normal error has no such bound.
@@ -51,26 +53,21 @@ def best_in_balls(
     return best
 
 
-def oracle(surface: Surface, budget: float, gate_sharpness: float) -> Scheme:
-    """Return the scheme that knows the surface and puts each edge vertex where it is best."""
-    gate = curvature_gate(gate_sharpness)
+def oracle(surface: Surface, budget: float, gate_sharpness: float) -> Method:
+    """Return the method that knows the surface and puts each edge vertex where it is best."""
 
-    def edge_rule(level: ControlLevel) -> Placement:
-        base, topology = loop_edge_rule(level), level.topology
-        interior = topology.interior
-        stencil, faces = topology.stencil[interior], topology.edge_faces[interior]
+    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
         frames = edge_frames(
-            edge_stencil(level.points, face_normals(level.points, topology.faces), stencil, faces)
+            read_edges(Surroundings(mesh, points), first_face=True), first_face=True
         )
-        envelope = budget / level.reference_length * frames.length**2
-        centres = base.loop[interior]
-        moved = best_in_balls(surface, centres, envelope * gate(frames.curvature)) - centres
-        displacement, ratio, gamma = np.zeros_like(base.loop), base.ratio.copy(), base.gate.copy()
-        displacement[interior], gamma[interior] = moved, gate(frames.curvature)
-        ratio[interior] = norm(moved) / np.where(envelope > 0, envelope, 1)
-        return Placement(base.loop, displacement, ratio, gamma, base.degenerate)
+        envelope = torch.zeros_like(frames.length)
+        envelope[mesh.interior] = budget / reference_length * frames.length[mesh.interior] ** 2
+        gate = (envelope > 0) * torch.tanh(gate_sharpness * frames.curvature**2)
+        centres = loop_mask(mesh)(points)[len(points) :]
+        best = best_in_balls(surface, centres.numpy(), (envelope * gate).numpy())
+        return on_edges(points, mesh, torch.from_numpy(best) - centres, envelope, gate)
 
-    return Scheme("limit", loop_vertex_rule, edge_rule, budget=budget)
+    return Method("limit", step)
 
 
 def envelope_limit(
@@ -78,7 +75,7 @@ def envelope_limit(
 ) -> dict[str, Improvement]:
     """Return the improvement over Loop that no member of the class can pass, in per cent."""
 
-    def best(instance: Instance) -> Scheme:
+    def best(instance: Instance) -> Method:
         return oracle(instance.surface, budget, gate_sharpness)
 
     improvements = compare_with_loop(best, dataset)

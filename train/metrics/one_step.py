@@ -10,10 +10,9 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from pns_common.base.arrays import cross, dot, norm, unit
-from pns_common.connectivity.topology import Topology
-from pns_common.geometry.frames import edge_stencil, face_normals
+from train.connectivity import Connectivity
 from train.surfaces.implicit import Surface, signed_distance
+from train.vectors import dot, face_normals, norm, unit
 
 # Vertices whose distance from the feature (|y'| on a ridge) is below this are near it.
 NEAR_FEATURE = 0.3
@@ -53,12 +52,12 @@ class Improvement:
 def one_step_errors(
     surface: Surface,
     coarse: Float[np.ndarray, "V 3"],
-    topology: Topology,
+    mesh: Connectivity,
     inserted: Float[np.ndarray, "I 3"],
 ) -> Errors:
-    """Measure the inserted vertices of a topology's interior edges against their surface."""
+    """Measure the inserted vertices of a mesh's interior edges against their surface."""
     distance = np.abs(signed_distance(surface, inserted))
-    angle = normal_error(surface, coarse, topology, inserted)
+    angle = normal_error(surface, coarse, mesh, inserted)
     near = surface.feature_distance(inserted) < NEAR_FEATURE
     return Errors(
         distance_near=_root_mean_square(distance[near]),
@@ -73,7 +72,7 @@ def one_step_errors(
 def normal_error(
     surface: Surface,
     coarse: Float[np.ndarray, "V 3"],
-    topology: Topology,
+    mesh: Connectivity,
     inserted: Float[np.ndarray, "I 3"],
 ) -> Float[np.ndarray, " I"]:
     """Return the published normal error: the angle (radians) between two directions at each q.
@@ -82,13 +81,13 @@ def normal_error(
     sees a correction almost only through the first: read it as a column of the published table,
     not as shading quality.
     """
-    fan = unit(fan_normal(coarse, topology, inserted))
+    fan = unit(fan_normal(coarse, mesh, inserted))
     target = unit(_distance_gradient(surface, inserted))
-    return np.arctan2(norm(cross(fan, target)), dot(fan, target))
+    return np.arctan2(norm(np.cross(fan, target)), dot(fan, target))
 
 
 def fan_normal(
-    coarse: Float[np.ndarray, "V 3"], topology: Topology, inserted: Float[np.ndarray, "I 3"]
+    coarse: Float[np.ndarray, "V 3"], mesh: Connectivity, inserted: Float[np.ndarray, "I 3"]
 ) -> Float[np.ndarray, "I 3"]:
     """Return the sum of the area vectors of (q, a, c), (q, c, b), (q, b, d), (q, d, a).
 
@@ -96,20 +95,14 @@ def fan_normal(
     need that where q folds a triangle over. Where none is folded the sum is ± (b − a) × (c − d),
     whatever q is.
     """
-    interior = topology.interior
-    normals = face_normals(coarse, topology.faces)
-    stencil = edge_stencil(
-        coarse, normals, topology.stencil[interior], topology.edge_faces[interior]
-    )
-    triangles = [
-        (stencil.a, stencil.c, stencil.n1),
-        (stencil.c, stencil.b, stencil.n1),
-        (stencil.b, stencil.d, stencil.n2),
-        (stencil.d, stencil.a, stencil.n2),
-    ]
+    rows = mesh.interior
+    a, b, c, d = (coarse[column] for column in mesh.stencil[rows].T.numpy())
+    normals = face_normals(coarse, mesh.faces.numpy())
+    first, second = (normals[side] for side in mesh.half_edges[rows].T.numpy() // 3)
+    triangles = [(a, c, first), (c, b, first), (b, d, second), (d, a, second)]
     fan = np.zeros_like(inserted)
-    for first, second, outward in triangles:
-        area = cross(first - inserted, second - inserted)
+    for start, end, outward in triangles:
+        area = np.cross(start - inserted, end - inserted)
         fan += np.where(dot(area, outward)[:, None] < 0, -area, area)
     return fan
 

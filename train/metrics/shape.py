@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.base.arrays import cross, dot, norm
-from pns_common.geometry.frames import face_normals
-from pns_common.mesh import Mesh
-from pns_common.refine import Refinement
+from pns_common import Mesh
+from train.refining import Refined
 from train.surfaces.implicit import Surface, signed_distance, unit_normal
+from train.vectors import dot, face_normals, norm
 
 PROJECTIONS = 4
 FOOT_POINT_STEPS = 40
@@ -71,30 +70,30 @@ class DistanceLevel:
     flipped: int
 
 
-def distance_level(surface: Surface, refinement: Refinement) -> DistanceLevel:
+def distance_level(surface: Surface, refinement: Refined) -> DistanceLevel:
     """Measure the distances and the report of a refinement's last step."""
     distance = np.abs(signed_distance(surface, refinement.mesh.vertices))
-    last = refinement.report["levels"][-1]
+    last = refinement.levels[-1]
     return DistanceLevel(
-        faces=last["faces"],
+        faces=last.faces,
         distance=float(np.sqrt((distance**2).mean())),
         hausdorff=float(distance.max()),
-        jump=last["normal_jump_max"],
-        ratio=last["proximity_ratio"]["max"],
-        flipped=last["flipped_faces"],
+        jump=last.normal_jump,
+        ratio=last.ratio,
+        flipped=last.flipped,
     )
 
 
-def level_errors(surface: Surface, refinement: Refinement, level: int) -> LevelErrors:
+def level_errors(surface: Surface, refinement: Refined, level: int) -> LevelErrors:
     """Measure a refinement whose last step was the given level."""
-    last = refinement.report["levels"][-1]
+    last = refinement.levels[-1]
     return LevelErrors(
         level=level,
-        faces=last["faces"],
+        faces=last.faces,
         shape=shape_errors(surface, refinement.mesh),
-        normal_jump=last["normal_jump_max"],
-        ratio=last["proximity_ratio"]["max"],
-        flipped=last["flipped_faces"],
+        normal_jump=last.normal_jump,
+        ratio=last.ratio,
+        flipped=last.flipped,
     )
 
 
@@ -117,7 +116,7 @@ def face_normal_error(surface: Surface, mesh: Mesh) -> Float[np.ndarray, " N"]:
     centroids = mesh.vertices[mesh.faces[has_area]].mean(axis=1)
     target = unit_normal(surface, nearest_points(surface, centroids))
     own = normals[has_area]
-    return np.arctan2(norm(cross(own, target)), dot(own, target))
+    return np.arctan2(norm(np.cross(own, target)), dot(own, target))
 
 
 def nearest_points(surface: Surface, points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "P 3"]:

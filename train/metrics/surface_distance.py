@@ -5,11 +5,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.arrays import cross, dot, norm
-from pns_common.geometry.frames import face_normals
-from pns_common.mesh import Mesh
-from train.metrics.faces import point_mesh
-from train.metrics.faces.point_mesh import FaceTree, distances, face_tree, nearest
+from pns_common import Mesh
+from train.metrics.faces.point_mesh import FaceTree, face_tree, nearest
+from train.vectors import dot, face_normals, norm
 
 SEED = 0
 
@@ -58,15 +56,7 @@ class Surface:
 
 def prepared(mesh: Mesh, samples: int) -> Surface:
     """Return a mesh with its tree and so many sample points; the same mesh gives the same ones."""
-    return _sampled(face_tree(mesh), samples)
-
-
-def moved(surface: Surface, vertices: Float[np.ndarray, "V 3"]) -> Surface:
-    """Return what `prepared` does, of the same faces with vertices elsewhere, but not far."""
-    return _sampled(point_mesh.moved(surface.tree, vertices), len(surface.points))
-
-
-def _sampled(tree: FaceTree, samples: int) -> Surface:
+    tree = face_tree(mesh)
     points, faces = surface_samples(tree, samples, np.random.default_rng(SEED))
     return Surface(tree, face_normals(tree.vertices, tree.faces), points, faces)
 
@@ -80,7 +70,7 @@ def surface_samples(
     over two refinements of one mesh then differ by their surfaces, and hardly by the draw.
     """
     a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
-    upto = np.cumsum(norm(cross(b - a, c - a)))
+    upto = np.cumsum(norm(np.cross(b - a, c - a)))
     place = (np.arange(count) + rng.random(count)) / count * upto[-1]
     face = np.searchsorted(upto, place, side="right").clip(max=len(upto) - 1)
     u, v = rng.random((2, count, 1))
@@ -105,8 +95,8 @@ def _one_way(source: Surface, target: Surface) -> SurfaceErrors:
     """Measure from one surface to the other, in the surfaces' own unit."""
     closest = nearest(target.tree, source.points)
     here, there = source.normals[source.faces], target.normals[closest.face]
-    angle = np.arctan2(norm(cross(here, there)), dot(here, there))
-    at_vertices = distances(target.tree, source.tree.vertices)
+    angle = np.arctan2(norm(np.cross(here, there)), dot(here, there))
+    at_vertices = nearest(target.tree, source.tree.vertices).distance
     return SurfaceErrors(
         mean=float(closest.distance.mean()),
         p95=float(np.percentile(closest.distance, 95)),

@@ -3,16 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
-from pns_common.base.blocks import Blocks
-from pns_common.fused.levels.mesh_edges import build_edges
-from pns_common.geometry.frames import face_normals
-from pns_common.mesh import Mesh
-from pns_common.refine import Refinement, refine
-from pns_common.schemes import Scheme, loop
+from pns_common import Mesh, loop
+from train.connectivity import connect
 from train.data.datasets import Dataset, Instance
 from train.metrics.shape import face_normal_error, nearest_points
+from train.reference import Surroundings
+from train.refining import AnyScheme, largest_turn, refine
 from train.surfaces.implicit import signed_distance
 
 PAPER_UNITS = 1.0
@@ -48,33 +47,23 @@ class Gain:
     normal: float
 
 
-def whole_surface(scheme: Scheme, dataset: Dataset, levels: int) -> WholeSurface:
+def whole_surface(scheme: AnyScheme, dataset: Dataset, levels: int) -> WholeSurface:
     """Refine every instance in the paper's units and measure it whole."""
     rows = []
     for instance in dataset.instances:
-        refined = refine(instance.mesh, scheme, levels, PAPER_UNITS, threads=1)
+        refined = refine(instance.mesh, scheme, levels, PAPER_UNITS)
         distance = signed_distance(instance.surface, refined.mesh.vertices)
-        reports = refined.report["levels"]
         rows.append(
             (
                 np.sqrt((distance**2).mean()),
                 np.abs(distance).max(),
                 face_normal_error(instance.surface, refined.mesh).mean(),
-                reports[-1]["normal_jump_max"],
-                max(largest_ratio(refined, level) for level in range(levels)),
-                sum(level["flipped_faces"] for level in reports),
+                refined.levels[-1].normal_jump,
+                max(level.ratio for level in refined.levels),
+                sum(level.flipped for level in refined.levels),
             )
         )
     return WholeSurface(*np.array(rows, dtype=float).T)
-
-
-def largest_ratio(refined: Refinement, level: int) -> float:
-    """Return the largest proximity ratio of a level, of edge and of vertex vertices."""
-    report = refined.report["levels"][level]
-    edges = report["proximity_ratio"]["max"]
-    if "vertex_rule" not in report:
-        return edges
-    return max(edges, report["vertex_rule"]["proximity_ratio"]["max"])
 
 
 def gain(surface: WholeSurface, reference: WholeSurface) -> Gain:
@@ -88,7 +77,7 @@ def gain(surface: WholeSurface, reference: WholeSurface) -> Gain:
 
 def surface_jump(instance: Instance, levels: int) -> float:
     """Return the largest jump of Loop's refined mesh once its vertices lie on the surface."""
-    refined = refine(instance.mesh, loop(), levels, PAPER_UNITS, threads=1).mesh
+    refined = refine(instance.mesh, loop(), levels, PAPER_UNITS).mesh
     laid = Mesh(nearest_points(instance.surface, refined.vertices), refined.faces)
     return normal_jump(laid)
 
@@ -98,12 +87,8 @@ def normal_jump(mesh: Mesh) -> float:
 
     Faces without area have no normal, and turn from none.
     """
-    edges = build_edges(mesh.faces.astype(np.int32), len(mesh.vertices), Blocks(threads=1))
-    normals = face_normals(mesh.vertices, mesh.faces)
-    left, right = (normals[side] for side in edges.half_edges[edges.interior].T // 3)
-    both = left.any(axis=1) & right.any(axis=1)
-    chord = np.linalg.norm(left - right, axis=1).max(initial=0, where=both)
-    return float(2 * np.arcsin(min(1.0, chord / 2)))
+    level = connect(mesh.faces, len(mesh.vertices))
+    return largest_turn(Surroundings(level, torch.tensor(mesh.vertices)))
 
 
 def _percent(value: float, reference: float) -> float:

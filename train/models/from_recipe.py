@@ -6,19 +6,12 @@ from types import MappingProxyType
 import numpy as np
 import torch
 
-from pns_common.errors import ParameterError
-from pns_common.features.edge_features import FEATURE_SETS
-from pns_common.features.feature_set import FeatureSet
-from pns_common.features.orientation import ORIENTATIONS
-from pns_common.features.ring_features import RING_FEATURE_SETS, RingFeatureSet
-from pns_common.formula.correction import curvature_gate
-from pns_common.formula.edge_operator import EdgeOperator
-from pns_common.formula.vertex_operator import VertexOperator
-from pns_common.rules.scale_free import ScaleFreeForm
-from pns_common.schemes import Scheme, scale_free_scheme
+from pns_common import ParameterError
+from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS, FeatureSet
 from train.models.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_correction
-from train.models.recipe import Recipe, ToLimit, VertexRule
+from train.models.recipe import Recipe, scale_free_parts
 from train.models.tied import TiedNet
+from train.reference import EDGE_FEATURES, GeneralRule, PaperRule
 
 # Usual sizes of features, by kind, on simplified meshes; others are about 1. Tied networks read
 # features in these units, so that training sees all of them from the start.
@@ -65,7 +58,7 @@ def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
 
 def _keeping_symmetry(
     recipe: Recipe,
-    seen: FeatureSet | RingFeatureSet,
+    seen: FeatureSet,
     hidden: tuple[int, ...],
     generator: torch.Generator,
 ) -> BoundedNet:
@@ -85,40 +78,32 @@ def _keeping_symmetry(
     return TiedNet(group, copies, recipe.activation, generator, sizes)
 
 
-def recipe_operator(recipe: Recipe, network: BoundedNet) -> EdgeOperator:
-    """Return what a recipe makes of interior edges, with a network at budget 1."""
-    return EdgeOperator(
-        FEATURE_SETS[recipe.features],
-        ORIENTATIONS[recipe.orientation],
+def paper_rule(recipe: Recipe, network: BoundedNet) -> PaperRule:
+    """Return the rule of a recipe of the paper's class, differentiable in weights and positions."""
+    return PaperRule(
         unit_correction(network),
-        curvature_gate(recipe.gate_sharpness),
+        recipe.budget,
+        recipe.gate_sharpness,
+        EDGE_FEATURES[recipe.features],
+        first_face=recipe.orientation == "first-face",
     )
 
 
-def vertex_rule_operator(rule: VertexRule, network: BoundedNet) -> VertexOperator:
-    """Return what a vertex rule makes of old vertices, likewise."""
-    features = RING_FEATURE_SETS[rule.features]
-    return VertexOperator(features, unit_correction(network), rule.gate_sharpness)
-
-
-def recipe_scheme(recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet | None) -> Scheme:
-    """Return the scheme that a scale-free recipe trains, differentiable in its networks' weights.
-
-    s is that of training. Creases act in use alone.
+def general_rule(recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet) -> GeneralRule:
+    """Return the rule of a scale-free recipe as it is trained, differentiable likewise.
 
     Raises:
         ParameterError: the recipe is not scale-free, or has no vertex rule.
     """
-    form, rule, plan = recipe.scale_free, recipe.vertex, recipe.training
-    if form is None or rule is None or not isinstance(plan, ToLimit) or vertex_network is None:
-        raise ParameterError("recipe", recipe.name, expected="a scale-free one with a vertex rule")
-    numbers = ScaleFreeForm(
+    form, vertex_rule, strength = scale_free_parts(recipe)
+    return GeneralRule(
+        unit_correction(network),
+        unit_correction(vertex_network),
         recipe.budget,
-        plan.trained_strength,
+        recipe.gate_sharpness,
+        vertex_rule.gate_sharpness,
+        strength,
+        form.boundary_strength,
         form.network_scale,
         form.fold_angle,
-        learned_levels=1,
-        boundary_strength=form.boundary_strength,
     )
-    edges = recipe_operator(recipe, network)
-    return scale_free_scheme(edges, vertex_rule_operator(rule, vertex_network), numbers)

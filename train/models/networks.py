@@ -10,8 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from pns_common.features.edge_features import FEATURE_COUNT
-from pns_common.features.symmetry import Symmetries
+from pns_common.features import FEATURE_COUNT, Symmetries
 
 # The coordinates of a, b, c, d: what the unconstrained network sees instead of features.
 RAW_COORDINATES = "raw-12"

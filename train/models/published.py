@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from pns_common.errors import ModelError
+from pns_common import ModelError
 from train.models.networks import BoundedNet
 
 ACTIVATION = "gelu"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from pns_common.errors import ParameterError
+from pns_common import ParameterError
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,3 +161,15 @@ def one_step(recipe: Recipe) -> OneStep:
     if not isinstance(recipe.training, OneStep):
         raise ParameterError("recipe", recipe.name, expected="one that trains on one step")
     return recipe.training
+
+
+def scale_free_parts(recipe: Recipe) -> tuple[ScaleFree, VertexRule, float]:
+    """Return a scale-free recipe's form, vertex rule, and strength of the prior in training.
+
+    Raises:
+        ParameterError: it is not scale-free, or has no vertex rule.
+    """
+    form, rule, plan = recipe.scale_free, recipe.vertex, recipe.training
+    if form is None or rule is None or not isinstance(plan, ToLimit):
+        raise ParameterError("recipe", recipe.name, expected="a scale-free one with a vertex rule")
+    return form, rule, plan.trained_strength

@@ -1,25 +1,23 @@
 """A torch network as the operator's model, so that training and product share one harness."""
 
 import hashlib
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import safetensors.torch
 import torch
 from jaxtyping import Float
 
-from pns_common.errors import ModelError
-from pns_common.models.card import FORMAT, SCALE_FREE_FORMAT, VERTEX_FORMAT, ModelCard
+from pns_common import ModelError
+from pns_common.model.card import DEFAULT_FORMAT, PAPER_FORMAT, ModelCard
 from train.models.checkpoint import joined_state
-from train.models.networks import BoundedNet, unit_correction
-from train.models.recipe import Recipe, ScaleFree
+from train.models.networks import BoundedNet
+from train.models.recipe import Recipe
 
 
 @dataclass(frozen=True, eq=False)
 class TorchModel:
-    """Networks with a model card; they keep the `Model` protocol of pns_common.schemes.
+    """Networks with a model card; they keep the library's `Model` protocol.
 
     `vertex_network` goes with the card's vertex features.
     """
@@ -62,26 +60,13 @@ def _answer(
         return network(torch.from_numpy(features).to(own), budget).numpy()
 
 
-def numpy_correction(
-    network: BoundedNet,
-) -> Callable[[Float[np.ndarray, "E K"]], Float[np.ndarray, "E 3"]]:
-    """Return the network at budget 1 as the callable that pns_common's numpy kernels take."""
-    correction = unit_correction(network)
-
-    def on_arrays(features: Float[np.ndarray, "E K"]) -> Float[np.ndarray, "E 3"]:
-        with torch.no_grad():
-            return correction(torch.from_numpy(features)).numpy()
-
-    return on_arrays
-
-
 def recipe_model(
     recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet | None = None
 ) -> TorchModel:
     """Return a recipe's networks as a model whose card has no metrics yet."""
     rule, form = recipe.vertex, recipe.scale_free
     card = ModelCard(
-        format=FORMAT if rule is None else VERTEX_FORMAT if form is None else SCALE_FREE_FORMAT,
+        format=PAPER_FORMAT if form is None else DEFAULT_FORMAT,
         features=recipe.features,
         gate_sharpness=recipe.gate_sharpness,
         budget=recipe.budget,
@@ -90,12 +75,6 @@ def recipe_model(
         metrics={},
         vertex_features=None if rule is None else rule.features,
         vertex_gate_sharpness=None if rule is None else rule.gate_sharpness,
-        **({} if form is None else _format_3(form)),
+        **({} if form is None else asdict(form)),
     )
     return TorchModel(recipe.name, card, network, vertex_network)
-
-
-def _format_3(form: ScaleFree) -> dict[str, Any]:
-    """Return the fields of a card for the operator that reads format 3."""
-    names = ("prior_strength", "boundary_strength", "network_scale", "fold_angle")
-    return {"learned_levels": 1, **{name: getattr(form, name) for name in names}}

@@ -11,12 +11,8 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 from torch import Tensor
 
-from pns_common.base.arrays import marked
-from pns_common.errors import ParameterError
-from pns_common.geometry.side_lengths import SideLengths
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
-from pns_common.schemes import Scheme
+from pns_common import Mesh, ParameterError
+from train.refining import AnyScheme, refine
 from train.spectra import stars
 from train.spectra.star_symmetry import Subspace, keeps_blocks, symmetry_blocks
 from train.spectra.stars import Star
@@ -31,8 +27,6 @@ STEP = 1e-5
 RINGS = ((2, 2), (3, 2), (4, 3), (6, 4))
 
 VALENCES = tuple(range(3, 13))
-# A million faces with sides of one length.
-REGULAR = SideLengths(faces=10**6, total=3e6, squares=3e6)
 # Loop's tangent eigenvalue is double, once for each of three coordinates.
 TANGENT_COUNT = 6
 
@@ -65,15 +59,7 @@ def reif_gap(size: Float[np.ndarray, " M"]) -> float:
     return float(size[TANGENT_COUNT - 1] - size[TANGENT_COUNT])
 
 
-def of_regular_mesh(scheme: Scheme) -> Scheme:
-    """Return a scheme as it is on a large regular mesh, of which a star is a spot.
-
-    What is measured of a mesh as a whole is that mesh's, as R is, however the star is lifted.
-    """
-    return scheme.fitted(lambda: REGULAR)
-
-
-def closed_star(scheme: Scheme, valence: int) -> Callable[[float], Star]:
+def closed_star(scheme: AnyScheme, valence: int) -> Callable[[float], Star]:
     """Return the stars, by lift, on which a scheme maps the inner rings to themselves.
 
     Two rings suffice where an edge sees its two faces and a vertex its neighbours; a scheme that
@@ -82,7 +68,6 @@ def closed_star(scheme: Scheme, valence: int) -> Callable[[float], Star]:
     Raises:
         ParameterError: the scheme sees further than all rings tried.
     """
-    scheme = of_regular_mesh(scheme)
     for rings, inner_rings in RINGS:
         build = partial(stars.star, valence, rings, SPOKE, inner_rings=inner_rings)
         alone = build(0.0)
@@ -91,11 +76,11 @@ def closed_star(scheme: Scheme, valence: int) -> Callable[[float], Star]:
         refined = []
         for star in (alone, wider):
             mesh = Mesh(star.mesh.vertices + noise[: len(star.mesh.vertices)], star.mesh.faces)
-            refined.append(refine(mesh, scheme, 1, 1.0, threads=1).mesh.vertices[star.refined])
+            refined.append(refine(mesh, scheme, 1, 1.0).mesh.vertices[star.refined])
         outside = noise[: len(alone.mesh.vertices)].copy()
         outside[len(alone.inner) :] *= -1
         mesh = Mesh(alone.mesh.vertices + outside, alone.mesh.faces)
-        refined.append(refine(mesh, scheme, 1, 1.0, threads=1).mesh.vertices[alone.refined])
+        refined.append(refine(mesh, scheme, 1, 1.0).mesh.vertices[alone.refined])
         if max(np.abs(positions - refined[0]).max() for positions in refined) < 1e-12:
             return build
     raise ParameterError("scheme", scheme.name, expected="a rule that sees at most four rings")
@@ -134,15 +119,15 @@ def refined_inner(
     return refined[rows].reshape(copies, -1)
 
 
-def jacobian(scheme: Scheme, star: Star, step: float = STEP) -> Float[np.ndarray, "M M"]:
+def jacobian(scheme: AnyScheme, star: Star, step: float = STEP) -> Float[np.ndarray, "M M"]:
     """Differentiate one step of a scheme, inner rings to inner rings in all coordinates.
 
     By central differences on the scheme itself, in double precision: any scheme will do, and
     nothing is assumed of how it computes. `step` is in spokes; the reference length is 1.
     """
-    step, scheme = step * SPOKE, of_regular_mesh(scheme)
+    step = step * SPOKE
     mesh, count = perturbed_stars(star, step)
-    refined = refine(mesh, scheme, levels=1, reference_length=1.0, threads=1).mesh.vertices
+    refined = refine(mesh, scheme, levels=1, reference_length=1.0).mesh.vertices
     moved = refined_inner(star, refined, 2 * count)
     return (moved[:count] - moved[count:]).T / (2 * step)
 
@@ -223,7 +208,7 @@ def flat_spectrum(
     """
     spectrum = _decomposed(matrix, blocks or (np.eye(len(matrix)),))
     nearest = np.argsort(np.abs(spectrum.values - loop_eigenvalue(valence)), kind="stable")
-    return replace(spectrum, tangent=marked(nearest[:TANGENT_COUNT], len(spectrum.values)))
+    return replace(spectrum, tangent=_marked(nearest[:TANGENT_COUNT], len(spectrum.values)))
 
 
 def continued_spectrum(matrix: Float[np.ndarray, "L L"], before: Spectrum) -> Spectrum:
@@ -242,10 +227,10 @@ def continued_spectrum(matrix: Float[np.ndarray, "L L"], before: Spectrum) -> Sp
         own = np.flatnonzero(spectrum.block == block)
         nearest = own[np.argsort(-nearness[own], kind="stable")]
         tangents.append(nearest[:count])
-    return replace(spectrum, tangent=marked(np.concatenate(tangents), len(spectrum.values)))
+    return replace(spectrum, tangent=_marked(np.concatenate(tangents), len(spectrum.values)))
 
 
-def follow_lift(scheme: Scheme, valence: int, lifts: Sequence[float]) -> list[Spectrum]:
+def follow_lift(scheme: AnyScheme, valence: int, lifts: Sequence[float]) -> list[Spectrum]:
     """Follow the spectrum of a star while its centre is lifted; the first lift is 0.
 
     Between two lifts they are followed in smaller strides.
@@ -295,3 +280,10 @@ def _decomposed(matrix: Float[np.ndarray, "L L"], blocks: tuple[Subspace, ...]) 
         blocks=blocks,
         block=np.repeat(np.arange(len(blocks)), [len(own) for own in values]),
     )
+
+
+def _marked(rows: Int[np.ndarray, " N"], count: int) -> Bool[np.ndarray, " L"]:
+    """Return which of `count` rows are named."""
+    marks = np.zeros(count, dtype=bool)
+    marks[rows] = True
+    return marks

@@ -6,8 +6,8 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.connectivity.topology import build_topology
-from pns_common.mesh import Mesh
+from pns_common import Mesh
+from train.connectivity import connect
 
 # Place (sector, i, j) is i steps along the sector's first spoke and j along its second.
 Place = tuple[int, int, int]
@@ -49,8 +49,8 @@ def star(
     mesh = Mesh(points, _faces(valence, rings, number))
 
     inner = [place for place in places if place[1] + place[2] <= inner_rings]
-    topology = build_topology(mesh.faces, len(points))
-    edge = {tuple(ends): index for index, ends in enumerate(topology.edges.tolist())}
+    edges = connect(mesh.faces, len(points)).edges.tolist()
+    edge = {tuple(ends): index for index, ends in enumerate(edges)}
     refined = []
     for sector, i, j in inner:
         # At half the size, place (i, j) is half-way between two places of the old star.

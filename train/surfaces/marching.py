@@ -9,7 +9,7 @@ from itertools import permutations
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.surfaces.solids import Field, Points
 
 # Values nearer to 0 are pushed away from it: no grid point lies on the surface.

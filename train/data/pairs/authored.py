@@ -7,12 +7,11 @@ roughened. Their surface is Loop's own: they were drawn with its shrinking in vi
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
-from pns_common.schemes import loop
+from pns_common import Mesh, loop
 from train.data.pairs.faceted import block
 from train.data.pairs.grid import vertex_normals
 from train.data.pairs.references import AUTHORED, Pair, Reference
+from train.refining import refine
 
 Quads = Int[np.ndarray, "Q 4"]
 Points = Float[np.ndarray, "V 3"]
@@ -46,7 +45,7 @@ def authored_pair(rng: np.random.Generator) -> Pair | None:
     mesh = Mesh(points, _cut(points, quads, rng))
     if not FEWEST <= len(mesh.faces) <= MOST:
         return None
-    fine = refine(mesh, loop(), SURFACE_LEVELS, threads=1, limit=True).mesh
+    fine = refine(mesh, loop(), SURFACE_LEVELS, limit=True).mesh
     return Pair(AUTHORED, mesh, Reference(fine.vertices, vertex_normals(fine)))
 
 

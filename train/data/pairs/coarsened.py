@@ -3,8 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.errors import MeshError
-from pns_common.mesh import Mesh
+from pns_common import Mesh, MeshError
 from train.data.dense_meshes import is_manifold
 from train.data.simplifiers import SIMPLIFIERS, fast_quadric
 

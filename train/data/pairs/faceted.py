@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull
 
-from pns_common.connectivity.topology import build_topology, split
-from pns_common.mesh import Mesh
+from pns_common import Mesh
+from train.connectivity import connect
 from train.data.dense_meshes import is_manifold, largest_part
 from train.data.pairs.coarsened import coarsened
 from train.data.pairs.references import Pair, Reference
@@ -40,9 +40,9 @@ def faceted_pair(rng: np.random.Generator) -> Pair | None:
     points, faces = made
     dense, triangles = points, faces
     while len(triangles) < FEWEST_FACES:
-        topology = build_topology(triangles, len(dense))
-        dense = np.concatenate([dense, dense[topology.edges].mean(axis=1)])
-        triangles = split(topology)
+        level = connect(triangles, len(dense))
+        dense = np.concatenate([dense, dense[level.edges.numpy()].mean(axis=1)])
+        triangles = level.split().numpy()
     if len(triangles) > MOST_FACES:
         return None
     # A breath of noise: exact planes leave the order of the collapses to rounding.

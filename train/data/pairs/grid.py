@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.data.pairs.references import Pair, Reference
 from train.surfaces.solids import random_rotation
 

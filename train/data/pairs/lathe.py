@@ -7,13 +7,15 @@ says too little of any surface, for what quasi-interpolation makes of it.
 """
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
+from pns_common import Mesh, loop
+from train.connectivity import connect
 from train.data.pairs.faceted import sampled
 from train.data.pairs.references import LATHE, Pair
-from train.surfaces.quasi_interpolation import n1
+from train.refining import refine
+from train.surfaces.quasi_interpolation import normal_push
 from train.surfaces.solids import random_rotation
 
 FEWEST_SIDES, MOST_SIDES = 3, 40
@@ -48,7 +50,9 @@ def lathe_pair(rng: np.random.Generator) -> Pair:
     if sides >= ROUND:
         fine = turned(outline, sides * -(-FINE // sides), np.array([True, True]))
     elif tips.any():
-        fine = refine(coarse, n1(), FINE_LEVELS, threads=1).mesh
+        points, level = torch.tensor(coarse.vertices), connect(coarse.faces, len(coarse.vertices))
+        pushed = Mesh((points + normal_push(points, level)).numpy(), coarse.faces)
+        fine = refine(pushed, loop(), FINE_LEVELS).mesh
     turn = random_rotation(rng)
     surface = sampled(fine.vertices @ turn, fine.faces, rng)
     return Pair(LATHE, Mesh(coarse.vertices @ turn, coarse.faces), surface)

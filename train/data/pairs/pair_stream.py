@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pns_common.geometry.reference_length import measure_reference_length
+from pns_common.reference_length import measure_reference_length
 from train.data.pairs.authored import authored_pair
 from train.data.pairs.faceted import faceted_pair
 from train.data.pairs.grid import grid_pair
@@ -49,6 +49,8 @@ def pair_stream(seed: int) -> Iterator[Pair]:
             waiting = waiting or list(solid_pairs(rng))
             pair = waiting.pop() if waiting else None
         if pair is not None and len(pair.coarse.faces) <= MOST_FACES:
-            scale = 1 / measure_reference_length(pair.coarse.vertices, pair.coarse.faces)
+            scale = 1 / measure_reference_length(
+                pair.coarse.vertices, pair.coarse.faces.reshape(-1)
+            )
             centre = pair.coarse.vertices.mean(axis=0)
             yield moved(pair, scale * np.eye(3), -scale * centre)

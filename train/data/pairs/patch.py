@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from pns_common.refine import refine
-from pns_common.schemes import loop
+from pns_common import loop
 from train.data.pairs.references import Pair, Reference
 from train.data.stream import random_instance
+from train.refining import refine
 from train.surfaces.implicit import unit_normal
 
 LEVELS, PROJECTIONS = 3, 4
@@ -15,7 +15,7 @@ def patch_pair(rng: np.random.Generator) -> Pair:
     """Return a patch of `train.data.stream`, its surface by Loop's mesh laid onto it."""
     instance = random_instance(rng)
     surface = instance.surface
-    points = refine(instance.mesh, loop(), LEVELS, 1.0, threads=1).mesh.vertices
+    points = refine(instance.mesh, loop(), LEVELS, 1.0).mesh.vertices
     for _ in range(PROJECTIONS):
         slope = surface.gradient(points)
         points = points - (surface.value(points) / (slope**2).sum(axis=1))[:, None] * slope

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 
 # The kind of control meshes that were made for Loop's surface.
 AUTHORED = "authored"

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pns_common.errors import MeshError
-from pns_common.mesh import Mesh
+from pns_common import Mesh, MeshError
 from train.data.pairs.coarsened import coarsened
 from train.data.pairs.references import Pair, Reference
 from train.surfaces.marching import laid_onto, marched, unit_gradient

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.data.pairs.coarsened import coarsened
 from train.data.pairs.references import Pair, Reference
 from train.data.primitives import icosphere

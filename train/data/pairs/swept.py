@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.data.pairs.coarsened import coarsened
 from train.data.pairs.grid import Parametrised, cut_quads, random_cut, vertex_normals
 from train.data.pairs.references import SWEPT, Pair, Reference

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from pns_common.schemes import Scheme, loop
+from pns_common import loop
 from train.baselines.butterfly import modified_butterfly
 from train.data.dense_meshes import (
     ASSET,
@@ -36,6 +36,7 @@ from train.metrics.decimation import (
     summaries,
 )
 from train.metrics.surface_distance import SurfaceErrors
+from train.refining import AnyScheme
 
 LEVELS = (2, 3)
 # Sample points on a surface for each draw of the scale.
@@ -116,7 +117,7 @@ class ErrorRow:
     normal: float = column("Mean normal error", ".4f")
 
 
-def methods() -> dict[str, Scheme]:
+def methods() -> dict[str, AnyScheme]:
     """Return Loop, Modified Butterfly and PNS with every bundled model, the default last."""
     return {
         TITLES["loop"]: loop(),

@@ -10,15 +10,14 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
-from pns_common.schemes import Scheme
+from pns_common import Mesh
 from train.data.dense_meshes import CAD
 from train.experiments.harness.experiment import Figure
 from train.experiments.harness.render import ASPECT, CENTRE, HALF_WIDTH, Camera, shaded_image
 from train.experiments.harness.style import COLOURS, MARKERS, SEQUENTIAL, TITLES, panels
 from train.metrics.decimation import Pair, Summary
 from train.metrics.faces.point_mesh import face_tree, nearest
+from train.refining import AnyScheme, refine
 
 ELEVATION = 25.0
 # How much of the view a mesh fills, across or upright.
@@ -59,7 +58,7 @@ def pictured(pairs: Sequence[Pair]) -> list[Pair]:
     return [pair for pair in pairs if pair.dense.title in PICTURED] or list(pairs[:FALLBACK])
 
 
-def picture_figure(pairs: Sequence[Pair], schemes: Mapping[str, Scheme], level: int) -> Figure:
+def picture_figure(pairs: Sequence[Pair], schemes: Mapping[str, AnyScheme], level: int) -> Figure:
     """Render dense, coarse and refined meshes, the refined ones coloured by distance."""
     views = [view for pair in pairs for view in _views(pair, schemes, level)]
     return Figure(
@@ -80,7 +79,7 @@ def gains_figure(summarised: Sequence[Summary]) -> Figure:
     )
 
 
-def _views(pair: Pair, schemes: Mapping[str, Scheme], level: int) -> list[View]:
+def _views(pair: Pair, schemes: Mapping[str, AnyScheme], level: int) -> list[View]:
     dense = pair.dense.mesh
     tree, diagonal = face_tree(dense), np.linalg.norm(np.ptp(dense.vertices, axis=0))
     turn = np.eye(3) if pair.dense.kind == CAD else UPRIGHT
@@ -101,7 +100,7 @@ def _views(pair: Pair, schemes: Mapping[str, Scheme], level: int) -> list[View]:
         view("simplified", pair.coarse, np.zeros(len(pair.coarse.vertices))),
     ]
     for name, scheme in schemes.items():
-        refined = refine(pair.coarse, scheme, level, threads=1).mesh
+        refined = refine(pair.coarse, scheme, level).mesh
         distance = nearest(tree, refined.vertices).distance
         views.append(view(name.replace("`", ""), refined, distance))
     return views

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
+from pns_common import Mesh
 from train.data.dense_meshes import CONTROL_ENDING, asset_files, read_mesh
 from train.data.primitives import PRIMITIVES, TRIANGULATED_QUADS
 from train.experiments.beyond.models import model_files
@@ -14,6 +13,7 @@ from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.metrics.fairness import bending
+from train.refining import refine
 
 LEVELS = 4
 CAGE, QUADS, PRIMITIVE = "authored cage", "triangulated quads", "primitive"
@@ -68,7 +68,7 @@ def run(laboratory: Laboratory) -> Outcome:
 
 def _rows(kind: str, name: str, mesh: Mesh, levels: int) -> list[Row]:
     energies = {
-        method: bending(refine(mesh, scheme, levels, threads=1).mesh)
+        method: bending(refine(mesh, scheme, levels).mesh)
         for method, scheme in contenders().items()
     }
     return [

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from pns_common.schemes import loop
+from pns_common import loop
 from train.data.datasets import Dataset
 from train.data.family_sets import held_out_families, trained_families
 from train.experiments.beyond.models import bundled_schemes, model_files

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from train.ablations.feature_groups import Choice, features_scheme, fit_features, named
+from train.ablations.feature_groups import Choice, choices, features_method, fit_features
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
@@ -61,7 +61,7 @@ def run(laboratory: Laboratory) -> Outcome:
     for budget, gate_sharpness in SETTINGS:
         recipe = setting(budget, gate_sharpness)
         recipe = replace(recipe, steps=min(recipe.steps, laboratory.scale.training_steps))
-        rows += [_row(laboratory, recipe, choice) for choice in named()]
+        rows += [_row(laboratory, recipe, choice) for choice in choices()]
         limit = envelope_limit(laboratory.dataset("ridge-held-out"), budget, gate_sharpness)
         rows.append(
             Row(
@@ -86,14 +86,14 @@ def _row(laboratory: Laboratory, recipe: Recipe, choice: Choice) -> Row:
         laboratory.progress(f"training {choice.title}", done, recipe.steps)
 
     held_out = laboratory.dataset("ridge-held-out")
-    network = fit_features(recipe, choice.features, on_step)
-    scheme = features_scheme(recipe, choice.features, network)
+    network = fit_features(recipe, choice, on_step)
+    scheme = features_method(recipe, choice, network)
     improvements = compare_with_loop(scheme, held_out)
     return Row(
         budget=recipe.budget,
         gate_sharpness=recipe.gate_sharpness,
         features=choice.title,
-        count=choice.features.count,
+        count=len(choice.features),
         near_percent=improvements["distance_near"].percent,
         global_percent=improvements["distance"].percent,
         hausdorff_percent=improvements["hausdorff"].percent,

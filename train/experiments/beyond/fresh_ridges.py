@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pns_common.schemes import Scheme
 from train.data.datasets import Dataset, draw_ridges
 from train.data.family_sets import held_out_families, trained_families
 from train.experiments.beyond.models import model_files
@@ -13,6 +12,7 @@ from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.metrics.whole_surface import WholeSurface, whole_surface
+from train.refining import AnyScheme
 
 SEED, COUNT = 271_828, 10
 NOTE = (
@@ -50,7 +50,7 @@ def run(laboratory: Laboratory) -> Outcome:
     return Outcome((table("fresh_ridges", "Fresh ridges and families", Row, rows),), notes=(NOTE,))
 
 
-def _rows(data: Dataset, schemes: dict[str, Scheme], levels: int) -> list[Row]:
+def _rows(data: Dataset, schemes: dict[str, AnyScheme], levels: int) -> list[Row]:
     surfaces = {name: whole_surface(scheme, data, levels) for name, scheme in schemes.items()}
     return [_row(data.name, name, own, surfaces[LOOP]) for name, own in surfaces.items()]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.runtimes.onnx_model import BUNDLED, DEFAULT_MODEL, bundled_models, load_model
-from pns_common.schemes import Scheme, loop, pns
+from pns_common import loop, pns
+from pns_common.model.file import BUNDLED, DEFAULT_MODEL, bundled_models, load_model
 from train.data.datasets import Dataset
 from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
@@ -17,6 +17,7 @@ from train.experiments.harness.style import COLOURS, panels
 from train.experiments.paper.methods import unconstrained_scheme
 from train.metrics.evaluation import compare_with_loop
 from train.metrics.whole_surface import WholeSurface, gain, surface_jump, whole_surface
+from train.refining import AnyScheme
 
 # Times Loop's: the jump that is asked for where the surface itself has no larger one.
 JUMP_LIMIT = 1.5
@@ -52,7 +53,7 @@ def models_and_assets(laboratory: Laboratory) -> Iterable[Path]:
     return [*model_files(laboratory), *(path for path in folder if path.is_file())]
 
 
-def bundled_schemes() -> dict[str, Scheme]:
+def bundled_schemes() -> dict[str, AnyScheme]:
     """Return PNS with every bundled model, the default last, as the product runs them."""
     names = sorted(bundled_models(), key=lambda name: (name == DEFAULT_MODEL, name))
     return {name: pns(load_model(name)) for name in names}
@@ -101,7 +102,7 @@ def run(laboratory: Laboratory) -> Outcome:
 
 def _row(
     name: str,
-    scheme: Scheme,
+    scheme: AnyScheme,
     held_out: Dataset,
     after: WholeSurface,
     reference: WholeSurface,

@@ -7,9 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
-from pns_common.schemes import Scheme
+from pns_common import Mesh
 from train.data.dense_meshes import DenseMesh, asset_meshes, cad_meshes
 from train.data.simplifiers import SIMPLIFIERS, simplified
 from train.experiments.beyond.models import models_and_assets
@@ -19,9 +17,10 @@ from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.metrics.decimation import gain
 from train.metrics.faces.point_mesh import FaceTree, nearest
-from train.metrics.faces.self_intersection import self_intersecting
-from train.metrics.surface_distance import SurfaceErrors, moved, prepared, surface_errors
+from train.metrics.faces.self_intersection import crossing_faces
+from train.metrics.surface_distance import SurfaceErrors, prepared, surface_errors
 from train.metrics.whole_surface import normal_jump
+from train.refining import AnyScheme, refine
 
 # Faces of the coarse mesh, and the levels after which it is measured.
 SIZES: Mapping[int, int] = {500: 3, 2000: 3, 5000: 2, 20000: 1}
@@ -126,24 +125,18 @@ def coarse_meshes(
 
 
 def compared(
-    coarse: Coarse, schemes: Mapping[str, Scheme], deepest: int, samples: int
+    coarse: Coarse, schemes: Mapping[str, AnyScheme], deepest: int, samples: int
 ) -> list[Measured]:
     """Refine a coarse mesh by all schemes, to its size's level or to `deepest`, and measure it."""
     true = prepared(coarse.dense.mesh, samples)
     level = min(SIZES[coarse.faces], deepest)
-    refined = {
-        name: refine(coarse.mesh, scheme, level, threads=1) for name, scheme in schemes.items()
-    }
+    refined = {name: refine(coarse.mesh, scheme, level) for name, scheme in schemes.items()}
     meshes = {name: refinement.mesh for name, refinement in refined.items()}
-    loops = prepared(meshes[LOOP], samples)
     meshes[ON_SURFACE] = on_surface(meshes[LOOP], true.tree)
     rows = []
     for method, mesh in meshes.items():
-        # All have Loop's faces.
-        surface = moved(loops, mesh.vertices)
-        crossing = self_intersecting(surface.tree.boxes)
-        errors = surface_errors(true, surface)
-        rows.append(Measured(coarse, method, errors, normal_jump(mesh), int(crossing.sum())))
+        errors = surface_errors(true, prepared(mesh, samples))
+        rows.append(Measured(coarse, method, errors, normal_jump(mesh), crossing_faces(mesh)))
     return rows
 
 

@@ -8,9 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.errors import MeshError
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
+from pns_common import Mesh, MeshError
 from train.data.dense_meshes import read_mesh
 from train.data.primitives import PRIMITIVES
 from train.experiments.beyond.models import model_files
@@ -21,6 +19,7 @@ from train.experiments.harness.rows import column, table
 from train.experiments.harness.specular import camera, shaded
 from train.experiments.harness.style import panels
 from train.metrics.fairness import bending
+from train.refining import refine
 
 LEVELS = 4
 SHOWN = (OURS, LOOP, "N1")
@@ -51,7 +50,7 @@ def run(laboratory: Laboratory) -> Outcome:
         box = np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
         for method in SHOWN:
             levels = min(LEVELS, laboratory.scale.levels)
-            refined = refine(mesh, schemes[method], levels, threads=1).mesh
+            refined = refine(mesh, schemes[method], levels).mesh
             pictures[name, method] = shaded(refined, view, box)
             rows.append(Row(name, method, bending(refined)))
     figure = Figure(

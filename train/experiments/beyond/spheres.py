@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pns_common.connectivity.topology import build_topology
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
+from pns_common import Mesh
+from train.connectivity import connect
 from train.data.primitives import globe, icosphere, tetrahedron
 from train.experiments.beyond.models import model_files
 from train.experiments.harness.contenders import LOOP, contenders
@@ -14,6 +13,7 @@ from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.metrics.shape import face_normal_error
+from train.refining import refine
 from train.surfaces.implicit import SphereRidge
 
 LEVELS = 3
@@ -67,13 +67,13 @@ def run(laboratory: Laboratory) -> Outcome:
 def _rows(name: str, mesh: Mesh, levels: int) -> list[Row]:
     while len(mesh.faces) * 4**levels > MOST_FACES:
         levels -= 1
-    edges = build_topology(mesh.faces, len(mesh.vertices)).edges
+    edges = connect(mesh.faces, len(mesh.vertices)).edges.numpy()
     ends = mesh.vertices[edges]
     spacing = float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).mean())
     ball = SphereRidge(radius=1.0, amplitude=0.0, sharpness=1.0, angle=0.3)
     errors: dict[str, Errors] = {}
     for method, scheme in contenders().items():
-        refined = refine(mesh, scheme, levels, threads=1).mesh
+        refined = refine(mesh, scheme, levels).mesh
         radius = np.linalg.norm(refined.vertices, axis=1)
         errors[method] = Errors(
             distance=float(np.sqrt(((radius - 1) ** 2).mean())),

@@ -7,7 +7,7 @@ from itertools import cycle
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.runtimes.onnx_model import load_model
+from pns_common import load_model
 from train.certificates.double_precision import double_model, read_bytes
 from train.certificates.lifted_star import HIGHEST
 from train.certificates.subject import subject_of_model

@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 from itertools import islice
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.experiments.beyond.models import models_and_assets
 from train.experiments.beyond.whole_meshes import (
     MORE,
     REFERENCE,
     Row,
-    crossing,
     meshes,
     rows_of,
 )
@@ -17,6 +16,7 @@ from train.experiments.harness.contenders import LOOP, OURS, contenders
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
+from train.metrics.faces.self_intersection import crossing_faces
 
 LEVELS = 4
 # Of a refined mesh: deeper levels of larger meshes are left out.
@@ -51,7 +51,7 @@ def run(laboratory: Laboratory) -> Outcome:
     """Refine all meshes to every level."""
     schemes = {name: contenders()[name] for name in (LOOP, REFERENCE, OURS)}
     chosen = [
-        (name, mesh, crossing(mesh))
+        (name, mesh, crossing_faces(mesh))
         for name, mesh in islice(meshes(laboratory), laboratory.scale.instances)
         if _faces(mesh, 1) <= MOST_FACES
     ]

@@ -6,11 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.connectivity.topology import EdgeClass, build_topology
-from pns_common.errors import MeshError
-from pns_common.mesh import Mesh
-from pns_common.refine import Refinement, refine
-from pns_common.schemes import Scheme
+from pns_common import Mesh, MeshError
+from train.connectivity import connect
 from train.data.dense_meshes import asset_files, read_mesh
 from train.data.primitives import PRIMITIVES
 from train.experiments.beyond.models import models_and_assets
@@ -18,9 +15,9 @@ from train.experiments.harness.contenders import LOOP, OURS, contenders
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
-from train.metrics.faces.face_boxes import face_boxes
-from train.metrics.faces.self_intersection import self_intersecting
+from train.metrics.faces.self_intersection import crossing_faces
 from train.metrics.fairness import volume
+from train.refining import AnyScheme, Refined, refine
 
 LEVELS = 3
 # Self-intersecting faces that are allowed, over Loop's.
@@ -95,42 +92,36 @@ def meshes(laboratory: Laboratory) -> Iterator[tuple[str, Mesh]]:
                 continue
 
 
-def measured(refined: Refinement) -> Measured:
+def measured(refined: Refined) -> Measured:
     """Measure a refinement."""
     mesh = refined.mesh
     return Measured(
         mesh.vertices,
-        sum(level["flipped_faces"] for level in refined.report["levels"]),
-        crossing(mesh),
+        sum(level.flipped for level in refined.levels),
+        crossing_faces(mesh),
         volume(mesh),
     )
-
-
-def crossing(mesh: Mesh) -> int:
-    """Return how many faces cross others."""
-    return int(self_intersecting(face_boxes(mesh)).sum())
 
 
 def rows_of(
     name: str,
     mesh: Mesh,
     levels: int,
-    schemes: Mapping[str, Scheme],
+    schemes: Mapping[str, AnyScheme],
     *,
     control: int,
     limit: bool = False,
 ) -> list[Row]:
-    """Return a row for each method, Loop and N1 among them; `control` is `crossing(mesh)`."""
+    """Return a row for each method, Loop and N1 among them; `control` is `crossing_faces(mesh)`."""
     surfaces = {
-        method: measured(refine(mesh, scheme, levels, threads=1, limit=limit))
+        method: measured(refine(mesh, scheme, levels, limit=limit))
         for method, scheme in schemes.items()
     }
     loop, reference = surfaces[LOOP], surfaces[REFERENCE]
     box = np.concatenate([mesh.vertices, reference.points])
     low, high = box.min(axis=0), box.max(axis=0)
     diagonal = float(np.linalg.norm(high - low)) or 1.0
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    closed = bool((topology.edge_class == EdgeClass.INTERIOR).all())
+    closed = bool(connect(mesh.faces, len(mesh.vertices)).paired.all())
     rows: list[Row] = []
     for method, surface in surfaces.items():
         beyond = np.maximum(low - surface.points, surface.points - high).max(initial=0)
@@ -166,7 +157,7 @@ def run(laboratory: Laboratory) -> Outcome:
     for number, (name, mesh) in enumerate(chosen):
         laboratory.progress(f"whole-meshes: {name}", number, len(chosen))
         levels = min(LEVELS, scale.levels)
-        rows += rows_of(name, mesh, levels, schemes, control=crossing(mesh))
+        rows += rows_of(name, mesh, levels, schemes, control=crossing_faces(mesh))
     totals = (_total(method, rows) for method in schemes)
     ours = [row for row in rows if row.method == OURS]
     return Outcome(

@@ -4,20 +4,16 @@ The default keeps crease lines sharp: what that alone gains stands beside it, by
 the same lines, and what the rest gains, by the default without them.
 """
 
-from dataclasses import replace
-
-from pns_common.connectivity.creases import NO_CREASES
-from pns_common.runtimes.onnx_model import load_model
-from pns_common.schemes import Scheme, loop, pns
+from pns_common import load_model, loop, pns
 from train.baselines.butterfly import modified_butterfly
-from train.baselines.controls import flat, nc
-from train.surfaces.quasi_interpolation import n1, q1
+from train.baselines.controls import flat, n1, nc, q1
+from train.refining import AnyScheme, Method, Smooth, loop_rule
 
 LOOP, OURS = "Loop", "PNS"
 LOOP_CREASED, N1_CREASED, OURS_SMOOTH = "Loop, creases", "N1, creases", "PNS, no creases"
 
 
-def contenders() -> dict[str, Scheme]:
+def contenders() -> dict[str, AnyScheme]:
     """Return all schemes by the names of the tables, Loop first and ours last."""
     ours = pns(load_model())
     return {
@@ -27,8 +23,8 @@ def contenders() -> dict[str, Scheme]:
         "Q1": q1(),
         "N1": n1(),
         "NC": nc(),
-        LOOP_CREASED: replace(loop(), creases=ours.creases),
-        N1_CREASED: replace(n1(), creases=ours.creases),
-        OURS_SMOOTH: replace(ours, creases=NO_CREASES),
+        LOOP_CREASED: Method("loop", loop_rule, keeps_creases=True),
+        N1_CREASED: n1(keeps_creases=True),
+        OURS_SMOOTH: Smooth(ours),
         OURS: ours,
     }

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from pns_common.schemes import Scheme, pns
+from pns_common import pns
 from train.ablations.variants import PNS, Variant, fit_variant
 from train.data.datasets import DATASETS, Dataset
 from train.experiments.harness.sources import code_of, sources_of
@@ -16,6 +16,7 @@ from train.models.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
 from train.models.torch_model import recipe_model
+from train.refining import AnyScheme
 
 # Called with what is being done, how many steps of it are done, and of how many.
 OnProgress = Callable[[str, int, int], None]
@@ -77,7 +78,7 @@ class Laboratory:
         dataset = DATASETS[name]()
         return Dataset(dataset.name, dataset.instances[: max(2, self.scale.instances)])
 
-    def scheme(self, recipe: Recipe) -> Scheme:
+    def scheme(self, recipe: Recipe) -> AnyScheme:
         """Return PNS with the network of a recipe."""
         return pns(recipe_model(recipe, self.network(recipe)), recipe.budget)
 

@@ -13,9 +13,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from pns_common.geometry.frames import face_normals
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.experiments.harness.style import SEQUENTIAL
+from train.vectors import face_normals
 
 WIDTH, HEIGHT = 1000, 680
 ASPECT = HEIGHT / WIDTH

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import msgspec
 
-from pns_common.base.whole_file import replacing
+from pns_common.files import replacing
 from train.experiments.harness.experiment import Cell, Column, Experiment, Figure, Table
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.sources import code_of, sources_of

@@ -8,7 +8,7 @@ Phong.
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.metrics.fairness import vertex_normals
 
 # Width and height of a picture, pixels.

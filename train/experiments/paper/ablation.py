@@ -6,10 +6,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
-from pns_common.schemes import Scheme, loop, pns
-from train.ablations.variants import VARIANTS, variant_recipe, variant_scheme
+from pns_common import Mesh, loop, pns
+from train.ablations.variants import VARIANTS, variant_method, variant_recipe
 from train.data.datasets import Dataset
 from train.data.grid import grid_faces, jittered_grid
 from train.experiments.harness.experiment import Experiment, Outcome
@@ -21,6 +19,7 @@ from train.metrics.evaluation import compare_with_loop
 from train.models.from_recipe import initial_network
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
+from train.refining import AnyScheme, refine
 
 LEVEL = 3
 REMOVED_TITLES: Mapping[str, str] = MappingProxyType(
@@ -76,21 +75,21 @@ class Architecture:
     jump: float
 
 
-def architecture_numbers(scheme: Scheme, held_out: Dataset, levels: int) -> Architecture:
+def architecture_numbers(scheme: AnyScheme, held_out: Dataset, levels: int) -> Architecture:
     """Return what an operator's parts protect, of one step and of `levels`."""
     reports = [
-        refinement.report["levels"][0]
+        refinement.levels[0]
         for refinement in level_by_level(held_out.instances[0].mesh, scheme, levels)
     ]
     return Architecture(
         one_step=largest_ratio(scheme, held_out),
         affine=affine_error(scheme),
-        last=max(report["proximity_ratio"]["max"] for report in reports),
-        jump=reports[-1]["normal_jump_max"],
+        last=max(report.ratio for report in reports),
+        jump=reports[-1].normal_jump,
     )
 
 
-def affine_error(scheme: Scheme) -> float:
+def affine_error(scheme: AnyScheme) -> float:
     """Return the largest departure from Loop on a planar, tilted, jittered patch."""
     x, y = jittered_grid(seed=0, jitter=0.4).double().numpy().T
     mesh = Mesh(np.stack([x, y, 0.3 * x - 0.2 * y], axis=1), grid_faces())
@@ -108,13 +107,13 @@ def run(laboratory: Laboratory) -> Outcome:
         if name not in schemes:
             variant = VARIANTS[name]
             own = variant_recipe(recipe, variant)
-            schemes[name] = variant_scheme(variant, laboratory.network(own, variant), own)
+            schemes[name] = variant_method(variant, laboratory.network(own, variant), own)
     levels = min(LEVEL, laboratory.scale.levels)
     rows = [_row(name, schemes[name], held_out, levels) for name in TITLES]
     return Outcome((table("ablation", "What each part protects", Row, rows),), notes=NOTES)
 
 
-def _row(name: str, scheme: Scheme, held_out: Dataset, levels: int) -> Row:
+def _row(name: str, scheme: AnyScheme, held_out: Dataset, levels: int) -> Row:
     ours = architecture_numbers(scheme, held_out, levels)
     one_step, affine, last, jump, near = PUBLISHED_ABLATION.get(name, (None,) * 5)
     return Row(

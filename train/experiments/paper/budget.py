@@ -7,14 +7,14 @@ from jaxtyping import Float
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.connectivity.topology import build_topology
-from pns_common.refine import refine
+from train.connectivity import connect
 from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import SEQUENTIAL, panels
 from train.experiments.paper.methods import PAPER_UNITS, hard_instance, ridge_of
 from train.models.recipes import paper
+from train.refining import refine
 from train.surfaces.implicit import Ridge
 
 PARALLEL = 0.9
@@ -96,9 +96,9 @@ def measure(laboratory: Laboratory) -> Spending:
     instance = hard_instance()
     mesh, surface = instance.mesh, ridge_of(instance)
     refined = refine(mesh, laboratory.scheme(paper()), reference_length=PAPER_UNITS)
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    vertex = len(mesh.vertices) + topology.interior
-    ends = mesh.vertices[topology.edges[topology.interior]]
+    level = connect(mesh.faces, len(mesh.vertices))
+    rows = level.interior.numpy()
+    vertex, ends = len(mesh.vertices) + rows, mesh.vertices[level.edges.numpy()[rows]]
     tangent = ends[:, 1] - ends[:, 0]
     crest = np.array([np.cos(surface.angle), np.sin(surface.angle), 0.0])
     return Spending(

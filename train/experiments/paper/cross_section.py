@@ -10,14 +10,14 @@ from matplotlib.figure import Figure as Drawing
 from trimesh import Trimesh
 from trimesh.intersections import mesh_plane
 
-from pns_common.mesh import Mesh
-from pns_common.refine import refine
+from pns_common import Mesh
 from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, TITLES, method_style, panels, zero_line
 from train.experiments.paper.methods import PAPER_UNITS, hard_instance, learned_methods, ridge_of
 from train.metrics.one_step import NEAR_FEATURE
+from train.refining import refine
 from train.surfaces.implicit import Ridge, signed_distance
 
 

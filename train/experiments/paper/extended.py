@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.data.datasets import Instance
 from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory

@@ -9,7 +9,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.render import Camera, shaded_image

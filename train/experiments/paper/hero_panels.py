@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from pns_common.base.whole_file import replacing
+from pns_common.files import replacing
 from train.experiments.harness.laboratory import FULL, Laboratory
 from train.experiments.harness.style import TITLES
 from train.experiments.paper.hero import Panel, panels_of

@@ -3,10 +3,8 @@
 from collections.abc import Iterator
 from typing import cast
 
-from pns_common.mesh import Mesh
-from pns_common.refine import Refinement, refine
-from pns_common.schemes import Scheme, loop
-from train.ablations.variants import UNCONSTRAINED, variant_recipe, variant_scheme
+from pns_common import Mesh, loop
+from train.ablations.variants import UNCONSTRAINED, variant_method, variant_recipe
 from train.baselines.butterfly import modified_butterfly
 from train.baselines.curvature_adaptive import curvature_adaptive
 from train.baselines.normal_displacement import fit_scalar, normal_displacement
@@ -17,13 +15,14 @@ from train.experiments.harness.laboratory import Laboratory
 from train.experiments.paper.paper_values import PAPER_INSTANCE
 from train.models.recipe import one_step
 from train.models.recipes import paper
+from train.refining import AnyScheme, Refined, refine
 from train.surfaces.implicit import Ridge
 
 # Reference length of all experiments: the paper's C is absolute.
 PAPER_UNITS = 1.0
 
 
-def eight_methods(laboratory: Laboratory) -> dict[str, Scheme]:
+def eight_methods(laboratory: Laboratory) -> dict[str, AnyScheme]:
     """Return Loop, five hand-made methods, PNS and the unconstrained network."""
     recipe = paper()
     training_set = laboratory.dataset(one_step(recipe).dataset)
@@ -39,7 +38,7 @@ def eight_methods(laboratory: Laboratory) -> dict[str, Scheme]:
     }
 
 
-def learned_methods(laboratory: Laboratory) -> dict[str, Scheme]:
+def learned_methods(laboratory: Laboratory) -> dict[str, AnyScheme]:
     """Return Loop and the two learned methods, which the paper's figures set side by side."""
     return {
         "loop": loop(),
@@ -48,13 +47,13 @@ def learned_methods(laboratory: Laboratory) -> dict[str, Scheme]:
     }
 
 
-def unconstrained_scheme(laboratory: Laboratory) -> Scheme:
+def unconstrained_scheme(laboratory: Laboratory) -> AnyScheme:
     """Return the unconstrained network, trained on the same ridges; ratios are against PNS's C h².
 
     It is a control that shows what the envelope is for, and no method to use.
     """
     recipe = variant_recipe(paper(), UNCONSTRAINED)
-    return variant_scheme(UNCONSTRAINED, laboratory.network(recipe, UNCONSTRAINED), recipe)
+    return variant_method(UNCONSTRAINED, laboratory.network(recipe, UNCONSTRAINED), recipe)
 
 
 def hard_instance() -> Instance:
@@ -73,7 +72,7 @@ def ridge_of(instance: Instance) -> Ridge:
     return cast(Ridge, instance.surface)
 
 
-def largest_ratio(scheme: Scheme, dataset: Dataset) -> float:
+def largest_ratio(scheme: AnyScheme, dataset: Dataset) -> float:
     """Return the largest proximity ratio of one step, over all instances."""
     return max(
         float(refine(instance.mesh, scheme, reference_length=PAPER_UNITS).ratio.max())
@@ -81,7 +80,7 @@ def largest_ratio(scheme: Scheme, dataset: Dataset) -> float:
     )
 
 
-def level_by_level(mesh: Mesh, scheme: Scheme, levels: int) -> Iterator[Refinement]:
+def level_by_level(mesh: Mesh, scheme: AnyScheme, levels: int) -> Iterator[Refined]:
     """Yield the refinement after each level; every step keeps the paper's units."""
     for _ in range(levels):
         refinement = refine(mesh, scheme, levels=1, reference_length=PAPER_UNITS)

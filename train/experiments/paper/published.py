@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from pns_common.schemes import Scheme, pns
+from pns_common import pns
 from train.ablations.variants import (
     UNCONSTRAINED,
     WITHOUT_BOUND,
     WITHOUT_GATE,
     WITHOUT_SQUARE,
     Variant,
-    variant_scheme,
+    variant_method,
 )
 from train.experiments.harness.experiment import Experiment, Outcome
 from train.experiments.harness.laboratory import Laboratory
@@ -31,6 +31,7 @@ from train.models.networks import BoundedNet
 from train.models.published import GATE_SHARPNESS, load_published, published_budget
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
+from train.refining import AnyScheme
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,14 +114,14 @@ NOTES = (
 )
 
 
-def published_scheme(claim: Claim, network: BoundedNet) -> Scheme:
+def published_scheme(claim: Claim, network: BoundedNet) -> AnyScheme:
     """Return the scheme that a published network was trained in."""
     budget = published_budget(claim.checkpoint)
     recipe = replace(paper(), name=claim.checkpoint, budget=budget, gate_sharpness=GATE_SHARPNESS)
     if claim.variant is None:
         return pns(recipe_model(recipe, network), budget)
     own = replace(recipe, features=claim.variant.features)
-    return variant_scheme(claim.variant, network, own)
+    return variant_method(claim.variant, network, own)
 
 
 def claimed_improvement(claim: Claim, improvement: Improvement) -> float:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.schemes import Scheme
 from train.data.datasets import Instance
 from train.experiments.harness.experiment import Experiment, Figure, Outcome
 from train.experiments.harness.laboratory import Laboratory
@@ -16,6 +15,7 @@ from train.experiments.harness.style import TITLES, method_style, panels
 from train.experiments.paper.methods import eight_methods, hard_instance, level_by_level
 from train.experiments.paper.paper_values import PAPER_REPEATED
 from train.metrics.shape import DistanceLevel, LevelErrors, distance_level, level_errors
+from train.refining import AnyScheme
 
 NOTES = (
     "Errors are over all vertices, old ones included; a flipped face opposes its Loop counterpart "
@@ -112,7 +112,7 @@ def run(laboratory: Laboratory) -> Outcome:
     return Outcome(tables, (figure,), NOTES)
 
 
-def measure(instance: Instance, scheme: Scheme, levels: int) -> list[LevelErrors]:
+def measure(instance: Instance, scheme: AnyScheme, levels: int) -> list[LevelErrors]:
     """Return the errors after each level."""
     steps = level_by_level(instance.mesh, scheme, levels)
     return [

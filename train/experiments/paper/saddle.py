@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pns_common.refine import refine
-from pns_common.schemes import Scheme
 from train.data.datasets import Dataset
 from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
 from train.experiments.harness.experiment import Experiment, Outcome
@@ -17,6 +15,7 @@ from train.experiments.paper.recipes import saddle
 from train.metrics.envelope import envelope_limit
 from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import paper
+from train.refining import AnyScheme, refine
 
 NOTES = (
     LIMIT_NOTE,
@@ -41,7 +40,7 @@ class GateRow:
     share_active: float = column("Gate above 0.01", ".1%")
 
 
-def gate_row(scheme: Scheme, dataset: Dataset) -> GateRow:
+def gate_row(scheme: AnyScheme, dataset: Dataset) -> GateRow:
     """Return mean, maximum and active share of the gate over a data set's inserted vertices."""
     gates = np.concatenate(
         [

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from pns_common.schemes import Scheme
 from train.certificates.adversary import Operator
 from train.certificates.gap_collapse import GapAttack, gap_attack
 from train.certificates.operator_jacobian import operator_jacobian
@@ -18,6 +17,7 @@ from train.experiments.harness.style import COLOURS, panels, zero_line
 from train.experiments.paper.paper_values import PUBLISHED_SPECTRAL
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
+from train.refining import AnyScheme
 from train.spectra.spectrum import (
     SPOKE,
     TANGENT_COUNT,
@@ -121,7 +121,7 @@ def run(laboratory: Laboratory) -> Outcome:
     )
 
 
-def planar_row(exact: Scheme, operator: Operator, valence: int) -> PlanarRow:
+def planar_row(exact: AnyScheme, operator: Operator, valence: int) -> PlanarRow:
     """Return one row of the table, from an operator in double precision and as a scheme."""
     size = spectrum(exact, valence)
     star = closed_star(exact, valence)(0.0)
@@ -142,7 +142,7 @@ def planar_row(exact: Scheme, operator: Operator, valence: int) -> PlanarRow:
     )
 
 
-def one_ring_gap(scheme: Scheme, valence: int) -> float:
+def one_ring_gap(scheme: AnyScheme, valence: int) -> float:
     """Return the Reif gap of the (k+1)-star, as it was published."""
     matrix = without_translations(jacobian(scheme, star(valence, 2, SPOKE, inner_rings=1)))
     return reif_gap(np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from train.ablations.variants import VARIANTS, variant_recipe, variant_scheme
+from train.ablations.variants import VARIANTS, variant_method, variant_recipe
 from train.certificates.adversary import (
     Attack,
     affine_attack,
@@ -164,7 +164,7 @@ def lacking(name: str, laboratory: Laboratory) -> Subject:
 def variant_subject(name: str, network: BoundedNet, recipe: Recipe) -> Subject:
     """Return a variant of the operator with a network of its recipe."""
     single, double = (
-        variant_scheme(VARIANTS[name], exact, recipe) for exact in (network, in_double(network))
+        variant_method(VARIANTS[name], exact, recipe) for exact in (network, in_double(network))
     )
     return Subject(name, single, double, recipe.budget)
 

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numba import njit
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
 
 # Eight float64 fill the widest register.
 WIDE = 8
@@ -46,17 +46,7 @@ def face_boxes(mesh: Mesh) -> FaceBoxes:
     """Return the tree of a mesh."""
     vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
     faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
-    return _filled(vertices, faces, _halved(vertices[faces].mean(axis=1)))
-
-
-def moved(tree: FaceBoxes, vertices: Float[np.ndarray, "V 3"]) -> FaceBoxes:
-    """Return the tree of the same faces with vertices elsewhere: good where that is not far."""
-    return _filled(np.ascontiguousarray(vertices, dtype=np.float64), tree.faces, tree.order)
-
-
-def _filled(
-    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"], order: Int[np.ndarray, " F"]
-) -> FaceBoxes:
+    order = _halved(vertices[faces].mean(axis=1))
     last_level, width = 0, 1
     while width * WIDE < len(faces):
         last_level, width = last_level + width, width * WIDE

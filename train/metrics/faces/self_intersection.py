@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Bool
 from numba import njit
 
-from train.metrics.faces.face_boxes import LOWER, MOST_WAITING, UPPER, WIDE, FaceBoxes
+from pns_common import Mesh
+from train.metrics.faces.face_boxes import LOWER, MOST_WAITING, UPPER, WIDE, FaceBoxes, face_boxes
 from train.metrics.faces.vectors import between, corner_of, cross, dot
 
 # Crossings this close to a border, as a share of a triangle, are no crossings.
@@ -14,6 +15,11 @@ SLACK = 1e-12
 
 # Heights over a face's plane below this share of the face's size decide nothing.
 NEARLY = 1e-9
+
+
+def crossing_faces(mesh: Mesh) -> int:
+    """Return how many faces of a mesh pass through others."""
+    return int(self_intersecting(face_boxes(mesh)).sum())
 
 
 def self_intersecting(tree: FaceBoxes) -> Bool[np.ndarray, " F"]:

@@ -2,9 +2,17 @@
 
 from numba import njit
 
-from pns_common.fused.kernels import vectors
 
-cross, dot = njit(vectors.cross), njit(vectors.dot)
+@njit
+def dot(u, v):
+    """Return the inner product."""
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+@njit
+def cross(u, v):
+    """Return the cross product."""
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
 @njit

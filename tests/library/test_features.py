@@ -1,0 +1,136 @@
+"""The symmetries of a stencil are a group, and the computed features follow it."""
+
+import numpy as np
+import pytest
+
+from pns_common.features import (
+    FEATURE_COUNT,
+    FEATURE_SETS,
+    HALF_TURN,
+    MIRROR,
+    RING_10,
+    RING_FEATURE_SETS,
+    TURN_OVER,
+    Feature,
+    symmetries,
+)
+from pns_common.level import Level
+from pns_common.operator import Rule, edge_inputs, vertex_inputs
+from pns_common.parallel import Blocks
+from pns_common.schemes import LOOP
+from pns_common.topology import build_topology
+from tests.support.meshes import bumpy_sphere
+
+SETS = {**FEATURE_SETS, **RING_FEATURE_SETS}
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_symmetries_are_a_group_of_involutions(name):
+    group, declared = SETS[name].symmetries, SETS[name].features
+    elements = list(zip(group.order, group.signs, group.local, strict=True))
+    known = {(tuple(o), tuple(s), tuple(d)) for o, s, d in elements}
+    count = SETS[name].count
+    assert FEATURE_COUNT[name] == count == int(name.partition("-")[2])
+    np.testing.assert_array_equal(elements[0][0], np.arange(count))
+    size = 2 if name == "ring-10" else 8 if any(f.turn_over < 0 for f in declared) else 4
+    assert len(known) == size
+    phi = np.random.default_rng(0).standard_normal(count)
+    for order, signs, local in elements:
+        np.testing.assert_array_equal(signs * (signs * phi[order])[order], phi)
+        for other, more, too in elements:
+            # First one, then the other: again one of them.
+            both = (order[other], more * signs[other], local * too)
+            assert tuple(map(tuple, both)) in known
+
+
+def test_a_half_turn_renames_the_ends_and_the_sides():
+    features = [Feature("log", side) for side in ("ac", "bc", "ad", "bd")]
+    features += [Feature("tilt", end, half_turn=-1) for end in "ab"]
+    features += [Feature("span", "cd")]  # of two that change places
+    group = symmetries(features, [HALF_TURN])
+    assert group.order[1].tolist() == [3, 2, 1, 0, 5, 4, 6]
+    assert group.signs[1].tolist() == [1, 1, 1, 1, -1, -1, 1]
+    assert group.local[1].tolist() == [-1, 1, -1]
+
+
+def test_rotations_of_the_frame_keep_its_orientation_and_mirrors_turn_it():
+    assert np.prod(HALF_TURN.local) == 1
+    assert np.prod(TURN_OVER.local) == 1
+    assert np.prod(MIRROR.local) == -1
+
+
+def edges_of(points, faces, name):
+    """The stencil's features and frames at every edge of a closed mesh, by its ends."""
+    level = Level(points, build_topology(faces, len(points)), LOOP, 1.0, Blocks())
+    rule = Rule(lambda phi: phi[:, :3], FEATURE_COUNT[name], True, 1.0, 1.0)
+    at = edge_inputs(level, rule, level.topology.interior)
+    keys = level.topology.edges[at.rows].astype(int)
+    return {
+        tuple(key): (phi, basis.reshape(3, 3))
+        for key, phi, basis in zip(keys.tolist(), at.features, at.basis, strict=True)
+    }
+
+
+# Element i of a group is the product of the generators whose bits i has.
+TURNED_OVER, MIRRORED = 4, 2
+
+
+@pytest.mark.parametrize("name", ["signed-14", "signed-18"])
+def test_faces_turned_over_permute_and_sign_the_features(name):
+    points, faces = bumpy_sphere()
+    seen, turned = edges_of(points, faces, name), edges_of(points, faces[:, ::-1], name)
+    group = FEATURE_SETS[name].symmetries
+    order, signs = group.order[TURNED_OVER], group.signs[TURNED_OVER]
+    for key, (phi, basis) in seen.items():
+        np.testing.assert_allclose(turned[key][0], signs * phi[order], atol=1e-13)
+        expected = group.local[TURNED_OVER][:, None] * basis
+        np.testing.assert_allclose(turned[key][1], expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", FEATURE_SETS)
+def test_a_mirror_permutes_and_signs_the_features(name):
+    points, faces = bumpy_sphere()
+    seen = edges_of(points, faces, name)
+    mirrored = edges_of(points * [-1, 1, 1], faces[:, ::-1], name)
+    group = FEATURE_SETS[name].symmetries
+    order, signs = group.order[MIRRORED], group.signs[MIRRORED]
+    for key, (phi, basis) in seen.items():
+        np.testing.assert_allclose(mirrored[key][0], signs * phi[order], atol=1e-13)
+        expected = group.local[MIRRORED][:, None] * basis * [-1, 1, 1]
+        np.testing.assert_allclose(mirrored[key][1], expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", FEATURE_SETS)
+def test_other_numbers_of_the_ends_are_a_half_turn(name):
+    points, faces = bumpy_sphere()
+    count = len(points)
+    seen = edges_of(points, faces, name)
+    other = edges_of(points[::-1], count - 1 - faces, name)
+    group = FEATURE_SETS[name].symmetries
+    for (a, b), (phi, basis) in seen.items():
+        again, frame = other[count - 1 - b, count - 1 - a]
+        np.testing.assert_allclose(again, group.signs[1] * phi[group.order[1]], atol=1e-13)
+        np.testing.assert_allclose(frame, group.local[1][:, None] * basis, atol=1e-13)
+
+
+def test_features_keep_their_limits():
+    points, faces = bumpy_sphere(bump=0.6)
+    rows = np.array([phi for phi, _ in edges_of(points, faces, "signed-18").values()])
+    limits = [feature.limit for feature in FEATURE_SETS["signed-18"].features]
+    assert (np.abs(rows).max(axis=0) <= limits).all()
+
+
+def test_rings_turned_over_sign_the_features():
+    points, faces = bumpy_sphere()
+    rule = Rule(lambda phi: phi[:, :3], 18, True, 1.0, 1.0)
+    at = []
+    for turned in (faces, faces[:, ::-1]):
+        level = Level(points, build_topology(turned, len(points)), LOOP, 1.0, Blocks())
+        at.append(vertex_inputs(level, rule, np.arange(len(points))))
+    group = RING_10.symmetries
+    signed = group.signs[1] * at[0].features[:, group.order[1]]
+    np.testing.assert_allclose(at[1].features, signed, atol=1e-13)
+    basis = at[0].basis.reshape(-1, 3, 3) * group.local[1][:, None]
+    np.testing.assert_allclose(at[1].basis.reshape(-1, 3, 3), basis, atol=1e-13)
+    limits = [feature.limit for feature in RING_10.features]
+    assert (np.abs(at[0].features).max(axis=0) <= limits).all()

@@ -1,0 +1,98 @@
+"""What the report says of distances from Loop, held against Loop itself."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pns_common import Mesh, load_model, loop, pns, refine
+from tests.support.meshes import bumpy_sphere, grid, icosphere, manifolds, soups
+from tests.support.networks import default_model
+
+MODELS = [default_model(0), default_model(1, 200.0)]
+
+
+@given(manifolds() | soups(), st.sampled_from(MODELS), st.integers(1, 3))
+def test_no_point_of_the_limit_is_farther_from_loops_than_the_report_says(mesh, model, levels):
+    refined = refine(mesh, pns(model), levels, limit=True)
+    base = refine(mesh, loop(), levels, limit=True)
+    apart = np.linalg.norm(refined.mesh.vertices - base.mesh.vertices, axis=1).max()
+    rounding = 1e-14 * np.abs(mesh.vertices).max()
+    assert apart <= refined.report["limit_distance"] + rounding
+    assert refined.report["limit_distance"] <= refined.report["limit_distance_bound"] * (1 + 1e-12)
+
+
+def test_the_distance_is_the_largest_displacement_where_one_level_is_learned():
+    mesh = Mesh(*bumpy_sphere())
+    corrected, base = (refine(mesh, scheme, 1, creases=None) for scheme in (pns(MODELS[0]), loop()))
+    apart = np.linalg.norm(corrected.mesh.vertices - base.mesh.vertices, axis=1).max()
+    report = refine(mesh, pns(MODELS[0]), 3, creases=None).report
+    assert report["limit_distance"] == pytest.approx(apart, rel=1e-12)
+    assert report["learned_levels"] == 1
+    first, second, _ = report["levels"]
+    assert first["displacement_max"] == report["limit_distance"]
+    assert first["envelope_max"] == report["limit_distance_bound"]
+    assert not {"displacement_max", "envelope_max", "guarded"} & set(second)
+
+
+def test_the_limit_comes_as_far_as_the_bound_says():
+    """A sphere so small that the budget cuts off everywhere: all of it is pushed outwards by ρ."""
+    points, faces = icosphere(2)
+    mesh = Mesh(points / 1024, faces)
+    schemes = pns(default_model(0, 0.0)), loop()
+    ours, base = (refine(mesh, scheme, 2, 1.0, limit=True) for scheme in schemes)
+    apart = np.linalg.norm(ours.mesh.vertices - base.mesh.vertices, axis=1).max()
+    assert 0.97 < apart / ours.report["limit_distance_bound"] <= 1
+
+
+def bump_in_a_plane(width):
+    """A bump of one shape in a plane, whose faces are ``width`` times as large beside it."""
+    points, faces = grid(13)
+    x, y = points[:, 0], points[:, 1]
+    z = np.where(np.hypot(x, y) < 0.3, 0.1, 0.0)
+    far = [c + (width - 1) * np.sign(c) * np.maximum(np.abs(c) - 0.6, 0) for c in (x, y)]
+    return Mesh(np.stack([*far, z], axis=1), faces)
+
+
+def test_planes_are_allowed_nothing_however_large_their_faces():
+    scheme = pns(load_model("paper"))
+    bounds = [
+        refine(bump_in_a_plane(width), scheme, reference_length=1.0).report["limit_distance_bound"]
+        for width in (1, 30)
+    ]
+    assert bounds[0] == bounds[1] > 0
+
+
+def test_levels_add_up_where_every_level_is_learned():
+    report = refine(Mesh(*bumpy_sphere()), pns(load_model("paper")), 3).report
+    assert report["learned_levels"] == 3
+    total = sum(level["displacement_max"] for level in report["levels"])
+    assert report["limit_distance"] == pytest.approx(total)
+    assert "guarded" not in report["levels"][0]
+
+
+def test_loop_is_at_no_distance_from_itself():
+    for creases in (None, np.array([[0, 1]])):
+        report = refine(Mesh(*grid(4)), loop(), 2, creases=creases).report
+        numbers = [report[k] for k in ("learned_levels", "limit_distance", "limit_distance_bound")]
+        assert numbers == [0, 0.0, 0.0]
+        assert "displacement_max" not in report["levels"][0]
+
+
+def test_guarded_vertices_are_counted():
+    tame = refine(Mesh(*bumpy_sphere(0, bump=0.01)), pns(default_model(0, 0.0))).report
+    wild = refine(Mesh(*bumpy_sphere(0, bump=0.3)), pns(MODELS[1])).report
+    assert tame["levels"][0]["guarded"] == 0
+    assert wild["levels"][0]["guarded"] > 10
+
+
+@pytest.mark.parametrize("creases", [None, np.array([[7, 8], [8, 9], [9, 10]])])
+@pytest.mark.parametrize("scheme", [loop(), pns(MODELS[0])], ids=["loop", "pns"])
+def test_limit_of_one_level_is_limit_of_the_next(creases, scheme):
+    """Put on the limit surface, vertices stay where they are however deep one goes."""
+    mesh = Mesh(*grid(6, lambda x, y: 0.3 * np.sin(3 * x) * y))
+    shallow, deep = (refine(mesh, scheme, k, limit=True, creases=creases) for k in (1, 3))
+    count = len(shallow.mesh.vertices)
+    np.testing.assert_allclose(deep.mesh.vertices[:count], shallow.mesh.vertices, atol=1e-13)
+    np.testing.assert_allclose(deep.normals[:count], shallow.normals, atol=1e-9)
+    assert refine(mesh, scheme, creases=creases).normals is None

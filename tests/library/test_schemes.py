@@ -1,0 +1,96 @@
+"""Schemes: a base scheme is a few lines, and a card's numbers reach the rule."""
+
+import copy
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh, ModelError, Scheme, load_model, loop, pns, refine
+from pns_common.base_scheme import BaseScheme
+from pns_common.model.file import bundled_models
+from pns_common.topology import split_triangles
+from tests.support.meshes import bumpy_sphere, grid
+from tests.support.networks import Float64Model, default_model, random_layers
+
+
+def midpoints(values, topology, blocks):
+    """Keep old vertices, and put new ones into the middle of edges: the masks of a toy scheme."""
+    ends = topology.edges
+    return np.concatenate([values, (values[ends[:, 0]] + values[ends[:, 1]]) / 2])
+
+
+FLAT = Scheme("flat", BaseScheme("flat", midpoints, split_triangles))
+
+
+def test_a_new_base_scheme_is_a_few_lines():
+    mesh = Mesh(*bumpy_sphere())
+    refined = refine(mesh, FLAT, 3)
+    assert refined.report["scheme"] == "flat"
+    assert len(refined.mesh.faces) == 64 * len(mesh.faces)
+    np.testing.assert_array_equal(refined.mesh.vertices[: len(mesh.vertices)], mesh.vertices)
+    corners = refined.mesh.vertices[refined.mesh.faces]
+    area = np.linalg.norm(np.cross(*(corners[:, k] - corners[:, 0] for k in (1, 2))), axis=1).sum()
+    given = mesh.vertices[mesh.faces]
+    before = np.linalg.norm(np.cross(*(given[:, k] - given[:, 0] for k in (1, 2))), axis=1).sum()
+    assert area == pytest.approx(before)
+
+
+def test_each_number_of_a_card_reaches_its_place_in_the_rule():
+    numbers = {
+        "gate_sharpness": 3.0,
+        "vertex_gate_sharpness": 5.0,
+        "prior_strength": 0.7,
+        "boundary_strength": 0.6,
+        "network_scale": 0.3,
+        "fold_angle": 60.0,
+    }
+    scheme = pns(default_model(0, **numbers, sharpness_levels=3), 4)
+    rule = scheme.rule
+    named = {name: getattr(rule, name) for name in numbers if name != "boundary_strength"}
+    assert named | {"boundary_strength": rule.curve_strength} == numbers
+    assert (rule.budget, rule.feature_count, rule.symmetric) == (4.0, 18, True)
+    assert (scheme.learned_levels, scheme.creases.levels) == (1, 3)
+
+
+def test_the_papers_model_acts_at_every_level_without_a_prior():
+    scheme = pns(Float64Model(random_layers(0)))
+    assert scheme.acts_at(15)
+    assert (scheme.rule.prior_strength, scheme.rule.vertex_network) == (None, None)
+    once = pns(default_model())
+    assert [once.acts_at(level) for level in range(3)] == [True, False, False]
+    assert not loop().acts_at(0)
+
+
+def test_networks_are_asked_at_a_budget_of_one():
+    """Their answers are scaled afterwards in float64, so one file serves every C / R."""
+    asked = []
+
+    class Asked(Float64Model):
+        card = default_model().card
+
+        def __call__(self, features, budget):
+            asked.append(budget)
+            return np.zeros((len(features), 3))
+
+        vertex_correction = __call__
+
+    refine(Mesh(*bumpy_sphere()), pns(Asked(random_layers(0)), 7.0), 1)
+    assert set(asked) == {1.0}
+
+
+def test_a_base_scheme_that_is_not_known_is_refused():
+    model = Float64Model(random_layers(0))
+    model.card = replace(default_model().card, base="catmull-clark")
+    with pytest.raises(ModelError, match="catmull-clark"):
+        pns(model)
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))])
+def test_a_scheme_can_be_sent_to_another_process(again):
+    mesh = Mesh(*grid(4, lambda x, y: x * y))
+    for scheme in (loop(), *(pns(load_model(name)) for name in bundled_models())):
+        ours, theirs = (refine(mesh, each, 2) for each in (scheme, again(scheme)))
+        np.testing.assert_array_equal(theirs.mesh.vertices, ours.mesh.vertices)
+        assert theirs.report == ours.report

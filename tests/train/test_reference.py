@@ -1,0 +1,210 @@
+"""The kernels agree with the formula written once more in torch, on every class of edge."""
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pns_common.curves import find_curves
+from pns_common.level import Level
+from pns_common.operator import Rule, edge_inputs, learned_level, vertex_inputs
+from pns_common.parallel import Blocks
+from pns_common.schemes.loop import LOOP
+from pns_common.topology import build_topology, split_triangles
+from scipy.spatial import Delaunay
+
+from train.connectivity import Connectivity, connect
+from train.data.primitives import icosphere
+from train.loop_masks import Mask, limit_mask, loop_mask
+from train.reference import (
+    GeneralRule,
+    PaperRule,
+    Surroundings,
+    edge_frames,
+    paper_5,
+    read_edges,
+    ring_10,
+    signed_18,
+)
+
+SEEDS = range(12)
+CLOSE = {"rtol": 0, "atol": 1e-12}
+
+
+def random_mesh(seed):
+    """Return vertices, faces and a sixth of the edges: open, closed, soup, or degenerate."""
+    rng = np.random.default_rng(seed)
+    plane = rng.uniform(-1, 1, (60, 2))
+    points = np.column_stack([plane, 0.4 * np.sin(3 * plane[:, 0])])
+    faces = Delaunay(plane).simplices.astype(np.int64)
+    kind = seed % 4
+    if kind == 0:
+        points[:, 2] += 0.05 * rng.standard_normal(60)
+    elif kind == 1:
+        mesh = icosphere(2)
+        faces, shake = mesh.faces, 0.1 * rng.standard_normal((len(mesh.vertices), 1))
+        points = mesh.vertices * (1 + shake)
+    elif kind == 2:
+        points = rng.standard_normal((14, 3))
+        faces = np.array([rng.choice(14, 3, replace=False) for _ in range(30)])
+    else:
+        holes = np.delete(faces, rng.choice(len(faces), 8), axis=0)
+        faces = np.concatenate([holes, holes[:2, [0, 2, 1]], [[0, 1, 2], [3, 3, 4]]])
+        points[5] = points[6]
+    mesh = connect(faces, len(points))
+    inner = rng.permutation(mesh.interior.numpy())
+    return points, faces, mesh.edges.numpy()[inner[: len(inner) // 6]]
+
+
+def network(columns, seed):
+    """Return a random network for arrays and for tensors alike."""
+    rng = np.random.default_rng(seed)
+    first, last = rng.standard_normal((columns, 3)), rng.standard_normal((3, 3))
+
+    def answer(features):
+        if isinstance(features, np.ndarray):
+            return np.tanh(features @ first) @ last
+        return torch.tanh(features @ torch.from_numpy(first)) @ torch.from_numpy(last)
+
+    return answer
+
+
+@pytest.fixture(params=[(seed, creased) for seed in SEEDS for creased in (False, True)])
+def both(request):
+    """Return one random mesh as the library's level and as the reference's."""
+    seed, creased = request.param
+    points, faces, creases = random_mesh(seed)
+    creases = creases if creased else creases[:0]
+    topology = build_topology(faces, len(points))
+    topology = topology.with_creases(topology.rows_of(creases))
+    level = Level(points, topology, LOOP, 1.0, Blocks())
+    return seed, level, torch.tensor(points), connect(faces, len(points), creases)
+
+
+def test_edges_faces_and_rings_agree(both):
+    _, level, _, mesh = both
+    topology = level.topology
+    np.testing.assert_array_equal(mesh.edges, topology.edges)
+    np.testing.assert_array_equal(mesh.face_edges, topology.face_edges)
+    np.testing.assert_array_equal(mesh.interior, topology.interior)
+    np.testing.assert_array_equal(mesh.ringed & (mesh.sharpest[0][:, 1] < 1), level.ringed)
+    split = split_triangles(topology, Blocks())
+    np.testing.assert_array_equal(mesh.split(), split.faces)
+
+
+def test_loop_and_its_limit_agree(both):
+    from pns_common.limit import limit_positions
+
+    _, level, points, mesh = both
+    topology = level.topology
+    np.testing.assert_allclose(
+        loop_mask(mesh)(points), LOOP.place(level.points, topology, Blocks()), **CLOSE
+    )
+    if (mesh.edges[:, 0] != mesh.edges[:, 1]).all():
+        np.testing.assert_allclose(
+            limit_mask(mesh)(points), limit_positions(level.points, topology), **CLOSE
+        )
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+def test_frames_and_features_agree(both, symmetric):
+    _, level, points, mesh = both
+    columns, count = (signed_18, 18) if symmetric else (paper_5, 5)
+    rule = Rule(network(count, 0), count, symmetric, 10.0, 0.5)
+    ours = edge_inputs(level, rule, level.topology.interior)
+    around = Surroundings(mesh, points)
+    edges = read_edges(around, first_face=not symmetric)
+    frames = edge_frames(edges, first_face=not symmetric)
+    rows = mesh.interior
+    np.testing.assert_allclose(
+        columns(around, edges, frames)[rows], ours.features, rtol=1e-12, atol=1e-12
+    )
+    axes = frames.axes[rows].transpose(1, 2).reshape(-1, 9)
+    np.testing.assert_allclose(axes, ours.basis, **CLOSE)
+    at_rings = vertex_inputs(level, rule, np.flatnonzero(level.ringed))
+    np.testing.assert_allclose(ring_10(around)[level.ringed], at_rings.features, **CLOSE)
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+def test_a_step_of_the_paper_agrees(both, symmetric):
+    seed, level, points, mesh = both
+    count, columns = (18, signed_18) if symmetric else (5, paper_5)
+    answer = network(count, seed)
+    made = learned_level(level, Rule(answer, count, symmetric, 10.0, 0.5))
+    step = PaperRule(answer, 0.5, 10.0, columns, first_face=not symmetric)(points, mesh)
+    np.testing.assert_allclose(step.points, made.points, **CLOSE)
+    np.testing.assert_allclose(step.ratio, made.ratio, **CLOSE)
+    np.testing.assert_allclose(step.gate, made.gate, **CLOSE)
+
+
+@pytest.mark.parametrize("budget", [0.3, 10.0])
+def test_a_step_of_the_default_agrees(both, budget):
+    seed, level, points, mesh = both
+    edges, vertices = network(18, seed), network(10, seed + 1)
+    made = learned_level(
+        level, Rule(edges, 18, True, 1e3, budget, vertices, 1e2, 0.85, 0.7, 0.4, 20.0)
+    )
+    rule = GeneralRule(edges, vertices, budget, 1e3, 1e2, 0.85, 0.7, 0.4, 20.0)
+    step = rule(points, mesh)
+    np.testing.assert_allclose(step.points, made.points, **CLOSE)
+    np.testing.assert_array_equal(step.scale, made.scale)
+    np.testing.assert_allclose(step.ratio, made.ratio, **CLOSE)
+
+
+def test_gradients_through_positions_are_derivatives():
+    points, faces, creases = random_mesh(0)
+    mesh = connect(faces, len(points), creases)
+    rule = GeneralRule(network(18, 0), network(10, 1), 10.0, 10.0, 10.0, 1.0, 1.0, 0.4, 89.0)
+    start = torch.tensor(points, requires_grad=True)
+    direction = torch.randn(start.shape, generator=torch.Generator().manual_seed(0)).double()
+    weights = torch.randn(rule(start, mesh).points.shape).double()
+    (gradient,) = torch.autograd.grad((weights * rule(start, mesh).points).sum(), start)
+    ahead, behind = (
+        (weights * rule(start.detach() + sign * 1e-6 * direction, mesh).points).sum()
+        for sign in (1, -1)
+    )
+    assert (gradient * direction).sum().item() == pytest.approx(
+        (ahead - behind).item() / 2e-6, rel=1e-5
+    )
+
+
+def blended(mesh: Connectivity, sharpness) -> tuple[Connectivity, Mask]:
+    """Return a mesh with other sharpness where edges have two faces, and Loop's mask there."""
+    from dataclasses import replace
+
+    w = torch.where(mesh.paired, sharpness, 1.0)
+    made = replace(mesh, sharpness=w)
+    return made, loop_mask(made)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10**6))
+def test_soft_masks_are_averages_and_continuous_in_sharpness(seed):
+    points, faces, _ = random_mesh(seed % 4)
+    mesh, rng = connect(faces, len(points)), torch.Generator().manual_seed(seed)
+    sharpness = torch.rand(len(mesh.edges), generator=rng).double()
+    move = 1e-6 * (2 * torch.rand(len(mesh.edges), generator=rng).double() - 1)
+    matrices = [blended(mesh, w.clamp(0, 1))[1].matrix() for w in (sharpness, sharpness + move)]
+    assert matrices[0].data.min() >= 0
+    np.testing.assert_allclose(matrices[0].sum(axis=1), 1, rtol=1e-12)
+    # A row changes by at most a few times the move.
+    assert abs(matrices[0] - matrices[1]).sum(axis=1).max() <= 8e-6
+
+
+def test_soft_masks_agree_with_the_kernels():
+    points, faces, _ = random_mesh(1)
+    mesh = connect(faces, len(points))
+    sharpness = torch.rand(len(mesh.edges), generator=torch.Generator().manual_seed(3)).double()
+    topology = build_topology(faces, len(points)).with_sharpness(sharpness.numpy())
+    np.testing.assert_allclose(
+        blended(mesh, sharpness)[1](torch.tensor(points)),
+        LOOP.place(points, topology, Blocks()),
+        **CLOSE,
+    )
+
+
+def test_planes_have_no_curves_to_move():
+    points, faces, _ = random_mesh(0)
+    flat = points * [1, 1, 0]
+    curves = find_curves(flat, build_topology(faces, len(flat)))
+    assert len(curves.rows)

@@ -1,0 +1,387 @@
+"""The operator once more, in torch: gradients through positions, and an oracle for the kernels.
+
+Written from the paper and from the derivations behind docs/theorems.md, not from `pns_common`: it
+finds edges by itself, sums in any order, and runs at a thousandth of the kernels' speed. All is
+float64. Symbols are those of docs/features.md; a, b, c, d are an edge's ends and opposite vertices.
+
+    format 1    q  = q0 + h² γ (C / R) F Π₁ η(φ)
+    format 4    x' = x0 + s γ Π_ρ(D + τ h F z(φ)),    ρ = C h² / R,    x0 = S_w p
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from train.connectivity import Connectivity
+from train.curve_rule import Curves
+from train.loop_masks import limit_weight, loop_mask
+from train.tensors import dot, ratio, root, shortened, unit
+
+# Below these a face has no area (of its squared sides), faces are antiparallel (1 + cosine), a
+# mean normal has no direction (its length), and a side's logarithm is cut off.
+NO_AREA, ANTIPARALLEL, CLEAR_NORMAL, SHORTEST = 1e-12, 1e-6, 1 / 4, 1e-150
+# The guard gives up after so many halvings; a child may not shrink below this share of its area.
+ROUNDS, LEAST_AREA = 30, 1e-3
+
+# Features (N, K) -> local vectors (N, 3).
+Network = Callable[[Tensor], Tensor]
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What is measured of a mesh with corners at `points`."""
+
+    mesh: Connectivity
+    points: Float[Tensor, "V 3"]
+
+    def mean(self, spokes: Float[Tensor, "S K"]) -> Float[Tensor, "V K"]:
+        """Return means over the spokes of each vertex."""
+        total = self.points.new_zeros((self.mesh.vertex_count, spokes.shape[1]))
+        total = total.index_add(0, self.mesh.centres, spokes)
+        return total / self.mesh.valence.clamp(min=1)[:, None]
+
+    @cached_property
+    def area_vectors(self) -> Float[Tensor, "F 3"]:
+        """(b − a) × (c − a) of each face."""
+        a, b, c = (self.points[corner] for corner in self.mesh.faces.T)
+        return torch.linalg.cross(b - a, c - a)
+
+    @cached_property
+    def normals(self) -> Float[Tensor, "F 3"]:
+        """Unit normals of faces; 0 without area."""
+        a, b, c = (self.points[corner] for corner in self.mesh.faces.T)
+        return unit(self.area_vectors, NO_AREA * (dot(b - a, b - a) + dot(c - a, c - a)))
+
+    @cached_property
+    def mean_normal(self) -> Float[Tensor, "V 3"]:
+        """m_v = Σ area vectors / Σ their lengths."""
+        corners, size = self.mesh.faces.T.reshape(-1), root(dot(*[self.area_vectors] * 2))
+        both = torch.cat([self.area_vectors, size[:, None]], dim=1).repeat(3, 1)
+        total = self.points.new_zeros((self.mesh.vertex_count, 4)).index_add(0, corners, both)
+        return ratio(total[:, :3], total[:, 3:])
+
+    @cached_property
+    def spokes(self) -> Float[Tensor, "S 3"]:
+        """p_j − p_v."""
+        return self.points[self.mesh.rims] - self.points[self.mesh.centres]
+
+    @cached_property
+    def umbrella(self) -> Float[Tensor, "V 3"]:
+        """u_v = mean of p_j − p_v."""
+        return self.mean(self.spokes)
+
+    @cached_property
+    def square(self) -> Float[Tensor, "V 1"]:
+        """h_v² = mean of ‖p_j − p_v‖²."""
+        return self.mean(dot(self.spokes, self.spokes)[:, None])
+
+    @cached_property
+    def height(self) -> Float[Tensor, "V 1"]:
+        """u_v · m_v / h_v; 0 at sharp edges."""
+        lean = dot(self.umbrella, self.mean_normal)[:, None]
+        return (1 - self.mesh.sharpest[0][:, :1]) * ratio(lean, root(self.square))
+
+    @cached_property
+    def turns(self) -> tuple[Float[Tensor, "S 1"], Float[Tensor, "S 1"]]:
+        """x = ‖n − n'‖² / 2 and s = (n × n') · T of each spoke; 0 at sharp edges."""
+        left = read_edges(self, first_face=False)
+        whole = (dot(left.n1, left.n1) > 0) & (dot(left.n2, left.n2) > 0)
+        apart, across = left.n1 - left.n2, torch.linalg.cross(left.n1, left.n2)
+        both = (torch.where(whole, dot(apart, apart) / 2, 0.0), dot(across, unit(left.b - left.a)))
+        smooth = 1 - self.mesh.sharpness
+        jump, bend = ((smooth * value).repeat_interleave(2)[:, None] for value in both)
+        return jump, bend
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeReading:
+    """All E edges as they are read: vertices' numbers, points, and normals of c's and d's faces."""
+
+    vertices: Int[Tensor, "E 4"]
+    a: Float[Tensor, "E 3"]
+    b: Float[Tensor, "E 3"]
+    c: Float[Tensor, "E 3"]
+    d: Float[Tensor, "E 3"]
+    n1: Float[Tensor, "E 3"]
+    n2: Float[Tensor, "E 3"]
+
+
+def read_edges(around: Surroundings, *, first_face: bool) -> EdgeReading:
+    """Read c in the face of lower index, or else in the face that runs from a to b.
+
+    Edges without two faces read a in place of c and d, and no normals.
+    """
+    mesh = around.mesh
+    sides, faces = mesh.opposites, mesh.half_edges // 3
+    if not first_face:
+        runs = mesh.faces.reshape(-1)[mesh.half_edges[:, :1]] == mesh.edges[:, :1]
+        sides, faces = (torch.where(runs, two, two.flip(1)) for two in (sides, faces))
+    vertices = torch.cat([mesh.edges, sides], dim=1)
+    normals = torch.where(mesh.paired[:, None, None], around.normals[faces], 0.0)
+    points = around.points[vertices].unbind(dim=1)
+    return EdgeReading(vertices, *points, *normals.unbind(dim=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """F = [T, N, B] with its columns as (E, 3, 3)[:, :, k], h, and x = 1 − n₁ · n₂."""
+
+    axes: Float[Tensor, "E 3 3"]
+    length: Float[Tensor, " E"]
+    curvature: Float[Tensor, " E"]
+    degenerate: Bool[Tensor, " E"]
+
+
+def edge_frames(edges: EdgeReading, *, first_face: bool) -> Frames:
+    """Return frames (section 3.2); degenerate ones are the world's triad.
+
+    There x is 0, but for the paper's reading also 2 between antiparallel faces.
+    """
+    along, cosine = edges.b - edges.a, dot(edges.n1, edges.n2)
+    length = root(dot(along, along))
+    undefined = (length == 0) | (dot(edges.n1, edges.n1) == 0) | (dot(edges.n2, edges.n2) == 0)
+    degenerate = undefined | (cosine <= -1 + ANTIPARALLEL)
+    triad = torch.eye(3, dtype=torch.float64)
+    tangent = torch.where(degenerate[:, None], triad[0], unit(along))
+    mean = torch.where(degenerate[:, None], triad[1], edges.n1 + edges.n2)
+    normal = unit(mean - dot(mean, tangent)[:, None] * tangent)
+    axes = torch.stack([tangent, normal, torch.linalg.cross(tangent, normal)], dim=2)
+    no_curvature = undefined if first_face else degenerate
+    return Frames(axes, length, torch.where(no_curvature, 0.0, 1 - cosine), degenerate)
+
+
+def paper_5(around: Surroundings, edges: EdgeReading, frames: Frames) -> Float[Tensor, "E 5"]:
+    """Return x and the logarithms of ac, bc, ad, bd over h."""
+    sides = (edges.c - edges.a, edges.c - edges.b, edges.d - edges.a, edges.d - edges.b)
+    logs = [root(dot(side, side)).clamp(min=SHORTEST).log() for side in sides]
+    over = frames.length.clamp(min=SHORTEST).log()
+    return torch.stack([frames.curvature, *(log - over for log in logs)], dim=1)
+
+
+def signed_18(around: Surroundings, edges: EdgeReading, frames: Frames) -> Float[Tensor, "E 18"]:
+    """Return those of `paper-5`, the dihedral, the tilts of ends and wings, and the umbrellas."""
+    tangent, binormal = frames.axes[:, :, 0], frames.axes[:, :, 2]
+    tilts = around.mean_normal[edges.vertices]
+    two = [(tilts[:, pair], axis) for pair in ([0, 1], [2, 3]) for axis in (tangent, binormal)]
+    return torch.cat(
+        [
+            paper_5(around, edges, frames),
+            dot(torch.linalg.cross(edges.n1, edges.n2), tangent)[:, None],
+            *(dot(tilt, axis[:, None]) for tilt, axis in two),
+            around.height[edges.vertices, 0],
+        ],
+        dim=1,
+    )
+
+
+EDGE_FEATURES = MappingProxyType({"paper-5": paper_5, "signed-18": signed_18})
+
+
+def ring_10(around: Surroundings) -> Float[Tensor, "V 10"]:
+    """Return the features of old vertices."""
+    mesh, mean, size = around.mesh, around.mean, root(around.square)
+    (jump, bend), height = around.turns, around.height
+    lengths = root(dot(around.spokes, around.spokes))[:, None]
+    tilt = around.mean_normal[mesh.rims] - around.mean_normal[mesh.centres]
+    columns = [
+        mean(jump),
+        mean(bend),
+        mean(bend**2),
+        height,
+        ratio(dot(around.umbrella, around.umbrella)[:, None], around.square),
+        dot(around.mean_normal, around.mean_normal)[:, None],
+        mean(height[mesh.rims]),
+        ratio(mean(dot(tilt, around.spokes)[:, None]), size),
+        ratio(mean(lengths), size),
+        mean(mean(jump)[mesh.rims]),
+    ]
+    return torch.cat(columns, dim=1)
+
+
+def ring_vectors(around: Surroundings) -> Float[Tensor, "V 3 3"]:
+    """Return e₁ = m_v, e₂ = u_v / h_v and e₃ = mean of (x / 2)(p_j − p_v) / h_v as columns."""
+    pull, size = around.mean(around.turns[0] / 2 * around.spokes), root(around.square)
+    three = (around.mean_normal, ratio(around.umbrella, size), ratio(pull, size))
+    return torch.stack(three, dim=2)
+
+
+def pushes(around: Surroundings) -> Float[Tensor, "V 3"]:
+    """Return d_v at s = 1: p less its limit, along the normal; 0 at open rings and sharp edges."""
+    mean = around.mean_normal
+    normal = mean / root(dot(mean, mean)).clamp(min=CLEAR_NORMAL)[:, None]
+    share = limit_weight(around.mesh.valence) * around.mesh.ringed
+    height = share * (1 - around.mesh.sharpest[0][:, 1]) * dot(around.umbrella, normal)
+    return -height[:, None] * normal
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step, old vertices first: x0, δ before the guard, ρ, γ, and s of the guard."""
+
+    base: Float[Tensor, "W 3"]
+    displacement: Float[Tensor, "W 3"]
+    envelope: Float[Tensor, " W"]
+    gate: Float[Tensor, " W"]
+    scale: Float[Tensor, " W"]
+
+    @property
+    def points(self) -> Float[Tensor, "W 3"]:
+        """x' = x0 + s δ."""
+        return self.base + self.scale[:, None] * self.displacement
+
+    @property
+    def ratio(self) -> Float[Tensor, " W"]:
+        """The proximity ratio s ‖δ‖ / ρ; 0 where ρ is 0."""
+        length = root(dot(self.displacement, self.displacement))
+        return self.scale * ratio(length, self.envelope)
+
+
+def on_edges(
+    points: Float[Tensor, "V 3"],
+    mesh: Connectivity,
+    displacement: Float[Tensor, "E 3"],
+    envelope: Float[Tensor, " E"],
+    gate: Float[Tensor, " E"],
+) -> Step:
+    """Return Loop's step with something added to edge vertices."""
+    none = points.new_zeros(mesh.vertex_count)
+    return Step(
+        loop_mask(mesh)(points),
+        torch.cat([torch.zeros_like(points), displacement]),
+        torch.cat([none, envelope]),
+        torch.cat([none, gate]),
+        points.new_ones(mesh.vertex_count + len(mesh.edges)),
+    )
+
+
+@dataclass(frozen=True)
+class PaperRule:
+    """The operator of format 1: C, c, its features, and the network at budget 1."""
+
+    network: Network
+    budget: float
+    gate_sharpness: float
+    features: Callable[[Surroundings, EdgeReading, Frames], Tensor] = paper_5
+    first_face: bool = True
+
+    def __call__(
+        self, points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float = 1.0
+    ) -> Step:
+        """Take one step; old vertices are Loop's."""
+        around = Surroundings(mesh, points)
+        edges = read_edges(around, first_face=self.first_face)
+        frames = edge_frames(edges, first_face=self.first_face)
+        interior = mesh.paired & (mesh.sharpness < 1)
+        gate = (1 - mesh.sharpness) * torch.tanh(self.gate_sharpness * frames.curvature**2)
+        eta = self.network(self.features(around, edges, frames)[interior])
+        local = torch.zeros_like(edges.a).index_put((interior,), shortened(eta, gate.new_ones(())))
+        envelope = self.budget / reference_length * frames.length**2 * interior
+        turned = (frames.axes @ local[:, :, None])[:, :, 0]
+        return on_edges(points, mesh, (envelope * gate)[:, None] * turned, envelope, gate)
+
+
+@dataclass(frozen=True)
+class GeneralRule:
+    """The operator of format 4 at its learned level.
+
+    Attributes:
+        edge_network, vertex_network: answer z, shortened to length 1 here.
+        budget: C.
+        gate_sharpness, vertex_gate_sharpness: c and c_v.
+        prior_strength: s.
+        boundary_strength: of the prior along boundaries and creases.
+        network_scale: τ.
+        fold_angle: θ, degrees.
+    """
+
+    edge_network: Network
+    vertex_network: Network
+    budget: float
+    gate_sharpness: float
+    vertex_gate_sharpness: float
+    prior_strength: float
+    boundary_strength: float
+    network_scale: float
+    fold_angle: float
+
+    def __call__(
+        self, points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float = 1.0
+    ) -> Step:
+        """Take the learned step."""
+        around, masks, one = Surroundings(mesh, points), loop_mask(mesh), points.new_ones(())
+        curves = Curves(mesh, points)
+        of_curves = self.boundary_strength * curves.pushes(self.vertex_gate_sharpness)
+        prior, along = masks(self.prior_strength * pushes(around) + of_curves), masks(of_curves)
+        edges = read_edges(around, first_face=False)
+        frames = edge_frames(edges, first_face=False)
+        interior, blend = mesh.paired & (mesh.sharpness < 1), mesh.sharpest[0][:, 1]
+        ringed = mesh.ringed & (blend < 1)
+        edge_gate = (1 - mesh.sharpness) * torch.tanh(self.gate_sharpness * frames.curvature**2)
+        z = shortened(self.edge_network(signed_18(around, edges, frames)[interior]), one)
+        local = torch.zeros_like(edges.a).index_put((interior,), z)
+        turned = frames.length[:, None] * (frames.axes @ local[:, :, None])[:, :, 0]
+        jump = around.mean(around.turns[0])[:, 0]
+        vertex_gate = (1 - blend) * ringed * torch.tanh(self.vertex_gate_sharpness * jump)
+        z = shortened(self.vertex_network(ring_10(around)[ringed]), one)
+        weights = torch.zeros_like(points).index_put((ringed,), z)
+        pulled = root(around.square) * (ring_vectors(around) @ weights[:, :, None])[:, :, 0]
+        asked = prior + self.network_scale * torch.cat([pulled, turned])
+        squares = torch.cat([around.square[:, 0] * ringed, frames.length**2 * interior])
+        # On curves there is neither gate nor network.
+        on_curve, gate = curves.moved, torch.cat([vertex_gate, edge_gate])
+        squares = torch.where(on_curve, curves.squares, squares)
+        envelope = self.budget / reference_length * squares
+        share = torch.where(on_curve, 1.0 * on_curve, gate)[:, None]
+        displacement = share * shortened(torch.where(on_curve[:, None], along, asked), envelope)
+        base, alone = masks(points), curves.of_boundary
+        scale = fold_guard(mesh.split(), base, displacement, self.fold_angle, alone)
+        return Step(base, displacement, envelope, gate, scale)
+
+
+def fold_guard(
+    faces: Int[Tensor, "C 3"],
+    base: Float[Tensor, "W 3"],
+    displacement: Float[Tensor, "W 3"],
+    angle: float,
+    of_boundary: Bool[Tensor, " W"],
+) -> Float[Tensor, " W"]:
+    """Return s: halved at the corners of all faces that turn by more than `angle`, until none do.
+
+    Vertices `of_boundary` are halved only by faces that they would fold by themselves, so that two
+    meshes still meet there. Gradients stop here.
+    """
+    base, displacement, scale = base.detach(), displacement.detach(), torch.ones(len(base)).double()
+    halvings = 0
+    while True:
+        folded = faces[_turned(faces, base, scale[:, None] * displacement, angle)]
+        by_itself = torch.where(of_boundary, scale, 0.0)[:, None] * displacement
+        alone = _turned(folded, base, by_itself, angle)
+        corners = folded[alone[:, None] | ~of_boundary[folded]]
+        corners = corners[scale[corners] > 0]
+        if len(corners) == 0:
+            return scale
+        scale[corners] = scale[corners] / 2 if halvings < ROUNDS else 0.0
+        halvings += 1
+
+
+def _turned(
+    faces: Int[Tensor, "C 3"], base: Float[Tensor, "W 3"], added: Float[Tensor, "W 3"], angle: float
+) -> Bool[Tensor, " C"]:
+    """Return whether a face with area turned by more than an angle, or lost nearly all its area."""
+    before, after = (_area_vectors(faces, points) for points in (base, base + added))
+    sides = [base[faces[:, corner]] - base[faces[:, 0]] for corner in (1, 2)]
+    least = NO_AREA * (dot(sides[0], sides[0]) + dot(sides[1], sides[1]))
+    old, new, cosine = dot(before, before), dot(after, after), math.cos(math.radians(angle))
+    kept = (dot(before, after) >= cosine * (old * new).sqrt()) & (new >= LEAST_AREA**2 * old)
+    return (old > least**2) & ~kept
+
+
+def _area_vectors(faces: Int[Tensor, "C 3"], points: Float[Tensor, "W 3"]) -> Tensor:
+    a, b, c = (points[corner] for corner in faces.T)
+    return torch.linalg.cross(b - a, c - a)
