@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from picture import STEEL, draw
 
 from pns_common import Mesh, load_model, loop, pns, refine, subdivide
-from pns_common.base.whole_file import replacing
+from pns_common.files import replacing
 
 FOLDER = Path(__file__).with_name("gallery")
 

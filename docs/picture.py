@@ -17,7 +17,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from pns_common import Mesh, Refinement, load_model, pns, refine
-from pns_common.base.whole_file import replacing
+from pns_common.files import replacing
 from service.meshes.weld import weld
 from service.meshfiles.example import part
 
