@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import setuptools
 
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL
+from pns_common.model.file import DEFAULT_MODEL
 from pns_common.version import VERSION
 from tests.support.installed import ROOT, checkout, environment, lend_kernels, run
 

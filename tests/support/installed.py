@@ -11,7 +11,6 @@ from typing import Any
 
 from packaging.metadata import Metadata
 from packaging.requirements import Requirement
-
 from pns_common.fused.storage import BUILT, cache_folder
 
 ROOT = Path(__file__).resolve().parents[2]

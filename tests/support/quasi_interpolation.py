@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-
 from pns_common.connectivity.topology import build_topology
 from pns_common.masks.linear import refine_linear
 

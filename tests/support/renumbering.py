@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import trimesh
-
-from pns_common import Mesh, clean
 from pns_common.connectivity.topology import build_topology
 from pns_common.geometry.reference_length import measure_reference_length
+
+from pns_common import Mesh, clean
 from tests.support.shared import shared_path
 
 # One of each kind, by their edges.

@@ -1,7 +1,6 @@
 """A vertex with faces around it, and Loop's step of any mesh with its creases."""
 
 import numpy as np
-
 from pns_common.connectivity.creases import crease_children, with_creases
 from pns_common.connectivity.topology import build_topology, split
 from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
