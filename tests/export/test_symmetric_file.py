@@ -61,7 +61,7 @@ def test_numbering_and_mirrors_change_nothing_through_a_file(features, name):
     shapes = {"sphere": bumpy_sphere, "patch": lambda: grid(7, bent)}
     mesh = Mesh(*shapes[name]()) if name in shapes else asset(name)
     scheme = pns(model_from_bytes(network_and_file(features)[1], "test"), BUDGET)
-    still = refine(mesh, scheme, reference_length=1.0).mesh.vertices
+    still = refine(mesh, scheme, 1, reference_length=1.0).mesh.vertices
     twins = [(renumbered(mesh, 0), still), (mirrored(mesh), still * MIRROR)]
     if features in SIGNED:
         twins.append((turned_over(mesh), still))
@@ -70,5 +70,5 @@ def test_numbering_and_mirrors_change_nothing_through_a_file(features, name):
     allowed = 1e-12 + SINGLE * BUDGET * np.concatenate([np.zeros(len(mesh.vertices)), square])
     kept = np.concatenate([np.ones(len(mesh.vertices), dtype=bool), well_conditioned(mesh)])
     for twin, expected in twins:
-        positions = refine(twin.mesh, scheme, reference_length=1.0).mesh.vertices[twin.place]
+        positions = refine(twin.mesh, scheme, 1, reference_length=1.0).mesh.vertices[twin.place]
         assert (np.linalg.norm(positions - expected, axis=1) <= allowed)[kept].all()

@@ -157,7 +157,7 @@ def test_a_file_of_format_2_may_do_without():
     model = two_networks()
     plain = replace(model.card, vertex_features=None, vertex_gate_sharpness=None)
     loaded = model_from_bytes(model_bytes(model.network, plain), "two")
-    report = refine(Mesh(*bumpy_sphere()), pns(loaded)).report
+    report = refine(Mesh(*bumpy_sphere()), pns(loaded), 1).report
     assert "vertex_rule" not in report["levels"][0]
 
 
@@ -175,7 +175,7 @@ def test_training_step_is_the_products_step():
     step = refine_once(
         points, topology, recipe_operator(RECIPE, exact.network), RECIPE.budget, differentiable
     )
-    refined = refine(mesh, pns(exact), reference_length=1.0)
+    refined = refine(mesh, pns(exact), 1, reference_length=1.0)
     np.testing.assert_allclose(step.points.detach(), refined.mesh.vertices, rtol=0, atol=1e-14)
     inner = refined.ratio[: topology.vertex_count]
     np.testing.assert_allclose(step.vertex_ratio.detach(), inner[inner > 0], rtol=0, atol=1e-13)
