@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pns_common import Mesh
-from pns_common.base.blocks import WHOLE
-from pns_common.geometry.corner_normals import angle_weighted_normals
+from pns_common.normals import angle_weighted_normals
+from pns_common.parallel import Blocks
 from service.meshfiles.indexed_triangles import IndexedTriangles
 
 
@@ -34,7 +34,7 @@ def unrolled_torus(faces: int) -> tuple[IndexedTriangles, np.ndarray]:
     triangles = _cut_quads(columns, rows)
     uv = np.stack([u / columns, v / rows], axis=1)
     mesh = whole.vertices, whole.faces
-    normals = angle_weighted_normals(*mesh, whole.faces, len(whole.vertices), WHOLE)
+    normals = angle_weighted_normals(*mesh, whole.faces, len(whole.vertices), Blocks())
     return IndexedTriangles(whole.vertices[place], triangles, uv), normals[place]
 
 

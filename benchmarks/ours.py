@@ -11,8 +11,7 @@ import sys
 import numpy as np
 
 from benchmarks.peers.protocol import read_mesh, serve
-from pns_common import Mesh, load_model, loop, pns, refine
-from pns_common.fused import load_kernels
+from pns_common import Mesh, load_model, loop, pns, refine, warm_up
 
 
 def main(name: str, path: str, levels: str) -> None:
@@ -29,7 +28,7 @@ def main(name: str, path: str, levels: str) -> None:
         return refined.mesh.vertices, refined.mesh.faces
 
     # Warm from the second run on, whatever the first did without.
-    serve(run, after_first=load_kernels)
+    serve(run, after_first=warm_up)
 
 
 if __name__ == "__main__":

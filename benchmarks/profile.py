@@ -10,13 +10,13 @@ from types import CodeType
 from typing import Annotated
 
 import typer
+from pns_common.fused import load_kernels
+from pns_common.fused.library import kernel_modules, kernels_of
 from rich.console import Console
 from rich.table import Table
 
 from benchmarks.generated import ORDERS
 from pns_common import load_model, loop, pns, refine
-from pns_common.fused import load_kernels
-from pns_common.fused.library import kernel_modules, kernels_of
 
 ROWS = 24
 

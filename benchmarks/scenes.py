@@ -20,7 +20,7 @@ from rich.table import Table
 
 from benchmarks.answers import served
 from pns_common import load_model
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL
+from pns_common.model.file import DEFAULT_MODEL
 from service.gltf.constants import COMPONENT_TYPES
 from service.gltf.read.container import write_glb
 from service.gltf.read.json_text import encode

@@ -7,8 +7,7 @@ import time
 from collections.abc import Callable
 
 from benchmarks.generated import torus
-from pns_common import load_model, loop, pns, refine
-from pns_common.fused import load_kernels
+from pns_common import load_model, loop, pns, refine, warm_up
 
 
 def plain_loop() -> Callable[[], object]:
@@ -54,7 +53,7 @@ def repeat(work: Callable[[], object], seconds: float) -> None:
 
 def main(name: str, seconds: str) -> None:
     """Load what the run needs, and repeat it."""
-    load_kernels()
+    warm_up()
     repeat(WORKLOADS[name](), float(seconds))
 
 

@@ -1,8 +1,8 @@
 """Schemes that break one promise each: what the certificates must find."""
 
 import numpy as np
-
 from pns_common.geometry.frames import edge_frames, edge_stencil
+
 from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule
 
 BUDGET, GATE_SHARPNESS = 0.5, 10.0
