@@ -37,7 +37,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     const statements = await page.textContent("#promises");
     assert.match(statements, /No point is farther from the classic smooth surface than [\d.]+\u00a0% of the model’s size \(/);
     // At the end of a line a unit would stand without its number.
-    assert.match(statements, /\d\u00a0c?m .*\d\u00a0%/s);
+    assert.match(statements, /\d\u00a0% .*\d\u00a0c?m\)/);
     assert.doesNotMatch(statements, /\d (c?m|%)/);
     assert.equal(await page.textContent("#validation-badge"), "nothing new");
     // Seams apart, as the service counts: 48 columns of 20 rows, closed.
@@ -443,7 +443,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   });
 
   test("a screen reader hears each step once, and no percents of it", async () => {
-    const page = await visit({ hash: "#levels=4&model=full" });
+    const page = await visit({ hash: "#levels=4" });
     await page.evaluate(() => {
       window.heard = [];
       const hear = ({ target }) => {
