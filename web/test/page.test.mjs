@@ -296,7 +296,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     const sheets = await page.$$eval(".tools, .timeline, .legend, .side-label", (floating) =>
       floating.map((one) => getComputedStyle(one).backgroundColor),
     );
-    const panel = await page.$eval("#panel", (panel) => getComputedStyle(panel).backgroundColor);
+    const panel = await page.$eval(".panel", (panel) => getComputedStyle(panel).backgroundColor);
     assert.deepEqual([...new Set(sheets)], [panel]);
   });
 

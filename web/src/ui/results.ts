@@ -20,7 +20,7 @@ export function showPromises(report: Report, lengths: Lengths): string {
           {},
           make("span", { className: "hidden", textContent: holds ? "Kept: " : "Broken: " }),
           make("strong", { textContent: title }),
-          make("span", { textContent: text }),
+          ` ${text}`,
         ),
       ),
     ),
