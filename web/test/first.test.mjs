@@ -3,19 +3,8 @@
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
 import { bodyOf, choose, downloaded, hold, noBrowser, picture, settled } from "./support/browser.mjs";
+import { BLUNT, CUBE } from "./support/solids.mjs";
 import { example, number, PART_FACES, same, studio, TETRAHEDRON } from "./support/studio.mjs";
-
-/** A cube of eight vertices, whose edges all turn by a right angle. */
-const CUBE = obj("cube.obj", (x) => x);
-/** The same, whose side at +Z is five times as small as the one at −Z. */
-const BLUNT = obj("blunt.obj", (x, z) => (z > 0 ? x / 5 : x));
-
-function obj(name, place) {
-  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [i & 1, (i >> 1) & 1, i >> 2].map((bit) => bit - 0.5));
-  const points = corners.map(([x, y, z]) => `v ${place(x, z)} ${place(y, z)} ${z}`);
-  const sides = ["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"].map((side) => `f ${side}`);
-  return { name, mimeType: "", buffer: Buffer.from([...points, ...sides].join("\n")) };
-}
 
 describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
   const { visit, refined } = studio();
