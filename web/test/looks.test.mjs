@@ -101,7 +101,7 @@ describe("pictures", { skip: noBrowser, timeout: 1_800_000 }, () => {
     });
     assert.deepEqual([ours.size, loop.size], [26, 26]);
     const apart = [...ours].map(([side, point]) => Math.hypot(...point.map((x, axis) => x - loop.get(side)[axis])));
-    const shown = Number(await page.getAttribute("#legend", "data-max", { timeout: 1000 }));
+    const shown = Number(await page.getAttribute("#legend", "data-max"));
     assert.ok(Math.abs(shown - Math.max(...apart)) < 1e-6, `${shown} is not ${Math.max(...apart)}`);
     assert.match(await page.textContent("#mathematics"), /Measured between the refined vertices/);
   });
