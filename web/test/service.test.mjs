@@ -50,14 +50,14 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       await choose(page, example);
       const { id } = await (await job).json();
       await page.waitForFunction(() => window.shares.size > 1);
-      assert.equal(await server.metric("pns_jobs_running"), 1);
+      await server.reaches("pns_jobs_running", 1);
       assert.equal((await slowJob(server)).status, 503);
       const freed = page.waitForResponse((answer) => answer.request().method() === "DELETE");
       const began = performance.now();
       await page.click("#cancel");
       assert.equal((await freed).status(), 204);
       t.diagnostic(`the worker was free ${Math.round(performance.now() - began)} ms after the click`);
-      assert.equal(await server.metric("pns_jobs_running"), 0);
+      await server.reaches("pns_jobs_running", 0);
       const state = await fetch(`${server.address}/jobs/${id}`);
       assert.ok(state.status === 404 || (await state.json()).state === "cancelled");
       assert.ok(await page.isHidden("#work"));
