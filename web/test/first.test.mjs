@@ -104,6 +104,20 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await page.locator("#advice").waitFor({ state: "hidden" });
   });
 
+  test("faces that only touch are told of, and joined by the setting that is named", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    // Two triangles whose common edge is open by a hundred-thousandth.
+    const text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1.00001 0 0\nv 0 1.00001 0\nv 1 1 1\nf 1 2 3\nf 4 6 5\n";
+    await choose(page, { name: "gap.obj", mimeType: "", buffer: Buffer.from(text) });
+    await settled(page);
+    assert.match(await page.textContent("#advice"), /switch on Close small gaps/);
+    const boundary = () => page.textContent("#statistics tr:has-text('Boundary edges') td:last-child");
+    assert.equal(await boundary(), "12");
+    await page.click(".more summary");
+    await page.check("#weld");
+    await page.waitForFunction(() => document.querySelector("#statistics").textContent.includes("Boundary edges68"));
+  });
+
   test("each setting but the angle explains itself to the pointer and to the keyboard", async () => {
     const page = await visit();
     await page.click(".more summary");
