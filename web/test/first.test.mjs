@@ -112,10 +112,10 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await settled(page);
     assert.match(await page.textContent("#advice"), /switch on Close small gaps/);
     const boundary = () => page.textContent("#statistics tr:has-text('Boundary edges') td:last-child");
-    assert.equal(await boundary(), "12");
+    assert.equal(await boundary(), "6");
     await page.click(".more summary");
     await page.check("#weld");
-    await page.waitForFunction(() => document.querySelector("#statistics").textContent.includes("Boundary edges68"));
+    await page.waitForFunction(() => document.querySelector("#statistics").textContent.includes("Boundary edges64"));
   });
 
   test("each setting but the angle explains itself to the pointer and to the keyboard", async () => {
