@@ -354,6 +354,7 @@ def test_the_description_names_bodies_parameters_and_errors(client: TestClient) 
         "crease",
         "weld_tolerance",
         "compress",
+        "format",
         "limit",
     }
     statuses = {"200", "400", "401", "403", "408", "413", "415", "422", "429", "500", "503", "504"}
