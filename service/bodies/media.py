@@ -26,7 +26,9 @@ FORMATS: dict[str, Kind] = {
     "model/stl": "stl",
     "model/off": "off",
 }
-ACCEPTED = (*FORMATS, ZIP, MULTIPART)
+# Any glTF, or an archive of one, told by its first bytes: generated clients send no other type.
+BYTES = "application/octet-stream"
+ACCEPTED = (*FORMATS, ZIP, MULTIPART, BYTES)
 
 _WEIGHT = re.compile(r"q\s*=\s*(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)")
 

@@ -6,7 +6,6 @@ from typing import Any
 
 from ..bodies import media
 from . import problems
-from .answer_types import BYTES
 from .problems import Problem
 
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
@@ -19,6 +18,13 @@ _BODY = {
             "schema": {"type": "object", "description": "glTF 2.0 with embedded (data:) buffers"}
         },
         **{kind: _BINARY for kind in media.FORMATS if kind not in (media.GLB, media.GLTF)},
+        media.BYTES: {
+            "schema": {
+                "type": "string",
+                "format": "binary",
+                "description": "a GLB, glTF JSON or an archive of one, told by its first bytes",
+            }
+        },
         media.ZIP: {
             "schema": {
                 "type": "string",
@@ -69,7 +75,7 @@ _SERVER_TIMING = {
 _FILE = {
     "description": "The refined file",
     # Plain bytes first: generators take the first kind that they know.
-    "content": {BYTES: _BINARY, media.GLB: _BINARY},
+    "content": {media.BYTES: _BINARY, media.GLB: _BINARY},
     "headers": _SERVER_TIMING,
 }
 
