@@ -1,4 +1,4 @@
-"""How long a client may keep the service waiting, whichever way the bytes go."""
+"""How long a client may keep the service waiting for its body."""
 
 from __future__ import annotations
 

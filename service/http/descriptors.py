@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from ...settings import Settings, StartError
+from ..settings import Settings, StartError
 
 log = logging.getLogger("pns.service")
 
@@ -16,9 +16,8 @@ OF_PROCESS = 128
 OF_REQUEST = 5
 # What is kept of one that is done: its answer and its report.
 OF_RESULT = 2
-# Connections that the event loop takes in a turn, and turns until one that has no slot is closed.
-A_TURN = 32
-TURNS = 4
+# Connections beyond those, until the idle ones have ended.
+BEYOND = 128
 
 
 def fitting(settings: Settings) -> int:
@@ -34,7 +33,7 @@ def fitting(settings: Settings) -> int:
     # Short jobs have a worker and slots of their own.
     requests = settings.slots + settings.queue + 1
     reserved = OF_PROCESS + OF_WORKER * (settings.workers + 1) + OF_REQUEST * requests
-    reserved += OF_RESULT * settings.results + A_TURN * TURNS
+    reserved += OF_RESULT * settings.results + BEYOND
     of_connection = 1 + OF_REQUEST
     wanted = reserved + of_connection * settings.connections
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)

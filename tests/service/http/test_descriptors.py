@@ -5,7 +5,7 @@ import resource
 
 import pytest
 
-from service.http.connection.descriptors import fitting
+from service.http.descriptors import fitting
 from service.settings import Settings, StartError
 
 SETTINGS = Settings(workers=1, queue=2, connections=100)
