@@ -112,7 +112,7 @@ image:
 # What the image installs, by hash: after a change of constraints.txt. It needs pip-tools.
 PIP_COMPILE := pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe --no-header --no-annotate --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --constraint constraints.txt
 hashes:
-	$(PIP_COMPILE) --extra service --unsafe-package meshopt --output-file requirements/service.new pyproject.toml
+	$(PIP_COMPILE) --extra service --extra store --unsafe-package meshopt --output-file requirements/service.new pyproject.toml
 	$(PYTHON) requirements/without_ourselves.py requirements/service.new requirements/service.txt
 	$(PIP_COMPILE) --output-file requirements/build.txt requirements/build.in
 
@@ -188,7 +188,7 @@ web/node_modules/.ready: web/package-lock.json
 $(SERVE)/.ready: pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv $(SERVE)
 	$(SERVE)/bin/python -m pip install $(HASHED)
-	$(SERVE)/bin/python -m pip install --quiet --editable '.[service]'
+	$(SERVE)/bin/python -m pip install --quiet --editable '.[service,store]'
 	touch $@
 
 # The generator of Python clients, for their test.

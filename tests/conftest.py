@@ -73,7 +73,7 @@ LONGEST = (
     "service/http/test_crossed_answers.py",
     "service/http/test_openapi.py",
     "soak/test_soak.py",
-    "service/http/connection/test_bounds.py",
+    "service/http/test_hostile.py",
     "service/test_assets.py",
     "service/workers/test_pool.py",
     "web/test_bundle.py",

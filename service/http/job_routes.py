@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Coroutine
 from contextlib import AsyncExitStack, ExitStack, suppress
 from typing import Annotated, Any
 
@@ -22,14 +22,15 @@ from .admission import DrainingError
 from .answer import FileAnswer
 from .answer_types import answer_type
 from .clients import client_of
-from .connection.crowd import LISTENS
 from .intake import Wanted, owner_of, taken_in
 from .job_book import Entry, NotDoneError
+from .job_store import ANSWER, REPORT
 from .leaving import unless_gone
 from .parameters import Parameters
 from .result_room import result_folder
 from .server_timing import server_timing
 from .service import Service
+from .shared_jobs import SharedJobs
 
 # How often the page of a running job is looked at, and how long a stream may be silent.
 LOOK_SECONDS = 0.25
@@ -53,16 +54,14 @@ def router(service: Service) -> APIRouter:
 
     @routes.get("/jobs/{job_id}", **documentation.JOB)
     async def read_job(request: Request, job_id: str) -> Response:
-        entry = _entry(service, request, job_id)
-        return JSONResponse(job_json(service, entry.job), headers={"Cache-Control": "no-store"})
+        view = await _view(service, request, job_id)
+        return JSONResponse(view, headers={"Cache-Control": "no-store"})
 
     @routes.get("/jobs/{job_id}/events", response_class=StreamingResponse, **documentation.EVENTS)
     async def read_job_events(request: Request, job_id: str) -> Response:
-        entry = _entry(service, request, job_id)
-        # Whoever follows a job can ask again: where connections run short, it gives way.
-        request.scope.get("extensions", {}).get(LISTENS, bool)()
+        await _view(service, request, job_id)
         return StreamingResponse(
-            _events(service, entry.job),
+            _events(service, request, job_id),
             media_type="text/event-stream",
             # A proxy that collects the stream (nginx) would keep it until its end.
             headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
@@ -70,22 +69,17 @@ def router(service: Service) -> APIRouter:
 
     @routes.get("/jobs/{job_id}/result", response_class=Response, **documentation.RESULT)
     async def read_job_result(request: Request, job_id: str) -> Response:
-        job = _entry(service, request, job_id).job
-        kind = answer_type(request, media.MEDIA_TYPES[job.work.target])
-        return _result(service, request, job_id, kind)
+        kind = (await _view(service, request, job_id))["format"]
+        file_type = answer_type(request, media.MEDIA_TYPES[kind])
+        return await _result(service, request, job_id, file_type)
 
     @routes.get("/jobs/{job_id}/report", response_class=Response, **documentation.JOB_REPORT)
     async def read_job_report(request: Request, job_id: str) -> Response:
-        return _result(service, request, job_id, media.JSON)
+        return await _result(service, request, job_id, media.JSON)
 
     @routes.delete("/jobs/{job_id}", status_code=204, **documentation.DELETE_JOB)
     async def delete_job(request: Request, job_id: str) -> Response:
-        entry = _entry(service, request, job_id)
-        if entry.job.state.ended:
-            service.book.forget(job_id)
-        elif entry.task is not None:
-            entry.task.cancel()
-            await asyncio.wait({entry.task})
+        await _delete(service, request, job_id)
         return Response(status_code=204)
 
     return routes
@@ -108,6 +102,7 @@ def job_json(service: Service, job: Job) -> dict[str, Any]:
         "share": round(job.share, 4),
         "estimate_seconds": None if estimate is None else round(estimate, 1),
         "faces": None if job.cost is None else job.cost.faces,
+        "format": job.work.target,
         "problem": problem,
     }
 
@@ -130,23 +125,39 @@ async def _hand_in(service: Service, request: Request, parameters: Parameters) -
     async with AsyncExitStack() as held:
         job = await held.enter_async_context(taken_in(service, request, parameters, wanted))
         entry = service.book.add(job, owner_of(client), client.networks)
-        entry.task = asyncio.create_task(_work(service, job, held.pop_all()))
+        if service.shared is not None:
+            try:
+                await service.shared.publish(job, entry.owner)
+            except ServiceError:
+                service.book.hand_over(job)
+                raise
+        entry.task = asyncio.create_task(_work(service, entry, held.pop_all()))
     try:
         await unless_gone(request.receive, job.accepted.wait())
     except ClientDisconnect:
         # Nobody knows its id. Nothing else would bound how many such jobs wait to be measured.
+        entry.cancelled = True
         service.book.forget(job.id)
         raise
     if job.error is not None and job.waiting is None:
         # Refused before it stood in line: there is nothing to come back for.
+        if service.shared is not None:
+            await service.shared.store.delete(job.id)
         service.book.forget(job.id)
         raise job.error
     return entry
 
 
-async def _work(service: Service, job: Job, held: AsyncExitStack) -> None:
+def begin_shared(service: Service, entry: Entry, held: AsyncExitStack) -> None:
+    """Work on a job that another replica has left."""
+    entry.task = asyncio.create_task(_work(service, entry, held))
+
+
+async def _work(service: Service, entry: Entry, held: AsyncExitStack) -> None:
     """Do a job that no connection waits for, to its end, and be under way until it is fetched."""
+    job, shared = entry.job, service.shared
     async with held:
+        beats = None if shared is None else asyncio.create_task(shared.beat(entry))
         try:
             async with service.admission.working():
                 await service.desk.serve(job)
@@ -158,20 +169,38 @@ async def _work(service: Service, job: Job, held: AsyncExitStack) -> None:
             # The traceback that matters is the worker's.
             log.error("a job failed in its worker:\n%s", error)  # noqa: TRY400
         finally:
-            service.book.keep(job)
-    if job.state is State.DONE:
+            if beats is not None:
+                beats.cancel()
+            # Of jobs that are shared any replica has the result, from the store.
+            if shared is not None and await _to_its_end(shared.end(entry)):
+                service.book.hand_over(job)
+            else:
+                service.book.keep(job)
+    if job.state is State.DONE and shared is None:
         # Who asks now and then whether it is done may not have asked since.
         with suppress(TimeoutError, DrainingError):
             async with service.admission.working(), asyncio.timeout(FETCH_SECONDS):
                 await job.fetched.wait()
 
 
-async def _events(service: Service, job: Job) -> AsyncIterator[str]:
+async def _to_its_end(work: Coroutine[Any, Any, bool]) -> bool:
+    """Wait for a short piece of work, also in a task that is being cancelled."""
+    task = asyncio.create_task(work)
+    await asyncio.wait({task})
+    return task.result()
+
+
+async def _events(service: Service, request: Request, job_id: str) -> AsyncIterator[str]:
     """Yield the job as server-sent events, one for each change, until it has ended."""
     said, silent = "", 0.0
     while True:
-        ended = job.state.ended
-        now = json.dumps(job_json(service, job), separators=(",", ":"))
+        try:
+            view = await _view(service, request, job_id)
+        except ServiceError:
+            # It is forgotten, or the store is away: who follows it asks again.
+            return
+        ended = State(view["state"]).ended
+        now = json.dumps(view, separators=(",", ":"))
         if now != said:
             said, silent = now, 0.0
             yield f"event: progress\ndata: {now}\n\n"
@@ -182,12 +211,69 @@ async def _events(service: Service, job: Job) -> AsyncIterator[str]:
             return
         try:
             async with asyncio.timeout(LOOK_SECONDS):
-                await job.ended.wait()
+                if service.book.has(job_id):
+                    await _entry(service, request, job_id).job.ended.wait()
+                else:
+                    await asyncio.sleep(LOOK_SECONDS)
         except TimeoutError:
-            silent += LOOK_SECONDS
+            pass
+        silent += LOOK_SECONDS
 
 
-def _result(service: Service, request: Request, job_id: str, kind: str) -> Response:
+async def _view(service: Service, request: Request, job_id: str) -> dict[str, Any]:
+    """Return a job as its client sees it, whichever replica works on it. Raises ServiceError."""
+    if service.shared is None or service.book.has(job_id):
+        return job_json(service, _entry(service, request, job_id).job)
+    client = client_of(request, service.settings)
+    return (await service.shared.find(job_id, client.id)).view
+
+
+async def _delete(service: Service, request: Request, job_id: str) -> None:
+    """Cancel a job, or forget one that has ended. Raises ServiceError."""
+    shared = service.shared
+    if shared is None or service.book.has(job_id):
+        entry = _entry(service, request, job_id)
+        ended = entry.job.state.ended
+        if not ended and entry.task is not None:
+            entry.cancelled = True
+            entry.task.cancel()
+            await asyncio.wait({entry.task})
+            return
+        service.book.forget(job_id)
+    else:
+        record = await shared.find(job_id, client_of(request, service.settings).id)
+        ended = State(record.view["state"]).ended
+    if shared is not None:
+        await (shared.store.delete if ended else shared.store.cancel)(job_id)
+
+
+async def _shared_result(
+    shared: SharedJobs, service: Service, request: Request, job_id: str, kind: str
+) -> Response:
+    """Answer with the result of a job that another replica has done."""
+    client = client_of(request, service.settings).id
+    view = (await shared.find(job_id, client)).view
+    if view["state"] == State.FAILED and view["problem"] is not None:
+        return problems.ProblemResponse(view["problem"], view["problem"]["status"])
+    if view["state"] != State.DONE:
+        raise NotDoneError(f"the job is {view['state']}")
+    file = await shared.file(REPORT if kind == media.JSON else ANSWER, job_id)
+    held = ExitStack()
+    held.callback(file.release)
+    return FileAnswer(
+        file,
+        held,
+        service.admission,
+        client,
+        stall_seconds=service.settings.stall_seconds,
+        media_type=kind,
+        headers={"Vary": "Accept", "Cache-Control": "no-store"},
+    )
+
+
+async def _result(service: Service, request: Request, job_id: str, kind: str) -> Response:
+    if service.shared is not None and not service.book.has(job_id):
+        return await _shared_result(service.shared, service, request, job_id, kind)
     job = _entry(service, request, job_id).job
     if job.state is State.FAILED and job.error is not None:
         return problems.of_job(job.error)
@@ -204,6 +290,7 @@ def _result(service: Service, request: Request, job_id: str, kind: str) -> Respo
         held,
         service.admission,
         client_of(request, service.settings).id,
+        stall_seconds=service.settings.stall_seconds,
         media_type=kind,
         headers={
             "Server-Timing": server_timing(job.seconds),
