@@ -24,6 +24,8 @@ BODY, ANSWER, REPORT = "body", "answer", "report"
 # How often a lease is renewed and its job's progress written, and how long it lasts.
 BEAT_SECONDS = 1.0
 LEASE_SECONDS = 10.0
+# How long the store may be silent.
+STORE_SECONDS = 5.0
 
 
 class StoreError(ServiceError):
@@ -131,7 +133,9 @@ class JobStore:
                 "PNS_STORE is set and redis is not installed: pip install 'pns-subdivision[store]'"
             ) from error
         self._errors = (RedisError, OSError)
-        self._redis = Redis.from_url(str(settings.store))
+        self._redis = Redis.from_url(
+            str(settings.store), socket_timeout=STORE_SECONDS, socket_connect_timeout=STORE_SECONDS
+        )
         self._replica = secrets.token_hex(8)
         self._seconds = settings.queue_seconds + settings.job_seconds + settings.result_seconds
         self._result_seconds = settings.result_seconds
