@@ -40,7 +40,8 @@ class Step:
 
     def added(self, envelope: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
         """Return ‖δ‖ from positions and Loop's; where these round, from ratio and envelope."""
-        apart = np.linalg.norm(self.positions - step(loop(), self.mesh).positions, axis=1)
+        base = step(loop(), self.mesh).positions
+        apart = np.linalg.norm(self.positions - base, axis=1)
         return np.where(apart <= rounding(self.mesh), self.ratio * envelope, apart)
 
 

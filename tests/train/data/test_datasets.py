@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-
 from pns_common.connectivity.topology import build_topology
+
 from tests.support.shared import published
 from train.data.datasets import DATASETS
 from train.data.grid import SIDE, grid_faces, jittered_grid

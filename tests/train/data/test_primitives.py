@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from pns_common.connectivity.topology import EdgeClass, build_topology
+
 from train.data.dense_meshes import is_manifold
 from train.data.primitives import PRIMITIVES, TRIANGULATED_QUADS, cylinder, icosphere, l_block
 from train.metrics.fairness import volume

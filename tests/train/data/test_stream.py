@@ -4,8 +4,8 @@ from itertools import islice
 
 import numpy as np
 import pytest
-
 from pns_common.connectivity.topology import EdgeClass, build_topology
+
 from train.data.family_sets import held_out_families, trained_families
 from train.data.plane_meshes import regular_grid, scattered, turned_grid
 from train.data.stream import FAMILIES, SHARES, crossing, decimated, stream

@@ -1,8 +1,8 @@
 """The table of real meshes: what stands beside the methods."""
 
 import numpy as np
-
 from pns_common.refine import refine
+
 from pns_common.schemes import loop
 from train.data.primitives import icosphere
 from train.experiments.beyond.real_meshes import on_surface

@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 import pytest
 import torch
-
 from pns_common.connectivity.topology import build_topology
 from pns_common.refine import refine
+
 from pns_common.schemes import loop
 from train.data.pairs import pair_stream as stream
 from train.data.pairs.grid import grid_pair

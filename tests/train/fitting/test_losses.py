@@ -1,7 +1,7 @@
 import numpy as np
 import torch
-
 from pns_common.connectivity.topology import build_topology
+
 from train.data.batch import pairs_sharing_a_face
 from train.data.datasets import ridge_held_out
 from train.fitting.losses import (

@@ -1,11 +1,11 @@
 import numpy as np
 import torch
-
 from pns_common.connectivity.topology import build_topology, split
 from pns_common.refine import refine
+from train.fitting.one_step import refine_once, vertex_normals
+
 from pns_common.schemes import pns
 from train.data.datasets import ridge_held_out
-from train.fitting.one_step import refine_once, vertex_normals
 from train.models.from_recipe import initial_network, recipe_operator
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 import trimesh
+from pns_common.features.edge_features import FEATURE_SETS
 
 from pns_common import Mesh, ParameterError, clean, load_model, loop, pns, refine
-from pns_common.features.edge_features import FEATURE_SETS
 from service.meshes.weld import weld
 from tests.support.meshes import grid
 from tests.support.shared import shared_path

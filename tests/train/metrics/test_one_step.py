@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-
 from pns_common.connectivity.topology import build_topology
+
 from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule, pns
 from tests.support.networks import published_model
 from tests.support.shared import published

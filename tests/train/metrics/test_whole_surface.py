@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from pns_common.refine import refine
 
 from pns_common.mesh import Mesh
-from pns_common.refine import refine
 from pns_common.schemes import loop
 from train.data.primitives import box, icosphere
 from train.metrics.whole_surface import normal_jump

@@ -5,8 +5,8 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-
 from pns_common.fused.kernels.smoothstep import smoothstep
+
 from train.models.networks import ACTIVATIONS, BoundedNet, unit_correction
 
 

@@ -7,13 +7,13 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-
-from pns_common import Mesh, pns, refine
 from pns_common.connectivity.topology import build_topology
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.orientation import FIRST_FACE, SYMMETRIC
 from pns_common.geometry.frames import edge_stencil, face_normals, shut_where_degenerate
 from pns_common.geometry.rings import Rings
+
+from pns_common import Mesh, pns, refine
 from tests.support.meshes import TETRAHEDRON, bumpy_sphere, manifolds, soups
 from tests.support.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
 from train.certificates.equivariance import well_conditioned

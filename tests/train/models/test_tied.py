@@ -5,15 +5,15 @@ import copy
 import numpy as np
 import pytest
 import torch
-
-from export.onnx_graph import model_bytes
-from export.parity import TOLERANCE, check_parity
-from pns_common import Mesh, pns, refine
 from pns_common.features.edge_features import FEATURE_SETS
 from pns_common.features.ring_features import RING_10
 from pns_common.models.card import ModelCard
 from pns_common.runtimes.onnx_model import model_from_bytes
 from pns_common.runtimes.tied_network import TiedNetwork
+
+from export.onnx_graph import model_bytes
+from export.parity import TOLERANCE, check_parity
+from pns_common import Mesh, pns, refine
 from tests.support.meshes import bumpy_sphere
 from tests.support.networks import SCALE_FREE_CARD
 from train.models.networks import unit_correction

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 import torch
+from pns_common.connectivity.topology import build_topology
 
 from pns_common import loop, pns, refine
-from pns_common.connectivity.topology import build_topology
 from pns_common.errors import ParameterError
 from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule
 from tests.support.networks import scale_free_model

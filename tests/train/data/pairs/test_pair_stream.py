@@ -5,13 +5,13 @@ from itertools import islice
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
-
 from pns_common.connectivity.topology import EdgeClass, build_topology
 from pns_common.geometry.frames import face_normals
 from pns_common.geometry.reference_length import measure_reference_length
-from pns_common.mesh import Mesh
 from pns_common.refine import refine
+from scipy.spatial import cKDTree
+
+from pns_common.mesh import Mesh
 from pns_common.schemes import loop
 from train.data.pairs.authored import authored_pair
 from train.data.pairs.faceted import faceted_pair

@@ -3,8 +3,8 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-
 from pns_common.connectivity.topology import EdgeClass, build_topology
+
 from train.data.pairs.swept import random_profile, swept_pair
 
 SEEDS = st.integers(0, 2**32 - 1)
