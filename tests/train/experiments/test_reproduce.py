@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 import train.experiments.command as command
 import train.run
-from pns_common.errors import MeshError
+from pns_common import MeshError
 from train.data.datasets import DATASETS
 from train.experiments.harness.experiment import Column, Experiment, Figure, Outcome, Table
 from train.experiments.harness.laboratory import FULL, SMALL, Laboratory

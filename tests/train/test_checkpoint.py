@@ -2,7 +2,7 @@ import pytest
 import safetensors.torch
 import torch
 
-from pns_common.errors import ModelError
+from pns_common import ModelError
 from train.models.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from train.models.from_recipe import initial_network
 from train.models.recipes import paper, paper_text

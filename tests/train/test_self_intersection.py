@@ -1,13 +1,14 @@
-"""Self-intersecting faces, against a test of every pair with every edge."""
+"""Faces of meshes that pass through other faces, found in a tree of boxes."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pns_common.mesh import Mesh
+from pns_common import Mesh
+from tests.support.meshes import bumpy_sphere
 from train.data.primitives import icosphere, torus
-from train.metrics.faces.face_boxes import face_boxes
+from train.metrics.faces.face_boxes import WIDE, face_boxes
 from train.metrics.faces.self_intersection import self_intersecting
 
 
@@ -100,3 +101,32 @@ def test_a_wall_of_rulings_does_not_cross_itself_by_rounding(seed):
     turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     noise = 1e-11 * np.random.default_rng(seed).normal(size=points.shape)
     assert not self_intersecting(face_boxes(Mesh(points @ turn + noise, faces))).any()
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 64, 65, 320])
+def test_boxes_hold_their_faces_and_the_boxes_below(count):
+    vertices, faces = bumpy_sphere(subdivisions=2)
+    mesh = Mesh(vertices, faces[:count])
+    for tree in (face_boxes(mesh), face_boxes(Mesh(vertices[::-1], mesh.faces))):
+        np.testing.assert_array_equal(np.sort(tree.order), np.arange(len(mesh.faces)))
+        corners = tree.vertices[tree.faces[tree.order]]
+        np.testing.assert_array_equal(tree.corners, corners)
+        lanes = tree.boxes[tree.last_level :].swapaxes(1, 2).reshape(-1, 6)
+        np.testing.assert_array_equal(lanes[: len(corners), :3], corners.min(axis=1))
+        np.testing.assert_array_equal(lanes[: len(corners), 3:], corners.max(axis=1))
+        assert (lanes[len(corners) :, :3] == np.inf).all()
+        for node in range(1, len(tree.boxes)):
+            above = tree.boxes[(node - 1) // WIDE, :, (node - 1) % WIDE]
+            np.testing.assert_array_equal(above[:3], tree.boxes[node, :3].min(axis=1))
+            np.testing.assert_array_equal(above[3:], tree.boxes[node, 3:].max(axis=1))
+
+
+def test_halves_are_compact():
+    """Of many faces side by side each node of the last level spans a small part."""
+    vertices, faces = bumpy_sphere(subdivisions=4)
+    mixed = np.random.default_rng(0).permutation(len(faces))
+    tree = face_boxes(Mesh(vertices, faces[mixed]))
+    nodes = tree.boxes[tree.last_level :]
+    spans = nodes[:, 3:].max(axis=2) - nodes[:, :3].min(axis=2)
+    whole = np.ptp(vertices, axis=0)
+    assert (spans / whole).max(axis=1).mean() < 4 * (WIDE / len(faces)) ** 0.5

@@ -1,21 +1,21 @@
 """Stars and spectra against Loop's closed forms, an independent matrix and autograd."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
-from pns_common.connectivity.topology import build_topology
 
-from pns_common import loop, pns, refine
-from pns_common.errors import ParameterError
-from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule
-from tests.support.networks import scale_free_model
+from pns_common import ParameterError, load_model, loop, pns, refine
 from train.certificates.adversary import Operator
 from train.certificates.operator_jacobian import operator_jacobian
+from train.connectivity import connect
+from train.models.from_recipe import initial_network
 from train.models.networks import BoundedNet
-from train.models.recipes import paper
+from train.models.recipes import paper, signed
 from train.models.torch_model import recipe_model
+from train.refining import Method, loop_rule
 from train.spectra.margin_gradient import margin_gradient
 from train.spectra.spectrum import (
     FIRST_LIFT,
@@ -28,9 +28,11 @@ from train.spectra.spectrum import (
     follow_lift,
     jacobian,
     loop_gap,
+    quotient_blocks,
     strides,
     without_translations,
 )
+from train.spectra.star_symmetry import keeps_blocks, symmetry_blocks
 from train.spectra.stars import star
 
 
@@ -83,7 +85,7 @@ def test_the_full_gap_at_valence_three_is_an_eighth():
 def test_refined_rings_are_the_rings_at_half_the_size():
     for k in (3, 6):  # where one step of Loop keeps lattices in place, up to the centre's ring
         fan = star(k, 3, 1.0, inner_rings=2)
-        refined = refine(fan.mesh, loop(), reference_length=1.0).mesh.vertices[fan.refined]
+        refined = refine(fan.mesh, loop(), 1, 1.0).mesh.vertices[fan.refined]
         inner = fan.mesh.vertices[fan.inner]
         angle = np.arctan2(inner[1:, 1], inner[1:, 0])
         angles = np.arctan2(refined[1:, 1], refined[1:, 0])
@@ -95,8 +97,7 @@ def test_refined_rings_are_the_rings_at_half_the_size():
 @pytest.mark.parametrize("rings", [2, 3, 4])
 def test_stars_are_regular_but_for_their_centre(k, rings):
     mesh = star(k, rings, 1.0, lift=0.3).mesh
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    valence = np.bincount(topology.edges.reshape(-1))
+    valence = connect(mesh.faces, len(mesh.vertices)).valence.numpy()
     assert len(mesh.vertices) == 1 + k * rings * (rings + 1) // 2
     assert len(mesh.faces) == k * rings**2
     assert valence[0] == k
@@ -187,28 +188,18 @@ def test_tangents_of_a_flat_star_are_those_nearest_loops():
 
 
 def far_sighted(rings):
-    """Loop, and on every edge a pull towards the vertex that is `rings` rings of edges away."""
+    """Loop, and on every edge a pull towards the vertices that are `rings` rings of edges away."""
 
-    def edge_rule(level):
-        base, topology = loop_edge_rule(level), level.topology
-        smooth = np.zeros((topology.vertex_count, topology.vertex_count))
-        smooth[topology.edges[:, 0], topology.edges[:, 1]] = 1
-        smooth += smooth.T + np.eye(len(smooth))
-        seen = np.linalg.matrix_power(smooth, rings)
-        pull = seen / seen.sum(axis=1, keepdims=True) @ level.points
-        positions = base.loop + 0.01 * (pull[topology.edges].mean(axis=1) - base.loop)
-        return Placement(positions, None, base.ratio, base.gate, base.degenerate)
+    def step(points, mesh, reference_length):
+        base = loop_rule(points, mesh, reference_length)
+        smooth = torch.eye(mesh.vertex_count).double()
+        smooth[mesh.centres, mesh.rims] = 1
+        seen = torch.linalg.matrix_power(smooth, rings)
+        pull = (seen / seen.sum(dim=1, keepdim=True)) @ points
+        towards = torch.cat([base.base[: len(points)], pull[mesh.edges].mean(dim=1)])
+        return replace(base, displacement=0.01 * (towards - base.base))
 
-    return Scheme("far-sighted", loop_vertex_rule, edge_rule)
-
-
-def test_what_is_measured_of_the_whole_mesh_is_no_sight_of_a_rule():
-    """The prior's strength, which follows how even a mesh is, is held as R is."""
-    scheme = pns(scale_free_model(prior_strength=0.5, even_prior_strength=1.5))
-    held = pns(scale_free_model(prior_strength=0.5), prior_strength=1.5)
-    build = closed_star(scheme, 5)
-    for lift in (0.0, 0.4):
-        np.testing.assert_array_equal(jacobian(scheme, build(lift)), jacobian(held, build(lift)))
+    return Method("far-sighted", step)
 
 
 def test_a_rule_that_sees_further_gets_more_rings():
@@ -217,3 +208,71 @@ def test_a_rule_that_sees_further_gets_more_rings():
     assert len(closed_star(far_sighted(2), 5)(0.0).inner) == 1 + 5 + 10 + 15 + 20
     with pytest.raises(ParameterError, match="far-sighted"):
         closed_star(far_sighted(9), 5)
+
+
+RECIPE = replace(signed(0), hidden=(24, 24), budget=0.8, gate_sharpness=1e5)
+SYMMETRIC = pns(recipe_model(RECIPE, initial_network(RECIPE).double()))
+
+
+@pytest.mark.parametrize("valence", [3, 4, 5, 6, 12])
+def test_the_blocks_are_an_orthonormal_basis_of_everything(valence):
+    basis = np.concatenate(symmetry_blocks(star(valence, 3, SPOKE), valence), axis=1)
+    np.testing.assert_allclose(basis.T @ basis, np.eye(len(basis)), atol=1e-12)
+
+
+@pytest.mark.parametrize("valence", [3, 4, 6])
+def test_symmetric_rules_keep_the_blocks_of_lifted_stars(valence):
+    fan = star(valence, 4, SPOKE, 0.3, inner_rings=3)
+    blocks = symmetry_blocks(fan, valence)
+    assert keeps_blocks(jacobian(loop(), fan), blocks)
+    assert keeps_blocks(jacobian(SYMMETRIC, fan), blocks)
+
+
+def test_a_rule_that_depends_on_numbering_does_not():
+    fan = star(5, 2, SPOKE, 0.3)
+    assert not keeps_blocks(jacobian(pns(load_model("paper")), fan), symmetry_blocks(fan, 5))
+
+
+def test_a_lopsided_star_does_not():
+    fan = star(5, 4, SPOKE, 0.3, inner_rings=3)
+    fan.mesh.vertices.setflags(write=True)
+    fan.mesh.vertices[7, 2] += 0.1 * SPOKE
+    assert not keeps_blocks(jacobian(SYMMETRIC, fan), symmetry_blocks(fan, 5))
+
+
+@pytest.mark.parametrize("valence", [3, 4, 5])
+def test_blocks_have_the_whole_spectrum(valence):
+    fan = star(valence, 4, SPOKE, 0.2, inner_rings=3)
+    matrix = without_translations(jacobian(SYMMETRIC, fan))
+    flat = flat_spectrum(matrix, valence, quotient_blocks(fan, valence))
+    expected = np.linalg.eigvals(matrix)
+    assert len(flat.values) == len(expected)
+    for value in expected:
+        assert np.abs(flat.values - value).min() < 1e-5
+    np.testing.assert_allclose((flat.right * flat.values @ flat.left).real, matrix, atol=1e-7)
+
+
+def test_each_block_keeps_its_number_of_tangents():
+    """A flat star's six: two of frequency 0, and the pairs of frequencies 1 and 2."""
+    for followed in follow_lift(SYMMETRIC, 5, [0.0, 0.2, 0.4]):
+        counts = np.bincount(followed.block[followed.tangent], minlength=len(followed.blocks))
+        assert counts.tolist() == [1, 1, 1, 1, 1, 1]
+
+
+def test_eigenvalues_that_cross_from_different_blocks_are_told_apart():
+    """In one stride: a tangent of one block comes to lie below another block's rest."""
+    blocks = (np.eye(8)[:, :2], np.eye(8)[:, 2:])
+    before = np.diag([0.5, 0.1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.2])
+    after = np.diag([0.2, 0.1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.4])
+    after[6, 7] = 5.0  # far from normal
+    continued = continued_spectrum(after, flat_spectrum(before, 6, blocks))
+    assert continued.tangent.tolist() == [True, False, True, True, True, True, True, False]
+    assert continued.margin == pytest.approx(-0.2)
+
+
+def test_eigenvalues_that_just_meet_do_not_stop_the_search():
+    matrix = np.diag([0.5] * 6 + [0.2, 0.2])
+    matrix[6, 7] = 1.0  # a Jordan block: one eigenvector for two eigenvalues
+    continued = continued_spectrum(matrix, flat_spectrum(np.diag([0.5] * 6 + [0.2, 0.1]), 6))
+    assert continued.margin == pytest.approx(0.3)
+    assert np.isfinite(continued.left).all()

@@ -9,7 +9,7 @@ import torch
 from typer.testing import CliRunner
 
 import train.run
-from pns_common.errors import ParameterError
+from pns_common import ParameterError
 from train.data.pairs import pair_stream as stream
 from train.data.primitives import box, globe, tetrahedron
 from train.fitting import distillation

@@ -8,22 +8,25 @@ import msgspec
 import numpy as np
 import pytest
 import torch
-from pns_common.connectivity.topology import build_topology
-from pns_common.refine import refine
 
-from pns_common.schemes import loop
+from pns_common import loop, pns
+from train.connectivity import connect
 from train.data.pairs import pair_stream as stream
 from train.data.pairs.grid import grid_pair
 from train.data.pairs.references import AUTHORED, Pair, Reference
 from train.data.primitives import box, globe, torus
 from train.fitting import limit_trainer
+from train.fitting.learned_level import learned_level
 from train.fitting.limit_batch import SMOOTH_KINDS, limit_batch
 from train.fitting.limit_loss import Standards, limit_loss, measure
-from train.fitting.limit_maps import applied, limit_maps, loop_matrix
+from train.fitting.limit_maps import applied, limit_maps
 from train.fitting.limit_trainer import fit_to_limit, limit_measures, standards_of
+from train.loop_masks import loop_mask
 from train.metrics.fairness import bending, vertex_normals
-from train.models.from_recipe import initial_network, initial_vertex_network, recipe_scheme
+from train.models.from_recipe import general_rule, initial_network, initial_vertex_network
 from train.models.recipes import general
+from train.models.torch_model import recipe_model
+from train.refining import refine
 
 SHAPES = {"torus": torus(7, 5), "globe": globe(9, 4), "box": box(1, 2, 3)}
 SURFACE = Reference(SHAPES["torus"].vertices, vertex_normals(SHAPES["torus"]))
@@ -41,7 +44,7 @@ def no_solids():
 @pytest.fixture(scope="module")
 def batch(no_solids):
     small = (pair for pair in stream.pair_stream(0) if len(pair.coarse.faces) < 400)
-    return limit_batch(list(islice(small, 5)), np.random.default_rng(0))
+    return limit_batch(list(islice(small, 5)), general(), np.random.default_rng(0))
 
 
 def open_grid():
@@ -49,17 +52,30 @@ def open_grid():
 
 
 @pytest.mark.parametrize("mesh", [*SHAPES.values(), open_grid()], ids=[*SHAPES, "grid"])
-def test_the_matrix_of_a_level_is_loop(mesh):
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    expected = refine(mesh, loop(), 1, threads=1).mesh.vertices
-    np.testing.assert_allclose(loop_matrix(topology) @ mesh.vertices, expected, atol=1e-14)
+def test_the_step_that_is_trained_is_the_formulas_and_the_products(mesh):
+    recipe = general()
+    networks = [initial_network(recipe).double(), initial_vertex_network(recipe).double()]
+    generator = torch.Generator().manual_seed(0)
+    with torch.no_grad():
+        for network in networks:
+            last = network.linear_layers[-1]
+            last.weight = torch.randn(last.weight.shape, generator=generator).double()
+    made = learned_level(mesh, recipe).points(*networks).detach()
+    level = connect(mesh.faces, len(mesh.vertices))
+    expected = general_rule(recipe, *networks)(torch.tensor(mesh.vertices), level).points.detach()
+    torch.testing.assert_close(made, expected, rtol=0, atol=1e-12)
+    # In use the prior is weaker.
+    weaker = replace(recipe.scale_free, prior_strength=recipe.training.trained_strength)
+    scheme = pns(recipe_model(replace(recipe, scale_free=weaker), *networks))
+    product = refine(mesh, scheme, 1, 1.0, creases=None).mesh.vertices
+    np.testing.assert_allclose(made, product, atol=1e-12)
 
 
 @pytest.mark.parametrize("levels", [0, 1])
 @pytest.mark.parametrize("mesh", [*SHAPES.values(), open_grid()], ids=[*SHAPES, "grid"])
 def test_maps_lead_to_where_many_levels_lead(mesh, levels):
-    maps = limit_maps(build_topology(mesh.faces, len(mesh.vertices)), levels)
-    deep = refine(mesh, loop(), 5, threads=1).mesh
+    maps = limit_maps(connect(mesh.faces, len(mesh.vertices)), levels)
+    deep = refine(mesh, loop(), 5).mesh
     count = len(maps.ancestor)
     positions = maps.position @ mesh.vertices
     np.testing.assert_allclose(positions, deep.vertices[:count], atol=1e-3 * np.ptp(mesh.vertices))
@@ -75,7 +91,7 @@ def test_maps_lead_to_where_many_levels_lead(mesh, levels):
 
 def test_applied_has_the_transposed_gradient():
     mesh = SHAPES["torus"]
-    matrix = loop_matrix(build_topology(mesh.faces, len(mesh.vertices)))
+    matrix = loop_mask(connect(mesh.faces, len(mesh.vertices))).matrix()
     points = torch.from_numpy(mesh.vertices.copy()).requires_grad_()
     weights = torch.rand(matrix.shape[0], 3, dtype=torch.float64)
     (weights * applied(matrix, points)).sum().backward()
@@ -111,7 +127,7 @@ def test_bending_too_much_costs_by_the_kind_of_mesh(kind, batch, held):
 
 def test_what_is_to_bend_no_more_than_the_prior_is_counted_as_smooth():
     pairs = [Pair(kind, SHAPES["torus"], SURFACE) for kind in (*SMOOTH_KINDS, "faceted", AUTHORED)]
-    batch = limit_batch(pairs, np.random.default_rng(0))
+    batch = limit_batch(pairs, general(), np.random.default_rng(0))
     assert batch.smooth.tolist() == [True] * len(SMOOTH_KINDS) + [False, False]
     assert batch.authored.tolist() == [False] * (len(SMOOTH_KINDS) + 1) + [True]
 
@@ -138,9 +154,9 @@ def kinds_of(batch, kind="sharp"):
 @pytest.mark.parametrize("mesh", [torus(9, 6), globe(11, 6), box(1, 2, 3)])
 def test_bending_is_that_of_a_finely_refined_mesh(mesh):
     pair = Pair("", mesh, Reference(mesh.vertices, vertex_normals(mesh)))
-    one = limit_batch([pair], np.random.default_rng(0))
-    points = applied(loop_matrix(one.level.topology), one.level.points)
-    expected = bending(refine(mesh, loop(), 5, threads=1).mesh)
+    one = limit_batch([pair], general(), np.random.default_rng(0))
+    points = one.level.base
+    expected = bending(refine(mesh, loop(), 5).mesh)
     assert measure(one, points).bend.item() == pytest.approx(expected, rel=0.03)
 
 
@@ -148,9 +164,9 @@ def test_untrained_networks_leave_the_prior_where_a_surface_bends_gently():
     recipe, mesh = general(), torus(24, 14)
     networks = initial_network(recipe), initial_vertex_network(recipe)
     pair = Pair("", mesh, Reference(mesh.vertices, vertex_normals(mesh)))
-    one = limit_batch([pair], np.random.default_rng(0))
+    one = limit_batch([pair], general(), np.random.default_rng(0))
     with torch.no_grad():
-        measures = limit_measures(one, recipe_scheme(recipe, *networks))
+        measures = limit_measures(one, *networks)
     standards = standards_of(one)
     torch.testing.assert_close(measures.bend, standards.prior.bend, rtol=1e-3, atol=0)
     assert (measures.bend < standards.loop.bend).all()
@@ -158,7 +174,7 @@ def test_untrained_networks_leave_the_prior_where_a_surface_bends_gently():
 
 def test_measures_see_a_shift(batch):
     with torch.no_grad():
-        points = applied(loop_matrix(batch.level.topology), batch.level.points)
+        points = batch.level.base
         shift = torch.tensor([0.3, 0.2, 0.1])
         here, away = measure(batch, points), measure(batch, points + shift)
     assert (away.mean > here.mean + 0.02).all()
@@ -177,7 +193,7 @@ def test_batches_made_ahead_are_those_made_here(no_solids, monkeypatch):
     kept = [[0], [0, 1], [1, 2], [2, 3]]
     expected = [drawn[kept[n][place]] for n, draw in enumerate(drawn) for place in draw.places]
     for batch, draw in zip(given, expected, strict=True):
-        assert torch.equal(batch.level.points, draw.batch.level.points)
+        assert torch.equal(batch.level.base, draw.batch.level.base)
     # A batch that has travelled has the measures that it had.
     travelled = pickle.loads(pickle.dumps(drawn[0]))
     measured = standards_of(travelled.batch)

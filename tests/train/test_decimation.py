@@ -1,10 +1,10 @@
-"""Simplified meshes: what they keep, and how methods are compared on them."""
+"""The decimation test: coarse meshes of dense ones, refined and measured."""
 
 import numpy as np
 import pytest
 import trimesh
 
-from pns_common import Mesh, load_model, loop, pns, refine
+from pns_common import Mesh, load_model, loop, pns
 from tests.support.meshes import bent, bumpy_sphere, grid, icosphere
 from tests.support.shared import shared_path
 from train.baselines.butterfly import modified_butterfly
@@ -23,6 +23,7 @@ from train.metrics.decimation import (
     summaries,
 )
 from train.metrics.surface_distance import SurfaceErrors
+from train.refining import refine
 
 SPHERE = DenseMesh("sphere", CAD, Mesh(*bumpy_sphere(subdivisions=3, bump=0.02)))
 
@@ -145,7 +146,7 @@ def test_on_a_sphere_interpolation_is_nearer_than_loop(rows):
 
 def test_a_dense_mesh_that_is_its_own_refinement_has_no_error():
     coarse = Mesh(*bumpy_sphere())
-    dense = refine(coarse, loop(), 2, threads=1).mesh
+    dense = refine(coarse, loop(), 2).mesh
     (row,) = compare([Pair(DenseMesh("own", CAD, dense), coarse, 0)], {"loop": loop()}, (2,), 500)
     assert row.errors.hausdorff == pytest.approx(0, abs=1e-12)
 

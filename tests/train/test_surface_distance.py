@@ -1,4 +1,4 @@
-"""How far surfaces are apart, where the answer is known in closed form."""
+"""Distances between meshes as surfaces."""
 
 import numpy as np
 import pytest

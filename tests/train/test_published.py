@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import torch
 
-from pns_common.errors import ModelError
+from pns_common import ModelError
 from tests.support.shared import shared_path
 from train.models.published import is_operator, load_published, network_from_state, published_budget
 

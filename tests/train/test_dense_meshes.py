@@ -1,4 +1,4 @@
-"""Which files of a folder are in the decimation test, and what of them."""
+"""Dense meshes that files hold."""
 
 import numpy as np
 import pytest
@@ -178,7 +178,7 @@ def test_the_dense_shared_meshes_are_taken():
         assert is_manifold(entry.mesh)
     path = shared_path("assets/spot_control_mesh.obj")
     control = trimesh.load_mesh(path, process=False, skip_materials=True)
-    again = refine(welded(Mesh(control.vertices, control.faces)), loop(), 3, threads=1).mesh
+    again = refine(welded(Mesh(control.vertices, control.faces)), loop(), 3).mesh
     np.testing.assert_allclose(
         np.sort(taken["spot"].mesh.vertices, axis=0), np.sort(again.vertices, axis=0), atol=1e-12
     )
