@@ -3,12 +3,16 @@
 It writes a checkpoint and prints the held-out table; so does `distil`, of several trainings.
 """
 
+import sys
 import time
 from collections.abc import Generator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
+
+# Started as a file, Python looks for packages beside it and not in the checkout.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import typer
 from rich.console import Console
