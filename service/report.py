@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from pns_common.levels.diagnostics import EdgeCounts, GateSummary, LevelReport, RatioSummary
-from pns_common.refine import Report
+from pns_common.report import EdgeCounts, GateSummary, LevelReport, RatioSummary, Report
 from pns_common.schemes import Scheme
 
 from .errors import shortened, shortened_pointer
@@ -157,7 +156,6 @@ def _mesh(result: MeshResult) -> dict[str, Any]:
         "index": result.index,
         "instances": result.instances,
         "reference_length": 0.0 if report is None else report["reference_length"],
-        "prior_strength": None if report is None else report["prior_strength"],
         "multi_fan_vertices": 0 if report is None else report["multi_fan_vertices"],
         "learned_levels": 0 if report is None else report["learned_levels"],
         "limit_distance": 0.0 if report is None else report["limit_distance"],

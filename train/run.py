@@ -1,6 +1,7 @@
 """The laboratory's entry: `python train/run.py` trains the default recipe.
 
-It writes a checkpoint and prints the held-out table; so does `distil`, of several trainings.
+It writes a checkpoint and prints the held-out table; so does `distil`, which fits networks to the
+answers of other models.
 """
 
 import sys
@@ -24,12 +25,12 @@ from train.certificates.command import certify_command
 from train.experiments.command import reproduce_command
 from train.fitting.determinism import machine_fingerprint
 from train.fitting.distillation import distil as distilled
-from train.fitting.distillation import planned
+from train.fitting.distillation import load_teacher, planned
 from train.fitting.trainer import fit
 from train.metrics.card import card_metrics
 from train.metrics.one_step import improvements_as_data
 from train.metrics.tables import improvement_table
-from train.models.checkpoint import Checkpoint, Distillation, load_checkpoint, save_checkpoint
+from train.models.checkpoint import Checkpoint, Distillation, save_checkpoint
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
 from train.models.recipes import RECIPES
@@ -37,8 +38,8 @@ from train.models.torch_model import recipe_model
 from train.output_file import prepare_output
 
 CHECKPOINTS = Path("checkpoints")
-# Of a distillation, where nothing else is said.
-MESHES, STEPS = 1500, 10_000
+# Defaults of a distillation.
+MESHES, STEPS = 500, 10_000
 
 Output = Annotated[
     Path | None,
@@ -52,7 +53,7 @@ if TYPE_CHECKING:
     RecipeName = str
 else:  # A type checker cannot see the members that a table gives.
     RecipeName = StrEnum("RecipeName", {name: name for name in RECIPES})
-DEFAULT_RECIPE = RecipeName("paper")
+DEFAULT_RECIPE, DISTILLED_RECIPE = RecipeName("paper"), RecipeName("general")
 
 app = typer.Typer(
     help="Train, measure and certify the operator.",
@@ -93,31 +94,34 @@ def train(
 
 @app.command()
 def distil(
-    checkpoints: Annotated[list[Path], typer.Argument(help="Trainings of one scale-free recipe.")],
+    teachers: Annotated[list[Path], typer.Argument(help="Model files, or checkpoints.")],
+    recipe: Annotated[
+        RecipeName, typer.Option(help="Whose networks to fit: a scale-free one.")
+    ] = DISTILLED_RECIPE,
     meshes: Annotated[int, typer.Option(min=1, help="Pairs of the stream to ask on.")] = MESHES,
     steps: Annotated[int, typer.Option(min=1, help="Adam steps of each network.")] = STEPS,
     output: Output = None,
 ) -> None:
-    """Fit the networks of a recipe to what those of its trainings answer in the mean."""
+    """Fit the networks of a recipe to what teachers answer in the mean."""
     console = Console()
     began = time.perf_counter()
+    chosen = RECIPES[recipe](0)
+    path = output or CHECKPOINTS / f"{chosen.name}.safetensors"
     with _errors_told(console):
-        members = [load_checkpoint(path) for path in checkpoints]
-        recipe = _as_it_is_now(members[0].recipe)
-        plan = planned(recipe, members, meshes, steps)
-        path = output or CHECKPOINTS / f"{recipe.name}.safetensors"
-        if path.resolve() in [each.resolve() for each in checkpoints]:
-            raise ParameterError("output", str(path), expected="another file than the trainings")
+        loaded = [load_teacher(each) for each in teachers]
+        plan = planned(chosen, loaded, meshes, steps)
+        if path.resolve() in [each.resolve() for each in teachers]:
+            raise ParameterError("output", str(path), expected="another file than the teachers")
         prepare_output(path)
     with _progress(console) as progress:
-        task = progress.add_task(f"distilling {recipe.name}", total=2 * steps, loss=float("nan"))
+        task = progress.add_task(f"distilling {chosen.name}", total=2 * steps, loss=float("nan"))
         networks = distilled(
-            recipe,
-            members,
+            chosen,
+            loaded,
             plan,
             lambda done, loss: progress.update(task, completed=done, loss=loss),
         )
-    _measure_and_save(path, recipe, *networks, plan, console)
+    _measure_and_save(path, chosen, *networks, plan, console)
     _say_written(path, began, console)
 
 
@@ -129,13 +133,6 @@ def _errors_told(console: Console) -> Generator[None, None, None]:
     except PnsError as error:
         console.print(escape(str(error)), style="red", soft_wrap=True)
         raise typer.Exit(1) from error
-
-
-def _as_it_is_now(recipe: Recipe) -> Recipe:
-    """Return the recipe of this name and seed. Raises ParameterError where there is none."""
-    if recipe.name not in RECIPES:
-        raise ParameterError("recipe", recipe.name, expected=f"one of {', '.join(RECIPES)}")
-    return RECIPES[recipe.name](recipe.seed)
 
 
 def _measure_and_save(

@@ -65,16 +65,16 @@ def load_model(
 
     Raises:
         ParameterError: ``source`` is neither a name nor a path, or a provider is not available.
-        ModelError: there is no such file, it breaks the contract (says which part), or a bundled
-            file is not the one that SHA256SUMS names.
+        ModelError: there is no such file, it breaks the contract (says which part), a bundled
+            file is not the one that SHA256SUMS names, or there is no package onnx to check others.
     """
     source = DEFAULT_MODEL if source is None else source
     if not isinstance(source, str | os.PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise ParameterError("source", source, expected="a bundled name, a path, or None")
     if _is_bundled(source):
         data = (BUNDLED / f"{source}.onnx").read_bytes()
-        _check_listed(BUNDLED, source, data)
-        return model_from_bytes(data, source, providers)
+        # Its hash stands for the check, which takes longer than to refine a small mesh.
+        return OnnxModel(source, _listed_hash(BUNDLED, source, data), data, providers)
     path = Path(source)
     if not path.is_file():
         names = ", ".join(bundled_models()) or "none"
@@ -106,7 +106,7 @@ def model_from_bytes(data: bytes, name: str, providers: Sequence[str] = CPU) -> 
         ModelError: the file breaks the contract; ``name`` is what the error calls it.
     """
     card = check_file(data, name)
-    return OnnxModel(name, card, hashlib.sha256(data).hexdigest(), data, providers)
+    return OnnxModel(name, hashlib.sha256(data).hexdigest(), data, providers, card)
 
 
 def write_manifest(folder: Path) -> None:
@@ -137,8 +137,8 @@ def check_file(data: bytes, name: str) -> ModelCard:
     return card
 
 
-def _check_listed(folder: Traversable, name: str, data: bytes) -> None:
-    """Check a bundled file against the manifest beside it. Raises ModelError."""
+def _listed_hash(folder: Traversable, name: str, data: bytes) -> str:
+    """Return the hash of a bundled file, which the manifest beside it names. Raises ModelError."""
     path = folder / MANIFEST
     if not path.is_file():
         raise ModelError(name, expected=f"{MANIFEST} beside the bundled models", found="none")
@@ -147,6 +147,7 @@ def _check_listed(folder: Traversable, name: str, data: bytes) -> None:
     found = hashlib.sha256(data).hexdigest()
     if found != wanted:
         raise ModelError(name, expected=f"sha256 {wanted} ({MANIFEST})", found=found)
+    return found
 
 
 def _check_size(size: int, name: str) -> None:
@@ -156,9 +157,12 @@ def _check_size(size: int, name: str) -> None:
 
 def _parsed(data: bytes, name: str) -> ModelProto:
     """Parse a file of bounded size. Raises ModelError."""
-    import onnx  # lazy: an import of 0.2 s
-    from google.protobuf.message import DecodeError
-
+    try:
+        import onnx  # lazy: an import of 0.2 s
+        from google.protobuf.message import DecodeError
+    except ImportError as error:
+        expected = "the package onnx, which checks files that are not bundled"
+        raise ModelError(name, expected=expected, found="none") from error
     _check_size(len(data), name)
     try:
         proto = onnx.load_from_string(data)

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from pns_common.errors import ModelError, ParameterError
-from pns_common.model.card import EDGE_FEATURES, VERTEX_FEATURES, ModelCard
+from pns_common.model.card import CARD_KEY, EDGE_FEATURES, VERTEX_FEATURES, ModelCard
 
 # Rows of one call of onnxruntime. 1,024 take a fifth longer a row, 8,192 and 16,384 as long.
 CHUNK_ROWS = 4096
@@ -84,26 +84,34 @@ class OnnxModel:
     """
 
     def __init__(
-        self, name: str, card: ModelCard, digest: str, data: bytes, providers: Sequence[str] = CPU
+        self,
+        name: str,
+        digest: str,
+        data: bytes,
+        providers: Sequence[str] = CPU,
+        card: ModelCard | None = None,
     ):
-        """Open a file that ``file.check_file`` has checked.
+        """Open a file that is known to keep the contract; ``card`` is read where it is None.
 
         Raises:
             ParameterError: a provider is not available here.
             ModelError: onnxruntime cannot run the graph.
         """
-        self.name, self.card, self.hash, self.size = name, card, digest, len(data)
-        self._data, self._wanted = data, tuple(providers)
-        self._networks = {network.given: network for network in networks(card)}
-        self._sessions = threading.local()
-        self.providers: tuple[str, ...] = tuple(self._session().get_providers())
+        self.name, self.hash, self.size = name, digest, len(data)
+        self._data, self._wanted, self._sessions = data, tuple(providers), threading.local()
+        session = self._session()
+        self.providers: tuple[str, ...] = tuple(session.get_providers())
+        self.card = card or ModelCard.from_json(
+            session.get_modelmeta().custom_metadata_map[CARD_KEY]
+        )
+        self._networks = {network.given: network for network in networks(self.card)}
 
     def __repr__(self) -> str:
         return f"OnnxModel(name={self.name!r}, hash={self.hash!r})"
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A session cannot travel to another process; the file's bytes can.
-        return OnnxModel, (self.name, self.card, self.hash, self._data, self._wanted)
+        return OnnxModel, (self.name, self.hash, self._data, self._wanted, self.card)
 
     def __call__(
         self, features: Float[np.ndarray, "N K"], budget: float

@@ -33,7 +33,7 @@ from .watch.tracing import tracer_from_environment
 log = logging.getLogger("pns.service")
 
 if TYPE_CHECKING:
-    from pns_common.schemes import Model
+    from pns_common.model.session import Model
 
 
 def create_app(

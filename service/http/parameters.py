@@ -12,7 +12,6 @@ from ..options import (
     CREASE_PATTERN,
     DEFAULTS,
     MAX_LEVELS,
-    MAX_PRIOR_STRENGTH,
     MAX_WELD_TOLERANCE,
     Compression,
     Diagnostics,
@@ -59,20 +58,12 @@ class Parameters(BaseModel):
     model: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
         default=None,
         description="a name from `GET /models`; empty: the service's default. `scheme=loop` has no "
-        "use for it, for `budget` or for `prior_strength`: they are checked and nothing else",
+        "use for it or for `budget`: both are checked and then have no effect",
     )
     budget: Annotated[
         Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,
         BeforeValidator(_empty_is_absent),
     ] = Field(default=DEFAULTS.budget, description="C, dimensionless; empty: the model's own")
-    prior_strength: Annotated[
-        Annotated[float, Field(ge=0, le=MAX_PRIOR_STRENGTH, allow_inf_nan=False)] | None,
-        BeforeValidator(_empty_is_absent),
-    ] = Field(
-        default=DEFAULTS.prior_strength,
-        description="s of the model's prior, the same for every mesh; empty: as each mesh calls "
-        "for. A model without a prior refuses it",
-    )
     reference_length: Annotated[
         Literal["auto"] | Annotated[float, Field(gt=0, allow_inf_nan=False)],
         BeforeValidator(_length),
@@ -98,11 +89,10 @@ class Parameters(BaseModel):
     crease: str = Field(
         default=DEFAULTS.crease,
         pattern=f"^({CREASE_PATTERN})$",
-        description="edges to keep sharp: `lines` (those that the mesh shows: sharp, flat on both "
-        "sides, and going on), `auto` (where the model's card asks for them, these, the hard "
-        "edges of what is shaded smooth, and borders of primitives on flat sides), `off`, "
-        "`normals` (where the two sides carry different normals) or `angle:` and degrees (where "
-        "the faces meet at more)",
+        description="edges to keep sharp: `auto` (for models of format 4, as `general`: edges "
+        "beyond 40 degrees that are connected to one beyond 60, at as many levels as the card "
+        "says), `off`, `normals` (edges whose two sides carry different normals) or `angle:` and "
+        "degrees (edges whose faces meet at more)",
     )
     weld_tolerance: float = Field(
         default=DEFAULTS.weld_tolerance,

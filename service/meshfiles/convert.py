@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from pns_common import load_model
-from pns_common.base.whole_file import replace_file
-from pns_common.schemes import Model
+from pns_common.files import replace_file
+from pns_common.model.session import Model
 
 from ..bodies.folder import folder_of
 from ..bodies.media import GLTF_KINDS, KINDS
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..course import Course
 from ..errors import InvalidParameter
-from ..gltf.read.extras import REPORT_KEY
 from ..gltf.read.upload import read_upload
 from ..gltf.subdivide import make_scheme, subdivide_gltf
+from ..gltf.write.storage import REPORT_KEY
 from ..options import Limits, Options
 from ..printable import printable
 from ..report import Change

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from pns_common.rows import distinct_rows
 
-from pns_common.base.distinct import distinct_rows
 from pns_common.mesh import repeated_vertex
 
 from ..errors import UnrefinableError

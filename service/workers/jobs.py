@@ -6,6 +6,7 @@ imports this module to name its jobs, and never runs them.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from ..course import Course
 from ..errors import LimitError, NoModelError, check_limit
-from ..gltf.read.memory_cap import memory_cap
+from ..memory_cap import memory_cap
 from ..options import Limits, Options
 from . import memory_file
 from .costs import Cost
@@ -22,10 +23,11 @@ from .models import Models
 from .progress import Reporter
 
 if TYPE_CHECKING:
-    from pns_common.schemes import Model
+    from pns_common.model.session import Model
 
     from .catalogue import Catalogue
 
+log = logging.getLogger("pns.service")
 
 # What an archive may take to be measured; others wait meanwhile.
 GLANCE_BYTES = 128 * 1024**2
@@ -170,13 +172,13 @@ _MODELS = Models()
 
 def warm_up(model: Model | str | None) -> None:
     """Import and load what the first request would otherwise wait for. Raises NoModelError."""
-    from pns_common.fused import load_kernels
+    from pns_common import warm_up as compile_kernels
 
     from ..gltf import subdivide  # noqa: F401
     from ..meshfiles import to_gltf  # noqa: F401
     from ..meshfiles.formats import load_readers
 
-    load_kernels()
+    compile_kernels(log.info)
     load_readers()
     hold_model(model)
 

@@ -12,9 +12,9 @@ import msgspec
 
 from ..bodies.media import Kind
 from ..errors import ServiceError
+from ..gltf.constants import SURFACES, TRIANGLES
 from ..gltf.read.container import read_container
 from ..gltf.read.json_text import BOM, check_size, json_items
-from ..gltf.read.modes import SURFACES, TRIANGLES
 from ..gltf.read.plan import joint_sets
 from ..meshfiles.counted import count_triangles
 from ..options import Limits

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import logging
 import os
 import signal
+import sys
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -86,7 +88,7 @@ def rare_searches() -> Iterator[None]:
 
 
 def give_back() -> None:
-    """Give what jobs have freed, and kept for the next one, back to the system."""
-    from pns_common.fused import freed_memory
-
-    freed_memory.give_back()
+    """Return freed memory, which glibc keeps for the next job, to the system."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
+    if trim is not None:
+        trim(0)

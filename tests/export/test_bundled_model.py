@@ -28,14 +28,11 @@ BY_MODEL = {path.stem: recipe for recipe, path in FILE_OF_RECIPE.items()}
 # Models that are trained within seconds: tests train them again.
 QUICK = ("paper", "signed")
 
-# Models that stay readable and exact; what trained them is gone.
-OLDER = ("full",)
-
 each_model = pytest.mark.parametrize("name", sorted(BY_MODEL))
 
 
 def test_every_bundled_model_has_a_recipe_and_every_file_is_there():
-    assert sorted([*BY_MODEL, *OLDER]) == bundled_models()
+    assert sorted(BY_MODEL) == bundled_models()
     assert DEFAULT_MODEL in BY_MODEL
 
 

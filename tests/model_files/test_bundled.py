@@ -1,13 +1,21 @@
 """A bundled model is the one that was bundled, to the last bit."""
 
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from pns_common import ModelError
 from pns_common.model import file as model_file
-from pns_common.model.file import BUNDLED, MANIFEST, bundled_models, load_model, write_manifest
+from pns_common.model.file import (
+    BUNDLED,
+    MANIFEST,
+    bundled_models,
+    check_file,
+    load_model,
+    write_manifest,
+)
 
 
 @pytest.fixture
@@ -31,8 +39,19 @@ def test_sha256sum_agrees():
 
 
 @pytest.mark.parametrize("name", bundled_models())
-def test_every_bundled_model_loads(name):
-    assert load_model(name).name == name
+def test_every_bundled_model_keeps_the_contract_and_loads(name):
+    """Loading trusts the hash, so the check is here."""
+    model = load_model(name)
+    assert model.name == name
+    assert model.card == check_file((BUNDLED / f"{name}.onnx").read_bytes(), name)
+
+
+def test_bundled_models_load_without_the_package_onnx_and_no_others_do(monkeypatch):
+    """As in Blender, whose archive leaves it out."""
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    assert load_model().card.format == 4
+    with pytest.raises(ModelError, match="the package onnx"):
+        load_model(Path(str(BUNDLED)) / "paper.onnx")
 
 
 def test_the_default_is_bundled_and_of_format_4():

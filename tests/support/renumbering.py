@@ -50,9 +50,7 @@ def asset(name):
     loaded.merge_vertices(merge_tex=True, merge_norm=True)
     mesh = clean(Mesh(np.asarray(loaded.vertices), np.asarray(loaded.faces))).mesh
     centred = mesh.vertices - mesh.vertices.mean(axis=0)
-    return Mesh(
-        centred / measure_reference_length(mesh.vertices, mesh.faces.reshape(-1)), mesh.faces
-    )
+    return Mesh(centred / measure_reference_length(mesh.vertices, mesh.corners), mesh.faces)
 
 
 @dataclass(frozen=True, eq=False)

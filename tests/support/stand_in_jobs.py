@@ -26,7 +26,7 @@ from service.workers.jobs import Done, Work, hold_model, job_memory
 from service.workers.progress import Reporter
 
 if TYPE_CHECKING:
-    from pns_common.schemes import Model
+    from pns_common.model.session import Model
 
 
 def no_warm_up(model: object) -> None:
@@ -38,9 +38,9 @@ def hold_among(folder: str, model: Model | str | None) -> None:
 
     Unlike the real warm-up it loads no kernels and no readers: small meshes do without.
     """
-    from pns_common.runtimes import onnx_model
+    from pns_common.model import file
 
-    onnx_model.BUNDLED = Path(folder)
+    file.BUNDLED = Path(folder)
     hold_model(model)
 
 
@@ -206,7 +206,7 @@ def pid() -> int:
 
 def leave_freed() -> int:
     """The pages that the process has once it has freed 36 MiB, and kept most of them."""
-    from pns_common.fused.freed_memory import keep_freed_memory
+    from pns_common.memory import keep_freed_memory
 
     keep_freed_memory()
     tables = [bytearray(3 * 2**20) for _ in range(12)]

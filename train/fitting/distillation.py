@@ -1,33 +1,37 @@
-"""Networks fitted to what those of other trainings answer, in the mean.
+"""Networks fitted to what other models answer, in the mean.
 
 A network that learns another's answers, and not the shapes behind them, comes near to what it says
-(Bucilă, Caruana and Niculescu-Mizil 2006; Hinton, Vinyals and Dean 2015): so a rule gets another
-activation, which takes less time, and keeps what it was chosen for. Of several trainings it learns
-the mean answer, which errs less than each.
+(Bucilă, Caruana and Niculescu-Mizil 2006; Hinton, Vinyals and Dean 2015): so a rule gets a smaller
+network or another activation, which takes less time, and keeps what it was chosen for. Of several
+teachers it learns the mean answer, which errs less than each.
 
-The members are asked on the coarse meshes of the training stream, on what Loop makes of some of
-them, which has the small bends of fine meshes, and on regular ones: these have few rows each, and
-an error there shows as a shape that is less round. No answer leaves the unit ball, nor does a mean.
+Teachers are asked at level 0, on the coarse meshes of the training stream, on what Loop makes of
+some of them, which has the small bends of fine meshes, and on regular ones: these have few rows
+each, and an error there shows as a shape that is less round. A row counts by the square of its
+gate, since the operator adds gate times answer.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import torch
 from jaxtyping import Float, Float32
+from torch import Tensor
 
-from pns_common import Mesh, ParameterError, loop, pns, refine
+from pns_common import Mesh, ParameterError, load_model, loop, pns, refine
 from pns_common.model.card import ModelCard
+from pns_common.model.session import Model
 from train.data.pairs.pair_stream import pair_stream
 from train.data.primitives import box, globe, icosphere, tetrahedron, torus
 from train.fitting.determinism import deterministic
-from train.models.checkpoint import Checkpoint, Distillation
+from train.models.checkpoint import Distillation, load_checkpoint
 from train.models.from_recipe import initial_network, initial_vertex_network
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
-from train.models.torch_model import TorchModel, recipe_model
+from train.models.torch_model import recipe_model
 
 # Rows of a mesh that are kept, of each network; those of a regular one are repeated to so many.
 MOST_ROWS, REGULAR_ROWS = 1000, 20_000
@@ -36,7 +40,7 @@ REFINED, SHAKEN = 0.5, 0.5
 SHAKES = (1e-4, 1e-2)
 LARGEST_REFINED = 1500
 # Rows of a step, its learning rate at most, and the share of the steps in which it rises.
-BATCH_ROWS, LEARNING_RATE, WARM_UP = 8192, 2e-3, 0.03
+BATCH_ROWS, LEARNING_RATE, WARM_UP = 8192, 4e-3, 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +55,7 @@ class Answers:
 class Mean:
     """The mean of several models as one, which keeps what it was asked and what it answered."""
 
-    members: Sequence[TorchModel]
+    teachers: Sequence[Model]
     heard: dict[str, list[Answers]] = field(default_factory=lambda: {"edges": [], "vertices": []})
     name: str = "mean"
     hash: str = ""
@@ -59,19 +63,19 @@ class Mean:
     @property
     def card(self) -> ModelCard:
         """The first one's."""
-        return self.members[0].card
+        return self.teachers[0].card
 
     def __call__(
         self, features: Float[np.ndarray, "N K"], budget: float
     ) -> Float32[np.ndarray, "N 3"]:
         """Answer for edges."""
-        return self._keep("edges", features, [each(features, budget) for each in self.members])
+        return self._keep("edges", features, [each(features, budget) for each in self.teachers])
 
     def vertex_correction(
         self, features: Float[np.ndarray, "N L"], budget: float
     ) -> Float32[np.ndarray, "N 3"]:
         """Answer for old vertices."""
-        said = [each.vertex_correction(features, budget) for each in self.members]
+        said = [each.vertex_correction(features, budget) for each in self.teachers]
         return self._keep("vertices", features, said)
 
     def _keep(
@@ -85,67 +89,77 @@ class Mean:
         return mean
 
 
+def load_teacher(path: Path) -> Model:
+    """Load a model file, or a checkpoint where the name ends in .safetensors. Raises ModelError."""
+    if path.suffix != ".safetensors":
+        return load_model(path)
+    checkpoint = load_checkpoint(path)
+    return recipe_model(checkpoint.recipe, checkpoint.network, checkpoint.vertex_network)
+
+
+def planned(recipe: Recipe, teachers: Sequence[Model], meshes: int, steps: int) -> Distillation:
+    """Return how a recipe's networks are to be fitted to teachers.
+
+    Raises:
+        ParameterError: the recipe is not scale-free, a teacher reads other features, or two
+            teachers are the same.
+    """
+    if recipe.scale_free is None or recipe.vertex is None:
+        raise ParameterError("recipe", recipe.name, expected="a scale-free one")
+    wanted = recipe.features, recipe.vertex.features
+    for teacher in teachers:
+        read = teacher.card.features, teacher.card.vertex_features
+        if read != wanted:
+            expected = f"a model that reads {' and '.join(wanted)}"
+            raise ParameterError("teacher", teacher.name, expected=expected)
+    hashes = tuple(teacher.hash for teacher in teachers)
+    if len(set(hashes)) < len(hashes):
+        raise ParameterError("teachers", hashes, expected="different ones")
+    return Distillation(hashes, meshes, steps)
+
+
 def distil(
     recipe: Recipe,
-    members: Sequence[Checkpoint],
+    teachers: Sequence[Model],
     plan: Distillation,
     on_step: Callable[[int, float], None],
 ) -> tuple[BoundedNet, BoundedNet]:
-    """Return networks of a recipe that answer what all members do in the mean.
+    """Return networks of a recipe that answer what all teachers do in the mean.
 
     Args:
         on_step: called after each step of either network, with the number of steps and the loss.
     """
-    seed = recipe.seed
-    taught = initial_network(recipe), initial_vertex_network(recipe)
+    network, vertex_network, rule = (
+        initial_network(recipe),
+        initial_vertex_network(recipe),
+        recipe.vertex,
+    )
+    assert vertex_network is not None  # ``planned`` refuses it
+    assert rule is not None
     with deterministic():
-        heard = asked(members, coarse_and_fine(seed, plan.meshes), seed)
-        of_regular = asked(members, regular_meshes(), seed, REGULAR_ROWS)
-        heard = tuple(joined(both) for both in zip(heard, of_regular, strict=True))
-        for number, (network, start, answers) in enumerate(
-            zip(taught, (members[0].network, members[0].vertex_network), heard, strict=True)
-        ):
-            assert network is not None
-            assert start is not None
-            network.load_state_dict(start.state_dict())
-            done = number * plan.steps
-            for step, loss in enumerate(_steps(network, answers, plan.steps, seed), start=1):
-                on_step(done + step, loss)
-    network, vertex_network = taught
-    assert vertex_network is not None
+        heard = asked(teachers, coarse_and_fine(recipe.seed, plan.meshes), recipe.seed)
+        of_regular = asked(teachers, regular_meshes(), recipe.seed, REGULAR_ROWS)
+        edges, vertices = (joined(both) for both in zip(heard, of_regular, strict=True))
+        fitted = (
+            (network, edges, lambda x: torch.tanh(recipe.gate_sharpness * x**2)),
+            (vertex_network, vertices, lambda x: torch.tanh(rule.gate_sharpness * x)),
+        )
+        for number, (student, answers, gate) in enumerate(fitted):
+            steps = _steps(student, answers, gate, plan.steps, recipe.seed)
+            for step, loss in enumerate(steps, start=1):
+                on_step(number * plan.steps + step, loss)
     return network, vertex_network
 
 
-def planned(recipe: Recipe, members: Sequence[Checkpoint], meshes: int, steps: int) -> Distillation:
-    """Return how these trainings are to be distilled.
-
-    Raises:
-        ParameterError: the recipe is not scale-free, a member's differs from it in more than its
-            seed and its activation, or two members are of the same training.
-    """
-    if recipe.scale_free is None or recipe.vertex is None:
-        raise ParameterError("recipe", recipe.name, expected="a scale-free one")
-    for member in members:
-        own = replace(member.recipe, seed=recipe.seed, activation=recipe.activation)
-        if own != recipe:
-            expected = f"trainings of {recipe.name} as it is now"
-            raise ParameterError("recipe", own.name, expected=expected)
-    trainings = [(member.recipe.seed, member.recipe.activation) for member in members]
-    if len(set(trainings)) < len(trainings):
-        raise ParameterError("trainings", str(trainings), expected="different ones")
-    seeds, activations = zip(*trainings, strict=True)
-    return Distillation(seeds, activations, meshes, steps)
-
-
 def asked(
-    members: Sequence[Checkpoint], meshes: Iterable[Mesh], seed: int, repeated: int = 0
+    teachers: Sequence[Model], meshes: Iterable[Mesh], seed: int, repeated: int = 0
 ) -> tuple[Answers, Answers]:
     """Return what all answer in the mean on some meshes, at edges and at vertices.
 
     ``repeated``: to how many rows those of a mesh are repeated, if they are fewer.
     """
     rng = np.random.default_rng(seed)
-    mean = Mean([recipe_model(each.recipe, each.network, each.vertex_network) for each in members])
+    mean = Mean(teachers)
     kept: dict[str, list[Answers]] = {where: [] for where in mean.heard}
     for mesh in meshes:
         # One thread: its rows are the same in any order, but not those that are drawn of them.
@@ -190,8 +204,13 @@ def regular_meshes() -> Iterator[Mesh]:
     yield from (torus(around, around // 2) for around in (12, 24, 48))
 
 
-def _steps(network: BoundedNet, answers: Answers, steps: int, seed: int) -> Iterator[float]:
-    """Take Adam steps towards the answers, in the mean of squares; yield the loss before each."""
+def _steps(
+    network: BoundedNet, answers: Answers, gate: Callable[[Tensor], Tensor], steps: int, seed: int
+) -> Iterator[float]:
+    """Take Adam steps towards the answers, in gated squares; yield the loss before each.
+
+    The first feature of either network is what its gate reads.
+    """
     features, wanted = torch.from_numpy(answers.features), torch.from_numpy(answers.answers)
     generator = torch.Generator().manual_seed(seed)
     optimiser = torch.optim.Adam(network.parameters(), LEARNING_RATE, betas=(0.9, 0.99))
@@ -200,7 +219,9 @@ def _steps(network: BoundedNet, answers: Answers, steps: int, seed: int) -> Iter
     )
     for _ in range(steps):
         rows = torch.randint(len(features), (BATCH_ROWS,), generator=generator)
-        loss = (network(features[rows], 1.0) - wanted[rows]).square().sum(dim=1).mean()
+        weight = gate(features[rows, 0]).square()
+        square = (network(features[rows], 1.0) - wanted[rows]).square().sum(dim=1)
+        loss = (weight * square).sum() / weight.sum()
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()

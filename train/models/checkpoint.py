@@ -24,16 +24,15 @@ VERTEX = "vertex."
 
 @dataclass(frozen=True, slots=True)
 class Distillation:
-    """How one training was put in place of several (train/fitting/distillation.py).
+    """How networks were fitted to the answers of others (train/fitting/distillation.py).
 
     Attributes:
-        seeds, activations: of these trainings; networks start from the first one's weights.
+        teachers: hashes of the models whose mean answer they learned.
         meshes: pairs of the training stream on whose meshes they were asked.
         steps: Adam steps of each network.
     """
 
-    seeds: tuple[int, ...]
-    activations: tuple[str, ...]
+    teachers: tuple[str, ...]
     meshes: int
     steps: int
 
@@ -48,7 +47,7 @@ class Checkpoint:
         metrics: held-out results, as on the model card.
         machine: fingerprint of the machine that trained it; elsewhere the last bits may differ.
         vertex_network: float32, where the recipe has a vertex rule.
-        distilled: where the weights stand for those of several trainings.
+        distilled: where the weights were fitted to answers of other models.
     """
 
     recipe: Recipe

@@ -138,7 +138,7 @@ describe("jobs of the page", { skip: noBrowser, timeout: 900_000 }, () => {
   });
 
   test("a job that the service ends is told of, and one that it no longer knows: either can be tried again", async () => {
-    const page = await visit({ hash: "#levels=5&model=full", expected: [404] });
+    const page = await visit({ hash: "#levels=5&model=signed", expected: [404] });
     const job = page.waitForResponse((answer) => answer.request().method() === "POST");
     await choose(page, example);
     const answer = await job;

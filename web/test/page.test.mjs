@@ -446,7 +446,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   });
 
   test("a screen reader hears each step once, and no percents of it", async () => {
-    const page = await visit({ hash: "#levels=4&model=full" });
+    const page = await visit({ hash: "#levels=4&model=signed" });
     await page.evaluate(() => {
       window.heard = [];
       const hear = ({ target }) => {

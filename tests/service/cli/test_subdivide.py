@@ -33,14 +33,13 @@ def test_example_then_subdivide_as_the_readme_has_it(pns: Any, tmp_path: Path) -
 
 
 def test_options_reach_the_operator(pns: Any, tmp_path: Path, part_file: Path) -> None:
-    arguments = "-o out.glb --budget 0.25 --reference-length 2.5 --prior-strength 0.5"
+    arguments = "-o out.glb --budget 0.25 --reference-length 2.5"
     arguments += " --diagnostics full --report r.json"
     assert pns("subdivide", str(part_file), *arguments.split()).code == 0
     report = json.loads((tmp_path / "r.json").read_text())
     assert report["scheme"] == "pns"
     assert report["budget"] == 0.25
     assert report["meshes"][0]["reference_length"] == 2.5
-    assert report["meshes"][0]["prior_strength"] == 0.5
     attributes = tree_of(tmp_path / "out.glb")["meshes"][0]["primitives"][0]["attributes"]
     assert "_PNS_RATIO" in attributes
 

@@ -203,8 +203,8 @@ def test_a_stranger_cannot_make_series(client, scrape):
 def test_jobs_faces_models_and_restarts_are_counted(scrape):
     metrics = Metrics()
     metrics.job({"queue": 0.2, "read": 0.1, "refine": 0.3}, faces_in=4, faces_out=64)
-    entry = {"name": "full", "hash": "ab" * 32, "default": True}
-    metrics.catalogue(Catalogue(("full",), json.dumps([entry]).encode()))
+    entry = {"name": "general", "hash": "ab" * 32, "default": True}
+    metrics.catalogue(Catalogue(("general",), json.dumps([entry]).encode()))
     metrics.gauge("pns_queue_jobs", "Jobs that wait", lambda: 3)
     metrics.tally("pns_worker_restarts", "…", "cause", lambda: Counter(died=2))
     values = scrape(metrics)
@@ -213,7 +213,7 @@ def test_jobs_faces_models_and_restarts_are_counted(scrape):
     assert labelled(values, "pns_queue_seconds_sum") == pytest.approx(0.2)
     assert labelled(values, "pns_stage_seconds_sum", stage="refine") == pytest.approx(0.3)
     assert labelled(values, "pns_stage_seconds_count", stage="queue") is None
-    assert labelled(values, "pns_model_info", name="full", hash="ab" * 32, default="true") == 1
+    assert labelled(values, "pns_model_info", name="general", hash="ab" * 32, default="true") == 1
     assert labelled(values, "pns_queue_jobs") == 3
     assert labelled(values, "pns_worker_restarts_total", cause="died") == 2
     assert any(name == "pns_build_info" for name, _ in values)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from service.gltf.refine.own_normals import own_shares
+from service.gltf.refine.normals import own_shares
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from tests.support.gltf import files

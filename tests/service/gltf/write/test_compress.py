@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from service.gltf.subdivide import subdivide_gltf
-from service.gltf.write.draco_encode import NORMAL_BITS, POSITION_BITS
+from service.gltf.write.compression import NORMAL_BITS, POSITION_BITS
 from service.options import Limits, Options
 from tests.support.gltf import files, validator
 from tests.support.gltf.shapes import box, octahedron
