@@ -31,14 +31,16 @@ from train.certificates.learned_once import (
     resolution_independence,
     smoothness_class,
 )
-from train.certificates.lifted_star import lifted_stars
 from train.certificates.plain_loop import plain_loop
-from train.certificates.planar_spectrum import planar_spectrum
-from train.certificates.regular import regular_smoothness
-from train.certificates.scaling import normal_variation_slope, proximity_slope
-from train.certificates.stability import lipschitz_slope
+from train.certificates.planar_spectrum import lifted_stars, planar_spectrum
+from train.certificates.scaling import (
+    lipschitz_slope,
+    normal_variation_slope,
+    proximity_slope,
+    regular_smoothness,
+)
+from train.certificates.step import drawn_creases
 from train.certificates.subject import Subject, subject_of_model, subject_of_network
-from train.certificates.trials import drawn_creases
 from train.experiments.paper.structural import scaled, variant_subject
 from train.models.from_recipe import initial_network
 from train.models.networks import BoundedNet

@@ -14,7 +14,6 @@ from train.connectivity import connect
 from train.data.batch import disjoint_union
 from train.data.datasets import DATASETS, ridge_training
 from train.data.dense_meshes import is_manifold
-from train.data.family_sets import held_out_families, trained_families
 from train.data.grid import SIDE, grid_faces, jittered_grid
 from train.data.parts import (
     CAD_PARTS,
@@ -30,8 +29,16 @@ from train.data.parts import (
 from train.data.plane_meshes import regular_grid, scattered, turned_grid
 from train.data.primitives import PRIMITIVES, TRIANGULATED_QUADS, cylinder, icosphere, l_block
 from train.data.simplifiers import SIMPLIFIERS, clustered, fast_quadric, simplified
-from train.data.stream import FAMILIES, SHARES, crossing, decimated, stream
-from train.metrics.fairness import volume
+from train.data.stream import (
+    FAMILIES,
+    SHARES,
+    crossing,
+    decimated,
+    held_out_families,
+    stream,
+    trained_families,
+)
+from train.metrics.shape import volume
 from train.surfaces.cad import Torus
 from train.surfaces.implicit import signed_distance
 

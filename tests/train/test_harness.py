@@ -12,10 +12,9 @@ import pytest
 from pns_common import Mesh
 from tests.support.meshes import bent, grid
 from train.data.primitives import icosphere
-from train.experiments.harness.experiment import Column, Table
+from train.experiments.harness.experiment import Column, Table, column, table
 from train.experiments.harness.laboratory import SMALL, Laboratory
 from train.experiments.harness.render import HEIGHT, WIDTH, Camera, by_matplotlib, by_pyvista
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.sources import ROOT, code_of, sources_of
 from train.experiments.harness.specular import MARGIN, SIDE, camera, shaded
 from train.experiments.harness.style import TITLES

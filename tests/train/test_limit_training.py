@@ -22,7 +22,7 @@ from train.fitting.limit_loss import Standards, limit_loss, measure
 from train.fitting.limit_maps import applied, limit_maps
 from train.fitting.limit_trainer import fit_to_limit, limit_measures, standards_of
 from train.loop_masks import loop_mask
-from train.metrics.fairness import bending, vertex_normals
+from train.metrics.shape import bending, vertex_normals
 from train.models.from_recipe import general_rule, initial_network, initial_vertex_network
 from train.models.recipes import general
 from train.models.torch_model import recipe_model

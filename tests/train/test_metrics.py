@@ -13,7 +13,6 @@ from train.data.datasets import Dataset, ridge_held_out, saddle_held_out, sphere
 from train.data.primitives import box, globe, icosphere, torus
 from train.metrics.envelope import best_in_balls, envelope_limit, oracle
 from train.metrics.evaluation import compare_with_loop, one_step_table
-from train.metrics.fairness import bending, volume
 from train.metrics.one_step import (
     METRICS,
     fan_normal,
@@ -23,11 +22,13 @@ from train.metrics.one_step import (
     one_step_errors,
 )
 from train.metrics.shape import (
+    bending,
     distance_level,
     face_normal_error,
     level_errors,
     nearest_points,
     shape_errors,
+    volume,
 )
 from train.metrics.whole_surface import normal_jump
 from train.refining import refine

@@ -15,19 +15,24 @@ from pns_common.reference_length import measure_reference_length
 from train.connectivity import connect
 from train.data.pairs import coarsened as subject
 from train.data.pairs.authored import authored_pair
-from train.data.pairs.coarsened import WAYS, coarsened
 from train.data.pairs.faceted import faceted_pair
 from train.data.pairs.grid import grid_pair
 from train.data.pairs.lathe import lathe_pair, turned
 from train.data.pairs.pair_stream import pair_stream
-from train.data.pairs.patch import patch_pair
-from train.data.pairs.references import Pair, Reference, moved
+from train.data.pairs.references import (
+    WAYS,
+    Pair,
+    Reference,
+    coarsened,
+    moved,
+    patch_pair,
+    sphere_pair,
+)
 from train.data.pairs.solid import solid_pairs
-from train.data.pairs.sphere import sphere_pair
 from train.data.pairs.swept import random_profile, swept_pair
 from train.data.primitives import icosphere
 from train.data.simplifiers import SIMPLIFIERS
-from train.metrics.fairness import volume
+from train.metrics.shape import volume
 from train.refining import refine
 from train.vectors import face_normals
 

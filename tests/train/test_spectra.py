@@ -9,7 +9,7 @@ import torch
 
 from pns_common import ParameterError, load_model, loop, pns, refine
 from train.certificates.adversary import Operator
-from train.certificates.operator_jacobian import operator_jacobian
+from train.certificates.gap_collapse import operator_jacobian
 from train.connectivity import connect
 from train.models.from_recipe import initial_network
 from train.models.networks import BoundedNet
@@ -32,8 +32,7 @@ from train.spectra.spectrum import (
     strides,
     without_translations,
 )
-from train.spectra.star_symmetry import keeps_blocks, symmetry_blocks
-from train.spectra.stars import star
+from train.spectra.stars import keeps_blocks, star, symmetry_blocks
 
 
 def ring_matrix(k):

@@ -18,8 +18,8 @@ from train.connectivity import connect
 from train.data.batch import disjoint_union, pairs_sharing_a_face
 from train.data.datasets import DATASETS, ridge_held_out, ridge_training
 from train.fitting.ahead import ahead
-from train.fitting.chords import squared_chords
 from train.fitting.determinism import deterministic, machine_fingerprint
+from train.fitting.limit_loss import squared_chords
 from train.fitting.losses import (
     distance_loss,
     fairness_loss,

@@ -5,18 +5,14 @@ from types import MappingProxyType
 
 from train.experiments.beyond import (
     cad,
-    decimation,
     fairness,
     families,
     features,
-    fresh_ridges,
     lifted_stars,
     models,
     real_meshes,
     shading,
     spheres,
-    stability,
-    whole_levels,
     whole_meshes,
 )
 from train.experiments.harness.experiment import Experiment
@@ -56,14 +52,10 @@ ORDERED: tuple[Experiment, ...] = (
     cad.EXPERIMENT,
     models.EXPERIMENT,
     families.EXPERIMENT,
-    stability.EXPERIMENT,
-    decimation.EXPERIMENT,
     real_meshes.TEST,
     real_meshes.VALIDATION,
     whole_meshes.EXPERIMENT,
-    whole_levels.EXPERIMENT,
     spheres.EXPERIMENT,
-    fresh_ridges.EXPERIMENT,
     fairness.EXPERIMENT,
     shading.EXPERIMENT,
     published.EXPERIMENT,

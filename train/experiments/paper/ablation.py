@@ -10,9 +10,8 @@ from pns_common import Mesh, pns
 from train.ablations.variants import VARIANTS, variant_method, variant_recipe
 from train.data.datasets import Dataset
 from train.data.grid import grid_faces, jittered_grid
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.paper.methods import PAPER_UNITS, largest_ratio, level_by_level
 from train.experiments.paper.paper_values import PUBLISHED_ABLATION
 from train.metrics.evaluation import compare_with_loop
