@@ -14,7 +14,7 @@ from train.connectivity import connect
 from train.data.pairs import pair_stream as stream
 from train.data.pairs.grid import grid_pair
 from train.data.pairs.references import AUTHORED, Pair, Reference
-from train.data.primitives import box, globe, torus
+from train.data.primitives import box, globe, icosphere, torus
 from train.fitting import limit_trainer
 from train.fitting.learned_level import learned_level
 from train.fitting.limit_batch import SMOOTH_KINDS, limit_batch
@@ -161,7 +161,7 @@ def test_bending_is_that_of_a_finely_refined_mesh(mesh):
 
 
 def test_untrained_networks_leave_the_prior_where_a_surface_bends_gently():
-    recipe, mesh = general(), torus(24, 14)
+    recipe, mesh = general(), icosphere(3)
     networks = initial_network(recipe), initial_vertex_network(recipe)
     pair = Pair("", mesh, Reference(mesh.vertices, vertex_normals(mesh)))
     one = limit_batch([pair], general(), np.random.default_rng(0))

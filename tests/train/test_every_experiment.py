@@ -13,9 +13,8 @@ pytestmark = pytest.mark.usefixtures("small_figures")
 
 NAMES = (
     "structural, spectral, ablation, headline, cross-section, repeated, c-sweep, budget, capacity, "
-    "saddle, sphere-ridge, features, extended, lifted-stars, cad, models, families, stability, "
-    "decimation, real-meshes, real-validation, whole-meshes, whole-levels, spheres, "
-    "fresh-ridges, fairness, shading, hero, published"
+    "saddle, sphere-ridge, features, extended, lifted-stars, cad, models, families, real-meshes, "
+    "real-validation, whole-meshes, spheres, fairness, shading, hero, published"
 )
 
 
@@ -43,8 +42,7 @@ def test_there_is_an_experiment_for_each_table_and_figure():
     assert set(EXPERIMENTS) == set(NAMES.split(", "))
 
 
-# The one of simplified meshes has a file of its own.
-@pytest.mark.parametrize("name", [name for name in EXPERIMENTS if name != "decimation"])
+@pytest.mark.parametrize("name", EXPERIMENTS)
 def test_writes_its_tables_and_figures(name, output):
     experiment = EXPERIMENTS[name]
     record = reproduce(experiment, laboratory_for(experiment, output), output)
