@@ -8,11 +8,13 @@ from train.experiments.beyond import (
     fairness,
     families,
     features,
+    fresh_ridges,
     lifted_stars,
     models,
     real_meshes,
     shading,
     spheres,
+    whole_levels,
     whole_meshes,
 )
 from train.experiments.harness.experiment import Experiment
@@ -55,7 +57,9 @@ ORDERED: tuple[Experiment, ...] = (
     real_meshes.TEST,
     real_meshes.VALIDATION,
     whole_meshes.EXPERIMENT,
+    whole_levels.EXPERIMENT,
     spheres.EXPERIMENT,
+    fresh_ridges.EXPERIMENT,
     fairness.EXPERIMENT,
     shading.EXPERIMENT,
     published.EXPERIMENT,
