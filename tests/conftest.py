@@ -64,11 +64,11 @@ KINDS = {
 
 # What takes longest comes first, so that several test processes end together.
 LONGEST = (
-    "train/experiments/test_every_experiment.py",
+    "train/test_every_experiment.py",
     "service/http/test_serve.py",
     "test_wheel.py",
     "conformance/test_conformance.py",
-    "train/experiments/test_reproduce.py",
+    "train/test_reproduce.py",
     "service/http/test_jobs.py",
     "service/http/test_crossed_answers.py",
     "service/http/test_openapi.py",
@@ -78,11 +78,11 @@ LONGEST = (
     "service/workers/test_pool.py",
     "web/test_bundle.py",
     "docs/test_site.py",
-    "train/certificates/test_ascent.py",
-    "train/certificates/test_adversary.py",
-    "train/data/pairs/test_pair_stream.py",
+    "train/test_adversaries.py",
+    "train/test_certificates.py",
+    "train/test_pairs.py",
     "train/test_train_command.py",
-    "train/fitting/test_limit_training.py",
+    "train/test_limit_training.py",
 )
 
 
