@@ -19,11 +19,11 @@ HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.
 PROCESSES ?= 2
 PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
-.PHONY: bench bench-answers scale image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
+.PHONY: prose size bench bench-answers image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
 
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
-	@$(SERVE)/bin/python -m pns_common.fused
+	@$(SERVE)/bin/python -m pns_common.warming
 	$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
 
 # Tests wait now and then, for processes that start and clients that stall: the checks, of one core, take
@@ -34,19 +34,28 @@ test: kernels $(CLIENTS)/.ready
 checks:
 	nice -n 5 $(MAKE) --output-sync=target lint shapes
 
-lint: $(DEV)/.ready
+# Lines and files by package, held to .ci/size.json.
+size:
+	$(PYTHON) .ci/size.py
+
+lint: $(DEV)/.ready size
 	$(DEV)/bin/ruff check .
 	$(DEV)/bin/ruff format --check .
 	$(DEV)/bin/pyright
 	$(DEV)/bin/lint-imports
+	$(DEV)/bin/python docs/prose.py
+
+# Docstrings that open with no verb, and sentences of more than 40 words: no more than docs/prose.json allows.
+prose: $(DEV)/.ready
+	$(DEV)/bin/python docs/prose.py
 
 # Once, where two test processes and every service that they start would each compile them.
 kernels: $(DEV)/.ready
-	@$(DEV)/bin/python -m pns_common.fused
+	@$(DEV)/bin/python -m pns_common.warming
 
 # Of each test of pns_common the first parameters, with the shapes of arrays checked.
 shapes: kernels
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest tests/pns_common
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest tests/library
 
 unit: kernels $(CLIENTS)/.ready
 	$(PYTEST) tests
@@ -59,7 +68,7 @@ quick: kernels
 # skipped. What they bring for pytest is left alone.
 interop-test: $(INTEROP)/.ready
 	$(INTEROP)/bin/python -c 'import meshio, open3d, pyvista, trimesh'
-	PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 OMP_NUM_THREADS=1 $(INTEROP)/bin/python -m pytest tests/pns_common/interop tests/pns_common/test_pyvista.py
+	PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 OMP_NUM_THREADS=1 $(INTEROP)/bin/python -m pytest tests/library/interop tests/library/test_pyvista.py
 
 # What `make test` shows on one of each kind, on all there are.
 exhaustive: kernels
@@ -85,7 +94,7 @@ MODELS ?= paper signed general
 models: $(DEV)/.ready
 	set -e; for recipe in $(MODELS); do \
 	  $(DEV)/bin/python train/run.py train --recipe $$recipe; \
-	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors; \
+	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors --install; \
 	done
 
 # Honest and hostile clients at one service: SOAK='--minutes 1440' for a day.
@@ -109,7 +118,7 @@ hashes:
 
 # After a bundled model was put in its place by hand.
 manifest: $(DEV)/.ready
-	$(DEV)/bin/python -c "from pathlib import Path; from pns_common.models.manifest import write_manifest; write_manifest(Path('pns_common/models'))"
+	$(DEV)/bin/python -c "from pathlib import Path; from pns_common.model.file import write_manifest; write_manifest(Path('pns_common/models'))"
 
 # Blender as a module, a version each in an environment of its own: 350 MB, and each for one version of
 # Python. 4.2 has the numpy that Blender 4.2 comes with. A missing Python leaves its version out.
@@ -140,7 +149,7 @@ paper-hero: $(DEV)/.ready $(BLENDER)-5.0/.ready build/blender-site/.ready
 	  -o docs/blender-paper.png --field distance --highest 0.1 --label 'Distance from the ridge' > /dev/null
 
 build/blender-site/.ready: $(DEV)/.ready constraints.txt
-	$(DEV)/bin/python -m pip install --quiet --no-deps --upgrade --target build/blender-site array-api-compat jaxtyping wadler-lindig
+	$(DEV)/bin/python -m pip install --quiet --no-deps --upgrade --target build/blender-site jaxtyping wadler-lindig numba llvmlite onnxruntime
 	touch $@
 
 # The Blender extension: dist/pns_refine-VERSION.zip, packed and validated by Blender's own tool.
@@ -217,12 +226,12 @@ constraints:
 # peers are built where Debian's packages can be had; a peer that cannot be set up is left out by name.
 # Ours runs in the environment of `make serve`, as users have it; BENCH holds further options.
 bench: $(DEV)/.ready $(SERVE)/.ready $(PEERS)/.ready build/bench/.ready
-	$(SERVE)/bin/python -m pns_common.fused
+	$(SERVE)/bin/python -m pns_common.warming
 	$(DEV)/bin/python -m benchmarks --python $(SERVE)/bin/python $(BENCH)
 
 # Files answered a second on one core, beside other programs: half a minute for each of six rows.
 bench-answers: $(DEV)/.ready $(SERVE)/.ready $(PEERS)/.ready build/bench/node/.ready
-	$(SERVE)/bin/python -m pns_common.fused
+	$(SERVE)/bin/python -m pns_common.warming
 	$(DEV)/bin/python -m benchmarks.answers --python $(SERVE)/bin/python $(BENCH)
 
 build/bench/node/.ready: benchmarks/peers/package.json
@@ -230,13 +239,6 @@ build/bench/node/.ready: benchmarks/peers/package.json
 	cp $< $(@D)
 	cd $(@D) && npm install --ignore-scripts --no-audit --no-fund
 	touch $@
-
-# Growth of `pns large` and `pns batch` with faces, parts, files and rows, and its plot in docs/: ten minutes, 6 GB of
-# disk. What benchmarks/scale.json holds is not measured again. SCALE="--share .01 --results build/scale.json --picture
-# build/scale.png" tries it at a hundredth of all sizes. Runs take place in the environment of `make serve`.
-scale: $(DEV)/.ready $(SERVE)/.ready
-	$(SERVE)/bin/python -m pns_common.fused
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m benchmarks.scale --python $(SERVE)/bin/python $(SCALE)
 
 # One by one: a library without a build for this machine keeps no other away.
 $(PEERS)/.ready: benchmarks/peers/requirements.txt

@@ -31,11 +31,12 @@ tangents so: on curves from k = 6 on (Σ sin(2πj/k) q_j), at corners from k = 3
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Shaped
 
 from pns_common.kernels import limit as kernels
 from pns_common.kernels import loop as masks
@@ -44,8 +45,8 @@ from pns_common.schemes.loop import LOOP, beta, limit_ring_weight
 from pns_common.topology import Topology
 
 CURVE_CENTRE, CURVE_NEIGHBOUR = 2 / 3, 1 / 6
-# A dart's weights decay from both ends of a sector by ρ, with ρ + 1/ρ = 5.
-DECAY = (5 - 21**0.5) / 2
+# Of a dart's smooth spokes, in units of β: far from the sharp edge, and how that decays towards it.
+FAR_WEIGHT, DECAY = 8 / 3, (5 - 21**0.5) / 2
 # From so many spokes on the even mask of a dart has one form.
 MANY = 9
 WIDTH = 3
@@ -120,7 +121,7 @@ def limit_normals(
     kind = np.zeros(len(around.first), dtype=np.int64)
     if around.opened:
         kind[: around.opened] = np.minimum(mesh.sharp_count[around.vertex[: around.opened]], CORNER)
-    at, weights = _tangent_masks(kind, around.size)
+    at, weights = _tables(tangent_mask, kind, around.size)
     sectors = np.empty((len(around.first), 3))
     read = points, *_walked(mesh), around.first, around.size, at, weights, kind == CORNER
     (blocks or Blocks()).run(
@@ -200,29 +201,47 @@ def _dart_limits(
     around, sums = find_sectors(topology), np.zeros((topology.vertex_count, WIDTH))
     total = np.zeros(topology.vertex_count)
     assert topology.sharpest is not None
+    # The sharp edge: 2 (β + an eighth of both spokes beside it); that eighth is in the tables.
     sums[darts] = 2 * (points[topology.sharpest.neighbours[darts, 0]] - points[darts])
     total[darts] = 2
     rows = np.flatnonzero(topology.sharp_count[around.vertex] == DART)
-    read = around.first, around.size, around.opened, rows, DECAY
+    at, weights = _tables(dart_weights, rows < around.opened, around.size[rows])
+    read = around.first, around.size, at, weights, rows
     kernels.sum_darts(points, *_walked(topology), *read, sums, total)
     scale = beta_of_darts / (1 + beta_of_darts * total[darts, None])
     return points[darts] + scale * sums[darts]
 
 
+def dart_weights(opened: int, k: int) -> Float[np.ndarray, " K"]:
+    """Return a dart's weights of q_0 … q_{k−1} in a sector, in units of β.
+
+    They solve 5 w_j = 8 + w_{j−1} + w_{j+1}, with 0 at both ends if the sector is open. In place of
+    w_0 stands the share that w_1 and w_{k−1} add to the sharp edge's weight.
+    """
+    if not opened:
+        return np.full(k, FAR_WEIGHT)
+    j = np.arange(k + 1)
+    weights = FAR_WEIGHT * (1 - (DECAY**j + DECAY ** (k - j)) / (1 + DECAY**k))
+    weights[0] = weights[1] / 2
+    return weights[:k]
+
+
+def _tables(
+    make: Callable[[int, int], np.ndarray],
+    kind: Shaped[np.ndarray, " S"],
+    size: Int[np.ndarray, " S"],
+) -> tuple[Int[np.ndarray, " S"], Float[np.ndarray, " *M"]]:
+    """Return ``make(kind, size)`` for all pairs that occur, in a row, and where each one begins."""
+    keys, which = np.unique(4 * size.astype(np.int64) + kind, return_inverse=True)
+    tables = [make(int(key % 4), int(key // 4)) for key in keys]
+    starts = np.cumsum([0, *map(len, tables)])[:-1]
+    return starts[which.reshape(-1)], np.concatenate(tables)
+
+
 # --- tangents -------------------------------------------------------------------------------------
 
 
-def _tangent_masks(
-    kind: Int[np.ndarray, " S"], size: Int[np.ndarray, " S"]
-) -> tuple[Int[np.ndarray, " S"], Float[np.ndarray, "M 2"]]:
-    """Return the masks of all kinds and sizes that occur, and where that of each sector begins."""
-    keys, which = np.unique(4 * size.astype(np.int64) + kind, return_inverse=True)
-    tables = [_tangent_mask(int(key % 4), int(key // 4)) for key in keys]
-    starts = np.cumsum([0, *map(len, tables)])[:-1]
-    return starts[which.reshape(-1)], np.concatenate([np.zeros((0, 2)), *tables])
-
-
-def _tangent_mask(kind: int, k: int) -> Float[np.ndarray, "K1 2"]:
+def tangent_mask(kind: int, k: int) -> Float[np.ndarray, "K1 2"]:
     """Return the weights of q_0 … q_k, less p, in both tangents of a sector of k faces.
 
     All weights sum to 0 with the centre's, so p has none.

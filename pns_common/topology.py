@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
-from pns_common.errors import ParameterError
+from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import connectivity as kernels
 from pns_common.kernels import loop
 from pns_common.parallel import Blocks
@@ -254,6 +254,9 @@ def build_topology(
         faces: (F, 3) triangles; or (corners, offsets) of faces of any degree ≥ 3.
         vertex_count: number of vertices.
         blocks: how the work is shared.
+
+    Raises:
+        MeshError: a face names a vertex that is not there.
     """
     blocks = blocks or Blocks()
     if isinstance(faces, tuple):
@@ -263,6 +266,8 @@ def build_topology(
         corners = np.ascontiguousarray(faces, dtype=np.uint32).reshape(-1)
         offsets = np.arange(0, len(corners) + 1, TRIANGLE, dtype=np.int32)
         degrees = NO_FACES
+    if len(corners) and int(corners.max()) >= vertex_count:  # a kernel would write beyond an array
+        raise MeshError(f"vertex {corners.max()}, expected 0 … {vertex_count - 1}", element="faces")
     triangles = bool((degrees == TRIANGLE).all())
     face_of_corner = NO_FACES
     if not triangles:
@@ -309,11 +314,11 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         made = build_topology(faces, vertex_count, blocks)
         if not inherit:
             return made
-        made = made.with_creases(made.rows_of(_halves(parent, creases)))
+        made = made.with_creases(made.rows_of(halves_of(parent, creases)))
         if len(soft):
             rows = np.flatnonzero(soft)
             sharpness = np.zeros(len(made.edges))
-            sharpness[made.rows_of(_halves(parent, rows))] = np.repeat(soft[rows], 2)
+            sharpness[made.rows_of(halves_of(parent, rows))] = np.repeat(soft[rows], 2)
             made = made.with_sharpness(sharpness)
         return made
     source = parent if inherit else parent.without_creases()
@@ -360,7 +365,7 @@ def split_faces(
     return faces
 
 
-def _halves(parent: Topology, rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M 2"]:
+def halves_of(parent: Topology, rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M 2"]:
     """Return the halves of edges, as vertex pairs of the split mesh."""
     ends, middle = parent.edges[rows].astype(np.int64), parent.vertex_count + rows.astype(np.int64)
     return np.stack([ends, np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)

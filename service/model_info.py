@@ -9,8 +9,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from pns_common.models.card import ModelCard
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL, OnnxModel
+from pns_common.model.card import ModelCard
+from pns_common.model.file import DEFAULT_MODEL
+from pns_common.model.session import OnnxModel
 
 # A metric on the card: what was measured, and its improvement over the reference in per cent.
 METRIC_COLUMNS = ("reference_mean", "method_mean", "percent", "low", "high")
@@ -71,20 +72,12 @@ def _further_rows(card: ModelCard) -> dict[str, Any]:
     rows = {
         "vertex features": card.vertex_features,
         "vertex gate sharpness c": card.vertex_gate_sharpness,
-        "learned levels K": card.learned_levels,
+        "base scheme": card.base,
         "prior strength s": card.prior_strength,
+        "boundary strength b": card.boundary_strength,
         "network scale τ": card.network_scale,
         "fold angle θ": card.fold_angle,
-        "boundary strength b": card.boundary_strength,
-        "side gates": card.side_gates,
-        "network altitudes α": card.network_altitudes,
-        "wide bound": card.wide_bound,
-        "crease prior": card.crease_prior,
-        "tip strength a": card.tip_strength,
-        "even prior strength s₁": card.even_prior_strength,
-        "crease angle θ": card.crease_angle,
-        "edged crease angle θ'": card.edged_crease_angle,
-        "crease levels": card.crease_levels,
+        "levels of sharpness": card.sharpness_levels,
     }
     return {name: value for name, value in rows.items() if value is not None}
 

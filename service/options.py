@@ -10,18 +10,18 @@ from typing import Literal, get_args
 from .errors import InvalidParameter, check_choice
 
 MAX_LEVELS = 6
-# The library's (pns_common/formula/prior_strength.py), without its import.
-MAX_PRIOR_STRENGTH = 100.0
+# The library's, without its import (tests hold them equal).
+DEFAULT_LEVELS = 2
 
 SchemeName = Literal["pns", "loop"]
 Diagnostics = Literal["summary", "full", "none"]
 UvRule = Literal["linear", "smooth"]
-NormalRule = Literal["keep", "smooth", "limit"]
+NormalRule = Literal["auto", "keep", "smooth", "limit"]
 Compression = Literal["none", "draco", "meshopt"]
 # A weld further than a hundredth of R is a different tool: it would take features away.
 MAX_WELD_TOLERANCE = 0.01
 # `angle:` is followed by degrees.
-CREASE_PATTERN = r"auto|off|lines|normals|angle:\d{1,3}(\.\d{1,6})?"
+CREASE_PATTERN = r"auto|off|normals|angle:\d{1,3}(\.\d{1,6})?"
 
 # The upload, its decoded JSON, and its bytes again in the answer.
 BYTES_PER_INPUT_BYTE = 4
@@ -31,24 +31,22 @@ BYTES_PER_INPUT_BYTE = 4
 class Options:
     """One request's parameters, valid once constructed: the command line's and HTTP's too.
 
-    `budget` is the dimensionless C (None: the model's own); `prior_strength` is s of the prior
-    (None: what each mesh calls for); `reference_length` is a length in the mesh's local
-    coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
+    `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
+    mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
     vertices on the limit surface. Raises InvalidParameter.
     """
 
-    levels: int = 1
+    levels: int = DEFAULT_LEVELS
     scheme: SchemeName = "pns"
     budget: float | None = None
     reference_length: float | Literal["auto"] = "auto"
     diagnostics: Diagnostics = "summary"
     uv: UvRule = "linear"
-    normals: NormalRule = "keep"
+    normals: NormalRule = "auto"
     crease: str = "auto"
     weld_tolerance: float = 0.0
     compress: Compression = "none"
     limit: bool = False
-    prior_strength: float | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.levels <= MAX_LEVELS:
@@ -64,11 +62,6 @@ class Options:
             raise InvalidParameter("normals", "normals=limit needs limit=true: they stand there")
         if self.budget is not None and not (math.isfinite(self.budget) and self.budget >= 0):
             raise InvalidParameter("budget", "budget must be a finite number, zero or more")
-        strength = self.prior_strength
-        if strength is not None and not 0 <= strength <= MAX_PRIOR_STRENGTH:
-            raise InvalidParameter(
-                "prior_strength", f"prior_strength must be 0 to {MAX_PRIOR_STRENGTH:g}"
-            )
         if self.reference_length != "auto" and not (
             math.isfinite(self.reference_length) and self.reference_length > 0
         ):
@@ -78,7 +71,7 @@ class Options:
         if not re.fullmatch(CREASE_PATTERN, self.crease) or not (self.crease_angle or 0) <= math.pi:
             raise InvalidParameter(
                 "crease",
-                "crease must be 'auto', 'off', 'lines', 'normals' or 'angle:' and 0 to 180 degrees",
+                "crease must be 'auto', 'off', 'normals' or 'angle:' and 0 to 180 degrees",
             )
         if not 0 <= self.weld_tolerance <= MAX_WELD_TOLERANCE:
             raise InvalidParameter(

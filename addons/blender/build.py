@@ -1,6 +1,10 @@
 """Build the extension: the wheels it needs beside it, packed and checked by Blender's own tool.
 
-python -m addons.blender.build PYTHON     # PYTHON has bpy (`make addon`)
+python -m addons.blender.build PYTHON                       # PYTHON has bpy (`make addon`)
+python -m addons.blender.build PYTHON windows-x64           # for another platform
+
+The wheels of numba, llvmlite and onnxruntime are built for one platform and one version of Python:
+that of PYTHON, which is Blender's own.
 """
 
 from __future__ import annotations
@@ -12,14 +16,21 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from pns_common.base.whole_file import replace_file
+from pns_common.files import replace_file
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = Path(__file__).with_name("pns_refine")
 CORE = Path(__file__).with_name("core.toml")
 DIST = ROOT / "dist"
 # What the library imports, and Blender does not have; pinned by constraints.txt.
-REQUIRED = ("array-api-compat", "jaxtyping", "wadler-lindig")
+REQUIRED = ("jaxtyping", "wadler-lindig", "numba", "llvmlite", "onnxruntime")
+# Blender's names of platforms, and those of wheels.
+PLATFORMS = {
+    "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux2014_x86_64"),
+    "windows-x64": ("win_amd64",),
+    "macos-arm64": ("macosx_14_0_arm64", "macosx_12_0_arm64", "macosx_11_0_arm64"),
+}
+PYTHON_TAG = "import sys; print('%d.%d' % sys.version_info[:2])"
 TOOL = """
 import bpy
 from pathlib import Path
@@ -28,38 +39,46 @@ print(next(scripts.glob("addons_core/bl_pkg/cli/blender_ext.py")))
 """
 
 
-def main(python: str) -> None:
+def main(python: str, platform: str = "linux-x64") -> None:
     """Build the zip, and let Blender validate what was packed."""
+    if platform not in PLATFORMS:
+        raise SystemExit(f"{platform}: expected one of {', '.join(PLATFORMS)}")
     tool = said(python, "-c", TOOL).splitlines()[-1]
+    version = said(python, "-c", PYTHON_TAG)
     with tempfile.TemporaryDirectory() as folder:
         stage, packed = Path(folder) / "pns_refine", Path(folder) / "packed"
         packed.mkdir()
-        staged(stage)
+        staged(stage, platform, version)
         print(said(python, tool, "build", "--source-dir", stage, "--output-dir", packed))
         (built,) = packed.glob("*.zip")
         print(said(python, tool, "validate", built))
         DIST.mkdir(exist_ok=True)
-        replace_file(DIST / built.name, built.read_bytes())
-    print(f"{DIST / built.name}: {(DIST / built.name).stat().st_size:,} bytes")
+        target = DIST / f"{built.stem}-{platform}-python{version}.zip"
+        replace_file(target, built.read_bytes())
+    print(f"{target}: {target.stat().st_size:,} bytes")
 
 
-def staged(stage: Path) -> None:
+def staged(stage: Path, platform: str, version: str) -> None:
     """Stage the extension's folder as it is packed: sources, licence, wheels, and a manifest."""
     shutil.copytree(SOURCE, stage, ignore=shutil.ignore_patterns("__pycache__"))
     wheels = stage / "wheels"
-    collect_wheels(wheels)
+    collect_wheels(wheels, platform, version)
     manifest = stage / "blender_manifest.toml"
-    manifest.write_text(with_wheels(manifest.read_text(), sorted(p.name for p in wheels.iterdir())))
+    names = sorted(path.name for path in wheels.iterdir())
+    manifest.write_text(with_wheels(manifest.read_text(), names, platform))
 
 
-def with_wheels(manifest: str, names: Sequence[str]) -> str:
-    """Return the manifest with a list of wheels at its end."""
+def with_wheels(manifest: str, names: Sequence[str], platform: str) -> str:
+    """Return the manifest with its platform and a list of wheels at its end."""
     listed = "".join(f'  "./wheels/{name}",\n' for name in names)
-    return f"{manifest.rstrip()}\nwheels = [\n{listed}]\n"
+    return f'{manifest.rstrip()}\nplatforms = ["{platform}"]\nwheels = [\n{listed}]\n'
 
 
-def collect_wheels(folder: Path) -> None:
-    """Collect the extension's wheels: the library alone, and what it needs as published."""
+def collect_wheels(folder: Path, platform: str, version: str) -> None:
+    """Collect the extension's wheels: the library alone, and what it needs as published.
+
+    ``version`` is that of Python, such as 3.11.
+    """
     folder.mkdir(parents=True)
     pip = (sys.executable, "-m", "pip", "--quiet")
     said(
@@ -67,6 +86,8 @@ def collect_wheels(folder: Path) -> None:
         "download",
         "--no-deps",
         "--only-binary=:all:",
+        *(f"--platform={tag}" for tag in PLATFORMS[platform]),
+        f"--python-version={version}",
         "--dest",
         folder,
         "--constraint",
@@ -99,4 +120,4 @@ def said(*command: object) -> str:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

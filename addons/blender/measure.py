@@ -68,7 +68,7 @@ def longest_pieces(obj: bpy.types.Object, scheme: str) -> float:
     from bl_ext.user_default.pns_refine.settings import choice_of
 
     from pns_common import load_model
-    from pns_common.runtimes.onnx_model import DEFAULT_MODEL
+    from pns_common.model.file import DEFAULT_MODEL
 
     asked = SimpleNamespace(
         scheme=scheme, levels=1, limit=False, crease_angle=math.pi, crease_lines=False, quads=False

@@ -15,8 +15,6 @@ from pns_common.kernels.vectors import between, cross, divisor, dot, norm, over,
 NO_PLANE = 1e-9
 # A sum of unit vectors below this, of the sum of their lengths, is what rounding leaves.
 CANCELLED = 1e-9
-# Of a dart's smooth spoke, in units of β, far from the sharp edge.
-FAR_WEIGHT = 8 / 3
 
 
 @inlined
@@ -31,7 +29,7 @@ def _opposed(corner_edges, half_edges, edge_class, h):
 
 @kernel
 def label_sectors(corner_edges, half_edges, edge_class, of_corner, first, size):
-    """Number the sectors, open ones first; return how many are open, and how many there are.
+    """Find the sectors, open ones first; return how many are open, and how many there are.
 
     Args:
         of_corner: (H,) out: the sector of each corner; −1 on entry.
@@ -83,22 +81,17 @@ def sector_normals(
         to: (S, 3) out; 0 without area.
     """
     for s in range(begin, end):
-        h, p = first[s], corners[first[s]]
-        u, v, area = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        for j in range(size[s]):
-            before = previous_corner(h)
-            leaving, arriving = (
-                between(points, p, corners[next_corner(h)]),
-                between(points, p, corners[before]),
-            )
-            mask = at[s] + j
-            u = _add(u, masks[mask, 0], leaving)
-            v = _add(v, masks[mask, 1], leaving)
-            area = _add(area, 1.0, cross(leaving, arriving))
-            if j == size[s] - 1:
-                u = _add(u, masks[mask + 1, 0], arriving)
-                v = _add(v, masks[mask + 1, 1], arriving)
-            else:
+        p, h, before = corners[first[s]], first[s], first[s]
+        u, v, area, last = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        for j in range(size[s] + 1):
+            far = corners[next_corner(h)] if j < size[s] else corners[before]
+            spoke = between(points, p, far)
+            u = _add(u, masks[at[s] + j, 0], spoke)
+            v = _add(v, masks[at[s] + j, 1], spoke)
+            area = _add(area, 1.0, cross(last, spoke))
+            last = spoke
+            if j < size[s]:
+                before = previous_corner(h)
                 h = _opposed(corner_edges, half_edges, edge_class, before)
         normal = cross(u, v)
         if outwards[s] and dot(normal, area) < 0:
@@ -133,15 +126,6 @@ def mean_of_sectors(normals, vertices, to, lengths):
             to[v, k] = mean[k] / length if length > 0 else 0.0
 
 
-@inlined
-def dart_weight(decay, size, j):
-    """Return a dart's weight of q_j in an open sector, in units of β: 0 at both ends.
-
-    It solves 5 w_j = 8 + w_{j−1} + w_{j+1}.
-    """
-    return FAR_WEIGHT * (1 - (decay**j + decay ** (size - j)) / (1 + decay**size))
-
-
 @kernel
 def sum_darts(
     points,
@@ -151,32 +135,25 @@ def sum_darts(
     edge_class,
     first,
     size,
-    opened,
+    at,
+    weights,
     rows,
-    decay,
     sums,
     total,
 ):
-    """Add the weighted spokes of darts, but for the sharp edge's own share, in units of β.
-
-    The sharp edge's weight is 2 (1 + the sum of those beside it / 8).
+    """Add the weighted spokes of darts.
 
     Args:
-        opened: how many sectors are open.
         rows: (N,) the sectors of darts, ascending.
-        decay: ρ with ρ + 1/ρ = 5, below 1.
+        at: (N,) where the weights of q_0 … q_{k−1} begin, of each of these.
         sums: (V, 3) in and out: of the weights times the spokes.
         total: (V,) in and out: of the weights.
     """
-    for s in rows:
-        h, p, k = first[s], corners[first[s]], size[s]
-        for j in range(k):
-            weight = FAR_WEIGHT
-            if s < opened:
-                weight = dart_weight(decay, k, j) if j > 0 else dart_weight(decay, k, 1) / 2
-            spoke = between(points, p, corners[next_corner(h)])
+    for i in range(rows.shape[0]):
+        h, p = first[rows[i]], corners[first[rows[i]]]
+        for j in range(size[rows[i]]):
+            weight, far = weights[at[i] + j], corners[next_corner(h)]
             total[p] += weight
-            for i in range(3):
-                sums[p, i] += weight * spoke[i]
-            if j < k - 1:
-                h = _opposed(corner_edges, half_edges, edge_class, previous_corner(h))
+            for k in range(3):
+                sums[p, k] += weight * (points[far, k] - points[p, k])
+            h = _opposed(corner_edges, half_edges, edge_class, previous_corner(h))

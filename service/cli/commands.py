@@ -24,11 +24,9 @@ from .parameters import (
     LengthOption,
     LevelsOption,
     LimitOption,
-    MemoryOption,
     ModelOption,
     NormalsOption,
     SchemeOption,
-    StrengthOption,
     UvOption,
     WeldOption,
     WorkersOption,
@@ -84,7 +82,6 @@ def subdivide(
     budget: BudgetOption = DEFAULTS.budget,
     model: ModelOption = None,
     reference_length: LengthOption = "auto",
-    prior_strength: StrengthOption = DEFAULTS.prior_strength,
     diagnostics: DiagnosticsOption = DEFAULTS.diagnostics,
     uv: UvOption = DEFAULTS.uv,
     normals: NormalsOption = DEFAULTS.normals,
@@ -116,7 +113,6 @@ def batch(
     budget: BudgetOption = DEFAULTS.budget,
     model: ModelOption = None,
     reference_length: LengthOption = "auto",
-    prior_strength: StrengthOption = DEFAULTS.prior_strength,
     diagnostics: DiagnosticsOption = DEFAULTS.diagnostics,
     uv: UvOption = DEFAULTS.uv,
     normals: NormalsOption = DEFAULTS.normals,
@@ -132,7 +128,7 @@ def batch(
     workers: WorkersOption = None,
     report: Annotated[
         Path, typer.Option(metavar="FILE", help="rows of all files: .parquet or .jsonl")
-    ] = Path("pns-batch.parquet"),
+    ] = Path("pns-batch.jsonl"),
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="say what would be done; write no result")
     ] = False,
@@ -169,74 +165,6 @@ def batch(
 
 
 @app.command()
-def large(
-    context: typer.Context,
-    source: Annotated[
-        Path, typer.Argument(metavar="IN", help="ply, obj, stl, glb, or a folder of arrays")
-    ],
-    output: Annotated[
-        Path, typer.Argument(metavar="OUT", help=".ply, .3dtiles, or a folder of arrays")
-    ],
-    levels: LevelsOption = DEFAULTS.levels,
-    scheme: SchemeOption = DEFAULTS.scheme,
-    budget: BudgetOption = DEFAULTS.budget,
-    model: ModelOption = None,
-    reference_length: LengthOption = "auto",
-    prior_strength: StrengthOption = DEFAULTS.prior_strength,
-    crease: Annotated[
-        str, typer.Option(metavar="auto|lines|off|angle:DEG", help="edges to keep sharp")
-    ] = DEFAULTS.crease,
-    parts: Annotated[
-        int | None, typer.Option(min=1, help="how many parts; default: as --memory asks for")
-    ] = None,
-    memory: MemoryOption = "2GiB",
-    engine: EngineOption = "local",
-    address: AddressOption = None,
-    workers: WorkersOption = None,
-    report: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="write the report")
-    ] = None,
-) -> None:
-    """Refine one mesh larger than memory, part by part; a run that was stopped goes on."""
-    check_posix("large")
-    from rich.console import Console
-
-    from ..scale.engines.named import engine_of
-    from ..scale.large.plan import Large, check_report, keep
-    from ..scale.large.run import large_work, run_large
-    from .stops import stoppable
-
-    chosen = Large(
-        source,
-        output,
-        options_of(context),
-        memory,
-        parts,
-        model,
-    )
-    if report is not None:
-        check_report(report, chosen)
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
-    where = engine_of(large_work(), engine, address, workers, console.print)
-    with stoppable(console):
-        made, spent = run_large(chosen, where, console)
-    if report is not None:
-        keep(report, made)
-    for change in made["changes"]:
-        console.print(printable(f"{change['count']} × {change['what']}"), markup=False)
-    # Vertices of a file are joined where they are one; faces that are missing are lost.
-    for name in ("degenerate_faces", "duplicate_faces"):
-        if count := made["dropped"].get(name):
-            console.print(f"{count} × {name.replace('_', ' ')} dropped", markup=False)
-    stages = ", ".join(f"{name} {seconds:.1f}" for name, seconds in spent.seconds.items())
-    console.print(
-        f"{output}: {made['levels'][-1]['faces']:,} faces in {sum(spent.seconds.values()):.1f} s "
-        f"({stages}); largest worker {spent.peak_bytes / 2**20:,.0f} MiB",
-        markup=False,
-    )
-
-
-@app.command()
 def serve(
     host: Annotated[str | None, typer.Option(help="default: PNS_HOST, else 127.0.0.1")] = None,
     port: Annotated[int | None, typer.Option(help="default: PNS_PORT, else 8000")] = None,
@@ -265,7 +193,7 @@ def info(
     ] = None,
 ) -> None:
     """List the bundled models; with a name or a file, show what that model says of itself."""
-    from pns_common.runtimes.onnx_model import bundled_models, load_model
+    from pns_common.model.file import bundled_models, load_model
 
     from ..model_info import print_model, print_models
 
@@ -276,11 +204,25 @@ def info(
 
 
 @app.command()
+def doctor() -> None:
+    """Show versions, models, memory and settings, and refine an example; 1 if anything is wrong."""
+    from ..doctor import findings
+
+    well = True
+    for finding in findings():
+        mark = "ok  " if finding.well else "FAIL"
+        typer.echo(printable(f"{mark} {finding.name:<12} {finding.text}"))
+        well = well and finding.well
+    if not well:
+        raise typer.Exit(FAILURE)
+
+
+@app.command()
 def example(
     output: Annotated[Path, typer.Argument(metavar="OUT.glb", help="file to write")],
 ) -> None:
     """Write a small mechanical part with ridges, fillets and UVs, to try the other commands on."""
-    from pns_common.base.whole_file import replace_file
+    from pns_common.files import replace_file
 
     from ..errors import InvalidParameter
     from ..meshfiles.example import part_glb

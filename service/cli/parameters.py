@@ -9,7 +9,6 @@ import typer
 
 from ..options import (
     MAX_LEVELS,
-    MAX_PRIOR_STRENGTH,
     MAX_WELD_TOLERANCE,
     Compression,
     Diagnostics,
@@ -39,29 +38,11 @@ def _reference_length(text: str) -> float | Literal["auto"]:
         raise typer.BadParameter("it must be 'auto' or a number") from error
 
 
-def _size(text: str) -> int:
-    from pydantic import TypeAdapter, ValidationError
-
-    from ..setting_types import Size
-
-    try:
-        return int(TypeAdapter(Size).validate_python(text))
-    except ValidationError as error:
-        raise typer.BadParameter("it must be a size, as 4GiB") from error
-
-
 LevelsOption = Annotated[
     int, typer.Option(help=f"depth, 1 to {MAX_LEVELS}: four faces of one at each level")
 ]
 SchemeOption = Annotated[SchemeName, typer.Option(help="the rules")]
 BudgetOption = Annotated[float | None, typer.Option(metavar="C", help="default: the model's own")]
-StrengthOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="S",
-        help=f"0 to {MAX_PRIOR_STRENGTH:g}, of the model's prior; default: as meshes call for",
-    ),
-]
 ModelOption = Annotated[
     str | None,
     typer.Option(
@@ -75,26 +56,22 @@ LengthOption = Annotated[
     Any,
     typer.Option(metavar="auto|X", parser=_reference_length, help="unit of length of the budget"),
 ]
-MemoryOption = Annotated[
-    # What the parser returns; its default is text, as it is shown.
-    Any,
-    typer.Option(metavar="SIZE", parser=_size, help="what a worker may take, as 4GiB"),
-]
 DiagnosticsOption = Annotated[Diagnostics, typer.Option(help="what a glTF carries of the report")]
 UvOption = Annotated[UvRule, typer.Option(help="smooth: Loop's stencil inside charts")]
 NormalsOption = Annotated[
     NormalRule,
     typer.Option(
-        help="smooth: new ones in a glTF, smooth but across creases; limit: those of the limit "
-        "surface, with --limit"
+        help="auto: those of the file; where a mesh has none, smooth but across sharp edges. "
+        "keep: none where there are none. smooth: new ones for every mesh. limit: those of the "
+        "limit surface, with --limit"
     ),
 ]
 CreaseOption = Annotated[
     str,
     typer.Option(
-        metavar="auto|lines|off|normals|angle:DEG",
-        help="edges to keep sharp; auto: the lines that the mesh shows, hard edges of what is "
-        "shaded smooth, and borders of materials on flat sides, if the model asks for them",
+        metavar="auto|off|normals|angle:DEG",
+        help="edges to keep sharp; auto: with general those beyond 40 degrees that are connected "
+        "to one beyond 60, at two levels; normals: those that a glTF's normals make hard",
     ),
 ]
 WeldOption = Annotated[

@@ -1,4 +1,4 @@
-"""A glTF file in, a refined GLB and its report out: a function of bytes and options alone."""
+"""Refine a glTF file: bytes and options in, a GLB and its report out."""
 
 from __future__ import annotations
 
@@ -7,25 +7,33 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
-from pns_common.schemes import Model, Scheme, loop, pns
+from pns_common.model.session import Model
+from pns_common.schemes import Scheme, loop, pns
 
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..course import Course
-from ..errors import InvalidParameter, NoModelError
+from ..errors import NoModelError
 from ..options import Limits, Options
 from ..report import Change, MeshResult, build_report
-from .read.checks.nodes import mesh_instances
 from .read.container import write_glb
-from .read.extras import put_report, replaces_extras
 from .read.json_text import encode
 from .read.plan import BYTES_FOR_LIMIT, BYTES_FOR_NORMALS
+from .read.references import mesh_instances
 from .read.upload import Media, Upload, read_upload
 from .refine.meshes import refined_meshes
-from .stage_shares import PUT_TOGETHER, READ
-from .write.packing import BYTES_PER_FACE, WRITERS
-from .write.same_geometry import same_geometry
-from .write.storage import remove_replaced, storage_changes, withdraw_unused
-from .write.unused import VertexUse
+from .write.compression import BYTES_PER_FACE, WRITERS
+from .write.prune import VertexUse
+from .write.storage import (
+    put_report,
+    remove_replaced,
+    replaces_extras,
+    same_geometry,
+    storage_changes,
+    withdraw_unused,
+)
+
+# Shares of a file's work: reading ends at the first, and writing the document begins at the second.
+READ, PUT_TOGETHER = 0.03, 0.95
 
 
 @dataclass(frozen=True)
@@ -33,7 +41,7 @@ class Subdivided:
     """A refined file.
 
     Attributes:
-        glb: the file, with the report in it unless diagnostics were not wanted.
+        glb: the file, with the report in it unless `diagnostics=none`.
         report: the report.
         timings: seconds by stage (read, weld, refine, attributes, write).
     """
@@ -55,12 +63,12 @@ def subdivide_gltf(
 ) -> Subdivided:
     """Refine every triangle mesh of a glTF file.
 
-    `course` is told how far it is. `siblings` are the files that the document may name; `losses` is
-    what it had already lost on its way to glTF, for the report.
+    `course` receives the progress. `siblings` are the files that the document may name. `losses`
+    are changes of an earlier conversion to glTF, for the report.
 
     Raises:
-        ServiceError: the upload is unreadable, wrong, over a limit, or cannot be refined yet.
-        pns_common.errors.ModelError: the model answered with something that is no correction.
+        ServiceError: the upload is unreadable, invalid, over a limit, or cannot be refined.
+        pns_common.errors.ModelError: the model's answer is no correction.
     """
     course = Course() if course is None else course
     with course.stage("read", 0.0, READ):
@@ -98,6 +106,7 @@ def subdivide_gltf(
                         degenerate=mesh.degenerate,
                         copies=mesh.copies,
                         report=mesh.report,
+                        bends=mesh.bends,
                     )
                     outcomes[mesh.index] = result, mesh.changes
     results, found = zip(*(outcomes[plan.mesh] for plan in upload.plans), strict=True)
@@ -115,22 +124,16 @@ def subdivide_gltf(
 
 
 def make_scheme(options: Options, model: Model | None) -> Scheme:
-    """Make the scheme that the options name.
+    """Return the scheme that the options name.
 
     Raises:
-        NoModelError: the learned scheme without a model.
-        InvalidParameter: a strength for the prior of a model that has none.
+        NoModelError: `scheme=pns` without a model.
     """
     if options.scheme == "loop":
         return loop()
     if model is None:
         raise NoModelError("no model is loaded; scheme=loop needs none")
-    strength = options.prior_strength
-    if strength is not None and model.card.prior_strength is None:
-        raise InvalidParameter(
-            "prior_strength", f"the model {model.name} has no prior: leave prior_strength out"
-        )
-    return pns(model, options.budget, strength)
+    return pns(model, options.budget)
 
 
 def _changes_of_container(upload: Upload, options: Options) -> list[Change]:

@@ -33,7 +33,7 @@ from .watch.tracing import tracer_from_environment
 log = logging.getLogger("pns.service")
 
 if TYPE_CHECKING:
-    from pns_common.schemes import Model
+    from pns_common.model.session import Model
 
 
 def create_app(
@@ -70,6 +70,7 @@ def create_app(
     )
     book = JobBook(
         seconds=settings.result_seconds,
+        promised_seconds=min(settings.promised_seconds, settings.result_seconds),
         max_bytes=int(settings.result_bytes),
         max_jobs=settings.results,
     )

@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+from ..bodies.media import Kind
 from ..options import (
     CREASE_PATTERN,
     DEFAULTS,
     MAX_LEVELS,
-    MAX_PRIOR_STRENGTH,
     MAX_WELD_TOLERANCE,
     Compression,
     Diagnostics,
@@ -59,20 +59,12 @@ class Parameters(BaseModel):
     model: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
         default=None,
         description="a name from `GET /models`; empty: the service's default. `scheme=loop` has no "
-        "use for it, for `budget` or for `prior_strength`: they are checked and nothing else",
+        "use for it or for `budget`: both are checked and then have no effect",
     )
     budget: Annotated[
         Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,
         BeforeValidator(_empty_is_absent),
     ] = Field(default=DEFAULTS.budget, description="C, dimensionless; empty: the model's own")
-    prior_strength: Annotated[
-        Annotated[float, Field(ge=0, le=MAX_PRIOR_STRENGTH, allow_inf_nan=False)] | None,
-        BeforeValidator(_empty_is_absent),
-    ] = Field(
-        default=DEFAULTS.prior_strength,
-        description="s of the model's prior, the same for every mesh; empty: as each mesh calls "
-        "for. A model without a prior refuses it",
-    )
     reference_length: Annotated[
         Literal["auto"] | Annotated[float, Field(gt=0, allow_inf_nan=False)],
         BeforeValidator(_length),
@@ -91,18 +83,18 @@ class Parameters(BaseModel):
     )
     normals: NormalRule = Field(
         default=DEFAULTS.normals,
-        description="`keep`: hard edges of the file stay hard, and what has no normals "
-        "stays without; `smooth`: new ones everywhere, smooth but across creases; "
+        description="`auto`: hard edges of the file stay hard, and a mesh without normals gets "
+        "new ones, smooth but across sharp edges; `keep`: a mesh without normals stays without; "
+        "`smooth`: new ones everywhere, smooth but across sharp edges; "
         "`limit`: the same, and exactly those of the limit surface (with `limit=true`)",
     )
     crease: str = Field(
         default=DEFAULTS.crease,
         pattern=f"^({CREASE_PATTERN})$",
-        description="edges to keep sharp: `lines` (those that the mesh shows: sharp, flat on both "
-        "sides, and going on), `auto` (where the model's card asks for them, these, the hard "
-        "edges of what is shaded smooth, and borders of primitives on flat sides), `off`, "
-        "`normals` (where the two sides carry different normals) or `angle:` and degrees (where "
-        "the faces meet at more)",
+        description="edges to keep sharp: `auto` (for models of format 4, as `general`: edges "
+        "beyond 40 degrees that are connected to one beyond 60, at as many levels as the card "
+        "says), `off`, `normals` (edges whose two sides carry different normals) or `angle:` and "
+        "degrees (edges whose faces meet at more)",
     )
     weld_tolerance: float = Field(
         default=DEFAULTS.weld_tolerance,
@@ -116,6 +108,11 @@ class Parameters(BaseModel):
         default=DEFAULTS.compress,
         description="`meshopt` is exact; `draco` is smaller, and rounds positions, normals and UVs",
     )
+    format: Kind = Field(
+        default="glb",
+        description="of the answer; `gltf` has its buffers inside, `obj`, `ply`, `stl` and `off` "
+        "hold what `pns subdivide` writes there",
+    )
     limit: bool = Field(
         default=DEFAULTS.limit,
         description="put the vertices where Loop's rules would take them in the end: on the limit "
@@ -123,5 +120,5 @@ class Parameters(BaseModel):
     )
 
     def options(self) -> Options:
-        """Return the same as the pipeline takes them: all but the model, not its to find."""
-        return Options(**self.model_dump(exclude={"model"}))
+        """Return the pipeline's options: all but the model and the format of the answer."""
+        return Options(**self.model_dump(exclude={"model", "format"}))

@@ -12,7 +12,8 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.connectivity.topology import build_topology, split
+from pns_common.parallel import Blocks
+from pns_common.topology import build_topology, split_faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,7 @@ def barycentric_grid(levels: int) -> BarycentricGrid:
         topology = build_topology(faces, len(points))
         a, b = topology.edges.T
         points = np.concatenate([points, (points[a] + points[b]) // 2])
-        faces = split(topology)
+        faces = split_faces(topology, Blocks(), np.int64)
     number_at = np.full((segments + 1, segments + 1), -1, dtype=np.int64)
     number_at[points[:, 0], points[:, 1]] = np.arange(len(points))
     slot = np.empty(len(points), dtype=np.int64)

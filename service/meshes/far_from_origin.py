@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.arrays import dot
-from pns_common.base.extent import extent
+from pns_common.rows import dot, extent
 
 # Nearer than so many times its own size a surface is not looked at: its sides would have to be some
 # ten thousandths of that.

@@ -1,23 +1,28 @@
-"""Which edges of a control mesh are creases by its shape: an angle, or the lines that it shows."""
+"""Creases of a control mesh by its shape: edges beyond an angle, or those of the scheme."""
 
 from __future__ import annotations
 
-from pns_common.connectivity.creases import NO_CREASES, Creases
-from pns_common.crease_lines import LINES
-from pns_common.geometry.sharp_edges import edges_sharper_than
+import numpy as np
+
+from pns_common.creases import NO_CREASES, Creases, edge_cosines
 from pns_common.mesh import Mesh
 from pns_common.schemes import Scheme
+from pns_common.topology import build_topology
 
 from ..options import Options
 
 
-def lines_of(options: Options, scheme: Scheme) -> Creases:
-    """Return the crease lines to look for: those of the scheme, or of who asks for them."""
-    return {"auto": scheme.creases, "lines": LINES}.get(options.crease, NO_CREASES)
-
-
 def creases_by_shape(mesh: Mesh, options: Options, scheme: Scheme) -> Creases:
-    """Return the edges that the options keep sharp by the mesh's shape; lines are to be found."""
-    if options.crease_angle is not None:
-        return Creases(edges_sharper_than(mesh.vertices, mesh.faces, options.crease_angle))
-    return lines_of(options, scheme)
+    """Return the edges of a mesh of triangles that the options keep sharp by its shape, by name.
+
+    With `crease=auto` these are the scheme's: none for Loop and models of format 1.
+    """
+    rule = scheme.creases if options.crease == "auto" else NO_CREASES
+    if options.crease_angle is None and rule.angle is None:
+        return NO_CREASES
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    if options.crease_angle is None:
+        rows = rule.found(mesh.vertices, topology)
+    else:
+        rows = np.flatnonzero(edge_cosines(mesh.vertices, topology) < np.cos(options.crease_angle))
+    return Creases(topology.edges[rows].astype(np.int64), levels=rule.levels)

@@ -8,12 +8,12 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.base.arrays import marked
-from pns_common.base.distinct import as_words, distinct_rows, number_by_first_appearance
-from pns_common.connectivity.creases import Creases, pair_keys
-from pns_common.connectivity.topology import EdgeClass, Topology, split
-from pns_common.masks.linear import level_topologies
-from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
+from pns_common.columns import level_topologies
+from pns_common.creases import Creases
+from pns_common.parallel import Blocks, available_threads
+from pns_common.rows import as_words, distinct_rows, number_by_first_appearance
+from pns_common.schemes import LOOP
+from pns_common.topology import EdgeClass, Topology, split_faces
 
 from ..options import Options
 from .split_connectivity import SplitConnectivity
@@ -56,12 +56,11 @@ def smooth_uv(
     grid = connectivity.grid
     levels = grid.segments.bit_length() - 1
     sharp = Creases(_in_charts(creases.named, faces, vertex[corner_of]), levels=creases.levels)
-    topologies = level_topologies(faces, len(columns), levels, sharp)
+    blocks = Blocks(available_threads())
+    topologies = level_topologies(faces, len(columns), levels, sharp, blocks=blocks)
     for topology in topologies:
-        columns = np.concatenate(
-            [_chart_vertices(columns, topology), loop_edge_vertices(columns, topology)]
-        )
-    descendants = split(topologies[-1]).reshape(len(connectivity.faces), -1)
+        columns = _refined(columns, topology, blocks)
+    descendants = split_faces(topologies[-1], blocks, np.int64).reshape(len(faces), -1)
     return columns[connectivity.at_vertices(np.take(descendants, grid.slot, axis=1))]
 
 
@@ -75,13 +74,15 @@ def _in_charts(
         return None
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     count = int(max(vertex.max(), named.max())) + 1
-    return sides[np.isin(pair_keys(vertex[sides], count), pair_keys(named, count))]
+    ends, wanted = (np.sort(pairs, axis=1) @ [count, 1] for pairs in (vertex[sides], named))
+    return sides[np.isin(ends, wanted)]
 
 
-def _chart_vertices(
-    columns: Float[np.ndarray, "V 2"], topology: Topology
-) -> Float[np.ndarray, "V 2"]:
-    """Move vertices inside by Loop's rule; on a boundary they stay, as in linear blending."""
+def _refined(
+    columns: Float[np.ndarray, "V 2"], topology: Topology, blocks: Blocks
+) -> Float[np.ndarray, "W 2"]:
+    """Refine by Loop's masks; vertices on a boundary stay, as in linear blending."""
     rim = (topology.edge_class != EdgeClass.INTERIOR) & (topology.edge_class != EdgeClass.CREASE)
-    at_rim = marked(topology.edges[rim].reshape(-1), len(columns))
-    return np.where(at_rim[:, None], columns, loop_vertex_vertices(columns, topology))
+    at_rim, refined = topology.edges[rim].reshape(-1), LOOP.place(columns, topology, blocks)
+    refined[at_rim] = columns[at_rim]
+    return refined

@@ -7,8 +7,8 @@ from itertools import pairwise, product
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.distinct import distinct_rows
-from pns_common.geometry.reference_length import measure_reference_length
+from pns_common.reference_length import measure_reference_length
+from pns_common.rows import distinct_rows
 
 from .weld import Weld, weld_by_label
 
@@ -59,7 +59,9 @@ def _reference_lengths(
     )
     return np.array(
         [
-            measure_reference_length(welded.points[start:stop], welded.faces[begin:end] - start)
+            measure_reference_length(
+                welded.points[start:stop], welded.faces[begin:end].reshape(-1) - start
+            )
             for (begin, end), (start, stop) in ends
         ]
     )

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.connectivity.disjoint_union import disjoint_faces
+from pns_common.rows import disjoint_faces
 
 from ..errors import UnrefinableError
-from ..gltf.read.index_references import INSTANCING
-from ..gltf.read.modes import SURFACES, TRIANGLES
+from ..gltf.constants import SURFACES, TRIANGLES
+from ..gltf.read.extensions import INSTANCING
 from ..gltf.read.primitives import TrianglePrimitive, read_primitive
 from ..gltf.read.schema import Document
 from ..gltf.read.upload import read_upload
-from ..gltf.refine.skin_and_morph import read_skin_and_morph
+from ..gltf.refine.columns import read_skin_and_morph
 from ..meshes.weld import weld
 from ..options import Limits
 from ..report import Change

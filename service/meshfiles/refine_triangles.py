@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.distinct import distinct_rows, number_by_first_appearance
-from pns_common.connectivity.creases import Creases
-from pns_common.crease_lines import named_on
+from pns_common.creases import Creases
 from pns_common.errors import MeshError
 from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
-from pns_common.refine import Refinement, refine
+from pns_common.refinement import Refinement, refine
+from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import Scheme
 
+from ..advice import advice_on, count_bends
 from ..course import Course
 from ..errors import InvalidParameter, UnrefinableError, check_limit
 from ..gltf.read.plan import BYTES_FOR_LIMIT, BYTES_PER_FACE, check_memory
-from ..gltf.refine.refined_primitives import refined_ids
+from ..gltf.refine.control_mesh import refined_ids
 from ..meshes.barycentric_grid import barycentric_grid
 from ..meshes.shape_creases import creases_by_shape
 from ..meshes.split_connectivity import split_connectivity
@@ -57,9 +57,6 @@ def refine_triangles(
         raise UnrefinableError("no face has three different vertices")
     cleaned = clean(Mesh(welded.points, welded.faces))
     creases = creases_by_shape(cleaned.mesh, options, scheme)
-    if options.uv == "smooth":
-        # By name: texture coordinates have the same.
-        creases = named_on(cleaned.mesh, creases)
     refinement = refine(
         cleaned.mesh,
         scheme,
@@ -86,8 +83,11 @@ def refine_triangles(
         "zero_reference_lengths": int(report["reference_length"] == 0),
     }
     report["dropped"] = dropped(int((~proper).sum()), _unused_vertices(mesh_file, welded, cleaned))
+    (bends,) = count_bends(cleaned.mesh, creases)
+    levels = refinement.report["levels"]
     report["changes"] = [asdict(change) for change in changes]
-    report["levels"] = refinement.report["levels"]
+    report["advice"] = advice_on(levels, bends)
+    report["levels"] = levels
     return refined, report
 
 
@@ -121,7 +121,7 @@ def _with_corners(
 ) -> IndexedTriangles:
     """Cut the refined mesh open again where texture coordinates differ."""
     points, grid = refinement.mesh.vertices, barycentric_grid(options.levels)
-    ids = refined_ids(welded, cleaned, refinement, grid)
+    ids = refined_ids(welded, cleaned, refinement.mesh, grid)
     if mesh_file.uv is None:
         return IndexedTriangles(points, ids[:, grid.faces.reshape(-1)].reshape(-1, 3))
     faces = mesh_file.faces[cleaned.representative >= 0]

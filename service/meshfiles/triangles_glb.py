@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pns_common.base.extent import extent
+from pns_common.rows import extent
 
 from ..gltf.constants import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, FLOAT, UNSIGNED_INT
 from ..gltf.read.container import read_glb, write_glb

@@ -15,7 +15,7 @@ from ..options import Limits, Options
 from .same_model import check_same_model
 
 if TYPE_CHECKING:
-    from pns_common.schemes import Model
+    from pns_common.model.session import Model
 
     from ..bodies.sibling_files import SiblingFiles
     from .places import Place
@@ -128,7 +128,7 @@ def failed(path: str, output: str, error: Exception) -> Row:
 def _refine(task: Task) -> Row:
     from pns_common.errors import PnsError
 
-    from ..gltf.read.memory_cap import memory_cap
+    from ..memory_cap import memory_cap
     from ..meshfiles.convert import converted, lines_of
     from .places import place_of
 
@@ -212,7 +212,7 @@ def _is_done(known: Known | None, input_hash: str, output: Place) -> bool:
 def input_hash(data: bytes, kind: str, siblings: SiblingFiles, limits: Limits) -> str:
     """Return the SHA-256 of a file and then of the names and bytes of the files that it names."""
     from ..bodies.sibling_files import Opened
-    from ..gltf.read.named_files import named_files
+    from ..gltf.read.upload import named_files
 
     digest, opened = hashlib.sha256(data), Opened(siblings)
     for uri in named_files(data, kind, limits):

@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from pns_common.base.whole_file import replacing
+from pns_common.files import replacing
 
 from ..errors import InvalidParameter
 from .job import PLANNED, SKIPPED, UNREADABLE_FOLDER, Known, Row

@@ -16,7 +16,7 @@ from typing import Any
 import fsspec
 from fsspec.implementations.local import LocalFileSystem
 
-from pns_common.base.whole_file import replace_file
+from pns_common.files import replace_file
 
 from ..bodies.sibling_files import File, SiblingFiles
 from ..errors import InvalidParameter

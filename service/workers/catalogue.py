@@ -14,7 +14,7 @@ from ..errors import NoModelError
 from .models import Models
 
 if TYPE_CHECKING:
-    from pns_common.schemes import Model
+    from pns_common.model.session import Model
 
 log = logging.getLogger("pns.service")
 
@@ -35,48 +35,19 @@ class ModelEntry(BaseModel):
         description="feature set of old vertices; null where Loop's rule places them"
     )
     vertex_gate_sharpness: float | None = Field(description="c of the old vertices' gate")
-    learned_levels: int | None = Field(
-        description="K: levels at which it acts, after which it is Loop; null: at all of them"
+    base: str | None = Field(description="base scheme; null in format 1, which has Loop")
+    prior_strength: float | None = Field(description="s of the prior; null in format 1")
+    boundary_strength: float | None = Field(
+        description="strength of the prior along boundaries and creases; null in format 1"
     )
-    prior_strength: float | None = Field(description="s of the prior; null before format 3")
     network_scale: float | None = Field(
-        description="the most that the network may ask for, in edge lengths; null before format 3"
+        description="τ, the longest vector of the network in edge lengths; null in format 1"
     )
     fold_angle: float | None = Field(
-        description="of the fold guard, in degrees; null before format 3"
+        description="θ of the fold guard, in degrees; null in format 1"
     )
-    boundary_strength: float | None = Field(
-        description="b of the boundaries' own prior; null where they are Loop's"
-    )
-    side_gates: bool | None = Field(
-        description="whether an edge's gate reads the sides of its two faces; null: the faces alone"
-    )
-    network_altitudes: float | None = Field(
-        description="the longest that the network's unit may be, in altitudes of an edge's thinner "
-        "face; null: edge lengths alone"
-    )
-    wide_bound: bool | None = Field(
-        description="whether h of an edge's bound is the longest edge of both faces; null: its own"
-    )
-    crease_prior: bool | None = Field(
-        description="whether the boundaries' prior acts at creases too; null: creases are Loop's"
-    )
-    tip_strength: float | None = Field(
-        description="how much of Loop's own move is given back at tips; null: none"
-    )
-    even_prior_strength: float | None = Field(
-        description="s of the prior where a mesh is even; null: `prior_strength` for any mesh"
-    )
-    crease_angle: float | None = Field(
-        description="of the crease lines that `crease=auto` keeps, in degrees; null: none"
-    )
-    crease_levels: int | None = Field(
-        description="at how many levels these lines are sharp; null: there are none"
-    )
-    edged_crease_angle: float | None = Field(
-        description="of those of a mesh at least half of whose turns are that sharp, rows of like"
-        " ones apart, and of those beside plane sides that were cut finely, in degrees; null: the"
-        " same"
+    sharpness_levels: int | None = Field(
+        description="at how many levels `crease=auto` keeps sharp edges; null in format 1"
     )
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")

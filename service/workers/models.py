@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import NoModelError, check_choice
 
 if TYPE_CHECKING:
-    from pns_common.schemes import Model
+    from pns_common.model.session import Model
 
 
 class Models:
@@ -28,18 +29,21 @@ class Models:
     @property
     def served(self) -> Model | str:
         """The model that a request without a name gets, or its name or file."""
-        from pns_common.runtimes.onnx_model import DEFAULT_MODEL
+        from pns_common.model.file import DEFAULT_MODEL
 
         return DEFAULT_MODEL if self._source is None else self._source
 
     @property
     def sources(self) -> dict[str, Model | str]:
         """What each name stands for; a bundled name wins over that of a served file."""
-        from pns_common.runtimes.onnx_model import bundled_models, model_name
+        from pns_common.model.file import bundled_models
 
-        served = self.served
-        name = model_name(served) if isinstance(served, str) else served.name
-        return {name: served} | {bundled: bundled for bundled in bundled_models()}
+        served, names = self.served, bundled_models()
+        if not isinstance(served, str):
+            name = served.name
+        else:
+            name = served if served in names else Path(served).stem
+        return {name: served} | {bundled: bundled for bundled in names}
 
     def get(self, name: str | None = None) -> Model:
         """Return the model of that name, or the served one.

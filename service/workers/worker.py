@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import logging
 import os
 import signal
+import sys
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -67,10 +69,28 @@ def call(function: Callable[..., T], *arguments: object) -> T:
     try:
         with rare_searches():
             return function(*arguments)
-    except ServiceError:
-        raise
+    except ServiceError as error:
+        _let_go(error)
+        raise error.with_traceback(None) from None
     except Exception as error:
-        raise JobFaultError("".join(traceback.format_exception(error))) from None
+        text = "".join(traceback.format_exception(error))
+        _let_go(error)
+        raise JobFaultError(text) from None
+
+
+def _let_go(error: BaseException | None) -> None:
+    """Clear the frames of an error and of its causes, which hold the job's files and arrays.
+
+    The error is kept until it is sent, and in a cycle for longer.
+    """
+    seen: set[int] = set()
+    while error is not None and id(error) not in seen:
+        seen.add(id(error))
+        traceback.clear_frames(error.__traceback__)
+        error.__traceback__ = None
+        cause, context = error.__cause__, error.__context__
+        error.__cause__ = error.__context__ = None
+        error = cause or context
 
 
 @contextmanager
@@ -86,7 +106,7 @@ def rare_searches() -> Iterator[None]:
 
 
 def give_back() -> None:
-    """Give what jobs have freed, and kept for the next one, back to the system."""
-    from pns_common.fused import freed_memory
-
-    freed_memory.give_back()
+    """Return freed memory, which glibc keeps for the next job, to the system."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
+    if trim is not None:
+        trim(0)

@@ -151,6 +151,25 @@ def test_export_command_writes_the_same_bytes_twice(tmp_path):
     assert (tmp_path / "one.onnx").read_bytes() == (tmp_path / "two.onnx").read_bytes()
 
 
+def test_bundled_files_are_replaced_only_where_that_is_asked(tmp_path, monkeypatch):
+    """A copy of the folder stands for the bundled one."""
+    monkeypatch.setattr(export.run, "MODELS", tmp_path)
+    monkeypatch.setattr(export.run, "FILE_OF_RECIPE", {"paper": tmp_path / "paper.onnx"})
+    checkpoint = tmp_path / "checkpoints" / "c.safetensors"
+    save_checkpoint(checkpoint, Checkpoint(paper(), initial_network(paper()), {}, "machine"))
+
+    def command(*arguments):
+        given = ["--checkpoint", str(checkpoint), *arguments]
+        return CliRunner().invoke(export.run.app, given, catch_exceptions=False)
+
+    assert command().exit_code == 0
+    assert [path.name for path in tmp_path.glob("*")] == ["checkpoints"]
+    assert checkpoint.with_suffix(".onnx").exists()
+    assert command("--install").exit_code == 0
+    assert (tmp_path / "paper.onnx").exists()
+    assert command("--install", "--output", str(tmp_path / "x.onnx")).exit_code == 1
+
+
 def test_export_command_refuses_what_is_no_checkpoint(tmp_path):
     (tmp_path / "bad").write_text("{}")
     outcome = export_command(tmp_path / "bad", tmp_path / "m.onnx")

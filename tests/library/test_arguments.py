@@ -1,20 +1,15 @@
-"""Whoever refines refuses what is no argument of a refinement, by name, before any work."""
+"""Arguments out of range are refused by name, before any work."""
 
 import numpy as np
 import pytest
 
 import pns_common
-from pns_common import Mesh, ParameterError, arguments, loop, pns, refine
-from pns_common.refine_parts import refine_parts
+from pns_common import Mesh, ParameterError, loop, pns, refine, refinement
 from tests.support.meshes import grid
 from tests.support.networks import random_model
 
 MODEL = random_model(0, scale=30.0)
 MESH = Mesh(*grid(3))
-
-
-def refined_as_parts(mesh, scheme, levels=1, reference_length="auto", **options):
-    return refine_parts(mesh, np.array([0, 8]), scheme, levels, reference_length, **options)
 
 
 REFUSED = {
@@ -27,28 +22,24 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("refined", [refine, refined_as_parts])
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_be_asked_for_is_refused(name, refined):
+def test_arguments_out_of_range_are_refused_by_name(name):
     for value in REFUSED[name]:
         given = {"mesh": MESH, "scheme": loop(), name: value}
         # Where annotations are enforced, another kind ends there first.
         with pytest.raises((ParameterError, TypeError), match=name):
-            refined(**given)
+            refine(**given)
 
 
-@pytest.mark.parametrize("refined", [refine, refined_as_parts])
-def test_levels_that_cannot_fit_into_memory_are_refused(monkeypatch, refined):
+def test_levels_that_cannot_fit_into_memory_are_refused(monkeypatch):
     made = refine(MESH, loop(), 3).mesh
     kept = made.vertices.nbytes + made.faces.nbytes
-    monkeypatch.setattr(arguments, "memory_here", lambda: kept)
-    refined(MESH, loop(), 2)
+    monkeypatch.setattr(refinement, "memory_here", lambda: kept)
+    refine(MESH, loop(), 2)
     with pytest.raises(ParameterError, match=r"512 faces take 0\.0 GiB or more") as caught:
-        refined(MESH, loop(), 3)
+        refine(MESH, loop(), 3)
     assert caught.value.name == "levels"
-    with pytest.raises(ParameterError, match="levels = 3: expected fewer"):
-        pns_common.subdivide(grid(3), np.int8(3), loop())
-    monkeypatch.setattr(arguments, "memory_here", lambda: None)
+    monkeypatch.setattr(refinement, "memory_here", lambda: None)
     assert (refine(MESH, loop(), 3).mesh.vertices == made.vertices).all()
 
 
@@ -72,7 +63,7 @@ def test_budget_out_of_range_is_refused(budget):
         ("scheme", lambda: pns_common.subdivide(grid(3), scheme=MODEL)),
         ("model", lambda: pns("general")),
         ("mesh", lambda: pns_common.clean(grid(3))),
-        ("mesh", lambda: pns_common.crease_lines(grid(3))),
+        ("mesh", lambda: pns_common.sharp_edges(grid(3))),
         ("source", lambda: pns_common.load_model(3)),
         ("progress", lambda: refine(Mesh(*grid(3)), loop(), progress="bar")),
     ],

@@ -5,7 +5,6 @@ import pickle
 import pytest
 
 from pns_common.errors import MeshError, ModelError, ParameterError, PnsError
-from pns_common.pieces import ThinHaloError
 
 ERRORS = {
     "mesh": (MeshError("no area", element="face", index=3), "face 3: no area"),
@@ -19,7 +18,6 @@ ERRORS = {
         ParameterError("levels", "2", expected="a whole number"),
         "levels = '2': expected a whole number",
     ),
-    "halo": (ThinHaloError(1, 7), "level 1: 7 of the piece's faces are not certain"),
 }
 
 

@@ -6,8 +6,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, pns, refine
-from pns_common.connectivity.topology import EdgeClass, build_topology
-from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
+from pns_common.operator import edge_inputs
+from pns_common.refinement import control_level
+from pns_common.topology import EdgeClass, build_topology
 from tests.support.meshes import (
     axis_planes,
     bent,
@@ -35,7 +36,7 @@ def test_displacement_within_budget(mesh, model, budget, reference_length):
     proper = mesh.faces[(mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1)]
     assume(len(proper))
     mesh = Mesh(mesh.vertices, proper)
-    refined = refine(mesh, pns(model, budget), reference_length=reference_length)
+    refined = refine(mesh, pns(model, budget), 1, reference_length=reference_length)
     base = plain_loop(mesh.vertices, mesh.faces).positions
     length = refined.report["reference_length"]
     topology = build_topology(mesh.faces, len(mesh.vertices))
@@ -52,7 +53,7 @@ def test_displacement_within_budget(mesh, model, budget, reference_length):
 
 @given(soups() | manifolds(), models)
 def test_only_interior_edges_are_corrected(mesh, model):
-    refined = refine(mesh, pns(model))
+    refined = refine(mesh, pns(model), 1)
     topology = build_topology(mesh.faces, len(mesh.vertices))
     elsewhere = topology.edge_class != EdgeClass.INTERIOR
     at_edges = slice(len(mesh.vertices), None)
@@ -65,8 +66,8 @@ def moved_apart(mesh, model, seed):
     """How far refining commutes with a random rigid motion, at each vertex."""
     rng = np.random.default_rng(seed)
     turn, shift = rotation(rng), rng.standard_normal(3)
-    still = refine(mesh, pns(model))
-    after = refine(Mesh(mesh.vertices @ turn.T + shift, mesh.faces), pns(model))
+    still = refine(mesh, pns(model), 1)
+    after = refine(Mesh(mesh.vertices @ turn.T + shift, mesh.faces), pns(model), 1)
     assert still.report["levels"][0]["degenerate_frames"] == 0
     return np.linalg.norm(after.mesh.vertices - (still.mesh.vertices @ turn.T + shift), axis=1)
 
@@ -80,7 +81,7 @@ def test_commutes_with_rigid_motion(mesh, seed):
 def test_commutes_with_rigid_motion_through_a_model_file(mesh, seed):
     """The file reads single precision: a feature's last bit may move η by 1e-6 of the budget."""
     longest = np.linalg.norm(np.ptp(mesh.vertices, axis=0))
-    length = refine(mesh, loop()).report["reference_length"]
+    length = refine(mesh, loop(), 1).report["reference_length"]
     model = MODELS[0]
     allowed = 1e-12 + 1e-6 * model.card.budget / length * longest**2
     assert moved_apart(mesh, model, seed).max() <= allowed
@@ -98,17 +99,13 @@ def test_planar_input_gives_loop_exactly_on_axis_aligned_planes(model):
 def test_planar_input_gives_loop_in_any_orientation(model, seed):
     mesh = tilted_plane(seed)
     scheme = pns(model)
-    refined = refine(mesh, scheme)
+    refined = refine(mesh, scheme, 1)
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    stencil = edge_stencil(
-        mesh.vertices,
-        face_normals(mesh.vertices, mesh.faces),
-        topology.stencil[topology.interior],
-        topology.edge_faces[topology.interior],
-    )
-    length = edge_frames(stencil).length
-    delta = refined.ratio[len(mesh.vertices) :][topology.interior] * model.card.budget * length**2
-    assert (delta < 1e-28 * length**2).all()
+    inside = topology.interior
+    a, b = (mesh.vertices[topology.edges[inside, end]] for end in (0, 1))
+    square = np.sum((b - a) ** 2, axis=1)
+    delta = refined.ratio[len(mesh.vertices) :][inside] * model.card.budget * square
+    assert (delta < 1e-28 * square).all()
 
 
 @given(manifolds(), st.integers(-20, 20))
@@ -122,28 +119,22 @@ def test_scaling_a_mesh_scales_the_result(mesh, power):
 
 def test_halving_the_reference_length_doubles_the_correction():
     mesh = Mesh(*bumpy_sphere())
-    base = refine(mesh, loop()).mesh.vertices
-    whole = refine(mesh, pns(MODELS[0]), reference_length=1.0).mesh.vertices - base
-    half = refine(mesh, pns(MODELS[0]), reference_length=0.5).mesh.vertices - base
+    base = refine(mesh, loop(), 1).mesh.vertices
+    whole = refine(mesh, pns(MODELS[0]), 1, reference_length=1.0).mesh.vertices - base
+    half = refine(mesh, pns(MODELS[0]), 1, reference_length=0.5).mesh.vertices - base
     np.testing.assert_allclose(half, 2 * whole, rtol=0, atol=1e-15)
 
 
-@given(soups())
-def test_degenerate_frames_are_rotations_and_features_finite(mesh):
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    if not len(topology.interior):
-        return
-    stencil = edge_stencil(
-        mesh.vertices,
-        face_normals(mesh.vertices, mesh.faces),
-        topology.stencil[topology.interior],
-        topology.edge_faces[topology.interior],
-    )
-    frames = edge_frames(stencil)
-    columns = np.stack([frames.tangent, frames.normal, frames.binormal], axis=-1)
-    identity = np.einsum("eij,eik->ejk", columns, columns)
+@given(soups(), models)
+def test_degenerate_frames_are_rotations_and_features_finite(mesh, model):
+    scheme = pns(model)
+    level = control_level(mesh, scheme, 1.0)
+    at = edge_inputs(level, scheme.rule, level.topology.interior)
+    frames = at.basis.reshape(-1, 3, 3)
+    identity = np.einsum("eji,eki->ejk", frames, frames)
     np.testing.assert_allclose(identity, np.broadcast_to(np.eye(3), identity.shape), atol=1e-9)
-    assert (np.linalg.det(columns) > 0).all()
+    assert (np.linalg.det(frames) > 0).all()
+    assert np.isfinite(at.features).all()
 
 
 def test_faces_without_area_do_not_disturb_a_plane():
@@ -151,15 +142,15 @@ def test_faces_without_area_do_not_disturb_a_plane():
     vertices = np.array([[0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0], [1, -1, 0]], dtype=float)
     faces = np.array([[0, 1, 2], [0, 3, 1], [0, 4, 3], [3, 4, 1]])
     mesh = Mesh(vertices, faces)
-    refined = refine(mesh, pns(MODELS[2]))
-    np.testing.assert_array_equal(refined.mesh.vertices, refine(mesh, loop()).mesh.vertices)
+    refined = refine(mesh, pns(MODELS[2]), 1)
+    np.testing.assert_array_equal(refined.mesh.vertices, refine(mesh, loop(), 1).mesh.vertices)
     assert refined.report["levels"][0]["degenerate_frames"] == 3
 
 
 def test_zero_reference_length_switches_the_correction_off():
     points = np.zeros((4, 3)) + 2.0
     mesh = Mesh(points, np.array([[0, 1, 2], [0, 2, 3]]))
-    refined = refine(mesh, pns(MODELS[0]))
+    refined = refine(mesh, pns(MODELS[0]), 1)
     assert refined.report["reference_length"] == 0
     np.testing.assert_array_equal(refined.mesh.vertices, 2.0)
 

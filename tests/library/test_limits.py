@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from pns_common import Creases
 from pns_common.columns import level_topologies, refine_columns
-from pns_common.kernels.limit import dart_weight
 from pns_common.limit import (
     dart_tangents,
+    dart_weights,
     find_sectors,
     limit_normals,
     limit_positions,
@@ -132,10 +132,11 @@ def test_limits_do_not_depend_on_threads(mesh, seed):
 
 @pytest.mark.parametrize("k", [1, 2, 3, 6, 50])
 def test_weights_beside_a_dart_solve_their_equations(k):
-    decay = (5 - 21**0.5) / 2
-    w = np.array([dart_weight(decay, k, j) for j in range(k + 1)])
-    np.testing.assert_allclose(w[[0, k]], 0, atol=1e-15)
+    w = np.concatenate([[0], dart_weights(True, k)[1:], [0]])
     np.testing.assert_allclose(5 * w[1:-1], 8 + w[:-2] + w[2:], atol=1e-13)
+    assert dart_weights(True, k)[0] == pytest.approx((w[1] + w[-2]) / 4 if k > 1 else 0)
+    around = dart_weights(False, k)
+    np.testing.assert_allclose(5 * around, 8 + np.roll(around, 1) + np.roll(around, -1))
 
 
 # --- normals --------------------------------------------------------------------------------------

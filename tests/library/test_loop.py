@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, refine
-from pns_common.connectivity.topology import EdgeClass, build_topology
-from pns_common.masks.stencils import loop_beta
+from pns_common.schemes.loop import beta as loop_beta
+from pns_common.topology import EdgeClass, build_topology
 from tests.support.meshes import (
     TETRAHEDRON,
     bent,
@@ -54,7 +54,7 @@ def test_real_closed_meshes_equal_trimesh(name):
     mesh = trimesh.load(shared_path(f"assets/{name}"), process=False, force="mesh")
     merged = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)
     expected, _ = trimesh.remesh.subdivide_loop(merged.vertices, merged.faces)
-    refined = refine(Mesh(merged.vertices, merged.faces), loop()).mesh
+    refined = refine(Mesh(merged.vertices, merged.faces), loop(), 1).mesh
     assert match(refined.vertices, expected) < 1e-12
 
 
@@ -77,7 +77,7 @@ def test_tangent_eigenvalue_of_the_star_is_loops(valence):
     for column in range(1 + valence):
         points = np.zeros((count, 3))
         points[column] = 1
-        star[:, column] = refine(Mesh(points, faces), loop()).mesh.vertices[rows, 0]
+        star[:, column] = refine(Mesh(points, faces), loop(), 1).mesh.vertices[rows, 0]
     moduli = np.sort(np.abs(np.linalg.eigvals(star)))
     tangent = 3 / 8 + np.cos(2 * np.pi / valence) / 4
     assert moduli[-1] == pytest.approx(1, abs=1e-12)
@@ -94,7 +94,7 @@ def test_affine_heights_are_reproduced():
 
 def test_boundary_follows_the_cubic_curve():
     vertices, faces = grid(5, bent)
-    refined = refine(Mesh(vertices, faces), loop()).mesh.vertices
+    refined = refine(Mesh(vertices, faces), loop(), 1).mesh.vertices
     side = [5 * i for i in range(5)]  # y = −1
     for before, here, after in zip(side, side[1:], side[2:], strict=False):
         expected = vertices[before] / 8 + 3 * vertices[here] / 4 + vertices[after] / 8
@@ -107,7 +107,7 @@ def test_boundary_follows_the_cubic_curve():
 )
 def test_vertices_on_sharp_edges(shape, vertex, rule):
     vertices, faces = shape()
-    refined = refine(Mesh(vertices, faces), loop()).mesh.vertices
+    refined = refine(Mesh(vertices, faces), loop(), 1).mesh.vertices
     expected = vertices[vertex]
     if rule == "curve":
         expected = 3 * vertices[vertex] / 4 + (vertices[0] + vertices[1]) / 8
@@ -122,7 +122,7 @@ def test_vertex_on_one_irregular_edge_is_a_dart_and_follows_loops_rule():
     topology = build_topology(faces, len(points))
     sharp = topology.edges[topology.edge_class != EdgeClass.INTERIOR]
     assert sharp.tolist() == [[0, 1]]
-    refined = refine(Mesh(points, faces), loop())
+    refined = refine(Mesh(points, faces), loop(), 1)
     beta = loop_beta(np.array([5]))[0]
     expected = (1 - 5 * beta) * points[0] + beta * points[1:].sum(axis=0)
     np.testing.assert_allclose(refined.mesh.vertices[0], expected, rtol=0, atol=1e-14)
@@ -143,7 +143,7 @@ def test_relabelling_permutes_output(mesh):
     moved = np.empty_like(mesh.vertices)
     moved[order] = mesh.vertices
     other = Mesh(moved, order[mesh.faces])
-    refined, relabelled = refine(mesh, loop()).mesh, refine(other, loop()).mesh
+    refined, relabelled = refine(mesh, loop(), 1).mesh, refine(other, loop(), 1).mesh
     np.testing.assert_allclose(
         relabelled.vertices[relabelled.faces], refined.vertices[refined.faces], rtol=0, atol=1e-14
     )
@@ -152,5 +152,5 @@ def test_relabelling_permutes_output(mesh):
 def test_isolated_vertices_stay():
     vertices, faces = grid(3, bent)
     points = np.concatenate([vertices, [[5.0, 6.0, 7.0]]])
-    refined = refine(Mesh(points, faces), loop()).mesh.vertices
+    refined = refine(Mesh(points, faces), loop(), 1).mesh.vertices
     np.testing.assert_array_equal(refined[len(vertices)], points[-1])

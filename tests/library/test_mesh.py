@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from pns_common import Mesh, MeshError, clean
+from pns_common import Mesh, MeshError, clean, loop, refine
 from tests.support.meshes import soups
 
 POINTS = np.eye(3)
@@ -22,7 +22,7 @@ FACE = np.array([[0, 1, 2]])
         (np.array([["a", "b", "c"]] * 3), FACE, "vertices", None),
         (POINTS + 1j, FACE, "vertices", None),
         (POINTS, np.zeros((0, 3), int), "faces", None),
-        (POINTS, np.array([[0, 1]]), "faces", None),
+        (POINTS, np.array([[0, 1]]), "face", 0),
         (POINTS, np.array([[0.0, 1.0, 2.0]]), "faces", None),
         (POINTS, np.array([[0, 1, 2], [0, 1, 3]]), "face", 1),
         (POINTS, np.array([[0, -1, 2]]), "face", 0),
@@ -31,7 +31,7 @@ FACE = np.array([[0, 1, 2]])
         (np.array([[1e80, 0, 0], [0, 1, 0], [1, 1, 1]]), FACE, "vertex", 0),
         (1e-80 * POINTS, FACE, "vertices", None),
         ([[0, 0, 0], [1, 0], [0, 1, 0]], FACE, "vertices", None),
-        (POINTS, [[0, 1, 2], [0, 1]], "faces", None),
+        (POINTS, [[0, 1, 2], [0, 1]], "face", 1),
         (POINTS, np.array([[0, 1, 2**64 - 1]], dtype=np.uint64), "face", 0),
         (np.ma.array(POINTS, mask=np.eye(3)), FACE, "vertices", None),
         (POINTS, np.ma.array(FACE, mask=[[0, 1, 0]]), "faces", None),
@@ -103,3 +103,19 @@ def test_clean_keeps_each_set_of_three_vertices_once(mesh):
     for old, new in enumerate(cleaned.representative.tolist()):
         assert (new < 0) == (len(sets[old]) < 3)
         assert new < 0 or kept[new] == sets[old]
+
+
+def test_faces_of_any_degree_are_kept_and_named_in_errors():
+    points = np.random.default_rng(0).standard_normal((6, 3))
+    mesh = Mesh(points, [[0, 1, 2], [0, 2, 3, 4], [0, 4, 5]])
+    assert [face.tolist() for face in mesh.polygons] == [[0, 1, 2], [0, 2, 3, 4], [0, 4, 5]]
+    assert mesh.offsets.tolist() == [0, 3, 7, 10]
+    with pytest.raises(MeshError, match="different degrees"):
+        _ = mesh.faces
+    quads = Mesh(points, [[0, 1, 2, 3], [0, 3, 4, 5]])
+    assert quads.faces.shape == (2, 4)
+    assert not quads.triangles
+    with pytest.raises(MeshError, match=r"face 1: indices \[0, 2, 3, 9\]"):
+        Mesh(points, [[0, 1, 2], [0, 2, 3, 9]])
+    with pytest.raises(MeshError, match="expected triangles"):
+        refine(quads, loop())

@@ -3,11 +3,7 @@
 import pytest
 
 from pns_common import Mesh, load_model, loop, pns, refine
-from pns_common.models.tied_form import Layer, tied_form
-from pns_common.runtimes.numpy_network import open_network
-from pns_common.runtimes.onnx_model import BUNDLED
 from tests.support.meshes import bumpy_sphere
-from tests.support.tied import VERTICES, tied_layers
 
 MESH = Mesh(*bumpy_sphere(0))
 
@@ -16,18 +12,10 @@ MESH = Mesh(*bumpy_sphere(0))
     ("value", "said"),
     [
         (MESH, "Mesh(vertices=42, faces=80)"),
-        (refine(MESH, loop()), "Refinement('loop', levels=1, vertices=162, faces=320)"),
+        (refine(MESH, loop(), 1), "Refinement('loop', levels=1, vertices=162, faces=320)"),
         (loop(), "Scheme(name='loop'"),
-        (pns(load_model()), "Scheme(name='pns', budget="),
+        (pns(load_model()), "Scheme(name='pns', learned_levels=1, budget="),
         (load_model(), "OnnxModel(name='general', hash='"),
-        (
-            tied_form([Layer(*layer) for layer in tied_layers(VERTICES, (4, 3))], VERTICES),
-            "TiedForm(widths=[4, 3], copies=2)",
-        ),
-        (
-            open_network((BUNDLED / "paper.onnx").read_bytes(), "paper")[1],
-            "NumpyNetwork(nodes=17, weights=9)",
-        ),
     ],
     ids=lambda value: type(value).__name__,
 )

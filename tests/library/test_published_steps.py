@@ -4,14 +4,10 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, loop, pns, refine
-from pns_common.connectivity.topology import build_topology
-from pns_common.features.edge_features import paper_features
-from pns_common.formula.correction import correct, curvature_gate
-from pns_common.geometry.frames import edge_frames, edge_stencil, face_normals
-from pns_common.masks.stencils import loop_edge_point
+from pns_common.operator import edge_inputs
+from pns_common.refinement import control_level
 from tests.support.networks import (
     PUBLISHED_BUDGET,
-    PUBLISHED_GATE_SHARPNESS,
     float64_network,
     published_layers,
     published_model,
@@ -30,48 +26,43 @@ def weights():
 
 
 @pytest.fixture(scope="module")
-def sphere(steps):
+def sphere(steps, weights):
+    """The published mesh's level, its rule, and the author's edges among ours."""
     mesh = Mesh(steps["bumpy_sphere/vertices"], steps["bumpy_sphere/faces"])
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    # The author lists the edges in another order.
-    position = {tuple(edge): e for e, edge in enumerate(topology.edges.tolist())}
+    scheme = pns(published_model(weights, "pns_headline_C0.5"))
+    level = control_level(mesh, scheme, 1.0)
+    position = {tuple(edge): e for e, edge in enumerate(level.topology.edges.tolist())}
     order = np.array([position[tuple(edge)] for edge in steps["bumpy_sphere/edges"].tolist()])
-    normals = face_normals(mesh.vertices, mesh.faces)
-    stencil = edge_stencil(
-        mesh.vertices, normals, topology.stencil[order], topology.edge_faces[order]
-    )
-    return topology, order, stencil
+    return level, scheme.rule, order
 
 
-def test_edges_faces_and_opposites_are_the_published_ones(steps, sphere):
-    topology, order, _ = sphere
-    np.testing.assert_array_equal(topology.edges[order], steps["bumpy_sphere/edges"])
-    np.testing.assert_array_equal(topology.edge_faces[order], steps["bumpy_sphere/edge_faces"])
-    np.testing.assert_array_equal(topology.stencil[order, 2:], steps["bumpy_sphere/opposites"])
+def test_edges_and_their_faces_are_the_published_ones(steps, sphere):
+    level, _, order = sphere
+    np.testing.assert_array_equal(level.topology.edges[order], steps["bumpy_sphere/edges"])
+    faces = np.sort(level.topology.half_edges[order] // 3, axis=1)
+    np.testing.assert_array_equal(faces, np.sort(steps["bumpy_sphere/edge_faces"], axis=1))
 
 
 def test_every_intermediate_equals_the_published_one(steps, weights, sphere):
-    _, _, stencil = sphere
+    level, rule, order = sphere
+    at = edge_inputs(level, rule, order.astype(np.uint32))
     network = float64_network(published_layers(weights, "pns_headline_C0.5"))
-    gate = curvature_gate(PUBLISHED_GATE_SHARPNESS)
-    frames = edge_frames(stencil)
-    phi = paper_features(stencil, frames)
-    correction = correct(stencil, paper_features, network, gate, PUBLISHED_BUDGET)
-    q0 = loop_edge_point(stencil.a, stencil.b, stencil.c, stencil.d)
-    columns = np.stack([frames.tangent, frames.normal, frames.binormal], axis=-1)
+    frames = at.basis.reshape(-1, 3, 3)
+    eta, length = network(at.features), level.edges.lengths[order]
+    q0 = level.base.place(level.points, level.topology, level.blocks)[len(level.points) + order]
+    turned = np.einsum("ej,ejk->ek", eta, frames)
     own = {
-        "frames": columns,
-        "e_len": frames.length,
-        "phi": phi,
-        "gate": correction.gate,
-        "eta": PUBLISHED_BUDGET * network(phi),
+        "frames": np.swapaxes(frames, 1, 2),
+        "e_len": length,
+        "phi": at.features,
+        "gate": at.gate,
+        "eta": PUBLISHED_BUDGET * eta,
         "q0": q0,
-        "q": q0 + correction.displacement,
+        "q": q0 + (at.bound * at.gate)[:, None] * turned,
     }
     for name, value in own.items():
-        np.testing.assert_allclose(
-            value, steps[f"bumpy_sphere/{name}"], rtol=0, atol=1e-10, err_msg=name
-        )
+        expected = steps[f"bumpy_sphere/{name}"]
+        np.testing.assert_allclose(value, expected, rtol=0, atol=1e-10, err_msg=name)
 
 
 @pytest.mark.parametrize("instance", ["ridge_test_0", "ridge_test_3"])

@@ -1,7 +1,6 @@
 """refine: the report, determinism, and levels that compose."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -9,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pns_common
-from pns_common import Mesh, MeshError, loop, pns, refine
-from pns_common.base.blocks import Blocks
-from pns_common.connectivity.topology import build_topology
-from pns_common.schemes import Model
+from pns_common import Mesh, MeshError, loop, pns, refine, refine_many
+from pns_common import parallel
+from pns_common.model.session import Model
+from pns_common.topology import build_topology
 from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid, soups, three_pages
 from tests.support.networks import random_model
 
@@ -55,7 +54,7 @@ def test_report_is_json_and_counts_what_was_made():
     assert first["edges"] == {"interior": 40, "boundary": 16, "irregular": 0}
     edges = len(refined.ratio) - first["vertices"]
     interior = build_topology(
-        refine(Mesh(vertices, faces), loop()).mesh.faces, first["vertices"]
+        refine(Mesh(vertices, faces), loop(), 1).mesh.faces, first["vertices"]
     ).interior
     ratio = refined.ratio[first["vertices"] :]
     assert len(ratio) == edges
@@ -85,21 +84,47 @@ def test_a_report_has_no_nan_for_any_mesh(mesh, levels):
 def test_bits_do_not_depend_on_threads_or_block_size(monkeypatch):
     mesh = Mesh(*bumpy_sphere(0, subdivisions=2))
     expected = refine(mesh, pns(MODEL), 2, threads=1)
-    module = sys.modules["pns_common.refine"]
     for threads, rows in [(2, 8192), (3, 300), (1, 77)]:
-        for name in ("Blocks", "kernel_blocks"):
-            monkeypatch.setattr(module, name, lambda threads, *_, rows=rows: Blocks(threads, rows))
+        monkeypatch.setattr(parallel, "LEAST_ROWS", rows)
+        monkeypatch.setattr(parallel, "BLOCK_ROWS", rows)
         refined = refine(mesh, pns(MODEL), 2, threads=threads)
         np.testing.assert_array_equal(refined.mesh.vertices, expected.mesh.vertices)
         np.testing.assert_array_equal(refined.ratio, expected.ratio)
         assert refined.report == expected.report
 
 
+def test_many_meshes_are_refined_as_each_alone():
+    meshes = [Mesh(*bumpy_sphere(seed)) for seed in range(3)]
+    together = refine_many([(mesh, None) for mesh in meshes], pns(MODEL), 2)
+    for mesh, refined in zip(meshes, together, strict=True):
+        alone = refine(mesh, pns(MODEL), 2, creases=None)
+        np.testing.assert_array_equal(refined.mesh.vertices, alone.mesh.vertices)
+        assert refined.report == alone.report
+
+
+def test_progress_never_falls_and_ends_with_all_faces():
+    told = []
+    mesh = Mesh(*bumpy_sphere(0, subdivisions=2))
+    refine(mesh, pns(MODEL), 3, limit=True, progress=lambda *faces: told.append(faces))
+    made = [faces for faces, _ in told]
+    total = sum(len(mesh.faces) * 4**level for level in (1, 2, 3))
+    assert made == sorted(made)
+    assert told[-1] == (total, total)
+
+
+def test_an_exception_of_progress_ends_the_refinement():
+    def stop(*faces):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refine(Mesh(*bumpy_sphere()), loop(), progress=stop)
+
+
 def test_two_calls_with_the_first_ones_length_are_two_levels():
     mesh = Mesh(*bumpy_sphere())
-    once = refine(mesh, pns(MODEL))
+    once = refine(mesh, pns(MODEL), 1)
     length = once.report["reference_length"]
-    again = refine(once.mesh, pns(MODEL), reference_length=length)
+    again = refine(once.mesh, pns(MODEL), 1, length)
     both = refine(mesh, pns(MODEL), 2)
     np.testing.assert_array_equal(again.mesh.vertices, both.mesh.vertices)
 

@@ -7,11 +7,10 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from pns_common.formula.prior_strength import HIGHEST_STRENGTH
 from service.cli.commands import subdivide
 from service.errors import InvalidParameter
 from service.http.parameters import Parameters
-from service.options import DEFAULTS, MAX_PRIOR_STRENGTH, Options
+from service.options import DEFAULTS, Options
 
 WRONG = [
     ("levels", 0),
@@ -22,10 +21,6 @@ WRONG = [
     ("budget", -0.1),
     ("budget", math.nan),
     ("budget", math.inf),
-    ("prior_strength", -0.1),
-    ("prior_strength", 100.001),
-    ("prior_strength", math.nan),
-    ("prior_strength", math.inf),
     ("reference_length", 0.0),
     ("reference_length", -1.0),
     ("reference_length", math.nan),
@@ -98,7 +93,3 @@ def test_the_command_line_and_http_offer_the_same_choices():
     for name, expected in by_name.items():
         assert get_args(Parameters.model_fields[name].annotation) == expected
         assert get_args(on_the_line[name]) == expected
-
-
-def test_the_highest_prior_strength_is_the_librarys():
-    assert MAX_PRIOR_STRENGTH == HIGHEST_STRENGTH

@@ -7,19 +7,23 @@ from itertools import pairwise
 import numpy as np
 from onnx import TensorProto, helper, numpy_helper
 
-from pns_common.features.edge_features import FEATURE_COUNT
-from pns_common.features.ring_features import RING_10
-from pns_common.models.card import CARD_KEY, ModelCard
-from pns_common.runtimes.onnx_model import model_from_bytes
+from pns_common.model.card import CARD_KEY, EDGE_FEATURES, VERTEX_FEATURES, ModelCard
+from pns_common.model.file import model_from_bytes
 
 PUBLISHED_BUDGET, PUBLISHED_GATE_SHARPNESS = 0.5, 10.0
 
 CARD = ModelCard(1, "paper-5", PUBLISHED_GATE_SHARPNESS, PUBLISHED_BUDGET, "first-face", {}, {})
-SCALE_FREE_CARD = ModelCard(
-    *(3, "signed-18", 1e6, 20.0, "symmetric", {}, {}, "ring-10", 1e3),
-    *(1, 1.0, 0.4, 75.0),
+DEFAULT_CARD = ModelCard(
+    *(4, "signed-18", 1e6, 20.0, "symmetric", {}, {}),
+    base="loop",
+    vertex_features="ring-10",
+    vertex_gate_sharpness=1e3,
+    prior_strength=1.0,
+    boundary_strength=1.0,
+    network_scale=0.4,
+    fold_angle=75.0,
+    sharpness_levels=2,
 )
-VERTEX_CARD = ModelCard(2, "signed-18", 40.0, 0.25, "symmetric", {}, {}, "ring-10", 20.0)
 
 
 def model_bytes(
@@ -54,8 +58,8 @@ def perceptron_bytes(layers, *, project=True, card=CARD):
     return model_bytes(nodes, weights, card=card, width=len(layers[0][0]))
 
 
-def two_perceptrons_bytes(edges, vertices, *, card=VERTEX_CARD):
-    """A file of format 2: one perceptron for edges, one for old vertices."""
+def two_perceptrons_bytes(edges, vertices, *, card=DEFAULT_CARD):
+    """A file of format 4: one perceptron for edges, one for old vertices."""
     nodes, weights = perceptron(edges)
     more_nodes, more_weights = perceptron(vertices, prefix="vertex_")
     return model_bytes(
@@ -122,24 +126,16 @@ def random_model(seed, scale=1.0):
     return model_from_bytes(perceptron_bytes(random_layers(seed, scale=scale)), "random")
 
 
-def vertex_model_bytes(seed, scale=2.0):
-    """A file of format 2 with random weights, so loud that both rules use much of their bound."""
-    edges = random_layers(seed, (FEATURE_COUNT["signed-18"], 16, 3), scale)
-    vertices = random_layers(seed + 1, (RING_10.count, 16, 3), scale)
-    return two_perceptrons_bytes(edges, vertices)
+def default_model_bytes(seed=0, scale=2.0, **changes):
+    """A file of format 4 with random weights; of scale 0, the prior alone."""
+    edges = random_layers(seed, (EDGE_FEATURES["signed-18"], 16, 3), scale)
+    vertices = random_layers(seed + 1, (VERTEX_FEATURES["ring-10"], 16, 3), scale)
+    return two_perceptrons_bytes(edges, vertices, card=replace(DEFAULT_CARD, **changes))
 
 
-def vertex_model(seed=0, scale=2.0):
-    """A model with random weights for edges and for old vertices."""
-    return model_from_bytes(vertex_model_bytes(seed, scale), "vertices")
-
-
-def scale_free_model(seed=0, scale=2.0, **changes):
-    """A model of format 3 with random weights; of scale 0, the prior alone."""
-    edges = random_layers(seed, (FEATURE_COUNT["signed-18"], 16, 3), scale)
-    vertices = random_layers(seed + 1, (RING_10.count, 16, 3), scale)
-    card = replace(SCALE_FREE_CARD, **changes)
-    return model_from_bytes(two_perceptrons_bytes(edges, vertices, card=card), "scale-free")
+def default_model(seed=0, scale=2.0, **changes):
+    """A model of format 4 with random weights; of scale 0, the prior alone."""
+    return model_from_bytes(default_model_bytes(seed, scale, **changes), "default")
 
 
 def huge_model(seed):
@@ -163,12 +159,6 @@ def published_model(weights, checkpoint):
 def gelu(z):
     """x Φ(x), in double precision."""
     return 0.5 * z * (1 + np.vectorize(math.erf, otypes=[float])(z / math.sqrt(2)))
-
-
-def smoothstep(z):
-    """x S(x) with the cubic S that rises from 0 at −2 to 1 at 2, in double precision."""
-    u = np.clip((z + 2) / 4, 0, 1)
-    return z * u * u * (3 - 2 * u)
 
 
 def float64_network(layers, activation=gelu):
@@ -195,3 +185,6 @@ class Float64Model:
 
     def __call__(self, features, budget):
         return budget * self.network(features)
+
+    def vertex_correction(self, features, budget):
+        raise AssertionError("format 1 has no vertex network")

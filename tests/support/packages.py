@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pns_common.models.manifest import write_manifest
-from pns_common.runtimes.onnx_model import BUNDLED, DEFAULT_MODEL
-from tests.support.networks import perceptron_bytes, random_layers, vertex_model_bytes
+from pns_common.model.file import BUNDLED, DEFAULT_MODEL, write_manifest
+from tests.support.networks import default_model_bytes, perceptron_bytes, random_layers
 
 
 def several_models(folder: Path) -> Path:
@@ -14,8 +13,8 @@ def several_models(folder: Path) -> Path:
     folder.mkdir()
     for name in {DEFAULT_MODEL, "paper"}:
         (folder / f"{name}.onnx").write_bytes((BUNDLED / f"{name}.onnx").read_bytes())
-    (folder / "vertices.onnx").write_bytes(vertex_model_bytes(0))
-    (folder / "broken.onnx").write_bytes(vertex_model_bytes(0)[:1000])
+    (folder / "vertices.onnx").write_bytes(default_model_bytes(0))
+    (folder / "broken.onnx").write_bytes(default_model_bytes(0)[:1000])
     write_manifest(folder)
     return folder
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pns_common.models.card import ModelCard
+from pns_common.model.card import ModelCard
 
 ZERO_CARD = ModelCard(1, "paper-5", 10.0, 0.5, "first-face", {}, {})
 
@@ -20,6 +20,9 @@ class ZeroModel:
     hash: str = "0" * 64
 
     def __call__(self, features: np.ndarray, budget: float) -> np.ndarray:
+        return np.zeros((len(features), 3))
+
+    def vertex_correction(self, features: np.ndarray, budget: float) -> np.ndarray:
         return np.zeros((len(features), 3))
 
 

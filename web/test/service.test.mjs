@@ -67,7 +67,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       // The control mesh stays, and the worker takes the next job.
       await page.selectOption("#levels", "1");
       await settled(page);
-    }, { hash: "#levels=5&model=full" });
+    }, { hash: "#levels=5&model=signed" });
   });
 
   test("a service that goes away at work, in words, with another try", async () => {
@@ -79,7 +79,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       assert.equal(await page.textContent("#problem-title"), "The connection broke");
       assert.ok(await page.isVisible("#problem-again"));
       assert.ok(await page.isHidden("#work"));
-    }, { hash: "#levels=5&model=full", foreseen: /net::ERR_/ });
+    }, { hash: "#levels=5&model=signed", foreseen: /net::ERR_/ });
   });
 
   test("413: a body over the limit", async () => {
@@ -229,7 +229,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
 
 /** Ask for seconds of work. */
 function slowJob(server) {
-  return fetch(`${server.address}/jobs?levels=5&model=full`, {
+  return fetch(`${server.address}/jobs?levels=5&model=signed`, {
     method: "POST",
     headers: { "Content-Type": "model/gltf-binary" },
     body: part,

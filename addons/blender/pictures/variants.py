@@ -9,11 +9,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, Refinement, load_model, loop, pns, refine
-from pns_common.base.arrays import norm
-from pns_common.connectivity.topology import build_topology
-from pns_common.formula.prior import normal_pushes
-from pns_common.geometry.frames import face_normals
-from pns_common.geometry.rings import Rings
+from pns_common.operator import Rule, pushes
+from pns_common.refinement import control_level
+from pns_common.topology import build_topology
+
+# N1 asks no network: pushes of strength 1 alone.
+N1 = Rule(lambda features: np.zeros((len(features), 3)), 18, True, 1.0, 1.0, prior_strength=1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +40,7 @@ def loop_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
 
 def pushed_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
     """Make N1: push each vertex once along its normal by what Loop takes in; then Loop."""
-    topology = build_topology(mesh.faces, len(mesh.vertices))
-    rings = Rings(topology, mesh.vertices, face_normals(mesh.vertices, mesh.faces))
-    pushed = Mesh(mesh.vertices + normal_pushes(rings), mesh.faces)
+    pushed = Mesh(mesh.vertices + pushes(control_level(mesh, loop()), N1), mesh.faces)
     return _beside_loop("N1, untrained", refine(pushed, loop(), levels), mesh, levels, {})
 
 
@@ -86,5 +85,5 @@ def _beside_loop(
     title: str, made: Refinement, mesh: Mesh, levels: int, fields: dict[str, np.ndarray]
 ) -> Shape:
     plain = refine(mesh, loop(), levels)
-    distance = norm(made.mesh.vertices - plain.mesh.vertices)
+    distance = np.linalg.norm(made.mesh.vertices - plain.mesh.vertices, axis=1)
     return _smooth(title, made, {"distance": distance, **fields})

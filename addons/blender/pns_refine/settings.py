@@ -10,7 +10,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from pns_common import load_model
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL, OnnxModel, bundled_models
+from pns_common.model.file import DEFAULT_MODEL, bundled_models
+from pns_common.model.session import OnnxModel
 
 from .refining.compute import Choice
 

@@ -1,17 +1,35 @@
-"""Accessors: how elements lie in a buffer view (glTF 2.0 §3.6.2), and views of them as arrays."""
+"""Read accessors as arrays: layout (glTF 2.0 §3.6.2), and integers that stand for floats."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
 import msgspec
 import numpy as np
 from jaxtyping import Int, Shaped
 
 from ...errors import GltfError
-from ..constants import COLUMNS, COMPONENT_COUNTS, COMPONENT_TYPES
+from ..constants import (
+    BYTE,
+    COLUMNS,
+    COMPONENT_COUNTS,
+    COMPONENT_TYPES,
+    FLOAT,
+    SHORT,
+    UNSIGNED_BYTE,
+    UNSIGNED_SHORT,
+)
 from .schema import Accessor, Document, Sparse
+
+QUANTIZATION = "KHR_mesh_quantization"
+
+# Integer encodings (component type, normalized) by attribute: those of glTF 2.0 itself, then those
+# of the extension.
+_CORE_TEXCOORD = {(UNSIGNED_BYTE, True), (UNSIGNED_SHORT, True)}
+_SIGNED_FRACTIONS = {(BYTE, True), (SHORT, True)}
+_ALL = {(kind, flag) for kind in range(BYTE, UNSIGNED_SHORT + 1) for flag in (False, True)}
 
 
 def element_size(accessor: Accessor) -> int:
@@ -38,10 +56,10 @@ def is_padded(accessor: Accessor) -> bool:
 def read(
     document: Document, buffers: Sequence[memoryview], index: int
 ) -> Shaped[np.ndarray, "N K"]:
-    """Read all elements of an accessor; a dense one is a view of the file's bytes, so read-only.
+    """Read all elements of an accessor; those of a dense one are a read-only view of the bytes.
 
     Raises:
-        GltfError: a sparse accessor whose indices do not ascend, or reach past its end.
+        GltfError: the indices of a sparse accessor do not ascend, or reach past its end.
     """
     accessor = document.accessors[index]
     if accessor.sparse is None and accessor.buffer_view is not None and not is_padded(accessor):
@@ -54,13 +72,13 @@ def read(
 def read_rows(
     document: Document, buffers: Sequence[memoryview], index: int, rows: Int[np.ndarray, " N"]
 ) -> Shaped[np.ndarray, "N K"]:
-    """Read the elements `rows` of an accessor, sparse or dense; zeros where it has no bytes.
+    """Read some elements of an accessor, sparse or dense; zeros where it has no bytes.
 
-    Costs in proportion to the rows, whatever the accessor's count claims. The document has been
-    checked: everything lies inside its buffer view, and the rows inside the accessor.
+    The document is checked: elements lie inside their views, and rows inside the accessor. The cost
+    is proportional to the rows, whatever the accessor's count.
 
     Raises:
-        GltfError: a sparse accessor whose indices do not ascend, or reach past its end.
+        GltfError: the indices of a sparse accessor do not ascend, or reach past its end.
     """
     accessor = document.accessors[index]
     width, dtype = COMPONENT_COUNTS[accessor.type], COMPONENT_TYPES[accessor.component_type]
@@ -90,7 +108,7 @@ def _stored(
     *,
     strided: bool = True,
 ) -> Shaped[np.ndarray, "N ..."]:
-    """View elements as they lie in the bytes: (N, K), or (N, columns, rows) of a matrix."""
+    """Return a view of the elements in the bytes: (N, K), or (N, columns, rows) of matrices."""
     view = document.buffer_views[buffer_view]
     dtype = COMPONENT_TYPES[accessor.component_type]
     rows = COLUMNS.get(accessor.type)
@@ -126,3 +144,58 @@ def _sparse_places(
             pointer=f"/accessors/{index}/sparse/indices",
         )
     return places
+
+
+def is_dequantised(name: str) -> bool:
+    """Return whether an attribute is written as float32, however it was stored."""
+    return name in ("POSITION", "NORMAL", "TANGENT") or name.startswith("TEXCOORD_")
+
+
+def allowed(name: str) -> set[tuple[int, bool]]:
+    """Return the integer encodings that the extension allows: (component type, normalized)."""
+    return _SIGNED_FRACTIONS if name in ("NORMAL", "TANGENT") else _ALL
+
+
+def needs_extension(name: str, component_type: int, *, normalized: bool) -> bool:
+    """Return whether an attribute so stored is valid only with KHR_mesh_quantization."""
+    if not is_dequantised(name) or component_type == FLOAT:
+        return False
+    core = _CORE_TEXCOORD if name.startswith("TEXCOORD_") else set()
+    return (component_type, normalized) not in core
+
+
+def dequantised(
+    name: str, values: Shaped[np.ndarray, "N K"], accessor: Accessor
+) -> tuple[Shaped[np.ndarray, "N K"], Accessor]:
+    """Return the values to refine and write, and an accessor that describes them.
+
+    Positions, normals, tangents and texture coordinates become float32.
+    """
+    if not is_dequantised(name) or accessor.component_type == FLOAT:
+        return values, accessor
+    plain = msgspec.structs.replace(accessor, component_type=FLOAT, normalized=False)
+    return as_float(values, normalized=accessor.normalized), plain
+
+
+def as_float(values: Shaped[np.ndarray, "N K"], *, normalized: bool) -> Shaped[np.ndarray, "N K"]:
+    """Return integers as float32. Normalized ones are c / max, at least −1 (glTF §3.6.2.2)."""
+    if not normalized:
+        return values.astype(np.float32)
+    fractions = values.astype(np.float64) / np.iinfo(values.dtype).max
+    return np.maximum(fractions, -1.0).astype(np.float32)
+
+
+def still_needed(tree: dict[str, Any]) -> bool:
+    """Return whether an attribute or morph target of a document needs KHR_mesh_quantization."""
+    accessors = tree.get("accessors", [])
+    return any(
+        needs_extension(
+            name,
+            accessors[index]["componentType"],
+            normalized=accessors[index].get("normalized", False),
+        )
+        for mesh in tree.get("meshes", [])
+        for primitive in mesh.get("primitives", [])
+        for attributes in (primitive["attributes"], *primitive.get("targets", []))
+        for name, index in attributes.items()
+    )

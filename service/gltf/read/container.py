@@ -1,4 +1,4 @@
-"""The GLB container (glTF 2.0 §4): a header and chunks, read with exact bounds, and written."""
+"""Read and write the GLB container (glTF 2.0 §4): a header and chunks."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from ..constants import BIN_CHUNK, GLB_VERSION, JSON_CHUNK, WIDEST
 _HEADER = struct.Struct("<4sII")
 _CHUNK = struct.Struct("<I4s")
 _LARGEST = 2**32 - 1
-# JSON, BIN and one for each extension that has its own: a file of nothing but chunk headers is an
-# attack.
+# JSON, BIN and one for each extension that needs one. A file of chunk headers alone is an attack.
 MAX_CHUNKS = 64
 
 
@@ -24,8 +23,8 @@ class Container:
 
     Attributes:
         text: the JSON chunk.
-        binary: the BIN chunk, None where the file has none.
-        others: (type, data) of the chunks that follow, which belong to extensions and are kept.
+        binary: the BIN chunk; None without one.
+        others: (type, data) of the chunks after it. They belong to extensions and are kept.
     """
 
     text: bytes
@@ -34,9 +33,10 @@ class Container:
 
 
 def read_container(data: bytes, kind: str) -> Container:
-    """Read a .glb, or a .gltf as its text alone; whatever it is called, its first bytes tell.
+    """Read a .glb or a .gltf, whose container is its text; the first bytes decide which it is.
 
-    Raises as read_glb.
+    Raises:
+        UnreadableError, LimitError: as `read_glb`.
     """
     if data.startswith(GLB_MAGIC) or (kind == "glb" and not begins_as_json(data)):
         return read_glb(data)
@@ -47,7 +47,7 @@ def read_glb(data: bytes | memoryview) -> Container:
     """Split a GLB into its chunks, without copying BIN.
 
     Raises:
-        UnreadableError: not a GLB of version 2, or its lengths disagree with the bytes.
+        UnreadableError: not a GLB of version 2, or its lengths do not match the bytes.
         LimitError: more than MAX_CHUNKS chunks.
     """
     if len(data) < _HEADER.size:
@@ -71,12 +71,12 @@ def read_glb(data: bytes | memoryview) -> Container:
 def write_glb(
     text: bytes, binary: Sequence[bytes | memoryview], others: Sequence[tuple[bytes, memoryview]]
 ) -> bytes:
-    """Write a GLB of the JSON `text`, the BIN chunk made of the pieces `binary`, and more chunks.
+    """Write a GLB: the JSON `text`, the pieces of the BIN chunk, and further chunks.
 
-    BIN begins at a multiple of WIDEST bytes, as EXT_structural_metadata wants it.
+    BIN begins at a multiple of WIDEST bytes, as EXT_structural_metadata requires.
 
     Raises:
-        LimitError: the result would pass the 4 GiB that a GLB can hold.
+        LimitError: the result would exceed the 4 GiB of a GLB.
     """
     spaces = b" " * (-(_HEADER.size + _CHUNK.size + len(text)) % WIDEST)
     pieces = [*_padded_chunk(JSON_CHUNK, [text, spaces], b" ")]

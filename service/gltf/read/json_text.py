@@ -1,8 +1,9 @@
-"""JSON text in and out: strict, and bounded before anything is decoded.
+"""Decode and encode JSON, with limits that are checked before decoding.
 
-A decoder's cost is in the values it makes, not in the bytes it reads: 64 MiB of `{},` make tens of
-millions of objects. So the characters that open or separate values are counted in the raw bytes
-first (those inside strings too: the count may only err upwards), and so is the depth.
+A decoder's cost is in the values that it makes, not in the bytes that it reads: 64 MiB of `{},`
+make tens of millions of objects. The raw bytes are therefore searched first for the characters that
+open or separate values, and for the nesting depth. Characters inside strings count too, so the
+count errs upwards.
 """
 
 from __future__ import annotations
@@ -19,39 +20,40 @@ import numpy as np
 from ...errors import GltfError, UnreadableError, check_limit
 from ...options import BYTES_PER_INPUT_BYTE, Limits
 
-# Possessive, and an unterminated string runs to the end: no quote is ever looked at twice, however
-# hostile the text.
+BOM = b"\xef\xbb\xbf"
+# Bytes of a decoded value. The most that was measured is 233, for a node of two separators with its
+# typed view.
+BYTES_PER_ITEM = 128
+# More bytes for each byte of a string that is not ASCII: its widest character takes up to four
+# bytes for all of them, and msgspec keeps the UTF-8 form after encoding.
+BYTES_PER_WIDE_BYTE = 6
+
 _QUOTE = 2
 _MARKS = np.zeros(256, dtype=np.int8)
 _MARKS[[ord(mark) for mark in '{["]}']] = [1, 1, _QUOTE, -1, -1]
-# What is taken out of a text to count the rest.
+# Deleting these bytes leaves the items, or the brackets and quotes.
 _NO_ITEMS, _NO_MARKS = (bytes(set(range(256)) - set(kept)) for kept in (b'{[,:"', b'{["]}'))
-# A node of two separators takes 233 bytes, with its typed view: the most of all that were measured.
-BYTES_PER_ITEM = 128
-# More for each byte of a string that is not ASCII: its widest letter says what each takes, up to
-# four bytes, in the string and in what is told of it; and it is kept as UTF-8 once it was written.
-BYTES_PER_WIDE_BYTE = 6
-# Of brackets and quotes, whose depth is counted at a time.
+# Brackets and quotes whose depth is computed at a time.
 _BLOCK = 2**18
-BOM = b"\xef\xbb\xbf"
-# Beyond every double; Python itself refuses to read 4,300 digits.
+# Longer integers exceed every double. Python refuses to read 4,300 digits.
 _LONG_INTEGER = re.compile(rb"(?<=[\s:,\[-])\d{310,}")
 _LARGEST_INTEGER = 10**309
 _ONE_DIGIT = bytes.maketrans(b"123456789", b"000000000")
+# Possessive, and an unterminated string runs to the end: hostile text costs linear time.
 _STRING = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+(?:"|\\?\Z)', re.DOTALL)
 
 
 def decode_object(text: bytes, limits: Limits) -> dict[str, Any]:
-    """Decode the JSON object that `text` holds.
+    """Decode a JSON object.
 
     Raises:
-        LimitError: too many values or too deep.
-        UnreadableError: not JSON (RFC 8259; so no NaN or Infinity), or not UTF-8.
-        GltfError: JSON, but not an object; or an integer beyond every double, by its pointer.
+        LimitError: too many values, or nested too deep.
+        UnreadableError: not JSON (RFC 8259: no NaN or Infinity), or not UTF-8.
+        GltfError: JSON but no object, or an integer beyond every double, with its pointer.
     """
     check_size(text, limits)
     value = _decoded(text.removeprefix(BOM))
-    # All digits are made one: then a search in bytes is enough, where a pattern takes seconds.
+    # With all digits made equal, a search of bytes replaces a pattern that takes seconds.
     if 310 * b"0" in text.translate(_ONE_DIGIT):
         _refuse_long_integers(value)
     if not isinstance(value, dict):
@@ -61,10 +63,10 @@ def decode_object(text: bytes, limits: Limits) -> dict[str, Any]:
 
 def _decoded(text: bytes) -> Any:
     try:
-        with _uncollected():
+        with _without_garbage_collection():
             return msgspec.json.decode(text)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        # Digits without end are an error of their own; shorter ones in their place show where.
+        # msgspec fails on too many digits without their place; decode shorter ones to find it.
         shorter = _LONG_INTEGER.sub(b"1" + 310 * b"0", text)
         if isinstance(error, msgspec.ValidationError) and shorter != text:
             return _decoded(shorter)
@@ -72,8 +74,8 @@ def _decoded(text: bytes) -> Any:
 
 
 @contextmanager
-def _uncollected() -> Iterator[None]:
-    """Let the garbage collector rest: all that is decoded stays, and it would look at it often."""
+def _without_garbage_collection() -> Iterator[None]:
+    """Disable the garbage collector, which would scan the growing tree often and free nothing."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -96,17 +98,17 @@ def _refuse_long_integers(value: Any) -> None:
 
 
 def escaped(name: str) -> str:
-    """Return a key as one step of a JSON pointer (RFC 6901)."""
+    """Return a key as a step of a JSON pointer (RFC 6901)."""
     return name.replace("~", "~0").replace("/", "~1")
 
 
 def encode(value: Any) -> bytes:
-    """Encode as compact UTF-8 JSON, keys in the order that they have."""
+    """Encode compact UTF-8 JSON; keys keep their order."""
     return msgspec.json.encode(value)
 
 
 def check_size(text: bytes, limits: Limits) -> None:
-    """Count the values that a JSON text may hold, and how deep. Raises LimitError."""
+    """Check the number of values in a JSON text, their memory and depth. Raises LimitError."""
     items = json_items(text)
     check_limit("json-items", items, limits.max_json_items, f"the JSON holds {items} separators")
     needed = BYTES_PER_INPUT_BYTE * len(text) + decoded_size(text)
@@ -117,37 +119,37 @@ def check_size(text: bytes, limits: Limits) -> None:
 
 
 def decoded_size(text: bytes) -> int:
-    """Return the bytes that the decoded text and its typed view will take, erring upwards."""
+    """Return an upper bound of the bytes that the decoded text and its typed view take."""
     return BYTES_PER_ITEM * json_items(text) + BYTES_PER_WIDE_BYTE * _wide_bytes(text)
 
 
+def json_items(text: bytes) -> int:
+    """Return an upper bound of the number of values in a JSON text."""
+    return len(text.translate(None, _NO_ITEMS))
+
+
 def _wide_bytes(text: bytes) -> int:
-    """Return the bytes of the strings that hold more than ASCII, or may: an escape spells any."""
+    """Return the bytes of the strings that may hold more than ASCII; an escape may spell any."""
     if text.isascii() and b"\\u" not in text:
         return 0
-    # Pairs of backslashes first: what is left of them escapes what follows.
+    # Pairs of backslashes first: a backslash that is left escapes the next character.
     bare = text.replace(rb"\\", b"..").replace(rb"\"", b"..") if b"\\" in text else text
     strings = bare.split(b'"')[1::2]
     return sum(len(s) for s in strings if not s.isascii() or b"\\u" in s)
 
 
-def json_items(text: bytes) -> int:
-    """Return how many values a JSON text may hold, erring upwards."""
-    return len(text.translate(None, _NO_ITEMS))
-
-
 def _depth(text: bytes) -> int:
     """Return how deep brackets and braces nest outside strings.
 
-    The decoder's own limit will not do: it is what the caller's stack leaves of Python's (997 of
-    1,000, or 495 above 500 frames). A file would pass here, and fail there or when written.
+    The decoder's own limit depends on the caller's stack (997 of 1,000 levels, or 495 above 500
+    frames): a file could pass here and fail when it is written.
     """
-    # Without escapes, which are rare, every second quote ends a string: no pattern need be matched.
+    # Escapes are rare. Without them every second quote ends a string, and no pattern is needed.
     bare = _STRING.sub(b"", text) if b"\\" in text else text
-    # Two quotes beside each other leave what stands inside of strings inside, and outside outside.
+    # Removing two adjacent quotes leaves the inside of strings inside, and the outside outside.
     bare = bare.translate(None, _NO_MARKS).replace(b'""', b"")
     deepest, depth, inside = 0, 0, False
-    # Block by block: in one go, a text of nothing but brackets would take 20 times its size.
+    # In blocks: a text of brackets alone would take 20 times its size in one go.
     for start in range(0, len(bare), _BLOCK):
         block = bare[start : start + _BLOCK]
         marks = _MARKS[np.frombuffer(block, dtype=np.uint8)]

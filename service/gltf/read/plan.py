@@ -1,4 +1,4 @@
-"""What a document asks to be refined, and what that will cost, before anything is allocated."""
+"""Plan a document: meshes to refine, their cost before it is paid, and data to remove."""
 
 from __future__ import annotations
 
@@ -8,45 +8,63 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
-from ...errors import UnrefinableError, check_limit
+from ...errors import GltfError, UnrefinableError, check_limit
 from ...options import BYTES_PER_INPUT_BYTE, Limits
+from ..constants import SURFACES, TRIANGLES
 from .accessors import element_size
 from .json_text import encode
-from .modes import SURFACES, triangle_count
 from .schema import Document, Primitive
 
 # Peak bytes for each refined face: at least 1.15 times what was measured on generated meshes of
-# 240,000 faces, levels 1 to 6, smooth ones and ones where every corner is a vertex, by models with
-# and without a vertex rule, with compiled kernels and without them.
+# 240,000 faces, at levels 1 to 6, smooth and with every corner a vertex.
 BYTES_PER_FACE = 280
-# Three floats of each vertex, beside that, where a primitive gets normals on the way.
+# In addition for new normals: three floats for each vertex.
 BYTES_FOR_NORMALS = 36
-# For each refined vertex of a skin or morph target: the levels' connectivity again, a block of
-# columns, and each set of joints and weights while they are rounded (257 measured).
+# For each refined vertex with a skin or morph target: the connectivity of the levels again, a block
+# of columns, and each set of joints and weights during rounding (257 measured).
 BYTES_PER_FOLLOWING_VERTEX = 320
-# The limit masks, exact normals, and how far creases hold back what they reach: with the rest 1.14
-# times what was measured on 180,000 faces, where every edge is a crease or every corner a vertex.
+# Limit masks, exact normals and the shift of creases: 1.14 times what was measured in all on
+# 180,000 faces, with every edge a crease or every corner a vertex.
 BYTES_FOR_LIMIT = 480
-# A refined face has at most 1.5 vertices: made, cast to float32, written.
+# A refined face has at most 1.5 vertices, held when made, when cast to float32, and when written.
 BYTES_PER_VERTEX_BYTE = 3
-# Its arrays' headers, and its accessors in the JSON (9 KiB measured over 20,000 primitives).
+# Array headers, and accessors in the JSON (9 KiB measured over 20,000 primitives).
 BYTES_PER_PRIMITIVE = 16 * 1024
-# The same of each of its morph targets (4 KiB measured over 100,000 targets of one face).
+# The same for a morph target (4 KiB measured over 100,000 targets of one face).
 BYTES_PER_TARGET = 5 * 1024
 BYTES_PER_POSITION = 12
 
 
 @dataclass(frozen=True)
 class MeshPlan:
-    """A mesh with triangles: its index, its triangle primitives, their faces before refinement."""
+    """A mesh to refine: its index, its triangle primitives, and their faces before refinement."""
 
     mesh: int
     primitives: tuple[int, ...]
     faces: int
 
 
+@dataclass(frozen=True)
+class Spare:
+    """Data that may leave the file when refinement has replaced it.
+
+    Attributes:
+        accessors, views: those of surfaces in the file; all that were added later are spare too.
+        accessor_count, view_count: the numbers in the file.
+        ranges: (buffer, start, end) of compressed data that was decoded.
+        unknown: extensions that may refer to any of it.
+    """
+
+    accessors: frozenset[int]
+    views: frozenset[int]
+    accessor_count: int
+    view_count: int
+    ranges: tuple[tuple[int, int, int], ...]
+    unknown: tuple[str, ...]
+
+
 def plan(document: Document) -> list[MeshPlan]:
-    """Return the meshes to refine; others have only points or lines and stay as they are.
+    """Return the meshes that have triangles.
 
     Raises:
         GltfError: a primitive whose corners make no whole triangles.
@@ -70,6 +88,21 @@ def plan(document: Document) -> list[MeshPlan]:
     return plans
 
 
+def triangle_count(corners: int, mode: int, pointer: str) -> int:
+    """Return the number of triangles of a primitive.
+
+    Raises:
+        GltfError: the corners make no whole triangles.
+    """
+    if mode == TRIANGLES:
+        if corners % 3:
+            raise GltfError(f"{corners} corners are no whole triangles", pointer=pointer)
+        return corners // 3
+    if corners < 3:
+        raise GltfError(f"{corners} corners make no triangle", pointer=pointer)
+    return corners - 2
+
+
 def check_cost(
     document: Document,
     plans: Sequence[MeshPlan],
@@ -78,9 +111,9 @@ def check_cost(
     limits: Limits,
     bytes_per_face: int = 0,
 ) -> None:
-    """Check the refined faces and the memory that they will take against the limits.
+    """Check the number of refined faces and their memory.
 
-    `size` is the upload's, in bytes; `bytes_per_face` what a refined face takes beside the rest.
+    `size` is the upload's in bytes; writing takes `bytes_per_face` in addition.
 
     Raises:
         LimitError: over `max_faces` or `max_memory_bytes`.
@@ -92,7 +125,7 @@ def check_cost(
 
 
 def check_decoded(decoded: int, size: int, limits: Limits) -> None:
-    """Check bytes that compressed data will take, beside an upload of `size`, before decoding.
+    """Check the bytes that decoding will take, in addition to an upload of `size`.
 
     Raises:
         LimitError: over `max_memory_bytes`.
@@ -101,14 +134,14 @@ def check_decoded(decoded: int, size: int, limits: Limits) -> None:
 
 
 def check_memory(needed: int, limits: Limits) -> None:
-    """Check bytes that work will take, before it takes them. Raises LimitError."""
+    """Check the bytes that work will take. Raises LimitError."""
     check_limit("memory", needed, limits.max_memory_bytes, f"the work would take {needed} bytes")
 
 
 def repeated_text(tree: dict[str, Any], document: Document) -> int:
-    """Return the bytes of JSON that are written again for each primitive that shares an accessor.
+    """Return the bytes of JSON that sharing an accessor multiplies.
 
-    Each gets accessors of its own, and these the name and the extras of the shared one.
+    Each primitive gets accessors of its own, with the name and extras of the shared one.
     """
     uses = Counter(
         chain.from_iterable(
@@ -125,16 +158,16 @@ def repeated_text(tree: dict[str, Any], document: Document) -> int:
 
 
 def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, levels: int) -> int:
-    """Predict the bytes at the peak, erring upwards."""
+    """Return an upper bound of the peak memory in bytes."""
     total = BYTES_PER_INPUT_BYTE * size
     for mesh in plans:
         primitives = [document.meshes[mesh.mesh].primitives[number] for number in mesh.primitives]
-        # What moves the vertices of one moves all of a mesh's, those of others by 0.
+        # A target of one primitive moves those of the others by 0.
         targets = max(len(primitive.targets) for primitive in primitives)
         sets = max(joint_sets(primitive.attributes) for primitive in primitives)
         for primitive in primitives:
             sizes = (element_size(document.accessors[index]) for _, index in primitive.named)
-            # As they are written: at multiples of four bytes.
+            # They are written at multiples of four bytes.
             width = sum(size + -size % 4 for size in sizes)
             still = targets - sum("POSITION" in target for target in primitive.targets)
             width += still * BYTES_PER_POSITION
@@ -150,14 +183,14 @@ def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, l
 
 
 def joint_sets(attributes: Iterable[str]) -> int:
-    """Return how many sets of joints are among a primitive's attributes."""
+    """Return the number of JOINTS_n among attributes."""
     return sum(name.startswith("JOINTS_") for name in attributes)
 
 
 def _refined_vertices(faces: int, vertices: int, levels: int) -> int:
-    """Return how many vertices a mesh has after some levels, as Euler counts its edges.
+    """Return an upper bound of a mesh's vertices after some levels, by Euler's formula.
 
-    A closed mesh has 3/2 edges a face; none has more than three.
+    A closed mesh has 3/2 edges a face, and no mesh more than three.
     """
     inside = 2**levels - 1  # vertices on an edge
     edges = min(3 * faces, max(3 * faces // 2, vertices + faces))
@@ -169,3 +202,33 @@ def _corner_count(document: Document, primitive: Primitive) -> int:
     if index is None:
         index = primitive.attributes["POSITION"]
     return document.accessors[index].count
+
+
+def spare(
+    document: Document,
+    draco_views: Iterable[int],
+    ranges: Iterable[tuple[int, int, int]],
+    unknown: Iterable[str],
+) -> Spare:
+    """Return the data of a document's surfaces."""
+    accessors: set[int] = set()
+    for mesh in document.meshes:
+        for primitive in mesh.primitives:
+            if primitive.mode in SURFACES:
+                accessors.update(index for _, index in primitive.named)
+                accessors |= set() if primitive.indices is None else {primitive.indices}
+    views = set(draco_views)
+    for index in accessors:
+        if index < len(document.accessors):
+            accessor = document.accessors[index]
+            views |= set() if accessor.buffer_view is None else {accessor.buffer_view}
+            if accessor.sparse is not None:
+                views |= {accessor.sparse.indices.buffer_view, accessor.sparse.values.buffer_view}
+    return Spare(
+        frozenset(accessors),
+        frozenset(views),
+        len(document.accessors),
+        len(document.buffer_views),
+        tuple(ranges),
+        tuple(unknown),
+    )

@@ -1,4 +1,4 @@
-"""Triangle primitives as arrays: corners, and the attributes of the vertices that they use."""
+"""Read triangle primitives as arrays: corners, attributes and morph targets of used vertices."""
 
 from __future__ import annotations
 
@@ -9,14 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int, Shaped
 
-from pns_common.base.arrays import marked
-from pns_common.base.distinct import as_words, distinct_rows, number_by_first_appearance
+from pns_common.rows import as_words, distinct_rows, marked, number_by_first_appearance
 
 from ...errors import GltfError, UnsupportedFeature
-from ..constants import FLOAT
-from .accessors import read, read_rows
-from .modes import TRIANGLES, triangles
-from .quantization import dequantised
+from ..constants import FAN, FLOAT, TRIANGLES
+from .accessors import dequantised, read, read_rows
 from .schema import Accessor, Document
 
 _FOLLOWS_VERTEX = re.compile(r"POSITION|JOINTS_[0-9]+|WEIGHTS_[0-9]+")
@@ -24,17 +21,16 @@ _FOLLOWS_VERTEX = re.compile(r"POSITION|JOINTS_[0-9]+|WEIGHTS_[0-9]+")
 
 @dataclass(frozen=True, eq=False)
 class TrianglePrimitive:
-    """A primitive, reduced to the vertices that its faces use.
+    """A triangle primitive without the vertices that no face uses.
 
     Attributes:
         number: its place in the mesh.
-        rows: the accessors' elements that `attributes` hold, in ascending order.
+        rows: elements of the accessors that `attributes` hold, ascending.
         corners: (F, 3) rows of `attributes`.
-        attributes: by name (N, K) arrays in the component type that they are written in.
-        accessors: by name an accessor that describes them; one without bytes of its own where
-            they were quantised.
-        targets: the same of each morph target, whose values are added to the attributes'.
-        target_accessors: the same of each morph target.
+        attributes: (N, K) arrays by name, in the component type in which they are written.
+        accessors: descriptions of these by name; without bytes for dequantised ones.
+        targets: for each morph target, arrays by name that are added to the attributes.
+        target_accessors: for each morph target, descriptions by name.
     """
 
     number: int
@@ -52,8 +48,8 @@ def read_primitive(
     """Read a primitive whose references have been checked.
 
     Raises:
-        GltfError: an index beyond the vertices, or a NaN or infinity, with the accessor's pointer.
-        UnsupportedFeature: a strip or fan of which an index restarts it.
+        GltfError: an index beyond the vertices, a NaN, an infinity or a negative weight.
+        UnsupportedFeature: an index that restarts a strip or fan.
     """
     primitive = document.meshes[mesh].primitives[number]
     where = f"/meshes/{mesh}/primitives/{number}"
@@ -66,7 +62,7 @@ def read_primitive(
         if flat.max() >= count:
             pointer = f"/accessors/{primitive.indices}"
             if primitive.mode != TRIANGLES and flat.max() == np.iinfo(stored.dtype).max:
-                # As KHR_mesh_primitive_restart lets it, and nothing else does.
+                # KHR_mesh_primitive_restart allows it.
                 raise UnsupportedFeature("a strip or fan with restarts", pointer=pointer)
             raise GltfError(
                 f"{where} has index {flat.max()}, but there are {count} vertices", pointer=pointer
@@ -90,6 +86,19 @@ def read_primitive(
     )
 
 
+def triangles(corners: Int[np.ndarray, " C"], mode: int) -> Int[np.ndarray, "F 3"]:
+    """Return the corners of each triangle, in the order of glTF 2.0 §3.7.2.1."""
+    if mode == TRIANGLES:
+        return corners.reshape(-1, 3)
+    step = np.arange(len(corners) - 2)
+    if mode == FAN:
+        places = np.stack([step + 1, step + 2, np.zeros_like(step)], axis=1)
+    else:
+        odd = step % 2
+        places = np.stack([step, step + 1 + odd, step + 2 - odd], axis=1)
+    return corners[places]
+
+
 def _read_attributes(
     document: Document,
     buffers: Sequence[memoryview],
@@ -97,7 +106,7 @@ def _read_attributes(
     rows: Int[np.ndarray, " N"],
     where: str,
 ) -> tuple[dict[str, Shaped[np.ndarray, "N K"]], dict[str, Accessor]]:
-    """Read the rows of attributes, by name, and what describes them; errors name `where` too."""
+    """Read rows of attributes and the descriptions of these, by name; errors name `where`."""
     attributes: dict[str, Shaped[np.ndarray, "N K"]] = {}
     accessors: dict[str, Accessor] = {}
     for name, index in indices.items():
@@ -114,10 +123,10 @@ def _read_attributes(
 def compact(
     indices: Int[np.ndarray, " C"], count: int
 ) -> tuple[Int[np.ndarray, " U"], Int[np.ndarray, " C"]]:
-    """Return the used indices in ascending order, and each index's place among them.
+    """Return the used indices, ascending, and the place of each index among them.
 
-    Costs in proportion to the indices, however many vertices the accessor has: many primitives may
-    share one.
+    The cost is proportional to the indices, not to the vertices of the accessor, which many
+    primitives may share.
     """
     if count > 8 * len(indices):
         used = np.unique(indices)
@@ -131,11 +140,11 @@ def distinct_corners(
     corners: Int[np.ndarray, "F 3"],
     welded: Int[np.ndarray, " N"],
 ) -> tuple[Int[np.ndarray, "F 3"], Int[np.ndarray, " C"]]:
-    """Join vertices that agree in position and in all attributes, those of morph targets too.
+    """Join rows that agree in position and in all attributes and morph targets.
 
-    `welded` is the welded vertex of each row, and says what follows it: the position, how morph
-    targets move it, the skin's binding. Gives the distinct corners of each face, numbered by
-    first appearance, and for each of them a row of the primitive's attributes.
+    `welded` is the welded vertex of each row; rows of one agree in position, position deltas and
+    skin. Returns the distinct corners of each face, numbered by first appearance, and for each
+    distinct corner a row of the attributes.
     """
     others = [
         values

@@ -1,7 +1,7 @@
-"""The parts of glTF 2.0 that the reader relies on, as types that `msgspec` checks.
+"""Typed, checked views of the parts of a glTF 2.0 document that the reader uses.
 
-The document itself stays a plain JSON tree, which is edited in place: these are read-only views of
-it. What is not named here (factors, names, extras, extensions) is never looked at and never lost.
+The document stays a plain JSON tree, which is edited in place; the types are read-only views.
+Properties without a type here (factors, names, extras, extensions) are ignored and kept.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ import msgspec
 from msgspec import Meta
 
 from ...errors import GltfError
+from ...report import Change
 
-# Offsets and lengths too: no file that is taken has more bytes, and none has more elements.
+# Above every size of a file, and the range in which doubles tell integers apart.
 _MOST = 2**53
 Index = Annotated[int, Meta(ge=0, le=_MOST)]
 Size = Annotated[int, Meta(ge=1, le=_MOST)]
@@ -22,9 +23,9 @@ Shape = TypeVar("Shape", bound="Part")
 
 
 class Part(msgspec.Struct, frozen=True, rename="camel", gc=False):
-    """A JSON object of which the named properties are checked.
+    """A JSON object with checked properties.
 
-    None is ever part of a cycle, so the garbage collector need not look at thousands of them.
+    Views are never part of a cycle, so the garbage collector need not track thousands of them.
     """
 
 
@@ -103,7 +104,7 @@ class Primitive(Part, frozen=True):
 
     @property
     def named(self) -> list[tuple[str, int]]:
-        """What its vertices have, and how morph targets move it: attributes and accessors."""
+        """Names and accessors of the attributes, and of those of the morph targets."""
         return [
             entry for attributes in (self.attributes, *self.targets) for entry in attributes.items()
         ]
@@ -142,7 +143,7 @@ class Skin(Part, frozen=True):
 
 
 class Image(Part, frozen=True):
-    """`images[]`; its `uri` is followed to files that came with the document alone."""
+    """`images[]`."""
 
     buffer_view: Index | None = None
     uri: str | None = None
@@ -226,6 +227,24 @@ class Document(Part, frozen=True):
     textures: list[Texture] = []
 
 
+def lenient_view(tree: dict[str, Any]) -> tuple[Document, list[Change]]:
+    """Return the typed view of a tree in which some exporters write integers as `3.0`.
+
+    Where one does, all whole floats outside `extras` become integers: JSON has one type of number.
+
+    Raises:
+        GltfError: a property is missing, of another type or outside its range.
+    """
+    try:
+        return view(tree), []
+    except GltfError as error:
+        first = error
+    if not _floats_made_whole(tree):
+        raise first
+    what = "found, and read as integers: integers that are written with a fraction, as 3.0"
+    return view(tree), [Change(first.pointer or "", what, 1)]
+
+
 def view(tree: dict[str, Any]) -> Document:
     """Return the typed view of a glTF JSON tree.
 
@@ -236,7 +255,7 @@ def view(tree: dict[str, Any]) -> Document:
 
 
 def checked(value: Any, kind: type[Shape], pointer: str) -> Shape:
-    """Return a typed view of the JSON value at `pointer`; extensions have types of their own.
+    """Return the typed view of a JSON value that lies at `pointer`, such as an extension's.
 
     Raises:
         GltfError: a property is missing, of another type or outside its range.
@@ -249,6 +268,22 @@ def checked(value: Any, kind: type[Shape], pointer: str) -> Shape:
 
 
 def _pointer(path: str) -> str:
-    """Return `$.accessors[3].count` as a JSON pointer, to where the path is known (`[...]`)."""
+    """Return a path like `$.accessors[3].count` as a JSON pointer, up to an unknown step."""
     known = path.strip("`$").partition("[...]")[0]
     return "".join(f"/{step}" for step in re.findall(r"\w+", known))
+
+
+def _floats_made_whole(tree: dict[str, Any]) -> bool:
+    """Turn whole floats into integers, in place; return whether there were any."""
+    found = False
+    pending: list[Any] = [tree]
+    while pending:
+        part = pending.pop()
+        for key, value in list(part.items() if isinstance(part, dict) else enumerate(part)):
+            if isinstance(value, dict | list):
+                if key != "extras":
+                    pending.append(value)
+            elif isinstance(value, float) and value.is_integer() and abs(value) <= _MOST:
+                part[key] = int(value)
+                found = True
+    return found

@@ -1,4 +1,4 @@
-"""From bytes to a document that has been checked from end to end."""
+"""Read an upload: bytes become a fully checked document; or the names of the files it needs."""
 
 from __future__ import annotations
 
@@ -6,41 +6,36 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from ...bodies.sibling_files import ALONE, Opened, SiblingFiles
+from ...bodies.media import GLTF_KINDS
+from ...bodies.sibling_files import ALONE, Opened, SiblingFiles, has_scheme
+from ...errors import ServiceError
 from ...options import BYTES_PER_INPUT_BYTE, Limits
 from ...report import Change
-from .buffers import resolve_buffers
-from .checks.breaches import breaches
-from .checks.nodes import check_nodes
-from .checks.references import check_references
-from .checks.refusals import refuse_features, refuse_version
-from .compressed.draco import decode_primitives
-from .compressed.meshopt import decode_views
+from .checks import breaches, refuse_features, refuse_version
+from .compressed import decode_primitives, decode_views
 from .container import Container, read_container
-from .images import embed_images
-from .index_references import unknown_extensions
+from .extensions import leave_out_vertex_numbers, unknown_extensions
 from .json_text import decode_object, decoded_size
-from .plan import MeshPlan, check_cost, plan, repeated_text
-from .schema import Document, view
-from .spare import Spare, spare
-from .vertex_numbers import leave_out_vertex_numbers
-from .whole_numbers import lenient_view
+from .plan import MeshPlan, Spare, check_cost, plan, repeated_text, spare
+from .references import check_nodes, check_references
+from .resources import embed_images, resolve_buffers
+from .schema import Document, lenient_view, view
 
 Media = Literal["glb", "gltf"]
 
 
 @dataclass(frozen=True, eq=False)
 class Upload:
-    """A file that may be refined.
+    """A checked file.
 
     Attributes:
-        container: the GLB's chunks; of a .gltf the text alone.
-        tree: the JSON, which may be edited.
-        document: a typed view of the JSON as it came.
+        container: the chunks of a GLB, or the text of a .gltf.
+        tree: the JSON, to be edited.
+        document: a typed view of the JSON before edits.
         buffers: the bytes of each buffer.
         plans: the meshes to refine.
-        changes: what was joined and decoded on the way.
-        spare: what may leave the file once the meshes have been refined.
+        changes: data that was joined, decoded or left out.
+        spare: data that may leave the file after refinement.
     """
 
     container: Container
@@ -60,12 +55,12 @@ def read_upload(
     siblings: SiblingFiles = ALONE,
     bytes_per_face: int = 0,
 ) -> Upload:
-    """Check a file in the order in which its parts lean on each other; refine nothing yet.
+    """Read and check a file, each part after those that it depends on.
 
-    `bytes_per_face` is what writing takes for each refined face, beside refining.
+    Writing takes `bytes_per_face` for each refined face, in addition to refining.
 
     Raises:
-        ServiceError: the file is unreadable, wrong, over a limit, or cannot be refined yet.
+        ServiceError: the file is unreadable, invalid, over a limit, or cannot be refined.
     """
     container = read_container(data, media)
     tree = decode_object(container.text, limits)
@@ -114,7 +109,7 @@ def read_upload(
 def _changes_of_buffers(
     entries: Sequence[dict[str, Any]], files: int, unknown: Sequence[str]
 ) -> list[Change]:
-    """Return that so many buffers become the first, and what goes with the others."""
+    """Return the changes of joining buffers into one."""
     changes = [Change("/buffers", "joined into one", files)] if files > 1 else []
     if changes and unknown:
         names = ", ".join(unknown)
@@ -125,3 +120,29 @@ def _changes_of_buffers(
             what = f"left out, since buffers are one: {', '.join(lost)}"
             changes.append(Change(f"/buffers/{number}", what, 1))
     return changes
+
+
+def named_files(data: bytes, kind: str, limits: Limits) -> list[str]:
+    """Return the relative URIs of a document's buffers and images; none if it cannot be read."""
+    if kind not in GLTF_KINDS:
+        return []
+    try:
+        text = read_container(data, kind).text
+        # Most documents name no file; an escape could spell the word.
+        if b'"uri"' not in text and b"\\u" not in text:
+            return []
+        tree = decode_object(text, limits)
+    except ServiceError:
+        # Refining it will report the error.
+        return []
+    uris = (_uri(entry) for key in ("buffers", "images") for entry in _entries(tree.get(key)))
+    return list(dict.fromkeys(uri for uri in uris if uri is not None and not has_scheme(uri)))
+
+
+def _entries(values: Any) -> list[Any]:
+    return values if isinstance(values, list) else []
+
+
+def _uri(entry: Any) -> str | None:
+    uri = entry.get("uri") if isinstance(entry, dict) else None
+    return uri if isinstance(uri, str) else None

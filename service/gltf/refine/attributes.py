@@ -1,4 +1,8 @@
-"""What becomes of each vertex attribute at the refined vertices of a primitive."""
+"""Attributes and morph targets of refined primitives.
+
+A morph target's deltas are added to refined attributes in proportion to a weight. At weight 1 its
+normals are those of the surface that it makes, and its tangents are perpendicular to them.
+"""
 
 from __future__ import annotations
 
@@ -8,35 +12,52 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.base.blocks import Blocks, available_threads
-from pns_common.fused.where_loaded.tangents import perpendicular_tangents
+from pns_common.grid import rounded_rows
+from pns_common.normals import perpendicular_tangents
+from pns_common.parallel import Blocks, available_threads
 
-from ...meshes.split_connectivity import SplitConnectivity
+from ...course import Course
+from ...meshes.barycentric_grid import BarycentricGrid
+from ...meshes.split_connectivity import SplitConnectivity, blocks_of, split_connectivity
 from ...meshes.uv_charts import UvBlend
-from ..read.primitives import TrianglePrimitive
+from ..read.primitives import TrianglePrimitive, distinct_corners
 from ..read.schema import Accessor
-from .normals import safe_unit
-from .skin_and_morph import SkinAndMorph
-from .skins import skin_attributes
+from .columns import SkinAndMorph, skin_attributes
+from .control_mesh import ControlMesh, refined_ids, slices
+from .mesh_refine import RefinedMesh
+from .normals import Shading, safe_unit, shade
 
-# EXT_mesh_features and batched 3D tiles number features, as floats where 16 bits do not suffice:
-# no accessor of vertices may hold wider integers.
+# Share of the progress that normals take.
+SHADING = 0.85
+# Numbers of features, in EXT_mesh_features and batched 3D tiles. They are floats where 16 bits do
+# not suffice, since attributes cannot have wider integers.
 _IDENTIFIER = re.compile(r"_?FEATURE_ID_[0-9]+|_BATCHID")
+
+Columns = dict[str, Shaped[np.ndarray, "N K"]]
 
 
 @dataclass(frozen=True, eq=False)
-class RefinedVertices:
-    """The N refined vertices of a primitive, and all that is not blended from its corners.
+class RefinedPrimitive:
+    """A refined primitive, in the types in which it is written."""
+
+    source: TrianglePrimitive
+    faces: Int[np.ndarray, "F 3"]
+    attributes: Columns
+    targets: list[Columns]
+
+
+@dataclass(frozen=True, eq=False)
+class _Vertices:
+    """The N refined vertices of a primitive.
 
     Attributes:
-        row: for each of the C corners a row of the primitive's attributes.
-        vertex: of the mesh that was refined, for each corner.
+        row: (C,) a row of the primitive's attributes for each distinct corner.
+        vertex: (C,) the vertex of the control mesh at each corner.
         connectivity: how corners spread over refined vertices.
-        positions: the refined positions, in float32.
-        normals: the new normals, in float32; None where the primitive has none.
-        exact_normals: the same in float64, for tangents; None where the primitive has none of both.
+        positions, normals: refined, in float32; normals None if the primitive has none.
+        exact_normals: in float64, for tangents; None if the primitive lacks either.
         skin_and_morph: skin binding and morph deltas.
-        morphed_normals: for each morph target the normals under it; None where none is wanted.
+        morphed_normals: normals under each morph target; None where it moves none.
     """
 
     row: Int[np.ndarray, " C"]
@@ -49,64 +70,148 @@ class RefinedVertices:
     morphed_normals: tuple[Float[np.ndarray, "N 3"] | None, ...]
 
 
-def refined_attributes(
-    primitive: TrianglePrimitive, refined_vertices: RefinedVertices, uv_blend: UvBlend
-) -> dict[str, Shaped[np.ndarray, "N K"]]:
-    """Return the attributes in the order of the file, each in the component type that it had."""
-    skin: dict[str, Shaped[np.ndarray, "N 4"]] = {}
-    if refined_vertices.skin_and_morph.binding is not None:
-        skin = skin_attributes(primitive, refined_vertices.skin_and_morph.binding)
-    refined: dict[str, Shaped[np.ndarray, "N K"]] = {}
+def refined_primitives(
+    control: ControlMesh,
+    refined: RefinedMesh,
+    grid: BarycentricGrid,
+    uv_blend: UvBlend,
+    course: Course,
+) -> list[RefinedPrimitive]:
+    """Return the refined primitives; primitives without faces are left out."""
+    ids = refined_ids(control.weld, control.cleaned, refined.mesh, grid)
+    ends = slices(control.kept_counts)
+    with course.part(0.0, SHADING):
+        shading = shade(
+            control,
+            [ids[rows] for rows in ends],
+            grid,
+            refined.mesh.vertices,
+            refined.skin_and_morph,
+            refined.limit_normals,
+            course,
+        )
+    made: list[RefinedPrimitive] = []
+    with course.part(SHADING, 1.0):
+        for number, rows in enumerate(ends):
+            course.reach(rows.start / len(ids))
+            if rows.stop > rows.start:
+                own = ids[rows]
+                made.append(
+                    _refined_primitive(control, number, own, grid, refined, shading, uv_blend)
+                )
+    return made
+
+
+def _refined_primitive(
+    control: ControlMesh,
+    number: int,
+    ids: Int[np.ndarray, "F T"],
+    grid: BarycentricGrid,
+    refined: RefinedMesh,
+    shading: Shading | None,
+    uv_blend: UvBlend,
+) -> RefinedPrimitive:
+    primitive = control.primitives[number]
+    welded = control.weld.vertex_of[control.rows[number]]
+    corners, row = distinct_corners(primitive, primitive.corners[control.kept[number]], welded)
+    if shading is not None and np.array_equal(corners, shading.groups.connectivity.faces):
+        # Without seams inside of groups this split has been made.
+        own = shading.groups.connectivity
+    else:
+        own = split_connectivity(corners, len(row), grid)
+    vertex = own.at_vertices(ids)
+    normals, exact, morphed = None, None, (None,) * len(refined.skin_and_morph.deltas)
+    if shading is not None and number in shading.groups.ids:
+        group = own.at_vertices(shading.groups.ids[number])
+        normals, morphed = shading.rounded(group), shading.under_targets(group)
+        exact = shading.exact(group) if "TANGENT" in primitive.attributes else None
+    vertices = _Vertices(
+        row=row,
+        vertex=control.cleaned.vertex_map[welded[row]],
+        connectivity=own,
+        positions=rounded_rows(refined.mesh.vertices, vertex, blocks_of(grid)),
+        normals=normals,
+        exact_normals=exact,
+        skin_and_morph=refined.skin_and_morph.take(vertex),
+        morphed_normals=morphed,
+    )
+    attributes = _attributes(primitive, vertices, uv_blend)
+    targets = [
+        _target(primitive, vertices, attributes, target) for target in range(len(primitive.targets))
+    ]
+    for name, values in refined.scalars.items():
+        attributes[name] = values[vertex, None].astype(np.float32)
+    return RefinedPrimitive(primitive, own.refined_faces, attributes, targets)
+
+
+def _attributes(primitive: TrianglePrimitive, vertices: _Vertices, uv_blend: UvBlend) -> Columns:
+    """Return the refined attributes in the file's order, in their component types."""
+    skin: Columns = {}
+    if vertices.skin_and_morph.binding is not None:
+        skin = skin_attributes(primitive, vertices.skin_and_morph.binding)
+    own, refined = vertices.connectivity, Columns()
     for name, values in primitive.attributes.items():
-        corners = values[refined_vertices.row]
+        corners = values[vertices.row]
         if name == "POSITION":
-            refined[name] = refined_vertices.positions
-        elif name == "NORMAL" and refined_vertices.normals is not None:
-            refined[name] = refined_vertices.normals
+            refined[name] = vertices.positions
+        elif name == "NORMAL" and vertices.normals is not None:
+            refined[name] = vertices.normals
         elif name == "TANGENT":
-            direction = tangent_directions(
-                refined_vertices.connectivity.linear(corners[:, :3]),
-                refined_vertices.exact_normals,
-            )
-            sign = refined_vertices.connectivity.nearest(corners[:, 3:])
+            direction = _tangents(own.linear(corners[:, :3]), vertices.exact_normals)
+            sign = own.nearest(corners[:, 3:])
             refined[name] = np.hstack([direction, sign]).astype(np.float32)
         elif name in skin:
             refined[name] = skin[name]
         elif name.startswith("TEXCOORD_"):
-            blended = uv_blend(refined_vertices.connectivity, refined_vertices.vertex, corners)
-            refined[name] = in_type_of(values, blended)
+            refined[name] = _in_type_of(values, uv_blend(own, vertices.vertex, corners))
         else:
-            refined[name] = blend(
-                name, refined_vertices.connectivity, corners, primitive.accessors[name]
-            )
+            refined[name] = _blend(name, own, corners, primitive.accessors[name])
     return refined
 
 
-def blend(
-    name: str,
-    connectivity: SplitConnectivity,
-    corners: Shaped[np.ndarray, "C K"],
-    accessor: Accessor,
+def _target(
+    primitive: TrianglePrimitive, vertices: _Vertices, base: Columns, number: int
+) -> Columns:
+    """Return the refined deltas of a morph target; `base` are the refined attributes."""
+    own, refined, normals = vertices.connectivity, Columns(), vertices.morphed_normals[number]
+    for name, values in primitive.targets[number].items():
+        corners = values[vertices.row]
+        if name == "POSITION":
+            refined[name] = vertices.skin_and_morph.deltas[number]
+        elif name == "NORMAL" and normals is not None:
+            refined[name] = (normals - base[name]).astype(np.float32, copy=False)
+        elif name == "TANGENT" and name in base:
+            directions = own.linear(primitive.attributes[name][vertices.row, :3] + corners)
+            under = normals if "NORMAL" in primitive.targets[number] else None
+            morphed = _tangents(directions, vertices.exact_normals if under is None else under)
+            refined[name] = (morphed - base[name][:, :3]).astype(np.float32)
+        else:
+            refined[name] = _blend(name, own, corners, primitive.target_accessors[number][name])
+    return refined
+
+
+def _blend(
+    name: str, own: SplitConnectivity, corners: Shaped[np.ndarray, "C K"], accessor: Accessor
 ) -> Shaped[np.ndarray, "N K"]:
-    """Blend linearly: fractions, floats, colours; identifiers, which have no mean, by nearness."""
+    """Return linear blends; of identifiers and other whole numbers, values of nearest corners."""
     fraction = accessor.normalized or name.startswith("COLOR_")
     whole = corners.dtype.kind != "f" and not fraction
     if whole or _IDENTIFIER.fullmatch(name):
-        return connectivity.nearest(corners)
-    return in_type_of(corners, connectivity.linear(corners))
+        return own.nearest(corners)
+    return _in_type_of(corners, own.linear(corners))
 
 
-def tangent_directions(
+def _tangents(
     directions: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"] | None
 ) -> Float[np.ndarray, "N 3"]:
-    """Return unit tangents at a right angle to the normals, where there are normals."""
+    """Return unit tangents, perpendicular to the normals if there are any."""
     if normals is None:
         return safe_unit(directions)
     return perpendicular_tangents(directions, normals, Blocks(available_threads()))
 
 
-def in_type_of(
+def _in_type_of(
     old: Shaped[np.ndarray, "C K"], blended: Float[np.ndarray, "N K"]
 ) -> Shaped[np.ndarray, "N K"]:
-    """Return blended values in the component type that they had; integers rounded, in place."""
+    """Return blended values in a component type; integers are rounded, in place."""
     return (blended if old.dtype.kind == "f" else np.rint(blended, out=blended)).astype(old.dtype)

@@ -1,4 +1,4 @@
-"""The control mesh of a glTF mesh: its triangle primitives, welded and cleaned."""
+"""Control meshes: triangle primitives of one glTF mesh, or of many, welded and cleaned."""
 
 from __future__ import annotations
 
@@ -8,50 +8,112 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Int, Shaped
+from jaxtyping import Bool, Float, Int, Shaped
 
+from pns_common.grid import index_type, take_points
 from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
+from pns_common.rows import distinct_rows, dot, norm, unit
 
+from ...meshes.barycentric_grid import BarycentricGrid
+from ...meshes.split_connectivity import blocks_of
 from ...meshes.weld import Weld, weld
 from ...meshes.weld_tolerance import WHOLE, weld_within
 from ..read.primitives import TrianglePrimitive
-from .joined_normals import NO_NORMAL, joined_normals
-from .parts import Parts
-from .skin_and_morph import SkinAndMorph, read_skin_and_morph
+from .columns import SkinAndMorph, read_skin_and_morph
+
+# Exporters compute the two sides of a UV seam apart and round differently, in real files by up to
+# about 0.01°. Normals within 0.1° are one; hard edges have degrees.
+SAME_NORMAL = np.radians(0.1)
+# Label of a row without a normal.
+NO_NORMAL = -1
+# A direction in which different normals rarely have equal coordinates.
+SCAN = np.array([1.0, np.sqrt(2), np.sqrt(3)])
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """The P meshes of a union, whose primitives are joined number by number.
+
+    Attributes:
+        of_row: (N,) part of each row.
+        of_face: (F,) part of each face.
+        count: P.
+    """
+
+    of_row: Int[np.ndarray, " N"]
+    of_face: Int[np.ndarray, " F"]
+    count: int
+
+    @property
+    def order(self) -> Int[np.ndarray, " F"]:
+        """The faces part by part, in each part in the order of its primitives."""
+        return np.argsort(self.of_face, kind="stable")
+
+    def count_faces(self, chosen: Bool[np.ndarray, " F"]) -> Int[np.ndarray, " P"]:
+        """Count the chosen faces of each part."""
+        return np.bincount(self.of_face[chosen], minlength=self.count)
+
+    def apart(self, labels: Int[np.ndarray, " N"] | None) -> Int[np.ndarray, " N"]:
+        """Return labels that rows share if they share `labels` and their part."""
+        if labels is None:
+            return self.of_row
+        return distinct_rows(np.column_stack([labels, self.of_row]))
 
 
 @dataclass(frozen=True, eq=False)
 class ControlMesh:
-    """All triangle primitives of a mesh, joined by position and by what moves it.
+    """All triangle primitives of a mesh, welded by position, morph targets and skin.
 
     Attributes:
         primitives: in file order.
-        weld: the joined mesh over all their faces.
-        rows: which rows of `weld.vertex_of` are whose.
-        kept: for each primitive, which of its faces do not name a welded vertex twice.
-        cleaned: the mesh to refine; None where no face is left.
-        skin_and_morph: what follows the rows of all primitives.
-        near: for each part how many vertices were joined that are not equal.
-        authored: whether its normals are its file's, and not made anew.
+        weld: the welded mesh over all their faces.
+        rows: slices of `weld.vertex_of`, one for each primitive.
+        kept: for each primitive, which faces have three different welded vertices.
+        cleaned_or_none: the mesh to refine; None if no face is left.
+        skin_and_morph: of the rows of all primitives.
+        near: (P,) for each part, the number of unequal vertices that were joined.
+        authored: whether the normals are the file's.
     """
 
     primitives: Sequence[TrianglePrimitive]
     weld: Weld
     rows: list[slice]
     kept: list[Bool[np.ndarray, " F"]]
-    cleaned: Cleaned | None
+    cleaned_or_none: Cleaned | None
     skin_and_morph: SkinAndMorph
     near: Int[np.ndarray, " P"]
     authored: bool = True
 
     @property
+    def is_empty(self) -> bool:
+        """Whether no face is left."""
+        return self.cleaned_or_none is None
+
+    @property
+    def cleaned(self) -> Cleaned:
+        """The mesh to refine. Raises ValueError if no face is left."""
+        if self.cleaned_or_none is None:
+            raise ValueError("this mesh has no face left")
+        return self.cleaned_or_none
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh to refine. Raises ValueError if no face is left."""
+        return self.cleaned.mesh
+
+    @property
     def copies(self) -> int:
-        """Faces with the same three vertices as an earlier one: refined once, kept each."""
-        return 0 if self.cleaned is None else self.cleaned.dropped_duplicate
+        """Number of faces with the vertices of an earlier face; they are refined once."""
+        return 0 if self.is_empty else self.cleaned.dropped_duplicate
+
+    @property
+    def kept_counts(self) -> list[int]:
+        """Number of kept faces of each primitive."""
+        return [int(keep.sum()) for keep in self.kept]
 
     @cached_property
     def normal_labels(self) -> Int[np.ndarray, " N"]:
-        """What rows share that have one normal at one vertex; NO_NORMAL where there is none."""
+        """Labels that rows of one vertex share if they have one normal; NO_NORMAL without."""
         labels = np.full(len(self.weld.vertex_of), NO_NORMAL)
         chosen = [n for n, p in enumerate(self.primitives) if "NORMAL" in p.attributes]
         if chosen:
@@ -62,17 +124,22 @@ class ControlMesh:
             labels[rows] = joined_normals(self.weld.vertex_of[rows], normals)
         return labels
 
-    def of_cleaned(
-        self, cleaned: Cleaned, of_kept: Shaped[np.ndarray, "P ..."]
-    ) -> Shaped[np.ndarray, "F ..."]:
-        """Return for each face of the mesh to refine what belongs to the kept face that it is."""
-        place = cleaned.face_map[np.concatenate(self.kept)]
-        of_face = np.empty((len(cleaned.mesh.faces), *of_kept.shape[1:]), dtype=of_kept.dtype)
+    def of_cleaned(self, of_kept: Shaped[np.ndarray, "P ..."]) -> Shaped[np.ndarray, "F ..."]:
+        """Return for each face of the mesh to refine the value of its kept face."""
+        place = self.cleaned.face_map[np.concatenate(self.kept)]
+        of_face = np.empty((len(self.mesh.faces), *of_kept.shape[1:]), dtype=of_kept.dtype)
         of_face[place[place >= 0]] = of_kept[place >= 0]
         return of_face
 
+    def vertex_rows(self) -> Int[np.ndarray, " V"]:
+        """Return the first row of each vertex of the mesh to refine."""
+        used = np.flatnonzero(self.weld.vertex_of >= 0)[::-1]
+        row = np.empty(len(self.weld.points), dtype=np.int64)
+        row[self.weld.vertex_of[used]] = used
+        return row[self.cleaned.vertex_map >= 0]
+
     def with_new_normals(self, primitives: Sequence[TrianglePrimitive]) -> ControlMesh:
-        """Return the same mesh over primitives with new normals: more rows in the same places."""
+        """Return a copy over primitives with new normals: more rows at the same positions."""
         rows = _rows_of(primitives)
         vertex_of = np.full(rows[-1].stop, -1, dtype=np.int64)
         vertex_of[np.concatenate(_corners_of(primitives, rows))] = self.weld.faces
@@ -89,13 +156,12 @@ class ControlMesh:
 def control_mesh(
     primitives: Sequence[TrianglePrimitive],
     tolerance: float,
-    unit: float | None,
+    unit_of_length: float | None,
     parts: Parts | None = None,
 ) -> ControlMesh:
-    """Weld and clean the triangle primitives of one mesh; `tolerance` and `unit` as weld_within.
+    """Weld and clean the triangle primitives of a mesh; tolerance and unit as in `weld_within`.
 
-    `parts` of a union are never joined, and come in their order in the mesh to refine; None: it is
-    one mesh.
+    The `parts` of a union are never joined, and follow each other in the mesh to refine.
     """
     rows = _rows_of(primitives)
     positions = np.concatenate([primitive.attributes["POSITION"] for primitive in primitives])
@@ -107,12 +173,12 @@ def control_mesh(
         movement, order = parts.apart(movement), parts.order
         faces, starts = faces[order], np.searchsorted(parts.of_face[order], np.arange(parts.count))
     exact = weld(positions, faces, movement)
-    welded = weld_within(exact, tolerance, unit, movement, starts)
+    welded = weld_within(exact, tolerance, unit_of_length, movement, starts)
     proper = ~repeated_vertex(welded.faces)
     cleaned = clean(Mesh(welded.points, welded.faces)) if proper.any() else None
     near = _vertex_counts(exact.faces, starts) - _vertex_counts(welded.faces, starts)
     if order is not None:
-        # Back from the order of the parts to that of the primitives.
+        # From the order of the parts back to that of the primitives.
         place = np.argsort(order)
         proper, welded = proper[place], replace(welded, faces=welded.faces[place])
         if cleaned is not None:
@@ -126,10 +192,38 @@ def control_mesh(
         weld=welded,
         rows=rows,
         kept=[proper[part] for part in slices([len(own) for own in corners])],
-        cleaned=cleaned,
+        cleaned_or_none=cleaned,
         skin_and_morph=skin_and_morph,
         near=near,
     )
+
+
+def joined_normals(
+    vertex: Int[np.ndarray, " N"], normals: Float[np.ndarray, "N 3"]
+) -> Int[np.ndarray, " N"]:
+    """Return labels that rows share if they have one vertex and nearly one normal.
+
+    Directions count, not lengths; rows without a direction share it. Neighbours along a line are
+    compared, at the cost of one sort: equal normals always share a label, nearly equal ones all but
+    always.
+    """
+    # Most vertices, inside of smooth surfaces, have one row.
+    several = np.flatnonzero((np.bincount(vertex) > 1)[vertex])
+    v, n = vertex[several], unit(normals[several].astype(np.float64))
+    # The bits of a matrix product would depend on where a row stands.
+    order = np.lexsort((*n.T, dot(n, SCAN[None]), v))
+    v, n = v[order], n[order]
+    opens = np.ones(len(order), dtype=bool)
+    opens[1:] = (v[1:] != v[:-1]) | (norm(n[1:] - n[:-1]) > SAME_NORMAL)
+    labels = vertex.copy()
+    labels[several[order]] = vertex.max(initial=-1) + np.cumsum(opens)
+    return labels
+
+
+def slices(lengths: Sequence[int]) -> list[slice]:
+    """Return consecutive slices of the given lengths."""
+    ends = np.cumsum([0, *lengths]).tolist()
+    return [slice(start, end) for start, end in pairwise(ends)]
 
 
 def _rows_of(primitives: Sequence[TrianglePrimitive]) -> list[slice]:
@@ -145,22 +239,32 @@ def _corners_of(
 def _vertex_counts(
     faces: Int[np.ndarray, "F 3"], starts: Int[np.ndarray, " P"]
 ) -> Int[np.ndarray, " P"]:
-    """Count the vertices of each part, numbered part by part as they first appear."""
+    """Count the vertices of each part; they are numbered by first appearance."""
     if not len(faces):
         return np.zeros(len(starts), dtype=np.int64)
     a, b, c = faces.T
     return np.diff(np.maximum.reduceat(np.maximum(np.maximum(a, b), c), starts), prepend=-1)
 
 
-def vertex_rows(control: ControlMesh, cleaned: Cleaned) -> Int[np.ndarray, " V"]:
-    """Return for each vertex of the mesh to refine the first of the rows that are it."""
-    used = np.flatnonzero(control.weld.vertex_of >= 0)[::-1]
-    row = np.empty(len(control.weld.points), dtype=np.int64)
-    row[control.weld.vertex_of[used]] = used
-    return row[cleaned.vertex_map >= 0]
+def refined_ids(
+    welded: Weld, cleaned: Cleaned, refined: Mesh, grid: BarycentricGrid
+) -> Int[np.ndarray, "P T"]:
+    """Return the refined vertex at each grid point of each kept face.
 
-
-def slices(lengths: Sequence[int]) -> list[slice]:
-    """Return consecutive slices of the given lengths."""
-    ends = np.cumsum([0, *lengths]).tolist()
-    return [slice(start, end) for start, end in pairwise(ends)]
+    A copy of a face (double-sided modelling, decals) has the vertices of the refined face, in its
+    own order of corners.
+    """
+    proper = cleaned.representative >= 0
+    leader = cleaned.representative[proper]
+    corners = refined.faces.reshape(len(cleaned.mesh.faces), -1)
+    ids = take_points(corners, grid.slot, index_type(len(refined.vertices)), blocks_of(grid))
+    if not np.array_equal(leader, np.arange(len(leader))):
+        ids = np.take(ids, leader, axis=0)
+    copies = np.flatnonzero(cleaned.face_map[proper] < 0)
+    if len(copies):
+        own = cleaned.vertex_map[welded.faces[proper][copies]]
+        same = own[:, :, None] == cleaned.mesh.faces[leader[copies]][:, None, :]
+        place = same.argmax(axis=2)
+        reorder = grid.reorder[3 * place[:, 0] + place[:, 1]]
+        ids[copies] = np.take_along_axis(ids[copies], reorder, axis=1)
+    return ids

@@ -1,66 +1,68 @@
-"""Small meshes of one kind, refined as parts of one: what a step costs beside rows is paid once.
+"""Refine small meshes of one kind together, so that the fixed cost of each step is paid once.
 
-Scenes from CAD and building models hold thousands of meshes of a few faces. Each comes out as if it
-had been alone, bit for bit: positions are joined within a part only, and nothing is ever summed
-across parts.
+Scenes from CAD and building models have thousands of meshes of a few faces. Primitive s of their
+union holds the rows and faces of primitive s of each mesh, in the order of the meshes. Each mesh
+has the bits that it would have alone: positions are joined inside of a part only, and nothing is
+summed over parts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.base.deferred import Deferred
-from pns_common.connectivity.creases import Creases
+from pns_common.creases import Creases
 from pns_common.errors import MeshError
-from pns_common.fused.where_loaded.linear import linear_refinement
-from pns_common.mesh import Cleaned
-from pns_common.refine import Refinement, Report
-from pns_common.refine_parts import PartsRefinement, refine_parts
+from pns_common.report import Report
+from pns_common.rows import disjoint_faces
 from pns_common.schemes import Scheme
 
+from ...advice import NO_BENDS, Bends, count_bends
 from ...course import Course
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
 from ...options import Options
 from ...report import Change
 from ..read.primitives import TrianglePrimitive
-from ..stage_shares import StageShares
-from .common_slots import common_slots
-from .control_mesh import ControlMesh, control_mesh, slices, vertex_rows
-from .local_joints import local_joints
-from .parts import Parts
-from .refined_primitives import RefinedMesh, RefinedPrimitive, refined_primitives
-from .refinement import (
+from ..read.schema import Accessor
+from .attributes import Columns, RefinedPrimitive, refined_primitives
+from .columns import COLUMNS, skin_sets
+from .control_mesh import ControlMesh, Parts, control_mesh, slices
+from .mesh_refine import (
+    RefinedMesh,
     changes_of_primitive,
     changes_of_vertices,
     creases_of,
-    leaves_single_precision,
+    refined_union,
+    sharp_after,
 )
-from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
-from .smooth_normals import with_normal_accessor, with_smooth_normals
-from .union import divided, joined
-from .where_acted import vertex_scalars
+from .new_normals import with_normal_accessor, with_normal_rule, with_smooth_normals
 
-# More faces than this, refined, and a mesh's own work is more than what surrounds it.
-MOST_FACES = 2**15
-# So much is refined at a time: the memory of a group is small beside that of a large mesh.
-GROUP_FACES = 2**17
+
+@dataclass(frozen=True)
+class StageShares:
+    """Where the stages of a mesh begin, as shares of its work; writing is the rest."""
+
+    weld: float
+    refine: float
+    attributes: float
+    write: float
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What became of one mesh.
+    """A refined mesh of a union.
 
     Attributes:
         refined: its primitives that have a face left.
-        kept: for each of its primitives, which faces do not name a welded vertex twice.
-        copies: faces that follow another with the same vertices.
+        kept: for each primitive, which faces have three different welded vertices.
+        copies: number of faces with the vertices of an earlier face.
         report: the operator's.
         changes: what was joined, dropped or cut.
+        bends: bent edges, and the sharp ones among them.
     """
 
     refined: list[RefinedPrimitive]
@@ -68,15 +70,50 @@ class Part:
     copies: int
     report: Report
     changes: list[Change]
+    bends: Bends = NO_BENDS
 
 
-@dataclass(frozen=True, eq=False)
-class _Refined:
-    """What the operator made of a union: for each part its report, and how many lost a joint."""
+def kind_of(primitives: Sequence[TrianglePrimitive]) -> Hashable | None:
+    """Return what meshes that may be joined have in common; None for a mesh that may not."""
+    joints = {
+        values.dtype
+        for primitive in primitives
+        for name, values in primitive.attributes.items()
+        if name.startswith("JOINTS_")
+    }
+    # Joints of a wide primitive may reach into a narrow one and widen it, in its mesh alone.
+    if len(joints) > 1:
+        return None
+    return (
+        _joint_blocks(primitives),
+        *(
+            (
+                _signature(primitive.attributes, primitive.accessors),
+                *map(_signature, primitive.targets, primitive.target_accessors),
+            )
+            for primitive in primitives
+        ),
+    )
 
-    mesh: RefinedMesh
-    reports: list[Report]
-    cut: Int[np.ndarray, " P"]
+
+def _signature(attributes: Columns, accessors: dict[str, Accessor]) -> Hashable:
+    return tuple(
+        (name, values.dtype.str, values.shape[1], accessors[name].normalized)
+        for name, values in attributes.items()
+    )
+
+
+def _joint_blocks(primitives: Sequence[TrianglePrimitive]) -> int:
+    """Return the number of blocks of joints of a mesh to a factor of two; 0 without a skin.
+
+    Meshes with few joints then do not wait for one with many.
+    """
+    named = [
+        primitive.attributes[f"JOINTS_{number}"].reshape(-1)
+        for primitive in primitives
+        for number in skin_sets(primitive)
+    ]
+    return (-(-len(np.unique(np.concatenate(named))) // COLUMNS)).bit_length() if named else 0
 
 
 def refine_together(
@@ -87,48 +124,46 @@ def refine_together(
     course: Course,
     shares: StageShares,
 ) -> list[Part | None]:
-    """Refine meshes of one kind, given by their primitives; `pointers` say where they stand.
+    """Refine meshes of one kind, given by their primitives; `pointers` are their places.
 
-    None stands for one that must go alone: it has no face left or no extent, cannot be refined
-    (alone, it is told why), or there are no kernels that could serve.
+    None for a mesh that must be refined alone: it has no face left or no extent, or it cannot be
+    refined, which is then reported.
     """
-    primitives, parts = joined(meshes)
+    primitives, parts = _joined(meshes)
+    options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options.weld_tolerance, options.weld_unit, parts)
     able = _able(control, parts)
-    if control.cleaned is None or not able.all():
-        return _chosen_together(able, meshes, pointers, scheme, options, course, shares)
+    if control.is_empty or not able.all():
+        return _chosen(able, meshes, pointers, scheme, options, course, shares)
     with course.stage("weld", shares.weld, shares.refine):
-        creases = creases_of(control, options, scheme, parts)
+        creases = creases_of(control, options, scheme)
         if options.normals != "keep":
-            control, parts = _smoothed(control, control.cleaned, parts, creases, options)
+            control, parts = _smoothed(control, parts, creases, options)
     with course.stage("refine", shares.refine, shares.attributes):
         try:
-            made = _refined(control, parts, creases, scheme, options, course)
+            made = refined_union(control, parts, creases, scheme, options, course)
         except MeshError:
-            # Not to be told whose it is: the halves are asked, down to one.
+            # The error does not say which mesh it is: try halves, down to one mesh.
             if len(meshes) == 1:
                 return [None]
             half = np.arange(len(meshes)) < len(meshes) // 2
-            rest = pointers, scheme, options, course, shares
-            return [
-                first or second
-                for first, second in zip(
-                    _chosen_together(half, meshes, *rest),
-                    _chosen_together(~half, meshes, *rest),
-                    strict=True,
-                )
-            ]
-    if made is None or control.cleaned is None:
-        return [None] * len(meshes)
+            first, second = (
+                _chosen(each, meshes, pointers, scheme, options, course, shares)
+                for each in (half, ~half)
+            )
+            return [one or other for one, other in zip(first, second, strict=True)]
     with course.stage("attributes", shares.attributes, shares.write):
         grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
-        pieces = refined_primitives(control, control.cleaned, made.mesh, grid, blend, course)
-        return [*_divided(control, control.cleaned, parts, made, pieces, meshes, pointers, options)]
+        pieces = refined_primitives(control, made, grid, blend, course)
+        part_of_face, _ = control.part_of_face(parts)
+        bends = count_bends(control.mesh, creases, len(meshes), part_of_face)
+        cut = _divided(control, parts, made, pieces, meshes, pointers, options)
+        return [replace(part, bends=own) for part, own in zip(cut, bends, strict=True)]
 
 
 def _able(control: ControlMesh, parts: Parts) -> Bool[np.ndarray, " P"]:
-    """Return which parts have a face left, and an extent to measure by."""
+    """Return which parts have a face left and an extent."""
     proper = np.concatenate(control.kept)
     points = control.weld.points[control.weld.faces]
     low, high = np.full((parts.count, 3), np.inf), np.full((parts.count, 3), -np.inf)
@@ -138,25 +173,7 @@ def _able(control: ControlMesh, parts: Parts) -> Bool[np.ndarray, " P"]:
     return extended
 
 
-def _smoothed(
-    control: ControlMesh,
-    cleaned: Cleaned,
-    parts: Parts,
-    creases: Creases,
-    options: Options,
-) -> tuple[ControlMesh, Parts]:
-    """Return the union with new normals, for which vertices are split into more rows."""
-    primitives = with_smooth_normals(control, cleaned, creases.left_after(options.levels))
-    of_row = np.concatenate(
-        [
-            parts.of_row[share][primitive.rows]
-            for share, primitive in zip(control.rows, primitives, strict=True)
-        ]
-    )
-    return control.with_new_normals(primitives), replace(parts, of_row=of_row)
-
-
-def _chosen_together(
+def _chosen(
     chosen: Bool[np.ndarray, " P"],
     meshes: Sequence[Sequence[TrianglePrimitive]],
     pointers: Sequence[str],
@@ -176,95 +193,78 @@ def _chosen_together(
     return made
 
 
-def _refined(
-    control: ControlMesh,
-    parts: Parts,
-    creases: Creases,
-    scheme: Scheme,
-    options: Options,
-    course: Course,
-) -> _Refined | None:
-    """Refine the union; None where the compiled kernels cannot.
-
-    Raises:
-        MeshError: the refined coordinates of any part are too large.
-    """
-    cleaned = control.cleaned
-    if cleaned is None:
-        return None
-    faces = parts.count_faces(cleaned.face_map >= 0)
-    union, of_parts, length = cleaned.mesh, np.cumsum([0, *faces]), options.reference_length
-
-    def refined_to(levels: int, limit: bool = False) -> PartsRefinement | None:
-        return refine_parts(union, of_parts, scheme, levels, length, limit=limit, creases=creases)
-
-    made = refined_to(options.levels, options.limit)
-    if made is None:
-        return None
-    if leaves_single_precision(made.mesh.vertices):
-        raise MeshError("refined positions leave the range of float32", element="vertices")
-    skin_and_morph, cut = _skin_and_morph(control, cleaned, parts, creases, made, options, course)
-    scalars = vertex_scalars(made, refined_to, scheme, options)
-    refinement = Refinement(made.mesh, Deferred(lambda: made.reports[0]), made.ratio, made.gate)
-    normals = made.normals if options.normals == "limit" else None
-    return _Refined(RefinedMesh(refinement, skin_and_morph, scalars, normals), made.reports, cut)
+def _smoothed(
+    control: ControlMesh, parts: Parts, creases: Creases, options: Options
+) -> tuple[ControlMesh, Parts]:
+    """Return the union with new normals, which split vertices into more rows."""
+    primitives = with_smooth_normals(control, sharp_after(creases, options.levels))
+    of_row = np.concatenate(
+        [
+            parts.of_row[share][primitive.rows]
+            for share, primitive in zip(control.rows, primitives, strict=True)
+        ]
+    )
+    return control.with_new_normals(primitives), replace(parts, of_row=of_row)
 
 
-def _skin_and_morph(
-    control: ControlMesh,
-    cleaned: Cleaned,
-    parts: Parts,
-    creases: Creases,
-    made: PartsRefinement,
-    options: Options,
-    course: Course,
-) -> tuple[SkinAndMorph, Int[np.ndarray, " P"]]:
-    """Return what follows the refined vertices, and how many of each part lost a joint."""
-    if not control.skin_and_morph.any:
-        return control.skin_and_morph, np.zeros(parts.count, dtype=np.int64)
-    rows = vertex_rows(control, cleaned)
-    own, before = control.skin_and_morph.take(rows), parts.of_row[rows]
-    table = None
-    if own.binding is not None:
-        table, binding = local_joints(own.binding, before, parts.count)
-        own = replace(own, binding=binding)
-    mesh = cleaned.mesh
-    count = len(mesh.vertices)
-    linear = linear_refinement(mesh.faces, count, options.levels, creases, limit=options.limit)
-    slots = common_slots(control, cleaned, made.mesh.faces, len(made.mesh.vertices))
-    after = refine_skin_and_morph(own, linear, slots, course)
-    part_of = np.empty(len(made.mesh.vertices), dtype=np.int64)
-    # Descendants lie as their faces do.
-    part_of[made.mesh.faces] = np.repeat(
-        before[mesh.faces[:, 0]], len(made.mesh.faces) // len(mesh.faces)
-    )[:, None]
-    if table is not None and after.binding is not None:
-        after = replace(after, binding=table.named(after.binding, part_of))
-    return after, np.bincount(part_of[after.cut], minlength=parts.count)
+def _joined(meshes: Sequence[Sequence[TrianglePrimitive]]) -> tuple[list[TrianglePrimitive], Parts]:
+    """Return the primitives of the union, and the parts of their rows and faces."""
+    numbers = np.arange(len(meshes))
+    alike = list(zip(*meshes, strict=True))
+    rows = [[len(p.attributes["POSITION"]) for p in own] for own in alike]
+    faces = [[len(p.corners) for p in own] for own in alike]
+    parts = Parts(
+        of_row=np.concatenate([np.repeat(numbers, lengths) for lengths in rows]),
+        of_face=np.concatenate([np.repeat(numbers, lengths) for lengths in faces]),
+        count=len(meshes),
+    )
+    return [_joined_primitive(place, own) for place, own in enumerate(alike)], parts
+
+
+def _joined_primitive(place: int, primitives: Sequence[TrianglePrimitive]) -> TrianglePrimitive:
+    first = primitives[0]
+    counts = [len(primitive.attributes["POSITION"]) for primitive in primitives]
+    faces = [primitive.corners for primitive in primitives]
+    return TrianglePrimitive(
+        number=place,
+        rows=np.arange(sum(counts)),
+        corners=disjoint_faces(zip(faces, counts, strict=True)),
+        attributes=_concatenated([primitive.attributes for primitive in primitives]),
+        accessors=first.accessors,
+        targets=tuple(
+            _concatenated(alike)
+            for alike in zip(*(primitive.targets for primitive in primitives), strict=True)
+        ),
+        target_accessors=first.target_accessors,
+    )
+
+
+def _concatenated(columns: Sequence[Columns]) -> Columns:
+    return {name: np.concatenate([values[name] for values in columns]) for name in columns[0]}
 
 
 def _divided(
     control: ControlMesh,
-    cleaned: Cleaned,
     parts: Parts,
-    made: _Refined,
+    made: RefinedMesh,
     pieces: Sequence[RefinedPrimitive],
     meshes: Sequence[Sequence[TrianglePrimitive]],
     pointers: Sequence[str],
     options: Options,
 ) -> list[Part]:
-    """Return the union's refined primitives, cut into those of its parts."""
+    """Cut the refined primitives of the union into those of its parts."""
+    cleaned = control.cleaned
     copied = (cleaned.representative >= 0) & (cleaned.face_map < 0)
-    copies = parts.count_faces(copied).tolist()
+    copies, near = parts.count_faces(copied).tolist(), control.near.tolist()
     refined: list[list[RefinedPrimitive]] = [[] for _ in meshes]
-    # A primitive that has no face left in any part is not among the pieces.
+    # A primitive without a face left in any part is not among the pieces.
     for piece in pieces:
         place = piece.source.number
         own = [primitives[place] for primitives in meshes]
         kept = _shares(control.kept[place], own)
         counts = np.array([int(keep.sum()) for keep in kept]) * 4**options.levels
-        sources = own if options.normals == "keep" else [_with_normals(p) for p in own]
-        for into, cut in zip(refined, divided(piece, counts, sources), strict=True):
+        sources = own if options.normals == "keep" else [_with_normal_accessor(p) for p in own]
+        for into, cut in zip(refined, _divided_primitive(piece, counts, sources), strict=True):
             if len(cut.faces):
                 into.append(cut)
     kept = [
@@ -284,20 +284,52 @@ def _divided(
                     primitive, keep[part], options.levels, pointers[part]
                 )
             ]
-            + changes_of_vertices(int(control.near[part]), int(made.cut[part]), pointers[part]),
+            + changes_of_vertices(near[part], int(made.cut[part]), pointers[part]),
         )
         for part, primitives in enumerate(meshes)
     ]
 
 
+def _divided_primitive(
+    refined: RefinedPrimitive, counts: Int[np.ndarray, " P"], sources: Sequence[TrianglePrimitive]
+) -> list[RefinedPrimitive]:
+    """Cut a refined primitive into parts; `counts` are their faces, `sources` their primitives."""
+    parts = np.arange(len(counts))
+    part_of = np.empty(len(refined.attributes["POSITION"]), dtype=np.int64)
+    part_of[refined.faces] = np.repeat(parts, counts)[:, None]
+    order = np.argsort(part_of, kind="stable")
+    starts = np.searchsorted(part_of[order], np.arange(len(counts) + 1))
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order)) - starts[part_of[order]]
+    faces = place[refined.faces]
+    attributes, *targets = (
+        {name: values[order] for name, values in columns.items()}
+        for columns in (refined.attributes, *refined.targets)
+    )
+    ends = np.cumsum([0, *counts])
+    return [
+        RefinedPrimitive(
+            source=source,
+            faces=faces[ends[part] : ends[part + 1]],
+            attributes=_rows(attributes, own),
+            targets=[_rows(target, own) for target in targets],
+        )
+        for part, source in enumerate(sources)
+        for own in [slice(starts[part], starts[part + 1])]
+    ]
+
+
+def _rows(columns: Columns, rows: slice) -> Columns:
+    return {name: values[rows] for name, values in columns.items()}
+
+
 def _shares(
     kept: Bool[np.ndarray, " F"], primitives: Sequence[TrianglePrimitive]
 ) -> list[Bool[np.ndarray, " f"]]:
-    """Return each part's share of what says of a primitive's faces whether they were kept."""
+    """Return each part's share of the mask of a joined primitive's faces."""
     return [kept[share] for share in slices([len(primitive.corners) for primitive in primitives])]
 
 
-def _with_normals(primitive: TrianglePrimitive) -> TrianglePrimitive:
-    """Return the primitive, described as one that has normals."""
+def _with_normal_accessor(primitive: TrianglePrimitive) -> TrianglePrimitive:
     accessors = with_normal_accessor(primitive.accessors, len(primitive.rows))
     return replace(primitive, accessors=accessors)

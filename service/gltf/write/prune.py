@@ -1,29 +1,35 @@
-"""Geometry that refinement has replaced leaves the file: accessors, buffer views and bytes.
+"""Remove replaced geometry from a file: accessors, buffer views and bytes; count lost vertices.
 
-New entries take the places of old ones, so that numbers elsewhere (animations, skins, images) stay
-as they were. What the file carried without use stays too: it was not ours to judge.
+New entries take the numbers of old ones, so that other numbers (in animations, skins, images) stay.
+Data that was unused before stays.
 """
 
 from __future__ import annotations
 
 import sys
+from collections import defaultdict
 from collections.abc import Iterable, Sequence, Set
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
-from ..read.index_references import References, accessor_references, view_references
-from ..read.spare import Spare
+from pns_common.rows import marked
 
-# Where no cut starts.
+from ..read.extensions import References, accessor_references, view_references
+from ..read.plan import Spare
+from ..read.primitives import TrianglePrimitive
+from ..read.schema import Document
+
+# Start of the cut after the last.
 NEVER = sys.maxsize
 
 
 def remove_unused(tree: dict[str, Any], spare: Spare) -> list[tuple[int, int]]:
-    """Take unused spare accessors and views out of the tree; (start, end) of views that went.
+    """Remove unused spare accessors and views from the tree; return (start, end) of these views.
 
-    All buffers have been joined: every view lies in buffer 0, or is compressed.
+    All buffers have been joined: each view lies in buffer 0, or is compressed.
     """
     accessors = tree.get("accessors", [])
     named = accessor_references(tree)
@@ -45,7 +51,7 @@ def remove_unused(tree: dict[str, Any], spare: Spare) -> list[tuple[int, int]]:
 
 
 def _unused(references: Iterable[References], count: int, spare: Set[int], old: int) -> list[int]:
-    """Return which of ``count`` entries nothing names, of spare ones and those that are not old."""
+    """Return the entries without references among the spare and the new ones."""
     unused = {*spare, *range(old, count)}
     for holders, key in references:
         unused.difference_update([holder.get(key) for holder in holders])
@@ -55,7 +61,7 @@ def _unused(references: Iterable[References], count: int, spare: Set[int], old: 
 def _renumbered(
     entries: list[dict[str, Any]], unused: list[int], references: Iterable[References]
 ) -> list[dict[str, Any]]:
-    """Leave entries out: the last ones move into the places of those that went."""
+    """Return entries without the unused; the last ones take the free numbers."""
     count, gone = len(entries) - len(unused), set(unused)
     holes = [index for index in unused if index < count]
     movers = [index for index in range(count, len(entries)) if index not in gone]
@@ -75,10 +81,10 @@ def cut(
     gone: Int[np.ndarray, "N 2"],
     needed: Int[np.ndarray, "M 2"],
 ) -> tuple[list[bytes | memoryview], list[tuple[int, int]]]:
-    """Cut from the pieces the bytes of `gone` that nothing in `needed` covers.
+    """Cut the bytes in `gone` and not in `needed` from the pieces; both are starts and ends.
 
-    Both are starts and ends. Whole words go, so that what follows stays aligned. Also the
-    (position, bytes before it that went) of each cut, ascending, for `moved`.
+    Whole words are cut, so that the rest stays aligned. Also returns (end, bytes removed so far) of
+    each cut, ascending, for `moved`.
     """
     cuts = [
         (start + -start % 4, end - end % 4)
@@ -108,7 +114,7 @@ def cut(
 
 
 def moved(offsets: Sequence[int], shifts: Sequence[tuple[int, int]]) -> list[int]:
-    """Return where bytes lie after the cuts."""
+    """Return the offsets of bytes after the cuts."""
     ends, removed = np.array([(0, 0), *shifts], dtype=np.int64).T
     before = np.array(offsets, dtype=np.int64)
     after: list[int] = (before - removed[np.searchsorted(ends, before, side="right") - 1]).tolist()
@@ -116,7 +122,7 @@ def moved(offsets: Sequence[int], shifts: Sequence[tuple[int, int]]) -> list[int
 
 
 def _merged(ranges: Int[np.ndarray, "N 2"]) -> list[tuple[int, int]]:
-    """Return ascending ranges that do not touch, which cover the same."""
+    """Return disjoint, ascending ranges with the same union."""
     starts, ends = ranges.T
     order = np.argsort(starts)
     starts, ends = starts[order], np.maximum.accumulate(ends[order])
@@ -126,7 +132,7 @@ def _merged(ranges: Int[np.ndarray, "N 2"]) -> list[tuple[int, int]]:
 
 
 def _without(ranges: list[tuple[int, int]], others: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Return what is left of disjoint ascending ranges without others of the same kind."""
+    """Return the difference of two lists of disjoint, ascending ranges."""
     left: list[tuple[int, int]] = []
     place = 0
     for start, end in ranges:
@@ -141,3 +147,52 @@ def _without(ranges: list[tuple[int, int]], others: list[tuple[int, int]]) -> li
         if start < end:
             left.append((start, end))
     return left
+
+
+@dataclass
+class VertexUse:
+    """Elements of POSITION accessors that refined faces use; primitives may share accessors."""
+
+    document: Document
+    rows: defaultdict[int, list[Int[np.ndarray, " N"]]] = field(
+        default_factory=lambda: defaultdict(list)
+    )
+    refined: set[tuple[int, int]] = field(default_factory=set)
+
+    def add(
+        self,
+        mesh: int,
+        primitives: Sequence[TrianglePrimitive],
+        kept: Sequence[Bool[np.ndarray, " F"]],
+    ) -> None:
+        """Add the refined primitives of a mesh; `kept` are their refined faces."""
+        for primitive, keep in zip(primitives, kept, strict=True):
+            if keep.any():
+                source = self.document.meshes[mesh].primitives[primitive.number]
+                self.refined.add((mesh, primitive.number))
+                rows = primitive.rows
+                # All rows of a primitive are used by its faces.
+                if not keep.all():
+                    rows = rows[marked(primitive.corners[keep].reshape(-1), len(rows))]
+                self.rows[source.attributes["POSITION"]].append(rows)
+
+    def unused(self) -> int:
+        """Count elements without a refined face, of accessors that only refined primitives use."""
+        others = {
+            primitive.attributes["POSITION"]
+            for mesh, content in enumerate(self.document.meshes)
+            for number, primitive in enumerate(content.primitives)
+            if (mesh, number) not in self.refined and "POSITION" in primitive.attributes
+        }
+        return sum(
+            self.document.accessors[accessor].count - _count_distinct(rows)
+            for accessor, rows in self.rows.items()
+            if accessor not in others
+        )
+
+
+def _count_distinct(rows: Sequence[Int[np.ndarray, " N"]]) -> int:
+    """Count distinct rows of several ascending lists."""
+    # np.unique takes several times as long.
+    ordered = rows[0] if len(rows) == 1 else np.sort(np.concatenate(rows))
+    return 1 + int(np.count_nonzero(ordered[1:] != ordered[:-1]))

@@ -1,27 +1,30 @@
-"""What is written otherwise than it was stored: sparse, quantised, strips and fans; what goes."""
+"""Changes of storage to report, the report in the file, and meshes that share geometry."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from typing import Any
 
 from ...report import Change
-from ..constants import FLOAT
+from ..constants import FAN, FLOAT, STRIP, SURFACES
+from ..read.accessors import QUANTIZATION, is_dequantised, still_needed
 from ..read.extensions import withdraw
-from ..read.modes import FAN, STRIP
-from ..read.plan import MeshPlan
-from ..read.quantization import EXTENSION, is_dequantised, still_needed
+from ..read.plan import MeshPlan, Spare
 from ..read.schema import Document, Mesh, Primitive
-from ..read.spare import Spare
 from .writer import Writer
+
+# The report is `asset.extras.pns`. Extras may be any JSON value; one that is no object moves to
+# `asset.extras.extras`.
+REPORT_KEY, OLD_VALUE_KEY = "pns", "extras"
 
 _MODES = {STRIP: "triangle strip written as triangles", FAN: "triangle fan written as triangles"}
 
 
 def storage_changes(document: Document, plans: Sequence[MeshPlan]) -> list[Change]:
-    """Return one change for each primitive and way of storing that refinement gives up.
+    """Return a change for each primitive and form of storage that refinement replaces.
 
-    Points and lines of a mesh that is refined stay where its surface was: that is told too.
+    Points and lines of a refined mesh stay where they were, which is a change too.
     """
     return [
         change for plan in plans for change in _of_mesh(document.meshes[plan.mesh], plan, document)
@@ -29,7 +32,7 @@ def storage_changes(document: Document, plans: Sequence[MeshPlan]) -> list[Chang
 
 
 def remove_replaced(writer: Writer, spare: Spare) -> list[Change]:
-    """Let the geometry that was replaced leave the file, unless something may still point at it."""
+    """Remove replaced geometry, unless unknown extensions may refer to it; return the change."""
     if not spare.unknown:
         writer.remove(spare)
         return []
@@ -38,9 +41,9 @@ def remove_replaced(writer: Writer, spare: Spare) -> list[Change]:
 
 
 def withdraw_unused(tree: dict[str, Any]) -> None:
-    """Take KHR_mesh_quantization off the lists where no primitive of the new file needs it."""
+    """Withdraw KHR_mesh_quantization if no primitive of the new file needs it."""
     if not still_needed(tree):
-        withdraw(tree, EXTENSION)
+        withdraw(tree, QUANTIZATION)
 
 
 def _of_mesh(mesh: Mesh, plan: MeshPlan, document: Document) -> Iterator[Change]:
@@ -61,7 +64,7 @@ def _of_primitive(document: Document, primitive: Primitive, pointer: str) -> Ite
         yield Change(f"{pointer}/mode", _MODES[primitive.mode], 1)
     indices = [] if primitive.indices is None else [primitive.indices]
     stored = [*indices, *(index for _, index in primitive.named)]
-    # Those of morph targets stay sparse where that is smaller.
+    # Morph targets may stay sparse.
     dense = [*indices, *primitive.attributes.values()]
     sparse = sum(accessors[index].sparse is not None for index in dense)
     if sparse:
@@ -72,8 +75,35 @@ def _of_primitive(document: Document, primitive: Primitive, pointer: str) -> Ite
     )
     if quantised:
         yield Change(pointer, "quantised attributes written as float32", quantised)
-    # What they say may hold for the elements that were replaced alone, or name their bytes.
+    # Extensions of accessors may describe the replaced elements or name their bytes.
     lost = sorted({name for index in stored for name in accessors[index].extensions})
     if lost:
         what = f"left out with the accessors that had them: {', '.join(lost)}"
         yield Change(pointer, what, sum(bool(accessors[index].extensions) for index in stored))
+
+
+def replaces_extras(tree: dict[str, Any]) -> bool:
+    """Return whether `asset.extras` is no object, so that its value must move."""
+    return not isinstance(tree["asset"].get("extras", {}), dict)
+
+
+def put_report(tree: dict[str, Any], report: dict[str, Any]) -> None:
+    """Write the report into the tree; other keys of `asset.extras` are kept."""
+    asset = tree["asset"]
+    if replaces_extras(tree):
+        asset["extras"] = {OLD_VALUE_KEY: asset["extras"]}
+    asset.setdefault("extras", {})[REPORT_KEY] = report
+
+
+def same_geometry(document: Document, meshes: Iterable[int]) -> dict[int, list[int]]:
+    """Group meshes with the same accessors, as copies in other materials have: first, others."""
+    alike: defaultdict[Hashable, list[int]] = defaultdict(list)
+    for mesh in meshes:
+        primitives = document.meshes[mesh].primitives
+        alike[tuple(_geometry(p) if p.mode in SURFACES else None for p in primitives)].append(mesh)
+    return {first: later for first, *later in alike.values()}
+
+
+def _geometry(primitive: Primitive) -> Hashable:
+    targets = tuple(tuple(target.items()) for target in primitive.targets)
+    return primitive.mode, primitive.indices, tuple(primitive.attributes.items()), targets

@@ -1,4 +1,4 @@
-"""Put refined primitives into a document: new accessors at the end, the rest where it was."""
+"""Write refined primitives into a document: new accessors at the end, the rest unchanged."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from jaxtyping import Int, Shaped
 
-from pns_common.base.extent import extent
+from pns_common.rows import extent
 
 from ...course import Course
 from ...report import Change
@@ -19,23 +19,23 @@ from ..constants import (
     COLUMNS,
     COMPONENT_TYPES,
     ELEMENT_ARRAY_BUFFER,
+    TRIANGLES,
     UNSIGNED_INT,
     WIDEST,
 )
-from ..read.compressed import draco
-from ..read.modes import TRIANGLES
+from ..read.compressed import DRACO
+from ..read.plan import Spare
 from ..read.schema import Accessor
-from ..read.spare import Spare
-from ..refine.refined_primitives import RefinedPrimitive
+from ..refine.attributes import RefinedPrimitive
 from .prune import cut, moved, remove_unused
 
-# The largest value of an index type restarts primitives, so it may not be used as an index.
+# 65535 restarts primitives.
 LARGEST_UINT16_INDEX = 65534
 
-# What an accessor is called, and what applications say of it.
+# Properties that a new accessor of indices keeps.
 KEPT = ("name", "extras")
 
-# What a primitive names of accessors.
+# Properties of a primitive that name accessors.
 GEOMETRY = ("attributes", "targets", "indices")
 
 _COMPONENT_TYPE_OF = {dtype: number for number, dtype in COMPONENT_TYPES.items()}
@@ -43,7 +43,7 @@ _COMPONENT_TYPE_OF = {dtype: number for number, dtype in COMPONENT_TYPES.items()
 
 @dataclass
 class Writer:
-    """A document being edited: the JSON tree, and the pieces of its one buffer to be."""
+    """A document being edited: the JSON tree, and the pieces of its only buffer."""
 
     tree: dict[str, Any]
     pieces: list[bytes | memoryview] = field(default_factory=list)
@@ -52,7 +52,7 @@ class Writer:
 
     @classmethod
     def start(cls, tree: dict[str, Any], buffers: Sequence[memoryview]) -> Self:
-        """Take over the tree, with all its buffers one after the other as the first."""
+        """Return a writer that has joined all buffers of a tree into the first."""
         writer = cls(tree)
         writer.starts = [writer.append(buffer, WIDEST) for buffer in buffers]
         for view in tree.get("bufferViews", []):
@@ -62,7 +62,7 @@ class Writer:
         return writer
 
     def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], course: Course) -> int:
-        """Point the primitives of a mesh at their refined geometry; the vertices written."""
+        """Replace the geometry of a mesh; return the number of vertices written."""
         vertices = 0
         for number, primitive in enumerate(refined):
             course.reach(number / len(refined))
@@ -70,23 +70,23 @@ class Writer:
         return vertices
 
     def repeat_mesh(self, mesh: int, first: int, refined: Sequence[RefinedPrimitive]) -> None:
-        """Point the primitives of a mesh at the geometry that the same ones of another have."""
+        """Give primitives the new geometry of the primitives with their numbers in another mesh."""
         meshes = self.tree["meshes"]
         for number in (primitive.source.number for primitive in refined):
             primitive, like = (meshes[place]["primitives"][number] for place in (mesh, first))
             shared = {key: like[key] for key in GEOMETRY if key in like}
             primitive.update(deepcopy(shared))
             _name_triangles(primitive)
-            if draco.EXTENSION in like.get("extensions", {}):
-                data = deepcopy(like["extensions"][draco.EXTENSION])
-                primitive.setdefault("extensions", {})[draco.EXTENSION] = data
+            if DRACO in like.get("extensions", {}):
+                data = deepcopy(like["extensions"][DRACO])
+                primitive.setdefault("extensions", {})[DRACO] = data
 
     def changes(self) -> list[Change]:
-        """Return what was not written as it was made."""
+        """Return the changes that writing made."""
         return []
 
     def replace(self, mesh: int, refined: RefinedPrimitive) -> int:
-        """Point a primitive of the tree at its refined geometry; the vertices written."""
+        """Replace the geometry of a primitive; return the number of vertices written."""
         primitive = self.tree["meshes"][mesh]["primitives"][refined.source.number]
         primitive["attributes"] = {
             name: self._attribute(refined.source.accessors.get(name), name, values)
@@ -106,7 +106,7 @@ class Writer:
         return count
 
     def set_indices(self, primitive: dict[str, Any], index: int) -> None:
-        """Point a primitive at its new indices, called as those before them were."""
+        """Set a primitive's indices; their accessor keeps the name and extras of the old one."""
         accessors, old = self.tree["accessors"], primitive.get("indices")
         if old is not None:
             before = accessors[old]
@@ -114,7 +114,7 @@ class Writer:
         primitive["indices"] = index
 
     def remove(self, spare: Spare) -> None:
-        """Take what refinement has left without use out of the tree, and its bytes out of BIN."""
+        """Remove spare data that is no longer used from the tree and from BIN."""
         gone = remove_unused(self.tree, spare)
         gone += [
             (self.starts[buffer] + start, self.starts[buffer] + end)
@@ -133,11 +133,11 @@ class Writer:
         self.length = sum(len(piece) for piece in self.pieces)
 
     def bytes_of(self, view: dict[str, Any]) -> dict[str, Any]:
-        """Return the object that says where a view's bytes lie in BIN."""
+        """Return the object with the byteOffset and byteLength of a view's bytes in BIN."""
         return view
 
     def finish(self) -> list[bytes | memoryview]:
-        """Write the buffer's length into the tree; the pieces of BIN."""
+        """Write the length of the buffer into the tree; return the pieces of BIN."""
         if not self.pieces:
             return []
         self.append(memoryview(b""), WIDEST)
@@ -155,7 +155,7 @@ class Writer:
         return index
 
     def _deltas(self, before: Accessor, name: str, values: Shaped[np.ndarray, "N K"]) -> int:
-        """Write what a morph target adds: sparse, as it came, where it moves few vertices."""
+        """Write the deltas of a morph target, sparse if they were and that is smaller."""
         rows = np.flatnonzero(values.any(axis=1)).astype(np.uint32)
         moved = values[rows]
         smaller = rows.nbytes + moved.nbytes < values.nbytes
@@ -177,19 +177,19 @@ class Writer:
         return index
 
     def _accessor(self, values: Shaped[np.ndarray, "N K"], target: int, kind: str) -> int:
-        """Append the elements; their accessor's index."""
+        """Append elements; return the index of their accessor."""
         vertices = target == ARRAY_BUFFER
         content = in_words(values, kind) if vertices else np.ascontiguousarray(values)
         view = self.stored(content)
         padded = vertices and content.shape[1] != values.shape[1] * values.itemsize
-        # A matrix is as long as its padded columns: its elements lie close.
+        # A matrix includes the padding of its columns.
         if padded and kind not in COLUMNS:
             view["byteStride"] = content.shape[1]
         view["target"] = target
         return self.add_accessor(values, kind, self.add_view(view))
 
     def stored(self, content: Shaped[np.ndarray, "N B"]) -> dict[str, Any]:
-        """Append elements of a buffer view; the view."""
+        """Append elements; return a buffer view of them."""
         data = content.data.cast("B")
         return {"buffer": 0, "byteOffset": self.append(data), "byteLength": len(data)}
 
@@ -200,7 +200,7 @@ class Writer:
         return len(views) - 1
 
     def add_accessor(self, values: Shaped[np.ndarray, "N K"], kind: str, view: int | None) -> int:
-        """Add an accessor; return its index. `view` None: its elements lie elsewhere."""
+        """Add an accessor; return its index. `view` None: it gets no buffer view."""
         accessors = self.tree.setdefault("accessors", [])
         place = {} if view is None else {"bufferView": view}
         accessors.append(
@@ -214,7 +214,7 @@ class Writer:
         return len(accessors) - 1
 
     def append(self, data: memoryview, alignment: int = 4) -> int:
-        """Add bytes at the next multiple of so many; where they begin."""
+        """Append bytes at a multiple of `alignment`; return where they begin."""
         padding = -self.length % alignment
         if padding:
             self.pieces.append(b"\0" * padding)
@@ -225,7 +225,7 @@ class Writer:
 
 
 def _name_triangles(primitive: dict[str, Any]) -> None:
-    """Say that a primitive is made of triangles, whatever strip or fan it was."""
+    """Set the mode of a primitive, which may have been a strip or fan, to triangles."""
     if primitive.get("mode", TRIANGLES) != TRIANGLES:
         primitive["mode"] = TRIANGLES
 
@@ -233,11 +233,11 @@ def _name_triangles(primitive: dict[str, Any]) -> None:
 def describe(
     accessor: dict[str, Any], before: Accessor | None, name: str, values: Shaped[np.ndarray, "N K"]
 ) -> None:
-    """Say of an attribute's accessor what its type does not, as the one before it did."""
+    """Give an attribute's accessor the properties of the old one, and its bounds to POSITION."""
     if before is not None:
         if before.normalized:
             accessor["normalized"] = True
-        # Some readers name a morph target by its accessor.
+        # Some readers take the name of a morph target from its accessor.
         given = {"name": before.name, "extras": before.extras}
         accessor.update({key: value for key, value in given.items() if value is not None})
     if name == "POSITION":
@@ -245,14 +245,14 @@ def describe(
 
 
 def as_indices(faces: Int[np.ndarray, "F 3"], count: int) -> Shaped[np.ndarray, "F 3"]:
-    """Return faces over so many vertices in the narrowest type; not copied where they are int32."""
+    """Return indices of `count` vertices in the narrowest type; int32 is not copied."""
     if count - 1 <= LARGEST_UINT16_INDEX:
         return faces.astype(np.uint16)
     return faces.view(np.uint32) if faces.dtype == np.int32 else faces.astype(np.uint32)
 
 
 def in_words(values: Shaped[np.ndarray, "N K"], kind: str) -> Shaped[np.ndarray, "N B"]:
-    """Return rows as bytes, a matrix's columns and all rows padded to whole words if need be."""
+    """Return rows as bytes; rows, and columns of a matrix, are padded to four bytes."""
     narrow = np.ascontiguousarray(values)
     if narrow.itemsize == 4:
         return narrow.view(np.uint8).reshape(len(values), -1)

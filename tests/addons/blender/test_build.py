@@ -27,15 +27,17 @@ def test_the_licence_is_beside_the_sources():
 
 
 def test_wheels_are_listed_in_the_manifest():
-    manifest = tomllib.loads(with_wheels(MANIFEST, ["a.whl", "b.whl"]))
+    manifest = tomllib.loads(with_wheels(MANIFEST, ["a.whl", "b.whl"], "linux-x64"))
     assert manifest["wheels"] == ["./wheels/a.whl", "./wheels/b.whl"]
+    assert manifest["platforms"] == ["linux-x64"]
 
 
 def test_what_is_bundled_is_what_the_library_needs():
     needed = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
-    names = {line.split(">")[0] for line in needed} - {"numpy"}
-    # wadler-lindig is jaxtyping's own.
-    assert set(REQUIRED) == names | {"wadler-lindig"}
+    # Blender has numpy; bundled models are read without onnx.
+    names = {line.split(">")[0] for line in needed} - {"numpy", "onnx"}
+    # wadler-lindig is jaxtyping's own, llvmlite is numba's.
+    assert set(REQUIRED) == names | {"wadler-lindig", "llvmlite"}
 
 
 def test_the_library_alone_is_described_as_the_whole_describes_it():
@@ -51,6 +53,6 @@ def test_the_library_alone_is_described_as_the_whole_describes_it():
 
 def test_builds_leave_nothing_in_the_copy(tmp_path):
     copy = clean_copy(tmp_path / "copy")
-    assert (copy / "pns_common" / "refine.py").is_file()
+    assert (copy / "pns_common" / "refinement.py").is_file()
     assert not list(copy.rglob("__pycache__"))
     assert not (copy / "build").exists()

@@ -3,7 +3,7 @@
 from addons.blender.pns_refine import words
 
 LEVEL = {"proximity_ratio": {"max": 0.5}, "flipped_faces": 0}
-REPORT = {"scheme": "pns", "model": "full", "budget": 0.8, "levels": [LEVEL, LEVEL]}
+REPORT = {"scheme": "pns", "model": "general", "budget": 0.8, "levels": [LEVEL, LEVEL]}
 REPORT |= {"limit_distance": 0.5, "limit_distance_bound": 2.0}
 
 
@@ -20,7 +20,7 @@ def test_the_certificate_names_distance_share_and_folds():
     text = " ".join(words.certificate(REPORT, 0.25, lambda x: f"{1000 * x:g} mm"))
     for part in (
         "2 levels",
-        "model full",
+        "model general",
         "C = 0.8",
         "250 mm",
         "500 mm",

@@ -37,7 +37,6 @@ def test_files_are_refined_without_posix(tmp_path: Path, part_file: Path) -> Non
     [
         ("serve", "--port", "0"),
         ("batch", ".", "refined", "--report", "report.jsonl"),
-        ("large", "part.glb", "large.ply"),
     ],
 )
 def test_what_needs_posix_says_so(

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common import load_model
-from service.errors import InvalidParameter
-from service.gltf.subdivide import make_scheme, subdivide_gltf
+from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box, octahedron
@@ -13,7 +12,7 @@ from tests.support.networks import random_model
 
 
 def subdivide(*meshes, **options):
-    options = Options(**{"scheme": "loop", **options})
+    options = Options(**{"scheme": "loop", "levels": 1, **options})
     return subdivide_gltf(files.glb(*meshes), "glb", options, random_model(0), Limits())
 
 
@@ -198,11 +197,3 @@ def test_a_weld_tolerance_closes_what_does_not_quite_meet():
     # It is relative to R: a mesh a million times larger is welded alike.
     large = {"POSITION": 1e6 * loose["POSITION"]}
     assert subdivide([large], weld_tolerance=1e-3).report["changes"] == result.report["changes"]
-
-
-def test_a_strength_is_for_models_with_a_prior() -> None:
-    assert make_scheme(Options(prior_strength=0.5), load_model()).prior_strength == 0.5
-    assert make_scheme(Options(prior_strength=0.5, scheme="loop"), None).prior_strength is None
-    with pytest.raises(InvalidParameter, match="paper has no prior") as refused:
-        make_scheme(Options(prior_strength=0.5), load_model("paper"))
-    assert refused.value.name == "prior_strength"

@@ -226,7 +226,7 @@ def test_a_second_sigterm_and_the_deadline_end_running_jobs_in_order(drain_secon
     with serving(PNS_WORKERS="1", PNS_DRAIN_SECONDS=drain_seconds) as server:
         server.wait_until_ready()
         # Many times as long as the test needs.
-        query = "levels=5&model=full&compress=draco"
+        query = "levels=5&model=signed&compress=draco"
         under_way = begin_upload(server, part_glb(), query=query, whole=True)
         server.wait_until_a_job_runs()
         server.process.send_signal(signal.SIGTERM)

@@ -338,7 +338,6 @@ def test_failures_are_those_of_this_run(tmp_path):
         {"source": "{tmp_path}/empty"},
         {"destination": "{tmp_path}/in/a.obj/out"},
         {"destination": "{tmp_path}/in/a.obj"},
-        {"model": "paper", "options": Options(prior_strength=1.0)},
     ],
 )
 def test_what_cannot_be_used_is_told_before_anything_runs(tmp_path, changes):
@@ -432,7 +431,7 @@ def test_a_parquet_report_without_what_writes_it_is_told_beforehand(tmp_path, mo
 def test_a_worker_starts_without_what_only_a_driver_needs():
     code = (
         "import sys; from service.scale.job import read_libraries; read_libraries()\n"
-        "print({'numba', 'onnxruntime', 'pyarrow', 'rich', 'typer'} & set(sys.modules))"
+        "print({'onnxruntime', 'pyarrow', 'rich', 'typer'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, check=True)
     assert done.stdout == b"set()\n"

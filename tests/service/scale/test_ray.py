@@ -1,12 +1,10 @@
-"""On a Ray cluster of one worker: the bytes of this machine. It starts once, for both."""
+"""On a Ray cluster of one worker: the bytes of this machine."""
 
 import pytest
 
 from service.scale.batch import batch_work
 from service.scale.engines import on_ray
-from service.scale.large.run import large_work
 from tests.service.scale import libraries
-from tests.service.scale.large import parts
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
@@ -31,10 +29,3 @@ def test_a_library_has_the_same_bytes(tmp_path, cluster):
     done = libraries.refined(over, on_ray.on_ray(batch_work(60.0), None, 1))
     assert done.counts == {"done": 2}
     assert libraries.hashes(tmp_path / "ray") == libraries.hashes(tmp_path / "out")
-
-
-def test_a_large_mesh_has_the_same_bytes(tmp_path, cluster):
-    source = parts.arrays(tmp_path / "in", parts.many_kinds())
-    parts.refined(source, tmp_path / "expected", 3)
-    parts.refined(source, tmp_path / "out", 3, engine=on_ray.on_ray(large_work(), None, 1))
-    assert parts.contents(tmp_path / "out") == parts.contents(tmp_path / "expected")

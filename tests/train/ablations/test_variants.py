@@ -40,8 +40,8 @@ def loud_scheme(variant):
 
 
 def departure(scheme, mesh):
-    positions = refine(mesh, scheme, reference_length=1.0).mesh.vertices
-    expected = refine(mesh, loop(), reference_length=1.0).mesh.vertices
+    positions = refine(mesh, scheme, 1, reference_length=1.0).mesh.vertices
+    expected = refine(mesh, loop(), 1, reference_length=1.0).mesh.vertices
     return np.linalg.norm(positions - expected, axis=1).max()
 
 
@@ -55,7 +55,7 @@ def test_only_a_gate_reproduces_planes(variant):
 @pytest.mark.parametrize("variant", VARIANTS.values(), ids=lambda variant: variant.name)
 def test_only_a_bound_keeps_the_ratio_at_one(variant):
     mesh = Mesh(*grid(6, bent))
-    ratio = refine(mesh, loud_scheme(variant), reference_length=1.0).ratio.max()
+    ratio = refine(mesh, loud_scheme(variant), 1, reference_length=1.0).ratio.max()
     assert (ratio <= 1 + 1e-12) == (variant in (PNS, WITHOUT_GATE))
 
 
@@ -64,8 +64,8 @@ def test_only_raw_coordinates_lose_rigid_motion(variant):
     vertices, faces = bumpy_sphere()
     turn = rotation(np.random.default_rng(1))
     scheme = loud_scheme(variant)
-    here = refine(Mesh(vertices, faces), scheme, reference_length=1.0).mesh.vertices
-    there = refine(Mesh(vertices @ turn.T, faces), scheme, reference_length=1.0).mesh.vertices
+    here = refine(Mesh(vertices, faces), scheme, 1, reference_length=1.0).mesh.vertices
+    there = refine(Mesh(vertices @ turn.T, faces), scheme, 1, reference_length=1.0).mesh.vertices
     assert (np.abs(there - here @ turn.T).max() < 1e-4) == (variant is not UNCONSTRAINED)
 
 
@@ -117,5 +117,5 @@ def test_every_variant_refines_any_mesh_over_and_over(variant, mesh):
 
 def test_a_mesh_without_size_is_left_to_loop():
     point = Mesh(np.ones((4, 3)), np.array([[0, 1, 2], [2, 1, 3]]))
-    positions = refine(point, loud_scheme(UNCONSTRAINED)).mesh.vertices
+    positions = refine(point, loud_scheme(UNCONSTRAINED), 1).mesh.vertices
     np.testing.assert_array_equal(positions, 1)

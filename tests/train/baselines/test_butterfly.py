@@ -75,7 +75,7 @@ def test_star_rule_has_the_eigenvalues_of_a_smooth_limit(valence):
         if frequency == 2 and valence < 4:
             continue
         vertices, faces = star(valence, lambda angle, f=frequency: np.cos(f * angle))
-        refined = refine(Mesh(vertices, faces), modified_butterfly(), threads=1).mesh
+        refined = refine(Mesh(vertices, faces), modified_butterfly(), 1, threads=1).mesh
         topology = build_topology(faces, len(vertices))
         spokes = np.flatnonzero(topology.edges[:, 0] == 0)
         new = refined.vertices[len(vertices) + spokes]

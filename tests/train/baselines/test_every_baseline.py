@@ -28,8 +28,8 @@ def test_commutes_with_rigid_motion(name, mesh):
     turn = rotation(np.random.default_rng(3))
     shift = np.array([3.0, -1.0, 0.5])
     moved = Mesh(mesh.vertices @ turn.T + shift, mesh.faces)
-    here = refine(mesh, BASELINES[name], threads=1).mesh.vertices
-    there = refine(moved, BASELINES[name], threads=1).mesh.vertices
+    here = refine(mesh, BASELINES[name], 1, threads=1).mesh.vertices
+    there = refine(moved, BASELINES[name], 1, threads=1).mesh.vertices
     np.testing.assert_allclose(there, here @ turn.T + shift, atol=1e-6)
 
 
@@ -45,7 +45,7 @@ def test_irregular_edges_take_the_midpoint(name):
     vertices, faces = three_pages()
     topology = build_topology(faces, len(vertices))
     (edge,) = np.flatnonzero(topology.edge_class == EdgeClass.IRREGULAR)
-    refined = refine(Mesh(vertices, faces), BASELINES[name], threads=1).mesh.vertices
+    refined = refine(Mesh(vertices, faces), BASELINES[name], 1, threads=1).mesh.vertices
     middle = vertices[topology.edges[edge]].mean(axis=0)
     np.testing.assert_allclose(refined[len(vertices) + edge], middle)
 
@@ -61,8 +61,8 @@ def test_interpolating_methods_keep_old_vertices(name):
 def test_approximating_methods_move_old_vertices_as_loop_does(name):
     vertices, faces = grid(6, bent)
     mesh = Mesh(vertices, faces)
-    expected = refine(mesh, loop(), threads=1).mesh.vertices[: len(vertices)]
-    moved = refine(mesh, BASELINES[name], threads=1).mesh.vertices[: len(vertices)]
+    expected = refine(mesh, loop(), 1, threads=1).mesh.vertices[: len(vertices)]
+    moved = refine(mesh, BASELINES[name], 1, threads=1).mesh.vertices[: len(vertices)]
     np.testing.assert_array_equal(moved, expected)
 
 
@@ -70,8 +70,8 @@ def test_the_ratio_is_the_distance_from_loop_in_envelopes_of_half_a_curvature():
     vertices, faces = grid(6, bent)
     mesh = Mesh(vertices, faces)
     topology = build_topology(faces, len(vertices))
-    refined = refine(mesh, BASELINES["butterfly"], reference_length=1.0, threads=1)
-    smooth = refine(mesh, loop(), reference_length=1.0, threads=1).mesh.vertices
+    refined = refine(mesh, BASELINES["butterfly"], 1, reference_length=1.0, threads=1)
+    smooth = refine(mesh, loop(), 1, reference_length=1.0, threads=1).mesh.vertices
     a, b = vertices[topology.edges].transpose(1, 0, 2)
     away = np.linalg.norm(refined.mesh.vertices - smooth, axis=1)[len(vertices) :]
     ratio = away / (0.5 * ((b - a) ** 2).sum(axis=1))

@@ -19,11 +19,11 @@ def test_on_an_icosahedron_the_scalar_that_reaches_the_sphere_is_the_missing_sag
     sphere = SphereRidge(1.0, 0.0, 1.0, 0.0)
     data = Dataset("icosahedron", (Instance(sphere, Mesh(vertices, faces)),))
     # Loop's edge vertices all have one radius: its masks know the icosahedron's symmetry.
-    smooth = refine(Mesh(vertices, faces), loop(), threads=1).mesh.vertices[12:]
+    smooth = refine(Mesh(vertices, faces), loop(), 1, threads=1).mesh.vertices[12:]
     radius = np.linalg.norm(smooth, axis=1)
     assert np.ptp(radius) < 1e-14
     assert fit_scalar(data) == pytest.approx((1 - radius[0]) / edge)
-    pushed = refine(Mesh(vertices, faces), normal_displacement(fit_scalar(data)), threads=1)
+    pushed = refine(Mesh(vertices, faces), normal_displacement(fit_scalar(data)), 1, threads=1)
     np.testing.assert_allclose(np.linalg.norm(pushed.mesh.vertices[12:], axis=1), 1)
 
 
@@ -51,8 +51,8 @@ def test_the_blend_ends_at_loop_and_at_butterfly(sharpness, limit):
     rng = np.random.default_rng(0)
     mesh = Mesh(vertices * rng.uniform(0.8, 1.2, (len(vertices), 1)), faces)
     old = len(vertices)
-    inserted = refine(mesh, curvature_adaptive(sharpness), threads=1).mesh.vertices[old:]
-    expected = refine(mesh, limit, threads=1).mesh.vertices[old:]
+    inserted = refine(mesh, curvature_adaptive(sharpness), 1, threads=1).mesh.vertices[old:]
+    expected = refine(mesh, limit, 1, threads=1).mesh.vertices[old:]
     np.testing.assert_allclose(inserted, expected, atol=1e-12)
 
 
@@ -61,9 +61,9 @@ def test_the_blend_lies_between_loop_and_butterfly():
     mesh, old = Mesh(vertices, faces), len(vertices)
     topology = build_topology(faces, old)
     interior = old + topology.interior
-    blend = refine(mesh, curvature_adaptive(10.0), threads=1)
-    low = refine(mesh, loop(), threads=1).mesh.vertices[interior]
-    high = refine(mesh, modified_butterfly(), threads=1).mesh.vertices[interior]
+    blend = refine(mesh, curvature_adaptive(10.0), 1, threads=1)
+    low = refine(mesh, loop(), 1, threads=1).mesh.vertices[interior]
+    high = refine(mesh, modified_butterfly(), 1, threads=1).mesh.vertices[interior]
     share = blend.gate[interior]
     assert share.max() > 0.5
     expected = low + share[:, None] * (high - low)

@@ -19,7 +19,7 @@ def test_edge_vertices_over_a_sphere_have_the_closed_form_radius():
     vertices, faces = icosphere(0)
     cosine = 1 / np.sqrt(5)
     half = np.sqrt((1 + cosine) / 2)
-    refined = refine(Mesh(vertices, faces), pn_triangles(), threads=1).mesh.vertices
+    refined = refine(Mesh(vertices, faces), pn_triangles(), 1, threads=1).mesh.vertices
     radius = np.linalg.norm(refined[len(vertices) :], axis=1)
     np.testing.assert_allclose(radius, 2 * half * (5 - cosine) / 8, atol=1e-14)
     assert abs(radius[0] - 1) < abs(half - 1) / 4

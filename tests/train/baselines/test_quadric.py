@@ -38,6 +38,6 @@ def test_the_mean_of_both_ends_depends_on_the_order_of_neither():
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 def test_scales_with_the_mesh(scale):
     vertices, faces = grid(6, paraboloid)
-    here = refine(Mesh(vertices, faces), quadric_fit(), threads=1).mesh.vertices
-    there = refine(Mesh(scale * vertices, faces), quadric_fit(), threads=1).mesh.vertices
+    here = refine(Mesh(vertices, faces), quadric_fit(), 1, threads=1).mesh.vertices
+    there = refine(Mesh(scale * vertices, faces), quadric_fit(), 1, threads=1).mesh.vertices
     np.testing.assert_allclose(there / scale, here, atol=1e-9)

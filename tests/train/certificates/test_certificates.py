@@ -174,7 +174,7 @@ def test_lifted_stars_find_an_expanding_scheme():
 def test_plain_loop_agrees_with_the_operators_on_every_kind_of_edge(mesh):
     mesh = Mesh(*mesh)
     base = plain_loop(mesh.vertices, mesh.faces)
-    np.testing.assert_allclose(base.positions, refine(mesh, loop()).mesh.vertices, atol=1e-15)
+    np.testing.assert_allclose(base.positions, refine(mesh, loop(), 1).mesh.vertices, atol=1e-15)
     assert len(base.labels) == len(base.reach) == len(base.positions)
 
 
@@ -184,7 +184,7 @@ def test_plain_loop_agrees_with_the_operators_on_every_kind_of_edge(mesh):
 def test_plain_loop_keeps_the_creases_that_the_operator_keeps(body):
     mesh, creases = body.mesh, drawn_creases(body.mesh, np.random.default_rng(0))
     base = plain_loop(mesh.vertices, mesh.faces, creases)
-    kept = refine(mesh, loop(), creases=creases)
+    kept = refine(mesh, loop(), 1, creases=creases)
     np.testing.assert_allclose(base.positions, kept.mesh.vertices, atol=1e-15)
     inside, rims = (kept.report["levels"][0]["edges"][kind] for kind in ("crease", "boundary"))
     assert inside > 0

@@ -173,7 +173,7 @@ def test_a_scheme_that_goes_on_past_its_levels_is_found():
     assert not result.passed
 
 
-@pytest.mark.parametrize("model", ["paper", "full"])
+@pytest.mark.parametrize("model", ["paper", "signed"])
 def test_a_rule_in_squared_edge_lengths_depends_on_resolution(model):
     squared = subject_of_scheme(pns(load_model(model)), 0.5)
     result = resolution_independence(squared, BODIES)

@@ -41,7 +41,7 @@ def test_a_ball_without_size_stays_where_it_is():
 def test_the_oracle_keeps_to_the_envelope():
     instance = ridge_held_out().instances[8]
     scheme = oracle(instance.surface, budget=0.5, gate_sharpness=10.0)
-    refined = refine(instance.mesh, scheme, reference_length=1.0)
+    refined = refine(instance.mesh, scheme, 1, reference_length=1.0)
     assert (refined.ratio <= refined.gate + 1e-12).all()
     assert refined.ratio.max() > 0.9
 

@@ -26,7 +26,7 @@ def test_nearest_points_of_a_sphere_are_along_the_radius():
 def test_nearest_points_of_a_ridge_are_as_near_as_a_dense_search_finds():
     instance = ridge_held_out().instances[8]
     ridge = instance.surface
-    points = refine(instance.mesh, loop(), reference_length=1.0).mesh.vertices[:40]
+    points = refine(instance.mesh, loop(), 1, reference_length=1.0).mesh.vertices[:40]
     distances = np.linalg.norm(points - nearest_points(ridge, points), axis=1)
     # The ridge is a cylinder over its section, so the search is in the plane (y', z).
     y = np.linspace(-2, 2, 200_001)

@@ -40,8 +40,8 @@ def model(features="paper-5", orientation="symmetric", seed=0):
 
 def apart(mesh, twin, subject, expected=lambda positions: positions):
     """How far the twin's refined vertices are from where they should be, where well defined."""
-    positions = refine(twin.mesh, pns(subject), reference_length=1.0).mesh.vertices[twin.place]
-    wanted = expected(refine(mesh, pns(subject), reference_length=1.0).mesh.vertices)
+    positions = refine(twin.mesh, pns(subject), 1, reference_length=1.0).mesh.vertices[twin.place]
+    wanted = expected(refine(mesh, pns(subject), 1, reference_length=1.0).mesh.vertices)
     kept = np.ones(len(positions), dtype=bool)
     kept[len(mesh.vertices) :] = well_conditioned(mesh)
     return np.linalg.norm(positions - wanted, axis=1)[kept].max(initial=0)
@@ -120,7 +120,7 @@ def test_degenerate_edges_are_left_alone_and_their_features_finite(features, mes
     frames = shut_where_degenerate(stencil)
     assert (frames.curvature[frames.degenerate] == 0).all()
     assert np.isfinite(FEATURE_SETS[features](stencil, frames)).all()
-    refined = refine(mesh, pns(model(features)))
+    refined = refine(mesh, pns(model(features)), 1)
     assert (refined.ratio[len(mesh.vertices) + topology.interior[frames.degenerate]] == 0).all()
     assert refined.ratio.max() <= 1 + EXACT
 
@@ -128,7 +128,7 @@ def test_degenerate_edges_are_left_alone_and_their_features_finite(features, mes
 def test_a_folded_pair_of_faces_is_degenerate_in_both_orientations():
     folded = Mesh(np.array([[0, 0, 0], [1, 0, 0], [0.3, 1, 0], [0.4, 1, 0]]), TETRAHEDRON[:2])
     for orientation, moved in (("first-face", True), ("symmetric", False)):
-        refined = refine(folded, pns(model(orientation=orientation)))
+        refined = refine(folded, pns(model(orientation=orientation)), 1)
         assert refined.report["levels"][0]["degenerate_frames"] == 1
         assert (refined.ratio.max() > 0) == moved
 

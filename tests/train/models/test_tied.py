@@ -143,16 +143,16 @@ def test_a_mesh_mirrored_turned_over_and_renumbered_gives_the_same_surface():
     edges, vertices = trained(tied("edges")).double(), trained(tied("vertices")).double()
     scheme = pns(TorchModel("tied", card(), edges, vertices))
     points, faces = bumpy_sphere(0, bump=0.1)
-    positions = refine(Mesh(points, faces), scheme).mesh.vertices[: len(points)]
+    positions = refine(Mesh(points, faces), scheme, 1).mesh.vertices[: len(points)]
     mirror = np.array([1.0, 1.0, -1.0])
-    mirrored = refine(Mesh(points * mirror, faces[:, ::-1]), scheme).mesh.vertices[: len(points)]
+    mirrored = refine(Mesh(points * mirror, faces[:, ::-1]), scheme, 1).mesh.vertices[: len(points)]
     np.testing.assert_allclose(mirrored * mirror, positions, rtol=0, atol=1e-12)
-    over = refine(Mesh(points, faces[:, ::-1]), scheme).mesh.vertices[: len(points)]
+    over = refine(Mesh(points, faces[:, ::-1]), scheme, 1).mesh.vertices[: len(points)]
     np.testing.assert_allclose(over, positions, rtol=0, atol=1e-12)
     rng = np.random.default_rng(0)
     order = rng.permutation(len(points))
     renumbered = np.argsort(order)[rng.permutation(faces)]
-    again = refine(Mesh(points[order], renumbered), scheme)
+    again = refine(Mesh(points[order], renumbered), scheme, 1)
     assert again.ratio.max() > 0.01
     np.testing.assert_allclose(again.mesh.vertices[: len(points)], positions[order], atol=1e-12)
 

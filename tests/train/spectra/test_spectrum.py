@@ -83,7 +83,7 @@ def test_the_full_gap_at_valence_three_is_an_eighth():
 def test_refined_rings_are_the_rings_at_half_the_size():
     for k in (3, 6):  # where one step of Loop keeps lattices in place, up to the centre's ring
         fan = star(k, 3, 1.0, inner_rings=2)
-        refined = refine(fan.mesh, loop(), reference_length=1.0).mesh.vertices[fan.refined]
+        refined = refine(fan.mesh, loop(), 1, reference_length=1.0).mesh.vertices[fan.refined]
         inner = fan.mesh.vertices[fan.inner]
         angle = np.arctan2(inner[1:, 1], inner[1:, 0])
         angles = np.arctan2(refined[1:, 1], refined[1:, 0])

@@ -93,8 +93,8 @@ def affine_error(scheme: AnyScheme) -> float:
     """Return the largest departure from Loop on a planar, tilted, jittered patch."""
     x, y = jittered_grid(seed=0, jitter=0.4).double().numpy().T
     mesh = Mesh(np.stack([x, y, 0.3 * x - 0.2 * y], axis=1), grid_faces())
-    positions = refine(mesh, scheme, reference_length=PAPER_UNITS).mesh.vertices
-    expected = refine(mesh, loop(), reference_length=PAPER_UNITS).mesh.vertices
+    positions = refine(mesh, scheme, 1, reference_length=PAPER_UNITS).mesh.vertices
+    expected = refine(mesh, loop(), 1, reference_length=PAPER_UNITS).mesh.vertices
     return float(np.linalg.norm(positions - expected, axis=1).max())
 
 

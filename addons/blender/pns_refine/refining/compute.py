@@ -9,12 +9,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Creases, Mesh, Scheme, loop, pns
-from pns_common.base.arrays import norm
-from pns_common.connectivity.creases import NO_CREASES
-from pns_common.connectivity.topology import EdgeClass, Topology
-from pns_common.geometry.sharp_edges import edges_sharper_than
-from pns_common.masks.limit import limit_positions
-from pns_common.schemes import VertexModel
+from pns_common.creases import NO_CREASES, sharp_edges
+from pns_common.limit import limit_positions
+from pns_common.model.session import Model
+from pns_common.topology import EdgeClass, Topology
 
 from .corners import refine_corners
 from .edges import edge_parents
@@ -48,7 +46,7 @@ class Choice:
     card asks for it. ``quads`` joins the triangles of quads again.
     """
 
-    model: VertexModel | None
+    model: Model | None
     levels: int
     budget: float | None = None
     limit: bool = False
@@ -136,7 +134,7 @@ def all_creases(
     pairs, crease_sharpness = snapshot.edges[marked], snapshot.crease_sharpness[marked]
     found = []
     if angle is not None:
-        bent = edges_sharper_than(snapshot.points, snapshot.triangles, angle)
+        bent = sharp_edges(Mesh(snapshot.points, snapshot.triangles), float(np.degrees(angle)))
         found.append((bent, np.inf))
     if lines.named is not None:
         found.append((lines.named, np.inf if lines.levels is None else float(lines.levels)))
@@ -168,7 +166,7 @@ def _distance_from_loop(
     if choice.model is None:
         return np.zeros(len(positions.points))
     plain = refine_positions(mesh, loop(), steps, limit=choice.limit, progress=bar.within("loop"))
-    return norm(positions.points - plain.points)
+    return np.linalg.norm(positions.points - plain.points, axis=1)
 
 
 def _where_it_acted(

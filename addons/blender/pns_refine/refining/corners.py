@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.base.distinct import first_places
-from pns_common.connectivity.creases import crease_children, with_creases
-from pns_common.connectivity.topology import Topology, build_topology, sharp_edge_count, split
+from pns_common.parallel import Blocks
+from pns_common.rows import first_places
+from pns_common.topology import Topology, build_topology, halves_of, split_faces
 
 from .snapshot import edge_keys
-from .steps import one_level
+from .steps import one_level, with_creases
 
 
 def refine_corners(
@@ -36,16 +36,16 @@ def refine_corners(
         topology = build_topology(patches, len(columns))
         if level == 0 and len(creases):
             named = np.isin(edge_keys(vertex_of[topology.edges]), edge_keys(creases))
-            sharp = topology.edges[named]
+            sharp = topology.edges[named].astype(np.int64)
         # Where the border begins is seen before creases are: they are no border.
         border = _border(topology)
         if sharp is not None:
             topology = with_creases(topology, sharp)
-            sharp = crease_children(topology)
+            sharp = halves_of(topology, topology.crease_edges)
         finer = one_level(columns, topology)
         finer[: len(columns)][border] = columns[border]
         columns = finer
-        patches = split(topology)
+        patches = split_faces(topology, Blocks())
     return columns[patches.reshape(-1)]
 
 
@@ -69,4 +69,6 @@ def patch_points(
 
 
 def _border(topology: Topology) -> np.ndarray:
-    return sharp_edge_count(topology) > 0
+    if len(topology.sharp_count) == 0:
+        return np.zeros(topology.vertex_count, dtype=bool)
+    return topology.sharp_count > 0

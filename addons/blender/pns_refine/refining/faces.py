@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.connectivity.topology import Topology
+from pns_common.topology import Topology
 
 from .snapshot import Faces, Snapshot
 
@@ -28,8 +28,8 @@ def triangle_faces(final: Topology, parents: Int[np.ndarray, " T"]) -> FacePlan:
     count = len(final.faces)
     faces = Faces(
         starts=3 * np.arange(count + 1),
-        vertices=final.faces.reshape(-1),
-        edges=final.face_edges.reshape(-1),
+        vertices=final.corners.astype(np.int64),
+        edges=final.corner_edges.astype(np.int64),
         parents=parents,
     )
     return FacePlan(faces, np.arange(3 * count))
@@ -46,7 +46,8 @@ def quad_faces(
     """
     triangles = np.arange(len(diagonal))
     joined = np.flatnonzero(diagonal >= 0)
-    edge = final.face_edges[joined, diagonal[joined]]
+    sides = final.face_edges.astype(np.int64)
+    edge = sides[joined, diagonal[joined]]
     key = edge * (int(parents.max(initial=0)) + 1) + parents[joined]
     order = np.argsort(key, kind="stable")
     key, joined = key[order], joined[order]
@@ -73,10 +74,10 @@ def quad_faces(
         corner[starts[:-1] + place] = 3 * kept + (turn + place) % 3
     other = partner[kept[quad]]
     corner[starts[:-1][quad] + 3] = 3 * other + (diagonal[other] + 2) % 3
-    edges = final.face_edges.reshape(-1)[corner]
+    edges = sides.reshape(-1)[corner]
     # The third side of the first triangle is the diagonal: a quad goes on along the second's.
-    edges[starts[:-1][quad] + 2] = final.face_edges[other, (diagonal[other] + 1) % 3]
-    vertices = final.faces.reshape(-1)[corner]
+    edges[starts[:-1][quad] + 2] = sides[other, (diagonal[other] + 1) % 3]
+    vertices = final.corners.astype(np.int64)[corner]
     return FacePlan(Faces(starts, vertices, edges, parents[kept]), corner)
 
 

@@ -10,16 +10,14 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, Refinement, Scheme, loop, refine
-from pns_common.geometry.reference_length import measure_reference_length
-from pns_common.geometry.side_lengths import measure_sides
-from pns_common.masks.crease_shift import limit_crease_shift
-from pns_common.masks.limit import limit_normals, limit_positions
+from pns_common.limit import limit_normals, limit_positions, limit_shift
+from pns_common.reference_length import measure_reference_length
 
 from .steps import Steps
 
 Progress = Callable[[int, int], None]
-# How far from Loop a level may have gone, and how far its budget allows; None: not known.
-_Distances = tuple[float, float | None]
+# How far from Loop a level may have gone, and how far its budget allows.
+_Distances = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +57,7 @@ def _level_by_level(
     mixture of Loop's. Such a level's report is the sharper reading's; its distance to Loop is the
     larger of both.
     """
-    length = measure_reference_length(mesh.vertices, mesh.faces)
-    control = mesh
-    scheme = scheme.fitted(lambda: measure_sides(control.vertices, control.faces))
+    length = measure_reference_length(mesh.vertices, mesh.corners)
     counter = _Counter(progress, steps)
     reports: list[Any] = []
     distances: list[_Distances] = []
@@ -78,8 +74,7 @@ def _level_by_level(
         mesh = Mesh(points, made.mesh.faces)
     points, normals = mesh.vertices, None
     if limit:
-        shift = limit_crease_shift(mesh.vertices, mesh.faces, steps.last_creases)
-        kept_back = 0.0 if shift is None else shift.largest
+        kept_back = limit_shift(mesh.vertices, steps.at_last)
         distances.append((kept_back, kept_back))
         points = limit_positions(mesh.vertices, steps.at_last)
         normals = limit_normals(mesh.vertices, steps.at_last).vertices
@@ -92,10 +87,8 @@ def _distances(report: Any) -> _Distances:
 
 
 def _combined(distances: list[_Distances], combine: Callable[[list[float]], float]) -> _Distances:
-    """Return the largest or the sum of some; one that is not known makes the whole not known."""
-    bounds = [bound for _, bound in distances if bound is not None]
-    bound = combine(bounds) if len(bounds) == len(distances) else None
-    return combine([distance for distance, _ in distances]), bound
+    """Return the largest or the sum of some distances, and of their bounds."""
+    return combine([distance for distance, _ in distances]), combine([b for _, b in distances])
 
 
 def _one_report(reports: list[Any], distances: _Distances) -> dict[str, Any]:

@@ -13,15 +13,13 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.connectivity.creases import crease_children, with_creases
-from pns_common.connectivity.topology import Topology, build_topology, split
-from pns_common.masks.stencils import loop_edge_vertices, loop_vertex_vertices
+from pns_common.parallel import Blocks, available_threads
+from pns_common.schemes import LOOP
+from pns_common.topology import Topology, build_topology, halves_of, split_faces
 
 from .snapshot import edge_keys
 
 SHARPEST = 10.0
-# How many columns, and rows, are worked on at a time.
-COLUMNS, ROWS = 4, 8192
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +61,8 @@ class Steps:
     @cached_property
     def last_creases(self) -> Int[np.ndarray, "N 2"]:
         """The halves of the creases that the last level kept sharp."""
-        return crease_children(self.steps[-1].topology)
+        last = self.steps[-1].topology
+        return halves_of(last, last.crease_edges)
 
     @property
     def wears_off(self) -> bool:
@@ -101,7 +100,7 @@ def level_steps(
         topology = with_creases(plain, sharp) if len(sharp) else plain
         steps.append(Step(topology, sharp, _mixture(plain, pairs, crease_sharpness)))
         pairs, crease_sharpness = _worn(plain, pairs, crease_sharpness)
-        faces, vertex_count = split(plain), vertex_count + len(plain.edges)
+        faces, vertex_count = split_faces(plain, Blocks()), vertex_count + len(plain.edges)
     return Steps(tuple(steps), build_topology(faces, vertex_count), pairs, crease_sharpness)
 
 
@@ -130,17 +129,14 @@ def edge_numbers(topology: Topology, pairs: Int[np.ndarray, "N 2"]) -> Int[np.nd
     return np.where(keys[nearest] == wanted, nearest, -1)
 
 
-def one_level(columns: Float[np.ndarray, "V K"], topology: Topology) -> np.ndarray:
-    """Refine columns by a level, in pieces that stay in the processor's cache."""
-    old, width = columns.shape
-    made = np.empty((old + len(topology.edges), width))
-    for start in range(0, width, COLUMNS):
-        some = slice(start, start + COLUMNS)
-        made[:old, some] = loop_vertex_vertices(np.ascontiguousarray(columns[:, some]), topology)
-    for start in range(0, len(topology.edges), ROWS):
-        rows = slice(start, min(start + ROWS, len(topology.edges)))
-        made[old + rows.start : old + rows.stop] = loop_edge_vertices(columns, topology, rows)
-    return made
+def with_creases(topology: Topology, pairs: Int[np.ndarray, "N 2"]) -> Topology:
+    """Return the topology with the edges that pairs of vertices name as creases."""
+    return topology.with_creases(topology.rows_of(pairs)) if len(pairs) else topology
+
+
+def one_level(columns: Float[np.ndarray, "V K"], topology: Topology) -> Float[np.ndarray, "W K"]:
+    """Refine columns by one level of Loop's masks."""
+    return LOOP.place(columns, topology, Blocks(available_threads()))
 
 
 def _mixture(

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Int, Shaped
 
-from pns_common.connectivity.topology import CHILDREN, Topology
-from pns_common.masks.stencils import EDGE_ENDPOINT, EDGE_OPPOSITE
+from pns_common.kernels.loop import EDGE_ENDPOINT, EDGE_OPPOSITE
+from pns_common.topology import EdgeClass, Topology
 
 from .steps import Steps
+
+# The children of a face, by its corners a, b, c (0, 1, 2) and edge vertices ab, bc, ca (3, 4, 5).
+CHILDREN = np.array([(0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)])
 
 
 def vote_at_points(values: Shaped[np.ndarray, "V K"], steps: Steps) -> Shaped[np.ndarray, "W K"]:
@@ -38,7 +41,8 @@ def vote_at_corners(values: Shaped[np.ndarray, "C K"], levels: int) -> Shaped[np
 
 def _elected(values: Shaped[np.ndarray, "V K"], topology: Topology) -> Int[np.ndarray, " E"]:
     """Return for each edge the parent whose value is taken."""
-    a, b, c, d = (topology.stencil[:, column] for column in range(4))
+    a, b = topology.edges.T.astype(np.int64)
+    c, d = _opposites(topology)
     weight = np.array([EDGE_ENDPOINT, EDGE_ENDPOINT, EDGE_OPPOSITE, EDGE_OPPOSITE])
     parents = [a, b, np.where(c < 0, a, c), np.where(d < 0, b, d)]
     rows = [values[parent] for parent in parents]
@@ -47,3 +51,11 @@ def _elected(values: Shaped[np.ndarray, "V K"], topology: Topology) -> Int[np.nd
         for other in range(4):
             votes[voter] += weight[other] * (rows[voter] == rows[other]).all(axis=1)
     return np.stack(parents)[votes.argmax(axis=0), np.arange(len(a))]
+
+
+def _opposites(topology: Topology) -> Int[np.ndarray, "2 E"]:
+    """Return the vertices opposite to each edge between two faces; −1 at other edges."""
+    inside = np.isin(topology.edge_class, (int(EdgeClass.INTERIOR), int(EdgeClass.CREASE)))
+    before = topology.half_edges - 1 + 3 * (topology.half_edges % 3 == 0)
+    found = topology.corners[np.where(inside[:, None], before, 0)].astype(np.int64)
+    return np.where(inside[:, None], found, -1).T

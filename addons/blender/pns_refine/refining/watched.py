@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.models.card import ModelCard
-from pns_common.schemes import VertexModel
+from pns_common.model.card import ModelCard
+from pns_common.model.session import Model
 
 
 @dataclass(frozen=True, eq=False)
 class WatchedModel:
     """The same model; ``look_up`` is called before each block, and may raise to stop the work."""
 
-    model: VertexModel
+    model: Model
     look_up: Callable[[], None]
 
     @property

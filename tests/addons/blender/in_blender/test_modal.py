@@ -14,7 +14,7 @@ class Large(operator.Refining):
     """The operator as Blender would hold it: its settings, and somewhere to report to."""
 
     def __init__(self, **settings):
-        self.levels, self.scheme, self.model, self.model_file = 2, "PNS", "full", ""
+        self.levels, self.scheme, self.model, self.model_file = 2, "PNS", "general", ""
         self.budget, self.limit, self.crease_angle, self.quads = 0.5, False, 10.0, False
         self.crease_lines, self.keep_original = True, True
         self.said = []

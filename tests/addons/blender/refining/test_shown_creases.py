@@ -1,7 +1,5 @@
 """Hard edges of a mesh that is shaded smooth stay sharp where lines do."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,16 +7,16 @@ from addons.blender.pns_refine.refining.compute import Choice, compute
 from addons.blender.pns_refine.refining.shown_creases import shown_creases
 from addons.blender.pns_refine.refining.snapshot import Domain, Layer, Rule
 from pns_common import Creases, load_model
-from pns_common.connectivity.creases import NO_CREASES
+from pns_common.creases import NO_CREASES
 from tests.addons.blender.quads import cube, grid
 
 CELLS = 6
-LINES = Creases(line_angle=66.0, levels=2)
+LINES = Creases(angle=66.0, levels=2)
 
 
 def hard_edges_alone(shape):
     """What is kept where nothing turns so much that it is a line."""
-    return shown_creases(shape, Creases(line_angle=179.0)).named
+    return shown_creases(shape, Creases(angle=179.0)).named
 
 
 def marks(name, domain, values):
@@ -67,19 +65,3 @@ def test_a_refined_mesh_has_what_is_left_of_them(kept, sharp):
     shape, _ = with_sharp_middle()
     made = compute(shape, Choice(load_model(), 1, crease_lines=kept))
     assert (made.crease_sharpness == 1).sum() == sharp
-
-
-def test_borders_of_materials_on_flat_sides_are_kept_and_those_that_bend_are_not():
-    # The middle cells of a flat square; of a hilly one the same.
-    middle = np.zeros((CELLS, CELLS), dtype=np.int32)
-    middle[2:4, 2:4] = 3
-    material = Layer("material_index", "INT", Domain.FACE, Rule.KEEP, middle.reshape(-1, 1))
-    hilly = grid(CELLS, (material,))
-    flat = replace(hilly, points=hilly.points * [1, 1, 0])
-    made = shown_creases(flat, LINES)
-    assert made.named is not None
-    assert (len(made.named), made.levels) == (8, 2)
-    bent = shown_creases(hilly, LINES)
-    assert bent.named is not None
-    assert len(bent.named) == 0
-    assert shown_creases(flat, NO_CREASES).named is None

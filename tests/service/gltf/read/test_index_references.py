@@ -3,7 +3,7 @@
 import pytest
 
 from service.errors import GltfError, UnreadableError
-from service.gltf.read.index_references import (
+from service.gltf.read.extensions import (
     accessor_references,
     unknown_extensions,
     view_references,

@@ -3,7 +3,8 @@
 import pytest
 
 from service.errors import GltfError
-from service.gltf.read.modes import FAN, STRIP, TRIANGLES, triangle_count
+from service.gltf.constants import FAN, STRIP, TRIANGLES
+from service.gltf.read.plan import triangle_count
 
 
 @pytest.mark.parametrize(

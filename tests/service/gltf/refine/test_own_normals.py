@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from service.gltf.refine.own_normals import own_shares
+from service.gltf.refine.normals import own_shares
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from tests.support.gltf import files
 
 
 def subdivide(*meshes, **options):
-    options = Options(**{"scheme": "loop", **options})
+    options = Options(**{"scheme": "loop", "levels": 1, **options})
     return subdivide_gltf(files.glb(*meshes), "glb", options, None, Limits()).glb
 
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from service.errors import GltfError, LimitError
-from service.gltf.read.compressed.draco import SLACK, decode_primitives
-from service.gltf.read.compressed.draco_header import read_header
+from service.gltf.read.compressed import SLACK, decode_primitives, read_header
 from service.gltf.read.schema import view
 from service.options import Limits
 from tests.fuzz.seeds import draco

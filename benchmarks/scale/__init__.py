@@ -1,1 +1,0 @@
-"""Libraries of files, and meshes larger than memory: what they take."""

@@ -1,1 +1,0 @@
-"""Compressed geometry, decoded as if it had come plain: Draco, and meshopt."""

@@ -1,0 +1,230 @@
+"""Refine control meshes with the operator: one mesh, or the parts of a union."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.columns import level_topologies
+from pns_common.creases import NO_CREASES, Creases
+from pns_common.errors import MeshError
+from pns_common.mesh import Mesh
+from pns_common.parallel import Blocks, available_threads
+from pns_common.refinement import Refinement, refine, refine_many
+from pns_common.report import Report
+from pns_common.rows import disjoint_faces, extent
+from pns_common.schemes import Scheme
+from pns_common.topology import split_faces
+
+from ...course import Course
+from ...errors import UnrefinableError
+from ...meshes.far_from_origin import STEPS, faces_too_far
+from ...meshes.shape_creases import creases_by_shape
+from ...options import Options
+from ...report import Change
+from ..read.primitives import TrianglePrimitive
+from .columns import SkinAndMorph, refined_skin_and_morph
+from .control_mesh import ControlMesh, Parts
+from .new_normals import hard_edges
+
+RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedMesh:
+    """A refined control mesh; arrays have a row for each refined vertex.
+
+    Attributes:
+        mesh: the refined mesh.
+        reports: of the operator, one for each part.
+        skin_and_morph: skin binding and morph deltas.
+        cut: (P,) vertices of each part that lost a joint for lack of slots.
+        scalars: further attributes by name.
+        limit_normals: normals to use in place of those of the faces; None: none.
+    """
+
+    mesh: Mesh
+    reports: list[Report]
+    skin_and_morph: SkinAndMorph
+    cut: Int[np.ndarray, " P"]
+    scalars: dict[str, Float[np.ndarray, " V"]]
+    limit_normals: Float[np.ndarray, "V 3"] | None
+
+
+def creases_of(control: ControlMesh, options: Options, scheme: Scheme) -> Creases:
+    """Return the edges of the mesh to refine that the options keep sharp, by name."""
+    if control.is_empty:
+        return NO_CREASES
+    if options.crease == "normals":
+        return Creases(hard_edges(control))
+    return creases_by_shape(control.mesh, options, scheme)
+
+
+def sharp_after(creases: Creases, levels: int) -> Int[np.ndarray, "N 2"] | None:
+    """Return the named edges that are sharp at the last level."""
+    return creases.named if creases.sharp_at(levels - 1) else None
+
+
+def refined_mesh(
+    control: ControlMesh,
+    creases: Creases,
+    scheme: Scheme,
+    options: Options,
+    pointer: str,
+    course: Course,
+) -> RefinedMesh:
+    """Refine a control mesh that has faces.
+
+    Raises:
+        UnrefinableError: refined positions leave the range of float32.
+    """
+    try:
+        made = refine(
+            control.mesh,
+            scheme,
+            options.levels,
+            options.reference_length,
+            limit=options.limit,
+            creases=creases,
+            progress=lambda done, total: course.reach(done / total),
+        )
+        _check_range(made.mesh)
+    except MeshError as error:
+        raise UnrefinableError(str(error), pointer=pointer) from error
+    faces, levels = made.mesh.faces, made.topologies
+    return RefinedMesh(
+        made.mesh,
+        [made.report],
+        *refined_skin_and_morph(control, faces, levels, options, course),
+        _scalars(made, options),
+        made.normals if options.normals == "limit" else None,
+    )
+
+
+def refined_union(
+    control: ControlMesh,
+    parts: Parts,
+    creases: Creases,
+    scheme: Scheme,
+    options: Options,
+    course: Course,
+) -> RefinedMesh:
+    """Refine the parts of a union, each to the bits that it has alone.
+
+    Raises:
+        MeshError: a part cannot be refined, or its positions leave the range of float32.
+    """
+    counts = parts.count_faces(control.cleaned.face_map >= 0)
+    made = refine_many(
+        _jobs(control.mesh, counts, creases),
+        scheme,
+        options.levels,
+        options.reference_length,
+        limit=options.limit,
+    )
+    for each in made:
+        _check_range(each.mesh)
+    faces = disjoint_faces((each.mesh.faces, len(each.mesh.vertices)) for each in made)
+    scalars = [_scalars(each, options) for each in made]
+    normals = [each.normals for each in made if each.normals is not None]
+    return RefinedMesh(
+        Mesh.of_refined(np.concatenate([each.mesh.vertices for each in made]), faces),
+        [each.report for each in made],
+        *_skin_and_morph_of_union(control, parts, faces, creases, options, course),
+        {name: np.concatenate([each[name] for each in scalars]) for name in scalars[0]},
+        np.concatenate(normals) if options.normals == "limit" else None,
+    )
+
+
+def _skin_and_morph_of_union(
+    control: ControlMesh,
+    parts: Parts,
+    faces: Int[np.ndarray, "G 3"],
+    creases: Creases,
+    options: Options,
+    course: Course,
+) -> tuple[SkinAndMorph, Int[np.ndarray, " P"]]:
+    """Refine skin and morph of a union whose refined faces are given."""
+    if not control.skin_and_morph.any:
+        return control.skin_and_morph, np.zeros(parts.count, dtype=np.int64)
+    blocks, mesh = Blocks(available_threads()), control.mesh
+    levels = level_topologies(
+        mesh.faces, len(mesh.vertices), options.levels, creases, blocks=blocks
+    )
+    own = split_faces(levels[-1], blocks, np.int64)
+    refined, cut = refined_skin_and_morph(control, own, levels, options, course, parts)
+    # Refining the union orders its faces like refining the parts, but numbers vertices otherwise.
+    vertex = np.empty(int(faces.max()) + 1, dtype=np.int64)
+    vertex[faces] = own
+    return refined.take(vertex), cut
+
+
+def _jobs(
+    union: Mesh, counts: Int[np.ndarray, " P"], creases: Creases
+) -> list[tuple[Mesh, Creases]]:
+    """Return the parts of a union, whose faces and vertices follow each other, with creases."""
+    named = np.zeros((0, 2), dtype=np.int64) if creases.named is None else creases.named
+    ends = np.cumsum(counts)
+    vertex_ends = 1 + np.maximum.reduceat(union.faces.max(axis=1), np.append(0, ends[:-1]))
+    named = named[np.argsort(named[:, 0], kind="stable")]
+    crease_ends = np.searchsorted(named[:, 0], vertex_ends)
+    jobs: list[tuple[Mesh, Creases]] = []
+    face, vertex, crease = 0, 0, 0
+    for face_end, vertex_end, crease_end in zip(ends, vertex_ends, crease_ends, strict=True):
+        mesh = Mesh(union.vertices[vertex:vertex_end], union.faces[face:face_end] - vertex)
+        jobs.append((mesh, replace(creases, named=named[crease:crease_end] - vertex)))
+        face, vertex, crease = face_end, vertex_end, crease_end
+    return jobs
+
+
+def _check_range(mesh: Mesh) -> None:
+    """Check that positions fit into float32. Raises MeshError."""
+    low, high = extent(mesh.vertices)
+    if max(-low.min(), high.max()) > np.finfo(np.float32).max:
+        raise MeshError("refined positions leave the range of float32")
+
+
+def _scalars(made: Refinement, options: Options) -> dict[str, Float[np.ndarray, " V"]]:
+    """Return ratio and gate of the last learned level for `diagnostics=full`; otherwise nothing.
+
+    A vertex that a later level puts on an edge has the mean of its ends.
+    """
+    if options.diagnostics != "full":
+        return {}
+    learned = [depth for depth, step in enumerate(made.steps) if step.added is not None]
+    if not learned:
+        return {RATIO: made.ratio, GATE: made.gate}
+    added = made.steps[learned[-1]].added
+    assert added is not None
+    values = np.stack([added.ratio, added.gate], axis=1)
+    for topology in made.topologies[learned[-1] + 1 :]:
+        values = np.concatenate([values, values[topology.edges].mean(axis=1)])
+    return {RATIO: values[:, 0], GATE: values[:, 1]}
+
+
+def changes_of_primitive(
+    primitive: TrianglePrimitive, kept: Bool[np.ndarray, " F"], levels: int, pointer: str
+) -> list[Change]:
+    """Return the dropped faces of a primitive of the mesh at `pointer`, and those too far away."""
+    pointer = f"{pointer}/primitives/{primitive.number}"
+    if not kept.any():
+        return [Change(pointer, "left as it was: no face has an area", len(kept))]
+    dropped = int((~kept).sum())
+    faces = primitive.corners if dropped == 0 else primitive.corners[kept]
+    far = faces_too_far(primitive.attributes["POSITION"], faces, levels)
+    counts = {
+        "degenerate faces dropped": dropped,
+        f"faces too far from the origin: a side has fewer than {STEPS} steps of float32": far,
+    }
+    return [Change(pointer, what, count) for what, count in counts.items() if count]
+
+
+def changes_of_vertices(near: int, cut: int, pointer: str) -> list[Change]:
+    """Return the number of joined vertices of a mesh, and of refined ones that lost a joint."""
+    counts = {
+        "vertices joined within weld_tolerance": near,
+        "refined vertices that lost their lightest joints": cut,
+    }
+    return [Change(pointer, what, count) for what, count in counts.items() if count]

@@ -1,0 +1,148 @@
+"""Normals before refinement: edges that a file's normals make hard, and new, smooth normals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pns_common.normals import smooth_fans
+from pns_common.rows import marked
+from pns_common.topology import build_topology
+
+from ...options import Options
+from ..constants import FLOAT
+from ..read.primitives import TrianglePrimitive
+from ..read.schema import Accessor
+from .control_mesh import NO_NORMAL, ControlMesh
+from .normals import corner_normals, safe_unit
+
+
+def hard_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
+    """Return the interior edges whose two faces carry different normals at both ends.
+
+    Pairs of vertices of the mesh to refine, the lower first. Both ends count: the sides of a cone
+    share normals along its base and differ at its tip alone, and the cone is smooth. A corner
+    without a normal, or with one of length 0, makes no edge hard.
+    """
+    faces = control.mesh.faces
+    label, vertex = control.of_cleaned(_labels_of_faces(control)).reshape(-1), faces.reshape(-1)
+    of_vertex = np.empty(len(control.mesh.vertices), dtype=label.dtype)
+    of_vertex[vertex] = label
+    several = marked(vertex[of_vertex[vertex] != label], len(of_vertex))
+    topology = build_topology(faces, len(of_vertex))
+    edges, half_edges = topology.edges[topology.interior], topology.half_edges[topology.interior]
+    asked = np.flatnonzero(several[edges].all(axis=1))
+    hard = np.ones(len(asked), dtype=bool)
+    there, back = half_edges[asked].T
+    for corners, facing in ((there, _next_corner(back)), (_next_corner(there), back)):
+        first, second = label[corners], label[facing]
+        hard &= (first != NO_NORMAL) & (second != NO_NORMAL) & (first != second)
+    return edges[asked[hard]].astype(np.int64)
+
+
+def _next_corner(corners: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+    """Return the corner after each corner 3 f + i of its triangle."""
+    return np.where(corners % 3 < 2, corners + 1, corners - 2)
+
+
+def _labels_of_faces(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
+    """Label the corners of each kept face: equal normals at one vertex share a number."""
+    labels = control.normal_labels.copy()
+    shares = list(zip(control.primitives, control.kept, control.rows, strict=True))
+    for primitive, _, part in shares:
+        if "NORMAL" in primitive.attributes:
+            labels[part][~primitive.attributes["NORMAL"].any(axis=1)] = NO_NORMAL
+    return np.concatenate([labels[p.corners[keep] + part.start] for p, keep, part in shares])
+
+
+def with_normal_rule(options: Options, primitives: Sequence[TrianglePrimitive]) -> Options:
+    """Return the options with `normals=auto` decided: smooth for a mesh without any normals."""
+    if options.normals != "auto":
+        return options
+    given = any("NORMAL" in primitive.attributes for primitive in primitives)
+    return replace(options, normals="keep" if given else "smooth")
+
+
+def with_smooth_normals(
+    control: ControlMesh, creases: Int[np.ndarray, "N 2"] | None
+) -> list[TrianglePrimitive]:
+    """Return the primitives with new normals, smooth everywhere but across creases.
+
+    Vertices between creases are split. Copies of a face take its normals, reversed if the copy is.
+    Faces that will be dropped keep theirs.
+    """
+    fans = smooth_fans(control.mesh.faces, len(control.mesh.vertices), creases)
+    count = int(fans.max()) + 1
+    values = safe_unit(corner_normals(control.mesh.vertices, control.mesh.faces, fans, count))
+    fan, turned = _of_kept_faces(control, fans)
+    primitives: list[TrianglePrimitive] = []
+    start = 0
+    for primitive, keep in zip(control.primitives, control.kept, strict=True):
+        own = slice(start, start + int(keep.sum()))
+        primitives.append(_with_normals(primitive, keep, fan[own], turned[own], values))
+        start = own.stop
+    return primitives
+
+
+def with_normal_accessor(accessors: dict[str, Accessor], count: int) -> dict[str, Accessor]:
+    """Return the accessors of a primitive with normals; a new one if it had none."""
+    plain = Accessor(component_type=FLOAT, count=count, type="VEC3")
+    return {"NORMAL": plain} | accessors
+
+
+def _of_kept_faces(
+    control: ControlMesh, fans: Int[np.ndarray, "F 3"]
+) -> tuple[Int[np.ndarray, "P 3"], Bool[np.ndarray, " P"]]:
+    """Return the fans of the corners of all kept faces, and which faces are reversed copies."""
+    cleaned, proper = control.cleaned, np.concatenate(control.kept)
+    leader = cleaned.representative[proper]
+    if np.array_equal(leader, np.arange(len(fans))):
+        return fans, np.zeros(len(fans), dtype=bool)
+    own = cleaned.vertex_map[control.weld.faces[proper]]
+    place = (own[:, :, None] == cleaned.mesh.faces[leader][:, None, :]).argmax(axis=2)
+    turned = (place[:, 1] - place[:, 0]) % 3 != 1
+    return np.take_along_axis(fans[leader], place, axis=1), turned
+
+
+def _with_normals(
+    primitive: TrianglePrimitive,
+    keep: Bool[np.ndarray, " F"],
+    fan: Int[np.ndarray, "P 3"],
+    turned: Bool[np.ndarray, " P"],
+    values: Float[np.ndarray, "G 3"],
+) -> TrianglePrimitive:
+    """Return the primitive with a row for each vertex, fan and side of its corners."""
+    side = np.full(primitive.corners.shape, -1)
+    side[keep] = 2 * fan + turned[:, None]
+    # One number for each pair of row and side: sorting pairs takes ten times as long.
+    sides = int(side.max()) + 2
+    codes = primitive.corners.reshape(-1) * sides + (side.reshape(-1) + 1)
+    order = np.argsort(codes)
+    code = codes[order]
+    opens = np.diff(code, prepend=-1) > 0
+    corners = np.empty_like(order)
+    corners[order] = np.cumsum(opens) - 1
+    row, of_fan = np.divmod(code[opens], sides)
+    of_fan -= 1
+    old = primitive.attributes.get("NORMAL")
+    normals = np.zeros((len(row), 3)) if old is None else old[row].astype(np.float64)
+    known = of_fan >= 0
+    sign = np.where(of_fan % 2 == 1, -1.0, 1.0)[known, None]
+    normals[known] = sign * values[of_fan[known] // 2]
+    # Readers expect NORMAL beside POSITION; the others keep their order.
+    attributes = {"POSITION": primitive.attributes["POSITION"][row]}
+    attributes["NORMAL"] = safe_unit(normals).astype(np.float32)
+    attributes |= {
+        name: array[row] for name, array in primitive.attributes.items() if name not in attributes
+    }
+    return replace(
+        primitive,
+        rows=primitive.rows[row],
+        corners=corners.reshape(-1, 3),
+        attributes=attributes,
+        accessors=with_normal_accessor(primitive.accessors, len(row)),
+        targets=tuple({n: a[row] for n, a in target.items()} for target in primitive.targets),
+    )

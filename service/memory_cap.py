@@ -1,0 +1,33 @@
+"""Cap the memory of a block of code, such as a decoder that trusts its input."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+try:
+    import resource
+except ImportError:  # Windows has no such limit.
+    resource = None  # type: ignore[assignment]
+
+_STATM = Path("/proc/self/statm")
+
+
+@contextmanager
+def memory_cap(extra: int) -> Iterator[None]:
+    """Let the process grow by at most `extra` bytes of address space; beyond it, MemoryError.
+
+    Linux only; other systems have no cap.
+    """
+    if resource is None or not _STATM.exists():
+        yield
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    ceiling = int(_STATM.read_text().split()[0]) * resource.getpagesize() + extra
+    lower = [limit for limit in (soft, hard) if limit != resource.RLIM_INFINITY]
+    resource.setrlimit(resource.RLIMIT_AS, (min([ceiling, *lower]), hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
