@@ -1,4 +1,4 @@
-"""Sharp and soft edges: hard rules at 0 and 1, continuous between them, and found by their angle."""
+"""Sharp and soft edges: hard rules at 0 and 1, continuous in between, found by their angle."""
 
 import numpy as np
 import pytest

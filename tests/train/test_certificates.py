@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from tests.support.model_files import DEFAULT_CARD, default_model, paper_model
 
 from pns_common import Mesh, MeshError, Scheme, load_model, loop, pns, refine
 from tests.support import schemes
 from tests.support.meshes import bow_tie, bumpy_sphere, icosphere, one_way_pair, three_pages
-from tests.support.model_files import DEFAULT_CARD, default_model, paper_model
 from tests.support.shared import shared_path
 from train.ablations.variants import VARIANTS, variant_recipe
 from train.certificates.affine import affine_reproduction

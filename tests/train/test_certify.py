@@ -8,10 +8,6 @@ import msgspec
 import numpy as np
 import pytest
 from onnx import TensorProto, helper
-from typer.testing import CliRunner
-
-import train.run
-from pns_common.model.file import DEFAULT_MODEL, load_model, model_from_bytes
 from tests.support.model_files import (
     PAPER_CARD,
     float64_perceptron,
@@ -20,6 +16,10 @@ from tests.support.model_files import (
     perceptron,
     random_layers,
 )
+from typer.testing import CliRunner
+
+import train.run
+from pns_common.model.file import DEFAULT_MODEL, load_model, model_from_bytes
 from tests.support.schemes import BUDGET, SOUND
 from train.certificates.affine import affine_reproduction
 from train.certificates.bodies import flat_bodies, synthetic_bodies

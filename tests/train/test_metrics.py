@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.support.model_files import paper_model
 
 from pns_common import Mesh, loop, pns
 from tests.support.meshes import grid
-from tests.support.model_files import paper_model
 from train.connectivity import connect
 from train.data.datasets import Dataset, ridge_held_out, saddle_held_out, sphere_ridge_held_out
 from train.data.primitives import box, globe, icosphere, torus
