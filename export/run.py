@@ -1,7 +1,8 @@
 """The exporter's entry: `python export/run.py` writes a checkpoint as a model file beside it.
 
 With `--install` it writes the bundled model of the recipe instead, which is tracked. With
-`--published DIR` it writes a model file for each of the author's PNS networks.
+`--published DIR` it writes a model file for each of the author's PNS networks. With `--measure
+NAME` it measures a bundled model anew, which a change of the operator asks for.
 """
 
 import sys
@@ -15,6 +16,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from export.measure import measure_anew
 from export.model_file import Exported, export_model
 from export.published import export_published
 from pns_common.errors import ParameterError, PnsError
@@ -61,12 +63,18 @@ def main(
     install: Annotated[
         bool, typer.Option("--install", help="Replace the bundled model of the recipe.")
     ] = False,
+    measure: Annotated[
+        str | None, typer.Option(help="Bundled model whose card to write with new metrics.")
+    ] = None,
 ) -> None:
     """Write model files, after checking that each says what its network says."""
     console = Console()
     written: dict[Path, Exported] = {}
     try:
-        if published is not None:
+        if measure is not None:
+            measure_anew(MODELS / f"{measure}.onnx", lambda name: console.print(f"measured {name}"))
+            write_manifest(MODELS)
+        elif published is not None:
             written = export_published(published, output or PUBLISHED_MODELS)
         else:
             made = load_checkpoint(checkpoint)

@@ -26,7 +26,7 @@ from service.workers.jobs import Done, Work, hold_model, job_memory
 from service.workers.progress import Reporter
 
 if TYPE_CHECKING:
-    from pns_common.schemes import Model
+    from pns_common.model.session import Model
 
 
 def no_warm_up(model: object) -> None:
@@ -38,9 +38,9 @@ def hold_among(folder: str, model: Model | str | None) -> None:
 
     Unlike the real warm-up it loads no kernels and no readers: small meshes do without.
     """
-    from pns_common.model import file as model_file
+    from pns_common.model import file
 
-    model_file.BUNDLED = Path(folder)
+    file.BUNDLED = Path(folder)
     hold_model(model)
 
 
