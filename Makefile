@@ -19,11 +19,11 @@ HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.
 PROCESSES ?= 2
 PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
-.PHONY: bench bench-answers image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
+.PHONY: prose size bench bench-answers image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
 
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
-	@$(SERVE)/bin/python -m pns_common.fused
+	@$(SERVE)/bin/python -m pns_common.warming
 	$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
 
 # Tests wait now and then, for processes that start and clients that stall: the checks, of one core, take
@@ -34,19 +34,28 @@ test: kernels $(CLIENTS)/.ready
 checks:
 	nice -n 5 $(MAKE) --output-sync=target lint shapes
 
-lint: $(DEV)/.ready
+# Lines and files by package, held to .ci/size.json.
+size:
+	$(PYTHON) .ci/size.py
+
+lint: $(DEV)/.ready size
 	$(DEV)/bin/ruff check .
 	$(DEV)/bin/ruff format --check .
 	$(DEV)/bin/pyright
 	$(DEV)/bin/lint-imports
+	$(DEV)/bin/python docs/prose.py
+
+# Docstrings that open with no verb, and sentences of more than 40 words: no more than docs/prose.json allows.
+prose: $(DEV)/.ready
+	$(DEV)/bin/python docs/prose.py
 
 # Once, where two test processes and every service that they start would each compile them.
 kernels: $(DEV)/.ready
-	@$(DEV)/bin/python -m pns_common.fused
+	@$(DEV)/bin/python -m pns_common.warming
 
 # Of each test of pns_common the first parameters, with the shapes of arrays checked.
 shapes: kernels
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest tests/pns_common
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest tests/library
 
 unit: kernels $(CLIENTS)/.ready
 	$(PYTEST) tests
@@ -59,7 +68,7 @@ quick: kernels
 # skipped. What they bring for pytest is left alone.
 interop-test: $(INTEROP)/.ready
 	$(INTEROP)/bin/python -c 'import meshio, open3d, pyvista, trimesh'
-	PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 OMP_NUM_THREADS=1 $(INTEROP)/bin/python -m pytest tests/pns_common/interop tests/pns_common/test_pyvista.py
+	PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 OMP_NUM_THREADS=1 $(INTEROP)/bin/python -m pytest tests/library/interop tests/library/test_pyvista.py
 
 # What `make test` shows on one of each kind, on all there are.
 exhaustive: kernels
@@ -85,7 +94,7 @@ MODELS ?= paper signed general
 models: $(DEV)/.ready
 	set -e; for recipe in $(MODELS); do \
 	  $(DEV)/bin/python train/run.py train --recipe $$recipe; \
-	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors; \
+	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors --install; \
 	done
 
 # Honest and hostile clients at one service: SOAK='--minutes 1440' for a day.
@@ -103,13 +112,13 @@ image:
 # What the image installs, by hash: after a change of constraints.txt. It needs pip-tools.
 PIP_COMPILE := pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe --no-header --no-annotate --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --constraint constraints.txt
 hashes:
-	$(PIP_COMPILE) --extra service --unsafe-package meshopt --output-file requirements/service.new pyproject.toml
+	$(PIP_COMPILE) --extra service --extra store --unsafe-package meshopt --output-file requirements/service.new pyproject.toml
 	$(PYTHON) requirements/without_ourselves.py requirements/service.new requirements/service.txt
 	$(PIP_COMPILE) --output-file requirements/build.txt requirements/build.in
 
 # After a bundled model was put in its place by hand.
 manifest: $(DEV)/.ready
-	$(DEV)/bin/python -c "from pathlib import Path; from pns_common.models.manifest import write_manifest; write_manifest(Path('pns_common/models'))"
+	$(DEV)/bin/python -c "from pathlib import Path; from pns_common.model.file import write_manifest; write_manifest(Path('pns_common/models'))"
 
 # Blender as a module, a version each in an environment of its own: 350 MB, and each for one version of
 # Python. 4.2 has the numpy that Blender 4.2 comes with. A missing Python leaves its version out.
@@ -143,21 +152,27 @@ build/blender-site/.ready: $(DEV)/.ready constraints.txt
 	$(DEV)/bin/python -m pip install --quiet --no-deps --upgrade --target build/blender-site jaxtyping wadler-lindig numba llvmlite onnxruntime
 	touch $@
 
-# The Blender extension: dist/pns_refine-VERSION.zip, packed and validated by Blender's own tool.
-addon: $(DEV)/.ready $(BLENDER)-5.0/.ready
-	$(DEV)/bin/python -m addons.blender.build $(BLENDER)-5.0/bin/python
+# The Blender extension, packed and validated by Blender's own tool: dist/pns_refine-VERSION-PLATFORM-pythonX.Y.zip.
+# BPY_PLATFORM names another than this machine's: linux-x64, windows-x64 or macos-arm64.
+addon: addon-5.0
 
-# What the extension costs on 100,000 vertices, beside the library alone.
-blender-measure: addon
-	$(BLENDER)-5.0/bin/python addons/blender/measure.py "$(CURDIR)"/dist/pns_refine-*.zip
+addon-%: $(DEV)/.ready $(BLENDER)-%/.ready
+	$(DEV)/bin/python -m addons.blender.build $(BLENDER)-$*/bin/python $(BPY_PLATFORM)
+
+# The newest zip for a version's Python.
+ZIP_FOR = $$(ls -t "$(CURDIR)"/dist/pns_refine-*-$$(basename "$$(readlink -f $(BLENDER)-$(1)/bin/python)").zip | head -1)
+
+# The time of the extension for 100,000 vertices, beside the library alone.
+blender-measure: addon-5.0
+	$(BLENDER)-5.0/bin/python addons/blender/measure.py "$(call ZIP_FOR,5.0)"
 
 # It is installed from the zip into each of these, and every property that it keeps is looked at.
 BPY_VERSIONS ?= 4.2 5.0 $(if $(shell python3.13 --version 2>/dev/null),5.2)
-blender-test: addon $(foreach version,$(BPY_VERSIONS),$(BLENDER)-$(version)/.ready)
-	set -e; zip=$$(echo "$(CURDIR)"/dist/pns_refine-*.zip); cd tests/addons/blender/in_blender; \
-	for version in $(BPY_VERSIONS); do \
-	  PNS_ADDON="$$zip" OMP_NUM_THREADS=1 "$(CURDIR)"/$(BLENDER)-$$version/bin/python -m pytest -c pytest.ini --confcutdir .; \
-	done
+blender-test: $(BPY_VERSIONS:%=blender-test-%)
+
+blender-test-%: addon-%
+	zip="$(call ZIP_FOR,$*)"; cd tests/addons/blender/in_blender; \
+	PNS_ADDON="$$zip" OMP_NUM_THREADS=1 "$(CURDIR)"/$(BLENDER)-$*/bin/python -m pytest -c pytest.ini --confcutdir .
 
 # The page: from web/ to the bundle in service/web, which is committed. Only who changes it needs node.
 web: web/node_modules/.ready
@@ -179,7 +194,7 @@ web/node_modules/.ready: web/package-lock.json
 $(SERVE)/.ready: pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv $(SERVE)
 	$(SERVE)/bin/python -m pip install $(HASHED)
-	$(SERVE)/bin/python -m pip install --quiet --editable '.[service]'
+	$(SERVE)/bin/python -m pip install --quiet --editable '.[service,store]'
 	touch $@
 
 # The generator of Python clients, for their test.
@@ -217,12 +232,12 @@ constraints:
 # peers are built where Debian's packages can be had; a peer that cannot be set up is left out by name.
 # Ours runs in the environment of `make serve`, as users have it; BENCH holds further options.
 bench: $(DEV)/.ready $(SERVE)/.ready $(PEERS)/.ready build/bench/.ready
-	$(SERVE)/bin/python -m pns_common.fused
+	$(SERVE)/bin/python -m pns_common.warming
 	$(DEV)/bin/python -m benchmarks --python $(SERVE)/bin/python $(BENCH)
 
 # Files answered a second on one core, beside other programs: half a minute for each of six rows.
 bench-answers: $(DEV)/.ready $(SERVE)/.ready $(PEERS)/.ready build/bench/node/.ready
-	$(SERVE)/bin/python -m pns_common.fused
+	$(SERVE)/bin/python -m pns_common.warming
 	$(DEV)/bin/python -m benchmarks.answers --python $(SERVE)/bin/python $(BENCH)
 
 build/bench/node/.ready: benchmarks/peers/package.json

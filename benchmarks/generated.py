@@ -27,7 +27,7 @@ def torus(faces: int) -> Mesh:
 
 
 def unrolled_torus(faces: int) -> tuple[IndexedTriangles, np.ndarray]:
-    """Make the same as exporters write it, cut open where its texture begins; and its normals."""
+    """Make a torus as exporters write it, cut open where its texture begins; and its normals."""
     whole, (columns, rows) = torus(faces), _torus_size(faces)
     u, v = np.divmod(np.arange((columns + 1) * (rows + 1)), rows + 1)
     place = u % columns * rows + v % rows
@@ -99,7 +99,7 @@ def _wavy_box(cells: int) -> Mesh:
 
 
 def shuffled(mesh: Mesh, seed: int = 0) -> Mesh:
-    """Return the same mesh, vertices and faces in random order: the worst case for caches."""
+    """Return the mesh with vertices and faces in random order: the worst case for caches."""
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(mesh.vertices))
     vertices = np.empty_like(mesh.vertices)

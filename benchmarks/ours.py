@@ -11,7 +11,7 @@ import sys
 import numpy as np
 
 from benchmarks.peers.protocol import read_mesh, serve
-from pns_common import Mesh, load_model, loop, pns, refine, warm_up
+from pns_common import Mesh, load_model, loop, pns, refine
 
 
 def main(name: str, path: str, levels: str) -> None:
@@ -27,8 +27,7 @@ def main(name: str, path: str, levels: str) -> None:
             assert len(refined.report["levels"]) == int(levels)
         return refined.mesh.vertices, refined.mesh.faces
 
-    # Warm from the second run on, whatever the first did without.
-    serve(run, after_first=warm_up)
+    serve(run)
 
 
 if __name__ == "__main__":

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Literal, SupportsIndex
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Integer
 
 from pns_common.creases import Creases, chosen_creases
 from pns_common.errors import MeshError, ParameterError
+from pns_common.kernels import are_compiled
 from pns_common.kernels import loop as kernels
 from pns_common.level import Level
 from pns_common.limit import limit_normals, limit_positions, limit_shift
@@ -121,7 +123,7 @@ def refine(
     reference_length: float | str = "auto",
     *,
     limit: bool = False,
-    creases: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
+    creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Refinement:
@@ -149,6 +151,7 @@ def refine(
         ModelError: the network's answer is not finite, or has another shape.
         MeshError: the refined coordinates are too large, or not numbers.
     """
+    _announce_compiling()
     check_is_mesh(mesh)
     if not isinstance(scheme, Scheme):  # pyright: ignore[reportUnnecessaryIsInstance]
         expected = "a Scheme, as loop() or pns(load_model())"
@@ -196,7 +199,7 @@ def control_level(
     mesh: Mesh,
     scheme: Scheme,
     reference_length: float | str = "auto",
-    creases: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
+    creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
     threads: int | None = None,
 ) -> Level:
     """Return the level that the first step of ``refine`` reads: for training and experiments.
@@ -229,6 +232,13 @@ def refine_many(
         )
         for mesh, creases in jobs
     ]
+
+
+@cache
+def _announce_compiling() -> None:
+    """Say once that the first refinement after an installation compiles the kernels."""
+    if not are_compiled():
+        logging.getLogger("pns_common").info("Compiling kernels, once: some fifteen seconds")
 
 
 def _step(level: Level, scheme: Scheme, depth: int) -> Step:

@@ -1,38 +1,59 @@
-"""Compile or load the kernels before they are needed."""
+"""Compile or load the kernels before they are needed: ``python -m pns_common.warming``."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
+import sys
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from pns_common import kernels
+from pns_common.kernels import are_compiled
 from pns_common.mesh import Mesh
 from pns_common.model.file import load_model
 from pns_common.refinement import refine
 from pns_common.schemes import loop, pns
 
 ANNOUNCEMENT = "Compiling kernels, once: some fifteen seconds"
+VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]], dtype=float)
+CLOSED, SHEET = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], [[0, 1, 2], [2, 1, 3]]
 
 
-def kernels_are_cached() -> bool:
-    """Return whether compiled code is kept beside the sources from an earlier run."""
-    return any((Path(kernels.__file__).parent / "__pycache__").glob("*.nbc"))
+def warm_up(
+    announce: Callable[[str], None] = print,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> None:
+    """Run every kernel once on small meshes, so that later calls find it compiled.
 
-
-def warm_up(announce: Callable[[str], None] = print) -> None:
-    """Run everything once on small meshes, so that later calls find all kernels compiled.
-
-    ``announce`` is called with a sentence if they must be compiled first, which takes seconds;
-    loading them takes half a second.
+    Args:
+        announce: called with a sentence if the kernels must be compiled first, which takes seconds;
+            loading them takes half a second.
+        progress: called with (stages done, stages in all).
     """
-    if not kernels_are_cached():
+    if not are_compiled():
         announce(ANNOUNCEMENT)
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]], dtype=float)
-    closed, sheet = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], [[0, 1, 2], [2, 1, 3]]
-    scheme = pns(load_model())
-    for faces in (closed, sheet):
-        made = refine(Mesh(vertices, faces), scheme, levels=2, limit=True, creases=None)
-        assert made.report["levels"]
-    refine(Mesh(vertices, closed), loop(), creases=np.array([[0, 1], [1, 2]]), limit=True)
+    stages = list(_stages())
+    for done, run in enumerate(stages, start=1):
+        run()
+        progress(done, len(stages))
+
+
+def _stages() -> Iterator[Callable[[], object]]:
+    """Yield refinements that reach all kernels between them, the cheapest to compile first."""
+    sheet, closed, crease = Mesh(VERTICES, SHEET), Mesh(VERTICES, CLOSED), np.array([[0, 1]])
+    yield lambda: refine(closed, loop(), 1)
+    yield lambda: refine(closed, loop(), 2).report
+    yield lambda: refine(sheet, loop(), creases=crease[:0])
+    yield lambda: refine(closed, loop(), creases=crease).report
+    yield lambda: refine(closed, pns(load_model()), 1, creases=None)
+    yield lambda: refine(sheet, pns(load_model()), 2).report
+    yield lambda: refine(closed, pns(load_model("paper")), 1).report
+    yield lambda: refine(sheet, loop(), 1, limit=True)
+    yield lambda: refine(closed, loop(), 1, limit=True, creases=crease)
+
+
+if __name__ == "__main__":
+    from rich.progress import Progress
+
+    with Progress(transient=True, disable=are_compiled() or not sys.stderr.isatty()) as bar:
+        task = bar.add_task("Compiling kernels", total=None)
+        warm_up(print, lambda done, total: bar.update(task, completed=done, total=total))

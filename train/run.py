@@ -28,8 +28,7 @@ from train.fitting.distillation import distil as distilled
 from train.fitting.distillation import load_teacher, planned
 from train.fitting.trainer import fit
 from train.metrics.card import card_metrics
-from train.metrics.one_step import improvements_as_data
-from train.metrics.tables import improvement_table
+from train.metrics.one_step import improvement_table, improvements_as_data
 from train.models.checkpoint import Checkpoint, Distillation, save_checkpoint
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe

@@ -17,10 +17,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from numba import njit  # pyright: ignore[reportMissingTypeStubs]
+from numba import config, njit  # pyright: ignore[reportMissingTypeStubs]
 
 kernel: Any = njit(cache=True, nogil=True, error_model="numpy")
 inlined: Any = njit(nogil=True, error_model="numpy", forceinline=True)
+
+
+def are_compiled() -> bool:
+    """Return whether compiled code is kept from an earlier run."""
+    folder = Path(config.CACHE_DIR) if config.CACHE_DIR else Path(__file__).parent / "__pycache__"
+    return any(folder.rglob("children.*.nbc"))
 
 
 def forget_stale_code() -> None:

@@ -9,13 +9,11 @@ from starlette.types import ASGIApp
 
 from ..settings import Settings
 from .access.bearer import Bearer
-from .access.forwarded import Forwarded
 from .access.keys import Entry
-from .access.origins import Origins
-from .as_said import AsSaid
+from .access.origins import Origins, hosts_of
 from .body_limits import BodyLimit
-from .connection.pace import Pace
 from .head import Head
+from .pace import Pace
 from .watch.journal import Journal
 from .watch.metrics import Metrics
 from .watch.tracing import Traced
@@ -25,7 +23,7 @@ if TYPE_CHECKING:
 
 # What a page of another origin may send, beside what any may: all that is read here.
 TAKEN = (
-    *("Authorization", "Content-Type", "If-None-Match"),
+    *("Authorization", "Content-Encoding", "Content-Type", "If-None-Match"),
     *("Traceparent", "Tracestate", "X-Request-ID"),
 )
 # What it may read of an answer beside its body.
@@ -47,7 +45,7 @@ def around(
     app = BodyLimit(app, max_bytes=int(settings.body), pace=upload_pace(settings))
     if keys is not None:
         app = Bearer(app, keys)
-    app = Origins(app, settings.cors_origins)
+    app = Origins(app, settings.cors_origins, hosts_of(settings))
     if settings.cors_origins:
         app = CORSMiddleware(
             app,
@@ -56,11 +54,8 @@ def around(
             allow_headers=TAKEN,
             expose_headers=EXPOSED,
         )
-    app = AsSaid(app)
     app = Journal(app, (metrics.request,))
-    if tracer is not None:
-        app = Traced(app, tracer)
-    return Forwarded(app, settings.proxies)
+    return app if tracer is None else Traced(app, tracer)
 
 
 def upload_pace(settings: Settings) -> Pace:

@@ -6,9 +6,6 @@ import asyncio
 import logging
 import signal
 import socket
-from collections.abc import Callable
-from contextlib import ExitStack
-from functools import partial
 from types import FrameType
 
 import uvicorn
@@ -16,24 +13,26 @@ from fastapi import FastAPI
 
 from .. import log_lines
 from ..settings import Settings, StartError
+from . import descriptors
 from .admission import Admission
 from .app import create_app
-from .connection import descriptors
-from .connection.crowd import Crowd
-from .connection.pace import Pace
-from .connection.protocol import BoundedProtocol
-from .connection.shared import Bounds, Shared
+from .prompt_server import PromptServer
 from .watch.metrics import Metrics
+from .watch.scrapes import scrapes
 
 log = logging.getLogger("pns.service")
 
 # After draining, what is still in the sockets' buffers may go out.
 FLUSH_SECONDS = 2
-# Connections that may wait, in the system, to be taken.
-WAITING = 2048
+# Connections that wait in the system, and that the event loop takes of them in a turn.
+WAITING, A_TURN = 2048, 32
+# The longest head: request line and headers together.
+HEAD_BYTES = 16 * 1024
+# Connections to the metrics.
+MOST_SCRAPERS = 16
 
 
-class DrainingServer(uvicorn.Server):
+class DrainingServer(PromptServer):
     """On a first signal it takes nothing new, and exits once no request is under way.
 
     Bodies that have not arrived whole by then are refused: they may never. Until it exits it still
@@ -41,12 +40,24 @@ class DrainingServer(uvicorn.Server):
     once. A second signal, and the deadline, end what is under way with 503.
     """
 
-    def __init__(self, config: uvicorn.Config, admission: Admission, drain_seconds: float) -> None:
-        super().__init__(config)
-        self._admission = admission
-        self._drain_seconds = drain_seconds
+    def __init__(
+        self, app: FastAPI, settings: Settings, beside: uvicorn.Server | None = None
+    ) -> None:
+        most = descriptors.fitting(settings)
+        super().__init__(configuration(app, settings, most), settings.head_seconds, most)
+        metrics: Metrics = app.state.metrics
+        metrics.gauge("pns_connections", "Open connections", self.count)
+        self._admission: Admission = app.state.admission
+        self._drain_seconds = settings.drain_seconds
+        self._beside = beside
         self._deadline: float | None = None
         self._signals = 0
+
+    def count(self) -> int:
+        """Count the open connections."""
+        return len(self.server_state.connections)
+
+    capture_signals = uvicorn.Server.capture_signals
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Listen, with a longer queue than what is taken of it in a turn."""
@@ -56,8 +67,23 @@ class DrainingServer(uvicorn.Server):
                 with listening.dup() as same:
                     same.listen(WAITING)
 
+    async def serve(self, sockets: list[socket.socket] | None = None) -> None:
+        """Serve, with another server beside this one for as long."""
+        if self._beside is None:
+            await super().serve(sockets)
+            return
+        async with asyncio.TaskGroup() as both:
+            both.create_task(self._beside.serve())
+            await super().serve(sockets)
+            self._beside.should_exit = True
+
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Close the admission; uvicorn calls this as the signal handler."""
+        if not self._signals:
+            # The next request on a connection would meet its end. The list is that of answers under
+            # way, too; the other is what it is made anew of.
+            for headers in (self.server_state.default_headers, self.config.encoded_headers):
+                headers.append((b"connection", b"close"))
         self._signals += 1
         self._admission.draining = True
         # The third is for a shutdown that hangs.
@@ -84,81 +110,65 @@ class DrainingServer(uvicorn.Server):
 
 def serve(settings: Settings) -> None:
     """Serve until a signal comes. Raises StartError."""
-    with ExitStack() as ends:
-        # Uvicorn says between its log lines alone that a port is taken, by the metrics too.
-        with _listening(settings.host, settings.port):
-            log_lines.configure()
-            app = create_app(settings)
-            if settings.metrics_port is not None:
-                ends.callback(_serve_metrics(app.state.metrics, settings))
-        server = DrainingServer(
-            configuration(app, settings), app.state.admission, settings.drain_seconds
-        )
-        # Whoever was started by nohup goes on.
-        if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
-            signal.signal(signal.SIGHUP, server.hang_up)
-        server.run()
+    # Uvicorn says between its log lines alone that a port is taken.
+    with _listening(settings.host, settings.port, "give another --host or --port"):
+        log_lines.configure()
+        app = create_app(settings)
+        server = DrainingServer(app, settings, _metrics_server(app.state.metrics, settings))
+    # Under nohup the signal stays ignored.
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
+        signal.signal(signal.SIGHUP, server.hang_up)
+    server.run()
 
 
-def _listening(host: str, port: int) -> socket.socket:
-    """Listen at an address. Raises StartError where nobody can."""
+def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket:
+    """Listen at an address. Raises StartError where it is taken."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
-        raise StartError(f"{error.strerror}; give another --host or --port") from error
+        raise StartError(f"{what}{error.strerror}; {hint}") from error
 
 
-def _serve_metrics(metrics: Metrics, settings: Settings) -> Callable[[], None]:
-    """Answer on the port of the metrics; return what ends it. Raises StartError."""
+def _metrics_server(metrics: Metrics, settings: Settings) -> uvicorn.Server | None:
+    """Return what serves the metrics, where they have a port. Raises StartError."""
     host, wanted = settings.metrics_host, settings.metrics_port
-    try:
-        port, stop = metrics.serve(host, wanted or 0)
-    except OSError as error:
-        hint = "give a PNS_METRICS_PORT that is free, and not PNS_PORT"
-        raise StartError(f"metrics on {host}:{wanted}: {error.strerror}; {hint}") from error
-    log.info("metrics on http://%s:%d/metrics", host, port)
-    return stop
-
-
-def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:
-    """Return uvicorn's settings, and the protocol that takes over where they end."""
-    admission: Admission = app.state.admission
-    shared = Shared(
-        Bounds(
-            head_seconds=settings.head_seconds,
-            answer=Pace(
-                rate=int(settings.rate),
-                grace=settings.grace_seconds,
-                idle=settings.stall_seconds,
-                whole=settings.answer_seconds,
-            ),
-            linger_seconds=settings.linger_seconds,
-            # A client reads its 413 only once it has sent what it has, or most of it.
-            body_bytes=2 * int(settings.body),
-        ),
-        Crowd(
-            descriptors.fitting(settings),
-            settings.connections_of_address,
-            settings.proxies,
-        ),
-        drains=lambda: admission.draining,
+    if wanted is None:
+        return None
+    hint = "give a PNS_METRICS_PORT that is free, and not PNS_PORT"
+    listening = _listening(host, wanted, hint, f"metrics on {host}:{wanted}: ")
+    log.info("metrics on http://%s:%d/metrics", host, listening.getsockname()[1])
+    config = uvicorn.Config(
+        scrapes(metrics.registry),
+        http="h11",
+        lifespan="off",
+        ws="none",
+        proxy_headers=False,
+        server_header=False,
+        log_config=None,
+        access_log=False,
+        h11_max_incomplete_event_size=HEAD_BYTES,
+        timeout_graceful_shutdown=FLUSH_SECONDS,
     )
-    metrics: Metrics = app.state.metrics
-    metrics.gauge("pns_connections", "Open connections", lambda: len(shared.crowd))
-    metrics.count("pns_refused_connections", "Connections refused", lambda: shared.crowd.refused)
+    return PromptServer(config, settings.head_seconds, MOST_SCRAPERS, [listening])
+
+
+def configuration(app: FastAPI, settings: Settings, most: int) -> uvicorn.Config:
+    """Return uvicorn's settings, for `most` connections beside those that are idle."""
     return uvicorn.Config(
         app,
         host=settings.host,
         port=settings.port,
-        http=partial(BoundedProtocol, shared=shared),  # pyright: ignore[reportArgumentType]
+        # The other parser bounds no head.
+        http="h11",
+        h11_max_incomplete_event_size=HEAD_BYTES,
         ws="none",
-        # Whose Forwarded headers are believed is the application's to say.
-        proxy_headers=False,
+        proxy_headers=bool(settings.proxies),
+        forwarded_allow_ips=[str(network) for network in settings.proxies],
         server_header=False,
+        limit_concurrency=most + descriptors.BEYOND,
+        backlog=A_TURN,
         timeout_keep_alive=settings.keep_alive_seconds,  # pyright: ignore[reportArgumentType]
-        # asyncio takes as many connections in one turn, before it looks at any of them.
-        backlog=descriptors.A_TURN,
         # Its loggers are configured with ours, and the journal says what an access log would.
         log_config=None,
         access_log=False,

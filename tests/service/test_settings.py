@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from service.settings import Settings
 
 EXAMPLES = {
+    "ignore_unknown": ("true", True),
     "host": ("0.0.0.0", "0.0.0.0"),
     "port": ("8080", 8080),
     "prefix": ("/tools/pns", "/tools/pns"),
@@ -25,19 +26,17 @@ EXAMPLES = {
     "uploads": ("7", 7),
     "job_seconds": ("7.5", 7.5),
     "connections": ("100", 100),
-    "connections_of_address": ("5", 5),
     "proxies": ("10.0.0.0/8, 192.0.2.1", (ip_network("10.0.0.0/8"), ip_network("192.0.2.1"))),
     "keys_file": ("/keys.toml", Path("/keys.toml")),
     "cors_origins": (
         "https://a.example,http://[::1]:80",
         ("https://a.example", "http://[::1]:80"),
     ),
+    "hosts": ("pns.example, *.A.example", ("pns.example", "*.a.example")),
     "metrics_host": ("0.0.0.0", "0.0.0.0"),
     "metrics_port": ("9000", 9000),
     "head_seconds": ("3", 3),
     "keep_alive_seconds": ("4", 4),
-    "linger_seconds": ("1.5", 1.5),
-    "answer_seconds": ("100", 100),
     "grace_seconds": ("6", 6),
     "rate": ("1KiB", 1024),
     "upload_seconds": ("20", 20),
@@ -47,10 +46,13 @@ EXAMPLES = {
     "queue_seconds": ("90", 90),
     "short_seconds": ("0.2", 0.2),
     "faces_per_minute": ("1000", 1000),
+    "promised_seconds": ("30", 30),
     "result_seconds": ("60", 60),
     "result_bytes": ("1MiB", 2**20),
     "results": ("3", 3),
     "result_folder": ("/var/tmp", Path("/var/tmp")),
+    "store": ("redis://localhost:6379/0", "redis://localhost:6379/0"),
+    "store_files": ("s3://bucket/folder", "s3://bucket/folder"),
     "answer_bytes": ("2MiB", 2 * 2**20),
     "upload_bytes": ("100MiB", 100 * 2**20),
 }
@@ -112,12 +114,10 @@ def test_job_limits_are_the_settings() -> None:
         ("drain_seconds", 0),
         ("head_seconds", 0),
         ("keep_alive_seconds", 0),
-        ("linger_seconds", 0),
         ("answer_seconds", 0),
         ("grace_seconds", 0),
         ("rate", 0),
         ("connections", 0),
-        ("connections_of_address", 0),
         ("proxies", "10.0.0.1/8"),
         ("proxies", "localhost"),
         ("cors_origins", "https://a.example/"),
@@ -194,3 +194,21 @@ def test_a_misspelt_setting_is_refused(
     with pytest.raises(ValidationError) as refused:
         Settings()
     assert text in str(refused.value)
+
+
+def test_another_programs_variable_passes_where_it_is_said_to(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("PNS_FOO", "1")
+    with pytest.raises(ValidationError, match="PNS_FOO: unset it, or set PNS_IGNORE_UNKNOWN=1"):
+        Settings()
+    monkeypatch.setenv("PNS_IGNORE_UNKNOWN", "1")
+    assert Settings().ignore_unknown
+
+
+@pytest.mark.parametrize("name", ["PNS_BODDY", "PNS_JOB_FOO"])
+def test_what_resembles_a_setting_never_passes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PNS_IGNORE_UNKNOWN", "1")
+    monkeypatch.setenv(name, "1")
+    with pytest.raises(ValidationError, match=name):
+        Settings()

@@ -11,7 +11,8 @@ from typing import Any
 
 from packaging.metadata import Metadata
 from packaging.requirements import Requirement
-from pns_common.fused.storage import BUILT, cache_folder
+
+from pns_common import kernels
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -50,13 +51,14 @@ def environment(folder: Path, wheel: Path, extras: set[str]) -> Path:
 
 def lend_kernels(programs: Path) -> None:
     """Give an environment the kernels that this checkout has compiled, if it has."""
-    built = cache_folder()
-    (lent,) = programs.parent.glob("lib/python*/site-packages/pns_common/fused/kernels")
-    if built is None or not built.exists():
-        return
-    (lent / BUILT.name).mkdir(exist_ok=True)
-    for code in built.glob("*.o"):
-        shutil.copy(code, lent / BUILT.name)
+    ours = Path(kernels.__file__).parent
+    (theirs,) = programs.parent.glob("lib/python*/site-packages/pns_common/kernels")
+    # Compiled code is kept for a source file of one size and time.
+    for source in ours.glob("*.py"):
+        shutil.copy2(source, theirs / source.name)
+    (theirs / "__pycache__").mkdir(exist_ok=True)
+    for code in (ours / "__pycache__").glob("*.nb[ic]"):
+        shutil.copy2(code, theirs / "__pycache__" / code.name)
 
 
 def closure(requirements: list[Requirement], extras: set[str], own: str) -> set[str]:

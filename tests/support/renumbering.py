@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import trimesh
-from pns_common.connectivity.topology import build_topology
-from pns_common.geometry.reference_length import measure_reference_length
 
 from pns_common import Mesh, clean
+from pns_common.reference_length import measure_reference_length
+from pns_common.topology import build_topology
 from tests.support.shared import shared_path
 
 # One of each kind, by their edges.
@@ -50,7 +50,7 @@ def asset(name):
     loaded.merge_vertices(merge_tex=True, merge_norm=True)
     mesh = clean(Mesh(np.asarray(loaded.vertices), np.asarray(loaded.faces))).mesh
     centred = mesh.vertices - mesh.vertices.mean(axis=0)
-    return Mesh(centred / measure_reference_length(mesh.vertices, mesh.faces), mesh.faces)
+    return Mesh(centred / measure_reference_length(mesh.vertices, mesh.corners), mesh.faces)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,12 +24,14 @@ from train.certificates.learned_once import (
     resolution_independence,
     smoothness_class,
 )
-from train.certificates.lifted_star import lifted_stars
 from train.certificates.model_file import keeps_its_word
-from train.certificates.planar_spectrum import planar_spectrum
-from train.certificates.regular import regular_smoothness
-from train.certificates.scaling import normal_variation_slope, proximity_slope
-from train.certificates.stability import lipschitz_slope
+from train.certificates.planar_spectrum import lifted_stars, planar_spectrum
+from train.certificates.scaling import (
+    lipschitz_slope,
+    normal_variation_slope,
+    proximity_slope,
+    regular_smoothness,
+)
 from train.certificates.subject import Subject, subject_of_model
 from train.spectra.spectrum import VALENCES
 

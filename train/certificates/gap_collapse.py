@@ -12,7 +12,7 @@ from torch import Tensor
 
 from pns_common import pns
 from train.certificates.adversary import OnStep, Operator, ascend, initial_operator
-from train.certificates.lifted_star import LIFTS
+from train.certificates.planar_spectrum import LIFTS
 from train.connectivity import connect
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
@@ -123,3 +123,19 @@ class _Copies:
             )
         assert spectrum is not None  # FOLLOWED > 0
         return spectrum
+
+
+def operator_jacobian(operator: Operator, star: Star) -> Float[Tensor, "M M"]:
+    """Return the derivative of the refined inner coordinates by the inner coordinates.
+
+    The counterpart of `train.spectra.spectrum.jacobian`, which takes differences of any scheme.
+    """
+    level = connect(star.mesh.faces, len(star.mesh.vertices))
+    points, refined = torch.tensor(star.mesh.vertices), torch.from_numpy(star.refined)
+    where = (torch.from_numpy(star.inner),)
+
+    def inner_to_inner(inner: Float[Tensor, "N 3"]) -> Float[Tensor, " M"]:
+        return operator(points.index_put(where, inner), level).points[refined].reshape(-1)
+
+    derivative = torch.autograd.functional.jacobian(inner_to_inner, points[where])
+    return derivative.reshape(3 * len(star.inner), -1)

@@ -15,9 +15,8 @@ from pns_common import refine as refine_by_library
 from train.certificates.bodies import Body
 from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
-from train.certificates.step import rounding, step
+from train.certificates.step import rounding, step, trials
 from train.certificates.subject import Subject
-from train.certificates.trials import trials
 from train.refining import AnyScheme, refine
 
 # Child faces that Loop makes flatter than this, in squared edge lengths, have no direction.

@@ -103,3 +103,11 @@ def _one_way(source: Surface, target: Surface) -> SurfaceErrors:
         hausdorff=float(max(closest.distance.max(), at_vertices.max())),
         normal=float(angle.mean()),
     )
+
+
+def gain(reference: SurfaceErrors, errors: SurfaceErrors) -> dict[str, float]:
+    """Return for each metric by how many per cent errors are below the reference's."""
+    return {
+        metric: 100 * (1 - getattr(errors, metric) / getattr(reference, metric))
+        for metric in SURFACE_METRICS
+    }

@@ -39,7 +39,7 @@ def subdivide(client: httpx2.Client, body: bytes) -> httpx2.Response:
 
 def request_head(length: int, *, extra: str = "") -> bytes:
     return (
-        "POST /subdivide HTTP/1.1\r\nHost: test\r\nContent-Type: model/gltf-binary\r\n"
+        "POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n"
         f"Content-Length: {length}\r\n{extra}\r\n"
     ).encode()
 
@@ -182,25 +182,6 @@ def test_413_is_answered_before_the_body_is_sent(address: tuple[str, int]) -> No
         connection.sendall(request_head(10**12, extra="Expect: 100-continue\r\n"))
         answer = connection.recv(4096)
     assert answer.startswith(b"HTTP/1.1 413 ")
-
-
-def test_an_endless_chunked_upload_is_cut_off_at_the_limit(address: tuple[str, int]) -> None:
-    head = (
-        b"POST /subdivide HTTP/1.1\r\nHost: test\r\nContent-Type: model/gltf-binary\r\n"
-        b"Transfer-Encoding: chunked\r\n\r\n"
-    )
-    chunk = b"100000\r\n" + bytes(MIB) + b"\r\n"
-    sent = 0
-    with socket.create_connection(address) as connection:
-        connection.sendall(head)
-        try:
-            for _ in range(400):
-                connection.sendall(chunk)
-                sent += MIB
-        except OSError:
-            pass
-    # After its 413 it is listened to, up to twice the limit; the sockets' buffers hold some more.
-    assert sent <= 144 * MIB
 
 
 def test_an_answer_larger_than_any_buffer_arrives_whole(client: httpx2.Client) -> None:

@@ -9,16 +9,15 @@ import threading
 from pathlib import Path
 
 import pytest
-import uvicorn
-from fastapi.testclient import TestClient
 
 from service.gltf.read.container import read_glb
 from service.http.app import create_app
-from service.http.server import configuration
+from service.http.server import DrainingServer
 from service.meshfiles.example import part_glb
 from service.settings import Settings
 from tests.support import node_tools
 from tests.support import stand_in_jobs as jobs
+from tests.support.live import local
 
 ROOT = Path(__file__).resolve().parents[3]
 SUPPORT = ROOT / "tests" / "support"
@@ -27,14 +26,14 @@ SUPPORT = ROOT / "tests" / "support"
 @pytest.fixture(scope="module")
 def document():
     app = create_app(Settings(workers=1), warm_up=jobs.no_warm_up)
-    return TestClient(app).get("/openapi.json").json()
+    return local(app).get("/openapi.json").json()
 
 
 @pytest.fixture(scope="module")
 def address():
     """A server that really refines."""
     settings = Settings(workers=1, port=0)
-    server = uvicorn.Server(configuration(create_app(settings), settings))
+    server = DrainingServer(create_app(settings), settings)
     thread = threading.Thread(target=server.run)
     thread.start()
     pause = threading.Event()
@@ -69,7 +68,7 @@ def test_operations_have_names_of_their_own(document):
 
 
 def test_every_route_says_what_it_does_and_stands_on_the_page(document):
-    page = (ROOT / "docs" / "service.md").read_text()
+    page = (ROOT / "docs" / "reference" / "http.md").read_text()
     for name, operation in operations(document):
         # Without one it is made of the name.
         assert operation["summary"].lower() != operation["operationId"].replace("_", " "), name
@@ -115,6 +114,15 @@ def test_a_result_may_find_no_room_or_be_the_problem_that_its_job_failed_with(do
     assert {"200", "400", "404", "409", "413", "415", "422", "500", "503", "504"} <= told
 
 
+def test_probes_need_no_key_and_the_document_says_where_the_service_is(document):
+    for name, operation in operations(document):
+        expected = [] if "probes" in operation.get("tags", ()) else [{}, {"key": []}]
+        assert operation["security"] == expected, name
+    assert document["servers"] == [{"url": "/"}]
+    app = create_app(Settings(workers=1, prefix="/tools/pns"), warm_up=jobs.no_warm_up)
+    assert local(app).get("/openapi.json").json()["servers"] == [{"url": "/tools/pns"}]
+
+
 def test_every_reference_leads_somewhere(document):
     text = json.dumps(document)
     for name in re.findall(r'"#/components/schemas/(\w+)"', text):
@@ -136,7 +144,7 @@ def test_an_answer_is_sent_as_what_was_asked_for():
         Settings(workers=1), job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up
     )
     glb = {"Content-Type": "model/gltf-binary"}
-    with TestClient(app) as client:
+    with local(app) as client:
         for accept, kind in (
             ("*/*", "model/gltf-binary"),
             ("application/octet-stream", "application/octet-stream"),
@@ -193,6 +201,8 @@ def test_the_generated_python_client_works(document, address, tmp_path):
     seen = json.loads(done.stdout)
     check(seen, output)
     assert seen["fetched"] == "glTF"
+    # The bytes alone, without a form around them.
+    assert seen["raw"] is True
 
 
 def test_the_generated_typescript_client_works(document, address, tmp_path):

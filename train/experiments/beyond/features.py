@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 import msgspec
 
 from train.ablations.feature_groups import Choice, choices, features_method, fit_features
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.paper.methods import largest_ratio
 from train.metrics.envelope import envelope_limit
 from train.metrics.evaluation import compare_with_loop
@@ -19,8 +18,8 @@ SETTINGS = ((0.5, 10.0), (1.0, 100.0))
 
 NOTES = (
     "Improvements over Loop on the held-out ridges, all trained by the recipe `paper` with the "
-    "orientation `symmetric`; docs/features.md defines the features. *Limit* is the best that any "
-    "network could do with the same C and c; there is none for normals.",
+    "orientation `symmetric`; docs/reference/features.md defines the features. *Limit* is the "
+    "best that any network could do with the same C and c; there is none for normals.",
     "The paper has no such table: its five features have no sign.",
 )
 

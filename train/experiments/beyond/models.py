@@ -10,9 +10,8 @@ from matplotlib.figure import Figure as Drawing
 from pns_common import loop, pns
 from pns_common.model.file import BUNDLED, DEFAULT_MODEL, bundled_models, load_model
 from train.data.datasets import Dataset
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, panels
 from train.experiments.paper.methods import unconstrained_scheme
 from train.metrics.evaluation import compare_with_loop
@@ -83,7 +82,7 @@ def run(laboratory: Laboratory) -> Outcome:
         f"*Allowed* is {JUMP_LIMIT:g} times Loop's jump, or the jump of Loop's own mesh once it is "
         "laid onto the surface where that is more; the column is the worst ridge's.",
         "The product's own files are measured, each with its own C and c; "
-        "docs/models.md says how they were made.",
+        "docs/reference/models.md says how they were made.",
     )
     return Outcome(
         tables=(table("models", "Held-out ridges", Row, rows),),

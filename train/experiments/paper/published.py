@@ -12,9 +12,8 @@ from train.ablations.variants import (
     Variant,
     variant_method,
 )
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.paper.ablation import architecture_numbers
 from train.experiments.paper.paper_values import (
     PUBLISHED_ABLATION,

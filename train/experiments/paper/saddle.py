@@ -6,12 +6,10 @@ import numpy as np
 
 from train.data.datasets import Dataset
 from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
-from train.experiments.paper.methods import PAPER_UNITS
+from train.experiments.paper.methods import PAPER_UNITS, saddle
 from train.experiments.paper.paper_values import PUBLISHED_SADDLE
-from train.experiments.paper.recipes import saddle
 from train.metrics.envelope import envelope_limit
 from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import paper
@@ -44,7 +42,7 @@ def gate_row(scheme: AnyScheme, dataset: Dataset) -> GateRow:
     """Return mean, maximum and active share of the gate over a data set's inserted vertices."""
     gates = np.concatenate(
         [
-            refine(instance.mesh, scheme, reference_length=PAPER_UNITS).gate[
+            refine(instance.mesh, scheme, 1, reference_length=PAPER_UNITS).gate[
                 len(instance.mesh.vertices) :
             ]
             for instance in dataset.instances

@@ -123,3 +123,27 @@ def _fill(vertices, faces, order, last_level, corners, boxes):
         for k in range(3):
             boxes[parent, LOWER + k, lane] = boxes[node, LOWER + k].min()
             boxes[parent, UPPER + k, lane] = boxes[node, UPPER + k].max()
+
+
+@njit
+def dot(u, v):
+    """Return the inner product."""
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+@njit
+def cross(u, v):
+    """Return the cross product."""
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+
+
+@njit
+def corner_of(corners, face, corner):
+    """Return one of a face's three points."""
+    return corners[face, corner, 0], corners[face, corner, 1], corners[face, corner, 2]
+
+
+@njit
+def between(p, q):
+    """Return the vector from p to q."""
+    return q[0] - p[0], q[1] - p[1], q[2] - p[2]

@@ -7,8 +7,18 @@ from jaxtyping import Bool
 from numba import njit
 
 from pns_common import Mesh
-from train.metrics.faces.face_boxes import LOWER, MOST_WAITING, UPPER, WIDE, FaceBoxes, face_boxes
-from train.metrics.faces.vectors import between, corner_of, cross, dot
+from train.metrics.faces.face_boxes import (
+    LOWER,
+    MOST_WAITING,
+    UPPER,
+    WIDE,
+    FaceBoxes,
+    between,
+    corner_of,
+    cross,
+    dot,
+    face_boxes,
+)
 
 # Crossings this close to a border, as a share of a triangle, are no crossings.
 SLACK = 1e-12

@@ -4,7 +4,8 @@ import { Group, Mesh, type AnimationClip, type BufferGeometry } from "three";
 import { part } from "../api/part";
 import { fileProblem } from "../api/problem";
 import { plain } from "../view/looks";
-import { hasNormals, jsonOf, parseGltf, triangles, type GltfJson } from "./gltf";
+import { jsonOf, parseGltf, triangles, type GltfJson } from "./gltf";
+import type { ObjMaterials } from "./obj";
 import { unreadable } from "./unreadable";
 import type { Upload } from "./upload";
 
@@ -15,8 +16,6 @@ export interface Opened {
   faces: number;
   /** Files that it names and that did not come with it: textures, as it cannot be opened without others. */
   missing: string[];
-  /** Whether the file says how its surface is shaded. */
-  normals: boolean;
   /** null where the file is no glTF. */
   json: GltfJson | null;
   /** The bytes that a glTF validator reads; null where the file is no glTF. */
@@ -41,9 +40,15 @@ export async function open(upload: Upload): Promise<Opened> {
   }
   const mesh = new Mesh(geometry);
   plain([mesh]);
+  const missing = new Set<string>();
+  const { libraries = [] } = geometry.userData as Partial<ObjMaterials>;
+  if (libraries.length) {
+    const { objMaterials } = await part(import("./materials"));
+    mesh.material = await objMaterials(geometry.userData as ObjMaterials, upload.neighbours, missing);
+  }
   const scene = new Group().add(mesh);
   const corners = geometry.index?.count ?? geometry.getAttribute("position").count;
-  return { scene, clips: [], faces: Math.floor(corners / 3), missing: [], normals: false, json: null, gltf: null };
+  return { scene, clips: [], faces: Math.floor(corners / 3), missing: [...missing], json: null, gltf: null };
 }
 
 async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Promise<Opened> {
@@ -60,7 +65,6 @@ async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Prom
     clips: animations,
     faces: triangles(json),
     missing: [...missing],
-    normals: hasNormals(json),
     json,
     gltf: { bytes, neighbours },
   };

@@ -2,19 +2,22 @@
 
 import { Box3, type Mesh } from "three";
 import type { Unit } from "../report/format";
-import type { Result, Source } from "../session";
+import type { Result } from "../result";
+import type { Source } from "../tasks";
 import { LOOP } from "../settings";
 import { colour, HEATS, needsFull, type Heat, type Legend } from "../view/heat";
-import { edgesOf, normalsOf, removeLines } from "../view/lines";
+import { removeLines } from "../view/lines";
 import { dress, plain, type Look } from "../view/looks";
 import { dispose, extentOf, type Extent, type Model } from "../view/model";
 import { Playback } from "../view/playback";
 import { Viewer, type Layout } from "../view/viewer";
-import { debounced, element, input, select } from "./dom";
+import { debounced, element, select } from "./dom";
 import { bindKeys } from "./keys";
 import { showLabels } from "./labels";
 import { drawLegendBar, showLegend } from "./legend";
 import { copyMorphs, offerMorphs, Timeline } from "./timeline";
+import { drawLines, LINES } from "./overlays";
+import { chooseView, chosenLayout, chosenView } from "./tools";
 import { bindWipe } from "./wipe";
 
 interface Shown {
@@ -22,9 +25,6 @@ interface Shown {
   ours: Result | null;
   loop: Result | null;
 }
-
-/** What may be drawn over both sides, by the id of its toggle. */
-const LINES = ["edges", "normal-lines"] as const;
 
 export class Stage {
   /** null where the browser has no WebGL. */
@@ -57,7 +57,7 @@ export class Stage {
         if (moving) this.timeline.write();
         return moving;
       };
-      this.viewer.onChosen = debounced(300, this.changed);
+      this.viewer.rig.onChosen = debounced(300, this.changed);
     }
     for (const id of ["layout", "pair", "look", ...LINES]) {
       element(id).addEventListener("change", () => {
@@ -82,45 +82,33 @@ export class Stage {
 
   /** The view's own settings, for the page's address. */
   get view(): Record<string, string> {
-    const view: Record<string, string> = {};
-    if (this.layout !== "wipe") view.layout = this.layout;
-    if (select("pair").value !== "control") view.pair = select("pair").value;
-    if (select("look").value !== "material") view.look = select("look").value;
-    for (const lines of LINES) if (input(lines).checked) view[lines] = "1";
-    const place = this.viewer?.chosen ? this.viewer.place(this.extent) : this.awaited;
-    if (place !== null) view.camera = place;
-    return view;
+    const view = chosenView();
+    const place = this.viewer?.rig.chosen ? this.viewer.rig.place(this.extent) : this.awaited;
+    return place === null ? view : { ...view, camera: place };
   }
 
   set view(view: Record<string, string>) {
-    const radio = document.querySelector<HTMLInputElement>(
-      `input[name="layout"][value="${CSS.escape(view.layout ?? "wipe")}"]`,
-    );
-    if (radio) radio.checked = true;
-    for (const name of ["pair", "look"] as const) {
-      select(name).value = view[name] ?? "";
-      // What is not understood stays at its default.
-      if (select(name).selectedIndex < 0) select(name).selectedIndex = 0;
-    }
-    for (const lines of LINES) input(lines).checked = view[lines] === "1";
+    chooseView(view);
     this.awaited = view.camera ?? null;
     this.read();
     if (this.shown.source) this.lookFromLink();
   }
 
   private lookFromLink(): void {
-    if (this.awaited !== null) this.viewer?.goTo(this.awaited, this.extent);
+    if (this.awaited !== null) this.viewer?.rig.goTo(this.awaited, this.extent);
     this.awaited = null;
   }
 
   open(source: Source): void {
     this.shown = { source, ours: null, loop: null };
+    this.playback.clear();
     this.adopt(source.model);
     this.extent = extentOf(source.model);
     this.timeline.offer(source.model);
     offerMorphs(source.model, () => this.models(), () => this.viewer?.invalidate());
     this.cover();
-    const stale = this.viewer?.chosen;
+    const stale = this.viewer?.rig.chosen;
+    this.viewer?.ground(this.extent);
     this.viewer?.frame(this.extent);
     this.lookFromLink();
     this.arrange();
@@ -134,7 +122,9 @@ export class Stage {
     this.shown = { ...this.shown, ours, loop };
     for (const result of [fresh ? ours : null, news]) {
       if (!result) continue;
-      if (this.shown.source?.opened.json === null) plain(result.model.meshes);
+      // Materials without names are the service's own: both sides are to look alike.
+      const isNamed = ({ material }: Mesh): boolean => [material].flat().some(({ name }) => name);
+      if (this.shown.source?.opened.json === null) plain(result.model.meshes.filter((mesh) => !isNamed(mesh)));
       this.adopt(result.model);
       if (this.shown.source) copyMorphs(this.shown.source.model, result.model);
     }
@@ -165,8 +155,7 @@ export class Stage {
   }
 
   private get layout(): Layout {
-    const chosen = document.querySelector<HTMLInputElement>('input[name="layout"]:checked');
-    return (chosen?.value ?? "wipe") as Layout;
+    return chosenLayout();
   }
 
   private adopt(model: Model): void {
@@ -207,11 +196,13 @@ export class Stage {
     this.viewer.layout = this.layout;
     this.viewer.sides = { left, right };
     this.viewer.over = this.overlaid;
+    this.viewer.standsOnGround = this.surface === "material" || this.surface === "clay";
     for (const model of this.models()) {
       const look = this.lookOf(model);
       model.meshes.forEach((mesh) => dress(mesh, look, paper));
     }
-    this.drawLines();
+    this.clearLines();
+    this.lines = drawLines(this.models(), this.overlaid, (model) => this.lookOf(model), this.size);
     if (moved && (this.layout === "side" || this.layout === "wipe")) {
       this.viewer.frame(this.extent, false);
     }
@@ -237,7 +228,7 @@ export class Stage {
       this.wantFull();
       return null;
     }
-    return colour(this.heat, ours, loop, this.unit);
+    return colour(this.heat, ours, loop, this);
   }
 
   /** Make room for the tools that float over the canvas, however many lines they take. */
@@ -246,34 +237,13 @@ export class Stage {
     const above = (id: string) => bottom - (element(id).getBoundingClientRect().top || bottom);
     element("view").style.setProperty("--tools", `${Math.max(above("tools"), 0)}px`);
     if (!this.viewer) return;
-    this.viewer.covered = Math.max(above("tools"), above("timeline"), 0);
+    this.viewer.rig.covered = Math.max(above("tools"), above("timeline"), 0);
     this.viewer.invalidate();
   }
 
   private clearLines(): void {
     removeLines(this.lines);
     this.lines = [];
-  }
-
-  private drawLines(): void {
-    this.clearLines();
-    const style = getComputedStyle(document.body);
-    const accent = style.getPropertyValue("--accent");
-    for (const model of this.models()) {
-      if (model === this.overlaid) {
-        // Clear in front, faint behind.
-        this.lines.push(...edgesOf(model, accent, 0.9), ...edgesOf(model, accent, 0.2, true));
-        continue;
-      }
-      // Whatever the other side's heat map: a wireframe without its lines is nothing at all.
-      const wire = this.lookOf(model) === "wire";
-      if (input("edges").checked || wire) {
-        this.lines.push(...edgesOf(model, style.color, wire ? 0.9 : 0.35));
-      }
-      if (input("normal-lines").checked) {
-        this.lines.push(...normalsOf(model, accent, this.size / 60));
-      }
-    }
   }
 }
 

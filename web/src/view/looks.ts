@@ -47,14 +47,19 @@ export function dress(mesh: Mesh, look: Look, paper: string): void {
   mesh.material = material;
 }
 
-/** Give meshes of a format without materials one in which their shape can be seen. */
+/** Give meshes without materials one in which their shape, and the colours of their vertices, are seen. */
 export function plain(meshes: Mesh[]): void {
   for (const mesh of meshes) {
     [mesh.material].flat().forEach((material) => material.dispose());
-    const flatShading = !mesh.geometry.getAttribute("normal");
-    mesh.material = new MeshStandardMaterial({ color: 0xb8bcc4, roughness: 0.7, flatShading });
+    const { geometry } = mesh;
+    mesh.material = plainMaterial(!geometry.hasAttribute("normal"), geometry.hasAttribute("color"));
     mesh.userData.material = mesh.material;
   }
+}
+
+export function plainMaterial(flatShading = true, vertexColors = false): MeshStandardMaterial {
+  const color = vertexColors ? 0xffffff : 0xb8bcc4;
+  return new MeshStandardMaterial({ color, roughness: 0.7, flatShading, vertexColors });
 }
 
 const MAKERS = {

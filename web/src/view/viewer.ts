@@ -1,18 +1,16 @@
-/** One canvas, one camera, one or two models; drawn when something changed. */
+/** One canvas, one camera, one or two models, drawn when something changed. */
 
 import {
   Color,
   NeutralToneMapping,
-  PerspectiveCamera,
   Raycaster,
   Scene,
-  Sphere,
   Vector2,
-  Vector3,
   WebGLRenderer,
 } from "three";
-import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { light, paint, surround } from "./lights";
+import { Rig } from "./rig";
+import { ContactShadow } from "./shadow";
 import { drawnBySoftware } from "./software";
 import type { Extent, Model } from "./model";
 
@@ -21,14 +19,6 @@ export type Layout = "wipe" | "side" | "overlay" | "single";
 /** Milliseconds without a change after which a picture may take its time. */
 const REST = 200;
 
-/** The farthest that a link may put the camera from a model's centre, in its radii. */
-const FARTHEST = 100;
-
-/** How much farther away than need be: the air around a model. */
-const MARGIN = 1.15;
-
-const FIRST_DIRECTION = new Vector3(0.6, 0.5, 1).normalize();
-
 export interface Sides {
   left: Model | null;
   right: Model | null;
@@ -36,28 +26,23 @@ export interface Sides {
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
-  readonly camera = new PerspectiveCamera(35, 1, 0.01, 100);
-  readonly controls: OrbitControls;
+  readonly rig: Rig;
   sides: Sides = { left: null, right: null };
   /** Drawn together with the right side: lines over it. */
   over: Model | null = null;
   layout: Layout = "wipe";
   /** Where the wipe stands, 0 to 1 from the left. */
   wipe = 0.5;
-  /** How much of the canvas tools cover at its foot, in pixels: the model stands above them. */
-  covered = 0;
-  /** Whether the user has chosen where the camera stands: a link then holds it. */
-  chosen = false;
-  /** Called when the user has. */
-  onChosen: () => void = () => {};
+  /** Whether models stand on a ground, and cast a shadow there. */
+  standsOnGround = false;
   /** Called once a frame with the seconds since the last; returns whether it wants another. */
   onFrame: (seconds: number) => boolean = () => false;
 
   // Without a card, edges are smoothed by finer pixels, and only once nothing moves.
   private readonly software = drawnBySoftware();
   private readonly scene = new Scene();
+  private readonly shadow = new ContactShadow();
   private readonly paper = new Color();
-  private readonly sphere = new Sphere(new Vector3(), 1);
   private scheduled = false;
   private last = 0;
   private frames = 0;
@@ -68,12 +53,9 @@ export class Viewer {
     this.renderer = new WebGLRenderer({ canvas, antialias: !this.software });
     this.renderer.autoClear = false;
     this.renderer.toneMapping = NeutralToneMapping;
-    light(this.renderer, this.scene, this.camera, this.software);
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.enableDamping = false;
-    this.controls.zoomToCursor = true;
-    this.controls.addEventListener("change", () => this.invalidate());
-    this.controls.addEventListener("end", () => this.choose());
+    this.rig = new Rig(canvas, () => this.invalidate());
+    light(this.renderer, this.scene, this.rig.camera, this.software);
+    this.scene.add(this.shadow.ground);
     canvas.addEventListener("dblclick", (event) => this.centreAt(event));
     canvas.addEventListener("webglcontextrestored", () => {
       if (!this.software) surround(this.renderer, this.scene);
@@ -115,84 +97,15 @@ export class Viewer {
     this.rest = window.setTimeout(() => requestAnimationFrame(() => this.draw(true)), REST);
   }
 
-  /** Look at all of a model; `turn` goes back to the first direction: ahead, and a little above. */
-  frame({ box, points }: Extent, turn = true): void {
-    if (box.isEmpty()) return;
-    const { center, radius } = box.getBoundingSphere(this.sphere);
-    const size = radius || 1;
-    const towards = turn
-      ? FIRST_DIRECTION.clone()
-      : this.camera.position.clone().sub(this.controls.target).normalize();
-    const right = new Vector3().crossVectors(this.camera.up, towards).normalize();
-    const up = new Vector3().crossVectors(towards, right);
-    const { width, height } = this.size();
-    const tall = Math.tan((this.camera.fov * Math.PI) / 360);
-    const free = tall * (1 - this.foot(height));
-    const wide = (tall * (this.layout === "side" ? width / 2 : width)) / height;
-    // The nearest place from which every vertex is in the picture.
-    let distance = 0;
-    const at = new Vector3();
-    for (let place = 0; place < points.length; place += 3) {
-      at.fromArray(points, place).sub(center);
-      const aside = Math.max(Math.abs(at.dot(right)) / wide, Math.abs(at.dot(up)) / free);
-      distance = Math.max(distance, MARGIN * aside + at.dot(towards));
-    }
-    this.controls.target.copy(center);
-    this.camera.position.copy(center).addScaledVector(towards, distance || 3 * size);
-    this.camera.near = size / 200;
-    this.camera.far = size * 200;
-    this.controls.minDistance = size / 50;
-    this.controls.maxDistance = size * 40;
-    if (turn) this.chosen = false;
-    this.controls.update();
-    this.invalidate();
+  /** Look at all of a model; `turn` goes back to the first direction. */
+  frame(extent: Extent, turn = true): void {
+    const { width } = this.size();
+    this.rig.frame(extent, this.layout === "side" ? width / 2 : width, turn);
   }
 
-  /** Where the camera stands and where it looks, from a model's centre and in its radii: six numbers. */
-  place({ box }: Extent): string {
-    const { center, radius } = box.getBoundingSphere(this.sphere);
-    const at = [this.camera.position, this.controls.target];
-    const numbers = at.flatMap((point) => point.clone().sub(center).divideScalar(radius || 1).toArray());
-    return numbers.map((x) => Number(x.toFixed(4))).join();
-  }
-
-  /** Go to such a place; what is none changes nothing. */
-  goTo(place: string, { box }: Extent): void {
-    const numbers = place.split(",").map(Number);
-    if (numbers.length !== 6 || !numbers.every((x) => Math.abs(x) <= FARTHEST) || box.isEmpty()) return;
-    const { center, radius } = box.getBoundingSphere(this.sphere);
-    for (const [point, first] of [[this.camera.position, 0], [this.controls.target, 3]] as const) {
-      point.fromArray(numbers, first).multiplyScalar(radius || 1).add(center);
-    }
-    this.chosen = true;
-    this.controls.update();
-    this.invalidate();
-  }
-
-  private choose(): void {
-    this.chosen = true;
-    this.onChosen();
-  }
-
-  /** Turn around the centre, in radians. */
-  orbit(right: number, up: number): void {
-    const offset = this.camera.position.clone().sub(this.controls.target);
-    const side = new Vector3().crossVectors(this.camera.up, offset).normalize();
-    const polar = offset.angleTo(this.camera.up);
-    offset.applyAxisAngle(side, Math.min(Math.max(up, 0.01 - polar), Math.PI - 0.01 - polar));
-    offset.applyAxisAngle(this.camera.up, right);
-    this.camera.position.copy(this.controls.target).add(offset);
-    this.choose();
-    this.controls.update();
-    this.invalidate();
-  }
-
-  zoom(factor: number): void {
-    const offset = this.camera.position.clone().sub(this.controls.target);
-    this.camera.position.copy(this.controls.target).addScaledVector(offset, factor);
-    this.choose();
-    this.controls.update();
-    this.invalidate();
+  /** Lay the ground under a model. */
+  ground({ box }: Extent): void {
+    if (!box.isEmpty()) this.shadow.place(box);
   }
 
   /** The view as a PNG, at the canvas's own size. */
@@ -202,11 +115,6 @@ export class Viewer {
     return new Promise((resolve, reject) =>
       this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("no picture")))),
     );
-  }
-
-  /** The part of the canvas's height that tools cover; on a low canvas they are not minded. */
-  private foot(height: number): number {
-    return Math.min(this.covered / height, 0.3);
   }
 
   private size(): { width: number; height: number } {
@@ -221,18 +129,16 @@ export class Viewer {
       this.renderer.setPixelRatio(ratio);
       this.renderer.setSize(width, height, false);
     }
-    // A card that was lost comes back without it.
-    this.renderer.setScissorTest(true);
     const { left, right } = this.sides;
     const split = Math.round(this.wipe * width);
     if (!left || !right || this.layout === "overlay" || this.layout === "single") {
-      this.view(right ?? left, 0, width, 0, width);
+      this.view(right ?? left, finely, 0, width, 0, width);
     } else if (this.layout === "side") {
-      this.view(left, 0, width / 2, 0, width / 2);
-      this.view(right, width / 2, width / 2, width / 2, width / 2);
+      this.view(left, finely, 0, width / 2, 0, width / 2);
+      this.view(right, finely, width / 2, width / 2, width / 2, width / 2);
     } else {
-      this.view(left, 0, width, 0, split);
-      this.view(right, 0, width, split, width - split);
+      this.view(left, finely, 0, width, 0, split);
+      this.view(right, finely, 0, width, split, width - split);
     }
     this.tell();
   }
@@ -245,28 +151,27 @@ export class Viewer {
   }
 
   /** Draw one model over the columns from `x`, and of those the ones from `from`. */
-  private view(model: Model | null, x: number, width: number, from: number, columns: number): void {
+  private view(model: Model | null, finely: boolean, x: number, width: number, from: number, columns: number): void {
     if (columns <= 0) return;
     const { height } = this.size();
-    const { renderer } = this;
+    const { renderer, scene, shadow } = this;
+    for (const object of scene.children) {
+      if (object === this.rig.camera || "isLight" in object) continue;
+      object.visible = object === model?.root || object === this.over?.root;
+    }
+    renderer.setClearColor(this.paper);
+    if (model && this.standsOnGround) {
+      // Software draws it once nothing moves, and until then as it was.
+      if (finely) shadow.render(renderer, scene);
+      shadow.ground.visible = true;
+    }
+    renderer.setScissorTest(true);
     renderer.setViewport(x, 0, width, height);
     renderer.setScissor(from, 0, columns, height);
-    renderer.setClearColor(this.paper);
     renderer.clear();
     if (!model) return;
-    for (const object of this.scene.children) {
-      if (object === this.camera || "isLight" in object) continue;
-      object.visible = object === model.root || object === this.over?.root;
-    }
-    this.project(width, height);
-    renderer.render(this.scene, this.camera);
-  }
-
-  /** A picture of so many pixels, whose middle lies in the middle of what tools leave free. */
-  private project(width: number, height: number): void {
-    this.camera.setViewOffset(1, 1, 0, this.foot(height) / 2, 1, 1);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.rig.project(width, height);
+    renderer.render(scene, this.rig.camera);
   }
 
   private centreAt(event: MouseEvent): void {
@@ -284,15 +189,9 @@ export class Viewer {
     if (!model) return;
     const at = new Vector2((2 * x) / width - 1, 1 - (2 * (event.clientY - box.top)) / box.height);
     const caster = new Raycaster();
-    this.project(width, box.height);
-    caster.setFromCamera(at, this.camera);
+    this.rig.project(width, box.height);
+    caster.setFromCamera(at, this.rig.camera);
     const hit = caster.intersectObjects(model.meshes, false)[0];
-    if (!hit) return;
-    const shift = hit.point.clone().sub(this.controls.target);
-    this.controls.target.add(shift);
-    this.camera.position.add(shift);
-    this.choose();
-    this.controls.update();
-    this.invalidate();
+    if (hit) this.rig.centreOn(hit.point);
   }
 }

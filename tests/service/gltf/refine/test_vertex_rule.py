@@ -23,7 +23,7 @@ MODEL = default_model(boundary_strength=0.0)
 
 
 def subdivide(*meshes, model=MODEL, **options):
-    options = Options(**{"scheme": "pns", "crease": "off", **options})
+    options = Options(**{"scheme": "pns", "levels": 1, "crease": "off", **options})
     return subdivide_gltf(files.glb(*meshes), "glb", options, model, Limits())
 
 
