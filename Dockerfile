@@ -22,7 +22,7 @@ RUN (cd pns_common/models && sha256sum --check --strict SHA256SUMS) \
 # Kernels for any processor of the architecture, not only the one that builds.
 ENV NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=
 # From elsewhere than /src, whose package would be compiled instead of the installed one.
-RUN cd / && /opt/pns/bin/python -m pns_common.fused
+RUN cd / && /opt/pns/bin/python -m pns_common.warming
 
 # Run: the environment alone, as a user without a name, on a root that may be read-only.
 FROM ${BASE}

@@ -19,8 +19,7 @@ HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.
 PROCESSES ?= 2
 PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
-
-.PHONY: size size bench bench-answers image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
+.PHONY: prose size bench bench-answers image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
 
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
@@ -44,6 +43,11 @@ lint: $(DEV)/.ready size
 	$(DEV)/bin/ruff format --check .
 	$(DEV)/bin/pyright
 	$(DEV)/bin/lint-imports
+	$(DEV)/bin/python docs/prose.py
+
+# Docstrings that open with no verb, and sentences of more than 40 words: no more than docs/prose.json allows.
+prose: $(DEV)/.ready
+	$(DEV)/bin/python docs/prose.py
 
 # Once, where two test processes and every service that they start would each compile them.
 kernels: $(DEV)/.ready
@@ -51,7 +55,7 @@ kernels: $(DEV)/.ready
 
 # Of each test of pns_common the first parameters, with the shapes of arrays checked.
 shapes: kernels
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest tests/pns_common
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest tests/library
 
 unit: kernels $(CLIENTS)/.ready
 	$(PYTEST) tests
@@ -64,7 +68,7 @@ quick: kernels
 # skipped. What they bring for pytest is left alone.
 interop-test: $(INTEROP)/.ready
 	$(INTEROP)/bin/python -c 'import meshio, open3d, pyvista, trimesh'
-	PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 OMP_NUM_THREADS=1 $(INTEROP)/bin/python -m pytest tests/pns_common/interop tests/pns_common/test_pyvista.py
+	PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 OMP_NUM_THREADS=1 $(INTEROP)/bin/python -m pytest tests/library/interop tests/library/test_pyvista.py
 
 # What `make test` shows on one of each kind, on all there are.
 exhaustive: kernels
@@ -90,7 +94,7 @@ MODELS ?= paper signed general
 models: $(DEV)/.ready
 	set -e; for recipe in $(MODELS); do \
 	  $(DEV)/bin/python train/run.py train --recipe $$recipe; \
-	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors; \
+	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors --install; \
 	done
 
 # Honest and hostile clients at one service: SOAK='--minutes 1440' for a day.

@@ -14,13 +14,13 @@ from pns_common.fused import load_kernels
 def plain_loop() -> Callable[[], object]:
     """Refine 320,000 faces by one level of Loop."""
     mesh = torus(320_000)
-    return lambda: refine(mesh, loop())
+    return lambda: refine(mesh, loop(), 1)
 
 
 def learned_level() -> Callable[[], object]:
     """Refine 320,000 faces by one level of the default model, with its report."""
     mesh, scheme = torus(320_000), pns(load_model())
-    return lambda: refine(mesh, scheme).report
+    return lambda: refine(mesh, scheme, 1).report
 
 
 def three_levels() -> Callable[[], object]:

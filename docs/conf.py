@@ -33,6 +33,13 @@ def leave_the_site(app, doctree):
             link.replace_self(link.children)
 
 
+def drop_module_docstring(app, what, name, thing, options, lines):
+    """Leave out the module's own docstring: it guides readers of the sources."""
+    if what == "module":
+        lines.clear()
+
+
 def setup(app):
     """Register what Sphinx is to call."""
+    app.connect("autodoc-process-docstring", drop_module_docstring)
     app.connect("doctree-read", leave_the_site)

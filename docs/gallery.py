@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import trimesh
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-sys.path.insert(0, str(Path(__file__).parent))
-from picture import STEEL, draw
-
 from pns_common import Mesh, load_model, loop, pns, refine, subdivide
-from pns_common.base.whole_file import replacing
+from pns_common.files import replacing
 
 FOLDER = Path(__file__).with_name("gallery")
+VIEW = np.array([0.35, -0.72, 0.6])  # from the part towards the eye, y up
+LIGHT = np.array([-0.35, 0.75, 0.55])
+STEEL = np.array([0.62, 0.68, 0.76])
 
 
 def main() -> None:
@@ -95,6 +95,39 @@ def checks(uv: Float[np.ndarray, "F 2"]) -> Float[np.ndarray, "F 3"]:
     """Return a colour for each face: checks of a tenth of the way round."""
     dark = np.floor(uv * 10).sum(axis=1) % 2 == 0
     return np.where(dark[:, None], [0.20, 0.33, 0.50], [0.86, 0.80, 0.66])
+
+
+def draw(
+    axes: Axes,
+    vertices: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    base: Float[np.ndarray, "F 3"],
+    line_width: float,
+) -> None:
+    """Draw faces towards the eye, far ones first, in flat shading."""
+    forward = VIEW / np.linalg.norm(VIEW)
+    right = np.cross([0.0, 0.0, 1.0], forward)
+    right /= np.linalg.norm(right)
+    up = np.cross(forward, right)
+    # The part's axis is y; the picture's is z.
+    points = vertices[:, [0, 2, 1]] * [1, -1, 1]
+    corners = points[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    seen = np.flatnonzero(normals @ forward > 0)
+    order = seen[np.argsort((corners[seen].mean(axis=1)) @ forward)]
+    light = np.array([LIGHT[0], -LIGHT[2], LIGHT[1]]) / np.linalg.norm(LIGHT)
+    brightness = 0.45 + 0.6 * np.clip(normals[order] @ light, 0, 1)
+    shade = np.clip(base[order] * brightness[:, None], 0, 1)
+    outline = "#20242a" if line_width else shade
+    flat = np.stack([corners[order] @ right, corners[order] @ up], axis=-1)
+    # Faces without an outline get one of their own colour, which hides the seams between them.
+    axes.add_collection(
+        PolyCollection(flat, facecolors=shade, edgecolors=outline, linewidths=line_width or 0.3)
+    )
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.axis("off")
 
 
 if __name__ == "__main__":

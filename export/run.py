@@ -1,6 +1,8 @@
-"""The exporter's entry: `python export/run.py` makes a bundled model from its checkpoint.
+"""The exporter's entry: `python export/run.py` writes a checkpoint as a model file beside it.
 
-With `--published DIR` it makes one model file of each of the author's PNS networks instead.
+With `--install` it writes the bundled model of the recipe instead, which is tracked. With
+`--published DIR` it writes a model file for each of the author's PNS networks. With `--measure
+NAME` it measures a bundled model anew, which a change of the operator asks for.
 """
 
 import sys
@@ -14,6 +16,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from export.measure import measure_anew
 from export.model_file import Exported, export_model
 from export.published import export_published
 from pns_common.errors import ParameterError, PnsError
@@ -53,20 +56,31 @@ def main(
     output: Annotated[
         Path | None,
         typer.Option(
-            help="Model file to write, if not the bundled one of the recipe; with --published the "
-            "folder of the files."
+            help="Model file to write; with --published the folder of the files. Default: beside "
+            "the checkpoint."
         ),
+    ] = None,
+    install: Annotated[
+        bool, typer.Option("--install", help="Replace the bundled model of the recipe.")
+    ] = False,
+    measure: Annotated[
+        str | None, typer.Option(help="Bundled model whose card to write with new metrics.")
     ] = None,
 ) -> None:
     """Write model files, after checking that each says what its network says."""
     console = Console()
     written: dict[Path, Exported] = {}
     try:
-        if published is not None:
+        if measure is not None:
+            measure_anew(MODELS / f"{measure}.onnx", lambda name: console.print(f"measured {name}"))
+            write_manifest(MODELS)
+        elif published is not None:
             written = export_published(published, output or PUBLISHED_MODELS)
         else:
             made = load_checkpoint(checkpoint)
-            path = output or bundled_file(made.recipe) or checkpoint.with_suffix(".onnx")
+            path = output or checkpoint.with_suffix(".onnx")
+            if install:
+                path = _installed(made.recipe, output)
             if path.is_dir():
                 raise ParameterError("output", str(path), expected="a file, not a folder")
             written = {path: export_model(made, path)}
@@ -78,6 +92,19 @@ def main(
     for path, exported in written.items():
         console.print(f"parity with torch: {exported.parity.difference:.1e} of the budget")
         console.print(f"{escape(str(path))} written, sha256 {exported.sha256}", soft_wrap=True)
+
+
+def _installed(recipe: Recipe, output: Path | None) -> Path:
+    """Return the bundled file to replace.
+
+    Raises:
+        ParameterError: an output is named too, or no bundled file is made by this recipe and seed.
+    """
+    bundled = bundled_file(recipe)
+    if output is not None or bundled is None:
+        expected = "no --output, and a recipe with its own seed that has a bundled model"
+        raise ParameterError("install", recipe.name, expected=expected)
+    return bundled
 
 
 if __name__ == "__main__":

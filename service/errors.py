@@ -28,7 +28,8 @@ def shortened_pointer(pointer: str) -> str:
 class ServiceError(Exception):
     """Base of everything that the service answers with a problem document.
 
-    A detail and a pointer that are too long are cut: the pointer to what holds the value.
+    A detail and a pointer that are too long are cut: the pointer to what holds the value. `file` is
+    the path of the file, where the command line read one.
     """
 
     status = 500
@@ -40,11 +41,14 @@ class ServiceError(Exception):
         super().__init__(detail)
         self.detail = detail
         self.pointer = None if pointer is None else shortened_pointer(pointer)
+        self.file: str | None = None
         if code is not None:
             self.code = code
 
     def __str__(self) -> str:
-        return self.detail if self.pointer is None else f"{self.detail} (at {self.pointer})"
+        where = "" if self.file is None else f"{self.file}: "
+        at = "" if self.pointer is None else f" (at {self.pointer})"
+        return f"{where}{self.detail}{at}"
 
     def __reduce__(self) -> tuple[object, ...]:
         # Errors cross from worker processes, and are made from other things than their detail.
@@ -169,10 +173,9 @@ class JobTimeout(ServiceError):  # noqa: N818
     title = "The job took too long"
 
 
-class WorkerDied(ServiceError):  # noqa: N818
+class WorkerDied(BusyError):  # noqa: N818
     """The worker that held this job ended before it answered (memory, a signal)."""
 
-    status = 500
     code = "worker-died"
     title = "The worker process ended unexpectedly"
 

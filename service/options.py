@@ -10,11 +10,13 @@ from typing import Literal, get_args
 from .errors import InvalidParameter, check_choice
 
 MAX_LEVELS = 6
+# The library's, without its import (tests hold them equal).
+DEFAULT_LEVELS = 2
 
 SchemeName = Literal["pns", "loop"]
 Diagnostics = Literal["summary", "full", "none"]
 UvRule = Literal["linear", "smooth"]
-NormalRule = Literal["keep", "smooth", "limit"]
+NormalRule = Literal["auto", "keep", "smooth", "limit"]
 Compression = Literal["none", "draco", "meshopt"]
 # A weld further than a hundredth of R is a different tool: it would take features away.
 MAX_WELD_TOLERANCE = 0.01
@@ -34,13 +36,13 @@ class Options:
     vertices on the limit surface. Raises InvalidParameter.
     """
 
-    levels: int = 1
+    levels: int = DEFAULT_LEVELS
     scheme: SchemeName = "pns"
     budget: float | None = None
     reference_length: float | Literal["auto"] = "auto"
     diagnostics: Diagnostics = "summary"
     uv: UvRule = "linear"
-    normals: NormalRule = "keep"
+    normals: NormalRule = "auto"
     crease: str = "auto"
     weld_tolerance: float = 0.0
     compress: Compression = "none"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 from typing import Any
 
 from pns_common.report import EdgeCounts, GateSummary, LevelReport, RatioSummary, Report
 from pns_common.schemes import Scheme
 
+from .advice import Bends, advice_on
 from .errors import shortened, shortened_pointer
 
 
@@ -39,6 +40,7 @@ class MeshResult:
         degenerate: dropped faces of the control mesh.
         copies: faces of the control mesh that follow another with the same vertices.
         report: the operator's; None where no face was left, and the mesh stays as it was.
+        bends: its bent edges, and the sharp ones among them.
     """
 
     index: int
@@ -49,6 +51,7 @@ class MeshResult:
     degenerate: int
     copies: int
     report: Report | None
+    bends: Bends
 
 
 def build_report(
@@ -60,6 +63,11 @@ def build_report(
 ) -> dict[str, Any]:
     """Build the report as JSON data; `unused_vertices` of the file were dropped."""
     refined = [result.report for result in results if result.report is not None]
+    totals = [
+        total_level([report["levels"][level] for report in refined])
+        for level in range(levels if refined else 0)
+    ]
+    bends = Bends(*(sum(each) for each in zip(*(astuple(r.bends) for r in results), strict=True)))
     return {
         "scheme": scheme.name,
         "budget": scheme.budget,
@@ -75,10 +83,8 @@ def build_report(
         },
         "dropped": dropped(sum(result.degenerate for result in results), unused_vertices),
         "changes": [asdict(change) for change in changes],
-        "levels": [
-            total_level([report["levels"][level] for report in refined])
-            for level in range(levels if refined else 0)
-        ],
+        "advice": advice_on(totals, bends),
+        "levels": totals,
         "meshes": [_mesh(result) for result in results],
     }
 

@@ -18,6 +18,9 @@ _MOST_BYTES = 2**60
 # Scheme, host and perhaps port, as browsers send it.
 _ORIGIN = re.compile(r"\*|https?://[a-z0-9.-]+(:[0-9]{1,5})?|https?://\[[0-9a-f:]+\](:[0-9]{1,5})?")
 
+# A name or an address, without a port; a star stands for any label, alone for any name.
+_HOST = re.compile(r"\*|(\*\.)?[A-Za-z0-9.-]+|[0-9A-Fa-f:]+")
+
 
 def _whole_size(value: object) -> object:
     """Refuse a size that has more to it: pydantic reads a beginning, and 1,5GiB is a byte to it."""
@@ -52,11 +55,20 @@ def _origin(text: str) -> str:
     return text
 
 
+def _host(text: str) -> str:
+    if not _HOST.fullmatch(text):
+        raise ValueError(f"{text!r} is no host name, such as pns.example or *.pns.example")
+    return text.lower()
+
+
 Size = Annotated[ByteSize, BeforeValidator(_whole_size), Field(gt=0, le=_MOST_BYTES)]
 Seconds = Annotated[float, Field(gt=0)]
 Name = Annotated[str, BeforeValidator(_not_empty)]
 Place = Annotated[Path, BeforeValidator(_not_empty)]
 Networks = Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_networks)]
+Hosts = Annotated[
+    tuple[Annotated[str, BeforeValidator(_host)], ...], NoDecode, BeforeValidator(_listed)
+]
 Origins = Annotated[
     tuple[Annotated[str, BeforeValidator(_origin)], ...], NoDecode, BeforeValidator(_listed)
 ]

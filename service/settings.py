@@ -5,14 +5,16 @@ from __future__ import annotations
 import os
 from difflib import get_close_matches
 
-from pydantic import ByteSize, Field, model_validator
+from pydantic import ByteSize, Field, TypeAdapter, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from .options import MAX_LEVELS, Limits
-from .setting_types import Name, Networks, Origins, Place, Seconds, Size
+from .setting_types import Hosts, Name, Networks, Origins, Place, Seconds, Size
 
 MIB = 1024**2
 PREFIX = "PNS_"
+# Two names of settings are a misspelling apart from this ratio of equal letters on (difflib).
+ALIKE = 0.7
 
 
 def _worker_default() -> int:
@@ -28,7 +30,8 @@ class Settings(BaseSettings):
     """The service's settings; sizes read as `64MiB`, durations are seconds.
 
     Raises pydantic.ValidationError where a value is out of range, or where the environment holds a
-    `PNS_…` that is none of them: a limit that is misspelt would be lost without a word.
+    `PNS_…` that is none of them: a limit that is misspelt would be lost without a word. Only names
+    that resemble none of ours pass, and only with `ignore_unknown`.
     """
 
     model_config = SettingsConfigDict(
@@ -37,13 +40,25 @@ class Settings(BaseSettings):
 
     @model_validator(mode="before")
     @classmethod
-    def _refuse_unknown(cls, values: object) -> object:
-        known = {f"{PREFIX}{name.upper()}" for name in cls.model_fields}
+    def _refuse_unknown(cls, values: dict[str, object]) -> dict[str, object]:
+        known = {name.upper() for name in cls.model_fields}
+        words = {name.split("_")[0] for name in known}
+        ignore = TypeAdapter(bool).validate_python(values.get("ignore_unknown", False))
         for name in os.environ:
-            if name.upper().startswith(PREFIX) and name.upper() not in known:
-                near = get_close_matches(name.upper(), known, n=1)
-                hint = f"; is it {near[0]}?" if near else ""
-                raise ValueError(f"there is no setting {name}{hint}")
+            if not name.upper().startswith(PREFIX):
+                continue
+            own = name.upper().removeprefix(PREFIX)
+            if own in known:
+                continue
+            if near := get_close_matches(own, known, n=1, cutoff=ALIKE):
+                raise ValueError(f"there is no setting {name}; is it {PREFIX}{near[0]}?")
+            if own.split("_")[0] in words:
+                raise ValueError(f"there is no setting {name}: unset it")
+            if not ignore:
+                raise ValueError(
+                    f"there is no setting {name}: unset it, or set {PREFIX}IGNORE_UNKNOWN=1 if it "
+                    "belongs to another program"
+                )
         return values
 
     @model_validator(mode="after")
@@ -54,6 +69,9 @@ class Settings(BaseSettings):
             )
         return self
 
+    ignore_unknown: bool = Field(
+        default=False, description="pass over PNS_… variables that resemble no setting"
+    )
     host: Name = "127.0.0.1"
     port: int = Field(default=8000, ge=0, le=65535)
     prefix: str = Field(
@@ -90,11 +108,16 @@ class Settings(BaseSettings):
         description="refined faces that one client may ask for in a minute",
     )
     result_seconds: Seconds = Field(default=900, description="how long the result of a job is kept")
+    promised_seconds: Seconds = Field(
+        default=300, description="how long at least a result stays that nobody has fetched"
+    )
     result_bytes: Size = Field(
         default=ByteSize(1024 * MIB), description="what the results that are kept may take"
     )
     results: int = Field(
-        default=64, gt=0, description="jobs that are kept after their end, with or without a result"
+        default=256,
+        gt=0,
+        description="jobs that are kept after their end, with or without a result",
     )
     result_folder: Place | None = Field(
         default=None, description="where results are kept; none: the system's temporary folder"
@@ -120,6 +143,11 @@ class Settings(BaseSettings):
 
     keys_file: Place | None = Field(
         default=None, description="who may ask: a file of keys' hashes; none: everybody"
+    )
+    hosts: Hosts = Field(
+        default=(),
+        description="names under which the service is asked, with commas, `*.a.example` for any "
+        "below; none: those of loopback where it listens there and no proxy is named, else any",
     )
     cors_origins: Origins = Field(
         default=(), description="origins whose pages may ask, with commas; `*`: any"

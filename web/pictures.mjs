@@ -9,13 +9,12 @@ const docs = fileURLToPath(new URL("../docs/", import.meta.url));
 const assets = fileURLToPath(new URL("../../shared/assets/", import.meta.url));
 const WIDE = { width: 1280, height: 800 };
 
-/** `keys` are pressed on the canvas; `done` is what else is to be seen. Without `files` it is the example. */
+/** `done` brings what else is to be seen. Without `files` it is the example. */
 const PICTURES = {
-  "page.png": { keys: [...turned(4), "-"] },
+  "page.png": {},
   "page-dark.png": {
     hash: "#look=distance&layout=side&pair=loop",
     options: { colorScheme: "dark" },
-    keys: [...turned(4), "-"],
     done: (page) => page.locator("#legend").waitFor(),
   },
   "page-clip.png": {
@@ -31,18 +30,13 @@ const PICTURES = {
   "page-phone.png": {
     hash: "#look=zebra&pair=loop",
     options: { viewport: { width: 390, height: 844 }, hasTouch: true },
-    keys: [...turned(2), "-"],
   },
 };
-
-function turned(times) {
-  return Array(times).fill("ArrowRight");
-}
 
 const server = await serve();
 await server.warm();
 const browser = await launch();
-for (const [name, { hash = "", files, options = {}, keys = [], done }] of Object.entries(PICTURES)) {
+for (const [name, { hash = "", files, options = {}, done }] of Object.entries(PICTURES)) {
   const missing = files?.find((file) => !existsSync(assets + file));
   if (missing) {
     console.log(`docs/${name} stays: it needs ${assets}${missing}`);
@@ -52,10 +46,8 @@ for (const [name, { hash = "", files, options = {}, keys = [], done }] of Object
   if (files) await choose(page, ...files.map((file) => assets + file));
   else await page.click("#example");
   await settled(page);
-  await page.focus("#canvas");
-  for (const key of keys) await page.keyboard.press(key);
   await done?.(page);
-  // No focus ring where nobody pressed a key.
+  // Without a focus ring.
   await page.evaluate(() => document.activeElement.blur());
   // The fine picture comes once nothing moves.
   await page.waitForTimeout(1000);

@@ -26,6 +26,7 @@ FORMATS: dict[str, Kind] = {
     "model/stl": "stl",
     "model/off": "off",
 }
+MEDIA_TYPES: dict[Kind, str] = {kind: media for media, kind in FORMATS.items()}
 ACCEPTED = (*FORMATS, ZIP, MULTIPART)
 
 _WEIGHT = re.compile(r"q\s*=\s*(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)")

@@ -128,7 +128,7 @@ def batch(
     workers: WorkersOption = None,
     report: Annotated[
         Path, typer.Option(metavar="FILE", help="rows of all files: .parquet or .jsonl")
-    ] = Path("pns-batch.parquet"),
+    ] = Path("pns-batch.jsonl"),
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="say what would be done; write no result")
     ] = False,
@@ -201,6 +201,20 @@ def info(
         print_models(load_model(name) for name in bundled_models())
     else:
         print_model(load_model(model))
+
+
+@app.command()
+def doctor() -> None:
+    """Show versions, models, memory and settings, and refine an example; 1 if anything is wrong."""
+    from ..doctor import findings
+
+    well = True
+    for finding in findings():
+        mark = "ok  " if finding.well else "FAIL"
+        typer.echo(printable(f"{mark} {finding.name:<12} {finding.text}"))
+        well = well and finding.well
+    if not well:
+        raise typer.Exit(FAILURE)
 
 
 @app.command()

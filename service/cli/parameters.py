@@ -61,8 +61,9 @@ UvOption = Annotated[UvRule, typer.Option(help="smooth: Loop's stencil inside ch
 NormalsOption = Annotated[
     NormalRule,
     typer.Option(
-        help="smooth: new ones in a glTF, smooth but across creases; limit: those of the limit "
-        "surface, with --limit"
+        help="auto: those of the file; where a mesh has none, smooth but across sharp edges. "
+        "keep: none where there are none. smooth: new ones for every mesh. limit: those of the "
+        "limit surface, with --limit"
     ),
 ]
 CreaseOption = Annotated[

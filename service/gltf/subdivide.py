@@ -106,6 +106,7 @@ def subdivide_gltf(
                         degenerate=mesh.degenerate,
                         copies=mesh.copies,
                         report=mesh.report,
+                        bends=mesh.bends,
                     )
                     outcomes[mesh.index] = result, mesh.changes
     results, found = zip(*(outcomes[plan.mesh] for plan in upload.plans), strict=True)

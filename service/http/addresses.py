@@ -1,16 +1,16 @@
-"""Addresses: which of them count as one client, and which are named."""
+"""Addresses: which of them count as one client, and which are proxies."""
 
 from __future__ import annotations
 
 from ipaddress import IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 
 Network = IPv4Network | IPv6Network
-# What one subscriber of IPv6 is given: its addresses are one address here.
-IPV6_SITE = 64
+# One subscriber of IPv6 is given a /64 at least, often a /56, and a site a /48.
+IPV6_NETWORKS = (64, 56, 48)
 
 
 def is_named(address: str, networks: tuple[Network, ...]) -> bool:
-    """Return whether an address lies in one of the networks; what is no address lies in none."""
+    """Return whether an address lies in one of the networks; False where it is no address."""
     try:
         parsed = ip_address(address)
     except ValueError:
@@ -21,13 +21,18 @@ def is_named(address: str, networks: tuple[Network, ...]) -> bool:
 
 
 def site(address: str) -> str:
-    """Return the address that counts for a client's share: of IPv6 the network, others whole."""
+    """Return the address that counts for a client's share: of IPv6 the /64, others whole."""
+    return sites(address)[0]
+
+
+def sites(address: str) -> tuple[str, ...]:
+    """Return the networks whose shares an address counts for, the narrowest first."""
     try:
         parsed = ip_address(address)
     except ValueError:
-        return address
+        return (address,)
     if not isinstance(parsed, IPv6Address):
-        return address
+        return (address,)
     if parsed.ipv4_mapped:
-        return str(parsed.ipv4_mapped)
-    return str(ip_network((int(parsed), IPV6_SITE), strict=False))
+        return (str(parsed.ipv4_mapped),)
+    return tuple(str(ip_network((int(parsed), length), strict=False)) for length in IPV6_NETWORKS)

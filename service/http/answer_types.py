@@ -9,12 +9,12 @@ from ..bodies import media
 BYTES = "application/octet-stream"
 
 
-def answer_type(request: Request) -> str:
-    """Return the media type that the client wants most.
+def answer_type(request: Request, file_type: str = media.GLB) -> str:
+    """Return the media type that the client wants most; `file_type` is that of the file.
 
     Generated clients know a file by `application/octet-stream` alone, and may ask for that.
     """
     # Several lines of it are one; without any, all are equal.
     accept = ",".join(request.headers.getlist("accept"))
     # In the order of preference among equals.
-    return max((media.GLB, media.JSON, BYTES), key=lambda kind: media.quality(kind, accept))
+    return max((file_type, media.JSON, BYTES), key=lambda kind: media.quality(kind, accept))

@@ -70,6 +70,7 @@ def create_app(
     )
     book = JobBook(
         seconds=settings.result_seconds,
+        promised_seconds=min(settings.promised_seconds, settings.result_seconds),
         max_bytes=int(settings.result_bytes),
         max_jobs=settings.results,
     )

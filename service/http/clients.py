@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fastapi import Request
 
 from ..settings import Settings
-from .addresses import site
+from .addresses import sites
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,11 +18,17 @@ class Client:
         id: the same for all its requests; `key:NAME` or `address:…`.
         faces_per_minute: its budget of refined faces; None: no limit.
         named: whether it has proved who it is. What a named client makes is for it alone.
+        networks: what it counts for: its id, and the wider networks of its address.
     """
 
     id: str
     faces_per_minute: float | None
     named: bool = False
+    networks: tuple[str, ...] = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.networks:
+            object.__setattr__(self, "networks", (self.id,))
 
 
 def client_of(request: Request, settings: Settings) -> Client:
@@ -31,4 +37,5 @@ def client_of(request: Request, settings: Settings) -> Client:
     if isinstance(identified, Client):
         return identified
     host = "" if request.client is None else request.client.host
-    return Client(f"address:{site(host)}", settings.faces_per_minute)
+    networks = tuple(f"address:{network}" for network in sites(host))
+    return Client(networks[0], settings.faces_per_minute, networks=networks)

@@ -12,7 +12,8 @@ from pathlib import Path
 from fastapi import Request
 
 from ..bodies import media
-from ..errors import InvalidParameter, MediaTypeError, check_limit
+from ..bodies.encodings import encoding_of
+from ..errors import InvalidParameter, check_limit
 from ..request_ids import REQUEST_ID
 from ..workers.job import Job
 from ..workers.jobs import Work
@@ -54,8 +55,7 @@ async def taken_in(
     check_limit("levels", options.levels, settings.levels, f"levels is {options.levels}")
     content_type = request.headers.get("content-type", "")
     media.of_request(content_type)
-    if request.headers.get("content-encoding", "identity").lower() != "identity":
-        raise MediaTypeError("a compressed body (Content-Encoding) is not supported")
+    encoding = encoding_of(request.headers.get("content-encoding", ""))
     client = client_of(request, settings)
     # It would be sent for nothing.
     service.desk.turns.check_room(client.id)
@@ -82,10 +82,13 @@ async def taken_in(
                     page=page.file.name,
                     content_type=content_type,
                     options=options,
+                    target=parameters.format,
                     model=parameters.model,
                     limits=settings.job_limits(),
                     answer_bytes=None if wanted.folder is None else int(settings.result_bytes),
                     request_id=REQUEST_ID.get(),
+                    encoding=encoding,
+                    body_bytes=int(settings.body),
                 ),
                 body=body,
                 answer=answer,
@@ -96,6 +99,8 @@ async def taken_in(
             )
             # From here on they are the job's.
             files.pop_all()
+            # Also where its work never begins.
+            held.callback(job.close)
         yield job
 
 

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..errors import ServiceError
+from ..errors import BusyError, ServiceError
 from ..workers.job import Job, State
+
+# Shares of the room for results whose promised time is not over: of a client (in IPv6 a /64), and
+# of a /56 and a /48 that it is in.
+SHARES = (0.5, 0.625, 0.75)
 
 
 class NoSuchJobError(ServiceError):
@@ -28,43 +34,70 @@ class NotDoneError(ServiceError):
 
 @dataclass(eq=False, slots=True)
 class Entry:
-    """A job in the book, and whose it is: None for everybody who knows its id."""
+    """A job in the book.
+
+    Attributes:
+        owner: whose it is; None for everybody who knows its id.
+        networks: what it counts for: its client, and the wider networks of its address.
+        size: bytes of its result; None before its end.
+        promised_until: on the clock of `time.monotonic`; until then it stays, whoever needs room.
+    """
 
     job: Job
     owner: str | None
+    networks: tuple[str, ...]
     task: asyncio.Task[None] | None = None
     end: asyncio.TimerHandle | None = None
+    size: int | None = None
+    promised_until: float = 0.0
+
+    @property
+    def is_promised(self) -> bool:
+        """Whether its result must stay: nobody has fetched it, and its least time is not over."""
+        return (
+            self.job.state is State.DONE
+            and not self.job.fetched.is_set()
+            and time.monotonic() < self.promised_until
+        )
 
 
 class JobBook:
     """Keeps jobs for `seconds` after their end, at most `max_jobs`, their results in `max_bytes`.
 
-    Where one more does not fit, the client that holds the most loses its oldest: nobody can push
-    out another's by asking for much. A job that failed or was cancelled is one of them: it takes no
-    bytes, but nothing else would bound how many there are.
+    A result that nobody has fetched stays for `promised_seconds`. Where one more does not fit,
+    jobs are struck out in this order: those without a result, those that were fetched, then the
+    oldest of the client that holds the most. What is promised stays, and the new result is refused;
+    no client fills more than its share of the room with promises.
     """
 
-    def __init__(self, *, seconds: float, max_bytes: int, max_jobs: int) -> None:
+    def __init__(
+        self, *, seconds: float, promised_seconds: float, max_bytes: int, max_jobs: int
+    ) -> None:
         self._seconds = seconds
+        self._promised_seconds = promised_seconds
         self._max_bytes = max_bytes
         self._max_jobs = max_jobs
         self._entries: dict[str, Entry] = {}
-        # Of those that have ended, in that order.
-        self._sizes: dict[str, int] = {}
+        # Those that have ended, in that order.
+        self._ended: dict[str, Entry] = {}
 
     @property
     def bytes(self) -> int:
         """What the results take."""
-        return sum(self._sizes.values())
+        return sum(entry.size or 0 for entry in self._ended.values())
 
     @property
     def tasks(self) -> list[asyncio.Task[None]]:
         """What still works for a job in the book."""
         return [entry.task for entry in self._entries.values() if entry.task is not None]
 
-    def add(self, job: Job, owner: str | None) -> Entry:
+    def check_room(self, networks: tuple[str, ...]) -> None:
+        """Raise BusyError where a result of this client would find no place now."""
+        self._check_share(networks, 0)
+
+    def add(self, job: Job, owner: str | None, networks: tuple[str, ...] = ()) -> Entry:
         """Write a job down."""
-        entry = self._entries[job.id] = Entry(job, owner)
+        entry = self._entries[job.id] = Entry(job, owner, networks or (job.client,))
         return entry
 
     def find(self, job_id: str, client: str) -> Entry:
@@ -75,15 +108,25 @@ class JobBook:
         return entry
 
     def keep(self, job: Job) -> None:
-        """Keep a job that has ended: count its result, make room for it, forget it in time."""
+        """Keep a job that has ended: make room for its result, and forget it in time.
+
+        A job whose result finds no room has failed.
+        """
         entry = self._entries.get(job.id)
-        if entry is None or job.state is not State.DONE:
+        if entry is None:
             _release(job)
-        if entry is not None:
-            done = job.state is State.DONE
-            self._sizes[job.id] = sum(file.size for file in job.results) if done else 0
-            entry.end = asyncio.get_running_loop().call_later(self._seconds, self.forget, job.id)
-            self._make_room()
+            return
+        size = sum(file.size for file in job.results) if job.state is State.DONE else 0
+        try:
+            self._make_room(entry.networks, size)
+        except BusyError as error:
+            job.state, job.error, size = State.FAILED, error, 0
+        if job.state is not State.DONE:
+            _release(job)
+        entry.size = size
+        entry.promised_until = time.monotonic() + self._promised_seconds
+        entry.end = asyncio.get_running_loop().call_later(self._seconds, self.forget, job.id)
+        self._ended[job.id] = entry
 
     def forget(self, job_id: str) -> None:
         """Strike a job out, with its result; one that is not there is no error."""
@@ -91,7 +134,7 @@ class JobBook:
         if entry is not None:
             if entry.end is not None:
                 entry.end.cancel()
-            if self._sizes.pop(job_id, None) is not None and entry.job.state is State.DONE:
+            if self._ended.pop(job_id, None) is not None and entry.job.state is State.DONE:
                 _release(entry.job)
             if entry.task is not None:
                 # Also one that only waits for somebody to fetch the result.
@@ -104,16 +147,55 @@ class JobBook:
             self.forget(job_id)
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    def _make_room(self) -> None:
-        while self.bytes > self._max_bytes or len(self._sizes) > self._max_jobs:
-            held: Counter[str] = Counter()
-            for job_id, size in self._sizes.items():
-                # Many small ones weigh too.
-                held[self._entries[job_id].job.client] += size + self._max_bytes // self._max_jobs
-            ((greediest, _),) = held.most_common(1)
-            self.forget(
-                next(key for key in self._sizes if self._entries[key].job.client == greediest)
-            )
+    def _make_room(self, networks: tuple[str, ...], size: int) -> None:
+        """Strike out what may go, for a result of so many bytes. Raises BusyError."""
+        if size:
+            self._check_share(networks, size)
+        while self._ended:
+            too_large = self.bytes + size > self._max_bytes
+            if not too_large and len(self._ended) < self._max_jobs:
+                return
+            self.forget(self._next_to_go(by_size=too_large).job.id)
+
+    def _next_to_go(self, *, by_size: bool) -> Entry:
+        """Choose the job to strike out. Raises BusyError."""
+        free = [entry for entry in self._ended.values() if not entry.is_promised]
+        if not free:
+            raise BusyError("results that wait to be fetched leave no room", retry_after=60)
+        jobs, sizes = _held(self._ended.values())
+
+        def rank(entry: Entry) -> tuple[bool, bool, int, int]:
+            useful = entry.job.state is State.DONE
+            client = entry.networks[0]
+            greed = (sizes[client], 0) if by_size else (jobs[client], -(entry.size or 0))
+            return not useful, entry.job.fetched.is_set(), *greed
+
+        # The first of equals is the oldest.
+        return max(free, key=rank)
+
+    def _check_share(self, networks: tuple[str, ...], size: int) -> None:
+        """Raise BusyError where promised results leave no room, or these networks no share."""
+        promised = [entry for entry in self._ended.values() if entry.is_promised]
+        jobs, sizes = _held(promised)
+        for network, share in zip(networks, SHARES, strict=False):
+            many = jobs[network] + 1 > max(1, self._max_jobs * share)
+            # The first result of a client is never an unfair share.
+            large = sizes[network] and sizes[network] + size > self._max_bytes * share
+            if many or large:
+                raise BusyError("results of this client that wait leave no room", retry_after=60)
+        full = sum(entry.size or 0 for entry in promised) + size > self._max_bytes
+        if full or len(promised) >= self._max_jobs:
+            raise BusyError("results that wait to be fetched leave no room", retry_after=60)
+
+
+def _held(entries: Iterable[Entry]) -> tuple[Counter[str], Counter[str]]:
+    """Count jobs and bytes by network."""
+    jobs: Counter[str] = Counter()
+    sizes: Counter[str] = Counter()
+    for entry in entries:
+        jobs.update(entry.networks)
+        sizes.update(dict.fromkeys(entry.networks, entry.size or 0))
+    return jobs, sizes
 
 
 def _release(job: Job) -> None:

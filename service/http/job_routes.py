@@ -70,7 +70,9 @@ def router(service: Service) -> APIRouter:
 
     @routes.get("/jobs/{job_id}/result", response_class=Response, **documentation.RESULT)
     async def read_job_result(request: Request, job_id: str) -> Response:
-        return _result(service, request, job_id, answer_type(request))
+        job = _entry(service, request, job_id).job
+        kind = answer_type(request, media.MEDIA_TYPES[job.work.target])
+        return _result(service, request, job_id, kind)
 
     @routes.get("/jobs/{job_id}/report", response_class=Response, **documentation.JOB_REPORT)
     async def read_job_report(request: Request, job_id: str) -> Response:
@@ -123,9 +125,11 @@ async def _hand_in(service: Service, request: Request, parameters: Parameters) -
         folder=result_folder(settings),
         patience=settings.queue_seconds + settings.job_seconds,
     )
+    client = client_of(request, settings)
+    service.book.check_room(client.networks)
     async with AsyncExitStack() as held:
         job = await held.enter_async_context(taken_in(service, request, parameters, wanted))
-        entry = service.book.add(job, owner_of(client_of(request, settings)))
+        entry = service.book.add(job, owner_of(client), client.networks)
         entry.task = asyncio.create_task(_work(service, job, held.pop_all()))
     try:
         await unless_gone(request.receive, job.accepted.wait())
@@ -192,6 +196,7 @@ def _result(service: Service, request: Request, job_id: str, kind: str) -> Respo
     answer, report = job.results
     file = report if kind == media.JSON else answer
     file.hold()
+    sent = job.fetched.set if file is answer else lambda: None
     held = ExitStack()
     held.callback(file.release)
     return FileAnswer(
@@ -205,7 +210,7 @@ def _result(service: Service, request: Request, job_id: str, kind: str) -> Respo
             "Vary": "Accept",
             "Cache-Control": "no-store",
         },
-        sent=job.fetched.set,
+        sent=sent,
     )
 
 

@@ -11,7 +11,7 @@ from ..settings import Settings
 from .access.bearer import Bearer
 from .access.forwarded import Forwarded
 from .access.keys import Entry
-from .access.origins import Origins
+from .access.origins import Origins, hosts_of
 from .as_said import AsSaid
 from .body_limits import BodyLimit
 from .connection.pace import Pace
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # What a page of another origin may send, beside what any may: all that is read here.
 TAKEN = (
-    *("Authorization", "Content-Type", "If-None-Match"),
+    *("Authorization", "Content-Encoding", "Content-Type", "If-None-Match"),
     *("Traceparent", "Tracestate", "X-Request-ID"),
 )
 # What it may read of an answer beside its body.
@@ -47,7 +47,7 @@ def around(
     app = BodyLimit(app, max_bytes=int(settings.body), pace=upload_pace(settings))
     if keys is not None:
         app = Bearer(app, keys)
-    app = Origins(app, settings.cors_origins)
+    app = Origins(app, settings.cors_origins, hosts_of(settings))
     if settings.cors_origins:
         app = CORSMiddleware(
             app,

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+from ..bodies.media import Kind
 from ..options import (
     CREASE_PATTERN,
     DEFAULTS,
@@ -82,8 +83,9 @@ class Parameters(BaseModel):
     )
     normals: NormalRule = Field(
         default=DEFAULTS.normals,
-        description="`keep`: hard edges of the file stay hard, and what has no normals "
-        "stays without; `smooth`: new ones everywhere, smooth but across creases; "
+        description="`auto`: hard edges of the file stay hard, and a mesh without normals gets "
+        "new ones, smooth but across sharp edges; `keep`: a mesh without normals stays without; "
+        "`smooth`: new ones everywhere, smooth but across sharp edges; "
         "`limit`: the same, and exactly those of the limit surface (with `limit=true`)",
     )
     crease: str = Field(
@@ -106,6 +108,11 @@ class Parameters(BaseModel):
         default=DEFAULTS.compress,
         description="`meshopt` is exact; `draco` is smaller, and rounds positions, normals and UVs",
     )
+    format: Kind = Field(
+        default="glb",
+        description="of the answer; `gltf` has its buffers inside, `obj`, `ply`, `stl` and `off` "
+        "hold what `pns subdivide` writes there",
+    )
     limit: bool = Field(
         default=DEFAULTS.limit,
         description="put the vertices where Loop's rules would take them in the end: on the limit "
@@ -113,5 +120,5 @@ class Parameters(BaseModel):
     )
 
     def options(self) -> Options:
-        """Return the same as the pipeline takes them: all but the model, not its to find."""
-        return Options(**self.model_dump(exclude={"model"}))
+        """Return the pipeline's options: all but the model and the format of the answer."""
+        return Options(**self.model_dump(exclude={"model", "format"}))

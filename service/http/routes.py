@@ -35,7 +35,8 @@ def router(service: Service) -> APIRouter:
 
     @routes.post("/subdivide", response_class=Response, **documentation.SUBDIVIDE)
     async def subdivide(request: Request, parameters: Annotated[Parameters, Query()]) -> Response:
-        return await _subdivide(service, request, parameters, answer_type(request))
+        file_type = media.MEDIA_TYPES[parameters.format]
+        return await _subdivide(service, request, parameters, answer_type(request, file_type))
 
     @routes.post("/report", response_class=Response, **documentation.REPORT)
     async def report(request: Request, parameters: Annotated[Parameters, Query()]) -> Response:

@@ -6,8 +6,6 @@ import asyncio
 import logging
 import signal
 import socket
-from collections.abc import Callable
-from contextlib import ExitStack
 from functools import partial
 from types import FrameType
 
@@ -23,7 +21,9 @@ from .connection.crowd import Crowd
 from .connection.pace import Pace
 from .connection.protocol import BoundedProtocol
 from .connection.shared import Bounds, Shared
+from .prompt_server import PromptServer
 from .watch.metrics import Metrics
+from .watch.scrapes import scrapes
 
 log = logging.getLogger("pns.service")
 
@@ -31,6 +31,8 @@ log = logging.getLogger("pns.service")
 FLUSH_SECONDS = 2
 # Connections that may wait, in the system, to be taken.
 WAITING = 2048
+# Connections to the metrics.
+MOST_SCRAPERS = 16
 
 
 class DrainingServer(uvicorn.Server):
@@ -41,10 +43,17 @@ class DrainingServer(uvicorn.Server):
     once. A second signal, and the deadline, end what is under way with 503.
     """
 
-    def __init__(self, config: uvicorn.Config, admission: Admission, drain_seconds: float) -> None:
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        admission: Admission,
+        drain_seconds: float,
+        beside: uvicorn.Server | None = None,
+    ) -> None:
         super().__init__(config)
         self._admission = admission
         self._drain_seconds = drain_seconds
+        self._beside = beside
         self._deadline: float | None = None
         self._signals = 0
 
@@ -55,6 +64,16 @@ class DrainingServer(uvicorn.Server):
             for listening in server.sockets:
                 with listening.dup() as same:
                     same.listen(WAITING)
+
+    async def serve(self, sockets: list[socket.socket] | None = None) -> None:
+        """Serve, with another server beside this one for as long."""
+        if self._beside is None:
+            await super().serve(sockets)
+            return
+        async with asyncio.TaskGroup() as both:
+            both.create_task(self._beside.serve())
+            await super().serve(sockets)
+            self._beside.should_exit = True
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Close the admission; uvicorn calls this as the signal handler."""
@@ -84,41 +103,48 @@ class DrainingServer(uvicorn.Server):
 
 def serve(settings: Settings) -> None:
     """Serve until a signal comes. Raises StartError."""
-    with ExitStack() as ends:
-        # Uvicorn says between its log lines alone that a port is taken, by the metrics too.
-        with _listening(settings.host, settings.port):
-            log_lines.configure()
-            app = create_app(settings)
-            if settings.metrics_port is not None:
-                ends.callback(_serve_metrics(app.state.metrics, settings))
-        server = DrainingServer(
-            configuration(app, settings), app.state.admission, settings.drain_seconds
-        )
-        # Whoever was started by nohup goes on.
-        if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
-            signal.signal(signal.SIGHUP, server.hang_up)
-        server.run()
+    # Uvicorn says between its log lines alone that a port is taken.
+    with _listening(settings.host, settings.port, "give another --host or --port"):
+        log_lines.configure()
+        app = create_app(settings)
+        metrics = _metrics_server(app.state.metrics, settings)
+    server = DrainingServer(
+        configuration(app, settings), app.state.admission, settings.drain_seconds, metrics
+    )
+    # Under nohup the signal stays ignored.
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
+        signal.signal(signal.SIGHUP, server.hang_up)
+    server.run()
 
 
-def _listening(host: str, port: int) -> socket.socket:
-    """Listen at an address. Raises StartError where nobody can."""
+def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket:
+    """Listen at an address. Raises StartError where it is taken."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
-        raise StartError(f"{error.strerror}; give another --host or --port") from error
+        raise StartError(f"{what}{error.strerror}; {hint}") from error
 
 
-def _serve_metrics(metrics: Metrics, settings: Settings) -> Callable[[], None]:
-    """Answer on the port of the metrics; return what ends it. Raises StartError."""
+def _metrics_server(metrics: Metrics, settings: Settings) -> uvicorn.Server | None:
+    """Return what serves the metrics, where they have a port. Raises StartError."""
     host, wanted = settings.metrics_host, settings.metrics_port
-    try:
-        port, stop = metrics.serve(host, wanted or 0)
-    except OSError as error:
-        hint = "give a PNS_METRICS_PORT that is free, and not PNS_PORT"
-        raise StartError(f"metrics on {host}:{wanted}: {error.strerror}; {hint}") from error
-    log.info("metrics on http://%s:%d/metrics", host, port)
-    return stop
+    if wanted is None:
+        return None
+    hint = "give a PNS_METRICS_PORT that is free, and not PNS_PORT"
+    listening = _listening(host, wanted, hint, f"metrics on {host}:{wanted}: ")
+    log.info("metrics on http://%s:%d/metrics", host, listening.getsockname()[1])
+    config = uvicorn.Config(
+        scrapes(metrics.registry),
+        lifespan="off",
+        ws="none",
+        proxy_headers=False,
+        server_header=False,
+        log_config=None,
+        access_log=False,
+        timeout_graceful_shutdown=FLUSH_SECONDS,
+    )
+    return PromptServer(config, settings.head_seconds, MOST_SCRAPERS, [listening])
 
 
 def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:

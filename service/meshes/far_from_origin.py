@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float, Int
+
 from pns_common.rows import dot, extent
 
 # Nearer than so many times its own size a surface is not looked at: its sides would have to be some

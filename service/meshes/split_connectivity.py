@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
+
 from pns_common.grid import (
     blend_along,
     blend_inside,
@@ -18,7 +19,6 @@ from pns_common.grid import (
     number_points,
     take_points,
 )
-
 from pns_common.parallel import Blocks, available_threads
 from pns_common.topology import build_topology
 

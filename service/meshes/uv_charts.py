@@ -7,11 +7,11 @@ from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
-from pns_common.rows import as_words, distinct_rows, number_by_first_appearance
 
 from pns_common.columns import level_topologies
 from pns_common.creases import Creases
 from pns_common.parallel import Blocks, available_threads
+from pns_common.rows import as_words, distinct_rows, number_by_first_appearance
 from pns_common.schemes import LOOP
 from pns_common.topology import EdgeClass, Topology, split_faces
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
+
 from pns_common.rows import distinct_rows, number_by_first_appearance
 
 

@@ -6,9 +6,9 @@ from itertools import pairwise, product
 
 import numpy as np
 from jaxtyping import Float, Int
-from pns_common.rows import distinct_rows
 
 from pns_common.reference_length import measure_reference_length
+from pns_common.rows import distinct_rows
 
 from .weld import Weld, weld_by_label
 

@@ -19,11 +19,11 @@ from pns_common.model.session import Model
 from ..bodies.folder import folder_of
 from ..bodies.media import GLTF_KINDS, KINDS
 from ..bodies.sibling_files import ALONE, SiblingFiles
+from ..bodies.uploads import Sent
 from ..course import Course
-from ..errors import InvalidParameter
+from ..errors import InvalidParameter, ServiceError
 from ..gltf.read.upload import read_upload
 from ..gltf.subdivide import make_scheme, subdivide_gltf
-from ..gltf.write.storage import REPORT_KEY
 from ..options import Limits, Options
 from ..printable import printable
 from ..report import Change
@@ -32,7 +32,8 @@ from .flatten import flatten
 from .indexed_triangles import IndexedTriangles
 from .refine_triangles import check_cost, refine_triangles
 from .single_precision import rounding_changes
-from .triangles_glb import as_gltf_json, triangles_glb
+from .to_gltf import as_gltf
+from .triangles_glb import as_gltf_json
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -69,13 +70,20 @@ def convert(
     data = source.read_bytes()
     # Loop needs none, but one that is named and does not exist is a mistake to be told.
     loaded = load_model(model) if options.scheme == "pns" or model is not None else None
-    with _progress(console) as course:
-        written = converted(data, kind, target, options, loaded, limits, course, folder_of(source))
+    try:
+        with _progress(console) as course:
+            written = converted(
+                data, kind, target, options, loaded, limits, course, folder_of(source)
+            )
+    except ServiceError as error:
+        if not isinstance(error, InvalidParameter):
+            error.file = str(source)
+        raise
     replace_file(output, written.content)
     if report_file is not None:
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
         replace_file(report_file, text + b"\n")
-    for line in lines_of(written.report):
+    for line in (*lines_of(written.report), *advice_lines(written.report)):
         console.print(printable(line), markup=False)
     seconds = time.perf_counter() - began
     console.print(f"{output}: {written.faces:,} faces in {seconds:.1f} s", markup=False)
@@ -99,6 +107,12 @@ def converted(
     if kind in GLTF_KINDS:
         done = subdivide_gltf(data, kind, options, model, limits, course, siblings=siblings)
         return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
+    if target in GLTF_KINDS:
+        sent = as_gltf(Sent(data, kind, siblings=siblings), options, limits)
+        done = subdivide_gltf(
+            sent.data, sent.kind, options, model, limits, course, losses=sent.losses
+        )
+        return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
     course = Course() if course is None else course
     with course.stage("read", 0.0, 0.2):
         triangles = formats.read(data, kind)
@@ -106,7 +120,7 @@ def converted(
     with course.stage("refine", 0.2, 0.7):
         refined, report = refine_triangles(triangles, scheme, options, limits, course)
     with course.stage("write", 0.7, 1.0):
-        written = _of_triangles(refined, report, target, options, limits)
+        written = _of_triangles(refined, report, target, options)
     return replace(written, seconds=course.seconds)
 
 
@@ -143,6 +157,15 @@ def lines_of(report: dict[str, Any]) -> Iterator[str]:
             yield f"{count} × {what}"
 
 
+def advice_lines(report: dict[str, Any]) -> list[str]:
+    """Return the report's advice, with the options as the command line spells them."""
+    spelt = {"crease=": "--crease ", "weld_tolerance=": "--weld-tolerance "}
+    lines = report["advice"]
+    for option, flag in spelt.items():
+        lines = [line.replace(option, flag) for line in lines]
+    return lines
+
+
 def _kind(name: str, path: Path) -> str:
     kind = path.suffix.lower().removeprefix(".")
     if kind not in KINDS:
@@ -176,7 +199,7 @@ def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) ->
 
 
 def _of_triangles(
-    refined: IndexedTriangles, report: dict[str, Any], target: str, options: Options, limits: Limits
+    refined: IndexedTriangles, report: dict[str, Any], target: str, options: Options
 ) -> Written:
     changes = [] if target in formats.HOLDS_DOUBLE else rounding_changes(refined)
     if refined.uv is not None and target not in formats.HOLDS_UV:
@@ -184,17 +207,12 @@ def _of_triangles(
         changes.append(Change("", what, 1))
     if options.diagnostics == "full":
         changes.append(Change("", "values at vertices dropped: only a glTF's are kept", 1))
-    if options.normals != "keep":
-        changes.append(Change("", "normals not written: only a glTF that came as one has them", 1))
+    if options.normals not in ("auto", "keep"):
+        changes.append(Change("", "normals dropped: only a glTF's are written", 1))
     if options.compress != "none":
-        changes.append(Change("", "not compressed: only a glTF that came as one is", 1))
+        changes.append(Change("", "not compressed: only a glTF is", 1))
     report = _with_changes(report, changes)
-    faces = len(refined.faces)
-    if target not in GLTF_KINDS:
-        return Written(formats.write(refined, target), report, faces)
-    extras = {} if options.diagnostics == "none" else {REPORT_KEY: report}
-    glb = triangles_glb(refined, extras=extras)
-    return Written(glb if target == "glb" else as_gltf_json(glb, limits), report, faces)
+    return Written(formats.write(refined, target), report, len(refined.faces))
 
 
 def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+
 from pns_common.rows import disjoint_faces
 
 from ..errors import UnrefinableError

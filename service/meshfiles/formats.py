@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
+
 from pns_common.rows import disjoint_faces
 
 from ..bodies.media import GLTF_KINDS

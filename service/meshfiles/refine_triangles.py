@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
-from pns_common.rows import distinct_rows, number_by_first_appearance
 
 from pns_common.creases import Creases
 from pns_common.errors import MeshError
 from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
 from pns_common.refinement import Refinement, refine
+from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import Scheme
 
+from ..advice import advice_on, count_bends
 from ..course import Course
 from ..errors import InvalidParameter, UnrefinableError, check_limit
 from ..gltf.read.plan import BYTES_FOR_LIMIT, BYTES_PER_FACE, check_memory
@@ -82,8 +83,11 @@ def refine_triangles(
         "zero_reference_lengths": int(report["reference_length"] == 0),
     }
     report["dropped"] = dropped(int((~proper).sum()), _unused_vertices(mesh_file, welded, cleaned))
+    (bends,) = count_bends(cleaned.mesh, creases)
+    levels = refinement.report["levels"]
     report["changes"] = [asdict(change) for change in changes]
-    report["levels"] = refinement.report["levels"]
+    report["advice"] = advice_on(levels, bends)
+    report["levels"] = levels
     return refined, report
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from pns_common.rows import distinct_rows
 
 from pns_common.mesh import repeated_vertex
+from pns_common.rows import distinct_rows
 
 from ..errors import UnrefinableError
 from ..meshes.far_from_origin import STEPS, faces_too_far

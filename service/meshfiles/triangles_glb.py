@@ -6,6 +6,7 @@ import base64
 from typing import Any
 
 import numpy as np
+
 from pns_common.rows import extent
 
 from ..gltf.constants import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, FLOAT, UNSIGNED_INT

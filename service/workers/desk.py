@@ -116,8 +116,7 @@ class Desk:
         finally:
             if not job.state.ended:
                 job.state = State.CANCELLED
-            job.body.release()
-            job.page.close()
+            job.close()
             job.accepted.set()
             job.ended.set()
             for watcher in self.watchers:

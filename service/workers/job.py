@@ -74,6 +74,14 @@ class Job:
     accepted: asyncio.Event = field(default_factory=asyncio.Event)
     ended: asyncio.Event = field(default_factory=asyncio.Event)
     fetched: asyncio.Event = field(default_factory=asyncio.Event)
+    closed: bool = False
+
+    def close(self) -> None:
+        """Close the body and the page, once; what the page says last stays."""
+        if not self.closed:
+            self.closed = True
+            self.body.release()
+            self.page.close()
 
     @property
     def files(self) -> list[MemoryFile]:

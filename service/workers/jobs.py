@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from ..bodies.encodings import IDENTITY, decoded
+from ..bodies.media import Kind
 from ..course import Course
 from ..errors import LimitError, NoModelError, check_limit
 from ..memory_cap import memory_cap
@@ -25,6 +27,8 @@ from .progress import Reporter
 if TYPE_CHECKING:
     from pns_common.model.session import Model
 
+    from ..bodies.uploads import Sent
+    from ..meshfiles.convert import Written
     from .catalogue import Catalogue
 
 log = logging.getLogger("pns.service")
@@ -41,7 +45,8 @@ class Work:
 
     `answer` and `report` are what the worker fills, None what nobody wants; together they may hold
     `answer_bytes`. `page` is where it tells how far it is. `model` is the name of one of the
-    worker's models; None: the served one. `request_id` stands in what the worker logs.
+    worker's models; None: the served one. `request_id` stands in what the worker logs. A body with
+    an `encoding` unpacks to `body_bytes` at most. `target` is the kind of file to answer with.
     """
 
     body: FileName
@@ -52,8 +57,11 @@ class Work:
     options: Options
     model: str | None
     limits: Limits
+    target: Kind = "glb"
     answer_bytes: int | None = None
     request_id: str | None = None
+    encoding: str = IDENTITY
+    body_bytes: int = 64 * 1024**2
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +78,7 @@ class Done:
 
 
 def subdivide(work: Work) -> Done:
-    """Write the GLB to `work.answer`, and the report as JSON to `work.report`.
+    """Write the file to `work.answer`, and the report as JSON to `work.report`.
 
     Raises:
         ServiceError: the upload is wrong or over a limit; JobStopped where nobody wants it.
@@ -78,37 +86,51 @@ def subdivide(work: Work) -> Done:
     import msgspec
 
     from ..bodies import uploads
-    from ..gltf.subdivide import subdivide_gltf
-    from ..meshfiles.to_gltf import as_gltf
 
-    reporter = Reporter(work.page)
-    with job_memory(work.limits):
-        body = uploads.sent(memory_file.read(work.body), work.content_type, work.limits)
-        sent = as_gltf(body, work.options, work.limits)
+    with Reporter(work.page) as reporter, job_memory(work.limits):
+        sent = uploads.sent(_body_of(work), work.content_type, work.limits)
         model = _MODELS.get(work.model) if work.options.scheme == "pns" else None
-        done = subdivide_gltf(
-            sent.data,
-            sent.kind,  # pyright: ignore[reportArgumentType]  (as_gltf gives no other)
-            work.options,
-            model,
-            work.limits,
-            course=Course(begins=reporter.stage, moves=reporter.reach),
-            siblings=sent.siblings,
-            losses=sent.losses,
-        )
-        report = msgspec.json.encode(done.report)
-        _check_answer(work, report, done.glb)
+        course = Course(begins=reporter.stage, moves=reporter.reach)
+        written = _refined(work, sent, model, course)
+        report = msgspec.json.encode(written.report)
+        _check_answer(work, report, written.content)
         if work.report is not None:
             memory_file.write(work.report, report)
         if work.answer is not None:
-            memory_file.write(work.answer, done.glb)
-    faces = done.report["totals"]["faces"]
+            memory_file.write(work.answer, written.content)
+    faces = written.report["totals"]["faces"]
     return Done(
-        done.timings,
+        written.seconds,
         None if model is None else model.name,
         faces_in=faces // 4**work.options.levels,
         faces=faces,
     )
+
+
+def _refined(work: Work, sent: Sent, model: Model | None, course: Course) -> Written:
+    """Refine a file into one of the kind that is wanted."""
+    from ..gltf.subdivide import subdivide_gltf
+    from ..meshfiles.convert import Written, converted
+    from ..meshfiles.to_gltf import as_gltf
+
+    options, limits = work.options, work.limits
+    if work.target != "glb":
+        siblings = sent.siblings
+        return converted(
+            sent.data, sent.kind, work.target, options, model, limits, course, siblings
+        )
+    sent = as_gltf(sent, options, limits)
+    done = subdivide_gltf(
+        sent.data,
+        sent.kind,  # pyright: ignore[reportArgumentType]  (as_gltf gives no other)
+        options,
+        model,
+        limits,
+        course=course,
+        siblings=sent.siblings,
+        losses=sent.losses,
+    )
+    return Written(done.glb, done.report, done.report["totals"]["faces"], done.timings)
 
 
 def measure(work: Work) -> Cost:
@@ -119,18 +141,24 @@ def measure(work: Work) -> Cost:
 
     glance = replace(work.limits, max_memory_bytes=min(work.limits.max_memory_bytes, GLANCE_BYTES))
     with job_memory(work.limits):
-        body = memory_file.read(work.body)
+        body = _body_of(work)
         try:
             sent = uploads.sent(body, work.content_type, glance)
+            levels, learned = work.options.levels, _learned_levels(work)
+            of_kind = cost_of_gltf if sent.kind in ("glb", "gltf") else cost_of_other
+            return of_kind(sent.data, sent.kind, levels, work.limits, learned)
         except LimitError as error:
+            # An archive may be too large to be unpacked for a glance.
             if error.limit != "archive-bytes":
                 raise
-            # Too large to be unpacked for a glance: it is taken for the largest that may come.
-            return replace(cost_of(work.limits.max_faces, 1, len(body)), most=True)
-        levels, learned = work.options.levels, _learned_levels(work)
-        if sent.kind in ("glb", "gltf"):
-            return cost_of_gltf(sent.data, sent.kind, levels, work.limits, learned)
-        return cost_of_other(sent.data, sent.kind, levels, work.limits, learned)
+        except ArithmeticError:
+            # Counts that no number holds.
+            pass
+        return replace(cost_of(work.limits.max_faces, 1, len(body)), most=True)
+
+
+def _body_of(work: Work) -> bytes:
+    return decoded(memory_file.read(work.body), work.encoding, work.body_bytes)
 
 
 def _learned_levels(work: Work) -> int:

@@ -33,6 +33,8 @@ VALUES_PER_EMPTY_SET = 4
 
 # Of a sparse accessor all places are gone through each time it is read: forty cost as a value.
 PLACES_PER_VALUE = 40
+# Larger counts cost as this one: no file that is read has more of anything.
+LARGEST_COUNT = 2**40
 
 
 class _Sparse(msgspec.Struct):
@@ -124,7 +126,12 @@ def _places(primitive: _Primitive, accessors: list[_Accessor]) -> int:
     """Count the places of the sparse accessors that it names, as often as it does."""
     named = chain(primitive.attributes.values(), *(t.values() for t in primitive.targets))
     sparse = (accessors[index].sparse for index in named if 0 <= index < len(accessors))
-    return sum(max(part.count, 0) for part in sparse if part is not None)
+    return sum(_bounded(part.count) for part in sparse if part is not None)
+
+
+def _bounded(count: int) -> int:
+    """Clamp a count from a document, which may have thousands of digits."""
+    return min(max(count, 0), LARGEST_COUNT)
 
 
 def _triangles(primitive: _Primitive, accessors: list[_Accessor]) -> int:
@@ -134,7 +141,7 @@ def _triangles(primitive: _Primitive, accessors: list[_Accessor]) -> int:
         index = primitive.attributes.get("POSITION", -1)
     if not 0 <= index < len(accessors):
         return 0
-    corners = max(accessors[index].count, 0)
+    corners = _bounded(accessors[index].count)
     if primitive.mode == TRIANGLES:
         return corners // 3
     return max(corners - 2, 0) if primitive.mode in SURFACES else 0

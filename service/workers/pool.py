@@ -104,12 +104,35 @@ class Workers:
         Cancelling this call ends the work: `stop` is called to ask for it, and a worker that has
         not come back shortly after is killed, at once where there is no `stop`.
 
+        Jobs have no side effects: one whose process ended is tried once more, in another.
+
         Raises what the function raises (ServiceError as it is, anything else as
         worker.JobFaultError), BusyError where no worker becomes free, JobTimeout past the deadline,
-        WorkerDied where the process ended.
+        WorkerDied where the process ended twice.
         """
         if must_end is None:
             must_end = time.monotonic() + self._seconds
+
+        async def attempt() -> T:
+            return await self._run_once(
+                function, *arguments, files=files, must_end=must_end, stop=stop, taken=taken
+            )
+
+        try:
+            return await attempt()
+        except WorkerDied as error:
+            log.warning("a job is tried again: %s", error)
+            return await attempt()
+
+    async def _run_once(
+        self,
+        function: Callable[..., T],
+        *arguments: object,
+        files: Sequence[MemoryFile],
+        must_end: float,
+        stop: Callable[[], None] | None,
+        taken: Callable[[], None],
+    ) -> T:
         pool = await self._take(must_end)
         taken()
         for file in files:

@@ -89,14 +89,23 @@ class ProgressPage:
 
 
 class Reporter:
-    """The worker's side of the page."""
+    """The worker's side of the page, open until the end of a `with` block."""
 
     def __init__(self, name: FileName) -> None:
         descriptor = memory_file.opened(name, os.O_RDWR)
         try:
-            self._words = memoryview(mmap.mmap(descriptor, _SIZE)).cast("q")
+            self._map = mmap.mmap(descriptor, _SIZE)
         finally:
             os.close(descriptor)
+        self._words = memoryview(self._map).cast("q")
+
+    def __enter__(self) -> Reporter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        # A map has a descriptor of its own.
+        self._words.release()
+        self._map.close()
 
     def stage(self, name: str) -> None:
         """Begin a stage. Raises JobStopped."""

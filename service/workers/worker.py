@@ -69,10 +69,28 @@ def call(function: Callable[..., T], *arguments: object) -> T:
     try:
         with rare_searches():
             return function(*arguments)
-    except ServiceError:
-        raise
+    except ServiceError as error:
+        _let_go(error)
+        raise error.with_traceback(None) from None
     except Exception as error:
-        raise JobFaultError("".join(traceback.format_exception(error))) from None
+        text = "".join(traceback.format_exception(error))
+        _let_go(error)
+        raise JobFaultError(text) from None
+
+
+def _let_go(error: BaseException | None) -> None:
+    """Clear the frames of an error and of its causes, which hold the job's files and arrays.
+
+    The error is kept until it is sent, and in a cycle for longer.
+    """
+    seen: set[int] = set()
+    while error is not None and id(error) not in seen:
+        seen.add(id(error))
+        traceback.clear_frames(error.__traceback__)
+        error.__traceback__ = None
+        cause, context = error.__cause__, error.__context__
+        error.__cause__ = error.__context__ = None
+        error = cause or context
 
 
 @contextmanager

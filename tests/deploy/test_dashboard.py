@@ -2,17 +2,17 @@
 
 import json
 import re
-import urllib.request
 from pathlib import Path
 
 import pytest
-from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 
 from service.http.app import create_app
 from service.http.server import configuration
+from service.http.watch.scrapes import scrapes
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
+from tests.support.live import local
 
 DASHBOARD = json.loads(
     (Path(__file__).resolve().parents[2] / "deploy" / "grafana" / "pns.json").read_text()
@@ -27,15 +27,12 @@ def served():
     settings = Settings(workers=1)
     app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
     configuration(app, settings)
-    with TestClient(app) as client:
+    with local(app) as client:
         glb = {"Content-Type": "model/gltf-binary"}
         while client.post("/subdivide", content=b"x", headers=glb).status_code != 200:
             pass
         client.get("/models")
-        port, stop = app.state.metrics.serve("127.0.0.1", 0)
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:
-            text = answer.read().decode()
-        stop()
+        text = local(scrapes(app.state.metrics.registry)).get("/metrics").text
     families = list(text_string_to_metric_families(text))
     names = {sample.name: set() for family in families for sample in family.samples}
     for family in families:

@@ -77,4 +77,4 @@ def test_the_images_settings_are_settings():
 
 def test_the_kernels_of_the_installed_package_are_compiled():
     """In /src, `python -m` would take the sources there, and every worker would compile again."""
-    assert "cd / && /opt/pns/bin/python -m pns_common.fused" in DOCKERFILE
+    assert "cd / && /opt/pns/bin/python -m pns_common.warming" in DOCKERFILE

@@ -6,9 +6,7 @@ from typer.testing import CliRunner
 
 import export.run
 from export.published import export_published
-from pns_common import load_model, refine
-from pns_common.errors import ModelError
-from pns_common.schemes import pns
+from pns_common import ModelError, load_model, pns, refine
 from tests.support.networks import published_model
 from tests.support.shared import published, shared_path
 from train.data.datasets import ridge_held_out

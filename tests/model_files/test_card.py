@@ -6,7 +6,7 @@ from dataclasses import fields
 import pytest
 
 from pns_common.model.card import FORMAT_4_FIELDS, ModelCard
-from tests.support.model_files import DEFAULT_CARD, PAPER_CARD
+from tests.support.networks import CARD, DEFAULT_CARD
 
 
 def changed(card, **changes):
@@ -15,13 +15,13 @@ def changed(card, **changes):
     return json.dumps({name: value for name, value in values.items() if value is not None})
 
 
-@pytest.mark.parametrize("card", [PAPER_CARD, DEFAULT_CARD], ids=["1", "4"])
+@pytest.mark.parametrize("card", [CARD, DEFAULT_CARD], ids=["1", "4"])
 def test_a_card_reads_back_as_it_was_written(card):
     assert ModelCard.from_json(card.to_json()) == card
 
 
 def test_format_1_knows_no_field_of_format_4():
-    assert list(json.loads(PAPER_CARD.to_json())) == [
+    assert list(json.loads(CARD.to_json())) == [
         *("format", "features", "gate_sharpness", "budget", "orientation", "training", "metrics")
     ]
 
@@ -87,7 +87,7 @@ def test_a_wrong_field_is_named(changes, says):
 
 def test_a_field_of_format_4_is_refused_in_format_1():
     with pytest.raises(ValueError, match="unknown field fold_angle in format 1"):
-        ModelCard.from_json(changed(PAPER_CARD, fold_angle=75.0))
+        ModelCard.from_json(changed(CARD, fold_angle=75.0))
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,18 @@ import onnx
 import onnxruntime
 import pytest
 import torch
+from typer.testing import CliRunner
 
+import export.run
 from export.model_file import export_model, write_model
 from export.onnx_graph import OPSET, model_bytes
 from export.parity import BUDGETS, TOLERANCE, ParityError, check_parity
 from pns_common import ModelError
 from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS
-from pns_common.model.file import ALLOWED_OPERATORS, load_model, model_from_bytes
-from tests.support.model_files import DEFAULT_CARD, PAPER_CARD
+from pns_common.model.file import ALLOWED_OPERATORS, BUNDLED, load_model, model_from_bytes
+from tests.support.networks import CARD, DEFAULT_CARD
+from train.metrics.card import TO_LIMIT
+from train.metrics.one_step import Improvement
 from train.models.checkpoint import Checkpoint, save_checkpoint
 from train.models.from_recipe import initial_network, initial_vertex_network
 from train.models.networks import BoundedNet
@@ -59,7 +63,7 @@ def two_networks_bytes():
 @pytest.mark.parametrize("scale", [1.0, 20.0])
 def test_a_file_says_what_the_network_says(activation, scale):
     network = dense(activation, scale)
-    parity = check_parity(model_from_bytes(model_bytes(network, PAPER_CARD), "test"), network)
+    parity = check_parity(model_from_bytes(model_bytes(network, CARD), "test"), network)
     assert parity.difference <= TOLERANCE
     assert parity.length <= 1 + TOLERANCE
     if scale > 1:
@@ -113,7 +117,7 @@ def test_the_same_networks_give_the_same_bytes_and_nothing_of_this_machine():
 def test_onnxruntime_computes_an_activation_in_one_operator(tmp_path, activation, fused):
     options = onnxruntime.SessionOptions()
     options.optimized_model_filepath = str(tmp_path / "optimised.onnx")
-    data = model_bytes(dense(activation), PAPER_CARD)
+    data = model_bytes(dense(activation), CARD)
     onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     operators = [node.op_type for node in onnx.load(tmp_path / "optimised.onnx").graph.node]
     assert operators.count(fused) == 2
@@ -139,7 +143,7 @@ def test_a_file_that_differs_is_not_written(tmp_path, monkeypatch, damage):
         "export.model_file.model_bytes", lambda _, card, *rest: model_bytes(other, card)
     )
     with pytest.raises((ParityError, ModelError)) as caught:
-        write_model(network, PAPER_CARD, path)
+        write_model(network, CARD, path)
     if isinstance(caught.value, ParityError):
         assert caught.value.budget in BUDGETS
         assert caught.value.difference > TOLERANCE
@@ -194,3 +198,26 @@ def test_the_command_runs_from_a_checkout_that_is_not_installed(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "parity" in done.stdout
     assert load_model(tmp_path / "c.onnx").card.format == 1
+
+
+def test_a_bundled_model_is_measured_anew_and_keeps_its_networks(tmp_path, monkeypatch):
+    path = tmp_path / "general.onnx"
+    path.write_bytes((BUNDLED / "general.onnx").read_bytes())
+    row = Improvement(reference_mean=2.0, method_mean=1.0, percent=50.0, low=40.0, high=60.0)
+    measures = dict.fromkeys(TO_LIMIT, lambda scheme: {"distance": row})
+    monkeypatch.setattr("export.measure.MEASURES", measures)
+    monkeypatch.setattr("export.run.MODELS", tmp_path)
+    command = ["--measure", "general"]
+    outcome = CliRunner().invoke(export.run.app, command, catch_exceptions=False)
+    assert outcome.exit_code == 0
+    before, after = load_model("general"), load_model(path)
+    assert {name: rows["distance"]["percent"] for name, rows in after.card.metrics.items()} == (
+        dict.fromkeys(TO_LIMIT, 50.0)
+    )
+    assert replace(after.card, metrics={}) == replace(before.card, metrics={})
+    rows = np.random.default_rng(0).standard_normal((50, 18))
+    np.testing.assert_array_equal(after(rows, 1.0), before(rows, 1.0))
+    assert (tmp_path / "SHA256SUMS").read_text() == f"{after.hash}  general.onnx\n"
+    refused = CliRunner().invoke(export.run.app, ["--measure", "nothing"])
+    assert refused.exit_code == 1
+    assert "expected a model file" in refused.output

@@ -25,15 +25,16 @@ from pns_common.model.file import (
     model_name,
 )
 from pns_common.model.session import CHUNK_ROWS
-from tests.support.model_files import (
+from tests.support.networks import (
+    CARD,
     DEFAULT_CARD,
-    PAPER_CARD,
-    default_bytes,
+    default_model_bytes,
     model_bytes,
-    paper_bytes,
+    perceptron_bytes,
+    random_layers,
 )
 
-GOOD = paper_bytes()
+GOOD = perceptron_bytes(random_layers(0))
 node = helper.make_node
 PASS = [node("Slice", ["features", "from", "to", "axis"], ["three"])]
 CUT = {"from": np.array([0]), "to": np.array([3]), "axis": np.array([1])}
@@ -57,7 +58,7 @@ def changed(change, data=GOOD):
     return proto.SerializeToString()
 
 
-def card_text(card=PAPER_CARD, **changes):
+def card_text(card=CARD, **changes):
     return json.dumps(json.loads(card.to_json()) | changes)
 
 
@@ -67,8 +68,8 @@ def through(*nodes):
 
 
 def test_a_good_file_gives_its_card():
-    assert check_file(GOOD, "good") == PAPER_CARD
-    assert check_file(default_bytes(), "good") == DEFAULT_CARD
+    assert check_file(GOOD, "good") == CARD
+    assert check_file(default_model_bytes(), "good") == DEFAULT_CARD
 
 
 @pytest.mark.parametrize("data", [b"", b"not a model", GOOD[: len(GOOD) // 2], bytes(1000)])
@@ -88,7 +89,7 @@ def test_bytes_that_are_no_onnx_file_are_refused(data):
     ],
 )
 def test_a_wrong_card_is_named(card, says):
-    assert says in refused(paper_bytes(card=card)).found
+    assert says in refused(perceptron_bytes(random_layers(0), card=card)).found
 
 
 def test_a_second_card_is_refused():
@@ -235,7 +236,7 @@ def test_other_inputs_or_outputs_are_refused(inputs, outputs):
 
 
 def test_a_file_holds_the_networks_that_its_card_names():
-    two, one = default_bytes(), paper_bytes(card=DEFAULT_CARD)
+    two, one = default_model_bytes(), perceptron_bytes(random_layers(0), card=DEFAULT_CARD)
     assert "vertex_features" in refused(one).expected
 
     def as_paper(proto):
@@ -262,7 +263,7 @@ def doubled(source, axis, times):
 
 
 def test_wide_layers_are_accepted_up_to_the_limit_and_no_further():
-    assert check_file(two_wide(WIDEST), "wide") == PAPER_CARD
+    assert check_file(two_wide(WIDEST), "wide") == CARD
     error = refused(two_wide(WIDEST + 1))
     assert error.expected == f"at most {LARGEST_CALL} bytes in one call"
     assert int(error.found) > LARGEST_CALL
@@ -379,7 +380,7 @@ def test_a_file_is_called_by_its_stem(tmp_path):
         path = tmp_path / file
         path.write_bytes(GOOD)
         model = load_model(str(path))
-        assert (model.name, model.card, model.size) == ("mine", PAPER_CARD, len(GOOD))
+        assert (model.name, model.card, model.size) == ("mine", CARD, len(GOOD))
         assert model_name(path) == "mine"
     assert model_name("paper") == model_name(Path("other/paper.onnx")) == "paper"
 

@@ -13,14 +13,14 @@ from onnx import TensorProto, helper
 from pns_common import ModelError, ParameterError
 from pns_common.model.file import model_from_bytes
 from pns_common.model.session import CHUNK_ROWS, CPU, Model
-from tests.support.model_files import (
-    default_bytes,
+from tests.support.networks import (
     default_model,
-    float64_perceptron,
+    default_model_bytes,
+    float64_network,
     model_bytes,
-    paper_bytes,
-    paper_model,
+    perceptron_bytes,
     random_layers,
+    random_model,
 )
 
 node = helper.make_node
@@ -35,8 +35,8 @@ def rows(count, width=5, seed=0):
 @pytest.mark.parametrize("budget", [0.0, 0.5, 1e3])
 def test_answers_are_those_of_the_network_in_double_precision(budget):
     features = rows(700)
-    expected = budget * float64_perceptron(random_layers(0))(features)
-    answers = paper_model(0)(features, budget)
+    expected = budget * float64_network(random_layers(0))(features)
+    answers = random_model(0)(features, budget)
     assert answers.dtype == np.float32
     np.testing.assert_allclose(answers, expected, rtol=0, atol=2e-6 * budget)
     assert np.linalg.norm(answers, axis=1).max() <= budget * (1 + 1e-6)
@@ -50,12 +50,12 @@ def test_each_network_answers_its_own_features():
         (model.vertex_correction(vertices, 1.0), vertices, 4),
     ):
         layers = random_layers(seed, (features.shape[1], 16, 3), 1.0)
-        np.testing.assert_allclose(answers, float64_perceptron(layers)(features), atol=2e-6)
+        np.testing.assert_allclose(answers, float64_network(layers)(features), atol=2e-6)
 
 
 def test_a_rows_bits_depend_on_nothing_but_the_row():
     """Not on how many rows there are, nor on where in a chunk it stands."""
-    for ask, width in ((paper_model(0), 5), (default_model(0).vertex_correction, 10)):
+    for ask, width in ((random_model(0), 5), (default_model(0).vertex_correction, 10)):
         features = rows(2 * CHUNK_ROWS + 17, width)
         whole = ask(features, 1.0)
         for count in (1, 2, 3, 5, 8, 15, 16, 17, 31, 100, CHUNK_ROWS - 1, CHUNK_ROWS + 1):
@@ -75,7 +75,7 @@ def test_threads_share_a_model_and_change_nothing():
 
 
 def test_each_thread_has_a_session_of_its_own_and_keeps_it():
-    model, seen = paper_model(0), {}
+    model, seen = random_model(0), {}
 
     def ask(number):
         sessions = [model._session() for _ in range(2)]
@@ -90,27 +90,31 @@ def test_each_thread_has_a_session_of_its_own_and_keeps_it():
     assert len({id(session) for session in [*seen.values(), model._session()]}) == 4
 
 
-@pytest.mark.parametrize("make", [paper_bytes, default_bytes])
-def test_a_model_travels_to_another_process(make):
-    model = model_from_bytes(make(0), "mine")
+@pytest.mark.parametrize(
+    ("data", "width"),
+    [(perceptron_bytes(random_layers(0)), 5), (default_model_bytes(), 18)],
+    ids=["1", "4"],
+)
+def test_a_model_travels_to_another_process(data, width):
+    model = model_from_bytes(data, "mine")
     copy = pickle.loads(pickle.dumps(model))
     assert isinstance(copy, Model)
     assert (copy.name, copy.hash, copy.card, copy.size, copy.providers) == (
         *("mine", model.hash, model.card, model.size, CPU),
     )
-    features = rows(9, 5 if make is paper_bytes else 18)
+    features = rows(9, width)
     np.testing.assert_array_equal(copy(features, 0.5), model(features, 0.5))
 
 
 def test_a_model_without_a_vertex_network_says_so():
     with pytest.raises(ModelError, match="vertex_features"):
-        paper_model(0).vertex_correction(rows(1, 10), 1.0)
+        random_model(0).vertex_correction(rows(1, 10), 1.0)
 
 
 @pytest.mark.parametrize("providers", [(), ("NoSuchExecutionProvider",)])
 def test_a_provider_that_is_not_there_is_refused(providers):
     with pytest.raises(ParameterError, match="CPUExecutionProvider"):
-        model_from_bytes(paper_bytes(), "mine", providers)
+        model_from_bytes(perceptron_bytes(random_layers(0)), "mine", providers)
 
 
 def test_answers_that_are_not_finite_are_refused():

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from service.settings import Settings
 
 EXAMPLES = {
+    "ignore_unknown": ("true", True),
     "host": ("0.0.0.0", "0.0.0.0"),
     "port": ("8080", 8080),
     "prefix": ("/tools/pns", "/tools/pns"),
@@ -32,6 +33,7 @@ EXAMPLES = {
         "https://a.example,http://[::1]:80",
         ("https://a.example", "http://[::1]:80"),
     ),
+    "hosts": ("pns.example, *.A.example", ("pns.example", "*.a.example")),
     "metrics_host": ("0.0.0.0", "0.0.0.0"),
     "metrics_port": ("9000", 9000),
     "head_seconds": ("3", 3),
@@ -47,6 +49,7 @@ EXAMPLES = {
     "queue_seconds": ("90", 90),
     "short_seconds": ("0.2", 0.2),
     "faces_per_minute": ("1000", 1000),
+    "promised_seconds": ("30", 30),
     "result_seconds": ("60", 60),
     "result_bytes": ("1MiB", 2**20),
     "results": ("3", 3),
@@ -194,3 +197,21 @@ def test_a_misspelt_setting_is_refused(
     with pytest.raises(ValidationError) as refused:
         Settings()
     assert text in str(refused.value)
+
+
+def test_another_programs_variable_passes_where_it_is_said_to(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("PNS_FOO", "1")
+    with pytest.raises(ValidationError, match="PNS_FOO: unset it, or set PNS_IGNORE_UNKNOWN=1"):
+        Settings()
+    monkeypatch.setenv("PNS_IGNORE_UNKNOWN", "1")
+    assert Settings().ignore_unknown
+
+
+@pytest.mark.parametrize("name", ["PNS_BODDY", "PNS_JOB_FOO"])
+def test_what_resembles_a_setting_never_passes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PNS_IGNORE_UNKNOWN", "1")
+    monkeypatch.setenv(name, "1")
+    with pytest.raises(ValidationError, match=name):
+        Settings()

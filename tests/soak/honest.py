@@ -98,7 +98,7 @@ def slow(address: Address, samples: list[Sample], tally: Tally, ended: threading
     """Uploads and reads at 64 KiB a second: slow, and within what is allowed."""
     sample = next(sample for sample in samples if sample.name.startswith("obj"))
     head = (
-        f"POST /subdivide?{sample.query} HTTP/1.1\r\nHost: soak\r\nConnection: close\r\n"
+        f"POST /subdivide?{sample.query} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
         f"Content-Type: {sample.content_type}\r\nContent-Length: {len(sample.body)}\r\n\r\n"
     )
     while not ended.is_set():
@@ -130,7 +130,7 @@ def leaving(
     while not ended.is_set():
         sample = rng.choice(samples)
         head = (
-            f"POST /subdivide?{sample.query} HTTP/1.1\r\nHost: soak\r\n"
+            f"POST /subdivide?{sample.query} HTTP/1.1\r\nHost: localhost\r\n"
             f"Content-Type: {sample.content_type}\r\nContent-Length: {len(sample.body)}\r\n\r\n"
         )
         message = head.encode() + sample.body

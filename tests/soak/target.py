@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from multiprocessing.synchronize import Event
 
 Address = tuple[str, int]
-HEAD = "{} {} HTTP/1.1\r\nHost: soak\r\nContent-Type: model/gltf-binary\r\n{}\r\n"
+HEAD = "{} {} HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n{}\r\n"
 PATIENCE = 30
 
 

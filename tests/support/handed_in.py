@@ -11,11 +11,9 @@ from service.workers.memory_file import MemoryFile
 from service.workers.progress import ProgressPage
 
 
-def job_of(content: bytes, answer: MemoryFile, client: str = "a", seconds: float = 60) -> Job:
-    """A job of these bytes, to be done within so many seconds; whoever runs it lets go of them."""
-    body, page = MemoryFile(), ProgressPage()
-    body.append(content)
-    work = Work(
+def work_of(body: MemoryFile, answer: MemoryFile, page: ProgressPage) -> Work:
+    """What a worker is told of a GLB, with the usual options."""
+    return Work(
         body=body.name,
         answer=answer.name,
         report=None,
@@ -25,6 +23,13 @@ def job_of(content: bytes, answer: MemoryFile, client: str = "a", seconds: float
         model=None,
         limits=Limits(),
     )
+
+
+def job_of(content: bytes, answer: MemoryFile, client: str = "a", seconds: float = 60) -> Job:
+    """A job of these bytes, to be done within so many seconds; whoever runs it lets go of them."""
+    body, page = MemoryFile(), ProgressPage()
+    body.append(content)
+    work = work_of(body, answer, page)
     return Job(
         client=client,
         faces_per_minute=None,

@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import uvicorn
+from fastapi.testclient import TestClient
+from starlette.types import ASGIApp
 
 from service.http.app import create_app
 from service.http.server import configuration
@@ -16,6 +18,11 @@ from service.settings import Settings
 from service.workers.costs import Cost
 from service.workers.jobs import Done, Work
 from tests.support import stand_in_jobs as jobs
+
+
+def local(app: ASGIApp, **options: Any) -> TestClient:
+    """A client in this process, of a service that listens on loopback."""
+    return TestClient(app, **{"base_url": "http://localhost"} | options)
 
 
 @contextmanager

@@ -184,7 +184,7 @@ def test_the_command_writes_a_checkpoint_that_says_what_it_was_made_of(tmp_path,
     assert outcome.exit_code == 0, outcome.output
     made = load_checkpoint(out)
     assert made.recipe == small(0)
-    assert made.distilled == Distillation(tuple(each.hash for each in TEACHERS[:2]), 2, 2)
+    assert made.distilled == Distillation(tuple(each.hash for each in TEACHERS[:2]), 2, (2, 2))
 
 
 def test_what_cannot_be_distilled_is_one_line(tmp_path, monkeypatch):

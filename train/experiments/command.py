@@ -25,6 +25,8 @@ from train.experiments.registry import EXPERIMENTS
 from train.output_file import prepare_output
 
 PAGE = "README.md"
+# Of the repository, where this is run.
+INSTALLED = Path("results")
 
 
 def reproduce_command(
@@ -53,7 +55,10 @@ def reproduce_command(
             file_okay=False,
         ),
     ] = None,
-    output: Annotated[Path, typer.Option(help="Folder to write.")] = Path("results"),
+    output: Annotated[Path, typer.Option(help="Folder to write.")] = Path("build/results"),
+    install: Annotated[
+        bool, typer.Option("--install", help="Write results/, which is tracked.")
+    ] = False,
     force: Annotated[bool, typer.Option(help="Run finished experiments again.")] = False,
     processes: Annotated[
         int, typer.Option(min=1, help="Experiments at once; all cores if not given.")
@@ -63,6 +68,7 @@ def reproduce_command(
     console = Console()
     try:
         chosen = _chosen(name, published, assets)
+        output = INSTALLED if install else output
         prepare_output(output / PAGE)
         networks = output / "cache" / "networks"
         laboratory = Laboratory(FULL, networks, checkpoints, published, silent, assets)

@@ -115,7 +115,7 @@ def planned(recipe: Recipe, teachers: Sequence[Model], meshes: int, steps: int) 
     hashes = tuple(teacher.hash for teacher in teachers)
     if len(set(hashes)) < len(hashes):
         raise ParameterError("teachers", hashes, expected="different ones")
-    return Distillation(hashes, meshes, steps)
+    return Distillation(hashes, meshes, (steps, steps))
 
 
 def distil(
@@ -144,10 +144,11 @@ def distil(
             (network, edges, lambda x: torch.tanh(recipe.gate_sharpness * x**2)),
             (vertex_network, vertices, lambda x: torch.tanh(rule.gate_sharpness * x)),
         )
-        for number, (student, answers, gate) in enumerate(fitted):
-            steps = _steps(student, answers, gate, plan.steps, recipe.seed)
-            for step, loss in enumerate(steps, start=1):
-                on_step(number * plan.steps + step, loss)
+        done = 0
+        for (student, answers, gate), steps in zip(fitted, plan.steps, strict=True):
+            for loss in _steps(student, answers, gate, steps, recipe.seed):
+                done += 1
+                on_step(done, loss)
     return network, vertex_network
 
 
@@ -162,8 +163,8 @@ def asked(
     mean = Mean(teachers)
     kept: dict[str, list[Answers]] = {where: [] for where in mean.heard}
     for mesh in meshes:
-        # One thread: its rows are the same in any order, but not those that are drawn of them.
-        refine(mesh, pns(mean), 1, threads=1)
+        # In training no edge is a crease. One thread keeps the order of rows, which are drawn from.
+        refine(mesh, pns(mean), 1, creases=None, threads=1)
         for where, heard in mean.heard.items():
             together = joined(heard) if heard else None
             # Where no gate is open nothing is asked.

@@ -29,12 +29,12 @@ class Distillation:
     Attributes:
         teachers: hashes of the models whose mean answer they learned.
         meshes: pairs of the training stream on whose meshes they were asked.
-        steps: Adam steps of each network.
+        steps: Adam steps of the edge network, and of the vertex network.
     """
 
     teachers: tuple[str, ...]
     meshes: int
-    steps: int
+    steps: tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)

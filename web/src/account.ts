@@ -1,14 +1,16 @@
-/** The account of a result, in the panel: what its report and its file say, and what is measured on it. */
+/** Fill the panel: what a result's report and file say, and what is measured on it. */
 
 import { isAbort } from "./api/problem";
 import { dihedrals } from "./measure/dihedral";
 import { distances, largestLength, rounding } from "./measure/distance";
 import { surfaceOf } from "./measure/surface";
-import type { Lengths } from "./report/certificate";
-import type { Result, Source } from "./session";
+import type { Lengths } from "./report/promises";
+import type { Result } from "./result";
+import type { Source } from "./tasks";
 import {
-  showCertificate,
+  showAdvice,
   showChanges,
+  showPromises,
   showStatistics,
   showTimings,
   showValidation,
@@ -17,7 +19,7 @@ import {
 import { compare } from "./validate/compare";
 import { validate } from "./validate/validate";
 
-/** What lengths are told in: the model's size, and the unit. */
+/** The model's size, and the unit of its lengths. */
 type Scale = Pick<Lengths, "size" | "unit">;
 
 const STAGES: Record<string, string> = {
@@ -33,10 +35,10 @@ const STAGES: Record<string, string> = {
 };
 
 let validation = new AbortController();
-/** Of the file that is shown. */
+/** Facts of the file that is shown. */
 let facts: { source: Source; before: Before } | null = null;
 
-/** Show all that can be told before Loop's side has come. */
+/** Show all that does not need Loop's side. */
 export function describe(ours: Result, source: Source, scale: Scale): void {
   const milliseconds = performance.now() - ours.began;
   certify(ours, null, scale);
@@ -44,6 +46,7 @@ export function describe(ours: Result, source: Source, scale: Scale): void {
   const sharpest = (): number => dihedrals(ours.model).max;
   showStatistics(facts.before, ours.report, ours.bytes.byteLength, sharpest);
   showChanges(ours.report);
+  showAdvice(ours.report);
   showTimings([
     ...ours.timings.map(([name, ms]): [string, number] => [STAGES[name] ?? name, ms / 1000]),
     ["From request to picture", milliseconds / 1000],
@@ -51,9 +54,9 @@ export function describe(ours: Result, source: Source, scale: Scale): void {
   void validateBoth(ours, source);
 }
 
-/** Show what is certain of the distance to Loop, and return it in a sentence. */
+/** Show what is certain of the distance to Loop; returns it in a sentence. */
 export function certify(ours: Result, loop: Result | null, scale: Scale): string {
-  return showCertificate(ours.report, lengths(ours, loop, scale));
+  return showPromises(ours.report, lengths(ours, loop, scale));
 }
 
 function lengths({ model, report }: Result, loop: Result | null, { size, unit }: Scale): Lengths {
@@ -69,7 +72,7 @@ function lengths({ model, report }: Result, loop: Result | null, { size, unit }:
   };
 }
 
-/** What is told of the file itself; it stays the same however often it is refined. */
+/** Measure the file itself. */
 function before({ upload, opened, model }: Source): Before {
   const geometries = new Set(model.meshes.map(({ geometry }) => geometry));
   const vertices = [...geometries].reduce((n, g) => n + g.getAttribute("position").count, 0);

@@ -6,68 +6,45 @@ import { fileProblem } from "./api/problem";
 import type { Opened } from "./files/open";
 import { uploadsOf, type Dropped, type PathedFile, type Upload } from "./files/upload";
 import { bytes, listed } from "./report/format";
-import { Session, type Again, type Result } from "./session";
+import type { Result } from "./result";
+import { isTheFiles, Session } from "./session";
 import { DEFAULTS, fromHash, toHash, type Asked, type Settings } from "./settings";
+import type { Again } from "./tasks";
 import { debounced, element } from "./ui/dom";
-import { bindDownloads } from "./ui/downloads";
+import { bindDownloads, offerFormatOf } from "./ui/downloads";
 import { bindFiles } from "./ui/file-input";
 import { FileList } from "./ui/file-list";
+import { bindPanel, keepFocus } from "./ui/panel";
 import { SettingsForm } from "./ui/settings-form";
 import { Stage } from "./ui/stage";
-import {
-  addNotice,
-  announce,
-  bindNotice,
-  bindProblem,
-  hideNotice,
-  hideProblem,
-  hideProgress,
-  showNotice,
-  showProblem,
-  showProgress,
-} from "./ui/status";
+import { addNotice, announce, hideNotice, hideProblem, hideProgress, showNotice, showProblem, showProgress } from "./ui/status";
 import { dispose, type Model } from "./view/model";
 
-/** Another try at what failed last. */
-let retry: Again = () => {};
-/** Files that are chosen count up: the last of them counts, however long the others take to come. */
+const nothing: Again = () => {};
+/** Another try at what failed last, and at what was cancelled last. */
+let [retry, resume] = [nothing, nothing];
+/** Each choice of files gets a number: only the last one counts, however long the others take to arrive. */
 let choices = 0;
 /** The result whose values at vertices are on their way. */
 let awaiting: Result | null = null;
+/** The example that the page shows of itself. */
+let example: Upload | null = null;
 
 const stage = new Stage(() => void fetchValues(), remember);
 
 const session = new Session({
   progress: showProgress,
   opened: (source) => {
+    const { upload, opened } = source;
     document.body.classList.remove("empty", "refined");
-    fileList.show(source.upload);
+    document.body.classList.toggle("example", upload === example);
+    element("advice").hidden = true;
+    form.fit(opened.faces);
+    fileList.show(upload);
+    offerFormatOf(upload);
     stage.open(source);
-    const { missing } = source.opened;
-    if (missing.length) addNotice(`${source.upload.name} names what is not among the files: ${listed(missing)}.`);
+    if (opened.missing.length) addNotice(`${upload.name} names what is not among the files: ${listed(opened.missing)}.`);
   },
-  stayed: () => {
-    const { source, ours } = session;
-    fileList.show(source?.upload ?? null);
-    // A setting of what is over.
-    changed.cancel();
-    if (!source) {
-      // What it was fitted to is gone.
-      form.fit(null);
-      return;
-    }
-    if (ours) form.show(ours.asked, source.upload, source.opened.faces);
-    else form.fit(source);
-    remember();
-  },
-  renewed: (upload, asked) => {
-    const { source } = session;
-    fileList.show(source?.upload ?? null, upload);
-    changed.cancel();
-    form.show(asked, upload, source?.upload === upload ? source.opened.faces : 0);
-    remember();
-  },
-  stopped: ({ name }) => showNotice(`${name}: cancelled`, true),
   refined: (ours) => {
     stage.refine(ours, session.loop);
     document.body.classList.add("refined");
@@ -77,18 +54,36 @@ const session = new Session({
     const { ours } = session;
     if (!ours) return;
     stage.refine(ours, loop);
-    announce(`Refined. ${certify(ours, loop, stage)}`);
+    announce(`Done. ${certify(ours, loop, stage)}`);
+  },
+  stayed: (ours) => {
+    changed.cancel();
+    form.show(ours.asked, session.source?.opened.faces ?? 0);
+    remember();
+  },
+  renewed: (asked) => {
+    changed.cancel();
+    form.show(asked, session.source?.opened.faces ?? 0);
+    remember();
+  },
+  stopped: ({ name }, again) => {
+    resume = again;
+    fileList.show(session.source?.upload ?? null);
+    showNotice(`${name}: cancelled`, true);
   },
   idle: hideProgress,
-  failed: (error, again, upload) => {
+  failed: (error, { upload, again }) => {
     retry = again;
-    showProblem(error, upload?.name);
+    fileList.show(session.source?.upload ?? null);
+    // Nobody asked for the example.
+    if (upload && upload === example && !isTheFiles(error)) return session.leave();
+    showProblem(error, isTheFiles(error) ? upload?.name : "");
   },
   cleared: () => {
+    document.body.classList.remove("refined", "example");
     document.body.classList.add("empty");
-    document.body.classList.remove("refined");
     fileList.show(null);
-    form.fit(null);
+    form.fit(0);
     stage.arrange();
   },
   discarded: (model) => stage.discard(model),
@@ -98,58 +93,63 @@ const given = fromHash(location.hash);
 const changed = debounced(300, () => {
   remember();
   clear();
-  void session.again(form.asked, prepare);
+  void session.again(form.asked);
 });
 const form = new SettingsForm(given.settings, changed);
 stage.view = given.view;
 const fileList = new FileList(takeOne);
 
-async function prepare(upload: Upload, opened: Opened, signal: AbortSignal): Promise<Asked> {
+/** Return what is asked for a file that was just opened. */
+async function prepare(upload: Upload, { faces }: Opened, signal: AbortSignal): Promise<Asked> {
   // Which levels are open depends on the service's limits.
   await offered;
   signal.throwIfAborted();
-  form.fit({ upload, opened });
-  // It would be sent for nothing.
-  if (form.refused) throw fileProblem("The mesh is too large", `${upload.name} would have ${form.refused}.`);
-  return form.asked;
+  const before = form.asked;
+  form.fit(faces);
+  const { refused, asked } = form;
+  if (!refused) return asked;
+  form.show(before, session.source?.opened.faces ?? 0);
+  throw fileProblem("The mesh is too large", `${upload.name} would have ${refused}.`);
 }
 
-/** `again` is another try where they do not come. */
-async function take(files: PathedFile[] | Promise<PathedFile[]>, again: Again = () => {}): Promise<void> {
+/** Take the files of a drop or a choice; `again` is another try where they do not arrive. */
+async function take(files: PathedFile[] | Promise<PathedFile[]>, again = nothing): Promise<void> {
   clear();
   const choice = ++choices;
+  showProgress({ step: "open", share: null });
   try {
     const dropped = await uploadsOf(await files);
     if (choice !== choices) return;
     fileList.offer(dropped.uploads);
     const isTaken = takeOne(dropped.uploads[0]!);
-    const others = tellOthers(dropped, isTaken);
+    const others = describeOthers(dropped, isTaken);
     if (others) showNotice(others);
   } catch (error) {
     if (choice !== choices) return;
+    if (!session.isBusy) hideProgress();
     retry = again;
     showProblem(error);
   }
 }
 
-/** Whether it is on its way: what is too large is not. */
+/** Open and refine a file; returns false for one that is too large to be sent. */
 function takeOne(upload: Upload): boolean {
   clear();
   choices++;
   const most = form.largestUpload;
-  if (upload.bytes > most) {
-    // It would be sent for nothing.
-    const detail = `${upload.name} has ${bytes(upload.bytes)}; this service takes up to ${bytes(most)}.`;
-    showProblem(fileProblem("The file is too large", detail));
-    fileList.show(session.source?.upload ?? null, session.coming);
-    return false;
+  if (upload.bytes <= most) {
+    void session.take(upload, prepare);
+    return true;
   }
-  void session.take(upload, prepare);
-  return true;
+  if (!session.isBusy) hideProgress();
+  const detail = `${upload.name} has ${bytes(upload.bytes)}; this service takes up to ${bytes(most)}.`;
+  showProblem(fileProblem("The file is too large", detail));
+  fileList.show(session.source?.upload ?? null);
+  return false;
 }
 
-/** What came beside the first file, which may be opened; empty where nothing did. */
-function tellOthers({ uploads: [first, ...others], unused }: Dropped, isOpened: boolean): string {
+/** Say what came beside the first file; empty where nothing did. */
+function describeOthers({ uploads: [first, ...others], unused }: Dropped, isOpened: boolean): string {
   const names = listed(others.map(({ path }) => path));
   const rest = isOpened ? `${first?.path} is opened; the list at the top has ${names} too.` : `The list at the top has ${names}.`;
   const sentences = [
@@ -159,24 +159,23 @@ function tellOthers({ uploads: [first, ...others], unused }: Dropped, isOpened: 
   return sentences.filter(Boolean).join(" ");
 }
 
-/** Before something new: what was said of the last is over. */
+/** Take back what was said of the last try. */
 function clear(): void {
   hideProblem();
   hideNotice();
-  retry = () => {};
+  [retry, resume] = [nothing, nothing];
 }
 
 /** Put other settings in the form's place. */
 function restore(wanted: Settings): void {
   changed.cancel();
   form.want(wanted);
-  if (session.source) form.fit(session.source);
   remember();
   clear();
-  void session.again(form.asked, prepare);
+  void session.again(form.asked);
 }
 
-/** The values at vertices, which a plain result does not hold: the same job with all diagnostics. */
+/** Fetch the values at vertices, which a plain result does not hold. */
 async function fetchValues(): Promise<void> {
   const { ours } = session;
   if (!ours || ours === awaiting) return;
@@ -200,63 +199,35 @@ function adopt(ours: Result, full: Model): void {
   stage.arrange();
 }
 
+/** Put what the user wants into the address: not what one file makes of it. */
 function remember(): void {
-  const hash = toHash(form.asked.settings, stage.view);
+  const hash = toHash(form.asked.wanted, stage.view);
   history.replaceState(null, "", hash ? `#${hash}` : location.pathname + location.search);
 }
 
-async function example(): Promise<PathedFile[]> {
+async function exampleFile(): Promise<PathedFile[]> {
   const response = await request(`assets/${EXAMPLE}`);
   const file = new File([await response.arrayBuffer()], "example.glb");
   return [{ path: file.name, file }];
 }
 
-function bindPanel(): void {
-  element("cancel").addEventListener("click", () => {
-    session.cancel();
-    hideProgress();
-    // Its own button is gone.
-    element(element("notice").hidden ? "panel" : "again").focus();
-  });
-  bindNotice(() => void session.resume(prepare));
-  bindProblem(() => {
-    offered = start();
-    retry();
-  });
-  const takeExample = (): void => void take(example(), takeExample);
-  element("example").addEventListener("click", takeExample);
-  element("reset").addEventListener("click", () => restore({ ...DEFAULTS }));
-  // A link that is followed in the page's own tab changes nothing but the part after #.
-  addEventListener("hashchange", () => {
-    const { settings, view } = fromHash(location.hash);
-    stage.view = view;
-    restore(settings);
-  });
-  document.querySelector(".skip")?.addEventListener("click", (event) => {
-    // The part after # has the settings.
-    event.preventDefault();
-    element("panel").focus();
-  });
-  element("fold").addEventListener("click", () => {
-    const folded = document.body.classList.toggle("folded");
-    element("fold").setAttribute("aria-expanded", String(!folded));
-  });
-  element("share").addEventListener("click", async () => {
-    remember();
-    // Browsers keep the clipboard from pages without TLS; the address bar has the link all the same.
-    const copied = await navigator.clipboard?.writeText(location.href).then(
-      () => true,
-      () => false,
-    );
-    announce(copied ? "The link is copied" : "The link is in the address bar");
-    element("share").textContent = copied ? "Copied" : "See address bar";
-    setTimeout(() => (element("share").textContent = "Copy link"), 1500);
-  });
+/** Show the example of the page's own accord: quietly, and not to users who save data. */
+async function showLiveExample(): Promise<void> {
+  if ((navigator as { connection?: { saveData?: boolean } }).connection?.saveData) return;
+  const choice = choices;
+  try {
+    const { uploads } = await uploadsOf(await exampleFile());
+    if (choice !== choices) return;
+    example = uploads[0]!;
+    takeOne(example);
+  } catch {
+    // The welcome stays, with a button that says what is wrong.
+  }
 }
 
-/** What the service offers; the page works with less where it does not say. */
+/** Ask what the service offers; the page works with less where it does not answer. */
 async function start(): Promise<void> {
-  const models = json<ModelEntry[]>("models")
+  void json<ModelEntry[]>("models")
     .then((models) => form.offerModels(models))
     .catch(showProblem);
   await json<Limits>("limits")
@@ -265,10 +236,33 @@ async function start(): Promise<void> {
       element("limits").textContent = ` · up to ${bytes(limits.body_bytes)}`;
     })
     .catch(showProblem);
-  void models;
 }
 
 bindFiles((files) => void take(files));
-bindPanel();
 bindDownloads(session, stage);
+bindPanel({
+  cancel: () => {
+    choices++;
+    session.cancel();
+    if (!element("notice").hidden) element("again").focus();
+  },
+  reset: () => restore({ ...DEFAULTS }),
+  retry: () => {
+    offered = start();
+    retry();
+  },
+  resume: () => resume(),
+  showExample: function showExample() {
+    void take(exampleFile(), showExample);
+  },
+  remember,
+});
+keepFocus();
+// A link that is followed in the page's own tab changes nothing but the part after #.
+addEventListener("hashchange", () => {
+  const { settings, view } = fromHash(location.hash);
+  stage.view = view;
+  restore(settings);
+});
 let offered = start();
+void showLiveExample();

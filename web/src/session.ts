@@ -1,335 +1,253 @@
-/** A file, what became of it, and the jobs under way. Knows no element of the page. */
+/** A file, its refinement, and the tasks under way. Touches no element of the page. */
 
-import { refine, type Answer, type Progress } from "./api/jobs";
-import { isAbort, localProblem, Problem } from "./api/problem";
-import { open, type Opened } from "./files/open";
-import { jsonOf, parseGltf, type GltfJson } from "./files/gltf";
+import { refine, type Answer } from "./api/jobs";
+import { isAbort, Problem } from "./api/problem";
+import { open } from "./files/open";
+import { parseGltf } from "./files/gltf";
+import { Unreadable } from "./files/unreadable";
 import { bodyOf, type Upload } from "./files/upload";
-import type { Report } from "./report/report";
-import { asLoop, LOOP, query, type Asked, type Compression, type Diagnostics } from "./settings";
+import { resultOf, shownIn, type Order, type Result } from "./result";
+import { asLoop, DEFAULTS, LOOP, query, type Asked, type Writing } from "./settings";
+import { EMPTY, type Again, type Kind, type Listener, type Prepare, type Shown, type Source, type Task, type Work } from "./tasks";
 import { isFinite, modelOf, type Model } from "./view/model";
 
-/** What is asked of the service. */
-interface Order {
-  upload: Upload;
-  asked: Asked;
-  /** When, by the page's clock. */
-  began: number;
-}
-
-/** What came of an order, whatever has been asked for since. */
-export interface Result extends Order {
-  /** The query that made it. */
-  key: string;
-  bytes: ArrayBuffer;
-  json: GltfJson;
-  report: Report;
-  model: Model;
-  timings: [string, number][];
-  /** Whether values at vertices are in it. */
-  full: boolean;
-}
-
-export interface Source {
-  upload: Upload;
-  opened: Opened;
-  model: Model;
-}
-
-/** What the form makes of a file before it is refined; nothing of one that was ended meanwhile. */
-export type Prepare = (upload: Upload, opened: Opened, signal: AbortSignal) => Promise<Asked>;
-
-/** A refinement; what is asked for a new file is known once it is open. */
-type Request = Omit<Order, "asked"> & { asked: Asked | null };
-
-type Task = (signal: AbortSignal) => Promise<void>;
-
-/** What is under way: values are for the heat map of what is shown, and end with it. */
-type Kind = "refinement" | "values" | "download";
-
-/** Another try at what failed. */
-export type Again = () => void;
-
-export interface Listener {
-  progress(progress: Progress, what: string): void;
-  /** A new file has taken the place of the old. */
-  opened(source: Source): void;
-  /** What was asked for was refused or cancelled: what was there before it still is. */
-  stayed(): void;
-  /** What was asked for before is asked for again. */
-  renewed(upload: Upload, asked: Asked): void;
-  refined(ours: Result): void;
-  compared(loop: Result | null): void;
-  idle(): void;
-  /** `upload` is the file that is at fault. */
-  failed(error: unknown, again: Again, upload: Upload | null): void;
-  discarded(model: Model): void;
-  /** The refinement of a file was cancelled. */
-  stopped(upload: Upload): void;
-  /** The file that was shown turned out to be broken. */
-  cleared(): void;
-}
-
 export class Session {
-  source: Source | null = null;
-  ours: Result | null = null;
-  loop: Result | null = null;
-  /** Each task by what ends it. */
-  private readonly underWay = new Map<AbortController, Kind>();
-  /** The refinement among them. */
-  private refining: Request | null = null;
-  /** The one that was cancelled last. */
-  private stopped: Request | null = null;
+  private shown: Shown = EMPTY;
+  /** What was on the stage before the file that is shown, until the service has taken that file. */
+  private before: Shown = EMPTY;
+  private readonly underWay = new Map<AbortController, Work>();
 
   constructor(private readonly listener: Listener) {}
 
-  /** A file that is not refined yet, beside the one that is shown. */
-  get coming(): Upload | null {
-    const upload = this.refining?.upload ?? null;
-    return upload === this.source?.upload ? null : upload;
+  get source(): Source | null {
+    return this.shown.source;
+  }
+
+  get ours(): Result | null {
+    return this.shown.ours;
+  }
+
+  get loop(): Result | null {
+    return this.shown.loop;
   }
 
   /** End all that is under way. */
   cancel(): void {
-    const { refining } = this;
-    this.refining = null;
-    this.end("refinement", "values", "download");
-    if (!refining) return;
-    this.stopped = refining;
-    this.listener.stayed();
-    this.listener.stopped(refining.upload);
+    const stopped = [...this.underWay.values()].filter(({ upload }) => upload).at(-1);
+    this.end("opening", "refinement", "values", "download");
+    this.listener.idle();
+    if (!stopped?.upload) return;
+    this.forget();
+    if (this.ours) this.listener.stayed(this.ours);
+    this.listener.stopped(stopped.upload, stopped.again);
   }
 
-  /** Refine what was cancelled after all. */
-  async resume(prepare: Prepare): Promise<void> {
-    if (this.stopped) await this.renew(this.stopped, prepare);
+  get isBusy(): boolean {
+    return this.underWay.size > 0;
   }
 
-  /** Refine as it was asked for then, whatever has been asked for since. */
-  private async renew({ upload, asked }: Request, prepare: Prepare): Promise<void> {
-    if (asked) this.listener.renewed(upload, asked);
-    if (asked && this.source?.upload === upload) await this.again(asked, prepare);
-    else await this.take(upload, prepare);
-  }
-
-  /** Take a new file. What was there stays until the new one is refined. */
+  /** Open a file, show it, and refine it. */
   async take(upload: Upload, prepare: Prepare): Promise<void> {
     const began = performance.now();
-    const request: Request = { upload, asked: null, began };
-    const anew = () => void this.renew(request, prepare);
-    await this.only(request, anew, async (signal) => {
-      let source: Source | null = null;
-      let ours: Result;
-      this.listener.progress({ step: "open", share: null }, "");
+    const again = (): void => void this.take(upload, prepare);
+    this.end("opening");
+    this.listener.progress({ step: "open", share: null }, "");
+    let refined: Promise<void> | null = null;
+    await this.run({ kind: "opening", upload, again }, async (signal) => {
+      const source = await this.open(upload, signal);
       try {
-        const opened = await open(upload);
-        source = { upload, opened, model: modelOf(opened.scene, opened.clips) };
-        signal.throwIfAborted();
-        const asked = (request.asked = await prepare(upload, opened, signal));
-        // Nothing is lost by showing the first file at once.
-        if (this.source === null && isFinite(source.model)) this.show(source);
-        ours = await this.refine({ upload, asked, began }, signal);
+        const order = { upload, asked: await prepare(upload, source.opened, signal), began };
+        this.end("refinement", "values");
+        this.show(source, order);
+        refined = this.refineShown(order);
       } catch (error) {
-        this.giveUp(source, error, signal);
-        throw error;
-      }
-      if (this.source !== source) this.show(source);
-      await this.complete(ours, signal);
-    });
-    await this.makeUp(request, prepare);
-  }
-
-  /** Refine anew: the file that is on its way, or else the one that is there. */
-  async again(asked: Asked, prepare: Prepare): Promise<void> {
-    const { source, coming } = this;
-    if (coming) return this.take(coming, prepare);
-    if (!source) return;
-    const order = { upload: source.upload, asked, began: performance.now() };
-    const anew = () => void this.renew(order, prepare);
-    await this.only(order, anew, async (signal) => {
-      // It is there already where Loop's side alone was cancelled.
-      const there = this.ours?.key === query(asked.settings).toString() ? this.ours : null;
-      if (there) there.asked = asked;
-      try {
-        await this.complete(there ?? (await this.refine(order, signal)), signal);
-      } catch (error) {
-        // What was ended has given way to something else by now.
-        if (!signal.aborted) this.listener.stayed();
+        this.listener.discarded(source.model);
         throw error;
       }
     });
-    await this.makeUp(order, prepare);
+    await refined;
   }
 
-  /** What came to nothing may have ended what makes up the file that is shown: its result, or Loop's side of it. */
-  private async makeUp(after: Request, prepare: Prepare): Promise<void> {
-    const { source, ours, loop } = this;
-    if (this.refining) return;
-    if (source && !ours && after.upload !== source.upload) return this.take(source.upload, prepare);
-    if (!ours || loop || ours.asked.settings.model === LOOP || after.asked === ours.asked) return;
-    await this.again(ours.asked, prepare);
+  /** Refine the file that is shown with other settings. */
+  async again(asked: Asked): Promise<void> {
+    if (this.source) await this.refineShown({ upload: this.source.upload, asked, began: performance.now() });
+  }
+
+  /** Take a file that was never refined off the stage. */
+  leave(): void {
+    if (this.ours) return;
+    this.drop(this.shown);
+    this.shown = EMPTY;
+    this.listener.cleared();
   }
 
   /**
-   * Another answer for what made a result; null when it was cancelled, or failed: `again` is what then
-   * asks for it anew. Nothing under way ends for it, and nothing that comes later ends it.
+   * Fetch another answer for the order of a result; null where it was cancelled or failed, and `again`
+   * is the next try. Nothing else ends it, and it ends nothing else.
    */
-  async fetch(
-    ours: Result,
-    diagnostics: Diagnostics,
-    compress: Compression,
-    again: Again,
-  ): Promise<ArrayBuffer | null> {
+  async fetch(ours: Result, writing: Writing, again: Again): Promise<ArrayBuffer | null> {
     let bytes: ArrayBuffer | null = null;
-    await this.run("download", again, async (signal) => {
-      ({ bytes } = await this.answer(ours, query(ours.asked.settings, diagnostics, compress), signal));
+    await this.run({ kind: "download", upload: null, again }, async (signal) => {
+      ({ bytes } = await this.answer(ours, query(ours.asked.settings, writing), signal));
     });
     return bytes;
   }
 
-  /** A result with values at vertices, which a plain one does not hold: the same job with all diagnostics. */
+  /** Fetch a result with its values at vertices, by the same order with all diagnostics. */
   async full(ours: Result, again: Again): Promise<Model | null> {
     let model: Model | null = null;
-    await this.run("values", again, async (signal) => {
-      const { bytes } = await this.answer(ours, query(ours.asked.settings, "full"), signal);
+    await this.run({ kind: "values", upload: null, again }, async (signal) => {
+      const { bytes } = await this.answer(ours, query(ours.asked.settings, { diagnostics: "full" }), signal);
       const { scene } = await shownIn("The heat map", () => parseGltf(bytes));
       model = modelOf(scene, []);
     });
     return model;
   }
 
-  private async complete(ours: Result, signal: AbortSignal): Promise<void> {
-    const { upload, began, asked } = ours;
-    const loops = asLoop(asked);
-    if (this.ours !== ours) {
+  /** Open a file. Where the page cannot read it, the service's words say why. */
+  private async open(upload: Upload, signal: AbortSignal): Promise<Source> {
+    try {
+      const opened = await open(upload);
+      const model = modelOf(opened.scene, opened.clips);
+      if (!isFinite(model)) throw new Unreadable("Some of its positions are no numbers.");
+      return { upload, opened, model };
+    } catch (error) {
+      signal.throwIfAborted();
+      if (error instanceof Unreadable) {
+        const settings = { ...DEFAULTS, levels: 1, model: LOOP };
+        await this.answer({ upload, asked: { settings, wanted: settings }, began: 0 }, query(settings), signal);
+      }
+      throw error;
+    } finally {
+      signal.throwIfAborted();
+    }
+  }
+
+  private async refineShown(order: Order): Promise<void> {
+    const again = (): void => {
+      this.listener.renewed(order.asked);
+      void this.refineShown(order);
+    };
+    this.end("refinement");
+    await this.run({ kind: "refinement", upload: order.upload, again }, async (signal) => {
+      try {
+        await this.complete(order, signal);
+      } catch (error) {
+        // A task that was ended has given way to another.
+        if (!signal.aborted) this.giveUp(error);
+        throw error;
+      }
+    });
+    await this.makeUp(order);
+  }
+
+  /** Refine what an order ended that was then refused or cancelled itself: the file before it, or the comparison. */
+  private async makeUp({ asked }: Order): Promise<void> {
+    const { order, ours, loop } = this.shown;
+    const missing = ours ?? order;
+    const isRefining = [...this.underWay.values()].some(({ kind }) => kind === "refinement");
+    if (!missing || missing.asked === asked || isRefining) return;
+    if (!ours || (!loop && ours.asked.settings.model !== LOOP)) await this.refineShown(missing);
+  }
+
+  private async complete(order: Order, signal: AbortSignal): Promise<void> {
+    const isThere = this.ours?.key === query(order.asked.settings).toString();
+    const ours = isThere ? this.ours! : await this.refine(order, signal);
+    // It is there already where Loop's side alone was cancelled.
+    ours.asked = order.asked;
+    const loops = asLoop(order.asked);
+    if (!isThere) {
       this.replace("ours", ours);
       if (this.loop && this.loop.key !== query(loops.settings).toString()) this.replace("loop", null);
+      this.forget();
       this.listener.refined(ours);
     }
-    if (asked.settings.model !== LOOP && !this.loop) {
-      this.replace("loop", await this.refine({ upload, asked: loops, began }, signal, "Loop’s side"));
+    if (order.asked.settings.model !== LOOP && !this.loop) {
+      this.replace("loop", await this.refine({ ...order, asked: loops }, signal, "for comparison"));
     }
     this.listener.compared(this.loop);
   }
 
   private async refine(order: Order, signal: AbortSignal, what = ""): Promise<Result> {
     const answer = await this.answer(order, query(order.asked.settings), signal, what);
-    const result = await shownIn(what || "The result", () => resultOf(order, answer));
+    const result = await shownIn(what ? "The comparison" : "The result", () => resultOf(order, answer));
     if (signal.aborted) this.listener.discarded(result.model);
     signal.throwIfAborted();
     return result;
   }
 
-  private answer(
-    { upload }: Order,
-    asked: URLSearchParams,
-    signal: AbortSignal,
-    what = "",
-  ): Promise<Answer> {
+  private answer({ upload }: Order, asked: URLSearchParams, signal: AbortSignal, what = ""): Promise<Answer> {
     return refine(bodyOf(upload), asked, signal, (progress) => this.listener.progress(progress, what));
   }
 
-  private show(source: Source): void {
-    const old = this.source;
-    this.replace("ours", null);
-    this.replace("loop", null);
-    this.source = source;
-    this.listener.opened(source);
-    if (old) this.listener.discarded(old.model);
-  }
-
-  /** A new file was not refined: what was there before it stays. */
-  private giveUp(source: Source | null, error: unknown, { aborted }: AbortSignal): void {
-    if (source && this.source === source) {
-      if (isTheFiles(error)) this.clear();
-      return;
+  private show(source: Source, order: Order): void {
+    // Of several files that came too soon after each other the first stays to go back to.
+    if (this.ours || !this.before.source) {
+      this.forget();
+      this.before = this.shown;
+    } else {
+      this.drop(this.shown);
     }
-    if (source) this.listener.discarded(source.model);
-    // What was ended has given way to something else by now.
-    if (!aborted) this.listener.stayed();
+    this.shown = { source, order, ours: null, loop: null };
+    this.listener.opened(source);
   }
 
-  /** Back to a page without a file. */
-  private clear(): void {
-    const old = this.source;
-    this.source = null;
-    if (old) this.listener.discarded(old.model);
-    this.listener.cleared();
+  /** Go back to what was there before, if the service refused the file or its settings. */
+  private giveUp(error: unknown): void {
+    if (this.ours) this.listener.stayed(this.ours);
+    if (this.ours || !isTheFiles(error)) return;
+    const { shown, before } = this;
+    this.before = EMPTY;
+    this.shown = before;
+    this.drop(shown);
+    if (before.source) this.listener.opened(before.source);
+    else this.listener.cleared();
+    if (!before.ours) return;
+    this.listener.refined(before.ours);
+    this.listener.compared(before.loop);
+    this.listener.stayed(before.ours);
+  }
+
+  private forget(): void {
+    this.drop(this.before);
+    this.before = EMPTY;
+  }
+
+  private drop({ source, ours, loop }: Shown): void {
+    for (const part of [source, ours, loop]) if (part) this.listener.discarded(part.model);
   }
 
   private replace(side: "ours" | "loop", result: Result | null): void {
-    const old = this[side];
+    const old = this.shown[side];
     if (side === "ours" && old !== result) this.end("values");
-    this[side] = result;
+    this.shown = { ...this.shown, [side]: result };
     if (old && old !== result) this.listener.discarded(old.model);
   }
 
-  /** Run a refinement after ending the one that is under way. */
-  private async only(request: Request, again: Again, task: Task): Promise<void> {
-    this.end("refinement");
-    this.refining = request;
-    await this.run("refinement", again, async (signal) => {
-      try {
-        await task(signal);
-      } finally {
-        // Where it was ended, another may be under way.
-        if (this.refining === request) this.refining = null;
-      }
-    }, request.upload);
-  }
-
   private end(...kinds: Kind[]): void {
-    for (const [controller, kind] of this.underWay) {
+    for (const [controller, { kind }] of this.underWay) {
       if (!kinds.includes(kind)) continue;
       this.underWay.delete(controller);
       controller.abort();
     }
   }
 
-  /** Run a task beside what is under way; `upload` is what may be at fault. */
-  private async run(kind: Kind, again: Again, task: Task, upload: Upload | null = null): Promise<void> {
+  /** Run a task beside what is under way. */
+  private async run(work: Work, task: Task): Promise<void> {
     const controller = new AbortController();
     const { signal } = controller;
-    this.underWay.set(controller, kind);
+    this.underWay.set(controller, work);
     try {
       await task(signal);
     } catch (error) {
-      if (!signal.aborted && !isAbort(error)) this.listener.failed(error, again, isTheFiles(error) ? upload : null);
+      if (!signal.aborted && !isAbort(error)) this.listener.failed(error, work);
     } finally {
       if (this.underWay.delete(controller) && !this.underWay.size) this.listener.idle();
     }
   }
 }
 
-/** Whether an error is one of the file, which no other setting will mend. */
-function isTheFiles(error: unknown): boolean {
+/** Whether an error is one of the file, which no other setting mends. */
+export function isTheFiles(error: unknown): boolean {
   return error instanceof Problem && [400, 415, 422].includes(error.status) && !error.parameter;
-}
-
-/** What is made of an answer. Where nothing can be, that is no fault of the user's file, and another try may do. */
-async function shownIn<T>(what: string, make: () => Promise<T>): Promise<T> {
-  try {
-    return await make();
-  } catch (error) {
-    throw localProblem(`${what} cannot be shown`, (error as Error).message);
-  }
-}
-
-async function resultOf(order: Order, answer: Answer): Promise<Result> {
-  const began = performance.now();
-  const json = jsonOf(answer.bytes);
-  const report = json.asset?.extras?.pns as Report | undefined;
-  if (!report) throw new Error("The answer has no report.");
-  const { scene, animations } = await parseGltf(answer.bytes);
-  const timings: [string, number][] = [...answer.timings, ["opening", performance.now() - began]];
-  return {
-    ...order,
-    key: query(order.asked.settings).toString(),
-    bytes: answer.bytes,
-    json,
-    report,
-    model: modelOf(scene, animations),
-    timings,
-    full: false,
-  };
 }

@@ -7,14 +7,14 @@ export interface Settings {
   /** C, dimensionless; null: the model's own. */
   budget: number | null;
   limit: boolean;
-  crease: "auto" | "off" | "lines" | "normals" | "angle";
+  crease: "auto" | "angle" | "normals" | "off";
   /** Degrees. */
   angle: number;
   uv: "linear" | "smooth";
-  normals: "keep" | "smooth" | "limit";
+  normals: "auto" | "keep" | "smooth" | "limit";
 }
 
-/** What a file is refined with, and what the user wants of any: a file may close levels, or have no normals to keep. */
+/** Settings for one file, and those that the user wants for any file: a large file may close levels. */
 export interface Asked {
   settings: Settings;
   wanted: Settings;
@@ -30,19 +30,24 @@ export const DEFAULTS: Settings = {
   crease: "auto",
   angle: 40,
   uv: "linear",
-  normals: "keep",
+  normals: "auto",
 };
 
 export type Diagnostics = "summary" | "full";
 export type Compression = "none" | "meshopt" | "draco";
+export type Format = "glb" | "obj" | "ply" | "stl" | "off";
 
-/** The parameters of a job. */
-export function query(
-  settings: Settings,
-  diagnostics: Diagnostics = "summary",
-  compress: Compression = "none",
-): URLSearchParams {
+/** How an answer is to be written. */
+export interface Writing {
+  diagnostics?: Diagnostics;
+  compress?: Compression;
+  format?: Format;
+}
+
+/** Return the parameters of a job. What is at the service's default is left out where it may be. */
+export function query(settings: Settings, writing: Writing = {}): URLSearchParams {
   const loop = settings.model === LOOP;
+  const { diagnostics = "summary", compress = "none", format = "glb" } = writing;
   const parameters = new URLSearchParams({
     levels: String(settings.levels),
     scheme: loop ? "loop" : "pns",
@@ -53,17 +58,18 @@ export function query(
   if (!loop && settings.model) parameters.set("model", settings.model);
   if (!loop && settings.budget !== null) parameters.set("budget", String(settings.budget));
   if (settings.limit) parameters.set("limit", "true");
-  if (settings.normals !== "keep") parameters.set("normals", settings.normals);
+  if (settings.normals !== "auto") parameters.set("normals", settings.normals);
   if (compress !== "none") parameters.set("compress", compress);
+  if (format !== "glb") parameters.set("format", format);
   return parameters;
 }
 
-/** The same job by Loop's rules alone: the other side of the comparison. */
+/** Return the settings for Loop's rule alone: the other side of the comparison. */
 export function asLoop({ settings, wanted }: Asked): Asked {
   return { settings: { ...settings, model: LOOP, budget: null }, wanted };
 }
 
-/** The settings that differ from the defaults, as the part of an address after #. */
+/** Write the settings that differ from the defaults as the part of an address after #. */
 export function toHash(settings: Settings, view: Record<string, string>): string {
   const given = new URLSearchParams(view);
   for (const [name, value] of Object.entries(settings)) {
@@ -72,7 +78,7 @@ export function toHash(settings: Settings, view: Record<string, string>): string
   return given.toString();
 }
 
-/** Settings from the part after #; what is not understood stays at its default. */
+/** Read settings from the part after #; a value that is not understood stays at its default. */
 export function fromHash(hash: string): { settings: Settings; view: Record<string, string> } {
   const given = Object.fromEntries(new URLSearchParams(hash.replace(/^#/, "")));
   const settings = { ...DEFAULTS };
@@ -80,12 +86,12 @@ export function fromHash(hash: string): { settings: Settings; view: Record<strin
   settings.levels = whole(levels, 1, 6) ?? settings.levels;
   settings.model = model ?? settings.model;
   settings.budget = number(budget, 0, Infinity);
-  // Normals of the limit surface stand there.
+  // The service refuses exact normals anywhere but on the limit surface.
   settings.limit = limit === "true" || normals === "limit";
-  settings.crease = oneOf(crease, ["auto", "off", "lines", "normals", "angle"]) ?? settings.crease;
+  settings.crease = oneOf(crease, ["auto", "angle", "normals", "off"]) ?? settings.crease;
   settings.angle = number(angle, 0, 180) ?? settings.angle;
   settings.uv = oneOf(uv, ["linear", "smooth"]) ?? settings.uv;
-  settings.normals = oneOf(normals, ["keep", "smooth", "limit"]) ?? settings.normals;
+  settings.normals = oneOf(normals, ["auto", "keep", "smooth", "limit"]) ?? settings.normals;
   return { settings, view };
 }
 

@@ -48,7 +48,7 @@ const REFUSED = [
 ];
 
 describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
-  const { visit, refined } = studio();
+  const { visit, refined, refusal } = studio();
 
   test("both sides of an animation stand at the same time", async () => {
     const page = await visit({ hash: "#levels=1&layout=side" });
@@ -150,11 +150,10 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await settled(page);
     assert.match(await page.textContent("#label-left"), /\D4 faces/);
     assert.match(await page.textContent("#label-right"), /· 16 faces/);
-    assert.equal(await page.inputValue("#normals"), "smooth");
-    // What the page chose for this file it does not keep for one that brings its normals.
-    await choose(page, example);
-    await page.waitForFunction(() => document.querySelector("#normals").value === "keep");
-    await settled(page);
+    // What a file lacks does not change what the user wants.
+    assert.equal(await page.inputValue("#normals"), "auto");
+    await page.check("#edges");
+    assert.ok(!(await page.evaluate(() => location.hash)).includes("normals"));
   });
 
   test("each file of a collection is refined, or refused in words", { skip: !existsSync(FIXTURES) && `needs ${FIXTURES}` }, async () => {
@@ -198,8 +197,6 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.match(await page.textContent("#label-right"), /· 12 faces/);
     assert.match(await page.textContent("#changes"), /materials dropped/);
     assert.equal(await page.textContent("#statistics tr:has-text('Vertices in the file') td"), "5");
-    // It came back smooth, though the file has no normals.
-    assert.equal(await page.inputValue("#normals"), "smooth");
   });
 
   test("a broken file gets words, and the model that was there stays", async () => {
@@ -221,22 +218,36 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   const zipped = Buffer.from(zipSync({ "a.obj": Buffer.from("v 0 0 0") }));
   for (const [name, buffer, words] of [
     ["empty.glb", Buffer.alloc(0), /^The file is empty/],
-    ["text.zip", Buffer.from("hello"), /^The file cannot be read.*This is no ZIP/],
     ["mesh.zip", zipped, /^No glTF in this archive.*a\.obj/],
-    ["other.stl", part, /This is no STL: it ends too early/],
-    ["text.glb", Buffer.from("hello"), /This is no glTF: it is neither a GLB nor JSON/],
-    ["null.gltf", Buffer.from("null"), /This is no glTF: it is neither a GLB nor JSON with an asset/],
-    ["half.gltf", Buffer.from('{"asset":{"version":"2.0"},"meshes":[{}]}'), /cannot be shown.*cannot be read: something that has to be in it is not/],
-    ["old.gltf", Buffer.from('{"asset":{"version":"1.0"}}'), /cannot be read: Unsupported asset\. glTF versions >=2\.0 are supported/],
-    ["cut.glb", part.subarray(0, 9000), /cannot be shown.*cannot be read: it ends too early/],
     ["text.txt", Buffer.from("hello"), /^No mesh among these files/],
   ]) {
-    test(`${name} gets words, and no other try`, async () => {
+    test(`${name} gets words of the page, and no other try`, async () => {
       const page = await visit();
       await choose(page, { name, mimeType: "", buffer });
       await page.locator("#problem").waitFor();
       assert.match((await page.textContent("#problem")).trim().replace(/\s+/g, " "), words);
       assert.ok(await page.isHidden("#problem-again"));
+    });
+  }
+
+  for (const [name, buffer, type] of [
+    ["cut.glb", part.subarray(0, 9000), "model/gltf-binary"],
+    ["text.glb", Buffer.from("hello"), "model/gltf-binary"],
+    ["null.gltf", Buffer.from("null"), "model/gltf+json"],
+    ["half.gltf", Buffer.from('{"asset":{"version":"2.0"},"meshes":[{}]}'), "model/gltf+json"],
+    ["text.zip", Buffer.from("hello"), "application/zip"],
+    ["other.stl", part, "model/stl"],
+    ["nan.glb", broken(part), "model/gltf-binary"],
+  ]) {
+    test(`${name}, which the page cannot read, gets the service's own words`, async () => {
+      const page = await visit({ expected: [400, 422] });
+      await choose(page, { name, mimeType: "", buffer });
+      await page.locator("#problem").waitFor();
+      const { title, detail } = await refusal("levels=1&scheme=loop", buffer, type);
+      assert.equal(await page.textContent("#problem-title"), title);
+      assert.equal(await page.textContent("#problem-detail"), detail);
+      assert.ok(await page.isHidden("#problem-again"));
+      assert.ok(await page.isVisible("#welcome"));
     });
   }
 
@@ -413,8 +424,8 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       await settled(page);
       const shown = await picture(page);
       for (const from of [0, shown.width / 2]) assert.ok(middleOfShape(shown, from) > 0, `${name} from ${from}`);
-      assert.doesNotMatch(await page.textContent("#statements"), /Broken|more than 0\u00a0/, name);
-      assert.equal(/own rounding/.test(await page.textContent("#statements")), name === "far.obj");
+      assert.doesNotMatch(await page.textContent("#promises"), /Broken|than 0\u00a0/, name);
+      assert.equal(/own rounding/.test(await page.textContent("#mathematics")), name === "far.obj");
     }
   });
 
@@ -422,7 +433,7 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     const page = await visit({ hash: "#levels=1&layout=single" });
     await choose(page, join(FIXTURES, "simple-instancing.glb"));
     await settled(page);
-    assert.doesNotMatch(await page.textContent("#statements"), /Broken|more than 0 m/);
+    assert.doesNotMatch(await page.textContent("#promises"), /Broken|than 0\u00a0/);
     const shown = await picture(page);
     // A copy at each place of a grid: there is paper between them.
     const row = columns(shown, 0, shown.width).subarray(4 * shown.width * Math.floor(shown.height / 3));

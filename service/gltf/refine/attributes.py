@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
-from pns_common.grid import rounded_rows
 
+from pns_common.grid import rounded_rows
 from pns_common.normals import perpendicular_tangents
 from pns_common.parallel import Blocks, available_threads
 

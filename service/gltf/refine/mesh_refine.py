@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from pns_common.rows import disjoint_faces, extent
 
 from pns_common.columns import level_topologies
 from pns_common.creases import NO_CREASES, Creases
@@ -15,6 +14,7 @@ from pns_common.mesh import Mesh
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refinement import Refinement, refine, refine_many
 from pns_common.report import Report
+from pns_common.rows import disjoint_faces, extent
 from pns_common.schemes import Scheme
 from pns_common.topology import split_faces
 

@@ -14,6 +14,7 @@ from pns_common.progress import LEARNED_COST
 from pns_common.report import Report
 from pns_common.schemes import Scheme
 
+from ...advice import NO_BENDS, Bends, count_bends
 from ...course import Course
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
@@ -31,7 +32,7 @@ from .mesh_refine import (
     refined_mesh,
     sharp_after,
 )
-from .new_normals import with_smooth_normals
+from .new_normals import with_normal_rule, with_smooth_normals
 from .together import StageShares, kind_of, refine_together
 
 # Above so many refined faces a mesh is refined alone: its own work outweighs the fixed cost.
@@ -57,6 +58,7 @@ class MeshOutcome:
         copies: number of faces with the vertices of an earlier face.
         report: the operator's; None if no face was left.
         changes: what was joined, dropped or cut.
+        bends: bent edges, and the sharp ones among them.
     """
 
     index: int
@@ -66,6 +68,7 @@ class MeshOutcome:
     copies: int
     report: Report | None
     changes: list[Change]
+    bends: Bends = NO_BENDS
 
     @property
     def degenerate(self) -> int:
@@ -188,6 +191,7 @@ def _together(
                     copies=part.copies,
                     report=part.report,
                     changes=part.changes,
+                    bends=part.bends,
                 )
     return outcomes
 
@@ -200,6 +204,7 @@ def _alone(
     course: Course,
     shares: StageShares,
 ) -> MeshOutcome:
+    options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options.weld_tolerance, options.weld_unit)
         creases = creases_of(control, options, scheme)
@@ -229,4 +234,5 @@ def _alone(
         copies=control.copies,
         report=None if made is None else made.reports[0],
         changes=changes + changes_of_vertices(near, cut, pointer),
+        bends=NO_BENDS if made is None else count_bends(control.mesh, creases)[0],
     )

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from pns_common.rows import marked
 
 from pns_common.normals import smooth_fans
+from pns_common.rows import marked
 from pns_common.topology import build_topology
 
+from ...options import Options
 from ..constants import FLOAT
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
@@ -54,6 +56,14 @@ def _labels_of_faces(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
         if "NORMAL" in primitive.attributes:
             labels[part][~primitive.attributes["NORMAL"].any(axis=1)] = NO_NORMAL
     return np.concatenate([labels[p.corners[keep] + part.start] for p, keep, part in shares])
+
+
+def with_normal_rule(options: Options, primitives: Sequence[TrianglePrimitive]) -> Options:
+    """Return the options with `normals=auto` decided: smooth for a mesh without any normals."""
+    if options.normals != "auto":
+        return options
+    given = any("NORMAL" in primitive.attributes for primitive in primitives)
+    return replace(options, normals="keep" if given else "smooth")
 
 
 def with_smooth_normals(

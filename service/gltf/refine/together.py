@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Int
-from pns_common.rows import disjoint_faces
 
 from pns_common.creases import Creases
 from pns_common.errors import MeshError
 from pns_common.report import Report
+from pns_common.rows import disjoint_faces
 from pns_common.schemes import Scheme
 
+from ...advice import NO_BENDS, Bends, count_bends
 from ...course import Course
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
@@ -38,7 +39,7 @@ from .mesh_refine import (
     refined_union,
     sharp_after,
 )
-from .new_normals import with_normal_accessor, with_smooth_normals
+from .new_normals import with_normal_accessor, with_normal_rule, with_smooth_normals
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class Part:
         copies: number of faces with the vertices of an earlier face.
         report: the operator's.
         changes: what was joined, dropped or cut.
+        bends: bent edges, and the sharp ones among them.
     """
 
     refined: list[RefinedPrimitive]
@@ -68,6 +70,7 @@ class Part:
     copies: int
     report: Report
     changes: list[Change]
+    bends: Bends = NO_BENDS
 
 
 def kind_of(primitives: Sequence[TrianglePrimitive]) -> Hashable | None:
@@ -127,6 +130,7 @@ def refine_together(
     refined, which is then reported.
     """
     primitives, parts = _joined(meshes)
+    options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options.weld_tolerance, options.weld_unit, parts)
     able = _able(control, parts)
@@ -152,7 +156,10 @@ def refine_together(
     with course.stage("attributes", shares.attributes, shares.write):
         grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
         pieces = refined_primitives(control, made, grid, blend, course)
-        return [*_divided(control, parts, made, pieces, meshes, pointers, options)]
+        part_of_face, _ = control.part_of_face(parts)
+        bends = count_bends(control.mesh, creases, len(meshes), part_of_face)
+        cut = _divided(control, parts, made, pieces, meshes, pointers, options)
+        return [replace(part, bends=own) for part, own in zip(cut, bends, strict=True)]
 
 
 def _able(control: ControlMesh, parts: Parts) -> Bool[np.ndarray, " P"]:

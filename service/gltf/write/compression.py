@@ -10,6 +10,7 @@ import DracoPy
 import meshopt
 import numpy as np
 from jaxtyping import Float, Int, Shaped
+
 from pns_common.rows import extent
 
 from ...course import Course

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Int
+
 from pns_common.rows import marked
 
 from ..read.extensions import References, accessor_references, view_references

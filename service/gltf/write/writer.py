@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 from jaxtyping import Int, Shaped
+
 from pns_common.rows import extent
 
 from ...course import Course

@@ -13,7 +13,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ...errors import BusyError, ServiceError, UnauthorizedError
 from .. import problems
-from ..addresses import site
+from ..addresses import sites
 from ..clients import Client
 from .keys import NAME, PREFIX, Entry, Keyring
 
@@ -24,14 +24,21 @@ _BEARER = re.compile(rf"(?i:bearer) +({PREFIX}_({NAME})_[\w-]{{43}})", re.A)
 # them is checked all the same.
 OPEN = ("/", "/healthz", "/readyz", "/models", "/limits", "/docs", "/openapi.json")
 OPEN_FOLDERS = ("/assets/", "/docs/")
-# Each wrong key costs a scrypt; an address has so many a minute, and so many may wait.
+# Each wrong key costs a scrypt. An address has so many a minute for each name that it sends; in
+# IPv6 a /56 and a /48 have more, as they hold more subscribers.
 WRONG_A_MINUTE = 20
+WIDER = (1, 4, 16)
+# Checks that may wait: in all, of one address, and how many places are kept for addresses that have
+# sent no wrong key.
 MOST_WAITING = 8
+MOST_OF_ADDRESS = 4
+KEPT_FREE = 2
 MINUTE = 60.0
+PAUSE_SECONDS = 1.0
 
 
 class TooManyWrongKeysError(BusyError):
-    """An address has sent one wrong key after another."""
+    """An address has sent one wrong key of a name after another."""
 
     status = 429
     code = "too-many-wrong-keys"
@@ -47,8 +54,9 @@ class Bearer:
         # Of keys that were right, by their plain hash: scrypt is run once for each.
         self._known: dict[bytes, Entry] = {}
         self._one = asyncio.Semaphore(1)
-        self._waiting = 0
-        self._wrong: Counter[str] = Counter()
+        self._waiting: Counter[str] = Counter()
+        # By network and by the name in the key.
+        self._wrong: Counter[tuple[str, str]] = Counter()
         self._wrong_since = time.monotonic()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -79,26 +87,37 @@ class Bearer:
         plain = hashlib.sha256(key.encode()).digest()
         if plain in self._known:
             return self._known[plain]
-        address = site(scope["client"][0] if scope.get("client") else "")
-        self._check_patience(address)
-        self._waiting += 1
+        networks = sites(scope["client"][0] if scope.get("client") else "")
+        self._check_patience(networks, name)
+        self._waiting[networks[0]] += 1
         try:
             async with self._one:
                 entry = await asyncio.to_thread(self._keys.find, key, name)
+            if entry is None:
+                self._wrong.update((network, name) for network in networks)
+                if self._wrong_of(networks[0]) > WRONG_A_MINUTE:
+                    # Names without end are guessed slowly.
+                    await asyncio.sleep(PAUSE_SECONDS)
+                raise UnauthorizedError("the key is not known")
         finally:
-            self._waiting -= 1
-        if entry is None:
-            self._wrong[address] += 1
-            raise UnauthorizedError("the key is not known")
+            self._waiting -= Counter({networks[0]: 1})
         self._known[plain] = entry
         return entry
 
-    def _check_patience(self, address: str) -> None:
+    def _check_patience(self, networks: tuple[str, ...], name: str) -> None:
         now = time.monotonic()
         if now - self._wrong_since > MINUTE:
             self._wrong.clear()
             self._wrong_since = now
-        if self._wrong[address] >= WRONG_A_MINUTE:
-            raise TooManyWrongKeysError("wait a minute", retry_after=int(MINUTE))
-        if self._waiting >= MOST_WAITING:
+        for network, times in zip(networks, WIDER, strict=False):
+            if self._wrong[network, name] >= WRONG_A_MINUTE * times:
+                raise TooManyWrongKeysError(
+                    f"too many wrong keys of the name {name}: wait a minute",
+                    retry_after=int(MINUTE),
+                )
+        places = MOST_WAITING - (KEPT_FREE if self._wrong_of(networks[0]) else 0)
+        if self._waiting.total() >= places or self._waiting[networks[0]] >= MOST_OF_ADDRESS:
             raise BusyError("too many keys are being checked")
+
+    def _wrong_of(self, network: str) -> int:
+        return sum(count for (where, _), count in self._wrong.items() if where == network)

@@ -1,23 +1,28 @@
-"""Pages of other origins: which of them may have a visitor's browser ask for work.
+"""Hosts and origins: which pages may have a visitor's browser ask for work.
 
 A browser sends a form to any host that a page names, without asking first; only the answer is kept
 from the page. So any page could use up its visitors' budgets, or their own machines, where the
-service listens for them alone.
+service listens for them alone. A page whose own name is made to lead to this machine (DNS
+rebinding) has the same origin and host: so the names of the service are listed, too.
 """
 
 from __future__ import annotations
 
+from fnmatch import fnmatchcase
+from ipaddress import IPv4Address, IPv6Address, ip_address
 from urllib.parse import urlsplit
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ...errors import ServiceError
+from ...settings import Settings
 from .. import problems
 
 # What these ask for costs little, and no page of another origin is shown the answer.
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 # What a browser says of who asks: a page of this origin, or nobody but the user.
 OWN = frozenset({"same-origin", "none"})
+LOOPBACK_HOSTS = ("localhost", "*.localhost")
 
 
 class ForeignOriginError(ServiceError):
@@ -28,38 +33,74 @@ class ForeignOriginError(ServiceError):
     title = "A page of another origin may not ask"
 
 
-class Origins:
-    """ASGI layer that refuses what pages of other origins ask for, but those that are named.
+class ForeignHostError(ServiceError):
+    """The request is for a host that is none of this service's names."""
 
-    Who is no browser says nothing of an origin, and is not asked.
+    status = 421
+    code = "foreign-host"
+    title = "This service has another name"
+
+
+def hosts_of(settings: Settings) -> tuple[str, ...]:
+    """Return the patterns of host names that are served; those of loopback where only it is bound.
+
+    Behind a proxy the name is the proxy's.
+    """
+    if settings.hosts:
+        return settings.hosts
+    address = _address(settings.host)
+    loopback = settings.host == "localhost" if address is None else address.is_loopback
+    return LOOPBACK_HOSTS if loopback and not settings.proxies else ("*",)
+
+
+class Origins:
+    """ASGI layer that refuses requests for other hosts, and work that foreign pages ask for.
+
+    Clients that are no browsers send no origin, and are not asked for one.
     """
 
-    def __init__(self, app: ASGIApp, named: tuple[str, ...]) -> None:
+    def __init__(self, app: ASGIApp, named: tuple[str, ...], hosts: tuple[str, ...]) -> None:
         self.app = app
         self.named = frozenset(named)
+        self.hosts = hosts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        if scope["type"] == "http" and scope["method"] not in SAFE:
+        if scope["type"] == "http":
             sent = {name: value.decode("latin-1") for name, value in scope["headers"]}
-            if not self._may_ask(sent):
-                error = ForeignOriginError(
-                    "a page of another origin asks; PNS_CORS_ORIGINS names those that may"
-                )
+            try:
+                self._check(scope["method"], sent)
+            except ServiceError as error:
                 await problems.of_service_error(error)(scope, receive, send)
                 return
         await self.app(scope, receive, send)
 
-    def _may_ask(self, sent: dict[bytes, str]) -> bool:
+    def _check(self, method: str, sent: dict[bytes, str]) -> None:
+        host = _host(f"//{sent.get(b'host', '')}")
+        # An address is no name that could be made to lead here.
+        served = _address(host) is not None or any(fnmatchcase(host, name) for name in self.hosts)
+        if not served:
+            raise ForeignHostError("the Host is none of this service's; PNS_HOSTS lists its names")
+        if method not in SAFE and not self._may_ask(sent, host):
+            raise ForeignOriginError(
+                "a page of another origin asks; PNS_CORS_ORIGINS names those that may"
+            )
+
+    def _may_ask(self, sent: dict[bytes, str], host: str) -> bool:
         origin, site = sent.get(b"origin"), sent.get(b"sec-fetch-site")
         if "*" in self.named or origin in self.named:
             return True
         if site is not None:
             return site in OWN
         # To hosts without TLS browsers say the origin alone. Not its port: proxies leave it out.
-        if origin is None:
-            return True
-        return _host(origin) == _host(f"//{sent.get(b'host', '')}") != ""
+        return origin is None or _host(origin) == host != ""
+
+
+def _address(host: str) -> IPv4Address | IPv6Address | None:
+    try:
+        return ip_address(host)
+    except ValueError:
+        return None
 
 
 def _host(address: str) -> str:

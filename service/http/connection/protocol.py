@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Iterator
+from contextlib import suppress
 from math import inf
 from typing import Any
 
@@ -312,8 +313,10 @@ class BoundedProtocol(H11Protocol, asyncio.BufferedProtocol):
             self._lingering = True
             self._linger_left = bounds.body_bytes - self.conn.body_bytes
             self._end_deadline.start(bounds.linger_seconds)
-            if real.can_write_eof():
-                real.write_eof()
+            # The client may have reset the connection.
+            with suppress(OSError):
+                if real.can_write_eof():
+                    real.write_eof()
             if not real.is_reading():
                 real.resume_reading()
 

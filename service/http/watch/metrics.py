@@ -18,7 +18,6 @@ from prometheus_client import (
     Info,
     PlatformCollector,
     ProcessCollector,
-    start_http_server,
 )
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
@@ -114,17 +113,6 @@ class Metrics:
     def tally(self, name: str, text: str, label: str, counts: Callable[[], Tally[str]]) -> None:
         """Show counts that are kept elsewhere, by their names."""
         self.registry.register(_Tally(name, text, label, counts))
-
-    def serve(self, host: str, port: int) -> tuple[int, Callable[[], None]]:
-        """Answer on a port, 0 for any; return it, and what ends it. Raises OSError."""
-        server, thread = start_http_server(port, addr=host, registry=self.registry)
-
-        def stop() -> None:
-            server.shutdown()
-            server.server_close()
-            thread.join()
-
-        return server.server_port, stop
 
 
 class _Count(Collector):

@@ -155,9 +155,14 @@ def test_a_gltf_is_read_with_the_files_of_its_own_folder(pns: Any, tmp_path: Pat
 
 @pytest.mark.parametrize("compress", ["draco", "meshopt"])
 def test_compressed_files_are_written_and_read(pns: Any, part_file: Path, compress: str) -> None:
-    assert pns("subdivide", "part.glb", "-o", "packed.glb", "--compress", compress).code == 0
+    assert (
+        pns(
+            "subdivide", "part.glb", "-o", "packed.glb", "--levels", "1", "--compress", compress
+        ).code
+        == 0
+    )
     assert tree_of(part_file.with_name("packed.glb"))["extensionsRequired"]
-    done = pns("subdivide", "packed.glb", "-o", "again.obj")
+    done = pns("subdivide", "packed.glb", "-o", "again.obj", "--levels", "1")
     assert done.code == 0
     assert f"{16 * FACES:,} faces" in done.err
 
@@ -274,3 +279,30 @@ def test_limit_puts_the_vertices_on_the_limit_surface(pns: Any, tmp_path: Path) 
     height = 1 - weight + weight / np.sqrt(5)
     tips = np.linalg.norm(made.vertices, axis=1)[: len(points)]
     np.testing.assert_allclose(tips, height, rtol=1e-6)
+
+
+def test_an_error_names_the_file_that_it_is_in(pns: Any, tmp_path: Path) -> None:
+    (tmp_path / "bad.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 x 0\nf 1 2 3\n")
+    outcome = pns("subdivide", "bad.obj", "-o", "out.obj")
+    assert outcome.code == 1
+    assert outcome.err.startswith("pns: bad.obj: line 3 ")
+
+
+def test_the_doctor_finds_this_machine_well(pns: Any) -> None:
+    outcome = pns("doctor")
+    assert outcome.code == 0, outcome.out
+    lines = outcome.out.splitlines()
+    assert all(line.startswith("ok ") for line in lines)
+    assert {"pns", "numpy", "kernels", "models", "self-test"} <= {line.split()[1] for line in lines}
+
+
+def test_the_doctor_goes_on_after_what_is_wrong_and_ends_with_1(
+    pns: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PNS_FOO", "1")
+    outcome = pns("doctor")
+    assert outcome.code == 1
+    failed = [line for line in outcome.out.splitlines() if line.startswith("FAIL")]
+    assert len(failed) == 1
+    assert "PNS_FOO" in failed[0]
+    assert "self-test" in outcome.out.splitlines()[-1]

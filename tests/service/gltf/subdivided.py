@@ -8,7 +8,7 @@ from tests.support.networks import random_model
 
 def subdivide(*meshes, data=None, **options):
     data = files.glb(*meshes) if data is None else data
-    options = Options(**{"scheme": "loop", **options})
+    options = Options(**{"scheme": "loop", "levels": 1, **options})
     model = random_model(0) if options.scheme == "pns" else None
     return subdivide_gltf(data, "glb", options, model, Limits())
 

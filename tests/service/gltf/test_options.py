@@ -12,7 +12,7 @@ from tests.support.networks import random_model
 
 
 def subdivide(*meshes, **options):
-    options = Options(**{"scheme": "loop", **options})
+    options = Options(**{"scheme": "loop", "levels": 1, **options})
     return subdivide_gltf(files.glb(*meshes), "glb", options, random_model(0), Limits())
 
 

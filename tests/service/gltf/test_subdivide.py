@@ -105,8 +105,8 @@ def test_normals_are_smooth_across_primitives():
         assert (np.einsum("vi,vi->v", part["POSITION"], part["NORMAL"]) > 0).all()
 
 
-def test_absent_normals_stay_absent():
-    _, attributes = files.primitive_of(subdivide([octahedron()]).glb)
+def test_absent_normals_stay_absent_if_asked_to():
+    _, attributes = files.primitive_of(subdivide([octahedron()], normals="keep").glb)
     assert set(attributes) == {"POSITION"}
 
 

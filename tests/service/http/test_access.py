@@ -12,11 +12,10 @@ from ipaddress import ip_network
 
 import httpx2
 import pytest
-from fastapi.testclient import TestClient
 from starlette.responses import PlainTextResponse
 
 from service.http.access import bearer as bearer_layer
-from service.http.access.bearer import MOST_WAITING, WRONG_A_MINUTE, Bearer
+from service.http.access.bearer import KEPT_FREE, MOST_WAITING, WRONG_A_MINUTE, Bearer
 from service.http.access.forwarded import Forwarded
 from service.http.access.keys import Entry, Keyring, KeysError, hash_of, matches, new_key, read_keys
 from service.http.access.keys import toml_entry as written
@@ -24,7 +23,7 @@ from service.http.access.origins import Origins
 from service.http.app import create_app
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
-from tests.support.live import served
+from tests.support.live import local, served
 
 GLB = {"Content-Type": "model/gltf-binary"}
 
@@ -37,7 +36,7 @@ def seen_behind(proxies, *, peer="10.0.0.1", **headers):
         await PlainTextResponse(text)(scope, receive, send)
 
     layer = Forwarded(app, tuple(map(ip_network, proxies)))
-    client = TestClient(layer, client=(peer, 1))
+    client = local(layer, client=(peer, 1))
     names = {name.replace("_", "-"): value for name, value in headers.items()}
     return client.get("/", headers=names).text.split()
 
@@ -104,7 +103,7 @@ def keys_file(tmp_path_factory):
 def client(keys_file):
     settings = Settings(workers=1, keys_file=keys_file)
     app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
-    with TestClient(app, raise_server_exceptions=False) as opened:
+    with local(app, raise_server_exceptions=False) as opened:
         yield opened
 
 
@@ -201,12 +200,12 @@ def test_a_target_with_a_host_needs_a_key_as_its_path_does(keys_file):
         closing(http.client.HTTPConnection(*where, timeout=600)) as connection,
     ):
         statuses = []
-        for target in ("http://b/healthz", "http://b/nothing", "http://healthz/jobs/x"):
+        for target in ("http://localhost/healthz", "http://localhost/nothing", "http://b/healthz"):
             connection.request("GET", target)
             answer = connection.getresponse()
             answer.read()
             statuses.append(answer.status)
-    assert statuses == [200, 401, 401]
+    assert statuses == [200, 401, 421]
 
 
 @pytest.mark.parametrize("scheme", ["Bearer", "bearer", "BEARER "])
@@ -232,25 +231,62 @@ def test_the_bearer_of_a_key_is_served(client, scheme):
 def test_a_wrong_key_is_refused_wherever_it_is_sent(keys_file, authorization):
     settings = Settings(workers=1, keys_file=keys_file)
     app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
-    client = TestClient(app)
+    client = local(app)
     headers = {"Authorization": authorization}
     assert client.get("/healthz", headers=headers).status_code == 401
     assert KEY not in client.get("/healthz", headers=headers).text
 
 
-def test_guessing_ends_and_keys_that_were_right_stay_right(keys_file):
+def test_guessing_ends_for_the_name_that_is_guessed_and_locks_out_no_other(keys_file):
     settings = Settings(workers=1, keys_file=keys_file)
-    client = TestClient(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up))
+    client = local(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up))
     assert client.get("/healthz", headers=bearer(KEY)).status_code == 200
     wrong = [
-        client.get("/healthz", headers=bearer(f"pns_x_{n:043d}")).status_code
+        client.get("/healthz", headers=bearer(f"pns_studio_{n:043d}")).status_code
         for n in range(WRONG_A_MINUTE + 2)
     ]
     assert wrong == [401] * WRONG_A_MINUTE + [429] * 2
-    refused = client.get("/healthz", headers=bearer(OTHER))
+    refused = client.get("/healthz", headers=bearer(f"pns_studio_{99:043d}"))
     assert (refused.status_code, refused.json()["code"]) == (429, "too-many-wrong-keys")
     assert int(refused.headers["retry-after"]) >= 1
+    # One that was right stays right, and another that was not seen yet is checked.
     assert client.get("/healthz", headers=bearer(KEY)).status_code == 200
+    assert client.get("/healthz", headers=bearer(OTHER)).status_code == 200
+
+
+def wrong_key_from(layer, address, name="x"):
+    """The status that a wrong key gets."""
+    said = []
+
+    async def send(message):
+        said.append(message.get("status"))
+
+    key = f"Bearer pns_{name}_{'w' * 43}".encode()
+    scope = {"type": "http", "headers": [(b"authorization", key)], "path": "/jobs"}
+
+    async def ask():
+        await layer(scope | {"client": (address, 1)}, None, send)
+
+    asyncio.run(ask())
+    return said[0]
+
+
+def test_a_site_of_ipv6_guesses_no_more_than_its_subscribers_may():
+    layer = Bearer(PlainTextResponse("never"), {})
+    # Each from a /64 of its own, within one /56.
+    said = [wrong_key_from(layer, f"2001:db8:0:{n:x}::1") for n in range(4 * WRONG_A_MINUTE + 1)]
+    assert said == [401] * 4 * WRONG_A_MINUTE + [429]
+    assert wrong_key_from(layer, "2001:db8:1::1") == 401
+
+
+def test_places_for_checks_are_kept_for_addresses_that_sent_no_wrong_key(monkeypatch):
+    layer = Bearer(PlainTextResponse("never"), {})
+    guessers = [f"192.0.2.{number}" for number in range(MOST_WAITING)]
+    for address in guessers:
+        assert wrong_key_from(layer, address) == 401
+    layer._waiting.update(guessers[: MOST_WAITING - KEPT_FREE])
+    assert wrong_key_from(layer, guessers[-1]) == 503
+    assert wrong_key_from(layer, "198.51.100.1") == 401
 
 
 def test_few_keys_wait_for_their_check_and_the_next_is_told_to_come_back(monkeypatch):
@@ -303,7 +339,7 @@ def test_a_check_costs_the_same_whoever_is_named_and_however_it_is_hashed(tmp_pa
     path = tmp_path / "keys.toml"
     path.write_text("\n\n".join(map(written, entries)))
     settings = Settings(workers=1, keys_file=path)
-    client = TestClient(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up))
+    client = local(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up))
     scrypt, costs = hashlib.scrypt, []
 
     def counted(*arguments, n, r, p, **others):
@@ -330,7 +366,7 @@ def test_the_routes_see_the_name_of_the_key(client, caplog):
 def test_the_service_says_at_start_to_whom_it_is_open(keys_file, with_keys, caplog):
     settings = Settings(workers=1, keys_file=keys_file if with_keys else None)
     app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
-    with caplog.at_level(logging.INFO), TestClient(app):
+    with caplog.at_level(logging.INFO), local(app):
         pass
     said = "the bearers of 2 keys" if with_keys else "open to everybody: no PNS_KEYS_FILE"
     assert said in caplog.text
@@ -344,7 +380,7 @@ def cross(client, method="GET", **headers):
 
 
 def test_no_other_origin_may_ask_unless_it_is_named():
-    with TestClient(create_app(Settings(workers=1), warm_up=jobs.no_warm_up)) as client:
+    with local(create_app(Settings(workers=1), warm_up=jobs.no_warm_up)) as client:
         assert "access-control-allow-origin" not in cross(client).headers
         assert cross(client, "OPTIONS").status_code == 405
 
@@ -380,14 +416,48 @@ def test_a_form_of_another_origin_is_refused_before_its_work(sent, origins, stat
         await PlainTextResponse("done")(scope, receive, send)
 
     named = Settings(cors_origins=origins).cors_origins
-    client = TestClient(Origins(app, named), base_url="http://pns.example")
+    client = local(Origins(app, named, ("*",)), base_url="http://pns.example")
     assert client.post("/jobs", headers=sent).status_code == status
     assert asked == ["POST"] * (status == 200)
     assert client.get("/models", headers=sent).status_code == 200
 
 
+@pytest.mark.parametrize(
+    ("settings", "host", "status"),
+    [
+        # A page whose name was made to lead here has one origin and host (DNS rebinding).
+        ({}, "evil.example", 421),
+        ({}, "evil.example:8000", 421),
+        ({}, "", 421),
+        ({}, "localhost.evil.example", 421),
+        ({}, "127.0.0.1.evil.example", 421),
+        ({}, "localhost", 200),
+        ({}, "pns.localhost:8000", 200),
+        ({}, "127.0.0.1:8000", 200),
+        ({}, "[::1]:8000", 200),
+        # Elsewhere than on loopback, or behind a proxy, any; or those that are listed.
+        ({"host": "0.0.0.0"}, "pns.example", 200),
+        ({"proxies": "192.0.2.1"}, "pns.example", 200),
+        ({"hosts": "pns.example, *.pns.example"}, "PNS.example", 200),
+        ({"hosts": "pns.example, *.pns.example"}, "a.pns.example:443", 200),
+        ({"hosts": "pns.example, *.pns.example"}, "localhost", 421),
+        ({"host": "0.0.0.0", "hosts": "pns.example"}, "evil.example", 421),
+    ],
+)
+def test_only_the_names_of_the_service_are_served(settings, host, status):
+    app = create_app(Settings(workers=1, **settings), warm_up=jobs.no_warm_up)
+    sent = {"Host": host, "Origin": f"http://{host}"}
+    assert local(app).get("/healthz", headers=sent).status_code == status
+
+
+@pytest.mark.parametrize("hosts", ["http://a.example", "a.example:80", "a*.example", "a/b"])
+def test_what_is_no_host_is_refused_at_start(hosts):
+    with pytest.raises(ValueError, match="no host name"):
+        Settings(hosts=hosts)
+
+
 def test_the_service_refuses_such_a_form():
-    with TestClient(create_app(Settings(workers=1), warm_up=jobs.no_warm_up)) as client:
+    with local(create_app(Settings(workers=1), warm_up=jobs.no_warm_up)) as client:
         form = {"files": {"file": ("a.glb", b"glTF")}}
         answer = client.post("/jobs", headers={"Sec-Fetch-Site": "cross-site"}, **form)
         assert (answer.status_code, answer.json()["code"]) == (403, "foreign-origin")
@@ -407,7 +477,7 @@ def test_no_answer_is_for_a_browser_to_guess():
 
 def test_a_named_origin_may(keys_file):
     settings = Settings(workers=1, cors_origins="https://a.example", keys_file=keys_file)
-    client = TestClient(create_app(settings, warm_up=jobs.no_warm_up))
+    client = local(create_app(settings, warm_up=jobs.no_warm_up))
     answer = cross(client)
     assert answer.headers["access-control-allow-origin"] == "https://a.example"
     assert "X-Request-ID" in answer.headers["access-control-expose-headers"]

@@ -25,7 +25,7 @@ async def sent(where: Address, body: bytes, told: str) -> tuple[StreamReader, St
     """A connection that has sent a whole request; its content type tells the worker more."""
     reader, writer = await asyncio.open_connection(*where)
     head = (
-        "POST /subdivide HTTP/1.1\r\nHost: test\r\nConnection: close\r\n"
+        "POST /subdivide HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
         f"Content-Type: model/gltf-binary; {told}\r\nContent-Length: {len(body)}\r\n\r\n"
     )
     writer.write(head.encode() + body)
@@ -92,7 +92,7 @@ def test_a_worker_that_outlives_its_request_writes_into_no_other_answer(tmp_path
         for _ in range(5):
             # An answer on another connection: the server has been round its loop.
             reader, writer = await asyncio.open_connection(*where)
-            writer.write(b"GET /healthz HTTP/1.1\r\nHost: test\r\nConnection: close\r\n\r\n")
+            writer.write(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
             await content(reader, writer)
         # Whatever the first request has closed by now, this one gets the numbers of.
         connection = await sent(where, b"patient", f"folder={patient}")

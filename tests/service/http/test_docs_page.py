@@ -4,18 +4,18 @@ import re
 from pathlib import Path
 
 import pytest
-from fastapi.testclient import TestClient
 
 from service.http.app import create_app
 from service.http.docs_page import FILES, FOLDER
 from service.http.static_files import MEDIA_TYPES
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
+from tests.support.live import local
 
 
 @pytest.fixture(scope="module")
 def client():
-    return TestClient(create_app(Settings(workers=1), warm_up=jobs.no_warm_up))
+    return local(create_app(Settings(workers=1), warm_up=jobs.no_warm_up))
 
 
 def test_the_page_and_all_that_it_names_are_there(client):

@@ -198,7 +198,7 @@ def test_who_leaves_before_a_job_stands_in_line_leaves_nothing(tmp_path: Path) -
     results.mkdir()
     told.mkdir()
     body = f"measured {told}"
-    head = f"POST /jobs HTTP/1.1\r\nHost: test\r\nContent-Type: {GLB['Content-Type']}\r\n"
+    head = f"POST /jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: {GLB['Content-Type']}\r\n"
     request = f"{head}Content-Length: {len(body)}\r\n\r\n{body}".encode()
     with served(workers=1, measure=measure_in_the_end, result_folder=results) as where:
         clients = [socket.create_connection(where) for _ in range(3)]
@@ -236,7 +236,9 @@ def test_results_are_forgotten_in_time_and_by_size(tmp_path: Path) -> None:
         job = started(client, b"echo")
         until(lambda: client.get(f"/jobs/{job}").status_code == 404)
     with (
-        served(workers=1, result_bytes=1000, result_folder=tmp_path) as where,
+        served(
+            workers=1, result_bytes=1000, result_folder=tmp_path, promised_seconds=1e-9
+        ) as where,
         opened(where) as client,
     ):
         # Answer and report hold the same here.
@@ -248,6 +250,24 @@ def test_results_are_forgotten_in_time_and_by_size(tmp_path: Path) -> None:
         last = started(client, b"large 100")
         until(lambda: client.get(f"/jobs/{first}").status_code == 404)
         assert [ended(client, job)["state"] for job in (second, third, last)] == ["done"] * 3
+
+
+def test_a_result_that_finds_no_room_beside_promised_ones_fails_and_says_when_to_come_back(
+    tmp_path: Path,
+) -> None:
+    with (
+        served(workers=1, result_bytes=1000, result_folder=tmp_path) as where,
+        opened(where) as client,
+    ):
+        first, second = (started(client, f"large {size}".encode()) for size in (200, 250))
+        failed = ended(client, second)
+        assert (failed["state"], failed["problem"]["code"]) == ("failed", "busy")
+        refused = client.get(f"/jobs/{second}/result")
+        assert refused.status_code == 503
+        assert int(refused.headers["retry-after"]) >= 1
+        # The first is there, and once it is fetched leaves its room.
+        assert client.get(f"/jobs/{first}/result").status_code == 200
+        assert ended(client, started(client, b"large 250"))["state"] == "done"
 
 
 def test_results_lie_on_disk_without_a_name(tmp_path: Path) -> None:

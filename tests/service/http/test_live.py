@@ -39,7 +39,7 @@ def subdivide(client: httpx2.Client, body: bytes) -> httpx2.Response:
 
 def request_head(length: int, *, extra: str = "") -> bytes:
     return (
-        "POST /subdivide HTTP/1.1\r\nHost: test\r\nContent-Type: model/gltf-binary\r\n"
+        "POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n"
         f"Content-Length: {length}\r\n{extra}\r\n"
     ).encode()
 
@@ -186,7 +186,7 @@ def test_413_is_answered_before_the_body_is_sent(address: tuple[str, int]) -> No
 
 def test_an_endless_chunked_upload_is_cut_off_at_the_limit(address: tuple[str, int]) -> None:
     head = (
-        b"POST /subdivide HTTP/1.1\r\nHost: test\r\nContent-Type: model/gltf-binary\r\n"
+        b"POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n"
         b"Transfer-Encoding: chunked\r\n\r\n"
     )
     chunk = b"100000\r\n" + bytes(MIB) + b"\r\n"

@@ -22,6 +22,7 @@ from service.meshfiles.example import part_glb
 from service.settings import Settings
 from service.workers.catalogue import Catalogue
 from tests.support import stand_in_jobs as jobs
+from tests.support.live import local
 from tests.support.networks import VERTEX_CARD
 from tests.support.packages import served_file, several_models
 
@@ -37,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @contextmanager
 def served(folder: Path, model: str | None = None) -> Iterator[TestClient]:
     warm_up = partial(jobs.hold_among, str(folder))
-    with TestClient(create_app(Settings(workers=1, model=model), warm_up=warm_up)) as client:
+    with local(create_app(Settings(workers=1, model=model), warm_up=warm_up)) as client:
         yield client
 
 
@@ -195,7 +196,7 @@ def test_the_log_names_the_model(client: TestClient, caplog: pytest.LogCaptureFi
 def test_503_for_the_list_while_no_worker_can_read_it() -> None:
     settings = Settings(workers=1, queue=0, job_seconds=1)
     app = create_app(settings, warm_up=partial(jobs.stay_away, 60.0))
-    with TestClient(app) as client:
+    with local(app) as client:
         began = time.monotonic()
         answer = client.get("/models")
         assert (answer.status_code, answer.json()["code"]) == (503, "busy")

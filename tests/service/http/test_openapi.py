@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 import uvicorn
-from fastapi.testclient import TestClient
 
 from service.gltf.read.container import read_glb
 from service.http.app import create_app
@@ -19,6 +18,7 @@ from service.meshfiles.example import part_glb
 from service.settings import Settings
 from tests.support import node_tools
 from tests.support import stand_in_jobs as jobs
+from tests.support.live import local
 
 ROOT = Path(__file__).resolve().parents[3]
 SUPPORT = ROOT / "tests" / "support"
@@ -27,7 +27,7 @@ SUPPORT = ROOT / "tests" / "support"
 @pytest.fixture(scope="module")
 def document():
     app = create_app(Settings(workers=1), warm_up=jobs.no_warm_up)
-    return TestClient(app).get("/openapi.json").json()
+    return local(app).get("/openapi.json").json()
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_operations_have_names_of_their_own(document):
 
 
 def test_every_route_says_what_it_does_and_stands_on_the_page(document):
-    page = (ROOT / "docs" / "service.md").read_text()
+    page = (ROOT / "docs" / "reference" / "http.md").read_text()
     for name, operation in operations(document):
         # Without one it is made of the name.
         assert operation["summary"].lower() != operation["operationId"].replace("_", " "), name
@@ -136,7 +136,7 @@ def test_an_answer_is_sent_as_what_was_asked_for():
         Settings(workers=1), job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up
     )
     glb = {"Content-Type": "model/gltf-binary"}
-    with TestClient(app) as client:
+    with local(app) as client:
         for accept, kind in (
             ("*/*", "model/gltf-binary"),
             ("application/octet-stream", "application/octet-stream"),

@@ -14,12 +14,13 @@ from fastapi.testclient import TestClient
 from service.http.app import create_app
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
+from tests.support.live import local
 
 def main():
     if not sys.flags.optimize:
         raise SystemExit("not optimised")
     stand_ins = {"job": jobs.obey, "measure": jobs.measure, "warm_up": jobs.no_warm_up}
-    with TestClient(create_app(Settings(workers=1, body=1000), **stand_ins)) as client:
+    with local(create_app(Settings(workers=1, body=1000), **stand_ins)) as client:
         glb = {"Content-Type": "model/gltf-binary"}
         def status(path="/subdivide", body=b"x", **headers):
             return client.post(path, content=body, headers=glb | headers).status_code

@@ -7,15 +7,15 @@ import re
 from pathlib import Path
 
 import pytest
-from fastapi.testclient import TestClient
 from pydantic import ValidationError
 
 from service.http import page
 from service.http.app import create_app
 from service.http.static_files import MEDIA_TYPES
 from service.settings import Settings
+from tests.support.live import local
 
-CLIENT = TestClient(create_app(Settings(workers=1)))
+CLIENT = local(create_app(Settings(workers=1)))
 ASSETS = sorted((page.FOLDER / "assets").iterdir())
 ADDRESS = re.compile(r'(?:src|href)="([^"#]+)"')
 
@@ -27,7 +27,7 @@ def test_the_page_names_only_files_that_are_there_relative_to_itself() -> None:
 
 
 def test_under_a_prefix_the_page_names_its_files_from_the_root_of_the_host() -> None:
-    client = TestClient(create_app(Settings(workers=1, prefix="/tools/pns")))
+    client = local(create_app(Settings(workers=1, prefix="/tools/pns")))
     answer = client.get("/")
     addresses = set(ADDRESS.findall(answer.text))
     assert len(addresses) >= 4

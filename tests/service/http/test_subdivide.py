@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import io
 import time
 import zipfile
@@ -13,15 +14,18 @@ import msgspec
 import pytest
 from fastapi.testclient import TestClient
 
+from service.bodies.media import MEDIA_TYPES, Kind
 from service.gltf.read.container import read_glb
 from service.http.app import create_app
 from service.meshfiles import formats
+from service.meshfiles.convert import converted
 from service.meshfiles.example import part as example_part
 from service.meshfiles.example import part_glb
 from service.meshfiles.triangles_glb import as_gltf_json
-from service.options import Limits
+from service.options import Limits, Options
 from service.settings import Settings
 from service.workers.jobs import hold_model
+from tests.support.live import local
 from tests.support.stand_in_models import CountedModel
 
 GLB = {"Content-Type": "model/gltf-binary"}
@@ -30,7 +34,7 @@ FACES = 1920
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[TestClient]:
-    with TestClient(create_app(Settings(workers=1, faces=100_000))) as opened:
+    with local(create_app(Settings(workers=1, faces=100_000))) as opened:
         for _ in range(600):
             if opened.get("/readyz").status_code == 200:
                 break
@@ -50,6 +54,22 @@ def tree_of(glb: bytes) -> dict[str, Any]:
 def report_of(answer: httpx2.Response) -> dict[str, Any]:
     assert answer.status_code == 200, answer.text
     return tree_of(answer.content)["asset"]["extras"]["pns"]
+
+
+def test_a_body_in_gzip_is_refined_as_it_was_before(client: TestClient, part: bytes) -> None:
+    plain = client.post("/subdivide", content=part, headers=GLB)
+    packed = client.post(
+        "/subdivide", content=gzip.compress(part), headers=GLB | {"Content-Encoding": "gzip"}
+    )
+    assert packed.status_code == 200
+    assert packed.content == plain.content
+
+
+def test_a_body_in_gzip_is_bounded_by_what_it_unpacks_to(client: TestClient) -> None:
+    bomb = gzip.compress(bytes(64 * 2**20 + 1))
+    assert len(bomb) < 2**17
+    answer = client.post("/subdivide", content=bomb, headers=GLB | {"Content-Encoding": "gzip"})
+    assert (answer.status_code, answer.json()["limit"]) == (413, "body")
 
 
 def test_a_raw_glb_is_refined_and_carries_its_report(client: TestClient, part: bytes) -> None:
@@ -94,7 +114,7 @@ def test_files_beside_the_document_come_as_parts_or_in_an_archive(
         "/subdivide", content=packed.getvalue(), headers={"Content-Type": "application/zip"}
     )
     in_form = client.post("/subdivide", files={"file": ("part.zip", packed.getvalue())})
-    assert report_of(in_parts)["totals"]["faces"] == 4 * FACES
+    assert report_of(in_parts)["totals"]["faces"] == 16 * FACES
     assert in_parts.content == raw.content == in_form.content
 
     missing = client.post("/subdivide", files={"file": ("part.gltf", text)})
@@ -169,7 +189,7 @@ def test_other_mesh_formats_come_back_as_the_glb_that_their_glb_gives(
     triangles = example_part()
     content = formats.write(triangles, kind)
     raw = client.post("/subdivide", content=content, headers={"Content-Type": f"model/{kind}"})
-    assert report_of(raw)["totals"]["faces"] == 4 * FACES
+    assert report_of(raw)["totals"]["faces"] == 16 * FACES
     assert report_of(raw)["levels"][0]["edges"]["boundary"] == 0
     form = client.post("/subdivide", files={"file": (f"part.{kind.upper()}", content)})
     assert form.content == raw.content
@@ -188,7 +208,7 @@ def test_what_a_conversion_loses_is_in_the_report(client: TestClient) -> None:
         ("vertices dropped that no face uses", 1),
         ("not used by the document: quad.mtl", 1),
     }
-    assert report["totals"]["faces"] == 8
+    assert report["totals"]["faces"] == 32
 
 
 @pytest.mark.parametrize(
@@ -230,7 +250,7 @@ def test_a_model_given_to_the_application_is_the_one_that_runs(part: bytes) -> N
     """And it crosses to each worker once."""
     before = CountedModel.pickled
     app = create_app(Settings(workers=1), model=CountedModel(), warm_up=hold_model)
-    with TestClient(app) as client:
+    with local(app) as client:
         for _ in range(3):
             report = report_of(client.post("/subdivide", content=part, headers=GLB))
             assert report["model"] == "zero"
@@ -242,7 +262,7 @@ def test_a_model_given_to_the_application_is_the_one_that_runs(part: bytes) -> N
 def test_what_an_upload_says_is_not_logged(capfd: pytest.CaptureFixture[str]) -> None:
     kind = {"Content-Type": "multipart/form-data; boundary=b"}
     # Its worker starts here, so that it writes to the stream that is captured.
-    with TestClient(create_app(Settings(workers=1), warm_up=hold_model)) as client:
+    with local(create_app(Settings(workers=1), warm_up=hold_model)) as client:
         answer = client.post("/subdivide", content=b"--b\r\nNot a header: x", headers=kind)
         assert answer.status_code == 400
     assert "header" not in capfd.readouterr().err
@@ -250,7 +270,7 @@ def test_what_an_upload_says_is_not_logged(capfd: pytest.CaptureFixture[str]) ->
 
 def test_without_a_model_loop_still_works(part: bytes) -> None:
     settings = Settings(workers=1, model="missing.onnx")
-    with TestClient(create_app(settings, warm_up=hold_model)) as client:
+    with local(create_app(settings, warm_up=hold_model)) as client:
         refused = client.post("/subdivide", content=part, headers=GLB)
         assert refused.status_code == 503
         assert refused.json()["code"] == "no-model"
@@ -267,3 +287,27 @@ def test_limit_moves_the_vertices_and_leaves_the_report(client: TestClient, part
     assert plain.content != limit.content
     refused = client.post("/subdivide?limit=perhaps", content=part, headers=GLB)
     assert refused.status_code == 422
+
+
+@pytest.mark.parametrize("target", ["gltf", "obj", "ply", "stl", "off"])
+def test_an_answer_in_another_format_is_what_the_command_writes(
+    client: TestClient, target: Kind
+) -> None:
+    query = f"levels=1&scheme=loop&format={target}"
+    answer = client.post(f"/subdivide?{query}", content=part_glb(), headers=GLB)
+    written = converted(part_glb(), "glb", target, Options(levels=1, scheme="loop"), None, Limits())
+    assert answer.content == written.content
+    assert answer.headers["content-type"] == MEDIA_TYPES[target]
+
+
+def test_a_job_keeps_its_format(client: TestClient) -> None:
+    query = "levels=1&scheme=loop&format=off"
+    job = client.post(f"/jobs?{query}", content=part_glb(), headers=GLB)
+    result = f"{job.headers['location']}/result"
+    for _ in range(600):
+        answer = client.get(result)
+        if answer.status_code == 200:
+            break
+        time.sleep(0.05)
+    assert answer.content.startswith(b"OFF")
+    assert answer.headers["content-type"] == "model/off"

@@ -3,7 +3,6 @@
 import sys
 
 import pytest
-from fastapi.testclient import TestClient
 
 from service.http import layers
 from service.http.app import create_app
@@ -11,6 +10,7 @@ from service.http.watch.metrics import Metrics
 from service.http.watch.tracing import TracingError, tracer_from_environment
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
+from tests.support.live import local
 
 GLB = {"Content-Type": "model/gltf-binary"}
 
@@ -28,7 +28,7 @@ def traced():
     app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
     tracer = provider.get_tracer("tests")
     app.layers = lambda routes: layers.around(routes, settings, Metrics(), None, tracer)
-    with TestClient(app, raise_server_exceptions=False) as client:
+    with local(app, raise_server_exceptions=False) as client:
         yield client, exporter.get_finished_spans
 
 

@@ -2,22 +2,29 @@
 
 import json
 import logging
+import socket
+import threading
 import urllib.request
 from collections import Counter
+from contextlib import ExitStack, closing, suppress
 
 import pytest
-from fastapi.testclient import TestClient
+import uvicorn
 from hypothesis import given
 from hypothesis import strategies as st
+from prometheus_client import CollectorRegistry, Gauge
 from prometheus_client.parser import text_string_to_metric_families
 
 from service.http.app import create_app
+from service.http.prompt_server import PromptServer
 from service.http.watch.metrics import Metrics
+from service.http.watch.scrapes import scrapes
 from service.log_lines import LONGEST, JsonLines
 from service.request_ids import REQUEST_ID
 from service.settings import Settings
 from service.workers.catalogue import Catalogue
 from tests.support import stand_in_jobs as jobs
+from tests.support.live import local
 
 GLB = {"Content-Type": "model/gltf-binary"}
 
@@ -30,7 +37,7 @@ def client():
     async def breaks():
         raise ZeroDivisionError("secret")
 
-    with TestClient(app, raise_server_exceptions=False) as opened:
+    with local(app, raise_server_exceptions=False) as opened:
         yield opened
 
 
@@ -137,7 +144,7 @@ def test_a_traceback_is_one_line():
 def test_what_a_worker_says_has_the_id_of_its_request(capfd):
     headers = GLB | {"X-Request-ID": "of-a-worker"}
     stand_ins = {"job": jobs.obey, "measure": jobs.measure, "warm_up": jobs.no_warm_up}
-    with TestClient(create_app(Settings(workers=1), **stand_ins)) as client:
+    with local(create_app(Settings(workers=1), **stand_ins)) as client:
         assert client.post("/subdivide", content=b"log", headers=headers).status_code == 200
     # The worker wrote before it answered.
     (line,) = [line for line in capfd.readouterr().err.splitlines() if "a job says" in line]
@@ -149,14 +156,12 @@ def test_what_a_worker_says_has_the_id_of_its_request(capfd):
 # Metrics
 
 
-def scraped(port):
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=600) as answer:
-        families = text_string_to_metric_families(answer.read().decode())
-        return {
-            (sample.name, tuple(sorted(sample.labels.items()))): sample.value
-            for family in families
-            for sample in family.samples
-        }
+def values_of(text):
+    return {
+        (sample.name, tuple(sorted(sample.labels.items()))): sample.value
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+    }
 
 
 def labelled(values, name, /, **labels):
@@ -165,16 +170,62 @@ def labelled(values, name, /, **labels):
 
 @pytest.fixture
 def scrape():
-    stops = []
-
     def of(metrics):
-        port, stop = metrics.serve("127.0.0.1", 0)
-        stops.append(stop)
-        return scraped(port)
+        text = local(scrapes(metrics.registry)).get("/metrics").text
+        return values_of(text)
 
-    yield of
-    for stop in stops:
-        stop()
+    return of
+
+
+def test_a_scrape_serves_those_that_come_within_a_second():
+    now = [100.0]
+    registry, made = CollectorRegistry(), []
+    Gauge("pns_made", "…", registry=registry).set_function(lambda: made.append(1) or len(made))
+    client = local(scrapes(registry, lambda: now[0]))
+    for seconds, times in ((0, 1), (0.9, 1), (1.0, 2)):
+        now[0] = 100.0 + seconds
+        assert f"pns_made {times}.0" in client.get("/metrics").text
+    assert len(made) == 2
+
+
+@pytest.mark.parametrize(("method", "path"), [("GET", "/"), ("POST", "/metrics")])
+def test_the_port_of_the_metrics_serves_nothing_else(method, path):
+    assert local(scrapes(CollectorRegistry())).request(method, path).status_code == 404
+
+
+@pytest.fixture
+def metrics_port():
+    """The address of a server of metrics that waits half a second for a head."""
+    with closing(socket.create_server(("127.0.0.1", 0))) as listening:
+        config = uvicorn.Config(scrapes(CollectorRegistry()), lifespan="off", log_config=None)
+        server = PromptServer(config, head_seconds=0.5, most=16, listening=[listening])
+        thread = threading.Thread(target=server.run)
+        thread.start()
+        yield listening.getsockname()
+        server.should_exit = True
+        thread.join()
+
+
+def ends(connection):
+    """Whether the server ends a connection without a word."""
+    try:
+        return connection.recv(1) == b""
+    except ConnectionResetError:
+        return True
+
+
+def test_half_sent_heads_end_and_metrics_are_served_beside_them(metrics_port):
+    with ExitStack() as opened:
+        heads = [
+            opened.enter_context(socket.create_connection(metrics_port, timeout=30))
+            for _ in range(100)
+        ]
+        for connection in heads:
+            with suppress(OSError):
+                connection.sendall(b"GET /metrics HTTP/1.1\r\nHost: a\r\nX-")
+        with urllib.request.urlopen("http://{}:{}/metrics".format(*metrics_port)) as answer:
+            assert answer.status == 200
+        assert all(ends(connection) for connection in heads)
 
 
 def test_requests_are_counted_by_route_status_and_code(client, scrape):

@@ -150,6 +150,30 @@ def test_a_form_of_too_many_parts_is_refused_at_a_glance() -> None:
     assert refusal.value.limit == "parts"
 
 
+@pytest.mark.parametrize("digits", [400, 4_300])
+@pytest.mark.parametrize("field", ["count", "sparse"])
+def test_a_count_of_thousands_of_digits_is_a_cost_and_no_fault(digits: int, field: str) -> None:
+    tree, binary = files.document([octahedron()])
+    text = files.json.dumps(tree).encode()
+    number = b"9" * digits
+    if field == "count":
+        text = re.sub(rb'"count": \d+', b'"count": ' + number, text)
+    else:
+        text = re.sub(rb'("count": \d+)', rb'\1, "sparse": {"count": ' + number + b"}", text)
+    job = measured(files.pack(text, binary), "model/gltf-binary")
+    assert job.faces >= 0
+    assert np.isfinite(job.seconds)
+
+
+def test_counts_that_no_number_holds_cost_the_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    def too_large(*_: object) -> Cost:
+        raise OverflowError("int too large to convert to float")
+
+    monkeypatch.setattr("service.workers.measure.cost_of_gltf", too_large)
+    job = measured(b"glTF", "model/gltf-binary", Limits(max_faces=1000))
+    assert (job.faces, job.most) == (1000, True)
+
+
 def measured(content: bytes, kind: str, limits: Limits | None = None) -> Cost:
     """The cost of a body, as the worker of short jobs measures it."""
     with MemoryFile() as body, MemoryFile() as page:

@@ -20,12 +20,15 @@ import pytest
 from pebble import ProcessPool
 from pebble.pool import process as pebble_process
 
-from service.errors import BusyError, GltfError, JobTimeout, WorkerDied
+from service.errors import BusyError, GltfError, JobTimeout, UnreadableError, WorkerDied
 from service.workers import pool as pools
+from service.workers.jobs import subdivide
 from service.workers.memory_file import MemoryFile
 from service.workers.pool import Workers
+from service.workers.progress import ProgressPage
 from service.workers.worker import JobFaultError
 from tests.support import stand_in_jobs as jobs
+from tests.support.handed_in import work_of
 
 PAGE = resource.getpagesize()
 
@@ -98,6 +101,32 @@ def test_a_dying_worker_takes_only_its_own_job(tmp_path: Path) -> None:
             (tmp_path / "go").touch()
             assert alive(await neighbour)
             assert await asyncio.gather(*(pool.run(jobs.sleep, 0.0) for _ in range(4)))
+
+    run(scenario)
+
+
+def test_a_job_whose_worker_dies_is_done_by_another(tmp_path: Path) -> None:
+    async def scenario() -> None:
+        async with workers(count=2) as pool:
+            assert alive(await pool.run(jobs.die_once, tmp_path / "died"))
+            assert (tmp_path / "died").exists()
+
+    run(scenario)
+
+
+def test_refused_jobs_leave_no_descriptors_in_their_worker() -> None:
+    async def scenario() -> None:
+        async with workers() as pool:
+            # The first imports what refuses.
+            held = []
+            for _ in range(6):
+                with MemoryFile() as body, MemoryFile() as answer, ProgressPage() as page:
+                    body.append(b"no glTF")
+                    work = work_of(body, answer, page)
+                    with pytest.raises(UnreadableError):
+                        await pool.run(subdivide, work)
+                held.append(await pool.run(jobs.descriptors))
+            assert held[-1] == held[0]
 
     run(scenario)
 
@@ -378,7 +407,9 @@ def test_a_process_that_the_system_refuses_is_told_and_tried_again(
     assert told in caplog.messages
 
 
-def test_a_worker_is_replaced_where_no_thread_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_is_replaced_where_no_thread_is_left(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """A limit on processes counts threads, too."""
 
     def refuses(thread: Thread) -> None:
@@ -388,14 +419,15 @@ def test_a_worker_is_replaced_where_no_thread_is_left(monkeypatch: pytest.Monkey
         async with workers() as pool:
             first = await pool.run(jobs.pid)
             with MemoryFile() as file:
-                job = asyncio.create_task(pool.run(jobs.sleep, 30, files=[file]))
-                await asyncio.sleep(0.05)
+                began = tmp_path / "began"
+                job = asyncio.create_task(pool.run(jobs.wait_once, began, files=[file]))
+                await until(began.exists)
                 with monkeypatch.context() as system:
                     system.setattr(Thread, "start", refuses)
                     os.kill(first, signal.SIGKILL)
-                    with pytest.raises(WorkerDied):
-                        await job
+                    await until(lambda: pool.restarts["worker-died"] == 1)
                     await asyncio.sleep(0.05)
+                assert await job != first
             assert file.closed
             assert await pool.run(jobs.pid) != first
 
@@ -444,12 +476,11 @@ def test_a_pool_that_ends_without_a_word_is_noticed(
 
     async def scenario() -> None:
         async with workers() as pool:
-            job = asyncio.create_task(pool.run(jobs.begin_to_hold, tmp_path / "begun"))
+            job = asyncio.create_task(pool.run(jobs.wait_once, tmp_path / "begun"))
             await until((tmp_path / "begun").exists)
             # Its threads end, and nobody is left to tell what becomes of the job.
             made[0].stop()
-            with pytest.raises(WorkerDied):
-                await job
-            assert await pool.run(jobs.sleep, 0.0) == "slept"
+            assert alive(await job)
+            assert pool.restarts["worker-died"] == 1
 
     run(scenario)

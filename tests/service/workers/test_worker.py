@@ -5,6 +5,7 @@ import weakref
 
 import pytest
 
+from service.errors import GltfError
 from service.workers import worker
 
 
@@ -35,6 +36,29 @@ def test_what_a_job_leaves_in_cycles_is_gone_after_it(fails: bool) -> None:
     assert left[0]() is None
     assert rare[0][0] == worker.OBJECTS_A_SEARCH
     assert gc.get_threshold() == usual
+
+
+class Held:
+    """Something that a job holds, as a file or an array."""
+
+
+@pytest.mark.parametrize("kind", [GltfError, ZeroDivisionError])
+def test_a_refusal_holds_nothing_of_its_job(kind: type[Exception]) -> None:
+    """The error is kept until it is sent, and with its frames would keep what they hold."""
+    left: list[weakref.ref[Held]] = []
+
+    def job() -> None:
+        held = Held()
+        left.append(weakref.ref(held))
+        try:
+            {}["inner"]
+        except KeyError as error:
+            raise kind("refused") from error
+
+    with pytest.raises((GltfError, worker.JobFaultError)) as caught:
+        worker.call(job)
+    assert left[0]() is None
+    assert caught.value.__cause__ is None
 
 
 @pytest.mark.parametrize(("given", "then"), [("0\n", "500"), ("875\n", "1000"), ("-998\n", "-498")])

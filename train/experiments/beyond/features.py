@@ -18,8 +18,8 @@ SETTINGS = ((0.5, 10.0), (1.0, 100.0))
 
 NOTES = (
     "Improvements over Loop on the held-out ridges, all trained by the recipe `paper` with the "
-    "orientation `symmetric`; docs/features.md defines the features. *Limit* is the best that any "
-    "network could do with the same C and c; there is none for normals.",
+    "orientation `symmetric`; docs/reference/features.md defines the features. *Limit* is the "
+    "best that any network could do with the same C and c; there is none for normals.",
     "The paper has no such table: its five features have no sign.",
 )
 

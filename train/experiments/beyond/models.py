@@ -82,7 +82,7 @@ def run(laboratory: Laboratory) -> Outcome:
         f"*Allowed* is {JUMP_LIMIT:g} times Loop's jump, or the jump of Loop's own mesh once it is "
         "laid onto the surface where that is more; the column is the worst ridge's.",
         "The product's own files are measured, each with its own C and c; "
-        "docs/models.md says how they were made.",
+        "docs/reference/models.md says how they were made.",
     )
     return Outcome(
         tables=(table("models", "Held-out ridges", Row, rows),),

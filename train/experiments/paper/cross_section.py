@@ -48,7 +48,7 @@ def run(laboratory: Laboratory) -> Outcome:
     instance = hard_instance()
     ridge = ridge_of(instance)
     meshes = {
-        name: refine(instance.mesh, scheme, reference_length=PAPER_UNITS).mesh
+        name: refine(instance.mesh, scheme, 1, reference_length=PAPER_UNITS).mesh
         for name, scheme in learned_methods(laboratory).items()
     }
     old, rows = len(instance.mesh.vertices), []

@@ -78,7 +78,7 @@ def ridge_of(instance: Instance) -> Ridge:
 def largest_ratio(scheme: AnyScheme, dataset: Dataset) -> float:
     """Return the largest proximity ratio of one step, over all instances."""
     return max(
-        float(refine(instance.mesh, scheme, reference_length=PAPER_UNITS).ratio.max())
+        float(refine(instance.mesh, scheme, 1, reference_length=PAPER_UNITS).ratio.max())
         for instance in dataset.instances
     )
 

@@ -42,7 +42,7 @@ def gate_row(scheme: AnyScheme, dataset: Dataset) -> GateRow:
     """Return mean, maximum and active share of the gate over a data set's inserted vertices."""
     gates = np.concatenate(
         [
-            refine(instance.mesh, scheme, reference_length=PAPER_UNITS).gate[
+            refine(instance.mesh, scheme, 1, reference_length=PAPER_UNITS).gate[
                 len(instance.mesh.vertices) :
             ]
             for instance in dataset.instances

@@ -1,7 +1,8 @@
-/** One refinement: upload, queue, stages, download. Each may be cancelled by its signal. */
+/** One refinement: upload, queue, stages, download. A signal cancels each of them. */
 
 import { address, headers, pieces, request } from "./client";
 import { events } from "./events";
+import { gzipped } from "./gzip";
 import { localProblem, Problem, problemOf, type ProblemDocument } from "./problem";
 
 export interface Body {
@@ -50,23 +51,26 @@ export async function refine(
     await finished(location, signal, tell);
     return await download(location, signal, tell);
   } finally {
-    // Fetched, failed or cancelled: nobody needs the job any more, and its worker should be free.
+    // Free the worker at once where the job was cancelled, and the result's memory otherwise.
     void request(location, { method: "DELETE", keepalive: true }).catch(() => {});
   }
 }
 
-/** POST the body; XMLHttpRequest, since fetch does not tell how much of a body has gone out. */
-function upload(
+/** Send the body. By XMLHttpRequest: fetch does not report how much of a body has gone out. */
+async function upload(
   path: string,
   body: Body,
   signal: AbortSignal,
   tell: (progress: Progress) => void,
 ): Promise<string> {
+  tell({ step: "upload", share: 0 });
+  const packed = await gzipped(body);
   return new Promise((resolve, reject) => {
     const sent = new XMLHttpRequest();
     sent.open("POST", address(path));
     for (const [name, value] of Object.entries(headers())) sent.setRequestHeader(name, value);
     if (body.type) sent.setRequestHeader("Content-Type", body.type);
+    if (packed) sent.setRequestHeader("Content-Encoding", "gzip");
     sent.upload.onprogress = (event) =>
       tell({ step: "upload", share: event.lengthComputable ? event.loaded / event.total : null });
     sent.onload = () => {
@@ -74,24 +78,23 @@ function upload(
       try {
         resolve(`jobs/${(JSON.parse(sent.responseText) as Job).id}`);
       } catch {
-        // Some proxy's words.
+        // A proxy answered in the service's place.
         reject(problemOf(sent.status, sent.responseText));
       }
     };
     sent.onerror = () => {
       const broken = localProblem("The upload did not arrive", "The connection to the service broke.");
-      // A file that is not there any more does not arrive either.
+      // The file may have been deleted meanwhile: that has words of its own.
       readable(body).then(() => reject(broken), reject);
     };
     sent.onabort = () => reject(new DOMException("cancelled", "AbortError"));
     signal.addEventListener("abort", () => sent.abort());
     if (signal.aborted) return reject(new DOMException("cancelled", "AbortError"));
-    tell({ step: "upload", share: 0 });
-    sent.send(body.content);
+    sent.send(packed ?? body.content);
   });
 }
 
-/** Reject as the browser does where a file of a body has changed since it was chosen. */
+/** Read a byte of each file of a body. Rejects where one has changed since it was chosen. */
 async function readable({ content }: Body): Promise<void> {
   const parts = content instanceof Blob ? [content] : content.values();
   for (const part of parts) if (part instanceof Blob) await part.slice(0, 1).arrayBuffer();
@@ -117,7 +120,7 @@ async function finished(
       estimate: job.estimate_seconds ?? null,
     });
   }
-  // A proxy may cut a long stream: the job itself tells what became of it.
+  // A proxy may cut a long stream: the job's own state decides.
   const job = (await (await request(location, { signal })).json()) as Job;
   if (hasEnded(job)) throw failure(job);
   if (job.state !== "done") return finished(location, signal, tell);
@@ -127,7 +130,7 @@ function hasEnded({ state }: Job): boolean {
   return state === "failed" || state === "cancelled";
 }
 
-/** Why a job ended without a result. One that was cancelled, and not by its user, is told of as well. */
+/** Say why a job ended without a result. The service itself may have cancelled it. */
 function failure({ state, problem }: Job): Problem {
   if (problem) return new Problem(problem);
   return state === "cancelled"
@@ -142,7 +145,8 @@ async function download(
 ): Promise<Answer> {
   const response = await request(`${location}/result`, {
     signal,
-    headers: { Accept: "model/gltf-binary" },
+    // Its format was asked for with the job; a report is the other answer.
+    headers: { Accept: "model/*" },
   });
   const total = Number(response.headers.get("Content-Length")) || null;
   const held: Uint8Array[] = [];

@@ -7,7 +7,7 @@ import { fileProblem } from "../api/problem";
 import { spread } from "./instances";
 import { numbered } from "./numbered";
 import { pathOf } from "./path";
-import { why } from "./unreadable";
+import { unreadable } from "./unreadable";
 import { whole } from "./whole";
 
 export interface GltfJson {
@@ -61,12 +61,6 @@ export function triangles(json: GltfJson): number {
   return count;
 }
 
-/** Whether any mesh brings normals. */
-export function hasNormals(json: GltfJson): boolean {
-  const primitives = (json.meshes ?? []).flatMap((mesh) => mesh.primitives);
-  return primitives.some(({ attributes }) => "NORMAL" in attributes);
-}
-
 /** Parse a glTF; `neighbours` are the files that it may name, `missing` gets those that are not among them. */
 export async function parseGltf(
   bytes: ArrayBuffer,
@@ -114,7 +108,7 @@ export async function parseGltf(
         `The document names ${[...missing].join(", ")}: drop it together with the .gltf, or as a .zip.`,
       );
     }
-    throw fileProblem("The file cannot be shown", `Its glTF cannot be read: ${why(error)}`);
+    throw unreadable("readable glTF", error);
   } finally {
     draco?.dispose();
     made.forEach((url) => URL.revokeObjectURL(url));

@@ -1,4 +1,4 @@
-/** OBJ, PLY, STL and OFF as geometry: positions alone, since nothing else is refined. */
+/** OBJ, PLY, STL and OFF as geometry: positions, and the colours of a PLY's vertices. */
 
 import { BufferAttribute, BufferGeometry } from "three";
 import { PLYLoader } from "three/addons/loaders/PLYLoader.js";
@@ -10,9 +10,10 @@ export function readMesh(bytes: ArrayBuffer, kind: string): BufferGeometry {
   if (!geometry?.getAttribute("position")?.count) throw new Error("it has no faces");
   // A PLY may have doubles, which no graphics card takes.
   const { array } = geometry.getAttribute("position");
-  return new BufferGeometry()
+  const read = new BufferGeometry()
     .setAttribute("position", new BufferAttribute(Float32Array.from(array), 3))
     .setIndex(geometry.index);
+  return geometry.hasAttribute("color") ? read.setAttribute("color", geometry.getAttribute("color")) : read;
 }
 
 const READERS: Record<string, (bytes: ArrayBuffer) => BufferGeometry> = {

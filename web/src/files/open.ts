@@ -4,7 +4,7 @@ import { Group, Mesh, type AnimationClip, type BufferGeometry } from "three";
 import { part } from "../api/part";
 import { fileProblem } from "../api/problem";
 import { plain } from "../view/looks";
-import { hasNormals, jsonOf, parseGltf, triangles, type GltfJson } from "./gltf";
+import { jsonOf, parseGltf, triangles, type GltfJson } from "./gltf";
 import { unreadable } from "./unreadable";
 import type { Upload } from "./upload";
 
@@ -15,8 +15,6 @@ export interface Opened {
   faces: number;
   /** Files that it names and that did not come with it: textures, as it cannot be opened without others. */
   missing: string[];
-  /** Whether the file says how its surface is shaded. */
-  normals: boolean;
   /** null where the file is no glTF. */
   json: GltfJson | null;
   /** The bytes that a glTF validator reads; null where the file is no glTF. */
@@ -43,7 +41,7 @@ export async function open(upload: Upload): Promise<Opened> {
   plain([mesh]);
   const scene = new Group().add(mesh);
   const corners = geometry.index?.count ?? geometry.getAttribute("position").count;
-  return { scene, clips: [], faces: Math.floor(corners / 3), missing: [], normals: false, json: null, gltf: null };
+  return { scene, clips: [], faces: Math.floor(corners / 3), missing: [], json: null, gltf: null };
 }
 
 async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Promise<Opened> {
@@ -60,7 +58,6 @@ async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Prom
     clips: animations,
     faces: triangles(json),
     missing: [...missing],
-    normals: hasNormals(json),
     json,
     gltf: { bytes, neighbours },
   };

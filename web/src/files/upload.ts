@@ -1,4 +1,4 @@
-/** A document and the files beside it, as they were dropped or chosen. */
+/** Documents and the files beside them, as they were dropped or chosen. */
 
 import type { Body } from "../api/jobs";
 import { fileProblem } from "../api/problem";
@@ -19,12 +19,12 @@ export interface Upload {
   path: string;
   kind: Kind;
   file: Blob;
-  /** What a .gltf names, by path relative to it. */
+  /** The files that it names, by path relative to it. */
   neighbours: Map<string, Blob>;
   bytes: number;
 }
 
-/** What came together. */
+/** The files of one drop. */
 export interface Dropped {
   /** Each document by itself; at least one. */
   uploads: Upload[];
@@ -32,9 +32,9 @@ export interface Dropped {
   unused: string[];
 }
 
-// What is opened first: a document rather than an archive, or a mesh without materials.
+// What is opened first: a document before an archive, and before a mesh without materials.
 const ORDER: Kind[] = ["gltf", "glb", "zip", "obj", "ply", "stl", "off"];
-// What systems leave beside files.
+// Files that operating systems leave beside others.
 const HIDDEN = /(^|\/)(\.|__MACOSX\/|Thumbs\.db$|desktop\.ini$)/i;
 
 /** The documents among the files, each with those that it names. */
@@ -57,7 +57,7 @@ export async function uploadsOf(given: PathedFile[]): Promise<Dropped> {
     const folder = path.slice(0, path.lastIndexOf("/") + 1);
     // A form has no place for what lies elsewhere.
     const beside = files.filter((other) => other.path.startsWith(folder));
-    const neighbours = kind === "gltf" ? await namedBy(path, file, beside) : [];
+    const neighbours = kind === "gltf" || kind === "obj" ? await namedBy(path, file, beside) : [];
     neighbours.forEach(([, beside]) => used.add(beside.path));
     uploads.push({
       name: file.name,
@@ -71,16 +71,32 @@ export async function uploadsOf(given: PathedFile[]): Promise<Dropped> {
   return { uploads, unused: files.filter(({ path }) => !used.has(path)).map(({ path }) => path) };
 }
 
-/** The files that a .gltf names, by path relative to it. */
+/** Find the files that a document names, by path relative to it: an OBJ's materials name textures in turn. */
 export async function namedBy(path: string, file: Blob, files: PathedFile[]): Promise<[string, PathedFile][]> {
   const among = new Map(files.map((other) => [shortest(other.path), other]));
   const folder = shortest(path).split("/").slice(0, -1);
-  return [...filesNamedIn(await file.arrayBuffer())].flatMap((name) => {
+  const find = (name: string): PathedFile | undefined => {
     const up = /^(\.\.\/)*/.exec(name)![0].length / 3;
     const there = [...folder.slice(0, Math.max(folder.length - up, 0)), name.slice(3 * up)].join("/");
-    const other = up <= folder.length ? among.get(there) : undefined;
+    return up <= folder.length ? among.get(there) : undefined;
+  };
+  const names = kindOf(path) === "obj" ? await namesInObj(file, find) : filesNamedIn(await file.arrayBuffer());
+  return [...names].flatMap((name) => {
+    const other = find(name);
     return other ? [[name, other] as [string, PathedFile]] : [];
   });
+}
+
+async function namesInObj(file: Blob, find: (name: string) => PathedFile | undefined): Promise<Set<string>> {
+  const named = async (text: Promise<string>, statement: RegExp): Promise<string[]> =>
+    [...(await text).matchAll(statement)].map(([, name]) => shortest(name!.trim()));
+  const libraries = await named(file.text(), /^[ \t]*mtllib[ \t]+(.+)$/gm);
+  const textures = libraries.map((name) => {
+    const library = find(name);
+    // Options of a texture stand before its name.
+    return library ? named(library.file.text(), /^[ \t]*(?:map_\w+|bump|norm|disp|decal)[ \t]+(?:.*[ \t])?(\S+)[ \t]*$/gm) : [];
+  });
+  return new Set([...libraries, ...(await Promise.all(textures)).flat()]);
 }
 
 /** The body of a job. */

@@ -1,4 +1,4 @@
-/** Numbers as people read them. */
+/** Write numbers as people read them. */
 
 const METRIC: [number, string][] = [
   [1e3, "km"],
@@ -18,17 +18,17 @@ export function count(value: number): string {
   return value.toLocaleString("en-US");
 }
 
-/** A number of things. */
+/** Write a number of things. */
 export function counted(value: number, thing: string): string {
   return `${count(value)} ${thing}${value === 1 ? "" : "s"}`;
 }
 
-/** A number and its unit, which no end of a line parts. */
+/** Join a number and its unit so that no line break parts them. */
 function measure(value: number | string, unit: string): string {
   return `${value}\u00a0${unit}`;
 }
 
-/** Two or three digits that mean something. */
+/** Round to two or three significant digits. */
 export function figure(value: number): string {
   if (value === 0) return "0";
   const size = Math.abs(value);
@@ -36,12 +36,17 @@ export function figure(value: number): string {
   return String(Number(value.toPrecision(size >= 100 ? 3 : 2)));
 }
 
-/** A length; glTF counts in metres, other formats in whatever their author meant. */
+/** Write a length: glTF counts in metres, other formats in an unnamed unit. */
 export function length(value: number, unit: Unit): string {
   if (unit === "unit") return measure(figure(value), "units");
   if (value === 0) return measure(0, "m");
   const [scale, name] = METRIC.find(([scale]) => Math.abs(value) >= scale) ?? [1e-9, "nm"];
   return measure(figure(value / scale), name);
+}
+
+/** Write a length as a share of the model's size, then in the file's unit. */
+export function lengthOf(value: number, size: number, unit: Unit): string {
+  return `${percent(value / size)} of the model’s size (${length(value, unit)})`;
 }
 
 export function percent(share: number): string {
@@ -50,7 +55,7 @@ export function percent(share: number): string {
   return measure(value < 0.01 ? "<\u00a00.01" : figure(value), "%");
 }
 
-/** An angle in degrees. */
+/** Write an angle in degrees. */
 export function angle(degrees: number): string {
   return degrees > 0 && degrees < FLAT ? `<\u00a0${FLAT}°` : `${figure(degrees)}°`;
 }
@@ -64,7 +69,7 @@ export function seconds(value: number): string {
   return value < 1 ? measure(Math.round(1000 * value), "ms") : measure(figure(value), "s");
 }
 
-/** Some names, and how many more there are. */
+/** List some names, and how many more there are. */
 export function listed(names: string[], most = 3): string {
   const more = names.length - most;
   // One more takes no more room than the word of it.

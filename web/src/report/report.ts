@@ -28,6 +28,8 @@ export interface Report {
   changes: { pointer: string; what: string; count: number }[];
   levels: Level[];
   meshes: MeshReport[];
+  /** Why little changed, and which setting changes that. */
+  advice?: string[];
 }
 
 export interface MeshReport {
@@ -48,8 +50,4 @@ export function learnedLevels(report: Report): number {
 
 export function largestRatio(level: Level): number {
   return Math.max(level.proximity_ratio.max, level.vertex_rule?.proximity_ratio.max ?? 0);
-}
-
-export function largestGate(level: Level): number {
-  return Math.max(level.gate.max, level.vertex_rule?.gate.max ?? 0);
 }

@@ -1,15 +1,27 @@
-/** What is downloaded of a result: its GLB, its report, and a picture. */
+/** Downloads of a result: the mesh in a format of the user's choice, its report, and a picture. */
 
 import type { Upload } from "../files/upload";
-import type { Result, Session } from "../session";
-import type { Compression, Diagnostics } from "../settings";
-import { element, input, save, select } from "./dom";
+import type { Result } from "../result";
+import type { Session } from "../session";
+import type { Compression, Format, Writing } from "../settings";
+import { element, input, option, save, select } from "./dom";
 import type { Stage } from "./stage";
 
+const MEDIA_TYPES: Record<Format, string> = {
+  glb: "model/gltf-binary",
+  obj: "model/obj",
+  ply: "model/ply",
+  stl: "model/stl",
+  off: "model/off",
+};
+
+const FORMATS = Object.keys(MEDIA_TYPES) as Format[];
+
 export function bindDownloads(session: Session, stage: Stage): void {
+  select("format").replaceChildren(...FORMATS.map((format) => option(format, format.toUpperCase())));
+  select("format").addEventListener("change", adjust);
   element("download").addEventListener("click", () => {
-    const diagnostics = input("attributes").checked ? "full" : "summary";
-    if (session.ours) void downloadGlb(session, session.ours, diagnostics, select("compress").value as Compression);
+    if (session.ours) void downloadMesh(session, session.ours, writing());
   });
   element("download-report").addEventListener("click", () => {
     if (!session.ours) return;
@@ -23,21 +35,39 @@ export function bindDownloads(session: Session, stage: Stage): void {
   input("download-picture").disabled = !stage.viewer;
 }
 
-/** What is downloaded is chosen now: another file may be there, or other settings, before the answer is. */
-async function downloadGlb(
-  session: Session,
-  ours: Result,
-  diagnostics: Diagnostics,
-  compress: Compression,
-): Promise<void> {
+/** Choose the format that a file came in; glTF and archives come back as GLB. */
+export function offerFormatOf({ kind }: Upload): void {
+  select("format").value = FORMATS.find((format) => format === kind) ?? "glb";
+  adjust();
+}
+
+/** Close what only a glTF can hold. */
+function adjust(): void {
+  const isGltf = select("format").value === "glb";
+  select("compress").disabled = input("attributes").disabled = !isGltf;
+}
+
+function writing(): Writing {
+  const format = select("format").value as Format;
+  if (format !== "glb") return { format };
+  return {
+    format,
+    diagnostics: input("attributes").checked ? "full" : "summary",
+    compress: select("compress").value as Compression,
+  };
+}
+
+/** Save a result as it was when asked for: another file or other settings may be shown before it is there. */
+async function downloadMesh(session: Session, ours: Result, wanted: Writing): Promise<void> {
+  const { format = "glb", diagnostics, compress } = wanted;
   let content = ours.bytes;
-  if (diagnostics === "full" || compress !== "none") {
-    const again = () => void downloadGlb(session, ours, diagnostics, compress);
-    const answer = await session.fetch(ours, diagnostics, compress, again);
+  if (format !== "glb" || diagnostics === "full" || compress !== "none") {
+    const again = (): void => void downloadMesh(session, ours, wanted);
+    const answer = await session.fetch(ours, wanted, again);
     if (!answer) return;
     content = answer;
   }
-  save(new Blob([content], { type: "model/gltf-binary" }), resultName(ours.upload, "glb"));
+  save(new Blob([content], { type: MEDIA_TYPES[format] }), resultName(ours.upload, format));
 }
 
 function resultName(upload: Upload, extension: string): string {

@@ -6,7 +6,7 @@ import { element, input } from "./dom";
 
 export function bindFiles(take: (files: PathedFile[] | Promise<PathedFile[]>) => void): void {
   const files = input("files");
-  for (const id of ["choose", "choose-first"]) {
+  for (const id of ["choose", "choose-first", "choose-own"]) {
     element(id).addEventListener("click", () => files.click());
   }
   files.addEventListener("change", () => {

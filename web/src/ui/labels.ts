@@ -1,17 +1,17 @@
-/** What stands over the sides: which mesh, and how many faces. */
+/** Labels over the two sides: which mesh, and how many faces. */
 
 import { counted } from "../report/format";
-import type { Result, Source } from "../session";
+import type { Result } from "../result";
+import type { Source } from "../tasks";
 import type { Layout } from "../view/viewer";
 import { element, make } from "./dom";
 
-/** What stands over a side. */
 interface Label {
   title: string;
   text: string;
 }
 
-/** `loop` is given where it takes the left. */
+/** Show the labels; `loop` is given where it takes the left side. */
 export function showLabels(source: Source | null, ours: Result | null, loop: Result | null, layout: Layout): void {
   const [left, right] = labels(source, ours, loop, layout);
   for (const [side, label] of [["left", left], ["right", right]] as const) {
@@ -30,10 +30,10 @@ function labels(
   layout: Layout,
 ): [Label | null, Label | null] {
   const of = ({ report }: Result): string => counted(report.totals.faces, "face");
-  const text = ours ? `${ours.report.model ?? "Loop"} · ${of(ours)}` : "";
+  const text = ours ? `${ours.report.model ?? "classic"} · ${of(ours)}` : "";
   const before = source && { title: "Before", text: counted(source.opened.faces, "face") };
   const after = ours && { title: "After", text };
   if (layout === "overlay" || layout === "single") return [null, after ?? before];
-  if (loop && ours) return [{ title: "Loop", text: of(loop) }, { title: "Ours", text }];
+  if (loop && ours) return [{ title: "Classic (Loop)", text: of(loop) }, { title: "Ours", text }];
   return [before, after];
 }

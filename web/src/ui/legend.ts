@@ -1,4 +1,4 @@
-/** What a heat map's colours mean. */
+/** The legend of a heat map. */
 
 import { cividis } from "../measure/cividis";
 import type { Legend } from "../view/heat";
@@ -9,6 +9,7 @@ export function showLegend(legend: Legend | null): void {
   figure.hidden = !legend;
   if (!legend) return;
   figure.dataset.end = String(legend.end);
+  figure.dataset.max = String(legend.max);
   element("legend-title").textContent = legend.title;
   element("legend-low").textContent = legend.low;
   element("legend-high").textContent = legend.high;

@@ -1,27 +1,33 @@
-/** What came of it: certificate, statistics, changes, validator, timings. */
+/** The account of a result: promises, advice, statistics, changes, validator, timings. */
 
 import type { Comparison } from "../validate/compare";
-import { certificate, type Lengths } from "../report/certificate";
 import { angle, bytes, count, figure, seconds } from "../report/format";
 import type { Surface } from "../measure/surface";
+import { promises, type Lengths } from "../report/promises";
 import type { Report } from "../report/report";
 import { element, make } from "./dom";
 
-export function showCertificate(report: Report, lengths: Lengths): string {
-  const statements = certificate(report, lengths);
-  element("statements").replaceChildren(
-    ...statements.map(({ holds, text, note }) =>
+/** Show the promises; returns them in one sentence. */
+export function showPromises(report: Report, lengths: Lengths): string {
+  const promised = promises(report, lengths);
+  element("promises").replaceChildren(
+    ...promised.map(({ holds, title, text }) =>
       make(
         "li",
         { className: holds ? "" : "broken" },
         make(
           "div",
           {},
-          make("span", { className: "hidden", textContent: holds ? "Holds: " : "Broken: " }),
-          make("strong", { textContent: text }),
-          make("span", { className: "note", textContent: note }),
+          make("span", { className: "hidden", textContent: holds ? "Kept: " : "Broken: " }),
+          make("strong", { textContent: title }),
+          make("span", { textContent: text }),
         ),
       ),
+    ),
+  );
+  element("mathematics").replaceChildren(
+    ...promised.filter(({ mathematics }) => mathematics).map(({ title, mathematics }) =>
+      make("li", {}, make("strong", { textContent: `${title}. ` }), mathematics),
     ),
   );
   const made = element("made-by");
@@ -29,7 +35,15 @@ export function showCertificate(report: Report, lengths: Lengths): string {
     ? `Model ${report.model}, C = ${figure(report.budget ?? 0)}, hash ${report.model_hash?.slice(0, 12)}…`
     : "";
   made.title = report.model_hash ?? "";
-  return statements.map(({ text }) => text).join(". ");
+  return promised.map(({ title, text }) => `${title}: ${text}`).join(" ");
+}
+
+/** Show why little changed, in the page's own words for the settings. */
+export function showAdvice({ advice = [] }: Report): void {
+  element("advice").hidden = !advice.length;
+  element("advice").replaceChildren(
+    ...advice.map((text) => make("li", { textContent: text.replace(/\buse crease=off/, "choose Sharp edges: None") })),
+  );
 }
 
 export interface Before {
@@ -41,7 +55,7 @@ export interface Before {
   sharpest: number;
 }
 
-/** `sharpest` is asked for where a report does not say it: its largest jump leaves creases out. */
+/** Show the table. `sharpest` is called where creases are left out of the report's largest turn. */
 export function showStatistics(
   before: Before, report: Report, size: number, sharpest: () => number,
 ): void {

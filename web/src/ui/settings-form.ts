@@ -1,26 +1,18 @@
 /** The form of settings: what may be chosen for this file, on this service. */
 
 import type { Limits, ModelEntry } from "../api/client";
-import type { Opened } from "../files/open";
-import type { Upload } from "../files/upload";
 import { count } from "../report/format";
 import { DEFAULTS, LOOP, type Asked, type Settings } from "../settings";
 import { element, input, option, select } from "./dom";
-
-/** A file, as far as settings depend on it. */
-interface Facts {
-  upload: Upload;
-  opened: Pick<Opened, "faces" | "normals">;
-}
+import { describeModel } from "./models";
 
 export class SettingsForm {
   private models: ModelEntry[] = [];
   private limits: Limits | null = null;
-  /** What the user wants of any file. */
+  /** What the user wants for any file. */
   private wanted: Settings;
-  /** What the form says: that, as far as the file has it. */
+  /** The same, with the levels that the file and the service leave open. */
   private settings: Settings;
-  private file: Upload | null = null;
   private faces = 0;
 
   constructor(
@@ -34,13 +26,7 @@ export class SettingsForm {
     form.addEventListener("input", ({ target }) => {
       // The browser says what is wrong with a number, in the user's language.
       if (target instanceof HTMLInputElement && !target.reportValidity()) return;
-      // Each model has its own budget: a number meant for another is let go.
-      if (target === select("model")) input("budget").value = "";
-      // Normals of the limit surface stand on the limit surface, and nowhere else.
-      if (target === input("limit") && !input("limit").checked && select("normals").value === "limit") {
-        select("normals").value = "smooth";
-      }
-      this.read();
+      this.read(target);
     });
     this.write();
   }
@@ -55,7 +41,7 @@ export class SettingsForm {
     this.write();
   }
 
-  /** Bytes; without a limit where the service has named none. */
+  /** In bytes; Infinity while the service has named no limit. */
   get largestUpload(): number {
     return this.limits?.body_bytes ?? Infinity;
   }
@@ -64,32 +50,20 @@ export class SettingsForm {
     return { settings: { ...this.settings }, wanted: { ...this.wanted } };
   }
 
-  /** Say what the user wants of any file. */
   want(wanted: Settings): void {
     this.wanted = { ...wanted };
-    this.fit(null);
+    this.fit(this.faces);
   }
 
-  /** Make the form that of a file. What the user then chooses for it stays, however often it is fitted to the same. */
-  fit(file: Facts | null): void {
-    if (!file || this.file !== file.upload) {
-      this.settings = { ...this.wanted };
-      // It would come back faceted: nobody refines for that.
-      if (file && !file.opened.normals && this.settings.normals === "keep") this.settings.normals = "smooth";
-    }
-    this.begin(file?.upload ?? null, file?.opened.faces ?? 0);
+  /** Close the levels that would make a file of so many faces too large; 0 where there is no file. */
+  fit(faces: number): void {
+    this.show({ settings: this.wanted, wanted: this.wanted }, faces);
   }
 
-  /** Say again what was asked for a file; 0 faces where they are not known yet. */
-  show(asked: Asked, upload: Upload, faces: number): void {
+  /** Show what was asked for a file of so many faces. */
+  show(asked: Asked, faces: number): void {
     this.wanted = { ...asked.wanted };
     this.settings = { ...asked.settings };
-    this.begin(upload, faces);
-  }
-
-  /** Levels beyond the service's limits close. */
-  private begin(upload: Upload | null, faces: number): void {
-    this.file = upload;
     this.faces = faces;
     const deepest = this.levels().filter((level) => !this.refusal(level));
     this.settings.levels = Math.min(this.settings.levels, deepest.at(-1) ?? 1);
@@ -105,17 +79,22 @@ export class SettingsForm {
     return this.faces * 4 ** level;
   }
 
-  /** Why a level is closed; empty where it is open. */
+  /** Say why a level is closed; empty where it is open. */
   private refusal(level: number): string {
     const most = this.limits?.faces;
     return most && this.predicted(level) > most ? `over the limit of ${count(most)} faces` : "";
   }
 
-  /** Why no level at all is open to the file; empty where one is. */
+  /** Say why every level is closed to the file; empty where one is open. */
   get refused(): string {
     const [first = 1] = this.levels();
     const refusal = this.refusal(first);
-    return refusal && `${count(this.predicted(first))} faces after ${first} level, ${refusal} of this service`;
+    return refusal && `${count(this.predicted(first))} faces after ${first} step, ${refusal} of this service`;
+  }
+
+  private get model(): ModelEntry | undefined {
+    const { model } = this.settings;
+    return this.models.find((entry) => (model ? entry.name === model : entry.default));
   }
 
   private write(): void {
@@ -123,24 +102,24 @@ export class SettingsForm {
     select("levels").replaceChildren(
       ...this.levels().map((level) => {
         const faces = this.faces ? ` · ${count(this.predicted(level))} faces` : "";
-        return option(String(level), `${level}${faces}`, this.refusal(level) !== "");
+        const isClosed = this.refusal(level) !== "";
+        return option(String(level), isClosed ? `${level} · too many faces` : `${level}${faces}`, isClosed);
       }),
     );
     select("levels").value = String(settings.levels);
     const closed = this.levels().find((level) => this.refusal(level));
-    element("levels-note").textContent = closed
+    element("levels-note").textContent = closed && this.wanted.levels >= closed
       ? `${closed} and more: ${this.refusal(closed)} of this service`
       : "";
     const bundled = this.models.map((model) =>
-      option(model.default ? "" : model.name, model.name + (model.default ? " (default)" : "")),
+      option(model.default ? "" : model.name, model.name),
     );
     if (!bundled.length) bundled.push(option("", "default"));
-    select("model").replaceChildren(...bundled, option(LOOP, "Loop’s rules alone"));
+    select("model").replaceChildren(...bundled, option(LOOP, "classic (Loop)"));
     select("model").value = settings.model;
-    const unknown = select("model").value !== settings.model;
-    // A model that a link names may be on a list that is still on its way.
-    if (unknown && this.models.length) select("model").value = settings.model = this.wanted.model = "";
-    input("budget").value = settings.budget === null ? "" : String(settings.budget);
+    // Before the list is there, a link may name a model of it.
+    const isUnknown = select("model").value !== settings.model && this.models.length > 0;
+    if (isUnknown) select("model").value = settings.model = this.wanted.model = "";
     input("limit").checked = settings.limit;
     select("crease").value = settings.crease;
     input("angle").value = String(settings.angle);
@@ -149,38 +128,46 @@ export class SettingsForm {
     this.adjust();
   }
 
-  private read(): void {
+  /** Read the form after a change of `target`. */
+  private read(target: EventTarget | null): void {
     const before = this.settings;
-    const budget = input("budget");
     const angle = input("angle");
-    // Where a number cannot be, that before it holds: other settings may change.
+    const own = this.model?.budget ?? 0;
+    const share = Number(input("strength").value) / 100;
     const settings: Settings = {
       levels: Number(select("levels").value),
       model: select("model").value,
-      budget: !budget.validity.valid ? before.budget : budget.value === "" ? null : Number(budget.value),
+      // A link may hold any number: it stays until the strength itself is moved.
+      budget: target !== input("strength") ? before.budget : share === 1 ? null : share * own,
       limit: input("limit").checked,
       crease: select("crease").value as Settings["crease"],
       angle: angle.validity.valid ? Number(angle.value || DEFAULTS.angle) : before.angle,
       uv: select("uv").value as Settings["uv"],
       normals: select("normals").value as Settings["normals"],
     };
-    if (settings.normals === "limit" && !settings.limit) {
-      settings.limit = input("limit").checked = true;
-    }
+    // Each model has its own budget.
+    if (target === select("model")) settings.budget = null;
+    // The service gives exact normals on the exact surface alone.
+    if (target === input("limit") && !settings.limit && settings.normals === "limit") settings.normals = "auto";
+    if (settings.normals === "limit") settings.limit = true;
     const isNew = ([name, value]: [string, unknown]) => value !== before[name as keyof Settings];
     Object.assign(this.wanted, Object.fromEntries(Object.entries(settings).filter(isNew)));
     this.settings = settings;
+    input("limit").checked = settings.limit;
+    select("normals").value = settings.normals;
     this.adjust();
     this.changed();
   }
 
+  /** Show what follows from the other settings. */
   private adjust(): void {
-    const { settings } = this;
-    const model = this.models.find((entry) =>
-      settings.model ? entry.name === settings.model : entry.default,
-    );
-    input("budget").placeholder = model ? `${model.budget}, the model’s` : "the model’s";
-    input("budget").disabled = settings.model === LOOP;
+    const { settings, model } = this;
+    const share = settings.budget === null || !model ? 1 : settings.budget / model.budget;
+    const percent = Math.round(100 * share);
+    input("strength").value = String(percent);
+    input("strength").disabled = settings.model === LOOP || !model;
+    element("strength-text").textContent = settings.model === LOOP ? "–" : `${percent} %`;
     element("angle-row").hidden = settings.crease !== "angle";
+    element("model-note").textContent = describeModel(settings.model === LOOP ? LOOP : model?.name ?? "");
   }
 }

@@ -2,10 +2,11 @@
 
 import { Box3, type Mesh } from "three";
 import type { Unit } from "../report/format";
-import type { Result, Source } from "../session";
+import type { Result } from "../result";
+import type { Source } from "../tasks";
 import { LOOP } from "../settings";
 import { colour, HEATS, needsFull, type Heat, type Legend } from "../view/heat";
-import { edgesOf, normalsOf, removeLines } from "../view/lines";
+import { removeLines } from "../view/lines";
 import { dress, plain, type Look } from "../view/looks";
 import { dispose, extentOf, type Extent, type Model } from "../view/model";
 import { Playback } from "../view/playback";
@@ -15,6 +16,7 @@ import { bindKeys } from "./keys";
 import { showLabels } from "./labels";
 import { drawLegendBar, showLegend } from "./legend";
 import { copyMorphs, offerMorphs, Timeline } from "./timeline";
+import { drawLines, LINES } from "./overlays";
 import { bindWipe } from "./wipe";
 
 interface Shown {
@@ -22,9 +24,6 @@ interface Shown {
   ours: Result | null;
   loop: Result | null;
 }
-
-/** What may be drawn over both sides, by the id of its toggle. */
-const LINES = ["edges", "normal-lines"] as const;
 
 export class Stage {
   /** null where the browser has no WebGL. */
@@ -115,12 +114,14 @@ export class Stage {
 
   open(source: Source): void {
     this.shown = { source, ours: null, loop: null };
+    this.playback.clear();
     this.adopt(source.model);
     this.extent = extentOf(source.model);
     this.timeline.offer(source.model);
     offerMorphs(source.model, () => this.models(), () => this.viewer?.invalidate());
     this.cover();
     const stale = this.viewer?.chosen;
+    this.viewer?.ground(this.extent);
     this.viewer?.frame(this.extent);
     this.lookFromLink();
     this.arrange();
@@ -134,7 +135,9 @@ export class Stage {
     this.shown = { ...this.shown, ours, loop };
     for (const result of [fresh ? ours : null, news]) {
       if (!result) continue;
-      if (this.shown.source?.opened.json === null) plain(result.model.meshes);
+      // Materials without names are the service's own: both sides are to look alike.
+      const isNamed = ({ material }: Mesh): boolean => [material].flat().some(({ name }) => name);
+      if (this.shown.source?.opened.json === null) plain(result.model.meshes.filter((mesh) => !isNamed(mesh)));
       this.adopt(result.model);
       if (this.shown.source) copyMorphs(this.shown.source.model, result.model);
     }
@@ -207,11 +210,13 @@ export class Stage {
     this.viewer.layout = this.layout;
     this.viewer.sides = { left, right };
     this.viewer.over = this.overlaid;
+    this.viewer.standsOnGround = !this.heat && (this.surface === "material" || this.surface === "clay");
     for (const model of this.models()) {
       const look = this.lookOf(model);
       model.meshes.forEach((mesh) => dress(mesh, look, paper));
     }
-    this.drawLines();
+    this.clearLines();
+    this.lines = drawLines(this.models(), this.overlaid, (model) => this.lookOf(model), this.size);
     if (moved && (this.layout === "side" || this.layout === "wipe")) {
       this.viewer.frame(this.extent, false);
     }
@@ -237,7 +242,7 @@ export class Stage {
       this.wantFull();
       return null;
     }
-    return colour(this.heat, ours, loop, this.unit);
+    return colour(this.heat, ours, loop, this);
   }
 
   /** Make room for the tools that float over the canvas, however many lines they take. */
@@ -253,27 +258,6 @@ export class Stage {
   private clearLines(): void {
     removeLines(this.lines);
     this.lines = [];
-  }
-
-  private drawLines(): void {
-    this.clearLines();
-    const style = getComputedStyle(document.body);
-    const accent = style.getPropertyValue("--accent");
-    for (const model of this.models()) {
-      if (model === this.overlaid) {
-        // Clear in front, faint behind.
-        this.lines.push(...edgesOf(model, accent, 0.9), ...edgesOf(model, accent, 0.2, true));
-        continue;
-      }
-      // Whatever the other side's heat map: a wireframe without its lines is nothing at all.
-      const wire = this.lookOf(model) === "wire";
-      if (input("edges").checked || wire) {
-        this.lines.push(...edgesOf(model, style.color, wire ? 0.9 : 0.35));
-      }
-      if (input("normal-lines").checked) {
-        this.lines.push(...normalsOf(model, accent, this.size / 60));
-      }
-    }
   }
 }
 

@@ -1,4 +1,4 @@
-/** What goes on, and what went wrong. */
+/** Progress, notices and problems. */
 
 import { useKey } from "../api/client";
 import type { Progress } from "../api/jobs";
@@ -30,12 +30,12 @@ export function sentence({ step, share, place, stage, estimate }: Progress): str
   }
 }
 
-/** Show progress; `what` says of which of several jobs. */
+/** Show progress; `what` names one of several jobs. */
 export function showProgress(progress: Progress, what = ""): void {
   element("work").hidden = false;
   const text = `${sentence(progress)}${what ? ` · ${what}` : ""}`;
   element("work-text").textContent = text;
-  // A screen reader hears each step, not each percent.
+  // A screen reader is to hear each step once, and no percents.
   const step = text.replace(/ \d+ %.*?(?= ·|$)/, "");
   if (element("announce").textContent !== step) announce(step);
   const bar = element<HTMLProgressElement>("work-bar");
@@ -48,7 +48,7 @@ export function hideProgress(): void {
   element("work").hidden = true;
 }
 
-/** Say what is no fault; `again` offers the refinement that was cancelled. */
+/** Show a notice; `again` offers the refinement that was cancelled. */
 export function showNotice(text: string, again = false): void {
   element("notice-text").textContent = text;
   element("again").hidden = !again;
@@ -56,35 +56,30 @@ export function showNotice(text: string, again = false): void {
   announce(text);
 }
 
-/** Say something more. */
+/** Add a sentence to the notice. */
 export function addNotice(text: string): void {
-  const said = element("notice").hidden ? "" : element("notice-text").textContent;
-  showNotice(`${said} ${text}`.trim());
+  const shown = element("notice").hidden ? "" : element("notice-text").textContent;
+  showNotice(`${shown} ${text}`.trim());
 }
 
 export function hideNotice(): void {
   element("notice").hidden = true;
 }
 
-/** `again` runs where the user wants what was cancelled after all. */
+/** Bind the notice's buttons; `again` refines after all. */
 export function bindNotice(again: () => void): void {
   element("again").addEventListener("click", () => {
-    // The button goes with its notice: the focus stays near.
-    element("panel").focus();
     hideNotice();
     again();
   });
-  element("notice-close").addEventListener("click", () => {
-    element("panel").focus();
-    hideNotice();
-  });
+  element("notice-close").addEventListener("click", hideNotice);
 }
 
 export function announce(text: string): void {
   element("announce").textContent = text;
 }
 
-/** `file` is the name of the one that is at fault: another may be shown. */
+/** Show a problem; `file` names the file at fault, since another may be shown. */
 export function showProblem(error: unknown, file = ""): void {
   const problem = problemFrom(error);
   if (!problem) console.error(error);
@@ -96,7 +91,7 @@ export function showProblem(error: unknown, file = ""): void {
   element("problem-pointer").textContent = place;
   element("problem-pointer").hidden = !place;
   element("key-form").hidden = problem?.status !== 401;
-  // Busy, slow, or gone, it or the job alone: the same may work in a moment.
+  // The service is busy, slow or gone, or has lost the job: the same may work in a moment.
   element("problem-again").hidden = !problem || (problem.status < 500 && ![0, 404, 408, 409, 429].includes(problem.status));
   element("problem").hidden = false;
   document.body.classList.remove("folded");
@@ -108,22 +103,17 @@ export function hideProblem(): void {
   element("problem").hidden = true;
 }
 
-/** `again` runs where the user wants another try, and once they have given a key. */
+/** Bind the problem's buttons and its form of a key; `again` is another try. */
 export function bindProblem(again: () => void): void {
   element("problem-again").addEventListener("click", () => {
-    element("panel").focus();
     hideProblem();
     again();
   });
-  element("problem-close").addEventListener("click", () => {
-    element("panel").focus();
-    hideProblem();
-  });
+  element("problem-close").addEventListener("click", hideProblem);
   element("key-form").addEventListener("submit", (event) => {
     event.preventDefault();
     useKey(input("key").value);
     input("key").value = "";
-    element("panel").focus();
     hideProblem();
     again();
   });

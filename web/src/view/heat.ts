@@ -1,11 +1,11 @@
-/** Which numbers colour the result, their unit, and the ends of the scale. */
+/** The numbers that colour a result, and the legend that explains them. */
 
 import { BufferAttribute } from "three";
-import type { Result } from "../session";
+import type { Result } from "../result";
 import { dihedrals } from "../measure/dihedral";
 import { distances, type Field } from "../measure/distance";
 import { angle, figure, length, percent, type Unit } from "../report/format";
-import { largestGate, largestRatio, learnedLevels } from "../report/report";
+import { learnedLevels } from "../report/report";
 import { LOOP } from "../settings";
 import { heatRange } from "./looks";
 import type { Model } from "./model";
@@ -21,30 +21,58 @@ export function needsFull(heat: Heat): boolean {
   return heat === "ratio" || heat === "gate";
 }
 
+/** This share of the vertices keeps its own colours; values above share the last one. */
+const CLIP = 0.98;
+
 export interface Legend {
   title: string;
   low: string;
   high: string;
-  /** The upper end as a number. */
+  /** The upper end of the colours. */
   end: number;
+  /** The largest value. */
+  max: number;
   note: string;
 }
 
+/** The size of the model, and the unit of its lengths. */
+export interface Scale {
+  size: number;
+  unit: Unit;
+}
+
 /** Colour the result; null where the values are not there. */
-export function colour(
-  heat: Heat,
-  ours: Result,
-  loop: Result | null,
-  unit: Unit,
-): Legend | null {
+export function colour(heat: Heat, ours: Result, loop: Result | null, scale: Scale): Legend | null {
   const shown = field(heat, ours, loop);
   if (!shown) return null;
   shown.values.forEach((values, number) =>
     ours.model.meshes[number]!.geometry.setAttribute("heat", new BufferAttribute(values, 1)),
   );
-  const legend = legendOf(heat, shown.max, ours, unit);
-  heatRange.high.value = legend.end;
-  return legend;
+  const end = clipped(shown);
+  heatRange.high.value = end;
+  const { title, write, note } = describe(heat, ours, scale);
+  const isClipped = end < shown.max;
+  return {
+    title,
+    low: write(0),
+    high: `${isClipped ? "≥ " : ""}${write(end)}`,
+    end,
+    max: shown.max,
+    note: isClipped ? `${note} The largest is ${write(shown.max)}.` : note,
+  };
+}
+
+/** Return the end of the colours: few sharp corners would leave one colour for all the rest. */
+function clipped({ values, max }: Field): number {
+  const all = new Float32Array(values.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const part of values) {
+    all.set(part, at);
+    at += part.length;
+  }
+  const end = all.sort()[Math.ceil(CLIP * all.length) - 1] ?? 0;
+  // Where nearly all vertices have no value, the few that have one show it.
+  return end > 0 ? end : max;
 }
 
 function field(heat: Heat, ours: Result, loop: Result | null): Field | null {
@@ -59,7 +87,7 @@ function field(heat: Heat, ours: Result, loop: Result | null): Field | null {
   }
 }
 
-/** What Loop's rules alone leave of all that is learned. */
+/** Zeros: nothing is learned in Loop's own result. */
 function zeros(model: Model): Field {
   const values = model.meshes.map(({ geometry }) => new Float32Array(geometry.getAttribute("position").count));
   return { values, max: 0 };
@@ -77,48 +105,39 @@ function attribute(model: Model, name: string): Field | null {
   return { values, max };
 }
 
-function legendOf(heat: Heat, max: number, { report }: Result, unit: Unit): Legend {
-  const isLoop = report.scheme === LOOP;
-  // Where no level is learned the last one has nothing to show, and says so.
-  const last = learnedLevels(report) || report.levels.length;
-  const level = report.levels[last - 1];
-  const carried = last < report.levels.length ? " Later vertices have the mean of their edge’s ends." : "";
-  switch (heat) {
-    case "distance":
-      return {
-        title: "Distance to Loop",
-        low: length(0, unit),
-        high: length(max, unit),
-        end: max,
-        note: isLoop ? BY_LOOP : "Each vertex against its counterpart by Loop’s rules.",
-      };
-    case "ratio": {
-      const end = level && !isLoop ? largestRatio(level) : max;
-      return {
-        title: "Share of the budget",
-        low: percent(0),
-        high: percent(Math.min(end, 1)),
-        end,
-        note: isLoop ? BY_LOOP : `Of corrections at level ${last}; ${percent(1)} is the bound C h² / R.${carried}`,
-      };
-    }
-    case "gate": {
-      const end = level && !isLoop ? largestGate(level) : max;
-      return {
-        title: "Gate",
-        low: "0, shut",
-        high: `${figure(end)}${end > 0.995 ? ", open" : ""}`,
-        end,
-        note: isLoop ? BY_LOOP : `Shut on planes, open at sharp edges; of level ${last}.${carried}`,
-      };
-    }
-    case "dihedral":
-      return {
-        title: "Dihedral angle",
-        low: "0°",
-        high: angle(max),
-        end: max,
-        note: "The largest turn between faces at each vertex.",
-      };
-  }
+interface Description {
+  title: string;
+  write: (value: number) => string;
+  note: string;
 }
+
+function describe(heat: Heat, { report }: Result, { size, unit }: Scale): Description {
+  const isLoop = report.scheme === LOOP && heat !== "dihedral";
+  const last = learnedLevels(report) || report.levels.length;
+  const carried = last < report.levels.length ? " Later vertices have the mean of their edge’s ends." : "";
+  const described = DESCRIPTIONS[heat](last, carried, { size, unit });
+  return isLoop ? { ...described, note: BY_LOOP } : described;
+}
+
+const DESCRIPTIONS: Record<Heat, (level: number, carried: string, scale: Scale) => Description> = {
+  distance: (_level, _carried, { size, unit }) => ({
+    title: "Distance to classic",
+    write: (value) => `${percent(value / size)} (${length(value, unit)})`,
+    note: "Each vertex against its counterpart by Loop’s rule, in per cent of the model’s size.",
+  }),
+  ratio: (level, carried) => ({
+    title: "Share of its limit used",
+    write: (value) => percent(Math.min(value, 1)),
+    note: `Of corrections at level ${level}; ${percent(1)} is the bound C h² / R.${carried}`,
+  }),
+  gate: (level, carried) => ({
+    title: "Where the rule acts",
+    write: (value) => figure(value),
+    note: `The gate γ: 0 on planes, 1 at sharp edges; of level ${level}.${carried}`,
+  }),
+  dihedral: () => ({
+    title: "Angles between faces",
+    write: angle,
+    note: "The largest turn between faces at each vertex.",
+  }),
+};

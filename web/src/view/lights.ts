@@ -1,4 +1,4 @@
-/** Light: an environment on a graphics card; plain lights where software draws. */
+/** Light: a room to mirror on a graphics card; plain lights where software draws. */
 
 import {
   Color,
@@ -12,7 +12,7 @@ import {
 } from "three";
 import { RoomEnvironment } from "three/addons/environments/RoomEnvironment.js";
 
-/** Where lamps stand before the camera, and how strong they are. */
+/** A lamp's place before the camera, and its strength. */
 type Lamp = readonly [x: number, y: number, z: number, strength: number];
 
 // One over the viewer's left shoulder; where nothing else mirrors, a weak one from the right too.
@@ -24,7 +24,7 @@ const ALONE: readonly Lamp[] = [
 // A room alone leaves no side of a model dark: its form would not show.
 const ROOM = 0.55;
 
-/** Light a scene; `software` says that no card draws, to which an environment map would be seconds. */
+/** Light a scene. `software` says that no card draws it: an environment map would take it seconds. */
 export function light(
   renderer: WebGLRenderer,
   scene: Scene,
@@ -44,7 +44,7 @@ export function light(
   surround(renderer, scene);
 }
 
-/** Let metal mirror a room. The card holds it alone: one that lost what it held is to be given it anew. */
+/** Let surfaces mirror a room. A card that was lost forgets it, and has to be given it again. */
 export function surround(renderer: WebGLRenderer, scene: Scene): void {
   const generator = new PMREMGenerator(renderer);
   const room = new RoomEnvironment();
@@ -54,7 +54,7 @@ export function surround(renderer: WebGLRenderer, scene: Scene): void {
   generator.dispose();
 }
 
-/** Without surroundings to mirror a metal is black: in plain light it is shown as if painted. */
+/** Show metal as if painted: in plain light it would mirror nothing, and be black. */
 export function paint(meshes: Mesh[]): void {
   for (const { material } of meshes) {
     for (const painted of [material].flat()) {

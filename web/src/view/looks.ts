@@ -47,12 +47,14 @@ export function dress(mesh: Mesh, look: Look, paper: string): void {
   mesh.material = material;
 }
 
-/** Give meshes of a format without materials one in which their shape can be seen. */
+/** Give meshes without materials one in which their shape, and the colours of their vertices, are seen. */
 export function plain(meshes: Mesh[]): void {
   for (const mesh of meshes) {
     [mesh.material].flat().forEach((material) => material.dispose());
     const flatShading = !mesh.geometry.getAttribute("normal");
-    mesh.material = new MeshStandardMaterial({ color: 0xb8bcc4, roughness: 0.7, flatShading });
+    const vertexColors = mesh.geometry.hasAttribute("color");
+    const color = vertexColors ? 0xffffff : 0xb8bcc4;
+    mesh.material = new MeshStandardMaterial({ color, roughness: 0.7, flatShading, vertexColors });
     mesh.userData.material = mesh.material;
   }
 }

@@ -25,6 +25,10 @@ export class Playback {
     this.mixers.delete(model);
   }
 
+  clear(): void {
+    for (const model of [...this.mixers.keys()]) this.remove(model);
+  }
+
   get duration(): number {
     const [model] = this.mixers.keys();
     return model?.clips[this.clip]?.duration ?? 0;

@@ -1,4 +1,4 @@
-/** One canvas, one camera, one or two models; drawn when something changed. */
+/** One canvas, one camera, one or two models, drawn when something changed. */
 
 import {
   Color,
@@ -12,7 +12,9 @@ import {
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { distanceTo } from "./framing";
 import { light, paint, surround } from "./lights";
+import { ContactShadow } from "./shadow";
 import { drawnBySoftware } from "./software";
 import type { Extent, Model } from "./model";
 
@@ -24,10 +26,8 @@ const REST = 200;
 /** The farthest that a link may put the camera from a model's centre, in its radii. */
 const FARTHEST = 100;
 
-/** How much farther away than need be: the air around a model. */
-const MARGIN = 1.15;
-
-const FIRST_DIRECTION = new Vector3(0.6, 0.5, 1).normalize();
+/** The front of a glTF is +Z: seen from a little beside and above it shows its depth. */
+const FRONT = new Vector3(0.35, 0.28, 1).normalize();
 
 export interface Sides {
   left: Model | null;
@@ -48,6 +48,8 @@ export class Viewer {
   covered = 0;
   /** Whether the user has chosen where the camera stands: a link then holds it. */
   chosen = false;
+  /** Whether models stand on a ground, and cast a shadow there. */
+  standsOnGround = false;
   /** Called when the user has. */
   onChosen: () => void = () => {};
   /** Called once a frame with the seconds since the last; returns whether it wants another. */
@@ -56,6 +58,7 @@ export class Viewer {
   // Without a card, edges are smoothed by finer pixels, and only once nothing moves.
   private readonly software = drawnBySoftware();
   private readonly scene = new Scene();
+  private readonly shadow = new ContactShadow();
   private readonly paper = new Color();
   private readonly sphere = new Sphere(new Vector3(), 1);
   private scheduled = false;
@@ -69,6 +72,7 @@ export class Viewer {
     this.renderer.autoClear = false;
     this.renderer.toneMapping = NeutralToneMapping;
     light(this.renderer, this.scene, this.camera, this.software);
+    this.scene.add(this.shadow.ground);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
     this.controls.zoomToCursor = true;
@@ -115,30 +119,22 @@ export class Viewer {
     this.rest = window.setTimeout(() => requestAnimationFrame(() => this.draw(true)), REST);
   }
 
-  /** Look at all of a model; `turn` goes back to the first direction: ahead, and a little above. */
-  frame({ box, points }: Extent, turn = true): void {
+  /** Look at all of a model; `turn` goes back to the first direction. */
+  frame(extent: Extent, turn = true): void {
+    const { box } = extent;
     if (box.isEmpty()) return;
     const { center, radius } = box.getBoundingSphere(this.sphere);
     const size = radius || 1;
     const towards = turn
-      ? FIRST_DIRECTION.clone()
+      ? FRONT.clone()
       : this.camera.position.clone().sub(this.controls.target).normalize();
-    const right = new Vector3().crossVectors(this.camera.up, towards).normalize();
-    const up = new Vector3().crossVectors(towards, right);
     const { width, height } = this.size();
     const tall = Math.tan((this.camera.fov * Math.PI) / 360);
     const free = tall * (1 - this.foot(height));
     const wide = (tall * (this.layout === "side" ? width / 2 : width)) / height;
-    // The nearest place from which every vertex is in the picture.
-    let distance = 0;
-    const at = new Vector3();
-    for (let place = 0; place < points.length; place += 3) {
-      at.fromArray(points, place).sub(center);
-      const aside = Math.max(Math.abs(at.dot(right)) / wide, Math.abs(at.dot(up)) / free);
-      distance = Math.max(distance, MARGIN * aside + at.dot(towards));
-    }
+    const distance = distanceTo(extent, center, towards, this.camera.up, wide, free) || 3 * size;
     this.controls.target.copy(center);
-    this.camera.position.copy(center).addScaledVector(towards, distance || 3 * size);
+    this.camera.position.copy(center).addScaledVector(towards, distance);
     this.camera.near = size / 200;
     this.camera.far = size * 200;
     this.controls.minDistance = size / 50;
@@ -146,6 +142,11 @@ export class Viewer {
     if (turn) this.chosen = false;
     this.controls.update();
     this.invalidate();
+  }
+
+  /** Lay the ground under a model. */
+  ground({ box }: Extent): void {
+    if (!box.isEmpty()) this.shadow.place(box);
   }
 
   /** Where the camera stands and where it looks, from a model's centre and in its radii: six numbers. */
@@ -221,18 +222,16 @@ export class Viewer {
       this.renderer.setPixelRatio(ratio);
       this.renderer.setSize(width, height, false);
     }
-    // A card that was lost comes back without it.
-    this.renderer.setScissorTest(true);
     const { left, right } = this.sides;
     const split = Math.round(this.wipe * width);
     if (!left || !right || this.layout === "overlay" || this.layout === "single") {
-      this.view(right ?? left, 0, width, 0, width);
+      this.view(right ?? left, finely, 0, width, 0, width);
     } else if (this.layout === "side") {
-      this.view(left, 0, width / 2, 0, width / 2);
-      this.view(right, width / 2, width / 2, width / 2, width / 2);
+      this.view(left, finely, 0, width / 2, 0, width / 2);
+      this.view(right, finely, width / 2, width / 2, width / 2, width / 2);
     } else {
-      this.view(left, 0, width, 0, split);
-      this.view(right, 0, width, split, width - split);
+      this.view(left, finely, 0, width, 0, split);
+      this.view(right, finely, 0, width, split, width - split);
     }
     this.tell();
   }
@@ -245,21 +244,27 @@ export class Viewer {
   }
 
   /** Draw one model over the columns from `x`, and of those the ones from `from`. */
-  private view(model: Model | null, x: number, width: number, from: number, columns: number): void {
+  private view(model: Model | null, finely: boolean, x: number, width: number, from: number, columns: number): void {
     if (columns <= 0) return;
     const { height } = this.size();
-    const { renderer } = this;
+    const { renderer, scene, shadow } = this;
+    for (const object of scene.children) {
+      if (object === this.camera || "isLight" in object) continue;
+      object.visible = object === model?.root || object === this.over?.root;
+    }
+    renderer.setClearColor(this.paper);
+    if (model && this.standsOnGround) {
+      // Software draws it once nothing moves, and until then as it was.
+      if (finely) shadow.render(renderer, scene);
+      shadow.ground.visible = true;
+    }
+    renderer.setScissorTest(true);
     renderer.setViewport(x, 0, width, height);
     renderer.setScissor(from, 0, columns, height);
-    renderer.setClearColor(this.paper);
     renderer.clear();
     if (!model) return;
-    for (const object of this.scene.children) {
-      if (object === this.camera || "isLight" in object) continue;
-      object.visible = object === model.root || object === this.over?.root;
-    }
     this.project(width, height);
-    renderer.render(this.scene, this.camera);
+    renderer.render(scene, this.camera);
   }
 
   /** A picture of so many pixels, whose middle lies in the middle of what tools leave free. */

@@ -1,6 +1,7 @@
 /** Debian's Chromium, drawing in software, and a page that keeps account of what it did. */
 
 import { existsSync } from "node:fs";
+import { gunzipSync } from "node:zlib";
 import { chromium } from "playwright-core";
 
 export const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
@@ -17,12 +18,13 @@ export function launch(...more) {
 }
 
 /**
- * A page at an address. `faults` collects what must not happen: foreign requests, violations of the
- * policy, errors on the console, those of a status or of words that a test foresees aside. `card`: the
- * page takes the renderer for a graphics card, and draws as it does there.
+ * Open a page. `faults` collects foreign requests, violations of the policy, and errors on the console
+ * except those of a status or of words that a test foresees. With `card` the page takes the renderer for
+ * a graphics card, and draws as it does there. Without `live` the browser asks to save data: the page
+ * then shows no example of its own accord.
  */
 export async function open(browser, address, options = {}) {
-  const { expected = [], foreseen, card, ...settings } = options;
+  const { expected = [], foreseen, card, live, ...settings } = options;
   const context = await browser.newContext({ viewport: { width: 1000, height: 700 }, ...settings });
   const page = await context.newPage();
   // A page that hangs ends some time; a machine that is busy is no fault.
@@ -48,6 +50,7 @@ export async function open(browser, address, options = {}) {
       console.error(`policy: ${event.violatedDirective} ${event.blockedURI}`),
     );
   });
+  if (!live) await context.addInitScript(() => Object.defineProperty(navigator, "connection", { value: { saveData: true } }));
   if (card) await context.addInitScript(nameRenderer, "A card");
   await page.goto(address);
   return { page, context, faults };
@@ -75,17 +78,23 @@ export async function settled(page) {
   await page.waitForFunction(() => !/Looking/.test(document.querySelector("#validation-text").textContent));
 }
 
-/** Jobs that are handed in wait, those alone whose body and address are `held`, until what comes back is called. */
+/** Let jobs wait whose body and address are `held`; returns what releases them. */
 export async function hold(page, held = () => true) {
   let release;
   const released = new Promise((resolve) => (release = resolve));
   await page.route(/\/jobs\?/, async (route) => {
     const request = route.request();
-    if (held(request.postDataBuffer(), request.url())) await released;
+    if (held(bodyOf(request), request.url())) await released;
     // The page may have ended it meanwhile.
     await route.continue().catch(() => {});
   });
   return release;
+}
+
+/** The body of a request as it was before compression; null where it has none. */
+export function bodyOf(request) {
+  const body = request.postDataBuffer();
+  return body && request.headers()["content-encoding"] === "gzip" ? gunzipSync(body) : body;
 }
 
 /** What the page offers when a button is pressed, as bytes. */
@@ -96,8 +105,14 @@ export async function downloaded(page, button) {
   return { name: download.suggestedFilename(), bytes: Buffer.concat(pieces) };
 }
 
+/** Unfold the options of downloads. */
+export async function openDownloadOptions(page) {
+  await page.$eval("#writing", (part) => (part.open = true));
+}
+
 /** The view as rows of RGBA, taken as the page's own picture. */
 export async function picture(page) {
+  await openDownloadOptions(page);
   const { bytes } = await downloaded(page, "#download-picture");
   const { width, height, data } = await page.evaluate(async (base64) => {
     const png = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));

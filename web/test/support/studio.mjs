@@ -46,6 +46,11 @@ export function studio(settings = {}) {
       opened.push(visited);
       return visited.page;
     },
+    /** The problem by which the service itself refuses a body. */
+    async refusal(query, body, type) {
+      const init = { method: "POST", headers: { "Content-Type": type }, body };
+      return (await fetch(`${server.address}/subdivide?${query}`, init)).json();
+    },
     /** What the service itself answers. */
     async refined(query, body = part, type = "model/gltf-binary") {
       const answer = await fetch(`${server.address}/subdivide?${query}`, {

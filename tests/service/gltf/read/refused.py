@@ -5,5 +5,5 @@ from service.options import Limits, Options
 
 
 def refine(data, media="glb", limits=None, **options):
-    options = Options(**{"scheme": "loop", **options})
+    options = Options(**{"scheme": "loop", "levels": 1, **options})
     return subdivide_gltf(data, media, options, None, limits or Limits())

@@ -24,7 +24,7 @@ MESHOPT = "EXT_meshopt_compression"
 
 
 def refine(data, limits=None):
-    options = Options(scheme="loop")
+    options = Options(scheme="loop", levels=1)
     return subdivide_gltf(data, "glb", options, None, limits or Limits())
 
 

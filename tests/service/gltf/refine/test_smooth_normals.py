@@ -51,6 +51,23 @@ def test_without_the_option_a_file_without_normals_stays_without():
     assert "NORMAL" not in primitive_of(refined([plain(octahedron())], normals="keep"))
 
 
+def test_a_mesh_without_normals_comes_back_smooth_but_for_sharp_edges():
+    by_default = {"normals": "auto", "crease": "angle:30"}
+    smooth = primitive_of(refined([plain(octahedron())], normals="auto"))
+    assert directions(smooth) == 1
+    sharp = primitive_of(refined([plain(box())], **by_default))
+    np.testing.assert_allclose(np.abs(sharp["NORMAL"]).max(axis=1), 1, atol=1e-6)
+    assert directions(sharp) == 3
+
+
+def test_normals_that_are_there_stay_beside_meshes_without_any():
+    """Each mesh of a file is asked for itself."""
+    result = refined([flat_box()], [plain(octahedron())], normals="auto")
+    kept = primitive_of(refined([flat_box()], normals="keep"))
+    np.testing.assert_array_equal(primitive_of(result)["NORMAL"], kept["NORMAL"])
+    assert "NORMAL" in indices_and_attributes(result, mesh=1)[1]
+
+
 def test_hard_edges_of_the_file_are_softened():
     flat = primitive_of(refined([flat_box()], normals="keep"))
     smooth = primitive_of(refined([flat_box()]))

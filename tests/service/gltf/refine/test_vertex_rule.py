@@ -23,7 +23,7 @@ MODEL = vertex_model()
 
 
 def subdivide(*meshes, model=MODEL, **options):
-    options = Options(**{"scheme": "pns", **options})
+    options = Options(**{"scheme": "pns", "levels": 1, **options})
     return subdivide_gltf(files.glb(*meshes), "glb", options, model, Limits())
 
 

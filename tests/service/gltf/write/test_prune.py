@@ -14,7 +14,7 @@ from tests.support.gltf.shapes import box, octahedron
 
 
 def refine(tree, binary):
-    options = Options(scheme="loop")
+    options = Options(scheme="loop", levels=1, normals="keep")
     return subdivide_gltf(files.pack(tree, binary), "glb", options, None, Limits())
 
 

@@ -85,7 +85,7 @@ def test_compressed_ones_are_read_again():
     plain = refined(tree, binary)
     compressed = refined(*made_sparse(*files.document([shape(CORNER)])), compress="meshopt")
     again = [
-        subdivide_gltf(each.glb, "glb", Options(scheme="loop"), None, Limits())
+        subdivide_gltf(each.glb, "glb", Options(scheme="loop", levels=1), None, Limits())
         for each in (plain, compressed)
     ]
     for one, other in zip(*(files.targets_of(each.glb) for each in again), strict=True):

@@ -13,7 +13,7 @@ from service.http.connection.protocol import HEAD_BYTES
 from tests.support.live import served
 
 PATIENCE = 30
-NEXT = b"GET /limits HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n"
+NEXT = b"GET /limits HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def address():
 
 
 def post(headers, body=b"", version=b"1.1"):
-    return b"POST /subdivide HTTP/%b\r\nHost: a\r\n%b\r\n%b" % (version, headers, body)
+    return b"POST /subdivide HTTP/%b\r\nHost: localhost\r\n%b\r\n%b" % (version, headers, body)
 
 
 def chunked(body):
@@ -69,15 +69,15 @@ REFUSED = {
         400,
     ),
     "a folded length": (post(b"Transfer-Encoding:\r\n chunked\r\n", b"0\r\n\r\n"), 400),
-    "a folded line": (get(b"Host: a\r\nX: b\r\n\tc\r\n"), 400),
+    "a folded line": (get(b"Host: localhost\r\nX: b\r\n\tc\r\n"), 400),
     "lines without CR": (b"GET /limits HTTP/1.1\nHost: a\n\n", 400),
-    "one line without CR": (get(b"Host: a\r\nX: b\nY: c\r\n"), 400),
-    "lines without LF": (b"GET /limits HTTP/1.1\rHost: a\r\r\n\r\n", 400),
-    "CR in a value": (get(b"Host: a\r\nX: b\rContent-Length: 9\r\n"), 400),
-    "NUL in a value": (get(b"Host: a\r\nX: b\0c\r\n"), 400),
-    "two hosts": (get(b"Host: a\r\nHost: b\r\n"), 400),
+    "one line without CR": (get(b"Host: localhost\r\nX: b\nY: c\r\n"), 400),
+    "lines without LF": (b"GET /limits HTTP/1.1\rHost: localhost\r\r\n\r\n", 400),
+    "CR in a value": (get(b"Host: localhost\r\nX: b\rContent-Length: 9\r\n"), 400),
+    "NUL in a value": (get(b"Host: localhost\r\nX: b\0c\r\n"), 400),
+    "two hosts": (get(b"Host: localhost\r\nHost: b\r\n"), 400),
     "no host": (get(b""), 400),
-    "a line without colon": (get(b"Host: a\r\nnonsense\r\n"), 400),
+    "a line without colon": (get(b"Host: localhost\r\nnonsense\r\n"), 400),
     "a chunk's size ends in LF": (chunked(b"1\nx\r\n0\r\n\r\n"), 400),
     "a chunk ends in LF": (chunked(b"1\r\nx\n0\r\n\r\n"), 400),
     "a chunk is longer than it says": (chunked(b"1\r\nxyz\r\n0\r\n\r\n"), 400),
@@ -88,16 +88,16 @@ REFUSED = {
     "the last chunk ends in LF": (chunked(b"1\r\nx\r\n0\n\r\n"), 400),
     "a body ends in LF": (chunked(b"1\r\nx\r\n0\r\n\n"), 400),
     "a trailer ends in LF": (chunked(b"1\r\nx\r\n0\r\nX: a\n\n"), 400),
-    "a target of no host": (get(b"Host: a\r\n", b"http:///limits"), 400),
-    "a target of a user": (get(b"Host: a\r\n", b"http://u:p@a/limits"), 400),
-    "a target of half an address": (get(b"Host: a\r\n", b"http://[::1/limits"), 400),
+    "a target of no host": (get(b"Host: localhost\r\n", b"http:///limits"), 400),
+    "a target of a user": (get(b"Host: localhost\r\n", b"http://u:p@a/limits"), 400),
+    "a target of half an address": (get(b"Host: localhost\r\n", b"http://[::1/limits"), 400),
     "a target with a host, and no Host": (get(b"", b"http://a/limits"), 400),
     "a target with a host, and two Hosts": (
-        get(b"Host: a\r\nHost: b\r\n", b"http://a/limits"),
+        get(b"Host: localhost\r\nHost: b\r\n", b"http://a/limits"),
         400,
     ),
     "the preface of HTTP/2": (b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", 505),
-    "a head that is too long": (get(b"Host: a\r\n", b"/limits?" + b"a" * HEAD_BYTES), 431),
+    "a head that is too long": (get(b"Host: localhost\r\n", b"/limits?" + b"a" * HEAD_BYTES), 431),
 }
 
 
@@ -114,23 +114,29 @@ TAKEN = {
     "extensions of chunks": (chunked(b"1;a=b\r\nx\r\n0;c\r\n\r\n"), 415),
     "trailers": (chunked(b"0\r\nContent-Length: 99\r\nAuthorization: Bearer x\r\n\r\n"), 415),
     "the same length twice": (post(b"Content-Length: 0\r\n" * 2), 415),
-    "a body that nobody reads": (get(b"Host: a\r\nContent-Length: 5\r\n") + b"hello", 200),
-    "an upgrade to HTTP/2": (get(b"Host: a\r\nConnection: Upgrade\r\nUpgrade: h2c\r\n"), 200),
-    "a long query": (get(b"Host: a\r\n", b"/limits?" + b"a" * 15000), 200),
-    "a long path": (get(b"Host: a\r\n", b"/" + b"a/" * 7000), 404),
-    "a path that climbs": (get(b"Host: a\r\n", b"/" + b"%2e%2e%2f" * 1500), 404),
-    "a target with a host": (get(b"Host: a\r\n", b"http://b.example:80/limits?x=1"), 200),
-    "a target with an address": (get(b"Host: a\r\n", b"HTTPS://[::1]/limits"), 200),
-    "a target of another protocol": (get(b"Host: a\r\n", b"ftp://b/limits"), 404),
-    "a path of a target": (get(b"Host: a\r\n", b"/http://b/limits"), 404),
-    "a target with two slashes": (get(b"Host: a\r\n", b"http://b//limits"), 404),
+    "a body that nobody reads": (get(b"Host: localhost\r\nContent-Length: 5\r\n") + b"hello", 200),
+    "an upgrade to HTTP/2": (
+        get(b"Host: localhost\r\nConnection: Upgrade\r\nUpgrade: h2c\r\n"),
+        200,
+    ),
+    "a long query": (get(b"Host: localhost\r\n", b"/limits?" + b"a" * 15000), 200),
+    "a long path": (get(b"Host: localhost\r\n", b"/" + b"a/" * 7000), 404),
+    "a path that climbs": (get(b"Host: localhost\r\n", b"/" + b"%2e%2e%2f" * 1500), 404),
+    "a target with a host": (get(b"Host: localhost\r\n", b"http://b.example:80/limits?x=1"), 200),
+    "a target with an address": (get(b"Host: localhost\r\n", b"HTTPS://[::1]/limits"), 200),
+    "a target of another protocol": (get(b"Host: localhost\r\n", b"ftp://b/limits"), 404),
+    "a path of a target": (get(b"Host: localhost\r\n", b"/http://b/limits"), 404),
+    "a target with two slashes": (get(b"Host: localhost\r\n", b"http://b//limits"), 404),
     "a target with a body": (
-        b"POST http://b/subdivide HTTP/1.1\r\nHost: a\r\nContent-Length: 5\r\n\r\nhello",
+        b"POST http://b/subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\n\r\nhello",
         415,
     ),
-    "many headers": (get(b"Host: a\r\n" + b"".join(b"h%d: x\r\n" % n for n in range(1500))), 200),
+    "many headers": (
+        get(b"Host: localhost\r\n" + b"".join(b"h%d: x\r\n" % n for n in range(1500))),
+        200,
+    ),
     "many parameters": (
-        b"POST /subdivide?%b HTTP/1.1\r\nHost: a\r\nContent-Length: 0\r\n\r\n"
+        b"POST /subdivide?%b HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n"
         % b"&".join(b"levels=%d" % n for n in range(1200)),
         422,
     ),
@@ -147,8 +153,8 @@ def test_what_reads_in_one_way_alone_leaves_the_next_request_alone(address, case
 
 @pytest.mark.parametrize("ranges", [b"0-0", b"-1", b"9-3", b",".join([b"0-"] * 3000)])
 def test_a_part_of_an_answer_is_the_whole_of_it(address, ranges):
-    head = b"Host: a\r\nConnection: close\r\nRange: bytes=" + ranges + b"\r\n"
-    whole = answers(address, get(b"Host: a\r\nConnection: close\r\n", b"/"))
+    head = b"Host: localhost\r\nConnection: close\r\nRange: bytes=" + ranges + b"\r\n"
+    whole = answers(address, get(b"Host: localhost\r\nConnection: close\r\n", b"/"))
     part = answers(address, get(head + b'If-Range: "x"\r\n', b"/"))
     assert part[0] == [200]
     assert part[1].partition(b"\r\n\r\n")[2] == whole[1].partition(b"\r\n\r\n")[2]

@@ -1,0 +1,74 @@
+"""Say why a refinement changed little, and which option changes that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+
+from pns_common.creases import Creases, edge_cosines
+from pns_common.mesh import Mesh
+from pns_common.report import LevelReport
+from pns_common.topology import EdgeClass, build_topology
+
+# Plane faces in single precision turn by less.
+BENT = math.radians(0.5)
+# From this share of sharp edges, or of borders, on, little is rounded.
+MOST = 0.9
+
+
+@dataclass(frozen=True)
+class Bends:
+    """How many edges of a control mesh bend, and how many of these are kept sharp."""
+
+    bent: int = 0
+    sharp: int = 0
+
+
+NO_BENDS = Bends()
+
+
+def count_bends(
+    mesh: Mesh, creases: Creases, parts: int = 1, part_of_face: Int[np.ndarray, " F"] | None = None
+) -> list[Bends]:
+    """Count the bent edges of each part of a mesh, and the sharp ones among them.
+
+    Without `part_of_face` the mesh is one part. Nothing is counted where no sharp edges are asked
+    for.
+    """
+    if creases.named is None:
+        return [NO_BENDS] * parts
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    bent = np.flatnonzero(edge_cosines(mesh.vertices, topology) < math.cos(BENT))
+    sharp = creases.applied(mesh.vertices, topology).edge_class[bent] == EdgeClass.CREASE
+    part = np.zeros(len(bent), dtype=np.int64)
+    if part_of_face is not None:
+        part = part_of_face[topology.half_edges[bent, 0] // 3]
+    counts = (np.bincount(part[chosen], minlength=parts).tolist() for chosen in (..., sharp))
+    return [Bends(*each) for each in zip(*counts, strict=True)]
+
+
+def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
+    """Return the reasons why a shape changed little, each with the option to set."""
+    if not levels:
+        return []
+    edges = levels[0]["edges"]
+    total = sum(edges[kind] for kind in ("interior", "boundary", "irregular")) + edges.get(
+        "crease", 0
+    )
+    if bends.bent and bends.sharp >= MOST * bends.bent:
+        return [
+            f"{bends.sharp} of {bends.bent} bent edges are kept sharp: "
+            "use crease=off for a rounder shape"
+        ]
+    if edges["boundary"] >= MOST * total:
+        return [
+            f"{edges['boundary']} of {total} edges are open borders, and faces that only touch "
+            "stay apart: use weld_tolerance=0.001 to join vertices that nearly coincide"
+        ]
+    if levels[-1]["normal_jump_max"] < BENT and not edges.get("crease"):
+        return ["the shape is flat: refining adds faces and rounds outlines, nothing else"]
+    return []

@@ -1,0 +1,58 @@
+"""make prose: what is counted, and that more of it fails."""
+
+import ast
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+
+PATH = Path(__file__).resolve().parents[2] / "docs" / "prose.py"
+spec = importlib.util.spec_from_file_location("prose", PATH)
+assert spec is not None
+assert spec.loader is not None
+prose = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(prose)
+
+
+@pytest.mark.parametrize(
+    ("source", "kinds"),
+    [
+        ('def f():\n    """Return it."""', []),
+        ('def f():\n    """The result."""', ["functions"]),
+        ('def f():\n    """Whether it holds."""', ["questions", "functions"]),
+        ('class C:\n    """What is told of it."""', ["questions"]),
+        ('class C:\n    """The state."""', []),
+        ('@property\ndef f(self):\n    """The state."""', []),
+        ("def f():\n    pass", []),
+    ],
+)
+def test_docstrings_are_counted_by_how_they_open(source, kinds):
+    (node,) = ast.parse(source).body
+    assert list(prose.faults(node, "service")) == kinds
+
+
+def test_sentences_end_at_points_items_and_cells_and_code_has_none():
+    page = (
+        "# Heading\n\nOne two. Three [four](a.md) `x`!\n\n- item one\n- item two\n\n"
+        "| a | b c |\n|---|---|\n| d | e |\n\n```sh\nno words here\n```\n"
+    )
+    found = [sentence.strip("| ") for sentence in prose.sentences_of(page)]
+    assert [sentence for sentence in found if sentence] == [
+        *("Heading", "One two.", "Three four `x`!", "item one", "item two"),
+        *("a", "b c", "d", "e"),
+    ]
+
+
+def test_more_than_the_budget_fails_and_names_the_place(tmp_path, monkeypatch, capsys):
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "page.md").write_text("word " * 41 + ".\n")
+    monkeypatch.setattr(prose, "ROOT", tmp_path)
+    monkeypatch.setattr(prose, "PAGES", ("docs",))
+    monkeypatch.setattr(prose, "BUDGETS", tmp_path / "prose.json")
+    (tmp_path / "prose.json").write_text("{}")
+    assert prose.main([]) == 1
+    assert "docs/page.md: 4" in capsys.readouterr().out
+    assert prose.main(["--update"]) == 0
+    assert json.loads((tmp_path / "prose.json").read_text()) == {"sentences docs": 1}
+    assert prose.main([]) == 0

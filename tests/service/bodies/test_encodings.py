@@ -1,0 +1,54 @@
+"""Content-Encoding: what is taken, and how far it may unpack."""
+
+from __future__ import annotations
+
+import gzip
+
+import pytest
+
+from service.bodies.encodings import decoded, encoding_of
+from service.errors import LimitError, MediaTypeError, ServiceError, UnreadableError
+
+CONTENT = bytes(range(256)) * 40
+
+
+@pytest.mark.parametrize("header", ["gzip", "GZIP", " gzip "])
+def test_gzip_is_taken_and_unpacked(header: str) -> None:
+    assert decoded(gzip.compress(CONTENT), encoding_of(header), len(CONTENT)) == CONTENT
+
+
+@pytest.mark.parametrize("header", ["", "identity", "Identity"])
+def test_no_encoding_leaves_the_body_alone(header: str) -> None:
+    assert decoded(CONTENT, encoding_of(header), 1) is CONTENT
+
+
+@pytest.mark.parametrize("header", ["br", "deflate", "gzip, gzip", "x"])
+def test_another_encoding_is_refused(header: str) -> None:
+    with pytest.raises(MediaTypeError):
+        encoding_of(header)
+
+
+def test_a_bomb_unpacks_to_its_limit_and_no_further() -> None:
+    with pytest.raises(LimitError) as refused:
+        decoded(gzip.compress(bytes(10**8)), "gzip", 1000)
+    assert (refused.value.limit, refused.value.found) == ("body", 1001)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [b"", b"no gzip", gzip.compress(CONTENT)[:-9], gzip.compress(CONTENT) + b"x"],
+)
+def test_what_is_not_one_whole_stream_is_unreadable(body: bytes) -> None:
+    with pytest.raises(UnreadableError):
+        decoded(body, "gzip", 10**6)
+
+
+def test_every_changed_byte_is_a_refusal_or_the_same_content() -> None:
+    packed = gzip.compress(CONTENT, mtime=0)
+    for place in range(len(packed)):
+        changed = bytearray(packed)
+        changed[place] ^= 0x55
+        try:
+            assert decoded(bytes(changed), "gzip", 10**6) == CONTENT
+        except ServiceError:
+            continue

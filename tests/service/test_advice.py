@@ -1,0 +1,73 @@
+"""advice: why little changed, and the option that changes it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pns_common import loop
+from service.gltf.subdivide import subdivide_gltf
+from service.meshfiles.convert import advice_lines
+from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.refine_triangles import refine_triangles
+from service.options import Limits, Options
+from tests.service.gltf.test_options import cylinder
+from tests.support.gltf.files import glb
+from tests.support.gltf.shapes import box, octahedron
+
+CUBE = "12 of 12 bent edges are kept sharp: use crease=off for a rounder shape"
+
+
+def advice(*meshes, **options):
+    chosen = Options(**{"scheme": "loop"} | options)
+    return subdivide_gltf(glb(*meshes), "glb", chosen, None, Limits()).report["advice"]
+
+
+def test_a_cube_of_sharp_edges_says_how_it_gets_round():
+    # A quad's diagonal does not bend.
+    assert advice([box()], crease="angle:60") == [CUBE]
+
+
+def test_a_shape_that_gets_round_says_nothing():
+    assert advice([box()], crease="off") == []
+    # The rims are sharp; the sides are not.
+    assert advice([cylinder()], crease="angle:60") == []
+
+
+@pytest.mark.parametrize("alone", [False, True])
+def test_the_meshes_of_a_file_count_together(alone, monkeypatch):
+    if alone:
+        monkeypatch.setattr("service.gltf.refine.meshes.MOST_FACES", -1)
+    assert advice([box()], [box()], crease="angle:60") == [CUBE.replace("12", "24")]
+    # 12 of an octahedron's edges bend by 70 degrees.
+    assert advice([box()], [octahedron()], crease="angle:80") == []
+
+
+def test_triangles_that_share_no_vertex_say_how_to_join_them():
+    shape = octahedron()
+    corners = shape["POSITION"][np.reshape(shape["indices"], -1)].astype(np.float64)
+    apart = corners + 1e-5 * np.arange(len(corners))[:, None]
+    (line,) = advice([{"POSITION": apart.astype(np.float32), "indices": np.arange(24)}])
+    assert line.startswith("24 of 24 edges are open borders")
+    assert "weld_tolerance=" in line
+
+
+def test_a_flat_sheet_says_that_it_is_flat():
+    sheet = {
+        "POSITION": np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], np.float32),
+        "indices": np.array([0, 1, 2, 2, 1, 3]),
+    }
+    (line,) = advice([sheet])
+    assert line.startswith("the shape is flat")
+
+
+def test_mesh_files_say_the_same_and_the_command_spells_its_own_options():
+    cube = box()
+    triangles = IndexedTriangles(
+        cube["POSITION"].astype(np.float64), np.reshape(cube["indices"], (-1, 3))
+    )
+    chosen = Options(scheme="loop", crease="angle:60")
+    _, report = refine_triangles(triangles, loop(), chosen, Limits())
+    assert report["advice"] == [CUBE]
+    (line,) = advice_lines(report)
+    assert line == "12 of 12 bent edges are kept sharp: use --crease off for a rounder shape"

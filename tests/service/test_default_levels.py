@@ -1,0 +1,39 @@
+"""Two levels at every door: one shows little."""
+
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+
+from pns_common import pyvista, refine, subdivide
+from service.http.parameters import Parameters
+from service.options import DEFAULTS
+
+ROOT = Path(__file__).resolve().parents[2]
+DEFAULT_LEVELS = 2
+
+
+@pytest.mark.parametrize(
+    "door",
+    [refine, subdivide, pyvista.PnsAccessor.subdivide, pyvista.PnsAccessor.loop],
+    ids=lambda door: door.__qualname__,
+)
+def test_python_refines_by_two_levels(door):
+    assert inspect.signature(door).parameters["levels"].default == DEFAULT_LEVELS
+
+
+def test_the_command_and_http_refine_as_deep_as_python():
+    assert DEFAULTS.levels == Parameters().levels == DEFAULT_LEVELS
+
+
+@pytest.mark.parametrize(
+    ("file", "pattern"),
+    [
+        ("addons/blender/pns_refine/settings.py", r"levels: IntProperty\([^)]*?default=(\d)"),
+        ("web/src/settings.ts", r"DEFAULTS: Settings = \{\s*levels: (\d)"),
+    ],
+)
+def test_blender_and_the_page_refine_as_deep_as_python(file, pattern):
+    (depth,) = re.findall(pattern, (ROOT / file).read_text())
+    assert int(depth) == DEFAULT_LEVELS

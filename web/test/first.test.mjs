@@ -1,0 +1,256 @@
+/** The first minute: what a stranger sees, reads and gets. */
+
+import assert from "node:assert/strict";
+import { describe, test } from "node:test";
+import { bodyOf, choose, downloaded, hold, noBrowser, picture, settled } from "./support/browser.mjs";
+import { example, number, PART_FACES, same, studio, TETRAHEDRON } from "./support/studio.mjs";
+
+/** A cube of eight vertices, whose edges all turn by a right angle. */
+const CUBE = obj("cube.obj", (x) => x);
+/** The same, whose side at +Z is five times as small as the one at −Z. */
+const BLUNT = obj("blunt.obj", (x, z) => (z > 0 ? x / 5 : x));
+
+function obj(name, place) {
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [i & 1, (i >> 1) & 1, i >> 2].map((bit) => bit - 0.5));
+  const points = corners.map(([x, y, z]) => `v ${place(x, z)} ${place(y, z)} ${z}`);
+  const sides = ["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"].map((side) => `f ${side}`);
+  return { name, mimeType: "", buffer: Buffer.from([...points, ...sides].join("\n")) };
+}
+
+describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
+  const { visit, refined } = studio();
+
+  test("the page shows an example at once, refined by the service, until the user has a file", async () => {
+    const page = await visit({ live: true });
+    await settled(page);
+    assert.equal(await page.textContent("#file-name"), "example.glb");
+    assert.match(await page.textContent("#label-right"), /· 5,952 faces/);
+    assert.ok(await page.isVisible("#invitation"));
+    assert.ok(await page.isHidden("#welcome"));
+    await choose(page, TETRAHEDRON);
+    await page.locator("#file-name", { hasText: "tetrahedron.obj" }).waitFor();
+    await settled(page);
+    assert.ok(await page.isHidden("#invitation"));
+  });
+
+  test("a file that is chosen while the example is on its way takes its place", async () => {
+    const page = await visit({ live: true, hash: "#levels=1" });
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    await page.waitForTimeout(1000);
+    await settled(page);
+    assert.equal(await page.textContent("#file-name"), "tetrahedron.obj");
+  });
+
+  test("an example that does not come leaves the welcome, without a word of a fault", async () => {
+    const page = await visit({ live: true, foreseen: /ERR_FAILED/ });
+    await page.route(/\/jobs\?/, (route) => route.abort());
+    await page.reload();
+    await page.waitForEvent("requestfailed");
+    await page.locator("#work").waitFor({ state: "hidden" });
+    await page.locator("#welcome").waitFor();
+    assert.ok(await page.isHidden("#problem"));
+    await page.unroute(/\/jobs\?/);
+    await page.click("#example");
+    await settled(page);
+  });
+
+  for (const viewport of [{ width: 1366, height: 768 }, { width: 1920, height: 1080 }, { width: 390, height: 844 }]) {
+    test(`at ${viewport.width} × ${viewport.height} the download is in view, whatever is unfolded`, async () => {
+      const page = await visit({ hash: "#levels=1", viewport });
+      await choose(page, CUBE);
+      await settled(page);
+      const isSeen = () => page.$eval("#download", (button) => {
+        const { left, right, top, bottom } = button.getBoundingClientRect();
+        const there = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
+        return there === button && bottom <= innerHeight;
+      });
+      assert.ok(await isSeen());
+      await page.evaluate(() => document.querySelectorAll("details").forEach((part) => (part.open = true)));
+      assert.ok(await isSeen());
+    });
+  }
+
+  for (const [file, format, type] of [
+    [{ ...TETRAHEDRON, name: "a.obj" }, "obj", "model/obj"],
+    [off(), "off", "model/off"],
+    [{ ...example, name: "a.glb" }, "glb", "model/gltf-binary"],
+  ]) {
+    test(`${file.name} comes back in its own format, and in others on demand`, async () => {
+      const page = await visit({ hash: "#levels=1" });
+      await choose(page, file);
+      await settled(page);
+      for (const wanted of [format, "stl"]) {
+        if (wanted !== format) await page.selectOption("#format", wanted);
+        const { name, bytes } = await downloaded(page, "#download");
+        assert.equal(name, `a-refined.${wanted}`);
+        same(bytes, await refined(`levels=1&format=${wanted}`, file.buffer, type));
+      }
+    });
+  }
+
+  test("an upload that shrinks by compression is sent compressed", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    const coming = page.waitForRequest(/\/jobs\?/);
+    const text = `${TETRAHEDRON.buffer}${"# a comment\n".repeat(1000)}`;
+    await choose(page, { ...TETRAHEDRON, buffer: Buffer.from(text) });
+    const sent = await coming;
+    assert.equal(sent.headers()["content-encoding"], "gzip");
+    assert.ok(sent.postDataBuffer().length < text.length / 10);
+    assert.equal(String(bodyOf(sent)), text);
+    await settled(page);
+    assert.match(await page.textContent("#label-right"), /· 16 faces/);
+  });
+
+  test("the page says why little changed, and its word for what to do is a setting's", async () => {
+    const page = await visit();
+    await choose(page, CUBE);
+    await settled(page);
+    const advice = await page.textContent("#advice");
+    assert.match(advice, /12 of 12 bent edges are kept sharp: choose Sharp edges: None/);
+    const settings = await page.$$eval("#settings label", (labels) => labels.map(({ textContent }) => textContent));
+    const choices = await page.$$eval("#crease option", (options) => options.map(({ text }) => text));
+    assert.ok(settings.includes("Sharp edges") && choices.some((text) => text.startsWith("None")));
+    await page.selectOption("#crease", "off");
+    await page.locator("#advice").waitFor({ state: "hidden" });
+  });
+
+  test("each setting but the angle explains itself to the pointer and to the keyboard", async () => {
+    const page = await visit();
+    await page.click(".more summary");
+    const controls = await page.$$eval("#settings :is(select, input)", (all) =>
+      all.filter(({ id }) => id !== "angle").map(({ id }) => `#${id}`),
+    );
+    assert.ok(controls.length >= 7, String(controls));
+    await page.locator("#strength:enabled").waitFor();
+    for (const control of controls) {
+      const tip = page.locator(`.row:has(${control}) .tip`);
+      await page.mouse.move(10, 10);
+      await page.hover(`.row:has(${control}) label`);
+      await tip.waitFor();
+      await page.mouse.move(10, 10);
+      await tip.waitFor({ state: "hidden" });
+      await page.keyboard.press("Shift");
+      await page.focus(control);
+      await page.keyboard.press("Shift");
+      await tip.waitFor();
+      assert.ok((await tip.textContent()).trim().length > 40);
+      await page.evaluate(() => document.activeElement.blur());
+    }
+  });
+
+  test("strength is a share of the model's own budget, and zero is the classic surface", async () => {
+    const page = await visit({ hash: "#levels=1&crease=off&look=distance" });
+    await choose(page, example);
+    await settled(page);
+    assert.ok(Number(await page.getAttribute("#legend", "data-max")) > 0);
+    const asked = page.waitForRequest(/budget=0(&|$)/);
+    await page.fill("#strength", "0");
+    await asked;
+    await page.locator("#strength-text", { hasText: "0 %" }).waitFor();
+    await page.waitForFunction(() => Number(document.querySelector("#legend").dataset.max) < 1e-6);
+    await settled(page);
+  });
+
+  test("each model is described in a sentence", async () => {
+    const page = await visit();
+    await page.locator("#strength:enabled").waitFor();
+    const names = await page.$$eval("#model option", (options) => options.map(({ value, text }) => [value, text]));
+    for (const [value, text] of names) {
+      if (text === "full") continue;
+      await page.selectOption("#model", value);
+      assert.match(await page.textContent("#model-note"), /\w+ \w+.*\.$/, text);
+    }
+  });
+
+  test("the opening camera looks at the front, +Z", async () => {
+    const page = await visit({ hash: "#levels=1&layout=single&look=clay&crease=angle&angle=20" });
+    await choose(page, BLUNT);
+    await settled(page);
+    // The small side is in front of the large one: all around it its flanks are seen.
+    const { width, height, data } = await picture(page);
+    const shade = (x, y) => data[4 * (Math.round(y * height) * width + Math.round(x * width))];
+    const middle = shade(0.5, 0.48);
+    for (const [x, y] of [[0.4, 0.48], [0.6, 0.48], [0.5, 0.33], [0.5, 0.63]]) {
+      assert.ok(Math.abs(shade(x, y) - middle) > 2, `the front reaches to ${x}, ${y}`);
+    }
+  });
+
+  test("a heat map keeps its colours for 98 of 100 vertices, and names the largest value", async () => {
+    const page = await visit({ hash: "#levels=2&look=dihedral&crease=off" });
+    // One spike in a wide sheet.
+    const side = 24;
+    const points = Array.from({ length: side ** 2 }, (_, i) => [i % side, i === 300 ? 5 : 0.02 * Math.sin(i), Math.floor(i / side)]);
+    const faces = points.flatMap((_, i) =>
+      i % side < side - 1 && i < side * (side - 1) ? [`f ${i + 1} ${i + side + 1} ${i + side + 2} ${i + 2}`] : [],
+    );
+    const text = [...points.map((point) => `v ${point.join(" ")}`), ...faces].join("\n");
+    await choose(page, { name: "spike.obj", mimeType: "", buffer: Buffer.from(text) });
+    await settled(page);
+    const { end, max } = await page.$eval("#legend", ({ dataset }) => dataset);
+    assert.ok(Number(end) > 0 && Number(end) < Number(max) / 3, `${end} of ${max}`);
+    assert.match(await page.textContent("#legend-high"), /^≥ /);
+    assert.match(await page.textContent("#legend-note"), new RegExp(`largest is ${Math.round(max)}`));
+  });
+
+  test("a model stands on the ground: a shadow lies there, and not above it", async () => {
+    const page = await visit({ hash: "#levels=1&layout=single" });
+    await choose(page, CUBE);
+    await settled(page);
+    const shaded = await picture(page);
+    await page.selectOption("#look", "zebra");
+    const bare = await picture(page);
+    const { width, height } = shaded;
+    const paper = bare.data.subarray(0, 4);
+    let [below, above] = [0, 0];
+    for (let i = 0; i < width * height; i++) {
+      const at = 4 * i;
+      // Where nothing but the ground is.
+      if (!bare.data.subarray(at, at + 4).equals(paper) || shaded.data.subarray(at, at + 4).equals(paper)) continue;
+      if (i > (width * height) / 2) below++;
+      else above++;
+    }
+    assert.ok(below > 0.005 * width * height, `${below} pixels of shadow`);
+    assert.equal(above, 0);
+  });
+
+  test("the focus is never lost with the control that had it", async () => {
+    const page = await visit({ hash: "#levels=1", foreseen: /ERR_FAILED/ });
+    const focused = () => page.evaluate(() => document.activeElement.id);
+    await page.locator("#example").press("Enter");
+    await page.locator("#welcome").waitFor({ state: "hidden" });
+    await settled(page);
+    assert.equal(await focused(), "canvas");
+    const release = await hold(page);
+    await page.selectOption("#levels", "2");
+    await page.locator("#cancel").focus();
+    release();
+    await settled(page);
+    assert.equal(await focused(), "panel");
+    await page.route(/\/jobs\?/, (route) => route.abort());
+    await page.selectOption("#levels", "3");
+    await page.locator("#problem-close").press("Enter");
+    assert.equal(await focused(), "panel");
+    await page.unroute(/\/jobs\?/);
+    await page.focus("#levels");
+    await page.selectOption("#levels", "1");
+    await page.locator("#label-right", { hasText: "1,488 faces" }).waitFor();
+    await settled(page);
+    assert.equal(await focused(), "levels");
+  });
+
+  test("lengths are in per cent of the model's size first, and the file's unit second", async () => {
+    const page = await visit({ hash: "#levels=1&look=distance" });
+    await choose(page, example);
+    await settled(page);
+    assert.match(await page.textContent("#promises"), /than [\d.]+\u00a0% of the model’s size \([\d.]+\u00a0c?m\)/);
+    assert.match(await page.textContent("#legend-high"), /[\d.]+\u00a0% \([\d.]+\u00a0[cm]?m\)$/);
+    assert.match(await page.textContent("#label-left"), new RegExp(number(PART_FACES)));
+  });
+});
+
+/** The tetrahedron as OFF. */
+function off() {
+  const text = "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+  return { name: "a.off", mimeType: "", buffer: Buffer.from(text) };
+}
