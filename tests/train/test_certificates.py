@@ -20,7 +20,6 @@ from train.certificates.bodies import (
     real_bodies,
     synthetic_bodies,
 )
-from train.certificates.certificate import Certificate, farthest, worst
 from train.certificates.certify import scheme_steps
 from train.certificates.displacement import bounded_displacement
 from train.certificates.equivariance import equivariance
@@ -40,7 +39,14 @@ from train.certificates.scaling import (
     regular_smoothness,
 )
 from train.certificates.step import drawn_creases
-from train.certificates.subject import Subject, subject_of_model, subject_of_network
+from train.certificates.subject import (
+    Certificate,
+    Subject,
+    farthest,
+    subject_of_model,
+    subject_of_network,
+    worst,
+)
 from train.experiments.paper.structural import scaled, variant_subject
 from train.models.from_recipe import initial_network
 from train.models.networks import BoundedNet

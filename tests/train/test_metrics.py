@@ -11,8 +11,8 @@ from tests.support.networks import random_model
 from train.connectivity import connect
 from train.data.datasets import Dataset, ridge_held_out, saddle_held_out, sphere_ridge_held_out
 from train.data.primitives import box, globe, icosphere, torus
+from train.metrics.card import compare_with_loop, one_step_table
 from train.metrics.envelope import best_in_balls, envelope_limit, oracle
-from train.metrics.evaluation import compare_with_loop, one_step_table
 from train.metrics.one_step import (
     METRICS,
     fan_normal,
