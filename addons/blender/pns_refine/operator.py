@@ -6,6 +6,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from pns_common import PnsError
+from pns_common.kernels import are_compiled
 
 from . import live
 from .animation import redirect_drivers
@@ -34,6 +35,11 @@ PASSED_ON = {
 def triangle_count(mesh: bpy.types.Mesh) -> int:
     """Return how many triangles a mesh's faces are cut into."""
     return len(mesh.loops) - 2 * len(mesh.polygons)
+
+
+def fits_at_once(triangles: int) -> bool:
+    """Return whether so many triangles are made without a wait that one would notice."""
+    return triangles <= AT_ONCE and are_compiled()
 
 
 def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -129,7 +135,7 @@ class OBJECT_OT_pns_refine(Refining, bpy.types.Operator):  # noqa: N801 (Blender
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Refine at once what is small, and the rest beside the interface."""
         count = sum(triangle_count(o.data) for o in chosen_objects(context)) * 4**self.levels
-        if count <= AT_ONCE:
+        if fits_at_once(count):
             return self.execute(context)
         chosen = {name: getattr(self, name) for name in self.as_keywords()}
         bpy.ops.object.pns_refine_large("INVOKE_DEFAULT", **chosen)
