@@ -11,6 +11,7 @@ from pns_common.kernels import are_compiled
 from . import live
 from .animation import redirect_drivers
 from .live_nodes import remove_modifier
+from .losses import subdividing_modifiers
 from .overlay import hide
 from .run import Key, Made, Run, Share, key_of, refine_meshes
 from .settings import Settings, choice_of
@@ -234,9 +235,12 @@ def homes_of(obj: bpy.types.Object) -> list[bpy.types.Collection]:
 
 
 def draw_forecast(layout: bpy.types.UILayout, objects: list[bpy.types.Object], levels: int) -> None:
-    """Show how many faces there will be, and whether that is wise."""
+    """Show how many faces there will be, whether that is wise, and what subdivides them again."""
     count = sum(triangle_count(o.data) for o in objects)
     layout.label(text=forecast(count, levels), icon="INFO")
     warning = too_many(count, levels)
     if warning:
         layout.label(text=warning, icon="ERROR")
+    again = sorted({name for o in objects for name in subdividing_modifiers(o)})
+    if again:
+        layout.label(text=f"Turn off, or it subdivides again: {listed(again)}", icon="ERROR")
