@@ -22,8 +22,9 @@ from ..workers.desk import Desk
 from ..workers.jobs import Done, Work
 from ..workers.pool import Workers
 from ..workers.turns import Lane, Turns
-from . import docs_page, job_routes, layers, openapi, page, problems, result_room, routes
+from . import docs_page, job_routes, job_work, layers, openapi, page, problems, result_room, routes
 from .access.keys import read_keys
+from .access.origins import is_loopback
 from .admission import Admission
 from .catalogue import ReadOnce
 from .job_book import JobBook
@@ -94,6 +95,10 @@ def create_app(
             log.warning("open to everybody: no PNS_KEYS_FILE is set")
         else:
             log.info("open to the bearers of %d keys", len(keys))
+        if not settings.proxies and not is_loopback(settings.host):
+            log.warning(
+                "no PNS_PROXIES are set: an address may connect and ask as often as it likes"
+            )
         for pool in workers.values():
             pool.start()
         shared = service.shared
@@ -135,8 +140,8 @@ def create_app(
     if settings.store is not None:
         service.shared = SharedJobs(
             JobStore(settings),
-            partial(job_routes.job_json, service),
-            partial(job_routes.begin_shared, service),
+            partial(job_work.job_json, service),
+            partial(job_work.begin_shared, service),
         )
     app.include_router(routes.router(service))
     app.include_router(job_routes.router(service))

@@ -24,8 +24,8 @@ log = logging.getLogger("pns.service")
 
 # After draining, what is still in the sockets' buffers may go out.
 FLUSH_SECONDS = 2
-# Connections that wait in the system, and that the event loop takes in a turn.
-WAITING = 128
+# Connections that wait in the system, and that the event loop takes of them in a turn.
+WAITING, A_TURN = 2048, 32
 # The longest head: request line and headers together.
 HEAD_BYTES = 16 * 1024
 # Connections to the metrics.
@@ -58,6 +58,14 @@ class DrainingServer(PromptServer):
         return len(self.server_state.connections)
 
     capture_signals = uvicorn.Server.capture_signals
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen, with a longer queue than what is taken of it in a turn."""
+        await super().startup(sockets)
+        for server in self.servers:
+            for listening in server.sockets:
+                with listening.dup() as same:
+                    same.listen(WAITING)
 
     async def serve(self, sockets: list[socket.socket] | None = None) -> None:
         """Serve, with another server beside this one for as long."""
@@ -158,8 +166,8 @@ def configuration(app: FastAPI, settings: Settings, most: int) -> uvicorn.Config
         proxy_headers=bool(settings.proxies),
         forwarded_allow_ips=[str(network) for network in settings.proxies],
         server_header=False,
-        limit_concurrency=most + WAITING,
-        backlog=WAITING,
+        limit_concurrency=most + descriptors.BEYOND,
+        backlog=A_TURN,
         timeout_keep_alive=settings.keep_alive_seconds,  # pyright: ignore[reportArgumentType]
         # Its loggers are configured with ours, and the journal says what an access log would.
         log_config=None,

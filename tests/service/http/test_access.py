@@ -347,6 +347,17 @@ def test_the_service_says_at_start_to_whom_it_is_open(keys_file, with_keys, capl
     assert said in caplog.text
 
 
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [({}, False), ({"host": "0.0.0.0"}, True), ({"host": "::", "proxies": "10.0.0.1"}, False)],
+)
+def test_the_service_says_at_start_what_it_leaves_to_a_proxy(settings, says, caplog):
+    app = create_app(Settings(workers=1, **settings), job=jobs.obey, warm_up=jobs.no_warm_up)
+    with local(app):
+        pass
+    assert ("no PNS_PROXIES are set" in caplog.text) is says
+
+
 # Other origins
 
 

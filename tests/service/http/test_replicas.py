@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import re
@@ -18,6 +19,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
+from service.http.job_store import ANSWER, JobStore
+from service.settings import Settings
 from tests.support.live import served
 from tests.support.proxy import free_port
 
@@ -204,3 +207,47 @@ def test_without_its_store_a_replica_says_so_and_takes_no_job() -> None:
         assert client.get("/jobs/none").status_code == 503
         # What needs no store is served.
         assert client.post("/subdivide", content=b"echo", headers=GLB).content == b"echo"
+
+
+def test_a_job_that_ends_while_orphans_are_looked_for_keeps_its_result(
+    redis: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is in the list of those that are open, and has no lease any more."""
+
+    async def scenario() -> None:
+        store = JobStore(Settings(store=redis))
+        await store.create("ended", None, {}, {"state": "queued"}, b"body")
+        await store.finish("ended", {"state": "done"}, {ANSWER: b"answer"})
+
+        async def listed_before(_: str) -> set[bytes]:
+            return {b"ended"}
+
+        monkeypatch.setattr(store._redis, "smembers", listed_before)
+        assert await store.take_orphan() is None
+        record = await store.find("ended")
+        assert record is not None
+        assert record.view == {"state": "done"}
+        assert await store.file(ANSWER, "ended") == b"answer"
+        await store.close()
+
+    asyncio.run(scenario())
+
+
+def test_a_lease_keeps_a_job_from_other_replicas(redis: str) -> None:
+    async def scenario() -> None:
+        one, other = JobStore(Settings(store=redis)), JobStore(Settings(store=redis))
+        await one.create("leased", None, {}, {"state": "queued"}, b"body")
+        assert await other.take_orphan() is None
+        await one.release("leased")
+        record = await other.take_orphan()
+        assert record is not None
+        assert record.id == "leased"
+        # Now it is the other's.
+        assert await one.take_orphan() is None
+        await one.cancel("leased")
+        assert await other.beat("leased", {"state": "running"}) is False
+        await other.delete("leased")
+        await one.close()
+        await other.close()
+
+    asyncio.run(scenario())
