@@ -180,8 +180,8 @@ class JobBook:
         def rank(entry: Entry) -> tuple[bool, bool, int, int]:
             useful = entry.job.state is State.DONE
             client = entry.networks[0]
-            greed = (sizes[client], 0) if by_size else (jobs[client], -(entry.size or 0))
-            return not useful, entry.job.fetched.is_set(), *greed
+            most, least = (sizes[client], 0) if by_size else (jobs[client], entry.size or 0)
+            return not useful, entry.job.fetched.is_set(), most, -least
 
         # The first of equals is the oldest.
         return max(free, key=rank)

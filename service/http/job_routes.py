@@ -139,7 +139,10 @@ async def _shared_result(
     client = client_of(request, service.settings).id
     view = (await shared.find(job_id, client)).view
     if view["state"] == State.FAILED and view["problem"] is not None:
-        return problems.ProblemResponse(view["problem"], view["problem"]["status"])
+        problem = view["problem"]
+        # What failed a while ago for want of room may find some.
+        headers = {"Retry-After": "1"} if problem["status"] == 503 else None
+        return problems.ProblemResponse(problem, problem["status"], headers)
     if view["state"] != State.DONE:
         raise NotDoneError(f"the job is {view['state']}")
     file = await shared.file(REPORT if kind == media.JSON else ANSWER, job_id)

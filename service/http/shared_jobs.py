@@ -142,7 +142,8 @@ class SharedJobs:
             await self.store.leave(record.id)
             return True
         settings = service.settings
-        asked = Asked(**record.asked | {"options": Options(**record.asked["options"])})
+        fields: dict[str, Any] = record.asked | {"options": Options(**record.asked["options"])}
+        asked = Asked(**fields)
         patience = settings.queue_seconds + settings.job_seconds
         async with AsyncExitStack() as held:
             counted = held.enter_context(service.admission.body(asked.client))
