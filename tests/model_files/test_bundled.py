@@ -92,3 +92,21 @@ def test_a_new_manifest_lists_what_is_there(package):
     assert sorted(
         entry.name for entry in package.iterdir() if entry.suffix not in (".py", ".onnx")
     ) == [MANIFEST]
+
+
+def test_models_load_and_answer_without_anything_of_training():
+    """What the service has installed."""
+    code = """if True:
+        import sys
+        absent = "torch", "scipy", "safetensors", "msgspec", "trimesh", "train", "export"
+        sys.modules.update(dict.fromkeys(absent))
+        import numpy as np
+        from pns_common.model.file import BUNDLED, bundled_models, load_model
+        for name in bundled_models():
+            for source in (name, BUNDLED / f"{name}.onnx"):
+                model = load_model(source)
+                columns = 5 if model.card.features == "paper-5" else 18
+                assert model(np.ones((7, columns)), model.card.budget).shape == (7, 3)
+        assert load_model().vertex_correction(np.ones((7, 10)), 1.0).shape == (7, 3)
+    """
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -16,7 +16,7 @@ from train.baselines.quadric import quadric_edge_points, quadric_fit
 from train.connectivity import connect
 from train.data.datasets import Dataset, Instance, ridge_training
 from train.data.primitives import box, globe, icosphere, torus
-from train.metrics.evaluation import one_step_table
+from train.metrics.card import one_step_table
 from train.refining import refine
 from train.surfaces.implicit import SphereRidge
 from train.surfaces.quasi_interpolation import full_push

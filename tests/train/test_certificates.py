@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.support.model_files import DEFAULT_CARD, default_model, paper_model
 
 from pns_common import Mesh, MeshError, Scheme, load_model, loop, pns, refine
 from tests.support import schemes
 from tests.support.meshes import bow_tie, bumpy_sphere, icosphere, one_way_pair, three_pages
+from tests.support.networks import default_model, huge_model, random_model
 from tests.support.shared import shared_path
 from train.ablations.variants import VARIANTS, variant_recipe
 from train.certificates.affine import affine_reproduction
@@ -20,7 +20,6 @@ from train.certificates.bodies import (
     real_bodies,
     synthetic_bodies,
 )
-from train.certificates.certificate import Certificate, farthest, worst
 from train.certificates.certify import scheme_steps
 from train.certificates.displacement import bounded_displacement
 from train.certificates.equivariance import equivariance
@@ -40,7 +39,14 @@ from train.certificates.scaling import (
     regular_smoothness,
 )
 from train.certificates.step import drawn_creases
-from train.certificates.subject import Subject, subject_of_model, subject_of_network
+from train.certificates.subject import (
+    Certificate,
+    Subject,
+    farthest,
+    subject_of_model,
+    subject_of_network,
+    worst,
+)
 from train.experiments.paper.structural import scaled, variant_subject
 from train.models.from_recipe import initial_network
 from train.models.networks import BoundedNet
@@ -144,7 +150,7 @@ def test_a_gate_of_order_one_keeps_the_planar_spectrum():
 
 def test_a_frame_fixed_in_the_world_fails_through_a_model_too():
     """The row for single precision allows 1e-6 of the envelope, and no more."""
-    model = paper_model(0)
+    model = random_model(0)
     subject = subject_of_model(model, model)
     assert failed(equivariance(subject, BODIES, 0)) <= {"equivariance, double precision"}
     broken = replace(subject, scheme=schemes.shifted(schemes.SOUND, edges=1e-6))
@@ -152,7 +158,7 @@ def test_a_frame_fixed_in_the_world_fails_through_a_model_too():
 
 
 def test_the_operator_holds_a_hostile_model_to_its_budget():
-    model = paper_model(2, scale=1e3, project=False)
+    model = huge_model(2)
     (certificate,) = CERTIFICATES["T1"](subject_of_model(model, model))
     assert certificate.passed
     assert certificate.value > 0.5
@@ -205,7 +211,7 @@ ONCE = (fold_free, limit_distance, smoothness_class, resolution_independence)
 
 
 def default_subject(scale=2.0, seed=0, **changes):
-    model = default_model(seed, scale=scale, card=replace(DEFAULT_CARD, **changes))
+    model = default_model(seed, scale, **changes)
     return subject_of_model(model, model)
 
 
@@ -305,7 +311,7 @@ def test_real_meshes_are_of_reference_length_one_and_pass(tmp_path):
         radius = np.linalg.norm(body.mesh.vertices, axis=1).max()
         assert radius / np.sqrt(2) == pytest.approx(1)
     real = [body for body in bodies if len(body.mesh.faces) < 1500]
-    model = paper_model(1, scale=3.0)
+    model = random_model(1, 3.0)
     subject = subject_of_model(model, model)
     assert not failed([bounded_displacement(subject, real, levels=1)])
     assert "equivariance, as it runs" not in failed(equivariance(subject, real, 0))

@@ -7,19 +7,19 @@ from functools import partial
 import msgspec
 import numpy as np
 import pytest
-from onnx import TensorProto, helper
-from tests.support.model_files import (
-    PAPER_CARD,
-    float64_perceptron,
-    model_bytes,
-    paper_bytes,
-    perceptron,
-    random_layers,
-)
+from onnx import helper
 from typer.testing import CliRunner
 
 import train.run
 from pns_common.model.file import DEFAULT_MODEL, load_model, model_from_bytes
+from tests.support.networks import (
+    CARD,
+    breaking_off_bytes,
+    float64_network,
+    model_bytes,
+    perceptron_bytes,
+    random_layers,
+)
 from tests.support.schemes import BUDGET, SOUND
 from train.certificates.affine import affine_reproduction
 from train.certificates.bodies import flat_bodies, synthetic_bodies
@@ -66,20 +66,6 @@ def nan_bytes():
         helper.make_node("Concat", ["scaled", "scaled", "scaled"], ["correction"], axis=1),
     ]
     return model_bytes(nodes, {"last": np.array([1]), "one": 1.0})
-
-
-def breaking_off_bytes():
-    """A file that keeps the contract and reads rows that there are not, whatever it is given."""
-    nodes = [
-        helper.make_node("Slice", ["features", "zero", "one", "axis"], ["first"]),
-        helper.make_node("Slice", ["features", "zero", "three", "axis"], ["answer"]),
-        helper.make_node("Squeeze", ["first", "axis"], ["flat"]),
-        helper.make_node("Add", ["flat", "far"], ["beyond"]),
-        helper.make_node("Cast", ["beyond"], ["rows"], to=TensorProto.INT64),
-        helper.make_node("Gather", ["answer", "rows"], ["correction"]),
-    ]
-    whole = {name: np.array([i]) for name, i in (("zero", 0), ("one", 1), ("three", 3))}
-    return model_bytes(nodes, whole | {"axis": whole["one"], "far": np.full(1, 1e6)})
 
 
 def test_the_papers_model_passes():
@@ -137,7 +123,7 @@ def test_a_missing_file_fails_by_name(tmp_path):
 
 
 def test_a_model_beyond_its_budget_fails_by_name():
-    data = paper_bytes(scale=3.0, project=False)
+    data = perceptron_bytes(random_layers(0, scale=3.0), project=False)
     model = model_from_bytes(data, "beyond")
     failed = {certificate.name for certificate in keeps_its_word(model) if not certificate.passed}
     assert failed == {"corrections within the budget given"}
@@ -152,8 +138,8 @@ def test_a_model_beyond_its_budget_fails_by_name():
     ],
 )
 def test_metrics_that_do_not_come_out_again_fail_by_name(metrics):
-    card = replace(PAPER_CARD, metrics=metrics)
-    model = model_from_bytes(paper_bytes(card=card), "boasts")
+    card = replace(CARD, metrics=metrics)
+    model = model_from_bytes(perceptron_bytes(random_layers(0), card=card), "boasts")
     failed = {
         certificate.name: certificate
         for certificate in keeps_its_word(model)
@@ -163,20 +149,19 @@ def test_metrics_that_do_not_come_out_again_fail_by_name(metrics):
 
 
 def test_metrics_on_data_that_is_not_here_are_named():
-    card = replace(PAPER_CARD, metrics={"their own set": {}})
-    model = model_from_bytes(paper_bytes(card=card), "other")
+    card = replace(CARD, metrics={"their own set": {}})
+    model = model_from_bytes(perceptron_bytes(random_layers(0), card=card), "other")
     assert "their own set" in keeps_its_word(model)[-1].where
 
 
 def test_double_precision_is_the_same_network():
     """Against a perceptron written in numpy; the file rounds what it reads to single."""
     layers = random_layers(0)
-    nodes, weights = perceptron(layers)
-    data = model_bytes(nodes, weights)
+    data = perceptron_bytes(layers)
     double = double_model(model_from_bytes(data, "double"), data)
     layers = [(np.float32(weight), np.float32(bias)) for weight, bias in layers]
     rows = np.random.default_rng(1).standard_normal((50, 5))
-    expected = 0.5 * float64_perceptron(layers)(rows)
+    expected = 0.5 * float64_network(layers)(rows)
     np.testing.assert_allclose(double(rows, 0.5), expected, atol=1e-14)
 
 
@@ -237,7 +222,7 @@ def test_the_command_passes_and_looks_at_given_meshes(tmp_path, monkeypatch):
     (folder / "tetrahedron.off").write_text(
         "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
     )
-    path = written(tmp_path, paper_bytes())
+    path = written(tmp_path, perceptron_bytes(random_layers(0)))
     arguments = ["certify", str(path), "--meshes", str(folder), "--json", str(verdict)]
     outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
     assert outcome.exit_code == 0, outcome.output

@@ -12,9 +12,8 @@ from pns_common import Mesh, MeshError
 from tests.support.shared import published
 from train.connectivity import connect
 from train.data.batch import disjoint_union
-from train.data.datasets import DATASETS, ridge_training
+from train.data.datasets import DATASETS, SIDE, grid_faces, jittered_grid, ridge_training
 from train.data.dense_meshes import is_manifold
-from train.data.grid import SIDE, grid_faces, jittered_grid
 from train.data.parts import (
     CAD_PARTS,
     cube_faces,

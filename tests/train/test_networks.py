@@ -9,11 +9,11 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.support.model_files import DEFAULT_CARD
 
 from pns_common import Mesh, ParameterError, pns, refine
 from pns_common.features import FEATURE_SETS, RING_10
 from tests.support.meshes import TETRAHEDRON, bumpy_sphere, manifolds
+from tests.support.networks import DEFAULT_CARD
 from tests.support.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
 from train.certificates.equivariance import well_conditioned
 from train.models.from_recipe import initial_network, initial_vertex_network

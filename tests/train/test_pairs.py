@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from pns_common import Mesh, loop
 from pns_common.reference_length import measure_reference_length
 from train.connectivity import connect
-from train.data.pairs import coarsened as subject
+from train.data.pairs import references as subject
 from train.data.pairs.authored import authored_pair
 from train.data.pairs.faceted import faceted_pair
 from train.data.pairs.grid import grid_pair

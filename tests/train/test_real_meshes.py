@@ -6,7 +6,7 @@ from pns_common import loop
 from train.data.primitives import icosphere
 from train.experiments.beyond.real_meshes import on_surface
 from train.experiments.harness.contenders import LOOP, contenders
-from train.metrics.faces.point_mesh import face_tree
+from train.metrics.surface_distance import face_tree
 from train.refining import refine
 
 

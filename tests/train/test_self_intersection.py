@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from pns_common import Mesh
 from tests.support.meshes import bumpy_sphere
 from train.data.primitives import icosphere, torus
-from train.metrics.faces.face_boxes import WIDE, face_boxes
-from train.metrics.faces.self_intersection import self_intersecting
+from train.metrics.face_boxes import WIDE, face_boxes
+from train.metrics.self_intersection import self_intersecting
 
 
 def by_every_pair(mesh):

@@ -9,14 +9,13 @@ import torch
 
 from pns_common import ParameterError, load_model, loop, pns, refine
 from train.certificates.adversary import Operator
-from train.certificates.gap_collapse import operator_jacobian
+from train.certificates.gap_collapse import margin_gradient, operator_jacobian
 from train.connectivity import connect
 from train.models.from_recipe import initial_network
 from train.models.networks import BoundedNet
 from train.models.recipes import paper, signed
 from train.models.torch_model import recipe_model
 from train.refining import Method, loop_rule
-from train.spectra.margin_gradient import margin_gradient
 from train.spectra.spectrum import (
     FIRST_LIFT,
     GROWTH,

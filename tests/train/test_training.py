@@ -17,19 +17,20 @@ from tests.support.shared import shared_path
 from train.connectivity import connect
 from train.data.batch import disjoint_union, pairs_sharing_a_face
 from train.data.datasets import DATASETS, ridge_held_out, ridge_training
-from train.fitting.ahead import ahead
 from train.fitting.determinism import deterministic, machine_fingerprint
 from train.fitting.limit_loss import squared_chords
-from train.fitting.losses import (
+from train.fitting.limit_trainer import ahead
+from train.fitting.quiet import draw_features, quiet_loss, quiet_term, support_of
+from train.fitting.trainer import (
+    batch_loss,
     distance_loss,
     fairness_loss,
+    fit,
     normal_loss,
     proximity_loss,
     vertex_normals,
     weighted_loss,
 )
-from train.fitting.quiet import draw_features, quiet_loss, quiet_term, support_of
-from train.fitting.trainer import batch_loss, fit
 from train.models.from_recipe import initial_network, paper_rule
 from train.models.networks import BoundedNet
 from train.models.recipe import LossWeights

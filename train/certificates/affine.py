@@ -7,10 +7,9 @@ import torch
 
 from pns_common import Mesh
 from train.certificates.bodies import Body, random_motion
-from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import Step, step
-from train.certificates.subject import Subject
+from train.certificates.subject import Certificate, Subject, worst
 from train.curve_rule import Curves
 from train.refining import loop_like, refine
 

@@ -14,7 +14,6 @@ from pns_common import ModelError, PnsError
 from pns_common.model.file import DEFAULT_MODEL, load_model
 from train.certificates.affine import affine_reproduction
 from train.certificates.bodies import Body, flat_bodies, spiky_sphere, synthetic_bodies
-from train.certificates.certificate import Certificate
 from train.certificates.displacement import bounded_displacement
 from train.certificates.double_precision import double_model, read_bytes
 from train.certificates.equivariance import equivariance
@@ -32,7 +31,7 @@ from train.certificates.scaling import (
     proximity_slope,
     regular_smoothness,
 )
-from train.certificates.subject import Subject, subject_of_model
+from train.certificates.subject import Certificate, Subject, subject_of_model
 from train.spectra.spectrum import VALENCES
 
 # Called with what comes next, how many steps are done, and of how many.

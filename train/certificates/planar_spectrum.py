@@ -9,8 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pns_common import loop
-from train.certificates.certificate import Certificate, Kind, worst
-from train.certificates.subject import Subject
+from train.certificates.subject import Certificate, Kind, Subject, worst
 from train.refining import AnyScheme, refine
 from train.spectra.spectrum import (
     SPOKE,

@@ -13,9 +13,8 @@ from jaxtyping import Float
 
 from pns_common import Mesh, loop
 from train.certificates.bodies import Body, bumpy_torus
-from train.certificates.certificate import Certificate, Kind, farthest
 from train.certificates.step import step
-from train.certificates.subject import Subject
+from train.certificates.subject import Certificate, Kind, Subject, farthest
 from train.refining import AnyScheme, refine
 from train.vectors import face_normals
 

@@ -12,8 +12,14 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common import Mesh, clean
-from train.data.datasets import Dataset, Instance, saddle_held_out, sphere_ridge_held_out
-from train.data.grid import grid_faces, jittered_grid
+from train.data.datasets import (
+    Dataset,
+    Instance,
+    grid_faces,
+    jittered_grid,
+    saddle_held_out,
+    sphere_ridge_held_out,
+)
 from train.data.patches import JITTER, marched, rounded_boxes, tori
 from train.data.plane_meshes import PlaneMesh, regular_grid, scattered, turned_grid
 from train.surfaces.cad import Fillet

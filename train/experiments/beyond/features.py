@@ -8,8 +8,8 @@ from train.ablations.feature_groups import Choice, choices, features_method, fit
 from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.paper.methods import largest_ratio
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
 from train.models.recipe import Recipe, one_step
 from train.models.recipes import paper
 

@@ -14,7 +14,7 @@ from train.experiments.harness.experiment import Experiment, Figure, Outcome, co
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.style import COLOURS, panels
 from train.experiments.paper.methods import unconstrained_scheme
-from train.metrics.evaluation import compare_with_loop
+from train.metrics.card import compare_with_loop
 from train.metrics.whole_surface import WholeSurface, gain, surface_jump, whole_surface
 from train.refining import AnyScheme
 

@@ -14,7 +14,7 @@ from train.experiments.beyond.models import models_and_assets
 from train.experiments.harness.contenders import LOOP, OURS, contenders
 from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.metrics.faces.self_intersection import crossing_faces
+from train.metrics.self_intersection import crossing_faces
 from train.metrics.shape import volume
 from train.refining import AnyScheme, Refined, refine
 

@@ -8,13 +8,12 @@ import numpy as np
 
 from pns_common import Mesh, pns
 from train.ablations.variants import VARIANTS, variant_method, variant_recipe
-from train.data.datasets import Dataset
-from train.data.grid import grid_faces, jittered_grid
+from train.data.datasets import Dataset, grid_faces, jittered_grid
 from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.paper.methods import PAPER_UNITS, largest_ratio, level_by_level
 from train.experiments.paper.paper_values import PUBLISHED_ABLATION
-from train.metrics.evaluation import compare_with_loop
+from train.metrics.card import compare_with_loop
 from train.models.from_recipe import initial_network
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model

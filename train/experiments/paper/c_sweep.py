@@ -11,8 +11,8 @@ from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.style import COLOURS, panels
 from train.experiments.paper.methods import largest_ratio, paper_with_budget
 from train.experiments.paper.paper_values import PUBLISHED_C_SWEEP
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
 from train.refining import AnyScheme
 
 BUDGETS = (0.1, 0.25, 0.5, 1.0)

@@ -15,8 +15,8 @@ from train.experiments.paper.paper_values import (
     PUBLISHED_HEADLINE,
     PUBLISHED_UNCONSTRAINED,
 )
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
 from train.metrics.one_step import METRIC_TITLES, METRICS, Improvement
 from train.models.recipes import paper, paper_text
 

@@ -24,7 +24,7 @@ from train.experiments.paper.paper_values import (
     PUBLISHED_SPHERE_RIDGE,
     PUBLISHED_UNCONSTRAINED,
 )
-from train.metrics.evaluation import compare_with_loop
+from train.metrics.card import compare_with_loop
 from train.metrics.one_step import Improvement
 from train.models.networks import BoundedNet
 from train.models.published import GATE_SHARPNESS, load_published, published_budget

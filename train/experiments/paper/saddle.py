@@ -10,8 +10,8 @@ from train.experiments.harness.experiment import Experiment, Outcome, column, ta
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.paper.methods import PAPER_UNITS, saddle
 from train.experiments.paper.paper_values import PUBLISHED_SADDLE
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import paper
 from train.refining import AnyScheme, refine
 

@@ -4,8 +4,8 @@ from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, compari
 from train.experiments.harness.experiment import Experiment, Outcome, table
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.paper.paper_values import PUBLISHED_SPHERE_RIDGE
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import paper
 
 NOTES = (

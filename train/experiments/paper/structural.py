@@ -15,9 +15,8 @@ from train.certificates.adversary import (
 )
 from train.certificates.affine import TURNED
 from train.certificates.bodies import random_motion
-from train.certificates.certificate import Certificate
 from train.certificates.certify import run_steps, scheme_steps
-from train.certificates.subject import Subject, in_double, subject_of_network
+from train.certificates.subject import Certificate, Subject, in_double, subject_of_network
 from train.experiments.harness.experiment import (
     Cell,
     Column,

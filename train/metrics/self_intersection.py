@@ -7,7 +7,7 @@ from jaxtyping import Bool
 from numba import njit
 
 from pns_common import Mesh
-from train.metrics.faces.face_boxes import (
+from train.metrics.face_boxes import (
     LOWER,
     MOST_WAITING,
     UPPER,
