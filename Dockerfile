@@ -21,8 +21,10 @@ RUN (cd pns_common/models && sha256sum --check --strict SHA256SUMS) \
  && /opt/pns/bin/python -m pip uninstall --yes --quiet setuptools pip
 # Kernels for any processor of the architecture, not only the one that builds.
 ENV NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=
-# From elsewhere than /src, whose package would be compiled instead of the installed one.
-RUN cd / && /opt/pns/bin/python -m pns_common.warming
+# From elsewhere than /src, whose package would be compiled instead of the installed one. Sources get a time of
+# whole seconds: compiled code is kept for a source of one time, and layers keep no fractions.
+RUN find /opt/pns/lib -path '*pns_common*' -name '*.py' -exec touch --date 2020-01-01 {} + \
+ && cd / && NUMBA_CACHE_DIR=/opt/pns/kernels /opt/pns/bin/python -m pns_common.warming
 
 # Run: the environment alone, as a user without a name, on a root that may be read-only.
 FROM ${BASE}
@@ -34,13 +36,13 @@ COPY --from=build /opt/pns /opt/pns
 ENV PATH=/opt/pns/bin:$PATH \
     NUMBA_CPU_NAME=generic \
     NUMBA_CPU_FEATURES= \
+    NUMBA_CACHE_DIR=/tmp/pns-kernels \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
     OMP_NUM_THREADS=1 \
     OPENBLAS_NUM_THREADS=1 \
     PNS_HOST=0.0.0.0 \
     PNS_PORT=8000 \
-    PNS_METRICS_HOST=0.0.0.0 \
     PNS_METRICS_PORT=9000 \
     PNS_MEMORY=256MiB \
     PNS_UPLOAD_BYTES=128MiB \
@@ -53,4 +55,6 @@ STOPSIGNAL SIGTERM
 # Not urllib, which asks the proxy that Docker may name in the environment of its containers.
 HEALTHCHECK --interval=30s --timeout=5s --start-period=20s --retries=3 \
   CMD ["python", "-c", "import os, http.client as h; c = h.HTTPConnection('127.0.0.1', os.environ['PNS_PORT'], timeout=4); c.request('GET', '/healthz'); exit(c.getresponse().status != 200)"]
+# numba reads compiled code from a folder that it may write alone, so it is copied to one: two megabytes.
+ENTRYPOINT ["sh", "-c", "cp -r /opt/pns/kernels \"$NUMBA_CACHE_DIR\"; exec \"$@\"", "--"]
 CMD ["pns", "serve"]

@@ -112,7 +112,7 @@ image:
 # What the image installs, by hash: after a change of constraints.txt. It needs pip-tools.
 PIP_COMPILE := pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe --no-header --no-annotate --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --constraint constraints.txt
 hashes:
-	$(PIP_COMPILE) --extra service --unsafe-package meshopt --output-file requirements/service.new pyproject.toml
+	$(PIP_COMPILE) --extra service --extra store --unsafe-package meshopt --output-file requirements/service.new pyproject.toml
 	$(PYTHON) requirements/without_ourselves.py requirements/service.new requirements/service.txt
 	$(PIP_COMPILE) --output-file requirements/build.txt requirements/build.in
 
@@ -121,9 +121,9 @@ manifest: $(DEV)/.ready
 	$(DEV)/bin/python -c "from pathlib import Path; from pns_common.model.file import write_manifest; write_manifest(Path('pns_common/models'))"
 
 # Blender as a module, a version each in an environment of its own: 350 MB, and each for one version of
-# Python. 4.2 has the numpy that Blender 4.2 comes with. A missing Python leaves its version out.
+# Python. A missing Python leaves its version out.
 BPY := addons/blender/requirements
-$(BLENDER)-4.2/.ready: PYTHON := python3.11
+$(BLENDER)-4.5/.ready: PYTHON := python3.11
 $(BLENDER)-5.0/.ready: PYTHON := python3.11
 $(BLENDER)-5.2/.ready: PYTHON := python3.13
 $(BLENDER)-%/.ready: $(BPY)-%.txt
@@ -152,21 +152,27 @@ build/blender-site/.ready: $(DEV)/.ready constraints.txt
 	$(DEV)/bin/python -m pip install --quiet --no-deps --upgrade --target build/blender-site jaxtyping wadler-lindig numba llvmlite onnxruntime
 	touch $@
 
-# The Blender extension: dist/pns_refine-VERSION.zip, packed and validated by Blender's own tool.
-addon: $(DEV)/.ready $(BLENDER)-5.0/.ready
-	$(DEV)/bin/python -m addons.blender.build $(BLENDER)-5.0/bin/python
+# The Blender extension, packed and validated by Blender's own tool: dist/pns_refine-VERSION-PLATFORM-pythonX.Y.zip.
+# BPY_PLATFORM names another than this machine's: linux-x64, windows-x64 or macos-arm64.
+addon: addon-5.0
 
-# What the extension costs on 100,000 vertices, beside the library alone.
-blender-measure: addon
-	$(BLENDER)-5.0/bin/python addons/blender/measure.py "$(CURDIR)"/dist/pns_refine-*.zip
+addon-%: $(DEV)/.ready $(BLENDER)-%/.ready
+	$(DEV)/bin/python -m addons.blender.build $(BLENDER)-$*/bin/python $(BPY_PLATFORM)
+
+# The newest zip for a version's Python.
+ZIP_FOR = $$(ls -t "$(CURDIR)"/dist/pns_refine-*-$$(basename "$$(readlink -f $(BLENDER)-$(1)/bin/python)").zip | head -1)
+
+# The time of the extension for 100,000 vertices, beside the library alone.
+blender-measure: addon-5.0
+	$(BLENDER)-5.0/bin/python addons/blender/measure.py "$(call ZIP_FOR,5.0)"
 
 # It is installed from the zip into each of these, and every property that it keeps is looked at.
-BPY_VERSIONS ?= 4.2 5.0 $(if $(shell python3.13 --version 2>/dev/null),5.2)
-blender-test: addon $(foreach version,$(BPY_VERSIONS),$(BLENDER)-$(version)/.ready)
-	set -e; zip=$$(echo "$(CURDIR)"/dist/pns_refine-*.zip); cd tests/addons/blender/in_blender; \
-	for version in $(BPY_VERSIONS); do \
-	  PNS_ADDON="$$zip" OMP_NUM_THREADS=1 "$(CURDIR)"/$(BLENDER)-$$version/bin/python -m pytest -c pytest.ini --confcutdir .; \
-	done
+BPY_VERSIONS ?= 4.5 5.0 $(if $(shell python3.13 --version 2>/dev/null),5.2)
+blender-test: $(BPY_VERSIONS:%=blender-test-%)
+
+blender-test-%: addon-%
+	zip="$(call ZIP_FOR,$*)"; cd tests/addons/blender/in_blender; \
+	PNS_ADDON="$$zip" OMP_NUM_THREADS=1 "$(CURDIR)"/$(BLENDER)-$*/bin/python -m pytest -c pytest.ini --confcutdir .
 
 # The page: from web/ to the bundle in service/web, which is committed. Only who changes it needs node.
 web: web/node_modules/.ready
@@ -188,7 +194,7 @@ web/node_modules/.ready: web/package-lock.json
 $(SERVE)/.ready: pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv $(SERVE)
 	$(SERVE)/bin/python -m pip install $(HASHED)
-	$(SERVE)/bin/python -m pip install --quiet --editable '.[service]'
+	$(SERVE)/bin/python -m pip install --quiet --editable '.[service,store]'
 	touch $@
 
 # The generator of Python clients, for their test.

@@ -20,8 +20,8 @@ from benchmarks.contest import OURS, Case, contest, ours
 from benchmarks.generated import ORDERS
 from benchmarks.peers.available import available_peers
 from benchmarks.plot import plot_results
-from pns_common.base.whole_file import replace_file
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL, bundled_models
+from pns_common.files import replace_file
+from pns_common.model.file import DEFAULT_MODEL, bundled_models
 
 HERE = Path(__file__).parent
 RESULTS, PICTURE = HERE / "results.json", HERE / "speed.png"

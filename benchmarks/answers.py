@@ -58,9 +58,9 @@ def main(
             path.write_bytes(upload(size))
         for _ in range(rounds):
             for size, path in uploads.items():
-                for query in ("", "scheme=loop"):
+                for query in ("", "&scheme=loop"):
                     name = f"pns serve, {'loop' if query else 'default model'}"
-                    rate = asked(port, f"/subdivide?{query}", path.read_bytes(), seconds)
+                    rate = asked(port, f"/subdivide?levels=1{query}", path.read_bytes(), seconds)
                     rates.setdefault(name, {}).setdefault(size, []).append(rate)
                 for name, command in PROGRAMS.items():
                     if name not in missing:

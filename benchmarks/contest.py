@@ -117,7 +117,7 @@ def contest(
         for _ in range(1, rounds):
             copies.append(copy_bandwidth())
             for name, contestant in playing.items():
-                # Ours may have loaded its kernels in the first call.
+                # Ours loads its kernels in the first call.
                 if name.startswith(OURS) or contestant.runs[0]["processor"] < SLOW * fastest:
                     for _ in range(in_a_row):
                         contestant.run()

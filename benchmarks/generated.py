@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pns_common import Mesh
-from pns_common.base.blocks import WHOLE
-from pns_common.geometry.corner_normals import angle_weighted_normals
+from pns_common.normals import angle_weighted_normals
+from pns_common.parallel import Blocks
 from service.meshfiles.indexed_triangles import IndexedTriangles
 
 
@@ -27,14 +27,14 @@ def torus(faces: int) -> Mesh:
 
 
 def unrolled_torus(faces: int) -> tuple[IndexedTriangles, np.ndarray]:
-    """Make the same as exporters write it, cut open where its texture begins; and its normals."""
+    """Make a torus as exporters write it, cut open where its texture begins; and its normals."""
     whole, (columns, rows) = torus(faces), _torus_size(faces)
     u, v = np.divmod(np.arange((columns + 1) * (rows + 1)), rows + 1)
     place = u % columns * rows + v % rows
     triangles = _cut_quads(columns, rows)
     uv = np.stack([u / columns, v / rows], axis=1)
     mesh = whole.vertices, whole.faces
-    normals = angle_weighted_normals(*mesh, whole.faces, len(whole.vertices), WHOLE)
+    normals = angle_weighted_normals(*mesh, whole.faces, len(whole.vertices), Blocks())
     return IndexedTriangles(whole.vertices[place], triangles, uv), normals[place]
 
 
@@ -99,7 +99,7 @@ def _wavy_box(cells: int) -> Mesh:
 
 
 def shuffled(mesh: Mesh, seed: int = 0) -> Mesh:
-    """Return the same mesh, vertices and faces in random order: the worst case for caches."""
+    """Return the mesh with vertices and faces in random order: the worst case for caches."""
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(mesh.vertices))
     vertices = np.empty_like(mesh.vertices)

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from benchmarks.files import MeasuredFile, measure_file
 from benchmarks.stages import file_table
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL
+from pns_common.model.file import DEFAULT_MODEL
 
 LARGE = 5000
 BESIDE = ("read", "weld", "write")

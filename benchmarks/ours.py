@@ -12,7 +12,6 @@ import numpy as np
 
 from benchmarks.peers.protocol import read_mesh, serve
 from pns_common import Mesh, load_model, loop, pns, refine
-from pns_common.fused import load_kernels
 
 
 def main(name: str, path: str, levels: str) -> None:
@@ -28,8 +27,7 @@ def main(name: str, path: str, levels: str) -> None:
             assert len(refined.report["levels"]) == int(levels)
         return refined.mesh.vertices, refined.mesh.faces
 
-    # Warm from the second run on, whatever the first did without.
-    serve(run, after_first=load_kernels)
+    serve(run)
 
 
 if __name__ == "__main__":

@@ -17,8 +17,7 @@ from rich.table import Table
 from benchmarks.generated import torus
 from benchmarks.yardsticks import numpy_second
 from pns_common import load_model, loop, pns, refine
-from pns_common.fused import load_kernels
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL
+from pns_common.model.file import DEFAULT_MODEL
 
 FACES, RUNS = 80_000, 7
 # Processor seconds over the yardstick's: about twice what was measured.
@@ -26,8 +25,7 @@ LIMITS = {"loop": 0.6, DEFAULT_MODEL: 4.5}
 
 
 def main() -> int:
-    """Measure every limit; returns how many are broken."""
-    load_kernels()
+    """Measure every limit; return how many are broken."""
     mesh = torus(FACES)
     schemes = {name: loop() if name == "loop" else pns(load_model(name)) for name in LIMITS}
     table = Table("scheme", "processor ms", "yardstick ms", "ratio", "limit")

@@ -20,7 +20,7 @@ from rich.table import Table
 
 from benchmarks.answers import served
 from pns_common import load_model
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL
+from pns_common.model.file import DEFAULT_MODEL
 from service.gltf.constants import COMPONENT_TYPES
 from service.gltf.read.container import write_glb
 from service.gltf.read.json_text import encode
@@ -47,7 +47,7 @@ def main(
 
             def here(body: bytes = body) -> None:
                 with rare_searches():
-                    subdivide_gltf(body, "glb", Options(), loaded, limits)
+                    subdivide_gltf(body, "glb", Options(levels=1), loaded, limits)
 
             def asked(body: bytes = body) -> None:
                 _ask(port, body, model)
@@ -89,13 +89,13 @@ def boxes(rng: np.random.Generator) -> list[Primitive]:
 
 
 def parted_boxes(rng: np.random.Generator) -> list[Primitive]:
-    """Make the same in two primitives."""
+    """Make a box of two primitives."""
     (whole,) = boxes(rng)
     return [whole | {"indices": part} for part in np.split(whole["indices"], 2)]
 
 
 def skinned_boxes(rng: np.random.Generator) -> list[Primitive]:
-    """Make the same, hanging on two joints."""
+    """Make a box that hangs on two joints."""
     (whole,) = boxes(rng)
     upper = whole["POSITION"][:, 2] > 0
     weights = np.where(upper[:, None], (0.25, 0.75, 0, 0), (1, 0, 0, 0))
@@ -141,7 +141,7 @@ def _primitive(tree: dict[str, Any], pieces: list[bytes], arrays: Primitive) -> 
 
 
 def _accessor(tree: dict[str, Any], pieces: list[bytes], rows: np.ndarray) -> int:
-    """Write an array down; its number."""
+    """Write an array; return the number of its accessor."""
     content = rows.tobytes()
     start = tree["bufferViews"][-1] if tree["bufferViews"] else {"byteOffset": 0, "byteLength": 0}
     offset = -(-(start["byteOffset"] + start["byteLength"]) // 4) * 4
@@ -175,7 +175,7 @@ def _shortest(run: Callable[[], None], clock: Callable[[], float], runs: int) ->
 def _ask(port: int, body: bytes, model: str) -> None:
     connection = http.client.HTTPConnection("127.0.0.1", port)
     kind = {"Content-Type": "model/gltf-binary"}
-    connection.request("POST", f"/subdivide?model={model}", body, kind)
+    connection.request("POST", f"/subdivide?levels=1&model={model}", body, kind)
     answer = connection.getresponse()
     content = answer.read()
     connection.close()

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from benchmarks.files import SHADINGS, STAGES, MeasuredFile, measure_file, measure_generated
 from benchmarks.operator import METHODS, measure_operator
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL
+from pns_common.model.file import DEFAULT_MODEL
 
 SIZES = (20_000, 80_000, 320_000, 1_300_000)
 # In a file or a pipe tables are not squeezed.

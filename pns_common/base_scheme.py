@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Integer
 
 from pns_common.parallel import Blocks
 from pns_common.topology import Topology
@@ -15,6 +15,7 @@ from pns_common.topology import Topology
 Place = Callable[[Float[np.ndarray, "V K"], Topology, Blocks], Float[np.ndarray, "W K"]]
 
 
+@runtime_checkable
 class Split(Protocol):
     """Split every face; ``inherit``: whether the halves of sharp edges stay sharp."""
 
@@ -38,6 +39,6 @@ class BaseScheme:
     name: str
     place: Place = field(repr=False)
     split: Split = field(repr=False)
-    limit_weight: Callable[[Int[np.ndarray, " N"]], Float[np.ndarray, " N"]] | None = field(
+    limit_weight: Callable[[Integer[np.ndarray, " N"]], Float[np.ndarray, " N"]] | None = field(
         default=None, repr=False
     )

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int, Real
+from jaxtyping import Float, Integer, Real
 
 from pns_common.base_scheme import BaseScheme
 from pns_common.creases import NO_CREASES, Creases
@@ -29,7 +29,7 @@ TOGETHER = 12
 
 
 def level_topologies(
-    faces: Int[np.ndarray, "F 3"],
+    faces: Integer[np.ndarray, "F 3"],
     vertex_count: int,
     levels: int,
     creases: Creases = NO_CREASES,
@@ -125,13 +125,13 @@ class SubdivisionMatrix:
     so the columns of a row are the parents of a refined vertex.
     """
 
-    rows: Int[np.ndarray, " N"]
-    columns: Int[np.ndarray, " N"]
+    rows: Integer[np.ndarray, " N"]
+    columns: Integer[np.ndarray, " N"]
     weights: Float[np.ndarray, " N"]
     shape: tuple[int, int]
 
     @property
-    def starts(self) -> Int[np.ndarray, " R"]:
+    def starts(self) -> Integer[np.ndarray, " R"]:
         """Where the entries of each row begin, and after the last row where they end."""
         return np.searchsorted(self.rows, np.arange(self.shape[0] + 1))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Integer
 
 from pns_common.errors import ParameterError
 from pns_common.mesh import Mesh, check_is_mesh
@@ -38,7 +38,7 @@ class Creases:
             below the angle, or levels below 1.
     """
 
-    named: Int[np.ndarray, "N 2"] | None = None
+    named: Integer[np.ndarray, "N 2"] | None = None
     angle: float | None = None
     seed: float | None = None
     levels: int | None = None
@@ -54,7 +54,7 @@ class Creases:
         if levels is not None and not (is_whole(levels) and levels >= 1):
             raise ParameterError("levels", levels, expected="a whole number, at least 1")
 
-    def with_named(self, pairs: Int[np.ndarray, "N 2"]) -> Creases:
+    def with_named(self, pairs: Integer[np.ndarray, "N 2"]) -> Creases:
         """Return a copy with further pairs of vertices named."""
         if len(pairs) == 0:
             return self
@@ -77,7 +77,9 @@ class Creases:
             topology = topology.with_creases(self.found(points, topology))
         return topology
 
-    def found(self, points: Float[np.ndarray, "V 3"], topology: Topology) -> Int[np.ndarray, " N"]:
+    def found(
+        self, points: Float[np.ndarray, "V 3"], topology: Topology
+    ) -> Integer[np.ndarray, " N"]:
         """Return the interior edges that are found by their angle."""
         if self.angle is None:
             return np.zeros(0, dtype=np.int64)
@@ -93,7 +95,7 @@ AUTOMATIC = Creases(angle=ANGLE, seed=SEED)
 NO_CREASES = Creases()
 
 
-def sharp_edges(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2"]:
+def sharp_edges(mesh: Mesh, angle: float | None = None) -> Integer[np.ndarray, "N 2"]:
     """Return the edges of a mesh that its shape shows to be sharp, as pairs of vertices.
 
     Args:
@@ -111,7 +113,7 @@ def sharp_edges(mesh: Mesh, angle: float | None = None) -> Int[np.ndarray, "N 2"
 
 
 def chosen_creases(
-    given: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None, automatic: Creases
+    given: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None, automatic: Creases
 ) -> Creases:
     """Return the creases that an argument asks for; "auto": those of the scheme.
 
@@ -138,7 +140,7 @@ def edge_cosines(points: Float[np.ndarray, "V 3"], topology: Topology) -> Float[
 
 
 def _connected(
-    edges: Int[np.ndarray, "N 2"], seeds: Bool[np.ndarray, " N"]
+    edges: Integer[np.ndarray, "N 2"], seeds: Bool[np.ndarray, " N"]
 ) -> Bool[np.ndarray, " N"]:
     """Return the edges that a path of edges connects to a seed."""
     vertices, ends = np.unique(edges, return_inverse=True)
@@ -158,7 +160,7 @@ def _connected(
     return seeded[label[ends[:, 0]]]
 
 
-def as_pairs(creases: Any) -> Int[np.ndarray, "N 2"]:
+def as_pairs(creases: Any) -> Integer[np.ndarray, "N 2"]:
     """Return a copy of creases as rows of two whole numbers, whatever they number.
 
     Raises:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import connectivity
 from pns_common.kernels.loop import CURVE_CENTRE, CURVE_NEIGHBOUR, MIDPOINT
@@ -43,12 +43,12 @@ class Curves:
     """
 
     movable: Bool[np.ndarray, " V"]
-    rows: Int[np.ndarray, " N"]
-    sides: Int[np.ndarray, "N 2"]
+    rows: Integer[np.ndarray, " N"]
+    sides: Integer[np.ndarray, "N 2"]
     a: Float[np.ndarray, "N 3"]
     b: Float[np.ndarray, "N 3"]
-    ends: Int[np.ndarray, "K 2"]
-    new_rows: Int[np.ndarray, " M"]
+    ends: Integer[np.ndarray, "K 2"]
+    new_rows: Integer[np.ndarray, " M"]
     squares: Float[np.ndarray, " M"]
     shared: Bool[np.ndarray, " W"]
 

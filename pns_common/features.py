@@ -24,7 +24,7 @@ from math import inf
 from types import MappingProxyType
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Integer
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Symmetries:
     (g φ)_k = signs[g, k] · φ[order[g, k]], and D_g = diag(local[g]).
     """
 
-    order: Int[np.ndarray, "G K"]
+    order: Integer[np.ndarray, "G K"]
     signs: Float[np.ndarray, "G K"]
     local: Float[np.ndarray, "G 3"]
 
@@ -125,7 +125,7 @@ def symmetries(features: Sequence[Feature], generators: Sequence[Generator]) -> 
 
 def _signed_permutation(
     features: Sequence[Feature], generator: Generator
-) -> tuple[Int[np.ndarray, " K"], Float[np.ndarray, " K"]]:
+) -> tuple[Integer[np.ndarray, " K"], Float[np.ndarray, " K"]]:
     renaming = str.maketrans(generator.vertices, generator.renamed)
     place = {(each.kind, frozenset(each.vertices)): k for k, each in enumerate(features)}
     order = [place[each.kind, frozenset(each.vertices.translate(renaming))] for each in features]

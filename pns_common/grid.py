@@ -6,7 +6,7 @@ F triangles are split into a grid of T points each; ``ids`` say which refined ve
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float, Float32, Int, Real
+from jaxtyping import Float, Float32, Integer, Real
 from numpy.typing import DTypeLike
 
 from pns_common.kernels import grid as kernels
@@ -22,8 +22,11 @@ def index_type(count: int) -> type[np.int32] | type[np.int64]:
 
 
 def take_points(
-    rows: Int[np.ndarray, "F K"], columns: Int[np.ndarray, " T"], dtype: DTypeLike, blocks: Blocks
-) -> Int[np.ndarray, "F T"]:
+    rows: Integer[np.ndarray, "F K"],
+    columns: Integer[np.ndarray, " T"],
+    dtype: DTypeLike,
+    blocks: Blocks,
+) -> Integer[np.ndarray, "F T"]:
     """Return columns of rows of indices, in a type that can hold them."""
     given = np.ascontiguousarray(rows), np.ascontiguousarray(columns)
     taken = np.empty((len(rows), len(columns)), dtype=dtype)
@@ -32,13 +35,13 @@ def take_points(
 
 
 def number_points(
-    corners: Int[np.ndarray, "F 3"],
-    on_edges: Int[np.ndarray, "F 3"],
+    corners: Integer[np.ndarray, "F 3"],
+    on_edges: Integer[np.ndarray, "F 3"],
     inside: int,
-    owner: Int[np.ndarray, " T"],
-    place: Int[np.ndarray, "8 T"],
+    owner: Integer[np.ndarray, " T"],
+    place: Integer[np.ndarray, "8 T"],
     blocks: Blocks,
-) -> Int[np.ndarray, "F T"]:
+) -> Integer[np.ndarray, "F T"]:
     """Return the refined vertex at each point of each face.
 
     Args:
@@ -61,8 +64,11 @@ def number_points(
 
 
 def move_to_vertices(
-    ids: Int[np.ndarray, "F T"], at_points: Int[np.ndarray, "F T"], count: int, blocks: Blocks
-) -> Int[np.ndarray, " N"]:
+    ids: Integer[np.ndarray, "F T"],
+    at_points: Integer[np.ndarray, "F T"],
+    count: int,
+    blocks: Blocks,
+) -> Integer[np.ndarray, " N"]:
     """Move labels from points to the N vertices; points of one vertex have one label."""
     labels = np.empty(count, dtype=at_points.dtype)
     given = np.ascontiguousarray(ids), np.ascontiguousarray(at_points)
@@ -72,7 +78,7 @@ def move_to_vertices(
 
 def blend_along(
     values: Float[np.ndarray, "C K"],
-    edges: Int[np.ndarray, "E 2"],
+    edges: Integer[np.ndarray, "E 2"],
     parameters: Float[np.ndarray, " n"],
     blended: Float[np.ndarray, "P K"],
     blocks: Blocks,
@@ -84,7 +90,7 @@ def blend_along(
 
 def blend_inside(
     values: Float[np.ndarray, "C K"],
-    faces: Int[np.ndarray, "F 3"],
+    faces: Integer[np.ndarray, "F 3"],
     weights: Float[np.ndarray, "n 3"],
     blended: Float[np.ndarray, "P K"],
     blocks: Blocks,
@@ -95,7 +101,7 @@ def blend_inside(
 
 
 def rounded_rows(
-    values: Real[np.ndarray, "V K"], rows: Int[np.ndarray, " N"], blocks: Blocks
+    values: Real[np.ndarray, "V K"], rows: Integer[np.ndarray, " N"], blocks: Blocks
 ) -> Float32[np.ndarray, "N K"]:
     """Return rows of values in single precision."""
     rounded = np.empty((len(rows), values.shape[1]), dtype=np.float32)

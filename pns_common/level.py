@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Integer
 
 from pns_common.base_scheme import BaseScheme
 from pns_common.kernels import connectivity, measures
@@ -39,7 +39,7 @@ class RingMeasures:
 
     fields: Float[np.ndarray, "V 4"]
     means: Float[np.ndarray, "V M"]
-    valence: Int[np.ndarray, " V"]
+    valence: Integer[np.ndarray, " V"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,7 +36,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Integer, Shaped
 
 from pns_common.kernels import limit as kernels
 from pns_common.kernels import loop as masks
@@ -65,7 +65,7 @@ class LimitNormals:
 
     vertices: Float[np.ndarray, "V 3"]
     sectors: Float[np.ndarray, "S 3"]
-    sector_of_corner: Int[np.ndarray, " C"]
+    sector_of_corner: Integer[np.ndarray, " C"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +80,11 @@ class Sectors:
         vertex: of each sector.
     """
 
-    of_corner: Int[np.ndarray, " C"]
-    first: Int[np.ndarray, " S"]
-    size: Int[np.ndarray, " S"]
+    of_corner: Integer[np.ndarray, " C"]
+    first: Integer[np.ndarray, " S"]
+    size: Integer[np.ndarray, " S"]
     opened: int
-    vertex: Int[np.ndarray, " S"]
+    vertex: Integer[np.ndarray, " S"]
 
 
 def limit_positions(
@@ -194,7 +194,7 @@ def _limits_of_three(
 def _dart_limits(
     points: Float[np.ndarray, "V 3"],
     topology: Topology,
-    darts: Int[np.ndarray, " D"],
+    darts: Integer[np.ndarray, " D"],
     beta_of_darts: Float[np.ndarray, "D 1"],
 ) -> Float[np.ndarray, "D 3"]:
     """Return the limits of the vertices on exactly one sharp edge."""
@@ -229,8 +229,8 @@ def dart_weights(opened: int, k: int) -> Float[np.ndarray, " K"]:
 def _tables(
     make: Callable[[int, int], np.ndarray],
     kind: Shaped[np.ndarray, " S"],
-    size: Int[np.ndarray, " S"],
-) -> tuple[Int[np.ndarray, " S"], Float[np.ndarray, " *M"]]:
+    size: Integer[np.ndarray, " S"],
+) -> tuple[Integer[np.ndarray, " S"], Float[np.ndarray, " *M"]]:
     """Return ``make(kind, size)`` for all pairs that occur, in a row, and where each one begins."""
     keys, which = np.unique(4 * size.astype(np.int64) + kind, return_inverse=True)
     tables = [make(int(key % 4), int(key // 4)) for key in keys]

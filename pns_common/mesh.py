@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Integer
 
 from pns_common.errors import MeshError, ParameterError
 from pns_common.parallel import Blocks
@@ -43,9 +43,9 @@ class Mesh:
 
     __slots__ = ("_faces", "_offsets", "corners", "vertices")
     vertices: Float[np.ndarray, "V 3"]
-    corners: Int[np.ndarray, " H"]
-    _offsets: Int[np.ndarray, " F1"] | None
-    _faces: Int[np.ndarray, "F N"] | None
+    corners: Integer[np.ndarray, " H"]
+    _offsets: Integer[np.ndarray, " F1"] | None
+    _faces: Integer[np.ndarray, "F N"] | None
 
     def __init__(self, vertices: Any, faces: Any) -> None:
         given = _array(vertices, "vertices")
@@ -65,8 +65,8 @@ class Mesh:
     def _keep(
         self,
         vertices: Float[np.ndarray, "V 3"],
-        corners: Int[np.ndarray, " H"],
-        offsets: Int[np.ndarray, " F1"] | None,
+        corners: Integer[np.ndarray, " H"],
+        offsets: Integer[np.ndarray, " F1"] | None,
         degree: int | None,
     ) -> None:
         """Keep arrays; ``degree`` is that of all faces, which then need no offsets."""
@@ -89,14 +89,14 @@ class Mesh:
         return f"Mesh(vertices={len(self.vertices)}, faces={count})"
 
     @property
-    def offsets(self) -> Int[np.ndarray, " F1"]:
+    def offsets(self) -> Integer[np.ndarray, " F1"]:
         """Where the corners of each face begin, and where the last ones end: (F + 1,)."""
         if self._offsets is not None:
             return self._offsets
         return np.arange(0, len(self.corners) + 1, self.faces.shape[1])
 
     @property
-    def faces(self) -> Int[np.ndarray, "F N"]:
+    def faces(self) -> Integer[np.ndarray, "F N"]:
         """Vertices of each face, (F, 3) for triangles.
 
         Raises:
@@ -107,7 +107,7 @@ class Mesh:
         return self._faces
 
     @property
-    def polygons(self) -> list[Int[np.ndarray, " N"]]:
+    def polygons(self) -> list[Integer[np.ndarray, " N"]]:
         """Vertices of each face."""
         return np.split(self.corners, self.offsets[1:-1])
 
@@ -122,15 +122,17 @@ class Mesh:
         return build_topology(faces, len(self.vertices), blocks)
 
     @classmethod
-    def of_refined(cls, vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> Mesh:
+    def of_refined(
+        cls, vertices: Float[np.ndarray, "V 3"], faces: Integer[np.ndarray, "F 3"]
+    ) -> Mesh:
         """Make a mesh of arrays that a refinement made and checked: neither copied nor read."""
         return _kept(vertices, faces.reshape(-1), None, TRIANGLE)
 
 
 def _kept(
     vertices: Float[np.ndarray, "V 3"],
-    corners: Int[np.ndarray, " H"],
-    offsets: Int[np.ndarray, " F1"] | None,
+    corners: Integer[np.ndarray, " H"],
+    offsets: Integer[np.ndarray, " F1"] | None,
     degree: int | None,
 ) -> Mesh:
     """Make a mesh of arrays that are known to be right."""
@@ -144,11 +146,11 @@ class Cleaned:
     """A cleaned mesh and how it came about. −1 in a map means dropped."""
 
     mesh: Mesh
-    vertex_map: Int[np.ndarray, " V"]
-    face_map: Int[np.ndarray, " F"]
+    vertex_map: Integer[np.ndarray, " V"]
+    face_map: Integer[np.ndarray, " F"]
     # For each old face the new face with the same three vertices, or −1 if it was degenerate:
     # what a dropped duplicate should follow.
-    representative: Int[np.ndarray, " F"]
+    representative: Integer[np.ndarray, " F"]
     dropped_degenerate: int
     dropped_duplicate: int
     dropped_vertices: int
@@ -221,7 +223,7 @@ def check_faces(faces: np.ndarray, vertex_count: int) -> None:
     _check_indices(faces.reshape(-1), offsets, vertex_count)
 
 
-def repeated_vertex(faces: Int[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
+def repeated_vertex(faces: Integer[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
     """Return whether a triangle names a vertex twice."""
     a, b, c = faces.T
     return (a == b) | (b == c) | (c == a)
@@ -285,11 +287,11 @@ def _check_coordinates(vertices: Float[np.ndarray, "V 3"]) -> None:
         )
 
 
-def _first_alike(faces: Int[np.ndarray, "F 3"], vertex_count: int) -> Int[np.ndarray, " F"]:
+def _first_alike(faces: Integer[np.ndarray, "F 3"], vertex_count: int) -> Integer[np.ndarray, " F"]:
     """Return for each face the first that has the same three vertices, in whatever order."""
     # A face's number is the sum of its vertices', which are far apart: faces that are alike have
     # one number, and hardly any others do. Most meshes have no two, and a sort of numbers tells.
-    of_vertex: Int[np.ndarray, " V"] = np.arange(1, vertex_count + 1, dtype=np.uint64)
+    of_vertex: Integer[np.ndarray, " V"] = np.arange(1, vertex_count + 1, dtype=np.uint64)
     of_vertex *= np.uint64(0x9E3779B97F4A7C15)
     of_vertex ^= of_vertex >> np.uint64(29)
     of_vertex *= np.uint64(0xBF58476D1CE4E5B9)

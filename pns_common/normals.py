@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Integer
 
 from pns_common.kernels import measures
 from pns_common.kernels import normals as kernels
@@ -16,7 +16,9 @@ ONE_TRIANGLE = np.array([[0, 1, 2]])
 
 
 def face_normals(
-    points: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"], blocks: Blocks | None = None
+    points: Float[np.ndarray, "V 3"],
+    faces: Integer[np.ndarray, "F 3"],
+    blocks: Blocks | None = None,
 ) -> Float[np.ndarray, "F 3"]:
     """Return the unit normals of triangles; 0 for a triangle without area."""
     normals = np.empty((len(faces), 3))
@@ -29,11 +31,11 @@ def face_normals(
 
 def angle_weighted_normals(
     points: Float[np.ndarray, "V 3"],
-    faces: Int[np.ndarray, "F T"],
-    groups: Int[np.ndarray, "F T"],
+    faces: Integer[np.ndarray, "F T"],
+    groups: Integer[np.ndarray, "F T"],
     count: int,
     blocks: Blocks,
-    triangles: Int[np.ndarray, "D 3"] = ONE_TRIANGLE,
+    triangles: Integer[np.ndarray, "D 3"] = ONE_TRIANGLE,
 ) -> Float[np.ndarray, "G 3"]:
     """Return the unit normal of each group of corners; 0 without area, or where all cancel out.
 
@@ -62,8 +64,8 @@ def angle_weighted_normals(
 
 
 def smooth_fans(
-    faces: Int[np.ndarray, "F 3"], vertex_count: int, creases: Int[np.ndarray, "N 2"] | None
-) -> Int[np.ndarray, "F 3"]:
+    faces: Integer[np.ndarray, "F 3"], vertex_count: int, creases: Integer[np.ndarray, "N 2"] | None
+) -> Integer[np.ndarray, "F 3"]:
     """Return the smooth fan of each corner, numbered by first appearance.
 
     A fan is a run of faces around a vertex that follow one another across edges that are neither

@@ -32,7 +32,7 @@ from dataclasses import dataclass
 from itertools import count as rounds_from_0
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Integer
 
 from pns_common.curves import Curves, curve_prior, curve_pushes, find_curves
 from pns_common.errors import ModelError, ParameterError
@@ -125,7 +125,7 @@ class Inputs:
         degenerate: where there is no frame.
     """
 
-    rows: Int[np.ndarray, " N"]
+    rows: Integer[np.ndarray, " N"]
     features: Float[np.ndarray, "N K"]
     basis: Float[np.ndarray, "N 9"]
     gate: Float[np.ndarray, " N"]
@@ -214,7 +214,7 @@ def pushes(level: Level, rule: Rule) -> Float[np.ndarray, "V 3"]:
     return made
 
 
-def edge_inputs(level: Level, rule: Rule, rows: Int[np.ndarray, " N"]) -> Inputs:
+def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> Inputs:
     """Return what surrounds the network at interior edges."""
     mesh, count, signed = level.topology, len(rows), rule.feature_count > frames.DIHEDRAL
     basis, features = np.empty((count, 9)), np.empty((count, rule.feature_count))
@@ -250,7 +250,7 @@ def edge_inputs(level: Level, rule: Rule, rows: Int[np.ndarray, " N"]) -> Inputs
     )
 
 
-def vertex_inputs(level: Level, rule: Rule, rows: Int[np.ndarray, " N"]) -> Inputs:
+def vertex_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> Inputs:
     """Return what surrounds the network at old vertices with a closed ring."""
     rings, count, sharp = level.rings, len(rows), level.topology.sharpest
     features, basis = np.empty((count, 10)), np.empty((count, 9))

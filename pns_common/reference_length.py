@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Integer
 
 from pns_common.kernels import children
 
 
 def measure_reference_length(
-    vertices: Float[np.ndarray, "V 3"], corners: Int[np.ndarray, " H"]
+    vertices: Float[np.ndarray, "V 3"], corners: Integer[np.ndarray, " H"]
 ) -> float:
     """Return the largest distance of a referenced vertex from their centroid, over √2.
 

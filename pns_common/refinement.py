@@ -9,7 +9,7 @@ from functools import cache, cached_property
 from typing import Literal, SupportsIndex
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Integer
 
 from pns_common.creases import Creases, chosen_creases
 from pns_common.errors import MeshError, ParameterError
@@ -123,7 +123,7 @@ def refine(
     reference_length: float | str = "auto",
     *,
     limit: bool = False,
-    creases: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
+    creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Refinement:
@@ -199,7 +199,7 @@ def control_level(
     mesh: Mesh,
     scheme: Scheme,
     reference_length: float | str = "auto",
-    creases: Int[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
+    creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
     threads: int | None = None,
 ) -> Level:
     """Return the level that the first step of ``refine`` reads: for training and experiments.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NotRequired, TypedDict
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import children, connectivity
 from pns_common.operator import Additions
@@ -231,7 +231,7 @@ def longest(displacement: Float[np.ndarray, "W 3"]) -> float:
     return math.sqrt(float(squares.max(initial=0)))
 
 
-def edge_counts(edge_class: Int[np.ndarray, " E"]) -> EdgeCounts:
+def edge_counts(edge_class: Integer[np.ndarray, " E"]) -> EdgeCounts:
     """Count the edges of each class."""
     count = np.bincount(edge_class, minlength=4).tolist()
     counts: EdgeCounts = {
@@ -245,7 +245,7 @@ def edge_counts(edge_class: Int[np.ndarray, " E"]) -> EdgeCounts:
 
 
 def _of(
-    values: Float[np.ndarray, " N"], rows: Int[np.ndarray, " M"] | Bool[np.ndarray, " N"]
+    values: Float[np.ndarray, " N"], rows: Integer[np.ndarray, " M"] | Bool[np.ndarray, " N"]
 ) -> Float[np.ndarray, " M"]:
     """Return some of the values; no copy where they are all."""
     every = rows.all() if rows.dtype == bool else len(rows) == len(values)

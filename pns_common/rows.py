@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Shaped, UInt
+from jaxtyping import Bool, Float, Integer, Shaped, UInt
 
 # Points that are read as one row: down rows of three numbers numpy takes ten times as long.
 FOLD = 128
 
 
-def distinct_rows(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
+def distinct_rows(rows: Shaped[np.ndarray, "N K"]) -> Integer[np.ndarray, " N"]:
     """Return a number for each row: equal rows share it, bit by bit, and only they."""
     words = as_words(rows)
     mixed = _hash(words)
@@ -32,8 +32,8 @@ def distinct_rows(rows: Shaped[np.ndarray, "N K"]) -> Int[np.ndarray, " N"]:
 
 
 def number_by_first_appearance(
-    labels: Int[np.ndarray, " N"],
-) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " M"]]:
+    labels: Integer[np.ndarray, " N"],
+) -> tuple[Integer[np.ndarray, " N"], Integer[np.ndarray, " M"]]:
     """Rename labels ≥ 0 to 0, 1, 2, … in the order in which they first occur.
 
     Return them, and where each occurs first.
@@ -45,7 +45,7 @@ def number_by_first_appearance(
     return number[labels], first
 
 
-def first_places(labels: Int[np.ndarray, " N"], count: int) -> Int[np.ndarray, " S"]:
+def first_places(labels: Integer[np.ndarray, " N"], count: int) -> Integer[np.ndarray, " S"]:
     """Return where each of the labels 0 … count − 1 first occurs; −1 where it does not."""
     earliest = np.full(count, -1, dtype=np.int64)
     # Written backwards, so that the earliest occurrence is the one that remains.
@@ -72,7 +72,7 @@ def _hash(words: UInt[np.ndarray, "N W"]) -> UInt[np.ndarray, " N"]:
     return mixed
 
 
-def marked(rows: Int[np.ndarray, " N"], count: int) -> Bool[np.ndarray, " S"]:
+def marked(rows: Integer[np.ndarray, " N"], count: int) -> Bool[np.ndarray, " S"]:
     """Return which of ``count`` rows are named, however often."""
     marks = np.zeros(count, dtype=bool)
     marks[rows] = True
@@ -80,8 +80,8 @@ def marked(rows: Int[np.ndarray, " N"], count: int) -> Bool[np.ndarray, " S"]:
 
 
 def stable_sort(
-    key: Int[np.ndarray, " N"],
-) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " N"]]:
+    key: Integer[np.ndarray, " N"],
+) -> tuple[Integer[np.ndarray, " N"], Integer[np.ndarray, " N"]]:
     """Return keys ≥ 0 in order, and the positions they come from; equal keys keep their order.
 
     Packing key and position into one integer and sorting values is several times faster than
@@ -112,7 +112,7 @@ def _reduced(by: np.ufunc, points: Float[np.ndarray, "N K"]) -> Float[np.ndarray
     return by.reduce(points, axis=0)
 
 
-def disjoint_faces(parts: Iterable[tuple[np.ndarray, int]]) -> Int[np.ndarray, "F 3"]:
+def disjoint_faces(parts: Iterable[tuple[np.ndarray, int]]) -> Integer[np.ndarray, "F 3"]:
     """Return the faces of several meshes as one; the vertices of each follow those before it.
 
     Args:

@@ -11,7 +11,7 @@ from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt32
+from jaxtyping import Bool, Float, Integer, UInt32
 
 from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import connectivity as kernels
@@ -44,9 +44,9 @@ class SharpVertices:
         neighbours: (V, 2) the far ends of the two sharpest edges.
     """
 
-    rows: Int[np.ndarray, " N"]
+    rows: Integer[np.ndarray, " N"]
     weights: Float[np.ndarray, "V 3"]
-    neighbours: Int[np.ndarray, "V 2"]
+    neighbours: Integer[np.ndarray, "V 2"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,12 +72,12 @@ class Topology:
 
     vertex_count: int
     corners: UInt32[np.ndarray, " H"]
-    offsets: Int[np.ndarray, " F1"]
+    offsets: Integer[np.ndarray, " F1"]
     face_of_corner: UInt32[np.ndarray, " C"]
     edges: UInt32[np.ndarray, "E 2"]
     corner_edges: UInt32[np.ndarray, " H"]
-    half_edges: Int[np.ndarray, "E 2"]
-    edge_class: Int[np.ndarray, " E"]
+    half_edges: Integer[np.ndarray, "E 2"]
+    edge_class: Integer[np.ndarray, " E"]
     soft: Float[np.ndarray, " S"]
     plain: bool
 
@@ -118,13 +118,13 @@ class Topology:
         return np.flatnonzero(self.edge_class != kernels.INTERIOR).astype(np.uint32)
 
     @cached_property
-    def crease_edges(self) -> Int[np.ndarray, " S"]:
+    def crease_edges(self) -> Integer[np.ndarray, " S"]:
         """Indices of the creases."""
         sharp = self.sharp_edges
         return sharp[self.edge_class[sharp] == kernels.CREASE].astype(np.int64)
 
     @cached_property
-    def sharp_count(self) -> Int[np.ndarray, " V"]:
+    def sharp_count(self) -> Integer[np.ndarray, " V"]:
         """Number of edges at each vertex that are not interior; (0,) where there is none."""
         if len(self.sharp_edges) == 0:
             return np.zeros(0, dtype=np.int32)
@@ -153,17 +153,17 @@ class Topology:
         return SharpVertices(np.flatnonzero(weights[:, 1] > 0), weights, neighbours)
 
     @cached_property
-    def valence(self) -> Int[np.ndarray, " V"]:
+    def valence(self) -> Integer[np.ndarray, " V"]:
         """Number of edges at each vertex."""
         return np.bincount(self.edges.reshape(-1), minlength=self.vertex_count).astype(np.int32)
 
     @cached_property
-    def edge_reach(self) -> Int[np.ndarray, "B 2"]:
+    def edge_reach(self) -> Integer[np.ndarray, "B 2"]:
         """Smallest and largest vertex of each block of edges."""
         return _reach(self.edges.reshape(-1), 2 * kernels.SKIPPED_ROWS)
 
     @cached_property
-    def corner_reach(self) -> Int[np.ndarray, "B 2"]:
+    def corner_reach(self) -> Integer[np.ndarray, "B 2"]:
         """Smallest and largest vertex of each block of corners."""
         return _reach(self.corners, TRIANGLE * kernels.SKIPPED_ROWS)
 
@@ -191,7 +191,7 @@ class Topology:
         )
         return marked
 
-    def with_creases(self, rows: Int[np.ndarray, " N"]) -> Topology:
+    def with_creases(self, rows: Integer[np.ndarray, " N"]) -> Topology:
         """Return a copy in which the interior edges among ``rows`` are creases."""
         if len(rows) == 0:
             return self
@@ -211,8 +211,8 @@ class Topology:
         return replace(self, edge_class=classes.astype(np.int8), soft=NO_WEIGHTS)
 
     def rows_of(
-        self, pairs: Int[np.ndarray, "N 2"], name: str = "creases"
-    ) -> Int[np.ndarray, " N"]:
+        self, pairs: Integer[np.ndarray, "N 2"], name: str = "creases"
+    ) -> Integer[np.ndarray, " N"]:
         """Return the edges that pairs of vertices name.
 
         Raises:
@@ -244,7 +244,8 @@ class Topology:
 
 
 def build_topology(
-    faces: Int[np.ndarray, "F 3"] | tuple[Int[np.ndarray, " H"], Int[np.ndarray, " F1"]],
+    faces: Integer[np.ndarray, "F 3"]
+    | tuple[Integer[np.ndarray, " H"], Integer[np.ndarray, " F1"]],
     vertex_count: int,
     blocks: Blocks | None = None,
 ) -> Topology:
@@ -357,7 +358,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
 
 def split_faces(
     parent: Topology, blocks: Blocks, dtype: type[np.uint32] | type[np.int64] = np.uint32
-) -> Int[np.ndarray, "C 3"]:
+) -> Integer[np.ndarray, "C 3"]:
     """Return the triangles of the 1-to-4 split, in the order of ``split_triangles``."""
     faces = np.empty((4 * parent.face_count, TRIANGLE), dtype=dtype)
     read = parent.faces, parent.face_edges, parent.vertex_count
@@ -365,17 +366,19 @@ def split_faces(
     return faces
 
 
-def halves_of(parent: Topology, rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, "M 2"]:
+def halves_of(parent: Topology, rows: Integer[np.ndarray, " N"]) -> Integer[np.ndarray, "M 2"]:
     """Return the halves of edges, as vertex pairs of the split mesh."""
     ends, middle = parent.edges[rows].astype(np.int64), parent.vertex_count + rows.astype(np.int64)
     return np.stack([ends, np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
 
 
-Numbered = tuple[UInt32[np.ndarray, "E 2"], Int[np.ndarray, "E 2"], UInt32[np.ndarray, " H"], bool]
+Numbered = tuple[
+    UInt32[np.ndarray, "E 2"], Integer[np.ndarray, "E 2"], UInt32[np.ndarray, " H"], bool
+]
 
 
 def _number_edges(
-    corners: UInt32[np.ndarray, " H"], offsets: Int[np.ndarray, " F1"], vertex_count: int
+    corners: UInt32[np.ndarray, " H"], offsets: Integer[np.ndarray, " F1"], vertex_count: int
 ) -> Numbered:
     """Return edges, their half-edges, the edge of each corner, and whether triangles are plain."""
     count = len(corners)
@@ -394,7 +397,7 @@ def _number_edges(
 
 
 def _sort_edges(
-    corners: UInt32[np.ndarray, " H"], offsets: Int[np.ndarray, " F1"], vertex_count: int
+    corners: UInt32[np.ndarray, " H"], offsets: Integer[np.ndarray, " F1"], vertex_count: int
 ) -> Numbered:
     """Return what ``_number_edges`` does, by sorting: for vertices of thousands of edges."""
     following = np.arange(1, len(corners) + 1)
@@ -419,13 +422,13 @@ def _sort_edges(
     return np.sort(pairs[first[order]], axis=1), half_edges, corner_edges, plain
 
 
-def _keys(pairs: Int[np.ndarray, "N 2"], vertex_count: int) -> Int[np.ndarray, " N"]:
+def _keys(pairs: Integer[np.ndarray, "N 2"], vertex_count: int) -> Integer[np.ndarray, " N"]:
     """Return one number for each pair of vertices, in whichever order."""
     wide = pairs.astype(np.int64)
     return wide.min(axis=1) * vertex_count + wide.max(axis=1)
 
 
-def _reach(vertices: UInt32[np.ndarray, " N"], each: int) -> Int[np.ndarray, "B 2"]:
+def _reach(vertices: UInt32[np.ndarray, " N"], each: int) -> Integer[np.ndarray, "B 2"]:
     starts = np.arange(0, len(vertices), each)
     ends = np.minimum.reduceat(vertices, starts), np.maximum.reduceat(vertices, starts)
     return np.stack(ends, axis=1).astype(np.int64)

@@ -6,7 +6,7 @@ N rows keep K slots each: names, and their weights, heaviest first.
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Integer
 
 from pns_common.kernels import weights as kernels
 from pns_common.parallel import Blocks
@@ -14,8 +14,8 @@ from pns_common.parallel import Blocks
 
 def keep_heaviest(
     columns: Float[np.ndarray, "N C"],
-    names: Int[np.ndarray, " C"],
-    kept_names: Int[np.ndarray, "N K"],
+    names: Integer[np.ndarray, " C"],
+    kept_names: Integer[np.ndarray, "N K"],
     kept: Float[np.ndarray, "N K"],
     lost: Float[np.ndarray, " N"],
     blocks: Blocks,
@@ -37,7 +37,7 @@ def scale_rows(weights: Float[np.ndarray, "N K"], blocks: Blocks) -> None:
 
 def whole_units(
     weights: Float[np.ndarray, "N K"], total_units: int, blocks: Blocks
-) -> Int[np.ndarray, "N K"]:
+) -> Integer[np.ndarray, "N K"]:
     """Round weights to integers that sum to ``total_units`` a row: largest remainders go up.
 
     Rows without weight stay 0. Units are below 2³¹.

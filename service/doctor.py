@@ -72,9 +72,10 @@ def _settings() -> str:
 
 
 def _kernels() -> str:
-    from pns_common.warming import kernels_are_cached, warm_up
+    from pns_common.kernels import are_compiled
+    from pns_common.warming import warm_up
 
-    began, kept = time.perf_counter(), kernels_are_cached()
+    began, kept = time.perf_counter(), are_compiled()
     warm_up(lambda _: None)
     seconds = f"{time.perf_counter() - began:.1f} s"
     return f"loaded in {seconds}" if kept else f"compiled in {seconds}"

@@ -77,7 +77,7 @@ def _further_rows(card: ModelCard) -> dict[str, Any]:
         "boundary strength b": card.boundary_strength,
         "network scale τ": card.network_scale,
         "fold angle θ": card.fold_angle,
-        "levels of sharpness": card.sharpness_levels,
+        "sharpness levels": card.sharpness_levels,
     }
     return {name: value for name, value in rows.items() if value is not None}
 

@@ -122,6 +122,17 @@ class Settings(BaseSettings):
     result_folder: Place | None = Field(
         default=None, description="where results are kept; none: the system's temporary folder"
     )
+    store: str | None = Field(
+        default=None,
+        pattern=r"^(rediss?|unix)://",
+        description="Redis that replicas share, whichever a client asks for its job; none: each "
+        "replica answers for its own",
+    )
+    store_files: Name | None = Field(
+        default=None,
+        description="where bodies and results of shared jobs lie, as fsspec names it "
+        "(s3://bucket/folder); none: in Redis",
+    )
     answer_bytes: Size = Field(
         default=ByteSize(1024 * MIB), description="answers in memory that clients are taking"
     )
@@ -132,9 +143,8 @@ class Settings(BaseSettings):
     )
     uploads: int = Field(default=512, gt=0, description="bodies that may arrive at the same time")
 
-    connections: int = Field(default=512, gt=0, description="open connections in all")
-    connections_of_address: int = Field(
-        default=48, gt=0, description="open connections of one address (IPv6: of one /64)"
+    connections: int = Field(
+        default=512, gt=0, description="open connections; beyond those idle ones end, then 503"
     )
     proxies: Networks = Field(
         default=(),
@@ -163,17 +173,10 @@ class Settings(BaseSettings):
         default=10, description="longest wait for the next piece of a body"
     )
     head_seconds: Seconds = Field(
-        default=10, description="longest wait for a request line and its headers"
+        default=10, description="longest time that a connection asks for nothing"
     )
     keep_alive_seconds: Seconds = Field(
         default=5, description="how long a connection may rest between requests"
-    )
-    linger_seconds: Seconds = Field(
-        default=5,
-        description="how long a client is listened to that is answered before its body is whole",
-    )
-    answer_seconds: Seconds = Field(
-        default=600, description="longest wait in all for a client to take its answer"
     )
     stall_seconds: Seconds = Field(
         default=30, description="longest wait for a client to take more of its answer"

@@ -1,6 +1,6 @@
-"""What every test runs with; tests of pns_common alone also with its array annotations enforced.
+"""What every test runs with; tests of the library alone also with its array annotations enforced.
 
-Shapes and kinds are checked at run time in a run over tests/pns_common and nothing else. It takes
+Shapes and kinds are checked at run time in a run over tests/library and nothing else. It takes
 five times as long, and a shape does not hang on the numbers: of each test the first parameters
 serve, of a property a few examples. A run over all tests takes all of both.
 """
@@ -17,13 +17,13 @@ import tests.support.typecheck  # noqa: F401  (the hook finds it by name)
 TESTS = Path(__file__).resolve().parent
 PACKAGE = TESTS.parent / "pns_common"
 # These check their own input and raise errors of their own: the edge where values come in.
-FRONT_DOORS = {"mesh.py", "arguments.py", "refine.py", "schemes.py", "base/parameters.py"}
+FRONT_DOORS = {"mesh.py", "refinement.py", "creases.py", "schemes/scheme.py", "parameters.py"}
 CHECKED = [
     ".".join(["pns_common", *path.relative_to(PACKAGE).with_suffix("").parts])
     for path in sorted(PACKAGE.rglob("*.py"))
     if path.relative_to(PACKAGE).as_posix() not in FRONT_DOORS
     # Kernels are compiled from their source, and have their types from that.
-    and not path.is_relative_to(PACKAGE / "fused" / "kernels")
+    and not path.is_relative_to(PACKAGE / "kernels")
 ]
 
 # Derandomised: the same examples on every machine. Timings are never asserted.
@@ -64,33 +64,33 @@ KINDS = {
 
 # What takes longest comes first, so that several test processes end together.
 LONGEST = (
-    "train/experiments/test_every_experiment.py",
+    "train/test_every_experiment.py",
     "service/http/test_serve.py",
     "test_wheel.py",
     "conformance/test_conformance.py",
-    "train/experiments/test_reproduce.py",
+    "train/test_reproduce.py",
     "service/http/test_jobs.py",
     "service/http/test_crossed_answers.py",
     "service/http/test_openapi.py",
     "soak/test_soak.py",
-    "service/http/connection/test_bounds.py",
+    "service/http/test_hostile.py",
     "service/test_assets.py",
     "service/workers/test_pool.py",
     "web/test_bundle.py",
     "docs/test_site.py",
-    "train/certificates/test_ascent.py",
-    "train/certificates/test_adversary.py",
-    "train/data/pairs/test_pair_stream.py",
+    "train/test_adversaries.py",
+    "train/test_certificates.py",
+    "train/test_pairs.py",
     "train/test_train_command.py",
-    "train/fitting/test_limit_training.py",
+    "train/test_limit_training.py",
 )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Check annotations in a run over tests of pns_common; nothing has imported it yet."""
+    """Check annotations in a run over tests of the library; nothing has imported it yet."""
     here = config.invocation_params.dir
     given = [(here / argument.partition("::")[0]).resolve() for argument in config.args]
-    if given and all(path.is_relative_to(TESTS / "pns_common") for path in given):
+    if given and all(path.is_relative_to(TESTS / "library") for path in given):
         install_import_hook(CHECKED, "tests.support.typecheck.check")
         settings.load_profile("shapes")
         config.stash[FIRST_ALONE] = all(path.is_dir() for path in given)

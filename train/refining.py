@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from pns_common import Mesh, Scheme, load_model, sharp_edges
+from pns_common import Mesh, Scheme, load_model, loop, sharp_edges
 from pns_common import refine as refine_by_library
 from pns_common.reference_length import measure_reference_length
 from train.connectivity import Connectivity, connect
@@ -163,6 +163,11 @@ def loop_rule(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length
     base = loop_mask(mesh)(points)
     none = torch.zeros(len(base), dtype=torch.float64)
     return Step(base, torch.zeros_like(base), none, none, none + 1)
+
+
+def loop_like(scheme: AnyScheme) -> AnyScheme:
+    """Return Loop by the code that runs a scheme, with its rounding: the library's, or ours."""
+    return Method("loop", loop_rule) if isinstance(scheme, Method) else loop()
 
 
 def crease_children(mesh: Connectivity) -> Int[np.ndarray, "N 2"]:

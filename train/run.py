@@ -1,7 +1,6 @@
 """The laboratory's entry: `python train/run.py` trains the default recipe.
 
-It writes a checkpoint and prints the held-out table; so does `distil`, which fits networks to the
-answers of other models.
+It writes a checkpoint and prints the held-out table.
 """
 
 import sys
@@ -20,17 +19,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from pns_common import ParameterError, PnsError, pns
+from pns_common import PnsError, pns
 from train.certificates.command import certify_command
 from train.experiments.command import reproduce_command
 from train.fitting.determinism import machine_fingerprint
-from train.fitting.distillation import distil as distilled
-from train.fitting.distillation import load_teacher, planned
 from train.fitting.trainer import fit
 from train.metrics.card import card_metrics
-from train.metrics.one_step import improvements_as_data
-from train.metrics.tables import improvement_table
-from train.models.checkpoint import Checkpoint, Distillation, save_checkpoint
+from train.metrics.one_step import improvement_table, improvements_as_data
+from train.models.checkpoint import Checkpoint, save_checkpoint
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
 from train.models.recipes import RECIPES
@@ -38,8 +34,6 @@ from train.models.torch_model import recipe_model
 from train.output_file import prepare_output
 
 CHECKPOINTS = Path("checkpoints")
-# Defaults of a distillation.
-MESHES, STEPS = 500, 10_000
 
 Output = Annotated[
     Path | None,
@@ -53,7 +47,7 @@ if TYPE_CHECKING:
     RecipeName = str
 else:  # A type checker cannot see the members that a table gives.
     RecipeName = StrEnum("RecipeName", {name: name for name in RECIPES})
-DEFAULT_RECIPE, DISTILLED_RECIPE = RecipeName("paper"), RecipeName("general")
+DEFAULT_RECIPE = RecipeName("paper")
 
 app = typer.Typer(
     help="Train, measure and certify the operator.",
@@ -88,40 +82,7 @@ def train(
     with _progress(console) as progress:
         task = progress.add_task(f"training {chosen.name}", total=chosen.steps, loss=float("nan"))
         trained = fit(chosen, lambda done, loss: progress.update(task, completed=done, loss=loss))
-    _measure_and_save(path, chosen, trained.network, trained.vertex_network, None, console)
-    _say_written(path, began, console)
-
-
-@app.command()
-def distil(
-    teachers: Annotated[list[Path], typer.Argument(help="Model files, or checkpoints.")],
-    recipe: Annotated[
-        RecipeName, typer.Option(help="Whose networks to fit: a scale-free one.")
-    ] = DISTILLED_RECIPE,
-    meshes: Annotated[int, typer.Option(min=1, help="Pairs of the stream to ask on.")] = MESHES,
-    steps: Annotated[int, typer.Option(min=1, help="Adam steps of each network.")] = STEPS,
-    output: Output = None,
-) -> None:
-    """Fit the networks of a recipe to what teachers answer in the mean."""
-    console = Console()
-    began = time.perf_counter()
-    chosen = RECIPES[recipe](0)
-    path = output or CHECKPOINTS / f"{chosen.name}.safetensors"
-    with _errors_told(console):
-        loaded = [load_teacher(each) for each in teachers]
-        plan = planned(chosen, loaded, meshes, steps)
-        if path.resolve() in [each.resolve() for each in teachers]:
-            raise ParameterError("output", str(path), expected="another file than the teachers")
-        prepare_output(path)
-    with _progress(console) as progress:
-        task = progress.add_task(f"distilling {chosen.name}", total=2 * steps, loss=float("nan"))
-        networks = distilled(
-            chosen,
-            loaded,
-            plan,
-            lambda done, loss: progress.update(task, completed=done, loss=loss),
-        )
-    _measure_and_save(path, chosen, *networks, plan, console)
+    _measure_and_save(path, chosen, trained.network, trained.vertex_network, console)
     _say_written(path, began, console)
 
 
@@ -140,14 +101,13 @@ def _measure_and_save(
     recipe: Recipe,
     network: BoundedNet,
     vertex_network: BoundedNet | None,
-    plan: Distillation | None,
     console: Console,
 ) -> None:
     scheme = pns(recipe_model(recipe, network, vertex_network), recipe.budget)
     improvements = card_metrics(recipe, scheme)
     metrics = {name: improvements_as_data(rows) for name, rows in improvements.items()}
     machine = machine_fingerprint()
-    save_checkpoint(path, Checkpoint(recipe, network, metrics, machine, vertex_network, plan))
+    save_checkpoint(path, Checkpoint(recipe, network, metrics, machine, vertex_network))
     for name, rows in improvements.items():
         console.print(improvement_table(f"{name}, recipe {recipe.name}", rows))
 

@@ -46,7 +46,7 @@ for (const [across, levels] of [
 }
 const waits = [];
 for (let run = 0; run < RUNS; run++) {
-  const { page, context } = await open(browser, `${server.address}/#levels=5&model=signed`, { viewport: VIEWPORT });
+  const { page, context } = await open(browser, `${server.address}/#levels=5`, { viewport: VIEWPORT });
   await choose(page, { name: "torus.obj", mimeType: "", buffer: torus(50, 20) });
   // Inside a level: the worker is at its longest piece of work.
   await page.waitForFunction(() => document.querySelector("#work-bar").value > 0.2);

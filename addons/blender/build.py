@@ -30,7 +30,11 @@ PLATFORMS = {
     "windows-x64": ("win_amd64",),
     "macos-arm64": ("macosx_14_0_arm64", "macosx_12_0_arm64", "macosx_11_0_arm64"),
 }
-PYTHON_TAG = "import sys; print('%d.%d' % sys.version_info[:2])"
+PLATFORM_OF = {"Linux": "linux-x64", "Windows": "windows-x64", "Darwin": "macos-arm64"}
+PYTHON_TAG = """
+import platform, sys
+print("%d.%d" % sys.version_info[:2], platform.system())
+"""
 TOOL = """
 import bpy
 from pathlib import Path
@@ -39,12 +43,13 @@ print(next(scripts.glob("addons_core/bl_pkg/cli/blender_ext.py")))
 """
 
 
-def main(python: str, platform: str = "linux-x64") -> None:
+def main(python: str, platform: str | None = None) -> None:
     """Build the zip, and let Blender validate what was packed."""
+    tool = said(python, "-c", TOOL).splitlines()[-1]
+    version, system = said(python, "-c", PYTHON_TAG).split()
+    platform = platform or PLATFORM_OF.get(system, system)
     if platform not in PLATFORMS:
         raise SystemExit(f"{platform}: expected one of {', '.join(PLATFORMS)}")
-    tool = said(python, "-c", TOOL).splitlines()[-1]
-    version = said(python, "-c", PYTHON_TAG)
     with tempfile.TemporaryDirectory() as folder:
         stage, packed = Path(folder) / "pns_refine", Path(folder) / "packed"
         packed.mkdir()

@@ -38,13 +38,8 @@ def status_kib(name: str) -> int:
     return 0
 
 
-def serve(
-    refine: Callable[[], tuple[np.ndarray, np.ndarray]], after_first: Callable[[], object] = int
-) -> None:
-    """Make a run for each line that says so, and print what it took.
-
-    ``after_first`` is called once, outside what is measured.
-    """
+def serve(refine: Callable[[], tuple[np.ndarray, np.ndarray]]) -> None:
+    """Make a run for each line that says so, and print what it took."""
     for line in sys.stdin:
         if line.strip() != "run":
             return
@@ -58,5 +53,3 @@ def serve(
         since_start = time.process_time()
         took = {"seconds": seconds, "processor": spent, "processor_since_start": since_start}
         print(json.dumps(took | {"mib": mib} | made), flush=True)
-        after_first()
-        after_first = int  # does nothing

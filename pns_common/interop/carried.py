@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, SupportsIndex
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Integer, Shaped
 
 from pns_common.creases import Creases, as_pairs
 from pns_common.errors import ParameterError
@@ -46,7 +46,7 @@ class CarriedMesh:
     """
 
     vertices: Float[np.ndarray, "V 3"]
-    faces: Int[np.ndarray, "F 3"]
+    faces: Integer[np.ndarray, "F 3"]
     points: Data = field(default_factory=_nothing)
     corners: Data = field(default_factory=_nothing)
     cells: Data = field(default_factory=_nothing)
@@ -89,7 +89,7 @@ def refine_carried(
     return CarriedMesh(positions, faces, points, corners, cells), refinement
 
 
-def _renamed(creases: Any, joined: Int[np.ndarray, " V"]) -> Int[np.ndarray, "N 2"]:
+def _renamed(creases: Any, joined: Integer[np.ndarray, " V"]) -> Integer[np.ndarray, "N 2"]:
     """Return creases by the joined vertices.
 
     Raises:
@@ -106,7 +106,7 @@ def _renamed(creases: Any, joined: Int[np.ndarray, " V"]) -> Int[np.ndarray, "N 
 
 def join_by_position(
     vertices: Float[np.ndarray, "V 3"],
-) -> tuple[Int[np.ndarray, " V"], Int[np.ndarray, " W"]]:
+) -> tuple[Integer[np.ndarray, " V"], Integer[np.ndarray, " W"]]:
     """Return the joined vertex of each vertex, and the first vertex of each joined one.
 
     They are numbered by first appearance: a mesh without equal positions keeps its numbers.

@@ -21,7 +21,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Integer
 
 from pns_common.base_scheme import BaseScheme
 from pns_common.kernels import loop as kernels
@@ -32,14 +32,14 @@ KEPT = 64
 WIDTH = 3
 
 
-def beta(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+def beta(valence: Integer[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
     """Return β_k, the weight of one neighbour in Loop's own cosine formula; 0 for valence 0."""
     k = np.maximum(valence, 1)
     weight = (5 / 8 - (3 / 8 + np.cos(2 * np.pi / k) / 4) ** 2) / k
     return np.where(valence > 0, weight, 0.0)
 
 
-def limit_ring_weight(valence: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+def limit_ring_weight(valence: Integer[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
     """Return w_k = 1 / (1 + 3 / (8 k β_k)), the ring's weight in the limit mask; 0 for k = 0.
 
     The limit of a smooth vertex is (1 − w_k) p + w_k (mean of its neighbours).

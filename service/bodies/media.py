@@ -27,7 +27,9 @@ FORMATS: dict[str, Kind] = {
     "model/off": "off",
 }
 MEDIA_TYPES: dict[Kind, str] = {kind: media for media, kind in FORMATS.items()}
-ACCEPTED = (*FORMATS, ZIP, MULTIPART)
+# Any glTF, or an archive of one, told by its first bytes: generated clients send no other type.
+BYTES = "application/octet-stream"
+ACCEPTED = (*FORMATS, ZIP, MULTIPART, BYTES)
 
 _WEIGHT = re.compile(r"q\s*=\s*(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)")
 

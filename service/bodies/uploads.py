@@ -32,6 +32,10 @@ def sent(body: bytes, content_type: str, limits: Limits) -> Sent:
     media_type = media.of_request(content_type)
     if media_type in media.FORMATS:
         return Sent(body, media.FORMATS[media_type])
+    if media_type == media.BYTES:
+        media_type = media.sniff(body)
+        if media_type != media.ZIP:
+            return Sent(body, media.FORMATS[media_type])
     if media_type == media.ZIP:
         return _unpacked(body, limits)
     files = sent_files(body, content_type)

@@ -20,9 +20,9 @@ log = logging.getLogger("pns.service")
 class FileAnswer(Response):
     """Sends a memory file piece by piece, then lets go of what the request held.
 
-    How fast a client must take it is its connection's business. One who is gone is sent nothing
-    more: the pieces that are left would be read for nobody, and hold the event loop. `sent` is
-    called once all of it was sent, and not where it is refused, cut off, or nobody is there.
+    A client that takes nothing of it for `stall_seconds` is cut off. One that is gone is sent
+    nothing more: the pieces that are left would be read for nobody, and hold the event loop. `sent`
+    is called once all of it was sent, and not where it is refused or cut off, or the client gone.
     """
 
     def __init__(
@@ -32,6 +32,7 @@ class FileAnswer(Response):
         admission: Admission,
         client: str,
         *,
+        stall_seconds: float,
         media_type: str,
         headers: dict[str, str],
         sent: Callable[[], None] = lambda: None,
@@ -43,6 +44,7 @@ class FileAnswer(Response):
         self._held = held
         self._admission = admission
         self._client = client
+        self._stall_seconds = stall_seconds
         self._sent = sent
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -54,6 +56,8 @@ class FileAnswer(Response):
                     await self._send_start(send)
                     if await self._send_pieces(send, receive):
                         self._sent()
+            except TimeoutError:
+                log.warning("an answer is cut off: nothing for %g seconds", self._stall_seconds)
             except CutOffError:
                 log.warning("an answer is cut off: its memory is needed")
             except DrainingError:
@@ -79,7 +83,10 @@ class FileAnswer(Response):
                 if leaves.done():
                     break
                 piece = next(pieces, b"")
-                await send({"type": "http.response.body", "body": piece, "more_body": piece != b""})
+                async with asyncio.timeout(self._stall_seconds):
+                    await send(
+                        {"type": "http.response.body", "body": piece, "more_body": piece != b""}
+                    )
                 left -= len(piece)
         finally:
             leaves.cancel()

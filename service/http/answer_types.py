@@ -6,8 +6,6 @@ from fastapi import Request
 
 from ..bodies import media
 
-BYTES = "application/octet-stream"
-
 
 def answer_type(request: Request, file_type: str = media.GLB) -> str:
     """Return the media type that the client wants most; `file_type` is that of the file.
@@ -17,4 +15,4 @@ def answer_type(request: Request, file_type: str = media.GLB) -> str:
     # Several lines of it are one; without any, all are equal.
     accept = ",".join(request.headers.getlist("accept"))
     # In the order of preference among equals.
-    return max((file_type, media.JSON, BYTES), key=lambda kind: media.quality(kind, accept))
+    return max((file_type, media.JSON, media.BYTES), key=lambda kind: media.quality(kind, accept))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -21,12 +22,15 @@ from ..workers.desk import Desk
 from ..workers.jobs import Done, Work
 from ..workers.pool import Workers
 from ..workers.turns import Lane, Turns
-from . import docs_page, job_routes, layers, openapi, page, problems, result_room, routes
+from . import docs_page, job_routes, job_work, layers, openapi, page, problems, result_room, routes
 from .access.keys import read_keys
+from .access.origins import is_loopback
 from .admission import Admission
 from .catalogue import ReadOnce
 from .job_book import JobBook
+from .job_store import JobStore
 from .service import Service
+from .shared_jobs import SharedJobs
 from .watch.metrics import Metrics
 from .watch.tracing import tracer_from_environment
 
@@ -91,12 +95,22 @@ def create_app(
             log.warning("open to everybody: no PNS_KEYS_FILE is set")
         else:
             log.info("open to the bearers of %d keys", len(keys))
+        if not settings.proxies and not is_loopback(settings.host):
+            log.warning(
+                "no PNS_PROXIES are set: an address may connect and ask as often as it likes"
+            )
         for pool in workers.values():
             pool.start()
+        shared = service.shared
+        adopting = shared and asyncio.create_task(shared.adopt_for_ever(service))
         try:
             yield
         finally:
+            if adopting is not None:
+                adopting.cancel()
             await book.close()
+            if shared is not None:
+                await shared.store.close()
             for pool in workers.values():
                 await pool.stop()
 
@@ -104,6 +118,7 @@ def create_app(
         title="PNS",
         summary="Subdivision surfaces with a small, bounded, learned correction",
         version=version("pns-subdivision"),
+        servers=[{"url": settings.prefix or "/"}],
         lifespan=lifespan,
         # Else a slash too many is answered with whatever host the request names.
         redirect_slashes=False,
@@ -122,6 +137,12 @@ def create_app(
     problems.install(app)
     models = ReadOnce(workers[Lane.SHORT], admission, catalogue, metrics.catalogue)
     service = Service(settings, desk, admission, models, book)
+    if settings.store is not None:
+        service.shared = SharedJobs(
+            JobStore(settings),
+            partial(job_work.job_json, service),
+            partial(job_work.begin_shared, service),
+        )
     app.include_router(routes.router(service))
     app.include_router(job_routes.router(service))
     app.include_router(docs_page.router())

@@ -6,10 +6,9 @@ import asyncio
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ..errors import LimitError, ServiceError, UnreadableError, check_limit
+from ..errors import ServiceError, UnreadableError, check_limit
 from . import problems
-from .connection.pace import Pace
-from .connection.parser import BYTES_A_PIECE, FLOODED, FREE_PIECES
+from .pace import Pace
 
 
 class UploadTimeoutError(ServiceError):
@@ -21,13 +20,12 @@ class UploadTimeoutError(ServiceError):
 
 
 class BodyLimit:
-    """ASGI layer that counts a request's body while it arrives, in bytes, pieces and seconds.
+    """ASGI layer that counts a request's body while it arrives, in bytes and seconds.
 
     A Content-Length over the limit is answered at once with 413. A body without one is counted: the
-    read that passes the limit raises LimitError inside the application, as does one of a body in
-    countless pieces; a read for which the client took longer than its pace allows raises
-    UploadTimeoutError. Only waiting for the client is counted, not what is done in between. What
-    nobody reads is the connection's to bound.
+    read that passes the limit raises LimitError inside the application; a read for which the client
+    took longer than its pace allows raises UploadTimeoutError. Only waiting for the client is
+    counted, not what is done in between.
     """
 
     def __init__(self, app: ASGIApp, *, max_bytes: int, pace: Pace) -> None:
@@ -45,7 +43,7 @@ class BodyLimit:
         except ServiceError as error:
             await problems.of_service_error(error)(scope, receive, send)
             return
-        await self.app(scope, self._counted(scope, receive), send)
+        await self.app(scope, self._counted(receive), send)
 
     def _check_announced(self, scope: Scope) -> None:
         for name, value in scope["headers"]:
@@ -57,12 +55,11 @@ class BodyLimit:
     def _check(self, size: int) -> None:
         check_limit("body", size, self.max_bytes, f"the body has {size} bytes or more")
 
-    def _counted(self, scope: Scope, receive: Receive) -> Receive:
+    def _counted(self, receive: Receive) -> Receive:
         size = 0
         waited = 0.0
         complete = False
         clock = asyncio.get_running_loop().time
-        is_flood = scope.get("extensions", {}).get(FLOODED, bool)
 
         async def counted() -> Message:
             nonlocal size, waited, complete
@@ -81,18 +78,6 @@ class BodyLimit:
                 size += len(message.get("body", b""))
                 complete = not message.get("more_body", False)
                 self._check(size)
-                if is_flood():
-                    raise _flood()
             return message
 
         return counted
-
-
-def _flood() -> LimitError:
-    return LimitError(
-        f"the body comes in more pieces than {FREE_PIECES}, each of fewer than {BYTES_A_PIECE} "
-        "bytes; send larger chunks",
-        limit="pieces",
-        allowed=FREE_PIECES,
-        found=FREE_PIECES + 1,
-    )

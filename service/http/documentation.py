@@ -6,7 +6,6 @@ from typing import Any
 
 from ..bodies import media
 from . import problems
-from .answer_types import BYTES
 from .problems import Problem
 
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
@@ -19,6 +18,13 @@ _BODY = {
             "schema": {"type": "object", "description": "glTF 2.0 with embedded (data:) buffers"}
         },
         **{kind: _BINARY for kind in media.FORMATS if kind not in (media.GLB, media.GLTF)},
+        media.BYTES: {
+            "schema": {
+                "type": "string",
+                "format": "binary",
+                "description": "a GLB, glTF JSON or an archive of one, told by its first bytes",
+            }
+        },
         media.ZIP: {
             "schema": {
                 "type": "string",
@@ -69,7 +75,7 @@ _SERVER_TIMING = {
 _FILE = {
     "description": "The refined file",
     # Plain bytes first: generators take the first kind that they know.
-    "content": {BYTES: _BINARY, media.GLB: _BINARY},
+    "content": {media.BYTES: _BINARY, media.GLB: _BINARY},
     "headers": _SERVER_TIMING,
 }
 
@@ -139,6 +145,7 @@ JOB_FIELDS: dict[str, Any] = {
     "share": {"type": "number", "description": "share of the work that is done, 0 … 1"},
     "estimate_seconds": {"type": ["number", "null"], "description": "until it ends"},
     "faces": {"type": ["integer", "null"], "description": "predicted refined faces"},
+    "format": {"type": "string", "description": "of its result, as it was asked for"},
     "problem": {
         "anyOf": [_named("Problem"), {"type": "null"}],
         "description": "what it failed with; its `request_id` is that of the request that made it",

@@ -14,7 +14,9 @@ from fastapi import Request
 from ..bodies import media
 from ..bodies.encodings import encoding_of
 from ..errors import InvalidParameter, check_limit
+from ..options import Options
 from ..request_ids import REQUEST_ID
+from ..settings import Settings
 from ..workers.job import Job
 from ..workers.jobs import Work
 from ..workers.memory_file import MemoryFile
@@ -35,6 +37,19 @@ class Wanted:
     report: bool
     folder: Path | None
     patience: float
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a job is made of beside its body; another replica may make it again."""
+
+    client: str
+    options: Options
+    model: str | None
+    target: media.Kind
+    content_type: str
+    encoding: str
+    request_id: str | None
 
 
 @asynccontextmanager
@@ -69,39 +84,58 @@ async def taken_in(
                 async for piece in request.stream():
                     counted.grow(len(piece))
                     body.append(piece)
-            page = files.enter_context(ProgressPage())
-            answer = files.enter_context(MemoryFile(wanted.folder)) if wanted.answer else None
-            report = files.enter_context(MemoryFile(wanted.folder)) if wanted.report else None
-            job = Job(
+            asked = Asked(
                 client=client.id,
-                faces_per_minute=client.faces_per_minute,
-                work=Work(
-                    body=body.name,
-                    answer=None if answer is None else answer.name,
-                    report=None if report is None else report.name,
-                    page=page.file.name,
-                    content_type=content_type,
-                    options=options,
-                    target=parameters.format,
-                    model=parameters.model,
-                    limits=settings.job_limits(),
-                    answer_bytes=None if wanted.folder is None else int(settings.result_bytes),
-                    request_id=REQUEST_ID.get(),
-                    encoding=encoding,
-                    body_bytes=int(settings.body),
-                ),
-                body=body,
-                answer=answer,
-                report=report,
-                page=page,
-                upload_seconds=time.perf_counter() - began,
-                must_end=time.monotonic() + wanted.patience,
+                options=options,
+                model=parameters.model,
+                target=parameters.format,
+                content_type=content_type,
+                encoding=encoding,
+                request_id=REQUEST_ID.get(),
             )
-            # From here on they are the job's.
+            job = made_of(settings, asked, body, wanted)
+            # From here on the body is the job's.
             files.pop_all()
-            # Also where its work never begins.
-            held.callback(job.close)
+        job.faces_per_minute = client.faces_per_minute
+        job.upload_seconds = time.perf_counter() - began
+        # Also where its work never begins.
+        held.callback(job.close)
         yield job
+
+
+def made_of(settings: Settings, asked: Asked, body: MemoryFile, wanted: Wanted) -> Job:
+    """Make the job of a body that is there, with the files that it fills. Raises NoStorageError."""
+    with ExitStack() as files:
+        page = files.enter_context(ProgressPage())
+        answer = files.enter_context(MemoryFile(wanted.folder)) if wanted.answer else None
+        report = files.enter_context(MemoryFile(wanted.folder)) if wanted.report else None
+        work = Work(
+            body=body.name,
+            answer=None if answer is None else answer.name,
+            report=None if report is None else report.name,
+            page=page.file.name,
+            content_type=asked.content_type,
+            options=asked.options,
+            model=asked.model,
+            target=asked.target,
+            limits=settings.job_limits(),
+            answer_bytes=None if wanted.folder is None else int(settings.result_bytes),
+            request_id=asked.request_id,
+            encoding=asked.encoding,
+            body_bytes=int(settings.body),
+        )
+        files.pop_all()
+    return Job(
+        client=asked.client,
+        faces_per_minute=None,
+        work=work,
+        body=body,
+        answer=answer,
+        report=report,
+        page=page,
+        upload_seconds=0.0,
+        must_end=time.monotonic() + wanted.patience,
+    )
 
 
 def owner_of(client: Client) -> str | None:

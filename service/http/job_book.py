@@ -40,6 +40,8 @@ class Entry:
         owner: whose it is; None for everybody who knows its id.
         networks: what it counts for: its client, and the wider networks of its address.
         size: bytes of its result; None before its end.
+        adopted: whether another replica of the service took it in.
+        cancelled: whether its client has cancelled it.
         promised_until: on the clock of `time.monotonic`; until then it stays, whoever needs room.
     """
 
@@ -50,6 +52,8 @@ class Entry:
     end: asyncio.TimerHandle | None = None
     size: int | None = None
     promised_until: float = 0.0
+    adopted: bool = False
+    cancelled: bool = False
 
     @property
     def is_promised(self) -> bool:
@@ -100,6 +104,10 @@ class JobBook:
         entry = self._entries[job.id] = Entry(job, owner, networks or (job.client,))
         return entry
 
+    def has(self, job_id: str) -> bool:
+        """Return whether a job is in the book, whoever may see it."""
+        return job_id in self._entries
+
     def find(self, job_id: str, client: str) -> Entry:
         """Return the entry of a job that this client may see. Raises NoSuchJobError."""
         entry = self._entries.get(job_id)
@@ -127,6 +135,11 @@ class JobBook:
         entry.promised_until = time.monotonic() + self._promised_seconds
         entry.end = asyncio.get_running_loop().call_later(self._seconds, self.forget, job.id)
         self._ended[job.id] = entry
+
+    def hand_over(self, job: Job) -> None:
+        """Forget a job whose result lies elsewhere, and let go of its files here."""
+        self._entries.pop(job.id, None)
+        _release(job)
 
     def forget(self, job_id: str) -> None:
         """Strike a job out, with its result; one that is not there is no error."""
@@ -167,8 +180,8 @@ class JobBook:
         def rank(entry: Entry) -> tuple[bool, bool, int, int]:
             useful = entry.job.state is State.DONE
             client = entry.networks[0]
-            greed = (sizes[client], 0) if by_size else (jobs[client], -(entry.size or 0))
-            return not useful, entry.job.fetched.is_set(), *greed
+            most, least = (sizes[client], 0) if by_size else (jobs[client], entry.size or 0)
+            return not useful, entry.job.fetched.is_set(), most, -least
 
         # The first of equals is the oldest.
         return max(free, key=rank)

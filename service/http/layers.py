@@ -9,13 +9,11 @@ from starlette.types import ASGIApp
 
 from ..settings import Settings
 from .access.bearer import Bearer
-from .access.forwarded import Forwarded
 from .access.keys import Entry
 from .access.origins import Origins, hosts_of
-from .as_said import AsSaid
 from .body_limits import BodyLimit
-from .connection.pace import Pace
 from .head import Head
+from .pace import Pace
 from .watch.journal import Journal
 from .watch.metrics import Metrics
 from .watch.tracing import Traced
@@ -56,11 +54,8 @@ def around(
             allow_headers=TAKEN,
             expose_headers=EXPOSED,
         )
-    app = AsSaid(app)
     app = Journal(app, (metrics.request,))
-    if tracer is not None:
-        app = Traced(app, tracer)
-    return Forwarded(app, settings.proxies)
+    return app if tracer is None else Traced(app, tracer)
 
 
 def upload_pace(settings: Settings) -> Pace:

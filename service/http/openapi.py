@@ -75,6 +75,9 @@ def _described(document: dict[str, Any]) -> dict[str, Any]:
                 for status, text in (EVERYWHERE | also).items():
                     responses.setdefault(status, _problem(text))
                 operation["security"] = [{}, {"key": []}]
+            else:
+                # Nobody needs a key.
+                operation["security"] = []
             for status, answer in responses.items():
                 own = answer.get("headers", {})
                 answer["headers"] = own | HEADERS.get(status, {}) | _REQUEST_ID

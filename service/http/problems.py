@@ -98,9 +98,6 @@ def of_service_error(error: ServiceError) -> JSONResponse:
             headers["Retry-After"] = str(error.retry_after)
     if isinstance(error, UnauthorizedError):
         headers["WWW-Authenticate"] = 'Bearer realm="pns"'
-    if error.status in (408, 413):
-        # What is left of the body is not read, so the connection cannot serve another request.
-        headers["Connection"] = "close"
     return problem(error.status, error.code, error.title, error.detail, headers=headers, **members)
 
 

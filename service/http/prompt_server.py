@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
 
 import uvicorn
 
 
 class PromptServer(uvicorn.Server):
-    """A server without signal handlers, whose idle connections end in time.
+    """A server whose idle connections end in time.
 
     A connection is idle while it has no request under way: nothing was sent, or half a head, or it
     rests after an answer. It ends `head_seconds` later; where there are more than `most`
-    connections, those that are idle for longest end at once.
+    connections, those that are idle for longest end at once. One whose client still takes its
+    answer is idle once it takes none of it any more.
     """
 
     def __init__(
@@ -28,12 +31,14 @@ class PromptServer(uvicorn.Server):
         self._listening = listening
         self._head_seconds = head_seconds
         self._most = most
-        # By connection: its requests so far are not counted, only since when it is idle.
-        self._idle_since: dict[object, float] = {}
+        # By connection: since when it is idle, after which request, and what of its answer its
+        # client has not taken yet, in bytes.
+        self._idle: dict[Any, tuple[float, Any, int]] = {}
 
-    def capture_signals(self) -> AbstractContextManager[None]:
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
         """Leave the signals to another server of this process."""
-        return nullcontext()
+        yield
 
     async def serve(self, sockets: list[socket.socket] | None = None) -> None:
         """Serve on the sockets that it was made with, or as its configuration says."""
@@ -46,15 +51,20 @@ class PromptServer(uvicorn.Server):
 
     def _end_idle(self, now: float) -> None:
         connections = self.server_state.connections
-        idle = {
-            connection: self._idle_since.get(connection, now)
-            for connection in connections
-            if (cycle := getattr(connection, "cycle", None)) is None or cycle.response_complete
-        }
-        self._idle_since = dict(sorted(idle.items(), key=lambda item: item[1]))
+        before, self._idle = self._idle, {}
+        for connection in connections:
+            # Of the one protocol that is served here.
+            cycle: Any = getattr(connection, "cycle", None)
+            closing = connection.transport.is_closing()
+            if closing or cycle is None or cycle.response_complete:
+                untaken = connection.transport.get_write_buffer_size()
+                since, last, left = before.get(connection, (now, cycle, untaken))
+                rests = last is cycle and left == untaken
+                self._idle[connection] = (since if rests else now, cycle, untaken)
         too_many = len(connections) - self._most
-        for number, (connection, since) in enumerate(self._idle_since.items()):
+        oldest = sorted(self._idle, key=lambda connection: self._idle[connection][0])
+        for number, connection in enumerate(oldest):
+            waited = now - self._idle[connection][0]
             # One that has just come may have sent its head.
-            gives_way = number < too_many and since < now
-            if gives_way or now - since >= self._head_seconds:
-                connection.transport.close()
+            if waited >= self._head_seconds or (number < too_many and waited > 0):
+                connection.transport.abort()

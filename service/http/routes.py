@@ -92,6 +92,7 @@ async def _subdivide(
             held.pop_all(),
             service.admission,
             job.client,
+            stall_seconds=settings.stall_seconds,
             media_type=kind,
             headers={"Server-Timing": stages_text, "Vary": "Accept"},
         )

@@ -6,7 +6,6 @@ import asyncio
 import logging
 import signal
 import socket
-from functools import partial
 from types import FrameType
 
 import uvicorn
@@ -14,13 +13,9 @@ from fastapi import FastAPI
 
 from .. import log_lines
 from ..settings import Settings, StartError
+from . import descriptors
 from .admission import Admission
 from .app import create_app
-from .connection import descriptors
-from .connection.crowd import Crowd
-from .connection.pace import Pace
-from .connection.protocol import BoundedProtocol
-from .connection.shared import Bounds, Shared
 from .prompt_server import PromptServer
 from .watch.metrics import Metrics
 from .watch.scrapes import scrapes
@@ -29,13 +24,15 @@ log = logging.getLogger("pns.service")
 
 # After draining, what is still in the sockets' buffers may go out.
 FLUSH_SECONDS = 2
-# Connections that may wait, in the system, to be taken.
-WAITING = 2048
+# Connections that wait in the system, and that the event loop takes of them in a turn.
+WAITING, A_TURN = 2048, 32
+# The longest head: request line and headers together.
+HEAD_BYTES = 16 * 1024
 # Connections to the metrics.
 MOST_SCRAPERS = 16
 
 
-class DrainingServer(uvicorn.Server):
+class DrainingServer(PromptServer):
     """On a first signal it takes nothing new, and exits once no request is under way.
 
     Bodies that have not arrived whole by then are refused: they may never. Until it exits it still
@@ -44,18 +41,23 @@ class DrainingServer(uvicorn.Server):
     """
 
     def __init__(
-        self,
-        config: uvicorn.Config,
-        admission: Admission,
-        drain_seconds: float,
-        beside: uvicorn.Server | None = None,
+        self, app: FastAPI, settings: Settings, beside: uvicorn.Server | None = None
     ) -> None:
-        super().__init__(config)
-        self._admission = admission
-        self._drain_seconds = drain_seconds
+        most = descriptors.fitting(settings)
+        super().__init__(configuration(app, settings, most), settings.head_seconds, most)
+        metrics: Metrics = app.state.metrics
+        metrics.gauge("pns_connections", "Open connections", self.count)
+        self._admission: Admission = app.state.admission
+        self._drain_seconds = settings.drain_seconds
         self._beside = beside
         self._deadline: float | None = None
         self._signals = 0
+
+    def count(self) -> int:
+        """Count the open connections."""
+        return len(self.server_state.connections)
+
+    capture_signals = uvicorn.Server.capture_signals
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Listen, with a longer queue than what is taken of it in a turn."""
@@ -77,6 +79,11 @@ class DrainingServer(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Close the admission; uvicorn calls this as the signal handler."""
+        if not self._signals:
+            # The next request on a connection would meet its end. The list is that of answers under
+            # way, too; the other is what it is made anew of.
+            for headers in (self.server_state.default_headers, self.config.encoded_headers):
+                headers.append((b"connection", b"close"))
         self._signals += 1
         self._admission.draining = True
         # The third is for a shutdown that hangs.
@@ -107,10 +114,7 @@ def serve(settings: Settings) -> None:
     with _listening(settings.host, settings.port, "give another --host or --port"):
         log_lines.configure()
         app = create_app(settings)
-        metrics = _metrics_server(app.state.metrics, settings)
-    server = DrainingServer(
-        configuration(app, settings), app.state.admission, settings.drain_seconds, metrics
-    )
+        server = DrainingServer(app, settings, _metrics_server(app.state.metrics, settings))
     # Under nohup the signal stays ignored.
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
         signal.signal(signal.SIGHUP, server.hang_up)
@@ -136,55 +140,35 @@ def _metrics_server(metrics: Metrics, settings: Settings) -> uvicorn.Server | No
     log.info("metrics on http://%s:%d/metrics", host, listening.getsockname()[1])
     config = uvicorn.Config(
         scrapes(metrics.registry),
+        http="h11",
         lifespan="off",
         ws="none",
         proxy_headers=False,
         server_header=False,
         log_config=None,
         access_log=False,
+        h11_max_incomplete_event_size=HEAD_BYTES,
         timeout_graceful_shutdown=FLUSH_SECONDS,
     )
     return PromptServer(config, settings.head_seconds, MOST_SCRAPERS, [listening])
 
 
-def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:
-    """Return uvicorn's settings, and the protocol that takes over where they end."""
-    admission: Admission = app.state.admission
-    shared = Shared(
-        Bounds(
-            head_seconds=settings.head_seconds,
-            answer=Pace(
-                rate=int(settings.rate),
-                grace=settings.grace_seconds,
-                idle=settings.stall_seconds,
-                whole=settings.answer_seconds,
-            ),
-            linger_seconds=settings.linger_seconds,
-            # A client reads its 413 only once it has sent what it has, or most of it.
-            body_bytes=2 * int(settings.body),
-        ),
-        Crowd(
-            descriptors.fitting(settings),
-            settings.connections_of_address,
-            settings.proxies,
-        ),
-        drains=lambda: admission.draining,
-    )
-    metrics: Metrics = app.state.metrics
-    metrics.gauge("pns_connections", "Open connections", lambda: len(shared.crowd))
-    metrics.count("pns_refused_connections", "Connections refused", lambda: shared.crowd.refused)
+def configuration(app: FastAPI, settings: Settings, most: int) -> uvicorn.Config:
+    """Return uvicorn's settings, for `most` connections beside those that are idle."""
     return uvicorn.Config(
         app,
         host=settings.host,
         port=settings.port,
-        http=partial(BoundedProtocol, shared=shared),  # pyright: ignore[reportArgumentType]
+        # The other parser bounds no head.
+        http="h11",
+        h11_max_incomplete_event_size=HEAD_BYTES,
         ws="none",
-        # Whose Forwarded headers are believed is the application's to say.
-        proxy_headers=False,
+        proxy_headers=bool(settings.proxies),
+        forwarded_allow_ips=[str(network) for network in settings.proxies],
         server_header=False,
+        limit_concurrency=most + descriptors.BEYOND,
+        backlog=A_TURN,
         timeout_keep_alive=settings.keep_alive_seconds,  # pyright: ignore[reportArgumentType]
-        # asyncio takes as many connections in one turn, before it looks at any of them.
-        backlog=descriptors.A_TURN,
         # Its loggers are configured with ours, and the journal says what an access log would.
         log_config=None,
         access_log=False,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..settings import Settings
 from ..workers.desk import Desk
@@ -10,8 +11,11 @@ from .admission import Admission
 from .catalogue import ReadOnce
 from .job_book import JobBook
 
+if TYPE_CHECKING:
+    from .shared_jobs import SharedJobs
 
-@dataclass(frozen=True)
+
+@dataclass
 class Service:
     """One service: its settings, its desk, who is inside, and what it keeps."""
 
@@ -20,3 +24,4 @@ class Service:
     admission: Admission
     models: ReadOnce
     book: JobBook
+    shared: SharedJobs | None = None

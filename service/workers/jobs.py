@@ -162,7 +162,9 @@ def _body_of(work: Work) -> bytes:
 
 
 def _learned_levels(work: Work) -> int:
-    """Return at how many levels a model acts."""
+    """Return at how many levels a model acts: all in format 1, one in format 4."""
+    from pns_common.model.card import PAPER_FORMAT
+
     if work.options.scheme != "pns":
         return 0
     try:
@@ -170,7 +172,7 @@ def _learned_levels(work: Work) -> int:
     except NoModelError:
         # The job will say so, at once.
         return 0
-    return work.options.levels if card.learned_levels is None else card.learned_levels
+    return work.options.levels if card.format == PAPER_FORMAT else 1
 
 
 @contextmanager

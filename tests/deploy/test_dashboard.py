@@ -8,7 +8,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from service.http.app import create_app
-from service.http.server import configuration
+from service.http.server import DrainingServer
 from service.http.watch.scrapes import scrapes
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
@@ -26,7 +26,7 @@ def served():
     """The names and labels of all series, after a request of each kind."""
     settings = Settings(workers=1)
     app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
-    configuration(app, settings)
+    DrainingServer(app, settings)
     with local(app) as client:
         glb = {"Content-Type": "model/gltf-binary"}
         while client.post("/subdivide", content=b"x", headers=glb).status_code != 200:

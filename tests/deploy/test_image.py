@@ -45,8 +45,8 @@ def test_what_is_installed_is_what_the_tests_ran_with():
 def test_what_the_service_names_is_in_the_image():
     project = (ROOT / "pyproject.toml").read_text()
     named = set()
-    for table in ("dependencies", "fast", "service"):
-        (block,) = re.findall(rf"^{table} = \[\n(.*?)^\]", project, re.MULTILINE | re.DOTALL)
+    for table in ("dependencies", "fast", "service", "store"):
+        (block,) = re.findall(rf"^{table} = \[\s*(.*?)\]$", project, re.MULTILINE | re.DOTALL)
         named |= {normal(name) for name in re.findall(r'"([A-Za-z0-9._-]+)', block)}
     installed = set(pins(REQUIREMENTS[0])) | set(pins(REQUIREMENTS[2]))
     assert named - {"pns-subdivision"} <= installed
@@ -77,4 +77,4 @@ def test_the_images_settings_are_settings():
 
 def test_the_kernels_of_the_installed_package_are_compiled():
     """In /src, `python -m` would take the sources there, and every worker would compile again."""
-    assert "cd / && /opt/pns/bin/python -m pns_common.warming" in DOCKERFILE
+    assert "cd / && NUMBA_CACHE_DIR=/opt/pns/kernels /opt/pns/bin/python -m" in DOCKERFILE

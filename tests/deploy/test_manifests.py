@@ -12,8 +12,12 @@ from threading import Thread
 
 import pytest
 
+from service.http.app import create_app
 from service.http.result_room import KEPT_SHARE
+from service.http.watch.scrapes import scrapes
 from service.settings import Settings
+from tests.support import stand_in_jobs as jobs
+from tests.support.live import local
 
 yaml = pytest.importorskip("yaml")
 
@@ -24,15 +28,21 @@ OBJECTS = list(yaml.safe_load_all((DEPLOY / "kubernetes" / "pns.yaml").read_text
 BY_KIND = {entry["kind"]: entry for entry in OBJECTS}
 DOCKERFILE = (ROOT / "Dockerfile").read_text()
 POD = BY_KIND["Deployment"]["spec"]["template"]["spec"]
-(CONTAINER,) = POD["containers"]
+PROXY, CONTAINER = POD["containers"]
 
 
-def test_the_manifests_are_valid():
+@pytest.mark.parametrize("name", ["pns.yaml", "replicas.yaml"])
+def test_the_manifests_are_valid(name, tmp_path):
+    # Those of operators have schemas of their own.
+    kept = list(yaml.safe_load_all((DEPLOY / "kubernetes" / name).read_text()))
+    kept = [entry for entry in kept if entry["kind"] != "ServiceMonitor"]
+    file = tmp_path / name
+    file.write_text(yaml.safe_dump_all(kept))
     tool = ROOT / ".venv-clients" / "bin" / "kubernetes-validate"
     program = str(tool) if tool.exists() else shutil.which("kubernetes-validate")
     if program is None:
         pytest.skip("needs kubernetes-validate (requirements/clients.txt)")
-    command = [program, "--strict", str(DEPLOY / "kubernetes" / "pns.yaml")]
+    command = [program, "--strict", str(file)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
@@ -42,12 +52,13 @@ def test_the_pod_fits_the_restricted_standard():
     assert POD["securityContext"]["runAsNonRoot"] is True
     assert POD["securityContext"]["seccompProfile"] == {"type": "RuntimeDefault"}
     assert POD["automountServiceAccountToken"] is False
-    context = CONTAINER["securityContext"]
-    assert context["allowPrivilegeEscalation"] is False
-    assert context["readOnlyRootFilesystem"] is True
-    assert context["capabilities"] == {"drop": ["ALL"]}
+    for container in (PROXY, CONTAINER):
+        context = container["securityContext"]
+        assert context["allowPrivilegeEscalation"] is False
+        assert context["readOnlyRootFilesystem"] is True
+        assert context["capabilities"] == {"drop": ["ALL"]}
     assert not {"hostNetwork", "hostPID", "hostIPC"} & set(POD)
-    assert all(set(volume) & {"emptyDir", "secret"} for volume in POD["volumes"])
+    assert all(set(volume) & {"emptyDir", "secret", "configMap"} for volume in POD["volumes"])
 
 
 def test_probes_ask_what_the_service_answers():
@@ -58,7 +69,8 @@ def test_probes_ask_what_the_service_answers():
         "livenessProbe": "/healthz",
     }
     ports = {port["name"]: port["containerPort"] for port in CONTAINER["ports"]}
-    assert ports == {"http": 8000, "metrics": 9000}
+    assert ports == {"service": 8000, "metrics": 9000}
+    assert {CONTAINER[name]["httpGet"]["port"] for name in probes} == {"service"}
 
 
 @pytest.mark.parametrize(("status", "healthy"), [(200, True), (503, False)])
@@ -123,8 +135,27 @@ def test_proxies_end_connections_that_rest_before_the_service_does():
         r"^    keepalive_timeout (\d+)s;", (DEPLOY / "proxy" / "nginx.conf").read_text(), re.M
     )
     assert int(seconds) < Settings().keep_alive_seconds
-    behind_ingress = {entry["name"]: entry["value"] for entry in CONTAINER["env"]}
-    assert float(behind_ingress["PNS_KEEP_ALIVE_SECONDS"]) > 60
+    # An ingress keeps them for a minute.
+    (seconds,) = re.findall(
+        r"^  keepalive_timeout (\d+)s;", (DEPLOY / "proxy" / "nginx.conf").read_text(), re.M
+    )
+    assert int(seconds) > 60
+
+
+def test_the_pods_proxy_leads_to_the_service_beside_it():
+    configuration = (DEPLOY / "proxy" / "nginx.conf").read_text()
+    ports = {port["name"]: port["containerPort"] for port in CONTAINER["ports"]}
+    assert f"server service:{ports['service']};" in configuration
+    assert {"ip": "127.0.0.1", "hostnames": ["service"]} in POD["hostAliases"]
+    (listens,) = re.findall(r"^    listen (\d+)", configuration, re.M)
+    assert PROXY["ports"] == [{"name": "http", "containerPort": int(listens)}]
+    (mounted,) = (m["mountPath"] for m in PROXY["volumeMounts"] if m["name"] == "trusted")
+    assert f"include {mounted}/*.conf;" in configuration
+    environment = {entry["name"]: entry["value"] for entry in CONTAINER["env"]}
+    assert environment["PNS_PROXIES"] == "127.0.0.1"
+    # It takes nothing away from the service while that finishes what it has.
+    before = PROXY["lifecycle"]["preStop"]["exec"]["command"]
+    assert int(before[1]) >= 5 + Settings().drain_seconds
 
 
 def test_only_the_proxy_is_reached_from_outside():
@@ -224,3 +255,57 @@ def test_what_requests_may_hold_fits_into_the_memory_that_there_is(where):
 
 def mebibytes(size):
     return int(size[:-1]) * {"m": 1, "g": 1024}[size[-1]]
+
+
+REPLICAS = list(yaml.safe_load_all((DEPLOY / "kubernetes" / "replicas.yaml").read_text()))
+
+
+def of_kind(kind, name):
+    (found,) = (
+        entry for entry in REPLICAS if (entry["kind"], entry["metadata"]["name"]) == (kind, name)
+    )
+    return found["spec"]
+
+
+def test_replicas_are_scaled_by_a_metric_that_the_service_has():
+    scaler = of_kind("HorizontalPodAutoscaler", "pns")
+    assert scaler["scaleTargetRef"]["name"] == BY_KIND["Deployment"]["metadata"]["name"]
+    assert scaler["minReplicas"] > 1
+    (metric,) = scaler["metrics"]
+    app = create_app(Settings(workers=1), warm_up=jobs.no_warm_up)
+    text = local(scrapes(app.state.metrics.registry)).get("/metrics").text
+    assert f"\n{metric['pods']['metric']['name']} " in text
+
+
+def test_one_replica_at_a_time_goes_and_all_are_watched():
+    labels = BY_KIND["Deployment"]["spec"]["selector"]
+    assert of_kind("PodDisruptionBudget", "pns") == {"maxUnavailable": 1, "selector": labels}
+    (endpoint,) = of_kind("ServiceMonitor", "pns")["endpoints"]
+    (port,) = of_kind("Service", "pns-metrics")["ports"]
+    assert endpoint["port"] == port["name"]
+    assert port["targetPort"] in {port["name"] for port in CONTAINER["ports"]}
+
+
+def test_the_store_is_the_services_alone_and_throws_nothing_away():
+    policy = of_kind("NetworkPolicy", "pns-store")
+    (rule,) = policy["ingress"]
+    assert rule["from"] == [{"podSelector": BY_KIND["Deployment"]["spec"]["selector"]}]
+    assert "egress" not in policy
+    (store,) = of_kind("Deployment", "pns-store")["template"]["spec"]["containers"]
+    arguments = " ".join(store["args"])
+    assert "--maxmemory-policy noeviction" in arguments
+    assert "--maxmemory 1gb" in arguments
+    assert store["resources"]["limits"]["memory"] == "1536Mi"
+
+
+def test_both_replicas_of_compose_share_one_store_and_one_name():
+    services = yaml.safe_load((DEPLOY / "compose.replicas.yaml").read_text())["services"]
+    stores = {services[name]["environment"]["PNS_STORE"] for name in ("service", "second")}
+    assert stores == {"redis://store:6379/0"}
+    assert Settings(store=stores.pop()).store
+    assert "service" in services["second"]["networks"]["inside"]["aliases"]
+    network = ip_network(COMPOSE["networks"]["inside"]["ipam"]["config"][0]["subnet"])
+    inside = [entry["networks"]["inside"]["ipv4_address"] for entry in services.values()]
+    inside.append(COMPOSE["services"]["proxy"]["networks"]["inside"]["ipv4_address"])
+    assert len(set(inside)) == 4
+    assert all(ip_address(address) in network for address in inside)

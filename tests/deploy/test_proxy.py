@@ -4,34 +4,22 @@ import http.client
 import json
 import logging
 import re
-import shutil
 import socket
-import subprocess
 import threading
 from contextlib import closing, suppress
-from pathlib import Path
 
 import pytest
 
 from tests.support.live import served
+from tests.support.proxy import proxied
 
-CONFIGURATION = Path(__file__).resolve().parents[2] / "deploy" / "proxy" / "nginx.conf"
 GLB = {"Content-Type": "model/gltf-binary"}
-
-
-def free_port():
-    with closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.fixture(scope="module")
 def proxy(tmp_path_factory):
-    """The address of a proxy, and a function that returns the clients that the service has seen."""
-    nginx = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
-    if nginx is None:
-        pytest.skip("needs nginx (Debian: nginx-light)")
-    folder, port = tmp_path_factory.mktemp("proxy"), free_port()
+    """The address of a proxy, the service's log of requests, and the proxy's folder."""
+    folder = tmp_path_factory.mktemp("proxy")
     lines = []
     handler = logging.Handler()
     handler.emit = lambda record: lines.append(record.fields | {"request_id": record.request_id})
@@ -39,36 +27,12 @@ def proxy(tmp_path_factory):
     level = journal.level
     journal.addHandler(handler)
     journal.setLevel(logging.INFO)
-    with served(workers=1, proxies="127.0.0.1") as (host, behind):
-        text = CONFIGURATION.read_text()
-        text = text.replace("service:8000", f"{host}:{behind}")
-        text = text.replace("listen 8080", f"listen 127.0.0.1:{port}").replace(
-            "/tmp/", f"{folder}/"
-        )
-        text = text.replace("/dev/stdout", str(folder / "access.log"))
-        # A client may say which address it has; the times are shorter than what is deployed.
-        whose = "set_real_ip_from 127.0.0.1; real_ip_header X-Client;"
-        text = text.replace("server_tokens off;", f"server_tokens off; {whose}")
-        text = re.sub(r"(client_\w+_timeout) 10s", r"\1 1s", text)
-        (folder / "nginx.conf").write_text(text)
-        command = [nginx, "-p", folder, "-c", folder / "nginx.conf", "-g", "daemon off;"]
-        errors = folder / "error.log"
-        with errors.open("wb") as stderr:
-            process = subprocess.Popen(command, stderr=stderr)
-        try:
-            pause = threading.Event()
-            for _ in range(300):
-                with closing(socket.socket()) as probe:
-                    if probe.connect_ex(("127.0.0.1", port)) == 0:
-                        break
-                assert process.poll() is None, errors.read_text()
-                pause.wait(0.1)
-            yield ("127.0.0.1", port), lines, folder
-        finally:
-            process.terminate()
-            process.wait(30)
-            journal.removeHandler(handler)
-            journal.setLevel(level)
+    try:
+        with served(workers=1, proxies="127.0.0.1") as behind, proxied(behind, folder) as address:
+            yield address, lines, folder
+    finally:
+        journal.removeHandler(handler)
+        journal.setLevel(level)
 
 
 def ask(address, method, path, body=None, headers=None):
@@ -176,6 +140,23 @@ def test_neither_bodies_nor_answers_are_collected_at_the_proxy(proxy):
         # The service still has most of it, however long the proxy could have taken it.
         for _ in range(20):
             assert "/subdivide" not in [line["route"] for line in heard(address, lines)]
+
+
+def test_a_site_of_ipv6_has_so_many_connections_whatever_its_subscribers(proxy):
+    """A /56 may be one subscriber's, and a /48 one site's."""
+    address, _, _ = proxy
+    upload = "POST /subdivide HTTP/1.1\r\nHost: a\r\nX-Client: {}\r\nContent-Length: 100\r\n\r\n"
+    held = [socket.create_connection(address, timeout=600) for _ in range(160)]
+    try:
+        for network, connection in enumerate(held):
+            connection.sendall(upload.format(f"2001:db8:0:{network:x}::1").encode())
+        said = [beginning(connection) for connection in reversed(held)]
+    finally:
+        for connection in held:
+            connection.close()
+    assert b"HTTP/1.1 429" in said
+    answer, _ = ask(address, "GET", "/limits", headers={"X-Client": "2001:db8:1::1"})
+    assert answer.status == 200
 
 
 @pytest.mark.parametrize("query", ["levels=9", "model=none", "levels=1"])

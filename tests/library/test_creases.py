@@ -1,4 +1,4 @@
-"""Sharp and soft edges: hard rules at 0 and 1, continuous between them, and found by their angle."""
+"""Sharp and soft edges: hard rules at 0 and 1, continuous in between, found by their angle."""
 
 import numpy as np
 import pytest
@@ -108,7 +108,9 @@ def test_an_angle_of_ones_own_finds_all_edges_beyond_it():
 def test_sharp_edges_do_not_depend_on_numbering(mesh, seed):
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(mesh.vertices))
-    other = Mesh(mesh.vertices[np.argsort(order)], order[mesh.faces][rng.permutation(len(mesh.faces))])
+    other = Mesh(
+        mesh.vertices[np.argsort(order)], order[mesh.faces][rng.permutation(len(mesh.faces))]
+    )
     pairs = {frozenset(order[pair].tolist()) for pair in sharp_edges(mesh)}
     assert {frozenset(pair.tolist()) for pair in sharp_edges(other)} == pairs
 
@@ -130,7 +132,8 @@ def test_creases_that_are_no_edges_are_refused_by_name(creases, name):
 
 
 def test_a_prism_keeps_its_rims():
-    mesh = Mesh(*prism([[np.cos(t), np.sin(t)] for t in np.arange(12) * np.pi / 6]))
+    turns = np.arange(12) * np.pi / 6
+    mesh = prism(np.stack([np.cos(turns), np.sin(turns)], axis=1))
     found = sharp_edges(mesh)
     heights = mesh.vertices[found][:, :, 2]
     assert len(found) == 24

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pns_common
-from pns_common import Mesh, MeshError, loop, pns, refine, refine_many
-from pns_common import parallel
+from pns_common import Mesh, MeshError, loop, parallel, pns, refine, refine_many
 from pns_common.model.session import Model
 from pns_common.topology import build_topology
 from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid, soups, three_pages

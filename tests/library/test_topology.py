@@ -45,9 +45,7 @@ def test_edges_are_numbered_by_first_appearance_and_classified(mesh):
     assert topology.edge_class.tolist() == classes
 
 
-polygons = st.lists(
-    st.lists(st.integers(0, 9), min_size=3, max_size=6), min_size=1, max_size=12
-)
+polygons = st.lists(st.lists(st.integers(0, 9), min_size=3, max_size=6), min_size=1, max_size=12)
 
 
 @given(polygons)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from pns_common.connectivity.topology import EdgeClass, build_topology
+from pns_common.topology import EdgeClass, build_topology
 from service.bodies.folder import folder_of
 from service.errors import ServiceError
 from service.gltf.subdivide import subdivide_gltf

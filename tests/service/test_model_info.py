@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL, OnnxModel, load_model, model_from_bytes
+from pns_common.model.file import DEFAULT_MODEL, load_model, model_from_bytes
+from pns_common.model.session import OnnxModel
 from service.model_info import print_model, print_models
-from tests.support.networks import vertex_model_bytes
+from tests.support.networks import default_model_bytes
 
 NESTED = {
     "ridge-held-out": {
@@ -24,18 +26,20 @@ NESTED = {
 
 @pytest.fixture
 def vertices() -> OnnxModel:
-    return model_from_bytes(vertex_model_bytes(0), "vertices")
+    return model_from_bytes(default_model_bytes(0, gate_sharpness=40.0, budget=0.25), "vertices")
 
 
-def with_card(model: OnnxModel, **changes: Any) -> OnnxModel:
-    return replace(model, card=replace(model.card, **changes))
+def with_card(model: OnnxModel, name: str | None = None, **changes: Any) -> OnnxModel:
+    other = copy.copy(model)
+    other.card, other.name = replace(model.card, **changes), name or model.name
+    return other
 
 
 def test_models_are_compared_in_80_columns(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, vertices: OnnxModel
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    long = replace(with_card(vertices, metrics=NESTED), name="symmetric-signed")
+    long = with_card(vertices, "symmetric-signed", metrics=NESTED)
     print_models([load_model("paper"), long, vertices])
     lines = capsys.readouterr().out.splitlines()
     assert all(len(line) <= 80 for line in lines)
@@ -50,7 +54,7 @@ def test_models_are_compared_in_80_columns(
 
 def test_the_default_alone_is_marked(capsys: pytest.CaptureFixture[str]) -> None:
     default = load_model()
-    print_models([default, replace(default, name="other")])
+    print_models([default, with_card(default, "other")])
     lines = capsys.readouterr().out.splitlines()
     assert sum(" * " in line for line in lines) == 1
     assert any(line.startswith(f"{DEFAULT_MODEL} *") for line in lines)
@@ -74,7 +78,7 @@ def test_all_that_a_card_says_is_shown(capsys: pytest.CaptureFixture[str]) -> No
     values = {tuple(part.strip() for part in line.split("│")) for line in shown if "│" in line}
     told = {row[0]: row[1] for row in values if len(row) == 2}
     assert told["fold angle θ"] == f"{model.card.fold_angle:g}"
-    assert told["learned levels K"] == str(model.card.learned_levels)
+    assert told["sharpness levels"] == str(model.card.sharpness_levels)
     fields = {name for name, value in vars(model.card).items() if value is not None}
     for name in fields - {"training", "metrics"}:
         assert any(label.startswith(name.replace("_", " ")) for label in told), name

@@ -4,9 +4,9 @@ python -m tests.soak                            # ten minutes, a service of its 
 python -m tests.soak --minutes 1440
 python -m tests.soak --address 127.0.0.1:8000 --one-source   # one that runs, a container's say
 
-From one source the attackers share the honest clients' slots: give the service more for one
-address than it has in all (PNS_CONNECTIONS_OF_ADDRESS=1024). Results that it keeps hold descriptors
-at the end (PNS_RESULT_SECONDS=5).
+A service of its own stands behind the proxy of deploy/ where there is nginx. From one source the
+attackers share the honest clients' slots. Results that it keeps hold descriptors at the end
+(PNS_RESULT_SECONDS=5).
 """
 
 from __future__ import annotations

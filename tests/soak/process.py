@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -15,10 +17,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
+from tests.support.proxy import proxied
+
 ROOT = Path(__file__).resolve().parents[2]
 PROPORTIONAL = re.compile(r"^Pss: +(\d+) kB$", re.MULTILINE)
 # Results are not kept for a quarter of an hour: they would still be there at the end.
-SETTINGS = {"PNS_WORKERS": "2", "PNS_RESULT_SECONDS": "5"}
+SETTINGS = {"PNS_WORKERS": "2", "PNS_RESULT_SECONDS": "5", "PNS_PROXIES": "127.0.0.1"}
+# The honest clients have one address together.
+HONEST_RATE = 200
 RUNNING = re.compile(r"running on http://([\d.]+):(\d+)")
 
 
@@ -33,7 +39,10 @@ class Held:
 
 @contextmanager
 def started(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
-    """A server on a free port of 127.0.0.1: its address and process id; its lines go to `log`."""
+    """A server behind the proxy of deploy/, or alone where there is no nginx.
+
+    Yields the address that clients ask, and the server's process id; its lines go to `log`.
+    """
     command = [sys.executable, "-c", "from service.cli import main; main()", "serve", "--port", "0"]
     with log.open("w") as lines:
         process = subprocess.Popen(command, cwd=ROOT, stderr=lines, env=os.environ | SETTINGS)
@@ -43,7 +52,15 @@ def started(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
             if process.poll() is not None:
                 raise RuntimeError(log.read_text()[-2000:])
             pause.wait(0.1)
-        yield (told[1], int(told[2])), process.pid
+        address = told[1], int(told[2])
+        if shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin"):
+            with (
+                tempfile.TemporaryDirectory() as folder,
+                proxied(address, Path(folder), seconds=10, rate=HONEST_RATE) as front,
+            ):
+                yield front, process.pid
+        else:
+            yield address, process.pid
     finally:
         process.terminate()
         process.wait(90)

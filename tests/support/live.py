@@ -8,12 +8,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import uvicorn
 from fastapi.testclient import TestClient
 from starlette.types import ASGIApp
 
 from service.http.app import create_app
-from service.http.server import configuration
+from service.http.server import DrainingServer
 from service.settings import Settings
 from service.workers.costs import Cost
 from service.workers.jobs import Done, Work
@@ -34,7 +33,7 @@ def served(
     """Host and port of a server whose workers obey their request's body, or do another job."""
     chosen = Settings(**{"port": 0} | settings)
     app = create_app(chosen, job=job, warm_up=jobs.no_warm_up, measure=measure)
-    server = uvicorn.Server(configuration(app, chosen))
+    server = DrainingServer(app, chosen)
     thread = threading.Thread(target=server.run)
     thread.start()
     try:

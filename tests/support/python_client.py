@@ -34,6 +34,7 @@ with Client(address, timeout=600) as client:
         client=client, body=SubdivideFilesBody(file()), levels=2, scheme=SubdivideScheme("loop")
     )
     Path(output).write_bytes(refined.payload.read())
+    raw = subdivide.sync(client=client, body=file(), levels=2, scheme=SubdivideScheme("loop"))
     made = report.sync(client=client, body=ReportFilesBody(file()))
     refused = subdivide.sync(client=client, body=SubdivideFilesBody(file()), levels=7)
     job = create_job.sync(client=client, body=CreateJobFilesBody(file()))
@@ -46,6 +47,7 @@ with Client(address, timeout=600) as client:
         "body_bytes": limits.sync(client=client).body_bytes,
         "models": [model.name for model in models.sync(client=client)],
         "job": str(job.state),
+        "raw": raw.payload.read() == Path(output).read_bytes(),
         "fetched": fetched.payload.read(4).decode(),
     }
 print(json.dumps(seen))

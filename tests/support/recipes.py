@@ -1,4 +1,4 @@
-"""Recipes cut down to a few steps, and one with a vertex rule in the paper's envelope."""
+"""Recipes cut down to a few steps."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import msgspec
 
-from train.models.recipe import Recipe, ToLimit, VertexRule
-from train.models.recipes import signed
+from train.models.recipe import Recipe, ToLimit
 
 
 def tiny(recipe: Recipe, steps: int = 4) -> Recipe:
@@ -16,11 +15,3 @@ def tiny(recipe: Recipe, steps: int = 4) -> Recipe:
         return replace(recipe, steps=steps)
     plan = msgspec.structs.replace(recipe.training, faces=100, pool=1)
     return replace(recipe, steps=2, training=plan)
-
-
-def both_rules(seed: int = 0) -> Recipe:
-    """The paper's envelope with symmetric networks for edges and old vertices (format 2)."""
-    rule = VertexRule("ring-10", hidden=(24, 24), gate_sharpness=1e3)
-    return replace(
-        signed(seed), name="both", hidden=(24, 24), budget=0.8, gate_sharpness=1e5, vertex=rule
-    )

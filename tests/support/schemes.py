@@ -1,9 +1,11 @@
-"""Schemes that break one promise each: what the certificates must find."""
+"""Methods that break one promise each: what the certificates must find."""
 
-import numpy as np
+from dataclasses import replace
 
-from pns_common.geometry.frames import edge_frames, edge_stencil
-from pns_common.schemes import Placement, Scheme, loop_edge_rule, loop_vertex_rule
+import torch
+
+from train.reference import Surroundings, edge_frames, on_edges, read_edges
+from train.refining import Method
 
 BUDGET, GATE_SHARPNESS = 0.5, 10.0
 
@@ -11,39 +13,31 @@ BUDGET, GATE_SHARPNESS = 0.5, 10.0
 def along_normal(amount, name="stand-in"):
     """Loop, and ``amount(h, x)`` along the frame's normal on interior edges."""
 
-    def edge_rule(level):
-        base, interior = loop_edge_rule(level), level.topology.interior
-        stencil = edge_stencil(
-            level.points,
-            level.normals,
-            level.topology.stencil[interior],
-            level.topology.edge_faces[interior],
-        )
-        frames = edge_frames(stencil)
-        displacement = np.zeros_like(base.loop)
-        size = BUDGET * amount(frames.length, frames.curvature)
-        displacement[interior] = size[:, None] * frames.normal
-        return Placement(base.loop, displacement, base.ratio, base.gate, base.degenerate)
+    def step(points, mesh, reference_length):
+        edges = read_edges(Surroundings(mesh, points), first_face=True)
+        frames = edge_frames(edges, first_face=True)
+        inside = torch.zeros(len(mesh.edges)).double().index_fill(0, mesh.interior, 1.0)
+        size = inside * BUDGET * amount(frames.length, frames.curvature)
+        displacement = size[:, None] * frames.axes[:, :, 1]
+        return on_edges(points, mesh, displacement, BUDGET * inside * frames.length**2, 0 * inside)
 
-    return Scheme(name, loop_vertex_rule, edge_rule)
+    return Method(name, step)
 
 
-def shifted(scheme, edges=0.0, vertices=0.0):
-    """A scheme whose positions are all off by a fixed vector along x."""
+def shifted(method, edges=0.0, vertices=0.0):
+    """A method whose positions are all off by a fixed vector along x, which no ratio shows."""
 
-    def moved(rule, shift):
-        def shifted_rule(level):
-            placement = rule(level)
-            positions = placement.positions + np.array([shift, 0, 0])
-            return Placement(positions, None, placement.ratio, placement.gate, placement.degenerate)
+    def step(points, mesh, reference_length):
+        made = method.rule(points, mesh, reference_length)
+        shift = torch.zeros_like(made.base)
+        shift[: len(points), 0], shift[len(points) :, 0] = vertices, edges
+        return replace(made, base=made.base + shift)
 
-        return shifted_rule
-
-    return Scheme("shifted", moved(scheme.vertex_rule, vertices), moved(scheme.edge_rule, edges))
+    return Method("shifted", step)
 
 
 def gate(x):
-    return np.tanh(GATE_SHARPNESS * x**2)
+    return torch.tanh(GATE_SHARPNESS * x**2)
 
 
 # What the operator does, and what it must not do.
@@ -52,6 +46,6 @@ TOO_FAR = along_normal(lambda h, x: 3 * h**2 * gate(x))
 ONE_POWER_OF_H = along_normal(lambda h, x: h * gate(x))
 NO_GATE = along_normal(lambda h, x: h**2)
 NO_GATE_ONE_POWER = along_normal(lambda h, x: h)
-GATE_OF_ORDER_ONE = along_normal(lambda h, x: h**2 * np.tanh(GATE_SHARPNESS * x))
-GATE_WITH_A_KINK = along_normal(lambda h, x: h**2 * np.tanh(np.sqrt(x)))
-JUMPING = along_normal(lambda h, x: h**2 * (np.floor(1e6 * h) % 2))
+GATE_OF_ORDER_ONE = along_normal(lambda h, x: h**2 * torch.tanh(GATE_SHARPNESS * x))
+GATE_WITH_A_KINK = along_normal(lambda h, x: h**2 * torch.tanh(torch.sqrt(x.clamp(min=0))))
+JUMPING = along_normal(lambda h, x: h**2 * (torch.floor(1e6 * h) % 2))

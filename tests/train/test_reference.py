@@ -5,14 +5,14 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import Delaunay
+
 from pns_common.curves import find_curves
 from pns_common.level import Level
 from pns_common.operator import Rule, edge_inputs, learned_level, vertex_inputs
 from pns_common.parallel import Blocks
 from pns_common.schemes.loop import LOOP
 from pns_common.topology import build_topology, split_triangles
-from scipy.spatial import Delaunay
-
 from train.connectivity import Connectivity, connect
 from train.data.primitives import icosphere
 from train.loop_masks import Mask, limit_mask, loop_mask

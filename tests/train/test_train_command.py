@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 import train.run
-from train.models.checkpoint import Checkpoint, load_checkpoint
+from train.models.checkpoint import load_checkpoint
 from train.models.recipes import paper
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,15 +41,12 @@ def test_seed_and_output_can_be_chosen(tmp_path, monkeypatch):
     "arguments",
     [
         ["train", "--output"],
-        ["distil", "CHECKPOINT", "--output"],
         ["certify", "--json"],
         ["reproduce", "headline", "--output"],
     ],
 )
 def test_what_cannot_be_written_is_told_before_the_work_begins(arguments, tmp_path, monkeypatch):
     monkeypatch.setattr(train.run, "fit", lambda *_: pytest.fail("it trains"))
-    monkeypatch.setattr(train.run, "load_checkpoint", lambda _: Checkpoint(paper(), None, {}, ""))
-    monkeypatch.setattr(train.run, "planned", lambda *_: None)
     blocked = tmp_path / "file"
     blocked.write_text("no folder")
     outcome = CliRunner().invoke(

@@ -19,7 +19,7 @@ from train.certificates.bodies import bumpy_sphere, random_motion
 from train.certificates.displacement import AT_MOST, worst_ratio
 from train.certificates.equivariance import EXACT, well_conditioned
 from train.connectivity import Connectivity, connect
-from train.data.grid import grid_faces, jittered_grid
+from train.data.datasets import grid_faces, jittered_grid
 from train.fitting.determinism import deterministic
 from train.models.from_recipe import initial_network, paper_rule
 from train.models.networks import BoundedNet

@@ -5,14 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
-from pns_common import Mesh, loop
+from pns_common import Mesh
 from train.certificates.bodies import Body, random_motion
-from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import Step, step
-from train.certificates.subject import Subject
+from train.certificates.subject import Certificate, Subject, worst
 from train.curve_rule import Curves
-from train.refining import refine
+from train.refining import loop_like, refine
 
 LEVELS = 2
 
@@ -52,12 +51,14 @@ def _off_loop(subject: Subject, mesh: Mesh, axis: int) -> float:
     """
     refined, base = (
         refine(mesh, rules, LEVELS, 1.0, creases=None).mesh.vertices
-        for rules in (subject.scheme, loop())
+        for rules in (subject.scheme, loop_like(subject.scheme))
     )
     if not subject.moves_curves:
         return float(np.abs(refined - base).max())
     across = (axis + 2) % 3
-    first, plain = (step(rules, mesh).positions for rules in (subject.scheme, loop()))
+    first, plain = (
+        step(rules, mesh).positions for rules in (subject.scheme, loop_like(subject.scheme))
+    )
     inside = ~_on_curves(step(subject.scheme, mesh))
     out_of_plane = np.abs(refined[:, across] - base[:, across]).max()
     return float(max(np.abs(first - plain)[inside].max(initial=0), out_of_plane))

@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from pns_common import Mesh, MeshError, clean
 from pns_common.reference_length import measure_reference_length
-from train.data.datasets import draw_ridges
-from train.data.grid import grid_faces, jittered_grid
+from train.data.datasets import draw_ridges, grid_faces, jittered_grid
 from train.spectra.stars import star
 
 MESH_ENDINGS = (".obj", ".off", ".ply", ".stl")

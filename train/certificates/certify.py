@@ -14,7 +14,6 @@ from pns_common import ModelError, PnsError
 from pns_common.model.file import DEFAULT_MODEL, load_model
 from train.certificates.affine import affine_reproduction
 from train.certificates.bodies import Body, flat_bodies, spiky_sphere, synthetic_bodies
-from train.certificates.certificate import Certificate
 from train.certificates.displacement import bounded_displacement
 from train.certificates.double_precision import double_model, read_bytes
 from train.certificates.equivariance import equivariance
@@ -24,13 +23,15 @@ from train.certificates.learned_once import (
     resolution_independence,
     smoothness_class,
 )
-from train.certificates.lifted_star import lifted_stars
 from train.certificates.model_file import keeps_its_word
-from train.certificates.planar_spectrum import planar_spectrum
-from train.certificates.regular import regular_smoothness
-from train.certificates.scaling import normal_variation_slope, proximity_slope
-from train.certificates.stability import lipschitz_slope
-from train.certificates.subject import Subject, subject_of_model
+from train.certificates.planar_spectrum import lifted_stars, planar_spectrum
+from train.certificates.scaling import (
+    lipschitz_slope,
+    normal_variation_slope,
+    proximity_slope,
+    regular_smoothness,
+)
+from train.certificates.subject import Certificate, Subject, subject_of_model
 from train.spectra.spectrum import VALENCES
 
 # Called with what comes next, how many steps are done, and of how many.

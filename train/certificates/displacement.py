@@ -14,11 +14,9 @@ from jaxtyping import Float, Int
 
 from pns_common import Mesh
 from train.certificates.bodies import Body
-from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
-from train.certificates.step import rounding
-from train.certificates.subject import Subject
-from train.certificates.trials import NO_CREASES, trials
+from train.certificates.step import NO_CREASES, rounding, trials
+from train.certificates.subject import Certificate, Subject, worst
 from train.refining import refine
 
 # Faces up to which a mesh is refined further.

@@ -7,10 +7,9 @@ from jaxtyping import Bool, Float
 
 from pns_common import Mesh
 from train.certificates.bodies import Body, random_motion
-from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import step
-from train.certificates.subject import Subject
+from train.certificates.subject import Certificate, Subject, worst
 from train.connectivity import connect
 from train.refining import AnyScheme
 from train.vectors import face_normals

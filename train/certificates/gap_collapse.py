@@ -12,12 +12,11 @@ from torch import Tensor
 
 from pns_common import pns
 from train.certificates.adversary import OnStep, Operator, ascend, initial_operator
-from train.certificates.lifted_star import LIFTS
+from train.certificates.planar_spectrum import LIFTS
 from train.connectivity import connect
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
 from train.models.torch_model import recipe_model
-from train.spectra.margin_gradient import margin_gradient
 from train.spectra.spectrum import (
     SPOKE,
     STEP,
@@ -123,3 +122,39 @@ class _Copies:
             )
         assert spectrum is not None  # FOLLOWED > 0
         return spectrum
+
+
+def operator_jacobian(operator: Operator, star: Star) -> Float[Tensor, "M M"]:
+    """Return the derivative of the refined inner coordinates by the inner coordinates.
+
+    The counterpart of `train.spectra.spectrum.jacobian`, which takes differences of any scheme.
+    """
+    level = connect(star.mesh.faces, len(star.mesh.vertices))
+    points, refined = torch.tensor(star.mesh.vertices), torch.from_numpy(star.refined)
+    where = (torch.from_numpy(star.inner),)
+
+    def inner_to_inner(inner: Float[Tensor, "N 3"]) -> Float[Tensor, " M"]:
+        return operator(points.index_put(where, inner), level).points[refined].reshape(-1)
+
+    derivative = torch.autograd.functional.jacobian(inner_to_inner, points[where])
+    return derivative.reshape(3 * len(star.inner), -1)
+
+
+def margin_gradient(spectrum: Spectrum) -> Float[np.ndarray, "L L"]:
+    """Return the derivative of the margin by each entry of the matrix.
+
+    dλ = l dJ r for the left and right eigenvectors of a simple eigenvalue, l r = 1.
+    """
+    tangent, other = spectrum.least_tangent, spectrum.largest_other
+    return _size_gradient(spectrum, tangent) - _size_gradient(spectrum, other)
+
+
+def _size_gradient(spectrum: Spectrum, index: int) -> Float[np.ndarray, "L L"]:
+    """Return d|λ|."""
+    value = spectrum.values[index]
+    return np.real(np.conj(value) / max(abs(value), 1e-300) * _gradient(spectrum, index))
+
+
+def _gradient(spectrum: Spectrum, index: int) -> np.ndarray:
+    """Return dλ, complex."""
+    return np.outer(spectrum.left[index], spectrum.right[:, index])

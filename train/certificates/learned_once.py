@@ -13,11 +13,9 @@ from jaxtyping import Float, Int
 from pns_common import Creases, Mesh, Scheme, loop
 from pns_common import refine as refine_by_library
 from train.certificates.bodies import Body
-from train.certificates.certificate import Certificate, worst
 from train.certificates.plain_loop import plain_loop
-from train.certificates.step import rounding, step
-from train.certificates.subject import Subject
-from train.certificates.trials import trials
+from train.certificates.step import rounding, step, trials
+from train.certificates.subject import Certificate, Subject, worst
 from train.refining import AnyScheme, refine
 
 # Child faces that Loop makes flatter than this, in squared edge lengths, have no direction.

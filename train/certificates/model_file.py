@@ -14,7 +14,7 @@ from jaxtyping import Float
 from pns_common import pns
 from pns_common.model.card import EDGE_FEATURES, VERTEX_FEATURES
 from pns_common.model.session import Model
-from train.certificates.certificate import Certificate
+from train.certificates.subject import Certificate
 from train.metrics.card import MEASURES
 
 BUDGETS = (1e-6, 0.1, 0.5, 1.0, 1e3)

@@ -1,17 +1,21 @@
-"""T8, planar spectral inheritance: at a flat k-star the scheme's linearisation is Loop's."""
+"""T8, planar spectral inheritance, and lifted stars, of which no theorem speaks.
+
+At a flat k-star the scheme's linearisation is Loop's. Off the plane the signed Reif margin is a
+diagnostic.
+"""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from pns_common import loop
-from train.certificates.certificate import Certificate, worst
-from train.certificates.subject import Subject
+from train.certificates.subject import Certificate, Kind, Subject, worst
 from train.refining import AnyScheme, refine
 from train.spectra.spectrum import (
     SPOKE,
     TANGENT_COUNT,
     closed_star,
+    follow_lift,
     jacobian,
     loop_eigenvalue,
     loop_gap,
@@ -83,3 +87,34 @@ def derivative_of_departure(scheme: AnyScheme, valence: int) -> float:
 def _value_high(measured: list[tuple[float, str]], high: float) -> tuple[float, float, float, str]:
     value, place = worst(measured)
     return value, -np.inf, high, place
+
+
+# Lift, in spokes.
+HIGHEST = 0.4
+
+LIFTS = tuple(np.linspace(0, HIGHEST, 9).tolist())
+
+
+def lifted_stars(subject: Subject, valences: Sequence[int]) -> list[Certificate]:
+    """Measure the least margin over valences at lift 0.4, and the largest |λ|, which 1 bounds."""
+    followed = [(follow_lift(subject.exact, valence, LIFTS)[-1], valence) for valence in valences]
+    least, at_least = min(followed, key=lambda entry: entry[0].margin)
+    largest, at_largest = max(followed, key=lambda entry: entry[0].largest)
+    below_one = float(np.nextafter(1, 0))
+    return [
+        Certificate(
+            "stars",
+            f"Reif margin at lift {HIGHEST:g}",
+            least.margin,
+            where=f"k = {at_least}",
+            kind=Kind.DIAGNOSTIC,
+        ),
+        Certificate(
+            "stars",
+            f"largest |λ| at lift {HIGHEST:g}",
+            largest.largest,
+            high=below_one,
+            where=f"k = {at_largest}",
+            kind=Kind.DIAGNOSTIC,
+        ),
+    ]

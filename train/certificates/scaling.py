@@ -1,7 +1,9 @@
-"""T4 and T6, the orders in h: one mesh scaled down with the reference length held at 1.
+"""T4 to T7: the orders in h, normals that settle, and a bounded answer to small moves.
 
-Features do not see the scale, so the correction falls as h² exactly, and normals approach Loop's
-as h.
+T4 and T6 scale one mesh down with the reference length held at 1: features do not see the scale,
+so the correction falls as h² exactly, and normals approach Loop's as h. T5 is measured, not proved:
+C¹ limits show in the refined meshes, where the angle between neighbouring faces goes to nothing.
+T7 moves vertices by ε, which moves the refined mesh by a multiple of ε.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,11 +12,10 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common import Mesh, loop
-from train.certificates.bodies import Body
-from train.certificates.certificate import Certificate, farthest
+from train.certificates.bodies import Body, bumpy_torus
 from train.certificates.step import step
-from train.certificates.subject import Subject
-from train.refining import AnyScheme
+from train.certificates.subject import Certificate, Kind, Subject, farthest
+from train.refining import AnyScheme, refine
 from train.vectors import face_normals
 
 # Powers of two: scaling is exact. Normals need small ones to be in the linear regime.
@@ -79,3 +80,53 @@ def _slope(
         return Certificate(theorem, name, expected, low, high, "the scheme is Loop on every mesh")
     slope, place = farthest(slopes, expected)
     return Certificate(theorem, name, slope, low, high, place)
+
+
+LEVELS = 5
+
+AT_LEAST = 0.5
+
+
+def regular_smoothness(subject: Subject, seed: int) -> Certificate:
+    """Measure T5 on a torus whose vertices are all regular: the order at which normals settle.
+
+    The value is the fall of the largest face-normal jump from the last level but one to the last,
+    in powers of two; 1 for Loop.
+    """
+    refined = refine(bumpy_torus(seed), subject.scheme, LEVELS, 1.0)
+    jumps = np.array([level.normal_jump for level in refined.levels])
+    order = float(np.log2(jumps[-2] / jumps[-1])) if jumps[-1] > 0 else np.inf
+    where = f"bumpy torus, level {LEVELS}: largest jump {np.degrees(jumps[-1]):.1f}°"
+    name = "normals settle in regular regions"
+    return Certificate("T5", name, order, low=AT_LEAST, where=where, kind=Kind.MEASURED)
+
+
+# In reference lengths; edges of the bodies are about 0.3 long.
+EPSILONS = 10.0 ** -np.arange(2, 8)
+
+# Gates of scale-free rules open within a few degrees: larger moves close and open them.
+SMALLER_EPSILONS = 10.0 ** -np.arange(4, 9)
+
+NEAR_ONE = 0.1
+
+
+def lipschitz_slope(subject: Subject, bodies: Sequence[Body], seed: int) -> Certificate:
+    """Measure T7: how the change of the refined mesh grows with a random move of every vertex.
+
+    A slope well below 1 is a jump: the change does not go to nothing with the move.
+    """
+    rng, measured = np.random.default_rng(seed), []
+    epsilons = EPSILONS if subject.learned_once is None else SMALLER_EPSILONS
+    for body in bodies:
+        move = rng.standard_normal(body.mesh.vertices.shape)
+        still = step(subject.exact, body.mesh).positions
+        changes = []
+        for epsilon in epsilons:
+            moved = Mesh(body.mesh.vertices + epsilon * move, body.mesh.faces)
+            apart = step(subject.exact, moved).positions - still
+            changes.append(np.linalg.norm(apart, axis=1).max())
+        measured.append((fitted_slope(epsilons, np.array(changes)), body.name))
+    slope, place = farthest(measured, 1.0)
+    return Certificate(
+        "T7", "Lipschitz slope", slope, 1 - NEAR_ONE, 1 + NEAR_ONE, place, Kind.MEASURED
+    )

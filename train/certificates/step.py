@@ -1,12 +1,16 @@
-"""One step of a scheme with what certificates need beside the refined mesh."""
+"""One step of a scheme with what certificates need beside it, and the meshes they try it on."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
 
 from pns_common import Mesh, loop
+from train.certificates.bodies import Body
+from train.certificates.subject import Subject
 from train.connectivity import Connectivity, connect
 from train.reference import Surroundings, edge_frames, read_edges
 from train.refining import AnyScheme, refine
@@ -40,7 +44,8 @@ class Step:
 
     def added(self, envelope: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
         """Return ‖δ‖ from positions and Loop's; where these round, from ratio and envelope."""
-        apart = np.linalg.norm(self.positions - step(loop(), self.mesh).positions, axis=1)
+        base = step(loop(), self.mesh).positions
+        apart = np.linalg.norm(self.positions - base, axis=1)
         return np.where(apart <= rounding(self.mesh), self.ratio * envelope, apart)
 
 
@@ -54,3 +59,36 @@ def step(scheme: AnyScheme, mesh: Mesh, creases: Int[np.ndarray, "N 2"] | None =
 def rounding(mesh: Mesh) -> float:
     """Return how far two ways of computing one position may differ."""
     return 16 * float(np.finfo(float).eps) * float(np.abs(mesh.vertices).max())
+
+
+# Of a mesh's size. A scale-free rule asks for a share of h: only on small meshes is that more than
+# the budget, which falls as h², and something to cut off.
+SMALL = 2.0**-10
+
+NO_CREASES = np.zeros((0, 2), dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A mesh with edges to be kept sharp, as pairs of vertices, the lower first."""
+
+    name: str
+    mesh: Mesh
+    creases: Int[np.ndarray, "N 2"]
+
+
+def trials(subject: Subject, bodies: Sequence[Body], seed: int) -> Iterator[Trial]:
+    """Yield each body as it is, and with creases; and the same where the budget cuts off."""
+    rng = np.random.default_rng(seed)
+    sizes = (1.0,) if subject.learned_once is None else (1.0, SMALL)
+    for body, size in product(bodies, sizes):
+        mesh = Mesh(size * body.mesh.vertices, body.mesh.faces)
+        name = body.name if size == 1 else f"{body.name} times {size:g}"
+        yield Trial(name, mesh, NO_CREASES)
+        yield Trial(f"creased {name}", mesh, drawn_creases(mesh, rng))
+
+
+def drawn_creases(mesh: Mesh, rng: np.random.Generator) -> Int[np.ndarray, "N 2"]:
+    """Return a quarter of a mesh's edges, which make darts, curves and corners."""
+    edges = np.unique(connect(mesh.faces, len(mesh.vertices)).edges.numpy(), axis=0)
+    return edges[rng.random(len(edges)) < 1 / 4]

@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common import Mesh
-from train.data.datasets import Dataset, Instance
-from train.data.grid import grid_faces, jittered_grid
+from train.data.datasets import Dataset, Instance, grid_faces, jittered_grid
 from train.surfaces.cad import Fillet, RoundedBox, Torus
 from train.surfaces.implicit import Surface
 

@@ -12,8 +12,15 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common import Mesh, clean
-from train.data.datasets import Instance
-from train.data.patches import marched
+from train.data.datasets import (
+    Dataset,
+    Instance,
+    grid_faces,
+    jittered_grid,
+    saddle_held_out,
+    sphere_ridge_held_out,
+)
+from train.data.patches import JITTER, marched, rounded_boxes, tori
 from train.data.plane_meshes import PlaneMesh, regular_grid, scattered, turned_grid
 from train.surfaces.cad import Fillet
 from train.surfaces.implicit import Ridge, Saddle, Surface
@@ -180,3 +187,36 @@ def _graph(surface: Ridge | CurvedRidge | Crossing | Bump | Saddle) -> Drawn:
 
 def _mesh(plane: PlaneMesh, lift: Lift) -> Mesh:
     return Mesh(lift(plane.points), plane.faces)
+
+
+COUNT = 10
+# No stream starts from it: streams are seeded by recipes, from 0.
+TEST_SEED = 9999
+
+# Families of the paper, which have test sets of their own.
+DRAWN_ELSEWHERE = ("ridge", "saddle")
+
+
+def trained_families() -> list[Dataset]:
+    """Return test sets of the families that are in the stream, but for ridges."""
+    drawn = [
+        family_set(name, family) for name, family in FAMILIES.items() if name not in DRAWN_ELSEWHERE
+    ]
+    return [saddle_held_out(), *drawn]
+
+
+def held_out_families() -> list[Dataset]:
+    """Return test sets of the families that no stream holds."""
+    crossings = family_set("crossing", crossing)
+    return [sphere_ridge_held_out(), crossings, tori(), rounded_boxes()]
+
+
+def family_set(name: str, family: Family) -> Dataset:
+    """Return draws of a family, each on the paper's 9 × 9 patch."""
+    rng = np.random.default_rng(TEST_SEED)
+    instances = []
+    for index in range(COUNT):
+        drawn = family(rng)
+        plane = jittered_grid(TEST_SEED + index, JITTER).double().numpy()
+        instances.append(Instance(drawn.surface, Mesh(drawn.lift(plane), grid_faces())))
+    return Dataset(f"{name}-held-out", tuple(instances))

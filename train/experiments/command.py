@@ -1,7 +1,14 @@
 """`python train/run.py reproduce`: progress with an estimate, and the page at the end."""
 
+import multiprocessing
 import os
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from queue import Queue
 from typing import Annotated
 
 import typer
@@ -10,11 +17,10 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from pns_common import PnsError
-from train.experiments.at_once import run_each
 from train.experiments.harness.experiment import Experiment
 from train.experiments.harness.laboratory import FULL, Laboratory, silent
 from train.experiments.harness.page import markdown_page
-from train.experiments.harness.reproduce import Record, read_record
+from train.experiments.harness.reproduce import Record, read_record, reproduce
 from train.experiments.registry import EXPERIMENTS
 from train.output_file import prepare_output
 
@@ -128,3 +134,65 @@ def _chosen(name: str | None, published: Path | None, assets: Path | None) -> li
 def _records(output: Path) -> dict[str, Record]:
     records = {name: read_record(output / "cache" / f"{name}.json") for name in EXPERIMENTS}
     return {name: record for name, record in records.items() if record is not None}
+
+
+# Called with an experiment's name, what it is doing, how many steps are done, and of how many.
+OnNews = Callable[[str, str, int, int], None]
+
+NEWS_SECONDS = 0.2
+
+
+def run_each(
+    experiments: list[Experiment],
+    laboratory: Laboratory,
+    output: Path,
+    processes: int,
+    on_news: OnNews,
+    *,
+    force: bool,
+) -> Iterator[tuple[Experiment, float]]:
+    """Yield each experiment when it has ended, with the seconds it took.
+
+    An experiment runs in one process and draws from seeds of its own: how many run at once changes
+    no digit.
+    """
+    if processes == 1:
+        for experiment in experiments:
+            here = replace(laboratory, progress=partial(on_news, experiment.name))
+            yield experiment, _seconds(experiment, here, output, force=force)
+        return
+    context = multiprocessing.get_context("spawn")
+    unwatched = replace(laboratory, progress=silent)
+    with context.Manager() as manager, ProcessPoolExecutor(processes, context) as pool:
+        news = manager.Queue()
+        running = {
+            pool.submit(_in_process, each.name, unwatched, output, news, force=force): each
+            for each in experiments
+        }
+        while running:
+            ended, _ = wait(running, NEWS_SECONDS, FIRST_COMPLETED)
+            while not news.empty():
+                on_news(*news.get())
+            for future in ended:
+                yield running.pop(future), future.result()
+
+
+def _in_process(
+    name: str,
+    laboratory: Laboratory,
+    output: Path,
+    news: Queue[tuple[str, str, int, int]],
+    *,
+    force: bool,
+) -> float:
+    def tell(text: str, done: int, of: int) -> None:
+        news.put((name, text, done, of))
+
+    here = replace(laboratory, progress=tell)
+    return _seconds(EXPERIMENTS[name], here, output, force=force)
+
+
+def _seconds(experiment: Experiment, laboratory: Laboratory, output: Path, *, force: bool) -> float:
+    began = time.perf_counter()
+    reproduce(experiment, laboratory, output, force=force)
+    return time.perf_counter() - began

@@ -5,7 +5,6 @@ from types import MappingProxyType
 
 from train.experiments.beyond import (
     cad,
-    decimation,
     fairness,
     families,
     features,
@@ -15,7 +14,6 @@ from train.experiments.beyond import (
     real_meshes,
     shading,
     spheres,
-    stability,
     whole_levels,
     whole_meshes,
 )
@@ -56,8 +54,6 @@ ORDERED: tuple[Experiment, ...] = (
     cad.EXPERIMENT,
     models.EXPERIMENT,
     families.EXPERIMENT,
-    stability.EXPERIMENT,
-    decimation.EXPERIMENT,
     real_meshes.TEST,
     real_meshes.VALIDATION,
     whole_meshes.EXPERIMENT,

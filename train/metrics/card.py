@@ -1,16 +1,25 @@
-"""What a model card says of a model's results, by names under which they can be measured again."""
+"""Held-out evaluation against Loop, and the named measures of a model card."""
 
 import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from pns_common import loop
-from train.data.datasets import Dataset, ridge_held_out, saddle_held_out, sphere_ridge_held_out
-from train.metrics.evaluation import compare_with_loop
-from train.metrics.one_step import Improvement, improvement
+import numpy as np
+from jaxtyping import Float
+
+from pns_common import Scheme, loop
+from train.connectivity import connect
+from train.data.datasets import (
+    Dataset,
+    Instance,
+    ridge_held_out,
+    saddle_held_out,
+    sphere_ridge_held_out,
+)
+from train.metrics.one_step import METRICS, Errors, Improvement, improvement, one_step_errors
 from train.metrics.whole_surface import whole_surface
 from train.models.recipe import OneStep, Recipe
-from train.refining import AnyScheme
+from train.refining import AnyScheme, Method, Smooth, refine
 
 LEVELS = 4
 
@@ -56,3 +65,32 @@ def card_metrics(recipe: Recipe, scheme: AnyScheme) -> dict[str, Mapping[str, Im
     """Measure a trained scheme for its card."""
     names = ONE_STEP if isinstance(recipe.training, OneStep) else TO_LIMIT
     return {name: MEASURES[name](scheme) for name in names}
+
+
+# For each metric its value on every instance of a data set.
+ErrorTable = Mapping[str, Float[np.ndarray, " N"]]
+
+
+# A scheme for each instance: for what may look at the surface, as the envelope's limit does.
+SchemeOf = Callable[[Instance], AnyScheme]
+
+
+def one_step_table(scheme: AnyScheme | SchemeOf, dataset: Dataset) -> ErrorTable:
+    """Refine every instance by one step in the paper's units and measure it."""
+    choose = (lambda _: scheme) if isinstance(scheme, Scheme | Method | Smooth) else scheme
+    rows = [_instance_errors(choose(instance), instance) for instance in dataset.instances]
+    return {metric: np.array([getattr(row, metric) for row in rows]) for metric in METRICS}
+
+
+def compare_with_loop(scheme: AnyScheme | SchemeOf, dataset: Dataset) -> dict[str, Improvement]:
+    """Return the paired improvement of a scheme over Loop for each metric."""
+    reference, method = one_step_table(loop(), dataset), one_step_table(scheme, dataset)
+    return {metric: improvement(reference[metric], method[metric]) for metric in METRICS}
+
+
+def _instance_errors(scheme: AnyScheme, instance: Instance) -> Errors:
+    mesh = instance.mesh
+    refined = refine(mesh, scheme, levels=1, reference_length=1.0).mesh
+    level = connect(mesh.faces, len(mesh.vertices))
+    inserted = refined.vertices[level.vertex_count + level.interior.numpy()]
+    return one_step_errors(instance.surface, mesh.vertices, level, inserted)

@@ -12,7 +12,7 @@ from torch import Tensor
 from train.connectivity import Connectivity
 from train.data.datasets import Dataset, Instance
 from train.loop_masks import loop_mask
-from train.metrics.evaluation import compare_with_loop
+from train.metrics.card import compare_with_loop
 from train.metrics.one_step import Improvement
 from train.reference import Step, Surroundings, edge_frames, on_edges, read_edges
 from train.refining import Method

@@ -24,7 +24,7 @@ VERTEX = "vertex."
 
 @dataclass(frozen=True, slots=True)
 class Distillation:
-    """How networks were fitted to the answers of others (train/fitting/distillation.py).
+    """Record of how networks were fitted to the answers of others.
 
     Attributes:
         teachers: hashes of the models whose mean answer they learned.

@@ -14,8 +14,7 @@ from torch import Tensor
 from pns_common import Mesh, ParameterError
 from train.refining import AnyScheme, refine
 from train.spectra import stars
-from train.spectra.star_symmetry import Subspace, keeps_blocks, symmetry_blocks
-from train.spectra.stars import Star
+from train.spectra.stars import Star, Subspace, keeps_blocks, symmetry_blocks
 
 # Spoke of every star, in reference lengths.
 SPOKE = 0.25

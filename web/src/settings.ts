@@ -11,6 +11,8 @@ export interface Settings {
   /** Degrees. */
   angle: number;
   uv: "linear" | "smooth";
+  /** Join vertices that nearly coincide. */
+  weld: boolean;
   normals: "auto" | "keep" | "smooth" | "limit";
 }
 
@@ -22,6 +24,9 @@ export interface Asked {
 
 export const LOOP = "loop";
 
+/** How near vertices have to be to be joined, in units of R: the length that the service's advice names. */
+const WELD = "0.001";
+
 export const DEFAULTS: Settings = {
   levels: 2,
   model: "",
@@ -30,6 +35,7 @@ export const DEFAULTS: Settings = {
   crease: "auto",
   angle: 40,
   uv: "linear",
+  weld: false,
   normals: "auto",
 };
 
@@ -58,6 +64,7 @@ export function query(settings: Settings, writing: Writing = {}): URLSearchParam
   if (!loop && settings.model) parameters.set("model", settings.model);
   if (!loop && settings.budget !== null) parameters.set("budget", String(settings.budget));
   if (settings.limit) parameters.set("limit", "true");
+  if (settings.weld) parameters.set("weld_tolerance", WELD);
   if (settings.normals !== "auto") parameters.set("normals", settings.normals);
   if (compress !== "none") parameters.set("compress", compress);
   if (format !== "glb") parameters.set("format", format);
@@ -82,7 +89,7 @@ export function toHash(settings: Settings, view: Record<string, string>): string
 export function fromHash(hash: string): { settings: Settings; view: Record<string, string> } {
   const given = Object.fromEntries(new URLSearchParams(hash.replace(/^#/, "")));
   const settings = { ...DEFAULTS };
-  const { levels, model, budget, limit, crease, angle, uv, normals, ...view } = given;
+  const { levels, model, budget, limit, crease, angle, uv, weld, normals, ...view } = given;
   settings.levels = whole(levels, 1, 6) ?? settings.levels;
   settings.model = model ?? settings.model;
   settings.budget = number(budget, 0, Infinity);
@@ -91,6 +98,7 @@ export function fromHash(hash: string): { settings: Settings; view: Record<strin
   settings.crease = oneOf(crease, ["auto", "angle", "normals", "off"]) ?? settings.crease;
   settings.angle = number(angle, 0, 180) ?? settings.angle;
   settings.uv = oneOf(uv, ["linear", "smooth"]) ?? settings.uv;
+  settings.weld = weld === "true";
   settings.normals = oneOf(normals, ["auto", "keep", "smooth", "limit"]) ?? settings.normals;
   return { settings, view };
 }

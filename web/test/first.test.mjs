@@ -3,19 +3,8 @@
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
 import { bodyOf, choose, downloaded, hold, noBrowser, picture, settled } from "./support/browser.mjs";
+import { BLUNT, CUBE } from "./support/solids.mjs";
 import { example, number, PART_FACES, same, studio, TETRAHEDRON } from "./support/studio.mjs";
-
-/** A cube of eight vertices, whose edges all turn by a right angle. */
-const CUBE = obj("cube.obj", (x) => x);
-/** The same, whose side at +Z is five times as small as the one at −Z. */
-const BLUNT = obj("blunt.obj", (x, z) => (z > 0 ? x / 5 : x));
-
-function obj(name, place) {
-  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [i & 1, (i >> 1) & 1, i >> 2].map((bit) => bit - 0.5));
-  const points = corners.map(([x, y, z]) => `v ${place(x, z)} ${place(y, z)} ${z}`);
-  const sides = ["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"].map((side) => `f ${side}`);
-  return { name, mimeType: "", buffer: Buffer.from([...points, ...sides].join("\n")) };
-}
 
 describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
   const { visit, refined } = studio();
@@ -113,6 +102,20 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.ok(settings.includes("Sharp edges") && choices.some((text) => text.startsWith("None")));
     await page.selectOption("#crease", "off");
     await page.locator("#advice").waitFor({ state: "hidden" });
+  });
+
+  test("faces that only touch are told of, and joined by the setting that is named", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    // Two triangles whose common edge is open by a hundred-thousandth.
+    const text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1.00001 0 0\nv 0 1.00001 0\nv 1 1 1\nf 1 2 3\nf 4 6 5\n";
+    await choose(page, { name: "gap.obj", mimeType: "", buffer: Buffer.from(text) });
+    await settled(page);
+    assert.match(await page.textContent("#advice"), /switch on Close small gaps/);
+    const boundary = () => page.textContent("#statistics tr:has-text('Boundary edges') td:last-child");
+    assert.equal(await boundary(), "6");
+    await page.click(".more summary");
+    await page.check("#weld");
+    await page.waitForFunction(() => document.querySelector("#statistics").textContent.includes("Boundary edges64"));
   });
 
   test("each setting but the angle explains itself to the pointer and to the keyboard", async () => {
@@ -223,7 +226,7 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.equal(await focused(), "canvas");
     const release = await hold(page);
     await page.selectOption("#levels", "2");
-    await page.locator("#cancel").focus();
+    await page.locator("#cancel:visible").focus();
     release();
     await settled(page);
     assert.equal(await focused(), "panel");

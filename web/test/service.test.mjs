@@ -50,14 +50,14 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       await choose(page, example);
       const { id } = await (await job).json();
       await page.waitForFunction(() => window.shares.size > 1);
-      assert.equal(await server.metric("pns_jobs_running"), 1);
+      await server.reaches("pns_jobs_running", 1);
       assert.equal((await slowJob(server)).status, 503);
       const freed = page.waitForResponse((answer) => answer.request().method() === "DELETE");
       const began = performance.now();
       await page.click("#cancel");
       assert.equal((await freed).status(), 204);
       t.diagnostic(`the worker was free ${Math.round(performance.now() - began)} ms after the click`);
-      assert.equal(await server.metric("pns_jobs_running"), 0);
+      await server.reaches("pns_jobs_running", 0);
       const state = await fetch(`${server.address}/jobs/${id}`);
       assert.ok(state.status === 404 || (await state.json()).state === "cancelled");
       assert.ok(await page.isHidden("#work"));
@@ -67,7 +67,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       // The control mesh stays, and the worker takes the next job.
       await page.selectOption("#levels", "1");
       await settled(page);
-    }, { hash: "#levels=5&model=signed" });
+    }, { hash: "#levels=5" });
   });
 
   test("a service that goes away at work, in words, with another try", async () => {
@@ -79,7 +79,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       assert.equal(await page.textContent("#problem-title"), "The connection broke");
       assert.ok(await page.isVisible("#problem-again"));
       assert.ok(await page.isHidden("#work"));
-    }, { hash: "#levels=5&model=signed", foreseen: /net::ERR_/ });
+    }, { hash: "#levels=5", foreseen: /net::ERR_/ });
   });
 
   test("413: a body over the limit", async () => {
@@ -112,7 +112,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       assert.equal(await page.textContent("#problem-title"), "The mesh is too large");
       assert.equal(
         await page.textContent("#problem-detail"),
-        "part.glb would have 7,680 faces after 1 level, over the limit of 5,000 faces of this service.",
+        "part.glb would have 7,680 faces after 1 step, over the limit of 5,000 faces of this service.",
       );
       assert.ok(await page.isHidden("#problem-again"));
       assert.ok(await page.isVisible("#welcome"));
@@ -229,7 +229,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
 
 /** Ask for seconds of work. */
 function slowJob(server) {
-  return fetch(`${server.address}/jobs?levels=5&model=signed`, {
+  return fetch(`${server.address}/jobs?levels=5`, {
     method: "POST",
     headers: { "Content-Type": "model/gltf-binary" },
     body: part,

@@ -156,7 +156,7 @@ def refine_together(
     with course.stage("attributes", shares.attributes, shares.write):
         grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
         pieces = refined_primitives(control, made, grid, blend, course)
-        part_of_face, _ = control.part_of_face(parts)
+        part_of_face = control.of_cleaned(parts.of_face[np.concatenate(control.kept)])
         bends = count_bends(control.mesh, creases, len(meshes), part_of_face)
         cut = _divided(control, parts, made, pieces, meshes, pointers, options)
         return [replace(part, bends=own) for part, own in zip(cut, bends, strict=True)]

@@ -48,9 +48,14 @@ def hosts_of(settings: Settings) -> tuple[str, ...]:
     """
     if settings.hosts:
         return settings.hosts
-    address = _address(settings.host)
-    loopback = settings.host == "localhost" if address is None else address.is_loopback
-    return LOOPBACK_HOSTS if loopback and not settings.proxies else ("*",)
+    alone = is_loopback(settings.host) and not settings.proxies
+    return LOOPBACK_HOSTS if alone else ("*",)
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether a host to listen on is reached from this machine alone."""
+    address = _address(host)
+    return host == "localhost" if address is None else address.is_loopback
 
 
 class Origins:

@@ -16,6 +16,8 @@ log = logging.getLogger("pns.request")
 
 # Anything may be sent as a method; what is none of these is counted as one.
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+# Answers hold what strangers have sent: browsers are not to guess what it is.
+NO_SNIFFING = (b"x-content-type-options", b"nosniff")
 # Where a client is gone before it has its answer, as proxies log it.
 GONE = 499
 
@@ -74,7 +76,7 @@ class Journal:
             nonlocal status, sent, whole
             if message["type"] == "http.response.start":
                 status = message["status"]
-                headers = [*message.get("headers", []), (HEADER, name.encode())]
+                headers = [*message.get("headers", []), (HEADER, name.encode()), NO_SNIFFING]
                 message = {**message, "headers": headers}
             else:
                 sent += len(message.get("body", b""))

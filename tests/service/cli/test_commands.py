@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from pns_common.masks.stencils import limit_ring_weight
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL, bundled_models, load_model
+from pns_common.model.file import DEFAULT_MODEL, bundled_models, load_model
+from pns_common.schemes.loop import limit_ring_weight
 from service import cli
 from service.__main__ import main
 from service.gltf.read.container import read_glb, write_glb
@@ -24,7 +24,7 @@ from service.http.access import keys
 from service.meshfiles.example import part_glb
 from tests.service.cli.trees import FACES, tree_of, tree_of_bytes
 from tests.support.meshes import icosphere
-from tests.support.networks import vertex_model_bytes
+from tests.support.networks import default_model_bytes
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ __main__.main()
 def test_a_model_is_a_name_or_a_file_and_the_name_wins(
     pns: Any, tmp_path: Path, part_file: Path
 ) -> None:
-    (tmp_path / "paper").write_bytes(vertex_model_bytes(0))
+    (tmp_path / "paper").write_bytes(default_model_bytes(0))
     report = tmp_path / "r.json"
     for given, features in (("paper", "paper-5"), ("./paper", "signed-18")):
         command = f"subdivide part.glb -o out.glb --model {given} --report r.json"

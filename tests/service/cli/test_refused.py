@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from pns_common.runtimes.onnx_model import bundled_models
+from pns_common.model.file import bundled_models
 from service import cli
 from service.cli import commands
 from service.cli.errors import explained

@@ -76,10 +76,9 @@ def test_every_edge_of_a_cube_is_a_crease_and_its_corners_stay():
         ({"scheme": "pns", "crease": "off"}, 0),
         ({"scheme": "pns", "budget": 0.0}, 0),
         ({"scheme": "loop"}, 0),
-        ({"scheme": "loop", "crease": "lines"}, 12),
     ],
 )
-def test_lines_are_kept_where_the_model_asks_or_the_request_does(options, count):
+def test_sharp_edges_are_kept_where_the_model_asks(options, count):
     given = [[box()], [box()]]  # two meshes, which are refined together
     result = subdivide_gltf(files.glb(*given), "glb", Options(**options), load_model(), Limits())
     for mesh in result.report["meshes"]:
@@ -143,9 +142,9 @@ def test_smooth_uvs_are_refined_as_positions_are_inside_a_chart(levels):
 
 @pytest.mark.parametrize("meshes", [1, 3])
 @pytest.mark.parametrize("levels", [1, 3])
-@pytest.mark.parametrize("crease", ["normals", "lines", "angle:60"])
+@pytest.mark.parametrize("crease", ["normals", "angle:60"])
 def test_smooth_uvs_have_the_creases_of_the_positions(crease, levels, meshes):
-    # Lines are sharp at two levels. Small meshes of a file are refined together.
+    # Small meshes of a file are refined together.
     shapes = [cylinder(sides) for sides in (7, 8, 12)[:meshes]]
     for shape in shapes:
         shape["TEXCOORD_0"] = shape["POSITION"][:, 1:]

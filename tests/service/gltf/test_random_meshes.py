@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common.mesh import Mesh, clean
-from pns_common.refine import refine
+from pns_common.refinement import refine
 from pns_common.schemes import loop
 from service.gltf.subdivide import subdivide_gltf
 from service.meshes.weld import weld

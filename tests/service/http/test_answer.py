@@ -64,7 +64,14 @@ def answered(
         held = ExitStack()
         held.callback(file.release)
         answer = FileAnswer(
-            file, held, admission, "a", media_type="model/gltf-binary", headers={}, sent=sent
+            file,
+            held,
+            admission,
+            "a",
+            stall_seconds=60,
+            media_type="model/gltf-binary",
+            headers={},
+            sent=sent,
         )
         async with admission.answering("b", taken):
             await asyncio.wait_for(Head(answer)(scope, client.receive, client.send), 10)

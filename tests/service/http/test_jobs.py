@@ -323,7 +323,7 @@ def test_a_result_that_is_struck_out_while_it_is_fetched_arrives_whole(
 
 def test_a_result_that_nobody_takes_is_let_go() -> None:
     with (
-        served(workers=1, rate=2**26, grace_seconds=0.5) as where,
+        served(workers=1, stall_seconds=0.5) as where,
         opened(where) as client,
         opened(where) as slow,
     ):

@@ -14,7 +14,7 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL, load_model
+from pns_common.model.file import DEFAULT_MODEL, load_model
 from service.http.admission import Admission
 from service.http.app import create_app
 from service.http.catalogue import ReadOnce
@@ -23,7 +23,7 @@ from service.settings import Settings
 from service.workers.catalogue import Catalogue
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local
-from tests.support.networks import VERTEX_CARD
+from tests.support.networks import DEFAULT_CARD
 from tests.support.packages import served_file, several_models
 
 GLB = {"Content-Type": "model/gltf-binary", "Accept": "application/json"}
@@ -92,7 +92,7 @@ def test_a_request_picks_its_model_by_name(client: TestClient) -> None:
     assert paper["budget"] == load_model("paper").card.budget
     both = report(client, "model=vertices")
     assert both["model"] == "vertices"
-    assert both["budget"] == VERTEX_CARD.budget
+    assert both["budget"] == DEFAULT_CARD.budget
     assert both["levels"][0]["vertex_rule"]["proximity_ratio"]["max"] > 0.1
     assert report(client, "")["model"] == DEFAULT_MODEL
     assert report(client, "model=") == report(client, f"model={DEFAULT_MODEL}")

@@ -9,11 +9,10 @@ import threading
 from pathlib import Path
 
 import pytest
-import uvicorn
 
 from service.gltf.read.container import read_glb
 from service.http.app import create_app
-from service.http.server import configuration
+from service.http.server import DrainingServer
 from service.meshfiles.example import part_glb
 from service.settings import Settings
 from tests.support import node_tools
@@ -34,7 +33,7 @@ def document():
 def address():
     """A server that really refines."""
     settings = Settings(workers=1, port=0)
-    server = uvicorn.Server(configuration(create_app(settings), settings))
+    server = DrainingServer(create_app(settings), settings)
     thread = threading.Thread(target=server.run)
     thread.start()
     pause = threading.Event()
@@ -115,6 +114,15 @@ def test_a_result_may_find_no_room_or_be_the_problem_that_its_job_failed_with(do
     assert {"200", "400", "404", "409", "413", "415", "422", "500", "503", "504"} <= told
 
 
+def test_probes_need_no_key_and_the_document_says_where_the_service_is(document):
+    for name, operation in operations(document):
+        expected = [] if "probes" in operation.get("tags", ()) else [{}, {"key": []}]
+        assert operation["security"] == expected, name
+    assert document["servers"] == [{"url": "/"}]
+    app = create_app(Settings(workers=1, prefix="/tools/pns"), warm_up=jobs.no_warm_up)
+    assert local(app).get("/openapi.json").json()["servers"] == [{"url": "/tools/pns"}]
+
+
 def test_every_reference_leads_somewhere(document):
     text = json.dumps(document)
     for name in re.findall(r'"#/components/schemas/(\w+)"', text):
@@ -193,6 +201,8 @@ def test_the_generated_python_client_works(document, address, tmp_path):
     seen = json.loads(done.stdout)
     check(seen, output)
     assert seen["fetched"] == "glTF"
+    # The bytes alone, without a form around them.
+    assert seen["raw"] is True
 
 
 def test_the_generated_typescript_client_works(document, address, tmp_path):

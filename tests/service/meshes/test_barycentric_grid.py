@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pns_common.connectivity.topology import build_topology, split
+from pns_common.parallel import Blocks
+from pns_common.topology import build_topology, split_faces
 from service.meshes.barycentric_grid import barycentric_grid
 from service.meshes.split_connectivity import split_connectivity
 
@@ -43,7 +44,7 @@ def level_by_level(faces, values, levels):
         topology = build_topology(faces, len(values))
         a, b = topology.edges.T
         values = np.concatenate([values, (values[a] + values[b]) / 2])
-        faces = split(topology)
+        faces = split_faces(topology, Blocks())
     return faces, values
 
 

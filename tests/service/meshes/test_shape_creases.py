@@ -1,47 +1,49 @@
-"""Creases by the shape of a mesh: beyond an angle, or the lines that it shows."""
+"""Creases by the shape of a mesh: beyond an angle, or those of the scheme."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pns_common import Creases, crease_lines, loop
-from pns_common.connectivity.creases import NO_CREASES
-from pns_common.crease_lines import named_on
-from pns_common.geometry.sharp_edges import edges_sharper_than
-from service.meshes.shape_creases import creases_by_shape, lines_of
+from pns_common import Creases, loop
+from service.meshes.shape_creases import creases_by_shape
 from service.options import Options
 from train.data.primitives import box, cylinder
 
-ASKED = Creases(line_angle=50.0, levels=3)
-ASKING = replace(loop(), creases=ASKED)
-LINES = Creases(line_angle=66.0, levels=2)
+ASKING = replace(loop(), creases=Creases(angle=40.0, seed=60.0, levels=2))
 
 
 @pytest.mark.parametrize(
-    ("crease", "scheme", "lines"),
+    ("mesh", "crease", "scheme", "count"),
     [
-        ("auto", ASKING, ASKED),
-        ("auto", loop(), NO_CREASES),
-        ("lines", ASKING, LINES),
-        ("lines", loop(), LINES),
-        ("off", ASKING, NO_CREASES),
-        ("angle:30", ASKING, NO_CREASES),
+        # The walls of a cylinder of eight sides meet at 45 degrees, and its rims at 90.
+        (cylinder(8), "auto", ASKING, 24),
+        (cylinder(8), "auto", loop(), 0),
+        (cylinder(8), "off", ASKING, 0),
+        (cylinder(8), "angle:44", ASKING, 24),
+        (cylinder(8), "angle:46", ASKING, 16),
+        (cylinder(8), "angle:180", ASKING, 0),
+        (box(), "angle:89", loop(), 12),
     ],
 )
-def test_who_asks_for_lines(crease, scheme, lines):
-    found = lines_of(Options(crease=crease), scheme)
-    assert (found.line_angle, found.levels) == (lines.line_angle, lines.levels)
+def test_the_options_say_which_edges_are_sharp(mesh, crease, scheme, count):
+    found = creases_by_shape(mesh, Options(crease=crease), scheme)
+    named = np.zeros((0, 2)) if found.named is None else found.named
+    assert len(named) == count
+    turns = [turn(mesh, pair) for pair in named]
+    assert all(angle > 40 for angle in turns)
 
 
-def test_an_angle_takes_every_edge_beyond_it_for_good_and_lines_are_fewer_and_wear_off():
-    mesh = cylinder(8)  # its walls meet at 45 degrees
-    by_angle = creases_by_shape(mesh, Options(crease="angle:44"), ASKING)
-    np.testing.assert_array_equal(
-        by_angle.named, edges_sharper_than(mesh.vertices, mesh.faces, np.radians(44))
+def test_creases_of_a_scheme_wear_off_and_those_by_an_angle_do_not():
+    by_scheme, by_angle = (
+        creases_by_shape(box(), Options(crease=c), ASKING) for c in ("auto", "angle:89")
     )
-    of_lines = named_on(mesh, creases_by_shape(mesh, Options(crease="lines"), ASKING))
-    np.testing.assert_array_equal(of_lines.named, crease_lines(mesh))
-    assert (len(by_angle.named), len(of_lines.named)) == (24, 16)
-    assert (by_angle.levels, of_lines.levels) == (None, 2)
-    assert creases_by_shape(box(), Options(crease="off"), ASKING).named is None
+    assert (by_scheme.levels, by_angle.levels) == (2, None)
+
+
+def turn(mesh, pair):
+    """Degrees between the two faces at an edge."""
+    beside = [face for face in mesh.faces if set(pair) <= set(face)]
+    a, b, c = (mesh.vertices[np.array(beside)[:, k]] for k in range(3))
+    n, m = np.cross(b - a, c - a)
+    return np.degrees(np.arccos(n @ m / np.linalg.norm(n) / np.linalg.norm(m)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pns_common.mesh import Mesh
-from pns_common.refine import refine
+from pns_common.refinement import refine
 from pns_common.schemes import loop
 from service.errors import UnrefinableError
 from service.meshfiles import formats

@@ -12,6 +12,8 @@ from service.meshfiles.refine_triangles import refine_triangles
 from service.options import Limits, Options
 from tests.support.gltf.shapes import box, octahedron
 
+ASKING = replace(loop(), creases=Creases(angle=40.0, seed=60.0, levels=2))
+
 
 def refined(shape, texture=None, scheme=None, **options):
     triangles = IndexedTriangles(shape["POSITION"], shape["indices"].astype(np.int64), texture)
@@ -24,12 +26,8 @@ def test_mesh_files_take_creases_by_angle():
     assert (np.abs(triangles.vertices).max(axis=1) == 1).all()
 
 
-def test_mesh_files_keep_the_lines_that_the_model_asks_for():
-    asking = replace(loop(), creases=Creases(line_angle=66.0))
-    for scheme, crease, count in (
-        *((asking, "auto", 12), (asking, "off", 0)),
-        *((loop(), "auto", 0), (loop(), "lines", 12)),
-    ):
+def test_mesh_files_keep_the_edges_that_the_model_asks_for():
+    for scheme, crease, count in ((ASKING, "auto", 12), (ASKING, "off", 0), (loop(), "auto", 0)):
         _, report = refined(box(), scheme=scheme, crease=crease)
         assert report["levels"][0]["edges"].get("crease", 0) == count
 
@@ -46,10 +44,12 @@ def test_smooth_uvs_follow_the_positions_of_a_closed_chart():
     np.testing.assert_allclose(triangles.uv, triangles.vertices[:, :2], atol=1e-12)
 
 
-@pytest.mark.parametrize("crease", ["lines", "angle:60"])
+@pytest.mark.parametrize("crease", ["auto", "angle:60"])
 def test_smooth_uvs_have_the_creases_of_the_positions(crease):
     shape = box()
-    triangles, _ = refined(shape, shape["POSITION"][:, 1:], levels=3, uv="smooth", crease=crease)
+    triangles, _ = refined(
+        shape, shape["POSITION"][:, 1:], levels=3, uv="smooth", crease=crease, scheme=ASKING
+    )
     np.testing.assert_allclose(triangles.uv, triangles.vertices[:, 1:], atol=1e-12)
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pns_common.runtimes.onnx_model import BUNDLED
+from pns_common.model.file import BUNDLED
 from service.cli import app
 from service.errors import InvalidParameter, NoModelError
 from service.meshfiles.convert import converted

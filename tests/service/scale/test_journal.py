@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pns_common.base.whole_file import replacing
+from pns_common.files import replacing
 from service.scale.job import Known, Row
 from service.scale.journal import Journal, open_journal
 

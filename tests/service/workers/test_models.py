@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from pns_common.models.card import ModelCard
-from pns_common.runtimes import onnx_model
-from pns_common.runtimes.onnx_model import DEFAULT_MODEL, load_model
+from pns_common.model import file as model_file
+from pns_common.model.card import ModelCard
+from pns_common.model.file import DEFAULT_MODEL, load_model
 from service.errors import InvalidParameter, NoModelError
 from service.workers.catalogue import Catalogue, ModelEntry, catalogue_of
 from service.workers.models import Models
@@ -23,7 +23,7 @@ NAMES = sorted({"broken", "paper", "vertices", DEFAULT_MODEL})
 
 @pytest.fixture(autouse=True)
 def several(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(onnx_model, "BUNDLED", several_models(tmp_path / "models"))
+    monkeypatch.setattr(model_file, "BUNDLED", several_models(tmp_path / "models"))
 
 
 def serving(source: ZeroModel | str | None) -> Models:

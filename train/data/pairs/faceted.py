@@ -11,8 +11,7 @@ from scipy.spatial import ConvexHull
 from pns_common import Mesh
 from train.connectivity import connect
 from train.data.dense_meshes import is_manifold, largest_part
-from train.data.pairs.coarsened import coarsened
-from train.data.pairs.references import Pair, Reference
+from train.data.pairs.references import Pair, Reference, coarsened
 
 # Of the split polyhedron that is then simplified.
 FEWEST_FACES, MOST_FACES = 1500, 8000

@@ -14,10 +14,8 @@ from train.data.pairs.authored import authored_pair
 from train.data.pairs.faceted import faceted_pair
 from train.data.pairs.grid import grid_pair
 from train.data.pairs.lathe import lathe_pair
-from train.data.pairs.patch import patch_pair
-from train.data.pairs.references import Pair, moved
+from train.data.pairs.references import Pair, moved, patch_pair, sphere_pair
 from train.data.pairs.solid import solid_pairs
-from train.data.pairs.sphere import sphere_pair
 from train.data.pairs.swept import swept_pair
 
 # How often each draws a pair, in the order that a seed means; the rest are solids.

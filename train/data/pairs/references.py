@@ -1,11 +1,17 @@
-"""Coarse meshes beside the surface that they stand for: what a refined mesh is trained towards."""
+"""Coarse meshes beside the surface that they stand for, and the simplest makers of such pairs."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from pns_common import Mesh
+from pns_common import Mesh, MeshError, loop
+from train.data.dense_meshes import is_manifold
+from train.data.primitives import icosphere
+from train.data.simplifiers import SIMPLIFIERS, fast_quadric
+from train.data.stream import random_instance
+from train.refining import refine
+from train.surfaces.implicit import unit_normal
 
 # The kind of control meshes that were made for Loop's surface.
 AUTHORED = "authored"
@@ -42,3 +48,79 @@ def moved(pair: Pair, linear: Float[np.ndarray, "3 3"], shift: Float[np.ndarray,
         Mesh(pair.coarse.vertices @ linear + shift, pair.coarse.faces),
         Reference(pair.surface.points @ linear + shift, pair.surface.normals @ turn),
     )
+
+
+# How often it is an icosphere; and collapsed with its vertices laid back onto the surface.
+ICOSPHERE, ON_SURFACE = 0.4, 0.3
+
+DENSE_SPLITS, MOST_SPLITS = 5, 3
+FEWEST, MOST = 12, 2500
+ROUND = 0.5
+
+
+def sphere_pair(rng: np.random.Generator) -> Pair | None:
+    """Return a coarse mesh of a sphere, or of an ellipsoid; None where collapses spoilt it."""
+    dense = icosphere(DENSE_SPLITS)
+    axes = np.ones(3) if rng.random() < ROUND else 1 + rng.uniform(-0.4, 0.4, 3)
+    kind = rng.random()
+    if kind < ICOSPHERE:
+        coarse = icosphere(int(rng.integers(0, MOST_SPLITS + 1)))
+        coarse = Mesh(coarse.vertices * axes, coarse.faces)
+    else:
+        count = int(np.exp(rng.uniform(np.log(FEWEST), np.log(MOST))))
+        coarse = coarsened(dense.vertices * axes, dense.faces, count, rng)
+        if coarse is not None and kind < ICOSPHERE + ON_SURFACE:
+            unit = coarse.vertices / axes
+            unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+            coarse = Mesh(unit * axes, coarse.faces)
+    if coarse is None:
+        return None
+    normals = dense.vertices / axes
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Pair("sphere", coarse, Reference(dense.vertices * axes, normals))
+
+
+LEVELS, PROJECTIONS = 3, 4
+
+
+def patch_pair(rng: np.random.Generator) -> Pair:
+    """Return a patch of `train.data.stream`, its surface by Loop's mesh laid onto it."""
+    instance = random_instance(rng)
+    surface = instance.surface
+    points = refine(instance.mesh, loop(), LEVELS, 1.0).mesh.vertices
+    for _ in range(PROJECTIONS):
+        slope = surface.gradient(points)
+        points = points - (surface.value(points) / (slope**2).sum(axis=1))[:, None] * slope
+    return Pair("patch", instance.mesh, Reference(points, unit_normal(surface, points)))
+
+
+# How often each of `train.data.simplifiers`.
+#
+# The cheapest collapses first leave faces that are longer and thinner, along what bends one way
+# only, than sweeps with a threshold do.
+WAYS = {"fast-quadric": 0.5, "quadric": 0.3, "shortest-edges": 0.12, "clustered": 0.08}
+
+# How fast the sweeps' threshold may rise.
+AGGRESSIVENESS = (3.0, 5.0, 7.0)
+
+FEWEST = 8
+
+
+def coarsened(
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    count: int,
+    rng: np.random.Generator,
+) -> Mesh | None:
+    """Return a mesh of about `count` faces; None where it is no manifold any more."""
+    way = str(rng.choice(list(WAYS), p=list(WAYS.values())))
+    aggressiveness = float(rng.choice(AGGRESSIVENESS))
+    dense = Mesh(points, faces)
+    try:
+        if way == "fast-quadric":
+            mesh = fast_quadric(dense, count, aggressiveness)
+        else:
+            mesh = SIMPLIFIERS[way](dense, count)
+    except MeshError:
+        return None
+    return mesh if len(mesh.faces) >= FEWEST and is_manifold(mesh) else None

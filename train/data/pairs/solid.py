@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pns_common import Mesh, MeshError
-from train.data.pairs.coarsened import coarsened
-from train.data.pairs.references import Pair, Reference
+from train.data.pairs.references import Pair, Reference, coarsened
 from train.surfaces.marching import laid_onto, marched, unit_gradient
 from train.surfaces.solids import Field, random_solid
 

@@ -10,9 +10,8 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common import Mesh
-from train.data.pairs.coarsened import coarsened
 from train.data.pairs.grid import Parametrised, cut_quads, random_cut, vertex_normals
-from train.data.pairs.references import SWEPT, Pair, Reference
+from train.data.pairs.references import SWEPT, Pair, Reference, coarsened
 from train.surfaces.solids import random_rotation
 
 # Pieces of a profile, from and below; how often one is straight, but for one that never is.

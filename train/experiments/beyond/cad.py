@@ -3,11 +3,10 @@
 from train.data.datasets import Dataset
 from train.data.patches import fillets, rounded_boxes, tori
 from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import table
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import paper
 
 NOTES = (

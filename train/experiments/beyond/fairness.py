@@ -9,10 +9,9 @@ from train.data.dense_meshes import CONTROL_ENDING, asset_files, read_mesh
 from train.data.primitives import PRIMITIVES, TRIANGULATED_QUADS
 from train.experiments.beyond.models import model_files
 from train.experiments.harness.contenders import LOOP, OURS, contenders
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
-from train.metrics.fairness import bending
+from train.metrics.shape import bending
 from train.refining import refine
 
 LEVELS = 4

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 
 from pns_common import loop
 from train.data.datasets import Dataset
-from train.data.family_sets import held_out_families, trained_families
+from train.data.stream import held_out_families, trained_families
 from train.experiments.beyond.models import bundled_schemes, model_files
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
-from train.metrics.evaluation import compare_with_loop
+from train.metrics.card import compare_with_loop
 from train.metrics.whole_surface import gain, whole_surface
 
 SHALLOW = 1

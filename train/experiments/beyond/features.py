@@ -5,12 +5,11 @@ from dataclasses import dataclass, replace
 import msgspec
 
 from train.ablations.feature_groups import Choice, choices, features_method, fit_features
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.paper.methods import largest_ratio
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
 from train.models.recipe import Recipe, one_step
 from train.models.recipes import paper
 

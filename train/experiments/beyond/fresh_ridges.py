@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from train.data.datasets import Dataset, draw_ridges
-from train.data.family_sets import held_out_families, trained_families
+from train.data.stream import held_out_families, trained_families
 from train.experiments.beyond.models import model_files
 from train.experiments.harness.contenders import LOOP, contenders
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.metrics.whole_surface import WholeSurface, whole_surface
 from train.refining import AnyScheme
 

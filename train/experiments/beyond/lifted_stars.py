@@ -7,11 +7,10 @@ from types import MappingProxyType
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from train.certificates.lifted_star import HIGHEST, LIFTS
+from train.certificates.planar_spectrum import HIGHEST, LIFTS
 from train.certificates.subject import subject_of_network
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, panels, zero_line
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model

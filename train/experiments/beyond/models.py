@@ -10,12 +10,11 @@ from matplotlib.figure import Figure as Drawing
 from pns_common import loop, pns
 from pns_common.model.file import BUNDLED, DEFAULT_MODEL, bundled_models, load_model
 from train.data.datasets import Dataset
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, panels
 from train.experiments.paper.methods import unconstrained_scheme
-from train.metrics.evaluation import compare_with_loop
+from train.metrics.card import compare_with_loop
 from train.metrics.whole_surface import WholeSurface, gain, surface_jump, whole_surface
 from train.refining import AnyScheme
 

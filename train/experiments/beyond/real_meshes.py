@@ -12,13 +12,17 @@ from train.data.dense_meshes import DenseMesh, asset_meshes, cad_meshes
 from train.data.simplifiers import SIMPLIFIERS, simplified
 from train.experiments.beyond.models import models_and_assets
 from train.experiments.harness.contenders import LOOP, contenders
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
-from train.metrics.decimation import gain
-from train.metrics.faces.point_mesh import FaceTree, nearest
-from train.metrics.faces.self_intersection import crossing_faces
-from train.metrics.surface_distance import SurfaceErrors, prepared, surface_errors
+from train.metrics.self_intersection import crossing_faces
+from train.metrics.surface_distance import (
+    FaceTree,
+    SurfaceErrors,
+    gain,
+    nearest,
+    prepared,
+    surface_errors,
+)
 from train.metrics.whole_surface import normal_jump
 from train.refining import AnyScheme, refine
 

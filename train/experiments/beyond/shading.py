@@ -13,12 +13,11 @@ from train.data.dense_meshes import read_mesh
 from train.data.primitives import PRIMITIVES
 from train.experiments.beyond.models import model_files
 from train.experiments.harness.contenders import LOOP, OURS, contenders
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.specular import camera, shaded
 from train.experiments.harness.style import panels
-from train.metrics.fairness import bending
+from train.metrics.shape import bending
 from train.refining import refine
 
 LEVELS = 4

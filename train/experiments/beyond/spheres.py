@@ -9,9 +9,8 @@ from train.connectivity import connect
 from train.data.primitives import globe, icosphere, tetrahedron
 from train.experiments.beyond.models import model_files
 from train.experiments.harness.contenders import LOOP, contenders
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.metrics.shape import face_normal_error
 from train.refining import refine
 from train.surfaces.implicit import SphereRidge

@@ -13,10 +13,9 @@ from train.experiments.beyond.whole_meshes import (
     rows_of,
 )
 from train.experiments.harness.contenders import LOOP, OURS, contenders
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
-from train.metrics.faces.self_intersection import crossing_faces
+from train.metrics.self_intersection import crossing_faces
 
 LEVELS = 4
 # Of a refined mesh: deeper levels of larger meshes are left out.

@@ -12,11 +12,10 @@ from train.data.dense_meshes import asset_files, read_mesh
 from train.data.primitives import PRIMITIVES
 from train.experiments.beyond.models import models_and_assets
 from train.experiments.harness.contenders import LOOP, OURS, contenders
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
-from train.metrics.faces.self_intersection import crossing_faces
-from train.metrics.fairness import volume
+from train.metrics.self_intersection import crossing_faces
+from train.metrics.shape import volume
 from train.refining import AnyScheme, Refined, refine
 
 LEVELS = 3

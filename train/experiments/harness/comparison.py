@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from train.experiments.harness.rows import column
-from train.metrics.one_step import METRICS, Improvement
-from train.metrics.tables import METRIC_TITLES
+from train.experiments.harness.experiment import column
+from train.metrics.one_step import METRIC_TITLES, METRICS, Improvement
 
 # Per cent of improvement below which no share of the limit is given.
 SMALLEST_LIMIT = 0.1

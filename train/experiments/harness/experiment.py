@@ -1,8 +1,11 @@
 """What an experiment is: a function of the laboratory whose tables and figures are data."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from matplotlib.figure import Figure as Drawing
 
@@ -78,3 +81,21 @@ class Experiment:
     needs_published: bool = False
     needs_assets: bool = False
     reads: Callable[[Laboratory], Iterable[Path]] = lambda _: ()
+
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Row = TypeVar("Row", bound="DataclassInstance")
+
+
+def column(heading: str, digits: str = "") -> Any:
+    """Return a field of a row: its heading on the page, and how the page formats its number."""
+    return field(metadata={"heading": heading, "digits": digits})
+
+
+def table(name: str, title: str, kind: type[Row], rows: Iterable[Row]) -> Table:
+    """Return the table whose columns are the fields of the rows' class, in their order."""
+    columns = tuple(Column(each.name, **each.metadata) for each in fields(kind))
+    cells = (tuple(getattr(row, column.name) for column in columns) for row in rows)
+    return Table(name, title, columns, tuple(cells))

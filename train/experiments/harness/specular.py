@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common import Mesh
-from train.metrics.fairness import vertex_normals
+from train.metrics.shape import vertex_normals
 
 # Width and height of a picture, pixels.
 SIDE = 420

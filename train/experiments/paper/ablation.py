@@ -6,20 +6,18 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pns_common import Mesh, loop, pns
+from pns_common import Mesh, pns
 from train.ablations.variants import VARIANTS, variant_method, variant_recipe
-from train.data.datasets import Dataset
-from train.data.grid import grid_faces, jittered_grid
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.data.datasets import Dataset, grid_faces, jittered_grid
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.paper.methods import PAPER_UNITS, largest_ratio, level_by_level
 from train.experiments.paper.paper_values import PUBLISHED_ABLATION
-from train.metrics.evaluation import compare_with_loop
+from train.metrics.card import compare_with_loop
 from train.models.from_recipe import initial_network
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
-from train.refining import AnyScheme, refine
+from train.refining import AnyScheme, loop_like, refine
 
 LEVEL = 3
 REMOVED_TITLES: Mapping[str, str] = MappingProxyType(
@@ -93,8 +91,8 @@ def affine_error(scheme: AnyScheme) -> float:
     """Return the largest departure from Loop on a planar, tilted, jittered patch."""
     x, y = jittered_grid(seed=0, jitter=0.4).double().numpy().T
     mesh = Mesh(np.stack([x, y, 0.3 * x - 0.2 * y], axis=1), grid_faces())
-    positions = refine(mesh, scheme, 1, reference_length=PAPER_UNITS).mesh.vertices
-    expected = refine(mesh, loop(), 1, reference_length=PAPER_UNITS).mesh.vertices
+    positions = refine(mesh, scheme, reference_length=PAPER_UNITS).mesh.vertices
+    expected = refine(mesh, loop_like(scheme), reference_length=PAPER_UNITS).mesh.vertices
     return float(np.linalg.norm(positions - expected, axis=1).max())
 
 

@@ -8,9 +8,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure as Drawing
 
 from train.connectivity import connect
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import SEQUENTIAL, panels
 from train.experiments.paper.methods import PAPER_UNITS, hard_instance, ridge_of
 from train.models.recipes import paper

@@ -6,15 +6,13 @@ from matplotlib.figure import Figure as Drawing
 
 from train.data.datasets import Dataset
 from train.experiments.harness.comparison import LIMIT_NOTE
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, panels
-from train.experiments.paper.methods import largest_ratio
+from train.experiments.paper.methods import largest_ratio, paper_with_budget
 from train.experiments.paper.paper_values import PUBLISHED_C_SWEEP
-from train.experiments.paper.recipes import paper_with_budget
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
 from train.refining import AnyScheme
 
 BUDGETS = (0.1, 0.25, 0.5, 1.0)

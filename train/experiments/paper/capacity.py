@@ -1,13 +1,12 @@
 """Capacity control: is it the network or the envelope that limits the gain?"""
 
 from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import table
+from train.experiments.paper.methods import larger
 from train.experiments.paper.paper_values import PUBLISHED_CAPACITY, PUBLISHED_HEADLINE
-from train.experiments.paper.recipes import larger
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import paper
 
 

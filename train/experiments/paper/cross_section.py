@@ -11,9 +11,8 @@ from trimesh import Trimesh
 from trimesh.intersections import mesh_plane
 
 from pns_common import Mesh
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, TITLES, method_style, panels, zero_line
 from train.experiments.paper.methods import PAPER_UNITS, hard_instance, learned_methods, ridge_of
 from train.metrics.one_step import NEAR_FEATURE

@@ -7,9 +7,8 @@ from matplotlib.figure import Figure as Drawing
 
 from pns_common import Mesh
 from train.data.datasets import Instance
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import TITLES, method_style, panels
 from train.experiments.paper.methods import eight_methods, hard_instance, level_by_level, ridge_of
 from train.metrics.shape import DistanceLevel, distance_level

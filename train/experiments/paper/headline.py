@@ -5,9 +5,8 @@ from collections.abc import Mapping
 from matplotlib.figure import Figure as Drawing
 
 from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import table
 from train.experiments.harness.style import COLOURS, TITLES, panels, zero_line
 from train.experiments.paper.methods import unconstrained_scheme
 from train.experiments.paper.paper_values import (
@@ -16,10 +15,9 @@ from train.experiments.paper.paper_values import (
     PUBLISHED_HEADLINE,
     PUBLISHED_UNCONSTRAINED,
 )
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
-from train.metrics.one_step import METRICS, Improvement
-from train.metrics.tables import METRIC_TITLES
+from train.metrics.one_step import METRIC_TITLES, METRICS, Improvement
 from train.models.recipes import paper, paper_text
 
 NOTES = (

@@ -10,10 +10,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as Drawing
 
 from pns_common import Mesh
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.render import Camera, shaded_image
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import SEQUENTIAL, TITLES, panels
 from train.experiments.paper.methods import hard_instance, learned_methods, level_by_level
 from train.metrics.shape import LevelErrors, level_errors

@@ -1,7 +1,10 @@
 """The eight methods of the paper's comparison, trained or fitted, by the names of the style."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import cast
+
+import msgspec
 
 from pns_common import Mesh, loop
 from train.ablations.variants import UNCONSTRAINED, variant_method, variant_recipe
@@ -13,7 +16,7 @@ from train.baselines.quadric import quadric_fit
 from train.data.datasets import Dataset, Instance, ridge_held_out
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.paper.paper_values import PAPER_INSTANCE
-from train.models.recipe import one_step
+from train.models.recipe import Recipe, one_step
 from train.models.recipes import paper
 from train.refining import AnyScheme, Refined, refine
 from train.surfaces.implicit import Ridge
@@ -86,3 +89,24 @@ def level_by_level(mesh: Mesh, scheme: AnyScheme, levels: int) -> Iterator[Refin
         refinement = refine(mesh, scheme, levels=1, reference_length=PAPER_UNITS)
         mesh = refinement.mesh
         yield refinement
+
+
+def paper_with_budget(budget: float) -> Recipe:
+    """Return the default recipe with another C; at its own C it is the default one itself."""
+    recipe = paper()
+    if budget == recipe.budget:
+        return recipe
+    return replace(recipe, name=f"ridge-C{budget:g}", budget=budget)
+
+
+def larger() -> Recipe:
+    """Return a network of three times the parameters, trained for twice the steps."""
+    recipe = paper()
+    return replace(recipe, name="capacity", hidden=(64, 64), steps=2 * recipe.steps)
+
+
+def saddle() -> Recipe:
+    """Return the default recipe on saddles."""
+    base = paper()
+    plan = msgspec.structs.replace(one_step(base), dataset="saddle-training", batch_size=12)
+    return replace(base, name="saddle", training=plan)

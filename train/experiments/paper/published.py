@@ -12,9 +12,8 @@ from train.ablations.variants import (
     Variant,
     variant_method,
 )
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.paper.ablation import architecture_numbers
 from train.experiments.paper.paper_values import (
     PUBLISHED_ABLATION,
@@ -25,7 +24,7 @@ from train.experiments.paper.paper_values import (
     PUBLISHED_SPHERE_RIDGE,
     PUBLISHED_UNCONSTRAINED,
 )
-from train.metrics.evaluation import compare_with_loop
+from train.metrics.card import compare_with_loop
 from train.metrics.one_step import Improvement
 from train.models.networks import BoundedNet
 from train.models.published import GATE_SHARPNESS, load_published, published_budget

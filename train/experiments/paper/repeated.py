@@ -8,9 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from train.data.datasets import Instance
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import TITLES, method_style, panels
 from train.experiments.paper.methods import eight_methods, hard_instance, level_by_level
 from train.experiments.paper.paper_values import PAPER_REPEATED

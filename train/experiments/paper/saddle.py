@@ -6,14 +6,12 @@ import numpy as np
 
 from train.data.datasets import Dataset
 from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
-from train.experiments.paper.methods import PAPER_UNITS
+from train.experiments.paper.methods import PAPER_UNITS, saddle
 from train.experiments.paper.paper_values import PUBLISHED_SADDLE
-from train.experiments.paper.recipes import saddle
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import paper
 from train.refining import AnyScheme, refine
 

@@ -6,13 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from train.certificates.adversary import Operator
-from train.certificates.gap_collapse import GapAttack, gap_attack
-from train.certificates.operator_jacobian import operator_jacobian
+from train.certificates.gap_collapse import GapAttack, gap_attack, operator_jacobian
 from train.certificates.planar_spectrum import derivative_of_departure, spectrum
 from train.certificates.subject import in_double, subject_of_network
-from train.experiments.harness.experiment import Experiment, Figure, Outcome
+from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.harness.style import COLOURS, panels, zero_line
 from train.experiments.paper.paper_values import PUBLISHED_SPECTRAL
 from train.models.recipes import paper

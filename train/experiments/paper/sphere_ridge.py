@@ -1,12 +1,11 @@
 """Cross-family: the ridges' network on ridges of spheres, on which nothing was trained."""
 
 from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
-from train.experiments.harness.experiment import Experiment, Outcome
+from train.experiments.harness.experiment import Experiment, Outcome, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import table
 from train.experiments.paper.paper_values import PUBLISHED_SPHERE_RIDGE
+from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.metrics.evaluation import compare_with_loop
 from train.models.recipes import paper
 
 NOTES = (

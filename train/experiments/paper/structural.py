@@ -15,12 +15,18 @@ from train.certificates.adversary import (
 )
 from train.certificates.affine import TURNED
 from train.certificates.bodies import random_motion
-from train.certificates.certificate import Certificate
 from train.certificates.certify import run_steps, scheme_steps
-from train.certificates.subject import Subject, in_double, subject_of_network
-from train.experiments.harness.experiment import Cell, Column, Experiment, Outcome, Table
+from train.certificates.subject import Certificate, Subject, in_double, subject_of_network
+from train.experiments.harness.experiment import (
+    Cell,
+    Column,
+    Experiment,
+    Outcome,
+    Table,
+    column,
+    table,
+)
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.rows import column, table
 from train.experiments.paper.ablation import REMOVED_TITLES
 from train.experiments.paper.paper_values import PUBLISHED_ADVERSARIAL, PUBLISHED_STRUCTURAL
 from train.models.from_recipe import initial_network

@@ -1,10 +1,10 @@
 /** glTF into a scene, with no request to anywhere but the files at hand. */
 
-import { LoadingManager } from "three";
 import { GLTFLoader, type GLTF } from "three/addons/loaders/GLTFLoader.js";
 import { part } from "../api/part";
 import { fileProblem } from "../api/problem";
 import { spread } from "./instances";
+import { localFiles } from "./local";
 import { numbered } from "./numbered";
 import { pathOf } from "./path";
 import { unreadable } from "./unreadable";
@@ -67,22 +67,7 @@ export async function parseGltf(
   neighbours: Map<string, Blob> = new Map(),
   missing = new Set<string>(),
 ): Promise<GLTF> {
-  const made: string[] = [];
-  const blobUrl = (blob: Blob): string => {
-    const url = URL.createObjectURL(blob);
-    made.push(url);
-    return url;
-  };
-  const manager = new LoadingManager();
-  manager.setURLModifier((url) => {
-    if (url.startsWith("blob:")) return url;
-    // The content security policy lets blobs be fetched and nothing else.
-    if (url.startsWith("data:")) return blobUrl(blobOfDataUri(url));
-    const file = neighbours.get(pathOf(url));
-    if (file) return blobUrl(file);
-    missing.add(url);
-    return blobUrl(new Blob());
-  });
+  const { manager, release } = localFiles(neighbours, missing);
   const loader = new GLTFLoader(manager).register(numbered).register(whole);
   const json = jsonOf(bytes);
   const used = json.extensionsUsed ?? [];
@@ -111,7 +96,7 @@ export async function parseGltf(
     throw unreadable("readable glTF", error);
   } finally {
     draco?.dispose();
-    made.forEach((url) => URL.revokeObjectURL(url));
+    release();
   }
 }
 
@@ -122,13 +107,4 @@ async function dracoLoader() {
   // The types know a folder alone; a pair of addresses is taken too, and ours carry hashes.
   loader.setDecoderPath({ js: at(DRACO_WRAPPER), wasm: at(DRACO_WASM) } as unknown as string);
   return loader;
-}
-
-function blobOfDataUri(uri: string): Blob {
-  const comma = uri.indexOf(",");
-  const head = uri.slice(5, comma);
-  const type = head.replace(/;base64$/, "");
-  const text = decodeURIComponent(uri.slice(comma + 1));
-  if (!head.endsWith(";base64")) return new Blob([text], { type });
-  return new Blob([Uint8Array.from(atob(text), (character) => character.charCodeAt(0))], { type });
 }

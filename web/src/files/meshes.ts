@@ -1,4 +1,4 @@
-/** OBJ, PLY, STL and OFF as geometry: positions, and the colours of a PLY's vertices. */
+/** OBJ, PLY, STL and OFF as geometry: positions, an OBJ's materials, and the colours of a PLY's vertices. */
 
 import { BufferAttribute, BufferGeometry } from "three";
 import { PLYLoader } from "three/addons/loaders/PLYLoader.js";
@@ -8,6 +8,7 @@ import { readObj } from "./obj";
 export function readMesh(bytes: ArrayBuffer, kind: string): BufferGeometry {
   const geometry = READERS[kind]?.(bytes);
   if (!geometry?.getAttribute("position")?.count) throw new Error("it has no faces");
+  if (kind === "obj") return geometry;
   // A PLY may have doubles, which no graphics card takes.
   const { array } = geometry.getAttribute("position");
   const read = new BufferGeometry()

@@ -1,29 +1,83 @@
-/** OBJ: places and faces, whatever objects, groups and lines they stand among. */
+/** OBJ: places, texture coordinates and faces by material, whatever objects, groups and lines they stand among. */
 
 import { BufferAttribute, BufferGeometry } from "three";
 
+/** The materials that faces name, in the order of the geometry's groups, and the files that define them. */
+export interface ObjMaterials {
+  names: string[];
+  libraries: string[];
+}
+
+/** Read a file. `userData` of the geometry has its ObjMaterials. */
 export function readObj(source: string): BufferGeometry {
   const points: number[] = [];
-  const index: number[] = [];
+  const places: number[] = [];
+  const libraries: string[] = [];
+  // For each material, pairs of a vertex and its texture coordinates; −1 where a corner has none.
+  const corners = new Map<string, [number, number][]>();
+  let material = "";
   const lines = source.replace(/#.*/g, "").replace(/\\\r?\n/g, " ");
-  for (const [, kind, rest] of lines.matchAll(/^[ \t]*([vf])[ \t]+(.+)$/gm)) {
+  for (const [, kind, rest] of lines.matchAll(/^[ \t]*(v|vt|f|usemtl|mtllib)[ \t]+(.+)$/gm)) {
     const words = rest!.trim().split(/\s+/);
-    if (kind === "v") {
-      points.push(Number(words[0]), Number(words[1]), Number(words[2]));
-      continue;
-    }
-    const last = points.length / 3;
-    // From 1; below 0 they count back. Texture coordinates and normals follow after a slash.
-    const corners = words.map((word) => parseInt(word, 10)).map((at) => (at < 0 ? last + at : at - 1));
-    for (let corner = 2; corner < corners.length; corner++) {
-      index.push(corners[0]!, corners[corner - 1]!, corners[corner]!);
+    if (kind === "v") points.push(Number(words[0]), Number(words[1]), Number(words[2]));
+    else if (kind === "vt") places.push(Number(words[0]), Number(words[1] ?? 0));
+    else if (kind === "usemtl") material = rest!.trim();
+    else if (kind === "mtllib") libraries.push(rest!.trim());
+    else {
+      const polygon = words.map((word): [number, number] => {
+        const [vertex, place] = word.split("/");
+        return [numbered(vertex, points.length / 3), numbered(place, places.length / 2)];
+      });
+      const triangles = corners.get(material) ?? [];
+      corners.set(material, triangles);
+      for (let i = 2; i < polygon.length; i++) triangles.push(polygon[0]!, polygon[i - 1]!, polygon[i]!);
     }
   }
-  if (!index.length) throw new Error("it has no faces");
-  if (index.some((at) => !(at >= 0 && 3 * at < points.length))) {
+  const all = [...corners.values()].flat();
+  if (!all.length) throw new Error("it has no faces");
+  if (all.some(([vertex]) => !(vertex >= 0 && 3 * vertex < points.length))) {
     throw new Error("a face names a vertex that it does not have");
   }
+  const isMapped = all.every(([, place]) => place >= 0 && 2 * place < places.length);
+  const geometry = isMapped ? mapped(points, places, all) : plain(points, all);
+  let first = 0;
+  for (const [number, triangles] of [...corners.values()].entries()) {
+    geometry.addGroup(first, triangles.length, number);
+    first += triangles.length;
+  }
+  geometry.userData = { names: [...corners.keys()], libraries } satisfies ObjMaterials;
+  return geometry;
+}
+
+/** Count from 0: an OBJ counts from 1, and back from its last where a number is negative. */
+function numbered(word: string | undefined, count: number): number {
+  const number = parseInt(word ?? "", 10);
+  if (Number.isNaN(number)) return -1;
+  return number < 0 ? count + number : number - 1;
+}
+
+function plain(points: number[], corners: [number, number][]): BufferGeometry {
   return new BufferGeometry()
     .setAttribute("position", new BufferAttribute(new Float32Array(points), 3))
+    .setIndex(corners.map(([vertex]) => vertex));
+}
+
+/** Make a vertex of each pair of a place in space and one in the texture. */
+function mapped(points: number[], places: number[], corners: [number, number][]): BufferGeometry {
+  const made = new Map<string, number>();
+  const [position, uv]: [number[], number[]] = [[], []];
+  const index = corners.map(([vertex, place]) => {
+    const key = `${vertex}/${place}`;
+    const known = made.get(key) ?? made.size;
+    if (known === made.size) {
+      made.set(key, known);
+      position.push(...points.slice(3 * vertex, 3 * vertex + 3));
+      uv.push(...places.slice(2 * place, 2 * place + 2));
+    }
+    return known;
+  });
+  return new BufferGeometry()
+    .setAttribute("position", new BufferAttribute(new Float32Array(position), 3))
+    .setAttribute("uv", new BufferAttribute(new Float32Array(uv), 2))
     .setIndex(index);
 }

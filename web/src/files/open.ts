@@ -5,6 +5,7 @@ import { part } from "../api/part";
 import { fileProblem } from "../api/problem";
 import { plain } from "../view/looks";
 import { jsonOf, parseGltf, triangles, type GltfJson } from "./gltf";
+import type { ObjMaterials } from "./obj";
 import { unreadable } from "./unreadable";
 import type { Upload } from "./upload";
 
@@ -39,9 +40,15 @@ export async function open(upload: Upload): Promise<Opened> {
   }
   const mesh = new Mesh(geometry);
   plain([mesh]);
+  const missing = new Set<string>();
+  const { libraries = [] } = geometry.userData as Partial<ObjMaterials>;
+  if (libraries.length) {
+    const { objMaterials } = await part(import("./materials"));
+    mesh.material = await objMaterials(geometry.userData as ObjMaterials, upload.neighbours, missing);
+  }
   const scene = new Group().add(mesh);
   const corners = geometry.index?.count ?? geometry.getAttribute("position").count;
-  return { scene, clips: [], faces: Math.floor(corners / 3), missing: [], json: null, gltf: null };
+  return { scene, clips: [], faces: Math.floor(corners / 3), missing: [...missing], json: null, gltf: null };
 }
 
 async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Promise<Opened> {

@@ -10,13 +10,13 @@ export function bindKeys(viewer: Viewer | null, timeline: Timeline, setWipe: (sh
   const layout = (value: string) => () =>
     document.querySelector<HTMLInputElement>(`input[name="layout"][value="${value}"]`)?.click();
   const keys: Record<string, () => void> = {
-    ArrowLeft: () => viewer?.orbit(-turn, 0),
-    ArrowRight: () => viewer?.orbit(turn, 0),
-    ArrowUp: () => viewer?.orbit(0, -turn),
-    ArrowDown: () => viewer?.orbit(0, turn),
-    "+": () => viewer?.zoom(0.9),
-    "=": () => viewer?.zoom(0.9),
-    "-": () => viewer?.zoom(1 / 0.9),
+    ArrowLeft: () => viewer?.rig.orbit(-turn, 0),
+    ArrowRight: () => viewer?.rig.orbit(turn, 0),
+    ArrowUp: () => viewer?.rig.orbit(0, -turn),
+    ArrowDown: () => viewer?.rig.orbit(0, turn),
+    "+": () => viewer?.rig.zoom(0.9),
+    "=": () => viewer?.rig.zoom(0.9),
+    "-": () => viewer?.rig.zoom(1 / 0.9),
     f: click("frame"),
     w: click("edges"),
     n: click("normal-lines"),

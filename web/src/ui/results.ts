@@ -20,7 +20,7 @@ export function showPromises(report: Report, lengths: Lengths): string {
           {},
           make("span", { className: "hidden", textContent: holds ? "Kept: " : "Broken: " }),
           make("strong", { textContent: title }),
-          make("span", { textContent: text }),
+          ` ${text}`,
         ),
       ),
     ),
@@ -38,11 +38,17 @@ export function showPromises(report: Report, lengths: Lengths): string {
   return promised.map(({ title, text }) => `${title}: ${text}`).join(" ");
 }
 
+/** The settings that advice may name: the service's options, and the page's words. */
+const WORDS: [RegExp, string][] = [
+  [/\b(use|choose) crease=off/, "choose Sharp edges: None"],
+  [/\b(use|choose) weld_tolerance=[\d.]+/, "switch on Close small gaps"],
+];
+
 /** Show why little changed, in the page's own words for the settings. */
 export function showAdvice({ advice = [] }: Report): void {
   element("advice").hidden = !advice.length;
   element("advice").replaceChildren(
-    ...advice.map((text) => make("li", { textContent: text.replace(/\buse crease=off/, "choose Sharp edges: None") })),
+    ...advice.map((text) => make("li", { textContent: WORDS.reduce((said, [option, word]) => said.replace(option, word), text) })),
   );
 }
 

@@ -124,6 +124,7 @@ export class SettingsForm {
     select("crease").value = settings.crease;
     input("angle").value = String(settings.angle);
     select("uv").value = settings.uv;
+    input("weld").checked = settings.weld;
     select("normals").value = settings.normals;
     this.adjust();
   }
@@ -143,6 +144,7 @@ export class SettingsForm {
       crease: select("crease").value as Settings["crease"],
       angle: angle.validity.valid ? Number(angle.value || DEFAULTS.angle) : before.angle,
       uv: select("uv").value as Settings["uv"],
+      weld: input("weld").checked,
       normals: select("normals").value as Settings["normals"],
     };
     // Each model has its own budget.

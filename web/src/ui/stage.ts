@@ -11,12 +11,13 @@ import { dress, plain, type Look } from "../view/looks";
 import { dispose, extentOf, type Extent, type Model } from "../view/model";
 import { Playback } from "../view/playback";
 import { Viewer, type Layout } from "../view/viewer";
-import { debounced, element, input, select } from "./dom";
+import { debounced, element, select } from "./dom";
 import { bindKeys } from "./keys";
 import { showLabels } from "./labels";
 import { drawLegendBar, showLegend } from "./legend";
 import { copyMorphs, offerMorphs, Timeline } from "./timeline";
 import { drawLines, LINES } from "./overlays";
+import { chooseView, chosenLayout, chosenView } from "./tools";
 import { bindWipe } from "./wipe";
 
 interface Shown {
@@ -56,7 +57,7 @@ export class Stage {
         if (moving) this.timeline.write();
         return moving;
       };
-      this.viewer.onChosen = debounced(300, this.changed);
+      this.viewer.rig.onChosen = debounced(300, this.changed);
     }
     for (const id of ["layout", "pair", "look", ...LINES]) {
       element(id).addEventListener("change", () => {
@@ -81,34 +82,20 @@ export class Stage {
 
   /** The view's own settings, for the page's address. */
   get view(): Record<string, string> {
-    const view: Record<string, string> = {};
-    if (this.layout !== "wipe") view.layout = this.layout;
-    if (select("pair").value !== "control") view.pair = select("pair").value;
-    if (select("look").value !== "material") view.look = select("look").value;
-    for (const lines of LINES) if (input(lines).checked) view[lines] = "1";
-    const place = this.viewer?.chosen ? this.viewer.place(this.extent) : this.awaited;
-    if (place !== null) view.camera = place;
-    return view;
+    const view = chosenView();
+    const place = this.viewer?.rig.chosen ? this.viewer.rig.place(this.extent) : this.awaited;
+    return place === null ? view : { ...view, camera: place };
   }
 
   set view(view: Record<string, string>) {
-    const radio = document.querySelector<HTMLInputElement>(
-      `input[name="layout"][value="${CSS.escape(view.layout ?? "wipe")}"]`,
-    );
-    if (radio) radio.checked = true;
-    for (const name of ["pair", "look"] as const) {
-      select(name).value = view[name] ?? "";
-      // What is not understood stays at its default.
-      if (select(name).selectedIndex < 0) select(name).selectedIndex = 0;
-    }
-    for (const lines of LINES) input(lines).checked = view[lines] === "1";
+    chooseView(view);
     this.awaited = view.camera ?? null;
     this.read();
     if (this.shown.source) this.lookFromLink();
   }
 
   private lookFromLink(): void {
-    if (this.awaited !== null) this.viewer?.goTo(this.awaited, this.extent);
+    if (this.awaited !== null) this.viewer?.rig.goTo(this.awaited, this.extent);
     this.awaited = null;
   }
 
@@ -120,7 +107,7 @@ export class Stage {
     this.timeline.offer(source.model);
     offerMorphs(source.model, () => this.models(), () => this.viewer?.invalidate());
     this.cover();
-    const stale = this.viewer?.chosen;
+    const stale = this.viewer?.rig.chosen;
     this.viewer?.ground(this.extent);
     this.viewer?.frame(this.extent);
     this.lookFromLink();
@@ -168,8 +155,7 @@ export class Stage {
   }
 
   private get layout(): Layout {
-    const chosen = document.querySelector<HTMLInputElement>('input[name="layout"]:checked');
-    return (chosen?.value ?? "wipe") as Layout;
+    return chosenLayout();
   }
 
   private adopt(model: Model): void {
@@ -210,7 +196,7 @@ export class Stage {
     this.viewer.layout = this.layout;
     this.viewer.sides = { left, right };
     this.viewer.over = this.overlaid;
-    this.viewer.standsOnGround = !this.heat && (this.surface === "material" || this.surface === "clay");
+    this.viewer.standsOnGround = this.surface === "material" || this.surface === "clay";
     for (const model of this.models()) {
       const look = this.lookOf(model);
       model.meshes.forEach((mesh) => dress(mesh, look, paper));
@@ -251,7 +237,7 @@ export class Stage {
     const above = (id: string) => bottom - (element(id).getBoundingClientRect().top || bottom);
     element("view").style.setProperty("--tools", `${Math.max(above("tools"), 0)}px`);
     if (!this.viewer) return;
-    this.viewer.covered = Math.max(above("tools"), above("timeline"), 0);
+    this.viewer.rig.covered = Math.max(above("tools"), above("timeline"), 0);
     this.viewer.invalidate();
   }
 

@@ -123,7 +123,7 @@ const DESCRIPTIONS: Record<Heat, (level: number, carried: string, scale: Scale) 
   distance: (_level, _carried, { size, unit }) => ({
     title: "Distance to classic",
     write: (value) => `${percent(value / size)} (${length(value, unit)})`,
-    note: "Each vertex against its counterpart by Loop’s rule, in per cent of the model’s size.",
+    note: "From Loop’s surface, in per cent of the model’s size.",
   }),
   ratio: (level, carried) => ({
     title: "Share of its limit used",

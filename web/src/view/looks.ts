@@ -51,12 +51,15 @@ export function dress(mesh: Mesh, look: Look, paper: string): void {
 export function plain(meshes: Mesh[]): void {
   for (const mesh of meshes) {
     [mesh.material].flat().forEach((material) => material.dispose());
-    const flatShading = !mesh.geometry.getAttribute("normal");
-    const vertexColors = mesh.geometry.hasAttribute("color");
-    const color = vertexColors ? 0xffffff : 0xb8bcc4;
-    mesh.material = new MeshStandardMaterial({ color, roughness: 0.7, flatShading, vertexColors });
+    const { geometry } = mesh;
+    mesh.material = plainMaterial(!geometry.hasAttribute("normal"), geometry.hasAttribute("color"));
     mesh.userData.material = mesh.material;
   }
+}
+
+export function plainMaterial(flatShading = true, vertexColors = false): MeshStandardMaterial {
+  const color = vertexColors ? 0xffffff : 0xb8bcc4;
+  return new MeshStandardMaterial({ color, roughness: 0.7, flatShading, vertexColors });
 }
 
 const MAKERS = {

@@ -3,17 +3,13 @@
 import {
   Color,
   NeutralToneMapping,
-  PerspectiveCamera,
   Raycaster,
   Scene,
-  Sphere,
   Vector2,
-  Vector3,
   WebGLRenderer,
 } from "three";
-import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { distanceTo } from "./framing";
 import { light, paint, surround } from "./lights";
+import { Rig } from "./rig";
 import { ContactShadow } from "./shadow";
 import { drawnBySoftware } from "./software";
 import type { Extent, Model } from "./model";
@@ -23,12 +19,6 @@ export type Layout = "wipe" | "side" | "overlay" | "single";
 /** Milliseconds without a change after which a picture may take its time. */
 const REST = 200;
 
-/** The farthest that a link may put the camera from a model's centre, in its radii. */
-const FARTHEST = 100;
-
-/** The front of a glTF is +Z: seen from a little beside and above it shows its depth. */
-const FRONT = new Vector3(0.35, 0.28, 1).normalize();
-
 export interface Sides {
   left: Model | null;
   right: Model | null;
@@ -36,22 +26,15 @@ export interface Sides {
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
-  readonly camera = new PerspectiveCamera(35, 1, 0.01, 100);
-  readonly controls: OrbitControls;
+  readonly rig: Rig;
   sides: Sides = { left: null, right: null };
   /** Drawn together with the right side: lines over it. */
   over: Model | null = null;
   layout: Layout = "wipe";
   /** Where the wipe stands, 0 to 1 from the left. */
   wipe = 0.5;
-  /** How much of the canvas tools cover at its foot, in pixels: the model stands above them. */
-  covered = 0;
-  /** Whether the user has chosen where the camera stands: a link then holds it. */
-  chosen = false;
   /** Whether models stand on a ground, and cast a shadow there. */
   standsOnGround = false;
-  /** Called when the user has. */
-  onChosen: () => void = () => {};
   /** Called once a frame with the seconds since the last; returns whether it wants another. */
   onFrame: (seconds: number) => boolean = () => false;
 
@@ -60,7 +43,6 @@ export class Viewer {
   private readonly scene = new Scene();
   private readonly shadow = new ContactShadow();
   private readonly paper = new Color();
-  private readonly sphere = new Sphere(new Vector3(), 1);
   private scheduled = false;
   private last = 0;
   private frames = 0;
@@ -71,13 +53,9 @@ export class Viewer {
     this.renderer = new WebGLRenderer({ canvas, antialias: !this.software });
     this.renderer.autoClear = false;
     this.renderer.toneMapping = NeutralToneMapping;
-    light(this.renderer, this.scene, this.camera, this.software);
+    this.rig = new Rig(canvas, () => this.invalidate());
+    light(this.renderer, this.scene, this.rig.camera, this.software);
     this.scene.add(this.shadow.ground);
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.enableDamping = false;
-    this.controls.zoomToCursor = true;
-    this.controls.addEventListener("change", () => this.invalidate());
-    this.controls.addEventListener("end", () => this.choose());
     canvas.addEventListener("dblclick", (event) => this.centreAt(event));
     canvas.addEventListener("webglcontextrestored", () => {
       if (!this.software) surround(this.renderer, this.scene);
@@ -121,79 +99,13 @@ export class Viewer {
 
   /** Look at all of a model; `turn` goes back to the first direction. */
   frame(extent: Extent, turn = true): void {
-    const { box } = extent;
-    if (box.isEmpty()) return;
-    const { center, radius } = box.getBoundingSphere(this.sphere);
-    const size = radius || 1;
-    const towards = turn
-      ? FRONT.clone()
-      : this.camera.position.clone().sub(this.controls.target).normalize();
-    const { width, height } = this.size();
-    const tall = Math.tan((this.camera.fov * Math.PI) / 360);
-    const free = tall * (1 - this.foot(height));
-    const wide = (tall * (this.layout === "side" ? width / 2 : width)) / height;
-    const distance = distanceTo(extent, center, towards, this.camera.up, wide, free) || 3 * size;
-    this.controls.target.copy(center);
-    this.camera.position.copy(center).addScaledVector(towards, distance);
-    this.camera.near = size / 200;
-    this.camera.far = size * 200;
-    this.controls.minDistance = size / 50;
-    this.controls.maxDistance = size * 40;
-    if (turn) this.chosen = false;
-    this.controls.update();
-    this.invalidate();
+    const { width } = this.size();
+    this.rig.frame(extent, this.layout === "side" ? width / 2 : width, turn);
   }
 
   /** Lay the ground under a model. */
   ground({ box }: Extent): void {
     if (!box.isEmpty()) this.shadow.place(box);
-  }
-
-  /** Where the camera stands and where it looks, from a model's centre and in its radii: six numbers. */
-  place({ box }: Extent): string {
-    const { center, radius } = box.getBoundingSphere(this.sphere);
-    const at = [this.camera.position, this.controls.target];
-    const numbers = at.flatMap((point) => point.clone().sub(center).divideScalar(radius || 1).toArray());
-    return numbers.map((x) => Number(x.toFixed(4))).join();
-  }
-
-  /** Go to such a place; what is none changes nothing. */
-  goTo(place: string, { box }: Extent): void {
-    const numbers = place.split(",").map(Number);
-    if (numbers.length !== 6 || !numbers.every((x) => Math.abs(x) <= FARTHEST) || box.isEmpty()) return;
-    const { center, radius } = box.getBoundingSphere(this.sphere);
-    for (const [point, first] of [[this.camera.position, 0], [this.controls.target, 3]] as const) {
-      point.fromArray(numbers, first).multiplyScalar(radius || 1).add(center);
-    }
-    this.chosen = true;
-    this.controls.update();
-    this.invalidate();
-  }
-
-  private choose(): void {
-    this.chosen = true;
-    this.onChosen();
-  }
-
-  /** Turn around the centre, in radians. */
-  orbit(right: number, up: number): void {
-    const offset = this.camera.position.clone().sub(this.controls.target);
-    const side = new Vector3().crossVectors(this.camera.up, offset).normalize();
-    const polar = offset.angleTo(this.camera.up);
-    offset.applyAxisAngle(side, Math.min(Math.max(up, 0.01 - polar), Math.PI - 0.01 - polar));
-    offset.applyAxisAngle(this.camera.up, right);
-    this.camera.position.copy(this.controls.target).add(offset);
-    this.choose();
-    this.controls.update();
-    this.invalidate();
-  }
-
-  zoom(factor: number): void {
-    const offset = this.camera.position.clone().sub(this.controls.target);
-    this.camera.position.copy(this.controls.target).addScaledVector(offset, factor);
-    this.choose();
-    this.controls.update();
-    this.invalidate();
   }
 
   /** The view as a PNG, at the canvas's own size. */
@@ -203,11 +115,6 @@ export class Viewer {
     return new Promise((resolve, reject) =>
       this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("no picture")))),
     );
-  }
-
-  /** The part of the canvas's height that tools cover; on a low canvas they are not minded. */
-  private foot(height: number): number {
-    return Math.min(this.covered / height, 0.3);
   }
 
   private size(): { width: number; height: number } {
@@ -249,7 +156,7 @@ export class Viewer {
     const { height } = this.size();
     const { renderer, scene, shadow } = this;
     for (const object of scene.children) {
-      if (object === this.camera || "isLight" in object) continue;
+      if (object === this.rig.camera || "isLight" in object) continue;
       object.visible = object === model?.root || object === this.over?.root;
     }
     renderer.setClearColor(this.paper);
@@ -263,15 +170,8 @@ export class Viewer {
     renderer.setScissor(from, 0, columns, height);
     renderer.clear();
     if (!model) return;
-    this.project(width, height);
-    renderer.render(scene, this.camera);
-  }
-
-  /** A picture of so many pixels, whose middle lies in the middle of what tools leave free. */
-  private project(width: number, height: number): void {
-    this.camera.setViewOffset(1, 1, 0, this.foot(height) / 2, 1, 1);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.rig.project(width, height);
+    renderer.render(scene, this.rig.camera);
   }
 
   private centreAt(event: MouseEvent): void {
@@ -289,15 +189,9 @@ export class Viewer {
     if (!model) return;
     const at = new Vector2((2 * x) / width - 1, 1 - (2 * (event.clientY - box.top)) / box.height);
     const caster = new Raycaster();
-    this.project(width, box.height);
-    caster.setFromCamera(at, this.camera);
+    this.rig.project(width, box.height);
+    caster.setFromCamera(at, this.rig.camera);
     const hit = caster.intersectObjects(model.meshes, false)[0];
-    if (!hit) return;
-    const shift = hit.point.clone().sub(this.controls.target);
-    this.controls.target.add(shift);
-    this.camera.position.add(shift);
-    this.choose();
-    this.controls.update();
-    this.invalidate();
+    if (hit) this.rig.centreOn(hit.point);
   }
 }

@@ -44,11 +44,13 @@ export async function serve(settings = {}) {
         await answer.arrayBuffer();
       }
     },
-    /** A number of the service's own; it shows them with PNS_METRICS_PORT. */
-    async metric(name) {
-      const [, metrics] = /metrics on (http:\S+)/.exec(log);
-      const line = new RegExp(`^${name} (\\S+)$`, "m").exec(await (await fetch(metrics)).text());
-      return Number(line[1]);
+    /** Wait until a number of the service's own has a value; it shows them, a second late, with PNS_METRICS_PORT. */
+    async reaches(name, value) {
+      const [, metrics] = /metrics on (http:[^"\s]+)/.exec(log);
+      const wanted = new RegExp(`^${name} ${value}(\\.0)?$`, "m");
+      while (!wanted.test(await (await fetch(metrics)).text())) {
+        await new Promise((resolve) => setTimeout(resolve, 100));
+      }
     },
     /** As a machine that loses its power. */
     async kill() {

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Int, Shaped
 
 from pns_common import Creases
-from pns_common.topology import build_topology
+from pns_common.topology import Topology, build_topology
 
 from .snapshot import Domain, Snapshot, edge_keys
 
@@ -14,31 +14,30 @@ from .snapshot import Domain, Snapshot, edge_keys
 def shown_creases(snapshot: Snapshot, asked: Creases) -> Creases:
     """Return the creases of a scheme by name, with the hard edges that the mesh's shading marks.
 
-    A mesh whose edges are all hard is flat-shaded, and marks none.
+    A mesh whose polygons meet at hard edges alone is flat-shaded, and marks none.
     """
     if asked.angle is None:
         return asked
     topology = build_topology(snapshot.triangles, len(snapshot.points))
     found = topology.edges[asked.found(snapshot.points, topology)].astype(np.int64)
     named = Creases(found, levels=asked.levels)
-    edges, _, hard = shaded_edges(snapshot)
+    edges, hard = shaded_edges(snapshot, topology)
     return named if hard.all() else named.with_named(edges[hard])
 
 
 def shaded_edges(
-    snapshot: Snapshot,
-) -> tuple[Int[np.ndarray, "I 2"], Int[np.ndarray, "I 2"], Bool[np.ndarray, " I"]]:
-    """Return the interior edges, their faces, and which are marked sharp or lie at flat faces."""
-    topology = build_topology(snapshot.triangles, len(snapshot.points))
-    edges = topology.edges[topology.interior].astype(np.int64)
-    faces = topology.half_edges[topology.interior] // 3
-    polygons = snapshot.polygons[faces]
+    snapshot: Snapshot, topology: Topology
+) -> tuple[Int[np.ndarray, "N 2"], Bool[np.ndarray, " N"]]:
+    """Return the edges between two polygons, and which are marked sharp or lie at flat faces."""
+    polygons = snapshot.polygons[topology.half_edges[topology.interior] // 3]
+    # A polygon's own diagonals have one normal on both sides.
+    between = polygons[:, 0] != polygons[:, 1]
+    polygons = polygons[between]
+    edges = topology.edges[topology.interior][between].astype(np.int64)
     flat = _marked(snapshot, "sharp_face", Domain.FACE, len(snapshot.polygon_corners) - 1)
     marked = snapshot.edges[_marked(snapshot, "sharp_edge", Domain.EDGE, len(snapshot.edges))]
     hard = flat[polygons].any(axis=1) | np.isin(edge_keys(edges), edge_keys(marked))
-    # A polygon's own diagonals have one normal on both sides.
-    hard &= polygons[:, 0] != polygons[:, 1]
-    return edges, faces, hard
+    return edges, hard
 
 
 def _marked(snapshot: Snapshot, name: str, domain: Domain, count: int) -> Bool[np.ndarray, " N"]:

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pns_common import Mesh, load_model
-from pns_common.fused.where_loaded.linear import FusedLinearRefinement
-from pns_common.masks.linear import LinearRefinement
+from pns_common.columns import ColumnRefinement
 from service.course import Course
 from service.gltf.read.plan import MeshPlan
 from service.gltf.refine import meshes, together
@@ -80,14 +79,12 @@ def test_together_is_as_alone_to_the_last_byte(
     assert made.glb == alone.glb
 
 
-@pytest.mark.parametrize(
-    "options", [{}, {"normals": "smooth"}, {"normals": "smooth", "crease": "lines"}], ids=str
-)
-def test_each_is_edged_or_not_by_itself(
+@pytest.mark.parametrize("options", [{}, {"normals": "smooth"}, {"uv": "smooth"}], ids=str)
+def test_creases_are_found_in_each_mesh_by_itself(
     options: dict[str, object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A cylinder of six sides is edged, and with a few spheres beside it all together are not."""
-    shapes = [cylinder(6), *(Mesh(*icosphere(0)) for _ in range(4))]
+    """The rims and walls of a cylinder of six sides are sharp, and a sphere has no such edge."""
+    shapes = [cylinder(6), *(Mesh(*icosphere(2)) for _ in range(4))]
     data = files.glb(*([{"POSITION": m.vertices, "indices": m.faces}] for m in shapes))
     asked = Options(levels=2, **options)
 
@@ -218,8 +215,8 @@ def test_joints_of_one_mesh_do_not_wait_for_those_of_another() -> None:
         shapes.append([shape])
     columns: list[int] = []
     with pytest.MonkeyPatch.context() as patch:
-        for kind in (LinearRefinement, FusedLinearRefinement):
-            patch.setattr(kind, "__call__", counting(kind.__call__, columns))
+        counted = counting(ColumnRefinement.__call__, columns)
+        patch.setattr(ColumnRefinement, "__call__", counted)
         assert refine(files.glb(*shapes)).report["totals"]["meshes"] == 40
     assert sum(columns) == 4
 

@@ -6,7 +6,6 @@ import pytest
 from benchmarks.generated import torus
 from benchmarks.memory import peak_mib, reset_peak
 from pns_common import Mesh, load_model, loop, pns, refine
-from pns_common.base.blocks import BLOCK_ROWS
 from service.errors import LimitError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshes.weld import weld
@@ -17,13 +16,14 @@ from service.options import Limits, Options
 from tests.service.gltf.test_options import cylinder
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box, octahedron
-from tests.support.networks import random_model, vertex_model
+from tests.support.networks import default_model, random_model
 
-MODEL = vertex_model()
+# Boundaries and creases are Loop's.
+MODEL = default_model(boundary_strength=0.0)
 
 
 def subdivide(*meshes, model=MODEL, **options):
-    options = Options(**{"scheme": "pns", "levels": 1, **options})
+    options = Options(**{"scheme": "pns", "levels": 1, "crease": "off", **options})
     return subdivide_gltf(files.glb(*meshes), "glb", options, model, Limits())
 
 
@@ -52,17 +52,16 @@ def is_old(faces, levels):
     return old
 
 
-@pytest.mark.parametrize("levels", [1, 2])
-def test_old_vertices_carry_their_own_ratio_and_gate(levels):
-    result = subdivide([octahedron()], diagnostics="full", levels=levels)
-    expected = refine(welded_octahedron(), pns(MODEL), levels)
+def test_old_vertices_carry_their_own_ratio_and_gate():
+    result = subdivide([octahedron()], diagnostics="full")
+    expected = refine(welded_octahedron(), pns(MODEL), 1, creases=None)
     for name, values in (("_PNS_RATIO", expected.ratio), ("_PNS_GATE", expected.gate)):
         stored = corners(result, name)[..., 0]
         np.testing.assert_array_equal(stored, values.astype(np.float32)[expected.mesh.faces])
-        assert (stored[is_old(8, levels)] > 0.01).all()
+        assert (stored[is_old(8, 1)] > 0.01).all()
         assert stored.max() <= 1 + 1e-6
-    by_edges = subdivide([octahedron()], model=random_model(0), diagnostics="full", levels=levels)
-    assert not corners(by_edges, "_PNS_RATIO")[is_old(8, levels)].any()
+    by_edges = subdivide([octahedron()], model=random_model(0), diagnostics="full")
+    assert not corners(by_edges, "_PNS_RATIO")[is_old(8, 1)].any()
 
 
 def test_the_report_in_the_file_says_what_moved():
@@ -70,11 +69,12 @@ def test_the_report_in_the_file_says_what_moved():
     tree, _ = files.unpack(result.glb)
     report = tree["asset"]["extras"]["pns"]
     assert report == result.report
-    assert (report["model"], report["model_hash"]) == ("vertices", MODEL.hash)
-    # Six vertices and eight; after a level also those on twelve and on eighteen edges.
-    assert [level["vertex_rule"]["vertices"] for level in report["levels"]] == [14, 44]
-    for mesh, counts in zip(report["meshes"], ([6, 18], [8, 26]), strict=True):
-        assert [level["vertex_rule"]["vertices"] for level in mesh["levels"]] == counts
+    assert (report["model"], report["model_hash"]) == ("default", MODEL.hash)
+    # Six vertices and eight, at the first level alone.
+    assert report["levels"][0]["vertex_rule"]["vertices"] == 14
+    for mesh, count in zip(report["meshes"], (6, 8), strict=True):
+        assert mesh["levels"][0]["vertex_rule"]["vertices"] == count
+        assert "vertex_rule" not in mesh["levels"][1]
     assert report["levels"][0]["vertex_rule"]["proximity_ratio"]["max"] > 0.01
     without = subdivide([octahedron()], model=random_model(0)).report
     assert "vertex_rule" not in without["levels"][0]
@@ -150,7 +150,6 @@ def test_vertices_on_a_boundary_are_where_loop_puts_them():
     # Without one face, three vertices lie on a boundary and three have closed rings.
     shape = octahedron(indices=octahedron()["indices"][1:])
     result, by_loop = (subdivide([shape], scheme=scheme) for scheme in ("pns", "loop"))
-    assert result.report["levels"][0]["vertex_rule"]["vertices"] == 3
     old = shape["indices"].reshape(-1)
     apart = departure(result, by_loop)[is_old(7, 1)]
     assert not apart[np.isin(old, octahedron()["indices"][0])].any()
@@ -160,19 +159,20 @@ def test_vertices_on_a_boundary_are_where_loop_puts_them():
 def test_mesh_files_are_refined_by_the_same_rule():
     shape = octahedron()
     triangles = IndexedTriangles(shape["POSITION"], shape["indices"], None)
-    refined, report = refine_triangles(triangles, pns(MODEL), Options(levels=2), Limits())
-    expected = refine(welded_octahedron(), pns(MODEL), 2)
+    options = Options(levels=2, crease="off")
+    refined, report = refine_triangles(triangles, pns(MODEL), options, Limits())
+    expected = refine(welded_octahedron(), pns(MODEL), 2, creases=None)
     np.testing.assert_array_equal(
         refined.vertices[refined.faces], expected.mesh.vertices[expected.mesh.faces]
     )
-    assert [level["vertex_rule"]["vertices"] for level in report["levels"]] == [6, 18]
+    assert report["levels"][0]["vertex_rule"]["vertices"] == 6
 
 
 def test_the_result_does_not_depend_on_the_number_of_threads():
-    mesh = torus(2 * BLOCK_ROWS)
-    alone, several = (refine(mesh, pns(MODEL), threads=threads).mesh for threads in (1, 4))
+    mesh = torus(70_000)
+    alone, several = (refine(mesh, pns(MODEL), 1, threads=threads).mesh for threads in (1, 4))
     np.testing.assert_array_equal(alone.vertices, several.vertices)
-    by_loop = refine(mesh, loop(), threads=1).mesh.vertices
+    by_loop = refine(mesh, loop(), 1, threads=1).mesh.vertices
     assert (alone.vertices != by_loop)[: len(mesh.vertices)].any(axis=1).all()
 
 

@@ -1,1 +1,0 @@
-"""The socket's side of the service: uvicorn's connection, with bounds where its settings end."""

@@ -1,0 +1,136 @@
+"""The work of a job that no connection waits for: taken in, shared, done, kept."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Coroutine
+from contextlib import AsyncExitStack, suppress
+from typing import Any
+
+from fastapi import Request
+from starlette.requests import ClientDisconnect
+
+from ..errors import ServiceError
+from ..workers.job import Job, State
+from ..workers.worker import JobFaultError
+from . import problems
+from .admission import DrainingError
+from .clients import client_of
+from .intake import Wanted, owner_of, taken_in
+from .job_book import Entry
+from .leaving import unless_gone
+from .parameters import Parameters
+from .result_room import result_folder
+from .service import Service
+
+# How long after a job's end a shutdown waits for somebody to fetch its result.
+FETCH_SECONDS = 10.0
+
+log = logging.getLogger("pns.service")
+
+
+def job_json(service: Service, job: Job) -> dict[str, Any]:
+    """Return a job as its client sees it."""
+    queued = job.state is State.QUEUED
+    estimate = service.desk.remaining(job)
+    problem = None
+    if job.error is not None:
+        # By the id of the request that handed it in: what the log says of it stands under that.
+        problem = json.loads(bytes(problems.of_job(job.error).body))
+        problem["request_id"] = job.work.request_id
+    return {
+        "id": job.id,
+        "state": str(job.state),
+        "queue_place": service.desk.place(job) if queued else None,
+        "stage": job.page.stage if job.state is State.RUNNING else None,
+        "share": round(job.share, 4),
+        "estimate_seconds": None if estimate is None else round(estimate, 1),
+        "faces": None if job.cost is None else job.cost.faces,
+        "format": job.work.target,
+        "problem": problem,
+    }
+
+
+async def hand_in(service: Service, request: Request, parameters: Parameters) -> Entry:
+    """Take a file in, and its job until it stands in line.
+
+    Raises:
+        ServiceError: it is refused; ClientDisconnect: its client has left before that.
+    """
+    settings = service.settings
+    wanted = Wanted(
+        answer=True,
+        report=True,
+        folder=result_folder(settings),
+        patience=settings.queue_seconds + settings.job_seconds,
+    )
+    client = client_of(request, settings)
+    service.book.check_room(client.networks)
+    async with AsyncExitStack() as held:
+        job = await held.enter_async_context(taken_in(service, request, parameters, wanted))
+        entry = service.book.add(job, owner_of(client), client.networks)
+        if service.shared is not None:
+            try:
+                await service.shared.publish(job, entry.owner)
+            except ServiceError:
+                service.book.hand_over(job)
+                raise
+        entry.task = asyncio.create_task(_work(service, entry, held.pop_all()))
+    try:
+        await unless_gone(request.receive, job.accepted.wait())
+    except ClientDisconnect:
+        # Nobody knows its id. Nothing else would bound how many such jobs wait to be measured.
+        entry.cancelled = True
+        service.book.forget(job.id)
+        raise
+    if job.error is not None and job.waiting is None:
+        # Refused before it stood in line: there is nothing to come back for.
+        if service.shared is not None:
+            await service.shared.store.delete(job.id)
+        service.book.forget(job.id)
+        raise job.error
+    return entry
+
+
+def begin_shared(service: Service, entry: Entry, held: AsyncExitStack) -> None:
+    """Work on a job that another replica has left."""
+    entry.task = asyncio.create_task(_work(service, entry, held))
+
+
+async def _work(service: Service, entry: Entry, held: AsyncExitStack) -> None:
+    """Do a job that no connection waits for, to its end, and be under way until it is fetched."""
+    job, shared = entry.job, service.shared
+    async with held:
+        beats = None if shared is None else asyncio.create_task(shared.beat(entry))
+        try:
+            async with service.admission.working():
+                await service.desk.serve(job)
+        except DrainingError:
+            pass
+        except ServiceError as error:
+            log.info("a job failed: %s", error.code)
+        except JobFaultError as error:
+            # The traceback that matters is the worker's.
+            log.error("a job failed in its worker:\n%s", error)  # noqa: TRY400
+        finally:
+            if beats is not None:
+                beats.cancel()
+            # Of jobs that are shared any replica has the result, from the store.
+            if shared is not None and await _to_its_end(shared.end(entry)):
+                service.book.hand_over(job)
+            else:
+                service.book.keep(job)
+    if job.state is State.DONE and shared is None:
+        # Who asks now and then whether it is done may not have asked since.
+        with suppress(TimeoutError, DrainingError):
+            async with service.admission.working(), asyncio.timeout(FETCH_SECONDS):
+                await job.fetched.wait()
+
+
+async def _to_its_end(work: Coroutine[Any, Any, bool]) -> bool:
+    """Wait for a short piece of work, also in a task that is being cancelled."""
+    task = asyncio.create_task(work)
+    await asyncio.wait({task})
+    return task.result()

@@ -1,0 +1,216 @@
+"""Hostile clients at the service alone, and behind the proxy of deploy/; over real sockets.
+
+Nothing here measures time: a test waits for an answer or an end, and each socket gives up after
+`PATIENCE` where neither comes. What the service leaves to a proxy is tested behind it alone.
+"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import socket
+import time
+from contextlib import ExitStack, closing, suppress
+
+import pytest
+
+from tests.support.live import served
+from tests.support.proxy import proxied
+
+PATIENCE = 60
+MIB = 2**20
+HEAD = "{} {} HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n{}\r\n"
+CHUNKED = "Transfer-Encoding: chunked\r\n"
+GLB = {"Content-Type": "model/gltf-binary"}
+
+
+def connect(address):
+    return socket.create_connection(address, timeout=PATIENCE)
+
+
+def head(method, path, more=""):
+    return HEAD.format(method, path, more).encode()
+
+
+def received(connection):
+    """All that the server sends before it ends the connection."""
+    pieces = []
+    with suppress(ConnectionResetError):
+        while piece := connection.recv(2**16):
+            pieces.append(piece)
+    return b"".join(pieces)
+
+
+def status(answer):
+    return int(answer.split(maxsplit=2)[1])
+
+
+def is_served(address):
+    """Whether a client that means well is served."""
+    with closing(http.client.HTTPConnection(*address, timeout=PATIENCE)) as connection:
+        connection.request("POST", "/subdivide", b"honest", GLB)
+        answer = connection.getresponse()
+        return (answer.status, answer.read()) == (200, b"honest")
+
+
+def wait_until_served(address):
+    for _ in range(200):
+        with suppress(OSError, http.client.HTTPException):
+            if is_served(address):
+                return
+        time.sleep(0.1)
+    pytest.fail("the service does not recover")
+
+
+def trickle(connection, piece=b"x"):
+    """Send a piece now and then, until the server ends the connection; return what it said."""
+    connection.settimeout(0.05)
+    said = b""
+    for _ in range(int(PATIENCE / 0.05)):
+        try:
+            connection.sendall(piece)
+            if not (got := connection.recv(2**16)):
+                return said
+            said += got
+        except TimeoutError:
+            continue
+        except OSError:
+            return said
+    pytest.fail("the connection does not end")
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [("GET", "/healthz"), ("POST", "/nothing"), ("POST", "/subdivide?levels=9")],
+)
+def test_a_body_that_no_route_reads_ends_and_is_kept_nowhere(front, method, path):
+    chunk = b"10000\r\n" + bytes(2**16) + b"\r\n"
+    with connect(front) as connection:
+        connection.sendall(head(method, path, CHUNKED))
+        # Reset, or a broken pipe.
+        with pytest.raises(OSError):  # noqa: PT011, PT012
+            while True:
+                connection.sendall(chunk)
+    wait_until_served(front)
+
+
+@pytest.mark.parametrize("size", [MIB + 1, 3 * MIB])
+def test_a_client_that_sends_first_and_reads_later_sees_its_413(front, size):
+    with closing(http.client.HTTPConnection(*front, timeout=PATIENCE)) as connection:
+        connection.request("POST", "/subdivide", bytes(size), GLB)
+        answer = connection.getresponse()
+        assert answer.status == 413
+        assert json.loads(answer.read())["limit"] == "body"
+
+
+def test_a_chunked_body_in_ordinary_pieces_is_taken(front):
+    pieces = [bytes([n]) * 1024 for n in range(250)]
+    with closing(http.client.HTTPConnection(*front, timeout=PATIENCE)) as connection:
+        connection.request("POST", "/subdivide", iter(pieces), GLB, encode_chunked=True)
+        answer = connection.getresponse()
+        assert (answer.status, answer.read()) == (200, b"".join(pieces))
+
+
+def test_a_body_in_countless_pieces_keeps_nobody_out(front):
+    """The service alone parses them in one go, and recovers; the proxy takes them together."""
+    with connect(front) as connection, suppress(OSError):
+        connection.sendall(head("POST", "/subdivide", CHUNKED) + b"1\r\nx\r\n" * 100_000)
+    wait_until_served(front)
+
+
+@pytest.mark.parametrize("first", [b"", b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX-"])
+def test_a_connection_that_asks_for_nothing_is_ended(front, first):
+    with connect(front) as connection:
+        connection.sendall(first)
+        assert b"200 OK" not in received(connection)
+
+
+def test_a_head_that_trickles_is_ended(front):
+    with connect(front) as connection:
+        connection.sendall(b"GET /healthz HTTP/1.1\r\nX-")
+        assert b"200 OK" not in trickle(connection)
+
+
+def test_408_for_an_upload_below_the_least_rate(front):
+    with connect(front) as connection:
+        connection.sendall(head("POST", "/subdivide", f"Content-Length: {2**20}\r\n"))
+        answer = trickle(connection, bytes(100))
+    assert status(answer) == 408
+    assert b"slower than" in answer
+
+
+def test_a_client_that_only_sends_and_never_reads_keeps_nobody_out(front):
+    with connect(front) as connection, suppress(OSError):
+        connection.settimeout(2)
+        while True:
+            connection.sendall(head("GET", "/openapi.json") * 64)
+    wait_until_served(front)
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"secret\r\n\r\n",
+        b"GET / HTTP/1.1\r\n\r\n",
+        b"GET / HTTP/1.1\r\nKey : secret\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"x" * 2**18,
+        b"POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: gzip\r\n\r\n",
+        b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + bytes(64),
+    ],
+    ids=["words", "no host", "a blank in a name", "a long head", "an encoding", "TLS"],
+)
+def test_what_is_no_http_is_refused_and_not_repeated_in_the_log(front, sent, caplog):
+    with connect(front) as connection:
+        with suppress(OSError):
+            connection.sendall(sent)
+        answer = received(connection)
+    assert b" 200 " not in answer[:20]
+    # What could not be read may have been a key.
+    assert "secret" not in caplog.text
+    wait_until_served(front)
+
+
+def test_a_connection_that_asks_again_and_again_is_kept(front):
+    """Each of its answers is whole whenever the service looks."""
+    with closing(http.client.HTTPConnection(*front, timeout=PATIENCE)) as connection:
+        until = time.monotonic() + 2
+        while time.monotonic() < until:
+            connection.request("GET", "/healthz")
+            answer = connection.getresponse()
+            answer.read()
+            assert (answer.status, answer.will_close) == (200, False)
+            # The proxy takes no more than twenty in a second.
+            time.sleep(0.06)
+
+
+def test_hundreds_of_silent_connections_are_gone_and_keep_nobody_out(front):
+    """More than there are slots for: the service alone refuses meanwhile, and then recovers."""
+    with ExitStack() as opened:
+        for _ in range(700):
+            with suppress(OSError):
+                opened.enter_context(connect(front))
+        wait_until_served(front)
+
+
+def test_the_service_recovers_from_more_requests_than_it_has_connections():
+    """Uploads that stall fill all that there is; once they end, the next client is served."""
+    with served(workers=1, connections=4, idle_seconds=0.5) as address, ExitStack() as opened:
+        for _ in range(300):
+            with suppress(OSError):
+                connection = opened.enter_context(connect(address))
+                connection.sendall(head("POST", "/subdivide", "Content-Length: 1000\r\n"))
+        wait_until_served(address)
+
+
+def test_behind_the_proxy_one_address_that_fills_its_share_keeps_nobody_out(tmp_path):
+    with (
+        served(workers=1, proxies="127.0.0.1") as behind,
+        proxied(behind, tmp_path) as address,
+        ExitStack() as opened,
+    ):
+        upload = "Content-Length: 1000\r\nX-Client: 192.0.2.1\r\n"
+        for _ in range(100):
+            connection = opened.enter_context(connect(address))
+            with suppress(OSError):
+                connection.sendall(head("POST", "/subdivide", upload))
+        assert is_served(address)

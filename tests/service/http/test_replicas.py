@@ -1,0 +1,253 @@
+"""Two replicas that share their jobs in a Redis, one of them killed."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from service.http.job_store import ANSWER, JobStore
+from service.settings import Settings
+from tests.support.live import served
+from tests.support.proxy import free_port
+
+GLB = {"Content-Type": "model/gltf-binary"}
+RUNNING = re.compile(r"running on http://([\d.]+):(\d+)")
+# A replica whose workers do what their bodies say.
+REPLICA = """
+from service import log_lines
+from service.http.app import create_app
+from service.http.server import DrainingServer
+from service.settings import Settings
+from tests.support import stand_in_jobs as jobs
+
+if __name__ == "__main__":
+    log_lines.configure()
+    settings = Settings()
+    stand_ins = {"job": jobs.obey, "measure": jobs.measure, "warm_up": jobs.no_warm_up}
+    DrainingServer(create_app(settings, **stand_ins), settings).run()
+"""
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture(scope="module")
+def redis(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a Redis of this test's own."""
+    program = shutil.which("redis-server")
+    if program is None:
+        pytest.skip("needs redis-server (Debian: redis-server)")
+    port = free_port()
+    command = [program, "--port", str(port), "--bind", "127.0.0.1", "--save", ""]
+    folder = tmp_path_factory.mktemp("redis")
+    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL)
+    while True:
+        assert process.poll() is None
+        with closing(socket.socket()) as probe:
+            if probe.connect_ex(("127.0.0.1", port)) == 0:
+                break
+        time.sleep(0.02)
+    yield f"redis://127.0.0.1:{port}/0"
+    process.terminate()
+    process.wait(30)
+
+
+@contextmanager
+def replica(
+    store: str, folder: Path, **settings: str
+) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """The address of a replica in a process of its own, and the process."""
+    script, log = folder / "replica.py", folder / f"log-{os.urandom(4).hex()}"
+    script.write_text(REPLICA)
+    own = {"PNS_PORT": "0", "PNS_WORKERS": "1", "PNS_STORE": store, "PYTHONPATH": str(ROOT)}
+    with log.open("wb") as lines:
+        process = subprocess.Popen(
+            [sys.executable, script], stderr=lines, env=os.environ | own | settings
+        )
+    try:
+        while not (told := RUNNING.search(log.read_text())):
+            assert process.poll() is None, log.read_text()
+            time.sleep(0.05)
+        yield f"http://{told[1]}:{told[2]}", process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def hand_in(client: httpx2.Client, body: bytes, **headers: str) -> str:
+    answer = client.post("/jobs", content=body, headers=GLB | headers)
+    assert answer.status_code == 202, answer.text
+    return f"/jobs/{answer.json()['id']}"
+
+
+def ended(client: httpx2.Client, job: str) -> dict[str, object]:
+    while (view := client.get(job).json())["state"] in ("queued", "running"):
+        time.sleep(0.05)
+    return view
+
+
+def opened(address: tuple[str, int]) -> httpx2.Client:
+    return httpx2.Client(base_url=f"http://{address[0]}:{address[1]}", timeout=600)
+
+
+@pytest.fixture(scope="module", params=["redis", "a folder"])
+def pair(
+    redis: str, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[httpx2.Client, httpx2.Client]]:
+    """Clients of two replicas, whose files lie in Redis, or in a folder as in a bucket."""
+    shared = {"workers": 1, "store": redis}
+    if request.param != "redis":
+        shared["store_files"] = f"file://{tmp_path_factory.mktemp('bucket')}"
+    with (
+        served(**shared) as one,
+        served(**shared) as other,
+        opened(one) as first,
+        opened(other) as second,
+    ):
+        yield first, second
+
+
+def test_any_replica_answers_for_any_job(pair: tuple[httpx2.Client, httpx2.Client]) -> None:
+    first, second = pair
+    job = hand_in(first, b"echo this")
+    assert ended(second, job)["state"] == "done"
+    for client in pair:
+        for _ in range(2):
+            assert client.get(f"{job}/result").content == b"echo this"
+        assert client.get(f"{job}/report").headers["content-type"] == "application/json"
+    assert second.delete(job).status_code == 204
+    assert [client.get(job).status_code for client in pair] == [404, 404]
+    assert first.get(f"{job}/result").status_code == 404
+
+
+def test_a_problem_is_the_same_at_each_replica(pair: tuple[httpx2.Client, httpx2.Client]) -> None:
+    job = hand_in(pair[0], b"broken", **{"X-Request-ID": "mine"})
+    assert ended(pair[1], job)["state"] == "failed"
+    answers = [client.get(f"{job}/result") for client in pair]
+    assert [answer.status_code for answer in answers] == [422, 422]
+    assert answers[0].json() == answers[1].json()
+    assert answers[0].json()["request_id"] == "mine"
+
+
+def test_events_are_told_by_another_replica(
+    pair: tuple[httpx2.Client, httpx2.Client], tmp_path: Path
+) -> None:
+    job = hand_in(pair[0], f"steps {tmp_path}".encode())
+    states = []
+    with pair[1].stream("GET", f"{job}/events") as stream:
+        for line in stream.iter_lines():
+            if line.startswith("data: "):
+                states.append(json.loads(line.removeprefix("data: "))["state"])
+                for number in (1, 2, 3):
+                    (tmp_path / f"go-{number}").touch()
+    assert states[-1] == "done"
+
+
+def test_a_job_is_cancelled_at_another_replica(
+    pair: tuple[httpx2.Client, httpx2.Client], tmp_path: Path
+) -> None:
+    first, second = pair
+    job = hand_in(first, f"steps {tmp_path}".encode())
+    while not (tmp_path / "took-1").exists():
+        time.sleep(0.01)
+    assert second.delete(job).status_code == 204
+    assert ended(second, job)["state"] == "cancelled"
+    # Its worker is free.
+    assert ended(first, hand_in(first, b"echo"))["state"] == "done"
+
+
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])
+def test_no_job_is_lost_where_a_replica_is_killed(
+    redis: str, tmp_path: Path, sent: signal.Signals
+) -> None:
+    """Half of the jobs are one replica's: one runs, the others wait. Each is done by the other."""
+    with ExitStack() as stack:
+        # A drain that does not wait for what still runs.
+        first, process = stack.enter_context(replica(redis, tmp_path, PNS_DRAIN_SECONDS="0.1"))
+        second, _ = stack.enter_context(replica(redis, tmp_path))
+        clients = [
+            stack.enter_context(httpx2.Client(base_url=address, timeout=600))
+            for address in (first, second)
+        ]
+        waits = tmp_path / "steps"
+        waits.mkdir()
+        jobs = [hand_in(clients[0], f"steps {waits}".encode())]
+        jobs += [hand_in(clients[0], b"echo %d" % number) for number in range(3)]
+        jobs += [hand_in(clients[1], b"echo %d" % number) for number in range(3, 6)]
+        while not (waits / "took-1").exists():
+            time.sleep(0.01)
+        process.send_signal(sent)
+        process.wait(60)
+        for number in (1, 2, 3):
+            (waits / f"go-{number}").touch()
+        survivor = clients[1]
+        assert [ended(survivor, job)["state"] for job in jobs] == ["done"] * len(jobs)
+        contents = [survivor.get(f"{job}/result").content for job in jobs]
+        assert contents[1:] == [b"echo %d" % number for number in range(6)]
+        assert contents[0] == f"steps {waits}".encode()
+
+
+def test_without_its_store_a_replica_says_so_and_takes_no_job() -> None:
+    store = f"redis://127.0.0.1:{free_port()}/0"
+    with served(workers=1, store=store) as where, opened(where) as client:
+        refused = client.post("/jobs", content=b"echo", headers=GLB)
+        assert (refused.status_code, refused.json()["code"]) == (503, "store-unavailable")
+        assert client.get("/jobs/none").status_code == 503
+        # What needs no store is served.
+        assert client.post("/subdivide", content=b"echo", headers=GLB).content == b"echo"
+
+
+def test_a_job_that_ends_while_orphans_are_looked_for_keeps_its_result(
+    redis: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is in the list of those that are open, and has no lease any more."""
+
+    async def scenario() -> None:
+        store = JobStore(Settings(store=redis))
+        await store.create("ended", None, {}, {"state": "queued"}, b"body")
+        await store.finish("ended", {"state": "done"}, {ANSWER: b"answer"})
+
+        async def listed_before(_: str) -> set[bytes]:
+            return {b"ended"}
+
+        monkeypatch.setattr(store._redis, "smembers", listed_before)
+        assert await store.take_orphan() is None
+        record = await store.find("ended")
+        assert record is not None
+        assert record.view == {"state": "done"}
+        assert await store.file(ANSWER, "ended") == b"answer"
+        await store.close()
+
+    asyncio.run(scenario())
+
+
+def test_a_lease_keeps_a_job_from_other_replicas(redis: str) -> None:
+    async def scenario() -> None:
+        one, other = JobStore(Settings(store=redis)), JobStore(Settings(store=redis))
+        await one.create("leased", None, {}, {"state": "queued"}, b"body")
+        assert await other.take_orphan() is None
+        await one.release("leased")
+        record = await other.take_orphan()
+        assert record is not None
+        assert record.id == "leased"
+        # Now it is the other's.
+        assert await one.take_orphan() is None
+        await one.cancel("leased")
+        assert await other.beat("leased", {"state": "running"}) is False
+        await other.delete("leased")
+        await one.close()
+        await other.close()
+
+    asyncio.run(scenario())

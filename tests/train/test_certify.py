@@ -1,0 +1,250 @@
+"""certify of whole model files, and the command."""
+
+import json
+from dataclasses import replace
+from functools import partial
+
+import msgspec
+import numpy as np
+import pytest
+from onnx import helper
+from typer.testing import CliRunner
+
+import train.run
+from pns_common.model.file import DEFAULT_MODEL, load_model, model_from_bytes
+from tests.support.networks import (
+    CARD,
+    breaking_off_bytes,
+    float64_network,
+    model_bytes,
+    perceptron_bytes,
+    random_layers,
+)
+from tests.support.schemes import BUDGET, SOUND
+from train.certificates.affine import affine_reproduction
+from train.certificates.bodies import flat_bodies, synthetic_bodies
+from train.certificates.certify import (
+    Verdict,
+    certify_model_file,
+    run_steps,
+    scheme_steps,
+    verdict_json,
+)
+from train.certificates.displacement import bounded_displacement
+from train.certificates.double_precision import double_model, read_bytes
+from train.certificates.model_file import keeps_its_word, sample_features
+from train.certificates.subject import Subject, subject_of_model
+
+
+def quiet(title, done, total):
+    pass
+
+
+def written(tmp_path, data):
+    path = tmp_path / "model.onnx"
+    path.write_bytes(data)
+    return path
+
+
+def failures(verdict):
+    return {
+        certificate.name: certificate.where
+        for certificate in verdict.certificates
+        if certificate.counts and not certificate.passed
+    }
+
+
+def nan_bytes():
+    """0 · log(−1) for every row."""
+    nodes = [
+        helper.make_node("ReduceSum", ["features", "last"], ["sum"], keepdims=1),
+        helper.make_node("Abs", ["sum"], ["size"]),
+        helper.make_node("Neg", ["size"], ["below"]),
+        helper.make_node("Sub", ["below", "one"], ["negative"]),
+        helper.make_node("Log", ["negative"], ["nan"]),
+        helper.make_node("Mul", ["nan", "budget"], ["scaled"]),
+        helper.make_node("Concat", ["scaled", "scaled", "scaled"], ["correction"], axis=1),
+    ]
+    return model_bytes(nodes, {"last": np.array([1]), "one": 1.0})
+
+
+def test_the_papers_model_passes():
+    verdict = certify_model_file("paper", (), 0, quiet, valences=(3, 7))
+    assert verdict.passed, failures(verdict)
+    theorems = {certificate.theorem for certificate in verdict.certificates}
+    assert theorems == {"file", "stars", *(f"T{number}" for number in range(1, 9))}
+
+
+def test_the_default_model_keeps_its_envelope_and_its_planes():
+    """The whole certificate of a model with a vertex rule takes minutes: here what is quick."""
+    model = load_model()
+    subject = subject_of_model(model, double_model(model, read_bytes(DEFAULT_MODEL)))
+    certificates = [
+        bounded_displacement(subject, synthetic_bodies(0), levels=1),
+        *affine_reproduction(subject, flat_bodies(0), seed=0),
+    ]
+    assert all(certificate.passed for certificate in certificates), certificates
+
+
+def test_a_model_that_returns_nan_fails_by_name(tmp_path):
+    verdict = certify_model_file(written(tmp_path, nan_bytes()), (), 0, quiet, valences=(3,))
+    assert not verdict.passed
+    assert "NaN" in failures(verdict)["the file keeps its word"]
+    assert "NaN" in failures(verdict)["bounded displacement"]
+
+
+def test_a_model_of_other_shapes_fails_by_name(tmp_path):
+    data = model_bytes(
+        [helper.make_node("Identity", ["features"], ["correction"])],
+        {},
+        outputs=[("correction", ["edges", 5])],
+    )
+    verdict = certify_model_file(written(tmp_path, data), (), 0, quiet)
+    (reason,) = failures(verdict).values()
+    assert set(failures(verdict)) == {"the file keeps the contract"}
+    assert "outputs" in reason
+
+
+def test_a_graph_that_breaks_off_fails_by_name(tmp_path):
+    path = written(tmp_path, breaking_off_bytes())
+    verdict = certify_model_file(path, (), 0, quiet, valences=(3,))
+    assert "runs to its end" in failures(verdict)["the file keeps its word"]
+    assert "runs in double precision" in failures(verdict)["proximity slope"]
+
+
+def test_other_bytes_fail_by_name(tmp_path):
+    verdict = certify_model_file(written(tmp_path, b"no model"), (), 0, quiet)
+    assert set(failures(verdict)) == {"the file keeps the contract"}
+
+
+def test_a_missing_file_fails_by_name(tmp_path):
+    verdict = certify_model_file(tmp_path / "none.onnx", (), 0, quiet)
+    assert set(failures(verdict)) == {"the file keeps the contract"}
+
+
+def test_a_model_beyond_its_budget_fails_by_name():
+    data = perceptron_bytes(random_layers(0, scale=3.0), project=False)
+    model = model_from_bytes(data, "beyond")
+    failed = {certificate.name for certificate in keeps_its_word(model) if not certificate.passed}
+    assert failed == {"corrections within the budget given"}
+
+
+@pytest.mark.parametrize(
+    "metrics",
+    [
+        {"ridge-held-out": {"distance_near": {"percent": 50.0}}},
+        {"ridge-held-out": {"distance_near": "a lot"}},
+        {"ridge-held-out": "good"},
+    ],
+)
+def test_metrics_that_do_not_come_out_again_fail_by_name(metrics):
+    card = replace(CARD, metrics=metrics)
+    model = model_from_bytes(perceptron_bytes(random_layers(0), card=card), "boasts")
+    failed = {
+        certificate.name: certificate
+        for certificate in keeps_its_word(model)
+        if not certificate.passed
+    }
+    assert set(failed) == {"the card's metrics come out again"}
+
+
+def test_metrics_on_data_that_is_not_here_are_named():
+    card = replace(CARD, metrics={"their own set": {}})
+    model = model_from_bytes(perceptron_bytes(random_layers(0), card=card), "other")
+    assert "their own set" in keeps_its_word(model)[-1].where
+
+
+def test_double_precision_is_the_same_network():
+    """Against a perceptron written in numpy; the file rounds what it reads to single."""
+    layers = random_layers(0)
+    data = perceptron_bytes(layers)
+    double = double_model(model_from_bytes(data, "double"), data)
+    layers = [(np.float32(weight), np.float32(bias)) for weight, bias in layers]
+    rows = np.random.default_rng(1).standard_normal((50, 5))
+    expected = 0.5 * float64_network(layers)(rows)
+    np.testing.assert_allclose(double(rows, 0.5), expected, atol=1e-14)
+
+
+def test_double_precision_of_the_paper_model():
+    model, rows = load_model("paper"), sample_features(5)
+    double = double_model(model, read_bytes("paper"))
+    apart = np.abs(model(rows[:2000], 1.0) - double(rows[:2000], 1.0)).max()
+    assert 1e-9 < apart < 1e-5
+
+
+def test_constants_and_casts_are_widened_too():
+    nodes = [
+        helper.make_node("Constant", [], ["third"], value_float=1 / 3),
+        helper.make_node("Constant", [], ["row"], value_floats=[0.1, 0.2, 0.3]),
+        helper.make_node("Cast", ["features"], ["cast"], to=1),
+        helper.make_node("ReduceSum", ["cast", "last"], ["sum"], keepdims=1),
+        helper.make_node("Mul", ["sum", "row"], ["product"]),
+        helper.make_node("Mul", ["product", "third"], ["scaled"]),
+        helper.make_node("Mul", ["scaled", "budget"], ["correction"]),
+    ]
+    data = model_bytes(nodes, {"last": np.array([1])})
+    double = double_model(model_from_bytes(data, "constants"), data)
+    rows = np.random.default_rng(0).standard_normal((4, 5))
+    expected = rows.sum(axis=1, keepdims=True) * np.float32([0.1, 0.2, 0.3]).astype(float)
+    widened = double(rows, 1.0)
+    assert widened.dtype == np.float64
+    np.testing.assert_allclose(widened, expected * float(np.float32(1 / 3)), rtol=1e-14)
+
+
+def test_any_scheme_can_be_certified():
+    steps = scheme_steps(Subject("any", SOUND, SOUND, BUDGET), (), 0, valences=(4,))
+    verdict = Verdict("any", {}, run_steps(steps, quiet))
+    assert verdict.passed, failures(verdict)
+
+
+def test_the_verdict_is_json_and_nan_is_null(tmp_path):
+    verdict = certify_model_file(tmp_path / "none.onnx", (), 0, quiet)
+    read = msgspec.json.decode(verdict_json(verdict))
+    assert read["passed"] is False
+    assert read["certificates"][0]["value"] is None
+    assert read["certificates"][0]["passed"] is False
+
+
+def test_the_command_exits_with_failure_and_writes_json(tmp_path):
+    path, verdict = written(tmp_path, b"no model"), tmp_path / "verdict.json"
+    arguments = ["certify", str(path), "--json", str(verdict)]
+    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
+    assert outcome.exit_code == 1
+    assert "the file keeps the contract" in outcome.output
+    assert json.loads(verdict.read_text())["passed"] is False
+
+
+def test_the_command_passes_and_looks_at_given_meshes(tmp_path, monkeypatch):
+    quicker = partial(certify_model_file, valences=(3,))
+    monkeypatch.setattr("train.certificates.command.certify_model_file", quicker)
+    folder, verdict = tmp_path / "meshes", tmp_path / "verdict.json"
+    folder.mkdir()
+    (folder / "tetrahedron.off").write_text(
+        "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+    )
+    path = written(tmp_path, perceptron_bytes(random_layers(0)))
+    arguments = ["certify", str(path), "--meshes", str(folder), "--json", str(verdict)]
+    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
+    assert outcome.exit_code == 0, outcome.output
+    assert "every certificate passed" in outcome.output
+    assert json.loads(verdict.read_text())["meshes"] == ["tetrahedron"]
+
+
+def test_the_command_names_a_file_as_it_is_called():
+    """Square brackets are markup to what prints."""
+    outcome = CliRunner().invoke(train.run.app, ["certify", "a[/b].onnx"], catch_exceptions=False)
+    assert outcome.exit_code == 1
+    assert "Certificates of a[/b].onnx" in outcome.output
+
+
+def test_a_verdict_into_a_folder_is_refused_before_the_work(tmp_path):
+    arguments = ["certify", "none.onnx", "--json", str(tmp_path)]
+    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
+    assert outcome.exit_code == 2
+
+
+def test_a_folder_without_meshes_is_an_error_of_use(tmp_path):
+    arguments = ["certify", "--meshes", str(tmp_path)]
+    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
+    assert outcome.exit_code == 2
+    assert "no .obj" in outcome.output

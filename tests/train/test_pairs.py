@@ -1,0 +1,244 @@
+"""The stream of pairs that the default is trained on."""
+
+from collections import Counter
+from functools import cache
+from itertools import islice
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from pns_common import Mesh, loop
+from pns_common.reference_length import measure_reference_length
+from train.connectivity import connect
+from train.data.pairs import references as subject
+from train.data.pairs.authored import authored_pair
+from train.data.pairs.faceted import faceted_pair
+from train.data.pairs.grid import grid_pair
+from train.data.pairs.lathe import lathe_pair, turned
+from train.data.pairs.pair_stream import pair_stream
+from train.data.pairs.references import (
+    WAYS,
+    Pair,
+    Reference,
+    coarsened,
+    moved,
+    patch_pair,
+    sphere_pair,
+)
+from train.data.pairs.solid import solid_pairs
+from train.data.pairs.swept import random_profile, swept_pair
+from train.data.primitives import icosphere
+from train.data.simplifiers import SIMPLIFIERS
+from train.metrics.shape import volume
+from train.refining import refine
+from train.vectors import face_normals
+
+KINDS = [
+    solid_pairs,
+    grid_pair,
+    sphere_pair,
+    faceted_pair,
+    patch_pair,
+    authored_pair,
+    lathe_pair,
+    swept_pair,
+]
+
+CLOSED = [solid_pairs, sphere_pair, faceted_pair, authored_pair, lathe_pair]
+
+
+@cache
+def drawn(kind):
+    """Three pairs of a kind."""
+    rng, pairs = np.random.default_rng(3), []
+    while len(pairs) < 3:
+        if kind is solid_pairs:
+            pairs += list(solid_pairs(rng))
+        else:
+            pair = kind(rng)
+            pairs += [] if pair is None else [pair]
+    return pairs[:3]
+
+
+@cache
+def begun(seed):
+    """The first four pairs of a stream."""
+    return list(islice(pair_stream(seed), 4))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_coarse_faces_look_the_way_the_surface_does(kind):
+    for pair in drawn(kind):
+        normals = face_normals(pair.coarse.vertices, pair.coarse.faces)
+        middle = pair.coarse.vertices[pair.coarse.faces].mean(axis=1)
+        distance, nearest = cKDTree(pair.surface.points).query(middle)
+        agreement = (normals * pair.surface.normals[nearest]).sum(axis=1)
+        assert np.median(agreement) > 0.9
+        assert np.median(distance) < 0.2 * np.ptp(pair.coarse.vertices)
+        np.testing.assert_allclose(np.linalg.norm(pair.surface.normals, axis=1), 1, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "kind", [solid_pairs, sphere_pair, faceted_pair, authored_pair, lathe_pair]
+)
+def test_solids_are_closed(kind):
+    for pair in drawn(kind):
+        assert connect(pair.coarse.faces, len(pair.coarse.vertices)).paired.all()
+
+
+def test_the_surface_of_authored_meshes_is_loops():
+    for pair in drawn(authored_pair):
+        expected = refine(pair.coarse, loop(), 5).mesh.vertices
+        distance, _ = cKDTree(expected).query(pair.surface.points)
+        assert distance.max() < 0.03 * np.ptp(expected)
+        assert distance[: len(pair.coarse.vertices)].max() < 2e-3 * np.ptp(expected)
+
+
+def test_authored_meshes_are_quads_cut_in_two():
+    """Faces 2 i and 2 i + 1 share an edge, each face with one other."""
+    for pair in drawn(authored_pair):
+        one, other = pair.coarse.faces[::2], pair.coarse.faces[1::2]
+        np.testing.assert_array_equal(one[:, [0, 2]], other[:, :2])
+
+
+def test_a_turned_outline_is_the_prism_or_cone_that_it_draws():
+    """Volumes of n-gons' prisms and pyramids, lids with and without a vertex in the middle."""
+    for sides in (3, 8, 17):
+        area = sides * np.sin(2 * np.pi / sides) / 2
+        for centres in ((True, True), (False, True), (False, False)):
+            prism = turned(np.array([[1.0, 0], [1, 3]]), sides, np.array(centres))
+            cone = turned(np.array([[1.0, 0], [0, 3]]), sides, np.array([centres[0], True]))
+            assert volume(prism) == pytest.approx(3 * area)
+            assert volume(cone) == pytest.approx(area)
+            assert len(prism.faces) == 4 * sides - 2 * (2 - sum(centres))
+
+
+def test_the_stream_depends_on_its_seed_alone():
+    for a, b in zip(begun(1), islice(pair_stream(1), 4), strict=True):
+        assert a.kind == b.kind
+        np.testing.assert_array_equal(a.coarse.vertices, b.coarse.vertices)
+        np.testing.assert_array_equal(a.surface.points, b.surface.points)
+    other = list(islice(pair_stream(2), 2))
+    sizes = [[len(pair.coarse.faces) for pair in pairs] for pairs in (begun(1)[:2], other)]
+    assert sizes[0] != sizes[1]
+
+
+def test_the_stream_has_reference_length_one():
+    for pair in begun(1):
+        corners = pair.coarse.faces.reshape(-1)
+        assert measure_reference_length(pair.coarse.vertices, corners) == pytest.approx(1)
+
+
+def test_moved_pairs_keep_normals_at_right_angles():
+    triangle = Mesh(np.eye(3), np.array([[0, 1, 2]]))
+    normal = np.ones((3, 3)) / np.sqrt(3)
+    turn = 2 * np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    turned = moved(Pair("any", triangle, Reference(np.eye(3), normal)), turn, np.ones(3))
+    (across,) = face_normals(turned.coarse.vertices, turned.coarse.faces)
+    np.testing.assert_allclose(turned.surface.normals, np.tile(across, (3, 1)), atol=1e-12)
+    np.testing.assert_array_equal(turned.surface.points, turned.coarse.vertices)
+
+
+SPHERE = icosphere(3)
+
+
+def made(seed: int, count: int = 200) -> Mesh | None:
+    return coarsened(SPHERE.vertices, SPHERE.faces, count, np.random.default_rng(seed))
+
+
+def test_a_coarse_sphere_lies_near_the_sphere_with_mostly_the_faces_asked_for():
+    """Careful sweeps may stop before they are there."""
+    meshes = [mesh for mesh in map(made, range(8)) if mesh is not None]
+    assert 150 <= np.median([len(mesh.faces) for mesh in meshes]) <= 280
+    for mesh in meshes:
+        assert len(mesh.faces) < len(SPHERE.faces)
+        assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 0.12
+
+
+def test_a_seed_draws_the_same_mesh_again_and_another_seed_another():
+    first, again, other = made(1), made(1), made(2)
+    assert first is not None
+    assert again is not None
+    np.testing.assert_array_equal(first.vertices, again.vertices)
+    assert other is None or first.vertices.tobytes() != other.vertices.tobytes()
+
+
+def test_every_way_of_the_table_is_taken_about_as_often_as_it_says(monkeypatch):
+    seen: Counter[str] = Counter()
+    noted = {
+        name: (lambda mesh, count, name=name: (seen.update([name]), mesh)[1])
+        for name in SIMPLIFIERS
+    }
+    monkeypatch.setattr(subject, "SIMPLIFIERS", noted)
+    monkeypatch.setattr(
+        subject, "fast_quadric", lambda *_: (seen.update(["fast-quadric"]), SPHERE)[1]
+    )
+    rng = np.random.default_rng(0)
+    for _ in range(400):
+        coarsened(SPHERE.vertices, SPHERE.faces, 100, rng)
+    for way, share in WAYS.items():
+        assert abs(seen[way] / 400 - share) < 0.08
+
+
+def test_what_is_no_manifold_any_more_is_left_out(monkeypatch):
+    """Two triangles on one edge of a third."""
+    fan = Mesh(np.eye(5)[:, :3], np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]] * 3))
+    monkeypatch.setattr(subject, "SIMPLIFIERS", {name: lambda *_: fan for name in SIMPLIFIERS})
+    monkeypatch.setattr(subject, "fast_quadric", lambda *_: fan)
+    assert made(0) is None
+
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+@given(SEEDS)
+def test_a_profile_goes_on_smoothly_at_the_speed_of_its_arc_length(seed):
+    """Between points so near each other that the sharpest arc is straight there."""
+    profile = random_profile(np.random.default_rng(seed))
+    along = np.linspace(0, profile.starts[-1], 4001)
+    step = np.diff(profile.at(along), axis=0)
+    speed = np.linalg.norm(step, axis=1) / np.diff(along)
+    np.testing.assert_allclose(speed, 1, atol=1e-3)
+    turn = np.einsum("ij,ij->i", step[1:], step[:-1]) / (speed[1:] * speed[:-1])
+    assert (turn > 0.99 * np.diff(along)[1:] ** 2).all()
+    assert np.abs(profile.bends).max() > 0
+
+
+@given(SEEDS)
+def test_arcs_turn_by_their_angle_and_straight_pieces_by_none(seed):
+    profile = random_profile(np.random.default_rng(seed))
+    for bend, start, end, here, there in zip(
+        profile.bends,
+        profile.starts,
+        profile.starts[1:],
+        profile.headings,
+        profile.headings[1:],
+        strict=False,
+    ):
+        before, after = (
+            profile.at(np.array([start, start + 1e-7])),
+            profile.at(np.array([end - 1e-7, end])),
+        )
+        for ends, heading in ((before, here), (after, there)):
+            way = (ends[1] - ends[0]) / 1e-7
+            np.testing.assert_allclose(way, [np.cos(heading), np.sin(heading)], atol=1e-4)
+        assert np.isclose(there - here, bend * (end - start))
+
+
+def test_faces_are_longer_than_wide_by_far_and_hang_together():
+    rng = np.random.default_rng(1)
+    pairs = [pair for pair in (swept_pair(rng) for _ in range(12)) if pair is not None]
+    thinnest = []
+    for pair in pairs:
+        mesh = pair.coarse
+        level = connect(mesh.faces, len(mesh.vertices))
+        assert (level.paired | level.boundary).all()
+        a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
+        sides = np.stack([b - a, c - b, a - c])
+        longest = (sides**2).sum(axis=2).max(axis=0)
+        thinnest.append((longest / np.linalg.norm(np.cross(b - a, c - a), axis=1)).max())
+    assert np.median(thinnest) > 8

@@ -1,0 +1,240 @@
+"""The harness: what is written, what is remembered, and what makes it run again."""
+
+from dataclasses import replace
+from io import StringIO
+
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+import train.experiments.command as command
+import train.run
+from pns_common import MeshError
+from train.data.datasets import DATASETS
+from train.experiments.harness.experiment import Column, Experiment, Figure, Outcome, Table
+from train.experiments.harness.laboratory import FULL, SMALL, Laboratory
+from train.experiments.harness.page import markdown_page
+from train.experiments.harness.reproduce import content_key, read_record, reproduce
+from train.experiments.harness.style import panels
+from train.experiments.registry import EXPERIMENTS
+from train.models.checkpoint import Checkpoint, save_checkpoint
+from train.models.from_recipe import initial_network
+from train.models.recipes import paper
+
+COLUMNS = (Column("name", "Name"), Column("value", "Value", "+.2f"), Column("paper", "Paper"))
+
+
+def drawing():
+    figure, (axes,) = panels(1, height=1.0)
+    axes.plot([0, 1], [1, 0])
+    return figure
+
+
+class Counting:
+    """An experiment that counts its runs."""
+
+    def __init__(self):
+        self.runs = 0
+
+    def __call__(self, laboratory):
+        self.runs += 1
+        rows = (("third | column", 1 / 3, None), ("negative", -2.0, "≈ π"))
+        return Outcome(
+            (Table("counted", "Counted", COLUMNS, rows),),
+            (Figure("line", "A line.", drawing),),
+            ("A note [with brackets].",),
+        )
+
+
+# The key reads the source of the module that the experiment's function lives in.
+Counting.__module__ = "train.experiments.paper.headline"
+
+
+@pytest.fixture
+def counting():
+    return Counting()
+
+
+@pytest.fixture
+def experiment(counting):
+    return Experiment("counting", "Counting runs", "Here.", counting, 1.0)
+
+
+def laboratory(tmp_path, scale=SMALL, checkpoints=None, published=None):
+    return Laboratory(scale, tmp_path / "networks", checkpoints, published, lambda *_: None)
+
+
+def test_a_finished_experiment_is_not_run_again(tmp_path, counting, experiment):
+    first = reproduce(experiment, laboratory(tmp_path), tmp_path)
+    second = reproduce(experiment, laboratory(tmp_path), tmp_path)
+    assert counting.runs == 1
+    assert second == first
+    reproduce(experiment, laboratory(tmp_path), tmp_path, force=True)
+    assert counting.runs == 2
+
+
+def test_a_missing_file_or_a_broken_record_makes_it_run_again(tmp_path, counting, experiment):
+    reproduce(experiment, laboratory(tmp_path), tmp_path)
+    (tmp_path / "counted.csv").unlink()
+    reproduce(experiment, laboratory(tmp_path), tmp_path)
+    (tmp_path / "figures" / "line.pdf").unlink()
+    reproduce(experiment, laboratory(tmp_path), tmp_path)
+    record = tmp_path / "cache" / "counting.json"
+    record.write_text("{}")
+    assert read_record(record) is None
+    reproduce(experiment, laboratory(tmp_path), tmp_path)
+    assert counting.runs == 4
+
+
+def test_other_inputs_make_it_run_again(tmp_path, counting, experiment):
+    reproduce(experiment, laboratory(tmp_path), tmp_path)
+    reproduce(experiment, laboratory(tmp_path, scale=replace(SMALL, levels=3)), tmp_path)
+    assert counting.runs == 2
+    checkpoints = tmp_path / "given"
+    checkpoints.mkdir()
+    key = content_key(experiment, laboratory(tmp_path, checkpoints=checkpoints))
+    (checkpoints / "paper.safetensors").write_bytes(b"other weights")
+    assert content_key(experiment, laboratory(tmp_path, checkpoints=checkpoints)) != key
+    needing = replace(experiment, needs_published=True)
+    key = content_key(needing, laboratory(tmp_path, published=checkpoints))
+    (checkpoints / "weights.npz").write_bytes(b"other weights")
+    assert content_key(needing, laboratory(tmp_path, published=checkpoints)) != key
+
+
+def test_an_experiment_that_breaks_off_leaves_no_record(tmp_path, counting, experiment):
+    def broken(_):
+        raise KeyboardInterrupt
+
+    broken.__module__ = Counting.__module__
+    with pytest.raises(KeyboardInterrupt):
+        reproduce(replace(experiment, run=broken), laboratory(tmp_path), tmp_path)
+    assert not (tmp_path / "cache" / "counting.json").exists()
+    assert not list(tmp_path.rglob("*.tmp"))
+
+
+def test_tables_keep_every_digit_and_the_page_rounds(tmp_path, experiment):
+    record = reproduce(experiment, laboratory(tmp_path), tmp_path)
+    lines = (tmp_path / "counted.csv").read_text(encoding="utf-8").splitlines()
+    assert lines == ["name,value,paper", f"third | column,{1 / 3!r},", "negative,-2.0,≈ π"]
+    page = markdown_page({"counting": experiment}, {"counting": record})
+    assert "| third \\| column | +0.33 | – " in page
+    assert "| negative        | -2.00 | ≈ π   |" in page
+    assert "![line](figures/line.png)" in page
+    assert "A note [with brackets]." in page
+
+
+def test_an_experiment_without_a_record_keeps_its_section_of_the_page(tmp_path, experiment):
+    """A checkout has the page and no records: running one experiment lost all other sections."""
+    record = reproduce(experiment, laboratory(tmp_path), tmp_path)
+    others = [replace(experiment, name=name, title=name) for name in ("before", "after", "never")]
+    ordered = [others[0], experiment, *others[1:]]
+    known = {each.name: each for each in ordered}
+    whole = markdown_page(known, {"before": record, "counting": record, "after": record})
+    old = whole.replace("-2.00", "-1.00")
+    page = markdown_page(known, {"counting": record}, old)
+    assert [line for line in page.splitlines() if line.startswith("## ")] == [
+        "## before",
+        "## Counting runs",
+        "## after",
+    ]
+    assert (page.count("-1.00"), page.count("-2.00")) == (2, 1)
+    assert markdown_page(known, {}, whole) == whole
+
+
+def test_figures_are_the_same_bytes_every_time(tmp_path, experiment):
+    reproduce(experiment, laboratory(tmp_path), tmp_path / "a")
+    reproduce(experiment, laboratory(tmp_path), tmp_path / "b")
+    for name in ("line.png", "line.pdf"):
+        here, there = (tmp_path / side / "figures" / name for side in "ab")
+        assert here.read_bytes() == there.read_bytes()
+        assert here.read_bytes().startswith({".png": b"\x89PNG", ".pdf": b"%PDF"}[here.suffix])
+
+
+def test_a_given_checkpoint_is_taken_as_it_is(tmp_path):
+    recipe = replace(paper(seed=7), hidden=(8,))
+    network = initial_network(recipe)
+    save_checkpoint(tmp_path / "paper.safetensors", Checkpoint(recipe, network, {}, "here"))
+    taken = laboratory(tmp_path, checkpoints=tmp_path).network(paper())
+    for ours, given in zip(taken.parameters(), network.parameters(), strict=True):
+        assert ours.equal(given)
+    assert not (tmp_path / "networks").exists()
+
+
+def test_a_trained_network_is_kept_between_runs(tmp_path):
+    seen = []
+    lab = replace(laboratory(tmp_path), progress=lambda *step: seen.append(step))
+    first = lab.network(paper())
+    assert seen == [("training paper", 1, 2), ("training paper", 2, 2)]
+    second = lab.network(paper())
+    assert len(seen) == 2
+    for trained, kept in zip(first.parameters(), second.parameters(), strict=True):
+        assert trained.equal(kept)
+
+
+def test_full_scale_cuts_nothing(tmp_path):
+    lab = laboratory(tmp_path, scale=FULL)
+    for name, make in DATASETS.items():
+        assert len(lab.dataset(name).instances) == len(make().instances)
+    assert len(laboratory(tmp_path).dataset("ridge-held-out").instances) == 2
+
+
+def test_the_command_runs_one_experiment_and_writes_the_page(tmp_path, monkeypatch, experiment):
+    monkeypatch.setattr(command, "EXPERIMENTS", {"counting": experiment})
+    monkeypatch.setattr(command, "FULL", SMALL)
+    arguments = ["reproduce", "counting", "--output", str(tmp_path)]
+    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
+    assert outcome.exit_code == 0
+    assert "counting:" in outcome.output
+    page = (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert "## Counting runs" in page
+
+
+def test_the_command_refuses_what_it_cannot_do(tmp_path, monkeypatch, counting, experiment):
+    needing = replace(experiment, name="needing", needs_published=True)
+    monkeypatch.setattr(command, "EXPERIMENTS", {"counting": experiment, "needing": needing})
+    monkeypatch.setattr(command, "FULL", SMALL)
+    runner, output = CliRunner(), ["--output", str(tmp_path)]
+    unknown = runner.invoke(train.run.app, ["reproduce", "nothing", *output])
+    assert unknown.exit_code == 2
+    assert "counting, needing" in " ".join(unknown.output.split())
+    lacking = runner.invoke(train.run.app, ["reproduce", "needing", *output])
+    assert lacking.exit_code == 2
+    assert "--published" in lacking.output
+    assert counting.runs == 0
+    for folder in ("--checkpoints", "--published", "--assets"):
+        missing = [folder, str(tmp_path / "nowhere")]
+        misspelt = runner.invoke(train.run.app, ["reproduce", "counting", *output, *missing])
+        assert (misspelt.exit_code, counting.runs) == (2, 0)
+        assert folder in misspelt.output
+    everything = runner.invoke(train.run.app, ["reproduce", *output])
+    assert everything.exit_code == 0
+    assert counting.runs == 1
+
+
+def test_what_an_experiment_cannot_use_is_told_and_ends_the_command(
+    tmp_path, monkeypatch, experiment
+):
+    def cannot(laboratory):
+        raise MeshError("no file in [/meshes]", element="folder")
+
+    cannot.__module__ = Counting.__module__
+    monkeypatch.setattr(command, "EXPERIMENTS", {"cannot": replace(experiment, run=cannot)})
+    arguments = ["reproduce", "cannot", "--output", str(tmp_path)]
+    outcome = CliRunner().invoke(train.run.app, arguments)
+    assert outcome.exit_code == 1
+    assert "folder: no file in [/meshes]" in outcome.output
+
+
+@pytest.mark.spawning
+def test_experiments_that_run_at_once_find_the_same(tmp_path):
+    # One trains a network, one refines by bundled models.
+    chosen = [EXPERIMENTS[name] for name in ("saddle", "spheres")]
+    pages = []
+    for processes in (1, 2):
+        output = tmp_path / str(processes)
+        lab = laboratory(output)
+        console = Console(file=StringIO())
+        command.run_all(chosen, lab, output, console, processes, force=False)
+        pages.append({path.name: path.read_bytes() for path in output.glob("*.*")})
+    assert pages[0] == pages[1]
+    assert {"saddle.csv", "spheres.csv", "README.md"} <= set(pages[0])

@@ -1,0 +1,276 @@
+"""Stars and spectra against Loop's closed forms, an independent matrix and autograd."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from pns_common import ParameterError, load_model, loop, pns, refine
+from train.certificates.adversary import Operator
+from train.certificates.gap_collapse import margin_gradient, operator_jacobian
+from train.connectivity import connect
+from train.models.from_recipe import initial_network
+from train.models.networks import BoundedNet
+from train.models.recipes import paper, signed
+from train.models.torch_model import recipe_model
+from train.refining import Method, loop_rule
+from train.spectra.spectrum import (
+    FIRST_LIFT,
+    GROWTH,
+    SPOKE,
+    VALENCES,
+    closed_star,
+    continued_spectrum,
+    flat_spectrum,
+    follow_lift,
+    jacobian,
+    loop_gap,
+    quotient_blocks,
+    strides,
+    without_translations,
+)
+from train.spectra.stars import keeps_blocks, star, symmetry_blocks
+
+
+def ring_matrix(k):
+    """Loop on a k-star of one ring, written out from its masks."""
+    keep = 3 / 8 + (3 / 8 + math.cos(2 * math.pi / k) / 4) ** 2
+    matrix = np.zeros((k + 1, k + 1))
+    matrix[0, 0], matrix[0, 1:] = keep, (1 - keep) / k
+    for i in range(k):
+        matrix[1 + i, [0, 1 + i]] = 3 / 8
+        matrix[1 + i, [1 + (i + 1) % k, 1 + (i - 1) % k]] = 1 / 8
+    return matrix
+
+
+def steep_network(seed=0, scale=4.0):
+    generator = torch.Generator().manual_seed(seed)
+    network = BoundedNet(5, (32, 32), "gelu", generator).double()
+    with torch.no_grad():
+        for weight in network.parameters():
+            weight *= scale
+    return network
+
+
+@pytest.mark.parametrize("k", VALENCES)
+def test_loops_first_ring_matches_its_masks(k):
+    fan = star(k, 2, SPOKE)
+    matrix = jacobian(loop(), fan)
+    ring = 3 * (k + 1)
+    expected = np.kron(ring_matrix(k), np.eye(3))
+    np.testing.assert_allclose(matrix[:ring, :ring], expected, atol=1e-10)
+    np.testing.assert_allclose(matrix[:ring, ring:], 0, atol=1e-10)
+
+
+@pytest.mark.parametrize("k", VALENCES)
+def test_loops_spectrum_is_the_closed_form(k):
+    matrix = without_translations(jacobian(loop(), star(k, 2, SPOKE)))
+    size = np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
+    np.testing.assert_allclose(size[:6], 3 / 8 + math.cos(2 * math.pi / k) / 4, atol=1e-10)
+    assert size[5] - size[6] == pytest.approx(loop_gap(k), abs=1e-10)
+
+
+def test_the_full_gap_at_valence_three_is_an_eighth():
+    """The published (k+1)-star gives 3/16: its one ring misses Loop's eigenvalue 1/8."""
+    assert loop_gap(3) == pytest.approx(1 / 8)
+    ring = np.sort(np.abs(np.linalg.eigvals(ring_matrix(3))))[::-1]
+    assert ring[1] - ring[3] == pytest.approx(3 / 16)
+    assert [loop_gap(k) for k in (4, 6, 12)] == pytest.approx([0.234375, 0.25, 0.0915063509])
+
+
+def test_refined_rings_are_the_rings_at_half_the_size():
+    for k in (3, 6):  # where one step of Loop keeps lattices in place, up to the centre's ring
+        fan = star(k, 3, 1.0, inner_rings=2)
+        refined = refine(fan.mesh, loop(), 1, 1.0).mesh.vertices[fan.refined]
+        inner = fan.mesh.vertices[fan.inner]
+        angle = np.arctan2(inner[1:, 1], inner[1:, 0])
+        angles = np.arctan2(refined[1:, 1], refined[1:, 0])
+        np.testing.assert_allclose(np.exp(1j * angles), np.exp(1j * angle), atol=1e-12)
+    np.testing.assert_allclose(refined, inner / 2, atol=1e-12)
+
+
+@pytest.mark.parametrize("k", [3, 5, 8])
+@pytest.mark.parametrize("rings", [2, 3, 4])
+def test_stars_are_regular_but_for_their_centre(k, rings):
+    mesh = star(k, rings, 1.0, lift=0.3).mesh
+    valence = connect(mesh.faces, len(mesh.vertices)).valence.numpy()
+    assert len(mesh.vertices) == 1 + k * rings * (rings + 1) // 2
+    assert len(mesh.faces) == k * rings**2
+    assert valence[0] == k
+    interior = 1 + k * rings * (rings - 1) // 2
+    assert (valence[1:interior] == 6).all()
+    assert mesh.vertices[0].tolist() == [0, 0, 0.3]
+    corners = mesh.vertices[mesh.faces]
+    assert (np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] > 0).all()
+
+
+@pytest.mark.parametrize("lift", [0.0, 0.3])
+def test_differences_agree_with_autograd_through_the_kernels(lift):
+    network, recipe, fan = steep_network(), paper(), star(5, 2, SPOKE, lift)
+    exact = operator_jacobian(Operator(network, recipe), fan).numpy()
+    differences = jacobian(pns(recipe_model(recipe, network)), fan)
+    np.testing.assert_allclose(differences, exact, atol=1e-8)
+    base = jacobian(loop(), fan)
+    if lift:
+        assert np.abs(exact - base).max() > 1e-3
+    else:
+        np.testing.assert_allclose(exact, base, atol=1e-10)
+
+
+def test_translations_are_left_out_and_nothing_else():
+    matrix = jacobian(pns(recipe_model(paper(), steep_network())), star(5, 2, SPOKE, 0.3))
+    whole, rest = np.linalg.eigvals(matrix), np.linalg.eigvals(without_translations(matrix))
+    assert len(whole) == len(rest) + 3
+    eigenvalues = np.sort_complex(np.concatenate([rest, np.ones(3)]))
+    for value in whole:
+        assert np.abs(eigenvalues - value).min() < 1e-5
+
+
+def test_loops_margin_is_its_gap_at_any_lift():
+    for k in (3, 6, 9):
+        for spectrum in follow_lift(loop(), k, [0.0, 0.2, 0.4]):
+            assert spectrum.margin == pytest.approx(loop_gap(k), abs=1e-9)
+            assert spectrum.tangent.sum() == 6
+
+
+def test_a_margin_can_turn_negative():
+    scheme = pns(recipe_model(paper(), steep_network(scale=8.0)), 1.0)
+    assert follow_lift(scheme, 3, np.linspace(0, 0.4, 9))[-1].margin < 0
+
+
+def test_the_margin_is_continuous_in_the_lift():
+    scheme = pns(recipe_model(paper(), steep_network(scale=1.0)))
+    coarse = follow_lift(scheme, 6, np.linspace(0, 0.4, 5))[-1].margin
+    fine = follow_lift(scheme, 6, np.linspace(0, 0.4, 17))[-1].margin
+    assert coarse == pytest.approx(fine, abs=1e-9)
+
+
+def test_the_margins_gradient_is_its_derivative():
+    rng = np.random.default_rng(0)
+    scheme = pns(recipe_model(paper(), steep_network(scale=2.0)))
+    followed = follow_lift(scheme, 6, np.linspace(0, 0.4, 9))[-1]
+    matrix = (followed.right * followed.values @ followed.left).real
+    change = rng.standard_normal(matrix.shape)
+    up, down = (continued_spectrum(matrix + s * 1e-7 * change, followed).margin for s in (1, -1))
+    expected = (margin_gradient(followed) * change).sum()
+    assert (up - down) / 2e-7 == pytest.approx(expected, rel=1e-4)
+
+
+def turning(angle):
+    """Six tangents of size 0.5, a seventh of 0.3; the sixth's eigenvector turns into its."""
+    c, s = np.cos(angle), np.sin(angle)
+    frame = np.eye(7)
+    frame[5:, 5:] = [[c, -s], [s, c]]
+    return frame @ np.diag([0.5] * 6 + [0.3]) @ frame.T
+
+
+def test_strides_grow_from_small_lifts_and_end_where_asked():
+    lifts = strides(0.0, 0.4)
+    assert lifts[0] == FIRST_LIFT
+    assert lifts[-1] == 0.4
+    ratios = np.array(lifts[1:]) / lifts[:-1]
+    assert ratios[:-1] == pytest.approx(GROWTH)
+    assert ratios.max() <= GROWTH * (1 + 1e-12)
+    assert strides(0.3, 0.35) == [0.35]
+    assert strides(0.0, FIRST_LIFT / 2) == [FIRST_LIFT / 2]
+
+
+def test_tangents_of_a_flat_star_are_those_nearest_loops():
+    matrix = np.diag([0.5] * 6 + [0.25] * 5 + [0.9])
+    flat = flat_spectrum(matrix, 6)
+    assert flat.tangent.tolist() == [True] * 6 + [False] * 6
+    assert flat.margin == pytest.approx(0.5 - 0.9)
+    assert flat.largest == pytest.approx(0.9)
+
+
+def far_sighted(rings):
+    """Loop, and on every edge a pull towards the vertices that are `rings` rings of edges away."""
+
+    def step(points, mesh, reference_length):
+        base = loop_rule(points, mesh, reference_length)
+        smooth = torch.eye(mesh.vertex_count).double()
+        smooth[mesh.centres, mesh.rims] = 1
+        seen = torch.linalg.matrix_power(smooth, rings)
+        pull = (seen / seen.sum(dim=1, keepdim=True)) @ points
+        towards = torch.cat([base.base[: len(points)], pull[mesh.edges].mean(dim=1)])
+        return replace(base, displacement=0.01 * (towards - base.base))
+
+    return Method("far-sighted", step)
+
+
+def test_a_rule_that_sees_further_gets_more_rings():
+    assert len(closed_star(loop(), 5)(0.0).inner) == 1 + 5 + 10
+    assert len(closed_star(far_sighted(1), 5)(0.0).inner) == 1 + 5 + 10
+    assert len(closed_star(far_sighted(2), 5)(0.0).inner) == 1 + 5 + 10 + 15 + 20
+    with pytest.raises(ParameterError, match="far-sighted"):
+        closed_star(far_sighted(9), 5)
+
+
+RECIPE = replace(signed(0), hidden=(24, 24), budget=0.8, gate_sharpness=1e5)
+SYMMETRIC = pns(recipe_model(RECIPE, initial_network(RECIPE).double()))
+
+
+@pytest.mark.parametrize("valence", [3, 4, 5, 6, 12])
+def test_the_blocks_are_an_orthonormal_basis_of_everything(valence):
+    basis = np.concatenate(symmetry_blocks(star(valence, 3, SPOKE), valence), axis=1)
+    np.testing.assert_allclose(basis.T @ basis, np.eye(len(basis)), atol=1e-12)
+
+
+@pytest.mark.parametrize("valence", [3, 4, 6])
+def test_symmetric_rules_keep_the_blocks_of_lifted_stars(valence):
+    fan = star(valence, 4, SPOKE, 0.3, inner_rings=3)
+    blocks = symmetry_blocks(fan, valence)
+    assert keeps_blocks(jacobian(loop(), fan), blocks)
+    assert keeps_blocks(jacobian(SYMMETRIC, fan), blocks)
+
+
+def test_a_rule_that_depends_on_numbering_does_not():
+    fan = star(5, 2, SPOKE, 0.3)
+    assert not keeps_blocks(jacobian(pns(load_model("paper")), fan), symmetry_blocks(fan, 5))
+
+
+def test_a_lopsided_star_does_not():
+    fan = star(5, 4, SPOKE, 0.3, inner_rings=3)
+    fan.mesh.vertices.setflags(write=True)
+    fan.mesh.vertices[7, 2] += 0.1 * SPOKE
+    assert not keeps_blocks(jacobian(SYMMETRIC, fan), symmetry_blocks(fan, 5))
+
+
+@pytest.mark.parametrize("valence", [3, 4, 5])
+def test_blocks_have_the_whole_spectrum(valence):
+    fan = star(valence, 4, SPOKE, 0.2, inner_rings=3)
+    matrix = without_translations(jacobian(SYMMETRIC, fan))
+    flat = flat_spectrum(matrix, valence, quotient_blocks(fan, valence))
+    expected = np.linalg.eigvals(matrix)
+    assert len(flat.values) == len(expected)
+    for value in expected:
+        assert np.abs(flat.values - value).min() < 1e-5
+    np.testing.assert_allclose((flat.right * flat.values @ flat.left).real, matrix, atol=1e-7)
+
+
+def test_each_block_keeps_its_number_of_tangents():
+    """A flat star's six: two of frequency 0, and the pairs of frequencies 1 and 2."""
+    for followed in follow_lift(SYMMETRIC, 5, [0.0, 0.2, 0.4]):
+        counts = np.bincount(followed.block[followed.tangent], minlength=len(followed.blocks))
+        assert counts.tolist() == [1, 1, 1, 1, 1, 1]
+
+
+def test_eigenvalues_that_cross_from_different_blocks_are_told_apart():
+    """In one stride: a tangent of one block comes to lie below another block's rest."""
+    blocks = (np.eye(8)[:, :2], np.eye(8)[:, 2:])
+    before = np.diag([0.5, 0.1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.2])
+    after = np.diag([0.2, 0.1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.4])
+    after[6, 7] = 5.0  # far from normal
+    continued = continued_spectrum(after, flat_spectrum(before, 6, blocks))
+    assert continued.tangent.tolist() == [True, False, True, True, True, True, True, False]
+    assert continued.margin == pytest.approx(-0.2)
+
+
+def test_eigenvalues_that_just_meet_do_not_stop_the_search():
+    matrix = np.diag([0.5] * 6 + [0.2, 0.2])
+    matrix[6, 7] = 1.0  # a Jordan block: one eigenvector for two eigenvalues
+    continued = continued_spectrum(matrix, flat_spectrum(np.diag([0.5] * 6 + [0.2, 0.1]), 6))
+    assert continued.margin == pytest.approx(0.3)
+    assert np.isfinite(continued.left).all()

@@ -1,0 +1,260 @@
+"""Training on one step: its losses, the quiet term, the same bits again, and work made ahead."""
+
+import multiprocessing
+from dataclasses import replace
+from itertools import count, islice
+
+import msgspec
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+from pns_common import Mesh, ParameterError, clean, load_model, loop, pns, refine
+from tests.support.meshes import grid
+from tests.support.recipes import tiny
+from tests.support.shared import shared_path
+from train.connectivity import connect
+from train.data.batch import disjoint_union, pairs_sharing_a_face
+from train.data.datasets import DATASETS, ridge_held_out, ridge_training
+from train.fitting.determinism import deterministic, machine_fingerprint
+from train.fitting.limit_loss import squared_chords
+from train.fitting.limit_trainer import ahead
+from train.fitting.quiet import draw_features, quiet_loss, quiet_term, support_of
+from train.fitting.trainer import (
+    batch_loss,
+    distance_loss,
+    fairness_loss,
+    fit,
+    normal_loss,
+    proximity_loss,
+    vertex_normals,
+    weighted_loss,
+)
+from train.models.from_recipe import initial_network, paper_rule
+from train.models.networks import BoundedNet
+from train.models.recipe import LossWeights
+from train.models.recipes import RECIPES, paper, paper_text
+from train.models.torch_model import recipe_model
+
+
+def unit_rows(seed, count=6):
+    rows = torch.randn(count, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(seed))
+    return rows / rows.norm(dim=-1, keepdim=True)
+
+
+def test_fairness_pairs_are_the_interior_edges_that_share_a_face():
+    mesh = ridge_held_out().instances[0].mesh
+    level = connect(mesh.faces, len(mesh.vertices))
+    corners = [set(row) for row in level.edges[level.interior].tolist()]
+    faces = {frozenset(face) for face in mesh.faces.tolist()}
+    expected = {
+        (i, j)
+        for i in range(len(corners))
+        for j in range(i)
+        if frozenset(corners[i] | corners[j]) in faces
+    }
+    sorted_pairs = [(max(pair), min(pair)) for pair in pairs_sharing_a_face(level).tolist()]
+    assert len(sorted_pairs) == len(set(sorted_pairs))
+    assert set(sorted_pairs) == expected
+
+
+def test_fairness_is_zero_for_equal_normals_and_counts_only_its_pairs():
+    normals = unit_rows(0)
+    equal = normals[:1].expand(6, 3)
+    assert fairness_loss(equal, torch.tensor([[0, 5], [1, 2]])) == 0
+    pairs = torch.tensor([[0, 3]])
+    expected = (normals[0] - normals[3]).square().sum()
+    torch.testing.assert_close(fairness_loss(normals, pairs), expected)
+
+
+def test_normal_loss_is_one_minus_the_cosine():
+    angle = torch.tensor([0.0, 0.3, np.pi], dtype=torch.float64)
+    zero = torch.zeros(3, dtype=torch.float64)
+    normals = torch.stack([angle.sin(), zero, angle.cos()], dim=-1)
+    up = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64).expand(3, 3)
+    expected = (1 - angle.cos()).mean()
+    torch.testing.assert_close(normal_loss(normals, up), expected, rtol=0, atol=1e-15)
+
+
+def test_distance_and_proximity_are_mean_squares():
+    values = torch.tensor([3.0, -4.0])
+    assert distance_loss(values) == 12.5
+    assert proximity_loss(values) == 12.5
+
+
+def test_each_weight_counts_its_own_term():
+    distance, ratio = torch.tensor([0.1, -0.2]), torch.tensor([0.5, 1.0])
+    normals, target = unit_rows(1, 2).float(), unit_rows(2, 2).float()
+    pairs = torch.tensor([[0, 1]])
+    terms = {
+        "distance": distance_loss(distance),
+        "normal": normal_loss(normals, target),
+        "fairness": fairness_loss(normals, pairs),
+        "proximity": proximity_loss(ratio),
+    }
+    for name, term in terms.items():
+        weights = LossWeights(**{other: float(other == name) * 2 for other in terms})
+        loss = weighted_loss(weights, distance, normals, target, ratio, pairs)
+        torch.testing.assert_close(loss, 2 * term)
+
+
+def test_the_training_step_is_the_products_step():
+    mesh, network = ridge_held_out().instances[0].mesh, initial_network(paper()).double()
+    level = connect(mesh.faces, len(mesh.vertices))
+    step = paper_rule(paper(), network)(torch.tensor(mesh.vertices), level)
+    refined = refine(mesh, pns(recipe_model(paper(), network), 0.5), 1, 1.0)
+    np.testing.assert_allclose(step.points.detach(), refined.mesh.vertices, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(step.ratio.detach(), refined.ratio, rtol=0, atol=1e-13)
+    assert (refined.ratio > 0.05).any()
+    step.points.square().sum().backward()
+    assert all(parameter.grad.abs().max() > 0 for parameter in network.parameters())
+
+
+def test_vertex_normals_of_a_tilted_plane_are_its_normal():
+    mesh = ridge_held_out().instances[0].mesh
+    tilted = torch.tensor(mesh.vertices)
+    tilted[:, 2] = 2 * tilted[:, 0] - tilted[:, 1]
+    expected = torch.tensor([-2.0, 1.0, 1.0], dtype=torch.float64) / 6**0.5
+    normals = vertex_normals(tilted, torch.tensor(mesh.faces))
+    torch.testing.assert_close(normals, expected.expand(len(tilted), 3), rtol=0, atol=1e-14)
+
+
+@pytest.fixture(scope="module")
+def support():
+    meshes = [instance.mesh for instance in DATASETS["ridge-training"]().instances[:3]]
+    return support_of(meshes)
+
+
+def test_features_of_the_training_set_cost_nothing(support):
+    network = BoundedNet(5, (8,), "gelu", torch.Generator().manual_seed(0))
+    assert quiet_loss(network, support, support.rows).item() == 0
+    outside = support.high + 1.0
+    assert quiet_loss(network, support, outside[None]).item() > 0
+
+
+def test_draws_reach_far_outside_the_training_set(support):
+    drawn = draw_features(support, torch.Generator().manual_seed(0))
+    assert drawn[:, 0].min() >= 0
+    assert support.high[0] < drawn[:, 0].max() <= 2
+    inside = ((drawn >= support.low) & (drawn <= support.high)).all(dim=1)
+    assert 0.1 < inside.float().mean() < 0.9
+
+
+def test_features_that_see_more_than_an_edge_are_refused_by_name():
+    with pytest.raises(ParameterError, match=r"quiet.*signed-18"):
+        quiet_term([Mesh(*grid())], "signed-18", seed=0)
+
+
+@pytest.mark.parametrize("name", ["Fox", "alien", "RiggedFigure", "low-poly-tree"])
+def test_the_paper_model_tears_no_low_poly_asset(name):
+    """Right angles and few faces: far from any ridge that the model was trained on."""
+    scene = trimesh.load(shared_path(f"assets/{name}.glb"), process=False, force="mesh")
+    scene.merge_vertices(merge_tex=True, merge_norm=True)
+    mesh = clean(Mesh(np.asarray(scene.vertices), np.asarray(scene.faces))).mesh
+    schemes = pns(load_model("paper")), loop()
+    report, base = (refine(mesh, scheme, 2).report for scheme in schemes)
+    assert [level["flipped_faces"] for level in report["levels"]] == [0, 0]
+    jumps = [r["levels"][-1]["normal_jump_max"] for r in (report, base)]
+    assert jumps[0] < 1.25 * jumps[1]
+
+
+def ignore(done, loss):
+    pass
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_same_seed_same_bits(name):
+    recipe = tiny(RECIPES[name](3))
+    torch.manual_seed(1)
+    first = fit(recipe, ignore)
+    torch.manual_seed(2)
+    again = fit(recipe, ignore)
+    assert first.losses == again.losses
+    for weight, retrained in zip(
+        first.network.parameters(), again.network.parameters(), strict=True
+    ):
+        assert torch.equal(weight, retrained)
+
+
+@pytest.mark.parametrize("recipe", [paper, paper_text])
+def test_another_seed_gives_another_network(recipe):
+    assert fit(tiny(recipe(0), 2), ignore).losses != fit(tiny(recipe(1), 2), ignore).losses
+
+
+def test_training_lowers_the_loss_and_reports_every_step():
+    reports = []
+    # Without the quiet term, which is drawn anew at each step and would blur the comparison.
+    base = tiny(paper(), 20)
+    recipe = replace(base, training=msgspec.structs.replace(base.training, quiet=0.0))
+    trained = fit(recipe, lambda done, loss: reports.append((done, loss)))
+    assert [done for done, _ in reports] == list(range(1, 21))
+    assert tuple(loss for _, loss in reports) == trained.losses
+    assert trained.losses[-1] < 0.8 * trained.losses[0]
+
+
+def test_loss_of_a_union_is_the_mean_over_its_meshes():
+    recipe = paper()
+    network = initial_network(recipe).double()
+    instances = ridge_training().instances[:3]
+    whole = batch_loss(recipe, network, disjoint_union(instances)).item()
+    alone = [
+        batch_loss(recipe, network, disjoint_union([instance])).item() for instance in instances
+    ]
+    assert whole == pytest.approx(np.mean(alone), rel=1e-12)
+
+
+def test_training_leaves_torchs_settings_as_they_were():
+    before = torch.are_deterministic_algorithms_enabled(), torch.get_num_threads()
+    with deterministic():
+        assert torch.are_deterministic_algorithms_enabled()
+    fit(tiny(paper(), 1), ignore)
+    assert (torch.are_deterministic_algorithms_enabled(), torch.get_num_threads()) == before
+
+
+def test_fingerprint_is_stable():
+    assert machine_fingerprint() == machine_fingerprint()
+    assert len(machine_fingerprint()) == 16
+
+
+def test_values_come_in_order_and_end():
+    assert list(ahead(range, 2, 9, 3)) == [2, 5, 8]
+    assert multiprocessing.active_children() == []
+
+
+def test_an_error_comes_after_the_values_before_it():
+    made = ahead(map, int, ["7", "seven"])
+    assert next(made) == 7
+    with pytest.raises(ValueError, match="seven"):
+        next(made)
+
+
+def test_who_stops_early_leaves_no_process():
+    made = ahead(count)
+    assert list(islice(made, 3)) == [0, 1, 2]
+    made.close()
+    assert multiprocessing.active_children() == []
+
+
+def test_a_process_that_is_killed_is_missed():
+    made = ahead(count)
+    next(made)
+    (process,) = multiprocessing.active_children()
+    process.kill()
+    with pytest.raises(EOFError):
+        list(made)
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_lengths_and_gradients_have_the_bits_of_torch(order):
+    rng = np.random.default_rng(0)
+    table = np.asarray(rng.standard_normal((50, 3)), order=order)
+    # Many pairs share an end, so that the order of sums shows; some are of one row with itself.
+    ends, weights = rng.integers(0, 50, (400, 2)), torch.from_numpy(rng.standard_normal(400))
+    ours, theirs = (torch.tensor(table, requires_grad=True) for _ in range(2))
+    made = squared_chords(ours, ends)
+    expected = ((theirs[ends[:, 1]] - theirs[ends[:, 0]]) ** 2).sum(dim=1)
+    assert torch.equal(made, expected)
+    (made * weights).sum().backward()
+    (expected * weights).sum().backward()
+    assert torch.equal(ours.grad, theirs.grad)

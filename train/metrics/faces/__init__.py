@@ -1,1 +1,0 @@
-"""The faces of a mesh in space: which is nearest to a point, which cross each other."""
