@@ -9,27 +9,27 @@ from train.surfaces.cad import Fillet, RoundedBox, Torus
 from train.surfaces.implicit import Ridge, Saddle, SphereRidge, signed_distance, unit_normal
 from train.surfaces.smooth import Bump, Crossing, CurvedRidge, LumpySphere
 
-SURFACES = {"torus": Torus(1.0, 0.3), "box": RoundedBox(0.4), "fillet": Fillet(0.3)}
-each_surface = pytest.mark.parametrize("name", SURFACES)
+EXACT = {"torus": Torus(1.0, 0.3), "box": RoundedBox(0.4), "fillet": Fillet(0.3)}
+each_exact = pytest.mark.parametrize("name", EXACT)
 
 
 def points_for(count=200):
     return np.random.default_rng(5).uniform(-0.8, 1.2, (count, 3))
 
 
-@each_surface
+@each_exact
 def test_gradient_is_the_derivative_and_has_length_one(name):
     points = torch.tensor(points_for(), requires_grad=True)
-    surface = SURFACES[name]
+    surface = EXACT[name]
     (expected,) = torch.autograd.grad(surface.value(points).sum(), points)
     gradient = surface.gradient(points.detach())
     torch.testing.assert_close(gradient, expected, rtol=0, atol=1e-12)
     torch.testing.assert_close(gradient.norm(dim=1), torch.ones(len(gradient), dtype=torch.float64))
 
 
-@each_surface
+@each_exact
 def test_a_step_of_the_distance_along_the_gradient_lands_on_the_surface(name):
-    surface, points = SURFACES[name], points_for()
+    surface, points = EXACT[name], points_for()
     landed = points - surface.value(points)[:, None] * surface.gradient(points)
     near = np.abs(surface.value(points)) < 0.15
     np.testing.assert_allclose(surface.value(landed)[near], 0, atol=1e-12)

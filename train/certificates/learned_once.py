@@ -6,6 +6,7 @@ them for the scale-free rule and any weights.
 
 import math
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -70,7 +71,9 @@ def limit_distance(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> C
     """
     measured = []
     for trial in trials(subject, bodies, seed):
-        creases = Creases(trial.creases, levels=1) if len(trial.creases) else "auto"
+        creases: Creases | Literal["auto"] = "auto"
+        if len(trial.creases):
+            creases = Creases(trial.creases, levels=1)
         assert isinstance(subject.scheme, Scheme)
         ours, theirs = (
             refine_by_library(trial.mesh, scheme, 2, 1.0, limit=True, creases=sharp, threads=1)

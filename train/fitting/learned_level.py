@@ -133,8 +133,8 @@ def _inputs(at: operator.Inputs, first: int, prior: Float[Tensor, "W 3"]) -> Inp
     rows = torch.from_numpy(first + at.rows.astype(np.int64))
     gate = torch.from_numpy(at.weight * at.gate)
     axes = torch.from_numpy(at.basis).reshape(-1, 3, 3).transpose(1, 2)
-    measured = (torch.from_numpy(each) for each in (at.bound, at.reach))
-    return Inputs(rows, torch.from_numpy(at.features), axes, gate, *measured, prior[rows])
+    bound, reach = torch.from_numpy(at.bound), torch.from_numpy(at.reach)
+    return Inputs(rows, torch.from_numpy(at.features), axes, gate, bound, reach, prior[rows])
 
 
 def _not_asked(features: np.ndarray) -> np.ndarray:

@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..errors import BusyError, ServiceError
-from ..workers.job import Job, State
+from ...errors import BusyError, ServiceError
+from ...workers.job import Job, State
 
 # Shares of the room for results whose promised time is not over: of a client (in IPv6 a /64), and
 # of a /56 and a /48 that it is in.

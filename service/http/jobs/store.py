@@ -12,8 +12,8 @@ import secrets
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from ..errors import ServiceError
-from ..settings import Settings, StartError
+from ...errors import ServiceError
+from ...settings import Settings, StartError
 
 PREFIX = "pns:"
 OPEN = f"{PREFIX}open"
