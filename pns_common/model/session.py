@@ -162,7 +162,7 @@ class OnnxModel:
         return answers
 
     def _rows(self, network: Network) -> Float32[np.ndarray, "M K"]:
-        """Return the calling thread's array for chunks, kept since allocating takes a quarter longer.
+        """Return the calling thread's array for chunks: a new one for each takes a quarter longer.
 
         Rows past the last of a chunk pad it, whatever they hold.
         """
