@@ -111,6 +111,12 @@ def test_a_model_without_a_vertex_network_says_so():
         random_model(0).vertex_correction(rows(1, 10), 1.0)
 
 
+@pytest.mark.parametrize("shape", [(7, 4), (7, 1), (5,), (7, 5, 1)])
+def test_features_of_another_shape_are_refused(shape):
+    with pytest.raises(ParameterError, match=r"shape \(N, 5\)"):
+        random_model(0)(np.zeros(shape), 1.0)
+
+
 @pytest.mark.parametrize("providers", [(), ("NoSuchExecutionProvider",)])
 def test_a_provider_that_is_not_there_is_refused(providers):
     with pytest.raises(ParameterError, match="CPUExecutionProvider"):
