@@ -121,9 +121,9 @@ manifest: $(DEV)/.ready
 	$(DEV)/bin/python -c "from pathlib import Path; from pns_common.model.file import write_manifest; write_manifest(Path('pns_common/models'))"
 
 # Blender as a module, a version each in an environment of its own: 350 MB, and each for one version of
-# Python. 4.2 has the numpy that Blender 4.2 comes with. A missing Python leaves its version out.
+# Python. A missing Python leaves its version out.
 BPY := addons/blender/requirements
-$(BLENDER)-4.2/.ready: PYTHON := python3.11
+$(BLENDER)-4.5/.ready: PYTHON := python3.11
 $(BLENDER)-5.0/.ready: PYTHON := python3.11
 $(BLENDER)-5.2/.ready: PYTHON := python3.13
 $(BLENDER)-%/.ready: $(BPY)-%.txt
@@ -167,7 +167,7 @@ blender-measure: addon-5.0
 	$(BLENDER)-5.0/bin/python addons/blender/measure.py "$(call ZIP_FOR,5.0)"
 
 # It is installed from the zip into each of these, and every property that it keeps is looked at.
-BPY_VERSIONS ?= 4.2 5.0 $(if $(shell python3.13 --version 2>/dev/null),5.2)
+BPY_VERSIONS ?= 4.5 5.0 $(if $(shell python3.13 --version 2>/dev/null),5.2)
 blender-test: $(BPY_VERSIONS:%=blender-test-%)
 
 blender-test-%: addon-%

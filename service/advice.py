@@ -16,8 +16,10 @@ from pns_common.topology import EdgeClass, build_topology
 
 # Plane faces in single precision turn by less.
 BENT = math.radians(0.5)
-# From this share of sharp edges, or of borders, on, little is rounded.
-MOST = 0.9
+# From this share of bent edges that stay sharp on, a shape looks faceted.
+MANY_SHARP = 0.25
+# From this share of borders on, faces do not hang together.
+MOST_OPEN = 0.9
 
 
 @dataclass(frozen=True)
@@ -59,12 +61,12 @@ def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
     total = sum(edges[kind] for kind in ("interior", "boundary", "irregular")) + edges.get(
         "crease", 0
     )
-    if bends.bent and bends.sharp >= MOST * bends.bent:
+    if bends.bent and bends.sharp >= MANY_SHARP * bends.bent:
         return [
             f"{bends.sharp} of {bends.bent} bent edges are kept sharp: "
             "use crease=off for a rounder shape"
         ]
-    if edges["boundary"] >= MOST * total:
+    if edges["boundary"] >= MOST_OPEN * total:
         return [
             f"{edges['boundary']} of {total} edges are open borders, and faces that only touch "
             "stay apart: use weld_tolerance=0.001 to join vertices that nearly coincide"

@@ -77,8 +77,8 @@ def _kernels() -> str:
 
     began, kept = time.perf_counter(), are_compiled()
     warm_up(lambda _: None)
-    seconds = f"{time.perf_counter() - began:.1f} s"
-    return f"loaded in {seconds}" if kept else f"compiled in {seconds}"
+    seconds = f"ready after {time.perf_counter() - began:.1f} s"
+    return seconds if kept else f"{seconds}, compiled for the first time"
 
 
 def _providers() -> str:

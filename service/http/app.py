@@ -22,15 +22,17 @@ from ..workers.desk import Desk
 from ..workers.jobs import Done, Work
 from ..workers.pool import Workers
 from ..workers.turns import Lane, Turns
-from . import docs_page, job_routes, job_work, layers, openapi, page, problems, result_room, routes
+from . import docs_page, layers, openapi, page, problems, result_room, routes
 from .access.keys import read_keys
 from .access.origins import is_loopback
 from .admission import Admission
 from .catalogue import ReadOnce
-from .job_book import JobBook
-from .job_store import JobStore
+from .jobs import routes as job_routes
+from .jobs import work as job_work
+from .jobs.book import JobBook
+from .jobs.shared import SharedJobs
+from .jobs.store import JobStore
 from .service import Service
-from .shared_jobs import SharedJobs
 from .watch.metrics import Metrics
 from .watch.tracing import tracer_from_environment
 

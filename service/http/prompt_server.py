@@ -53,7 +53,8 @@ class PromptServer(uvicorn.Server):
         connections = self.server_state.connections
         before, self._idle = self._idle, {}
         for connection in connections:
-            cycle = connection.cycle
+            # Of the one protocol that is served here.
+            cycle: Any = getattr(connection, "cycle", None)
             closing = connection.transport.is_closing()
             if closing or cycle is None or cycle.response_complete:
                 untaken = connection.transport.get_write_buffer_size()

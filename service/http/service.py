@@ -9,10 +9,10 @@ from ..settings import Settings
 from ..workers.desk import Desk
 from .admission import Admission
 from .catalogue import ReadOnce
-from .job_book import JobBook
+from .jobs.book import JobBook
 
 if TYPE_CHECKING:
-    from .shared_jobs import SharedJobs
+    from .jobs.shared import SharedJobs
 
 
 @dataclass

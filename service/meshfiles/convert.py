@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import msgspec
 
@@ -17,7 +17,7 @@ from pns_common.files import replace_file
 from pns_common.model.session import Model
 
 from ..bodies.folder import folder_of
-from ..bodies.media import GLTF_KINDS, KINDS
+from ..bodies.media import GLTF_KINDS, KINDS, Kind
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..bodies.uploads import Sent
 from ..course import Course
@@ -108,10 +108,8 @@ def converted(
         done = subdivide_gltf(data, kind, options, model, limits, course, siblings=siblings)
         return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
     if target in GLTF_KINDS:
-        sent = as_gltf(Sent(data, kind, siblings=siblings), options, limits)
-        done = subdivide_gltf(
-            sent.data, sent.kind, options, model, limits, course, losses=sent.losses
-        )
+        sent = as_gltf(Sent(data, cast(Kind, kind), siblings), options, limits)
+        done = subdivide_gltf(sent.data, "glb", options, model, limits, course, losses=sent.losses)
         return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
     course = Course() if course is None else course
     with course.stage("read", 0.0, 0.2):

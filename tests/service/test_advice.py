@@ -30,8 +30,10 @@ def test_a_cube_of_sharp_edges_says_how_it_gets_round():
 
 def test_a_shape_that_gets_round_says_nothing():
     assert advice([box()], crease="off") == []
-    # The rims are sharp; the sides are not.
-    assert advice([cylinder()], crease="angle:60") == []
+    # Two rims of eight are sharp; the eight sides are not.
+    (line,) = advice([cylinder()], crease="angle:60")
+    assert line.startswith("16 of 24 ")
+    assert advice([cylinder()], crease="angle:100") == []
 
 
 @pytest.mark.parametrize("alone", [False, True])
@@ -39,8 +41,9 @@ def test_the_meshes_of_a_file_count_together(alone, monkeypatch):
     if alone:
         monkeypatch.setattr("service.gltf.refine.meshes.MOST_FACES", -1)
     assert advice([box()], [box()], crease="angle:60") == [CUBE.replace("12", "24")]
-    # 12 of an octahedron's edges bend by 70 degrees.
-    assert advice([box()], [octahedron()], crease="angle:80") == []
+    # All of an octahedron's edges bend, and by 70 degrees.
+    assert advice([box()], [octahedron()], crease="angle:80") == [CUBE.replace("of 12", "of 24")]
+    assert advice([box()], *[[octahedron()]] * 4, crease="angle:80") == []
 
 
 def test_triangles_that_share_no_vertex_say_how_to_join_them():

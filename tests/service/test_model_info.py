@@ -26,7 +26,7 @@ NESTED = {
 
 @pytest.fixture
 def vertices() -> OnnxModel:
-    return model_from_bytes(default_model_bytes(0), "vertices")
+    return model_from_bytes(default_model_bytes(0, gate_sharpness=40.0, budget=0.25), "vertices")
 
 
 def with_card(model: OnnxModel, name: str | None = None, **changes: Any) -> OnnxModel:

@@ -113,10 +113,23 @@ def _of_modifiers(obj: bpy.types.Object) -> list[str]:
         said.append(f"Hooks move the old vertices alone: {listed(hooks)}")
     if obj.particle_systems:
         said.append("Particles and hair are to be placed again")
+    subdividing = subdividing_modifiers(obj)
+    if subdividing:
+        said.append(f"The refined mesh is subdivided again by: {listed(subdividing)}")
     simulated = [m.name for m in obj.modifiers if m.type in SIMULATED]
     if simulated:
         said.append(f"To be baked again: {listed(simulated)}")
     return said
+
+
+def subdividing_modifiers(obj: bpy.types.Object) -> list[str]:
+    """Return the names of the Subdivision Surface modifiers that act in the viewport or renders."""
+    return [
+        m.name
+        for m in obj.modifiers
+        if m.type == "SUBSURF"
+        and ((m.show_viewport and m.levels) or (m.show_render and m.render_levels))
+    ]
 
 
 def irregularities(refined: Refined) -> list[str]:

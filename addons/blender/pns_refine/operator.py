@@ -6,10 +6,12 @@ import bpy
 from bpy.props import BoolProperty
 
 from pns_common import PnsError
+from pns_common.kernels import are_compiled
 
 from . import live
 from .animation import redirect_drivers
 from .live_nodes import remove_modifier
+from .losses import subdividing_modifiers
 from .overlay import hide
 from .run import Key, Made, Run, Share, key_of, refine_meshes
 from .settings import Settings, choice_of
@@ -34,6 +36,11 @@ PASSED_ON = {
 def triangle_count(mesh: bpy.types.Mesh) -> int:
     """Return how many triangles a mesh's faces are cut into."""
     return len(mesh.loops) - 2 * len(mesh.polygons)
+
+
+def fits_at_once(triangles: int) -> bool:
+    """Return whether so many triangles are made without a wait that one would notice."""
+    return triangles <= AT_ONCE and are_compiled()
 
 
 def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -129,7 +136,7 @@ class OBJECT_OT_pns_refine(Refining, bpy.types.Operator):  # noqa: N801 (Blender
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Refine at once what is small, and the rest beside the interface."""
         count = sum(triangle_count(o.data) for o in chosen_objects(context)) * 4**self.levels
-        if count <= AT_ONCE:
+        if fits_at_once(count):
             return self.execute(context)
         chosen = {name: getattr(self, name) for name in self.as_keywords()}
         bpy.ops.object.pns_refine_large("INVOKE_DEFAULT", **chosen)
@@ -228,9 +235,12 @@ def homes_of(obj: bpy.types.Object) -> list[bpy.types.Collection]:
 
 
 def draw_forecast(layout: bpy.types.UILayout, objects: list[bpy.types.Object], levels: int) -> None:
-    """Show how many faces there will be, and whether that is wise."""
+    """Show how many faces there will be, whether that is wise, and what subdivides them again."""
     count = sum(triangle_count(o.data) for o in objects)
     layout.label(text=forecast(count, levels), icon="INFO")
     warning = too_many(count, levels)
     if warning:
         layout.label(text=warning, icon="ERROR")
+    again = sorted({name for o in objects for name in subdividing_modifiers(o)})
+    if again:
+        layout.label(text=f"Turn off, or it subdivides again: {listed(again)}", icon="ERROR")

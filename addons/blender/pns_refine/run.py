@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import bpy
+
+from pns_common import warm_up
+from pns_common.kernels import are_compiled
 
 from .losses import irregularities, losses
 from .reading import Reading, read_mesh
@@ -121,6 +124,8 @@ def refine_mesh(
 
     ``into`` is written anew, if given, in place of a new mesh.
     """
+    if not are_compiled():
+        yield from compile_kernels(share)
     mesh: bpy.types.Mesh = obj.data
     reading: Reading = yield from read_mesh(mesh)
     job = Job(partial(compute, reading.snapshot, choice)).start()
@@ -135,6 +140,24 @@ def refine_mesh(
     notes = losses(obj, reading, quads=choice.quads) + irregularities(refined) + refused
     remember(new, refined, notes)
     return Made(mesh, new, refined)
+
+
+def compile_kernels(share: Share) -> Generator[object, None, None]:
+    """Compile the library's kernels in a thread of their own, once after the installation."""
+
+    def work(report: Callable[[float], None]) -> None:
+        warm_up(lambda text: None, lambda done, total: report(done / total))
+
+    before, share.text = share.text, "Compiling, once after the installation"
+    job = Job(work).start()
+    try:
+        while job.running:
+            share.value = job.share
+            yield WAITING
+        job.answer()
+    finally:
+        job.cancel()
+    share.text = before
 
 
 __all__ = ["Key", "Made", "Run", "Share", "StoppedError", "key_of", "refine_mesh", "refine_meshes"]

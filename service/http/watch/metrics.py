@@ -106,22 +106,9 @@ class Metrics:
         """Show a number that is asked for at each scrape."""
         Gauge(name, text, registry=self.registry).set_function(value)
 
-    def count(self, name: str, text: str, value: Callable[[], int]) -> None:
-        """Show a count that is kept elsewhere."""
-        self.registry.register(_Count(name, text, value))
-
     def tally(self, name: str, text: str, label: str, counts: Callable[[], Tally[str]]) -> None:
         """Show counts that are kept elsewhere, by their names."""
         self.registry.register(_Tally(name, text, label, counts))
-
-
-class _Count(Collector):
-    def __init__(self, name: str, text: str, value: Callable[[], int]) -> None:
-        self._named = (name, text)
-        self._value = value
-
-    def collect(self) -> Iterable[Metric]:
-        yield CounterMetricFamily(*self._named, value=self._value())
 
 
 class _Tally(Collector):

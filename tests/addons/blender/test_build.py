@@ -12,7 +12,7 @@ def test_the_manifest_is_what_blender_asks_for():
     manifest = tomllib.loads(MANIFEST)
     assert manifest["schema_version"] == "1.0.0"
     assert manifest["id"] == SOURCE.name
-    assert manifest["blender_version_min"] == "4.2.0"
+    assert manifest["blender_version_min"] == "4.5.0"
     assert manifest["license"] == ["SPDX:GPL-3.0-or-later"]
     (reason,) = [manifest["permissions"].pop("files"), *manifest["permissions"].values()]
     assert len(reason) <= 64

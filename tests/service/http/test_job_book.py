@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 
 from service.errors import BusyError
-from service.http.job_book import JobBook, NoSuchJobError
+from service.http.jobs.book import JobBook, NoSuchJobError
 from service.workers.job import Job, State
 from service.workers.memory_file import MemoryFile
 from tests.support.handed_in import job_of

@@ -19,7 +19,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from service.http.job_store import ANSWER, JobStore
+from service.http.jobs.store import ANSWER, JobStore
 from service.settings import Settings
 from tests.support.live import served
 from tests.support.proxy import free_port

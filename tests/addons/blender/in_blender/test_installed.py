@@ -3,18 +3,19 @@
 import sys
 
 import bpy
+import llvmlite
+import numba
+import onnxruntime
+import pytest
 from conftest import HOME, NAME
 from scene import cube
 
 import pns_common
 
 
-def test_the_operator_is_the_bundled_wheel():
-    assert pns_common.__file__.startswith(HOME.name)
-
-
-def test_models_are_evaluated_without_a_runtime():
-    assert "onnxruntime" not in sys.modules
+@pytest.mark.parametrize("package", [pns_common, numba, llvmlite, onnxruntime])
+def test_the_library_and_its_compiler_and_runtime_are_the_bundled_wheels(package):
+    assert package.__file__.startswith(HOME.name)
 
 
 def test_the_menu_has_the_operator():

@@ -2,7 +2,7 @@
 
 import bl_ext.user_default.pns_refine.panel as panel
 import bpy
-from scene import cube, grid, refined
+from scene import chosen, cube, grid, refined
 
 
 class Layout:
@@ -58,6 +58,17 @@ def test_a_million_faces_are_warned_of():
     last.levels = 3
     assert any("More than 1,000,000" in line for line in drawn(panel.VIEW3D_PT_pns))
     last.levels = 2
+
+
+def test_a_subdivision_surface_that_acts_again_is_named_before_and_after():
+    obj = cube()
+    modifier = obj.modifiers.new("Rounder", "SUBSURF")
+    assert any("Rounder" in line for line in drawn(panel.VIEW3D_PT_pns))
+    refined(obj)
+    assert any("again by: Rounder" in line for line in drawn(panel.VIEW3D_PT_pns_report))
+    chosen(obj)
+    modifier.levels = modifier.render_levels = 0
+    assert not any("Rounder" in line for line in drawn(panel.VIEW3D_PT_pns))
 
 
 def test_the_report_has_certificate_and_losses():

@@ -9,13 +9,14 @@ from contextlib import AsyncExitStack, ExitStack, suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from ..errors import BusyError, WorkerDied
-from ..options import Options
-from ..workers.job import Job, State
-from ..workers.memory_file import MemoryFile
-from .intake import Asked, Wanted, made_of
-from .job_book import Entry, NoSuchJobError
-from .job_store import (
+from ...errors import BusyError, WorkerDied
+from ...options import Options
+from ...workers.job import Job, State
+from ...workers.memory_file import MemoryFile
+from ..intake import Asked, Wanted, made_of
+from ..result_room import result_folder
+from .book import Entry, NoSuchJobError
+from .store import (
     ANSWER,
     BEAT_SECONDS,
     BODY,
@@ -25,10 +26,9 @@ from .job_store import (
     Record,
     StoreError,
 )
-from .result_room import result_folder
 
 if TYPE_CHECKING:
-    from .service import Service
+    from ..service import Service
 
 View = Callable[[Job], dict[str, Any]]
 
@@ -142,7 +142,8 @@ class SharedJobs:
             await self.store.leave(record.id)
             return True
         settings = service.settings
-        asked = Asked(**record.asked | {"options": Options(**record.asked["options"])})
+        fields: dict[str, Any] = record.asked | {"options": Options(**record.asked["options"])}
+        asked = Asked(**fields)
         patience = settings.queue_seconds + settings.job_seconds
         async with AsyncExitStack() as held:
             counted = held.enter_context(service.admission.body(asked.client))

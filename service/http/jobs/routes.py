@@ -11,20 +11,20 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
-from ..bodies import media
-from ..errors import ServiceError
-from ..workers.job import State
-from . import documentation, problems
-from .answer import FileAnswer
-from .answer_types import answer_type
-from .clients import client_of
-from .job_book import Entry, NotDoneError
-from .job_store import ANSWER, REPORT
-from .job_work import hand_in, job_json
-from .parameters import Parameters
-from .server_timing import server_timing
-from .service import Service
-from .shared_jobs import SharedJobs
+from ...bodies import media
+from ...errors import ServiceError
+from ...workers.job import State
+from .. import documentation, problems
+from ..answer import FileAnswer
+from ..answer_types import answer_type
+from ..clients import client_of
+from ..parameters import Parameters
+from ..server_timing import server_timing
+from ..service import Service
+from .book import Entry, NotDoneError
+from .shared import SharedJobs
+from .store import ANSWER, REPORT
+from .work import hand_in, job_json
 
 # How often the page of a running job is looked at, and how long a stream may be silent.
 LOOK_SECONDS = 0.25
@@ -139,7 +139,10 @@ async def _shared_result(
     client = client_of(request, service.settings).id
     view = (await shared.find(job_id, client)).view
     if view["state"] == State.FAILED and view["problem"] is not None:
-        return problems.ProblemResponse(view["problem"], view["problem"]["status"])
+        problem = view["problem"]
+        # What failed a while ago for want of room may find some.
+        headers = {"Retry-After": "1"} if problem["status"] == 503 else None
+        return problems.ProblemResponse(problem, problem["status"], headers)
     if view["state"] != State.DONE:
         raise NotDoneError(f"the job is {view['state']}")
     file = await shared.file(REPORT if kind == media.JSON else ANSWER, job_id)

@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..errors import BusyError, ServiceError
-from ..workers.job import Job, State
+from ...errors import BusyError, ServiceError
+from ...workers.job import Job, State
 
 # Shares of the room for results whose promised time is not over: of a client (in IPv6 a /64), and
 # of a /56 and a /48 that it is in.
@@ -180,8 +180,8 @@ class JobBook:
         def rank(entry: Entry) -> tuple[bool, bool, int, int]:
             useful = entry.job.state is State.DONE
             client = entry.networks[0]
-            greed = (sizes[client], 0) if by_size else (jobs[client], -(entry.size or 0))
-            return not useful, entry.job.fetched.is_set(), *greed
+            most, least = (sizes[client], 0) if by_size else (jobs[client], entry.size or 0)
+            return not useful, entry.job.fetched.is_set(), most, -least
 
         # The first of equals is the oldest.
         return max(free, key=rank)

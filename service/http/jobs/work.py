@@ -12,18 +12,18 @@ from typing import Any
 from fastapi import Request
 from starlette.requests import ClientDisconnect
 
-from ..errors import ServiceError
-from ..workers.job import Job, State
-from ..workers.worker import JobFaultError
-from . import problems
-from .admission import DrainingError
-from .clients import client_of
-from .intake import Wanted, owner_of, taken_in
-from .job_book import Entry
-from .leaving import unless_gone
-from .parameters import Parameters
-from .result_room import result_folder
-from .service import Service
+from ...errors import ServiceError
+from ...workers.job import Job, State
+from ...workers.worker import JobFaultError
+from .. import problems
+from ..admission import DrainingError
+from ..clients import client_of
+from ..intake import Wanted, owner_of, taken_in
+from ..leaving import unless_gone
+from ..parameters import Parameters
+from ..result_room import result_folder
+from ..service import Service
+from .book import Entry
 
 # How long after a job's end a shutdown waits for somebody to fetch its result.
 FETCH_SECONDS = 10.0

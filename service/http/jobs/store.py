@@ -10,13 +10,10 @@ import asyncio
 import json
 import secrets
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
-from ..errors import ServiceError
-from ..settings import Settings, StartError
-
-if TYPE_CHECKING:
-    from redis.asyncio import Redis
+from ...errors import ServiceError
+from ...settings import Settings, StartError
 
 PREFIX = "pns:"
 OPEN = f"{PREFIX}open"
@@ -73,7 +70,7 @@ class Files(Protocol):
 class RedisFiles:
     """Files as values of Redis, which deletes them in time."""
 
-    def __init__(self, redis: Redis) -> None:
+    def __init__(self, redis: Any) -> None:
         self._redis = redis
 
     async def write(self, name: str, content: bytes, seconds: float) -> None:
@@ -133,7 +130,8 @@ class JobStore:
                 "PNS_STORE is set and redis is not installed: pip install 'pns-subdivision[store]'"
             ) from error
         self._errors = (RedisError, OSError)
-        self._redis = Redis.from_url(
+        # Its types leave open whether it answers with bytes.
+        self._redis: Any = Redis.from_url(
             str(settings.store), socket_timeout=STORE_SECONDS, socket_connect_timeout=STORE_SECONDS
         )
         self._replica = secrets.token_hex(8)

@@ -1,0 +1,1 @@
+"""Jobs that clients come back for: taken in, kept, and shared between replicas."""
