@@ -6,6 +6,7 @@ them for the scale-free rule and any weights.
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -75,10 +76,9 @@ def limit_distance(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> C
         if len(trial.creases):
             creases = Creases(trial.creases, levels=1)
         assert isinstance(subject.scheme, Scheme)
-        ours, theirs = (
-            refine_by_library(trial.mesh, scheme, 2, 1.0, limit=True, creases=sharp, threads=1)
-            for scheme, sharp in ((subject.scheme, creases), (loop(), Creases()))
-        )
+        refined = partial(refine_by_library, trial.mesh, threads=1)
+        ours = refined(subject.scheme, 2, 1.0, limit=True, creases=creases)
+        theirs = refined(loop(), 2, 1.0, limit=True, creases=Creases())
         apart = np.linalg.norm(ours.mesh.vertices - theirs.mesh.vertices, axis=1).max()
         stated, bound = (ours.report[key] for key in ("limit_distance", "limit_distance_bound"))
         assert stated is not None
