@@ -61,6 +61,10 @@ class Level:
     reference_length: float | None
     blocks: Blocks
 
+    def measure(self) -> None:
+        """Make the measurements that several threads are about to read."""
+        _ = self.logs, self.rings, self.face_bends, self.ringed
+
     @cached_property
     def faces(self) -> tuple[Float[np.ndarray, "F 3"], Float[np.ndarray, "F 4"]]:
         """Unit normals, and twice the area vectors with their lengths."""
@@ -99,6 +103,21 @@ class Level:
 
         self.blocks.run(len(logs), take)
         return logs
+
+    @cached_property
+    def face_bends(self) -> Float[np.ndarray, " F"]:
+        """Mean of x over the edges of each face; less of a soft edge, by its sharpness."""
+        mesh, jumps = self.topology, self.edges.jumps
+        if len(mesh.soft):
+            jumps = jumps * (1 - mesh.soft)
+        bends = np.empty(mesh.face_count)
+
+        def take(begin: int, end: int) -> None:
+            first, second, third = jumps[mesh.face_edges[begin:end]].T
+            bends[begin:end] = (first + second + third) / 3
+
+        self.blocks.run(len(bends), take)
+        return bends
 
     @cached_property
     def rings(self) -> RingMeasures:

@@ -14,7 +14,8 @@ The default's rule, models of format 4, acts at the control mesh alone:
     F          the edge's frame; at an old vertex three vectors of its ring
     φ          features of the edge, or of the ring, and z(φ) the network's answer
     h          the edge's length; at an old vertex the root mean square of its edges
-    γ          the gate, 0 on planes: tanh(c x²) at edges, x = 1 − n1 · n2;
+    γ          the gate, 0 on planes: γ₂ + (1 − γ₂) tanh(c_v b) at edges, γ₂ = tanh(c x²),
+               x = 1 − n1 · n2, b the smaller mean of x over the edges of both faces;
                tanh(c_v x_v) at old vertices, x_v the mean of x over its edges
     Π_ρ        shortens to length ρ, whatever the network answers
     s          the fold guard: no child triangle turns by more than θ                ``guard_scale``
@@ -144,6 +145,7 @@ def learned_level(level: Level, rule: Rule) -> Additions:
     mesh, base, blocks = level.topology, level.base, level.blocks.of_rows(NETWORK_ROWS)
     count, edges = len(level.points), mesh.interior
     x = base.place(level.points, mesh, level.blocks)  # x0
+    level.measure()
     if rule.prior_strength is None:
         made = _Rows.starting_with(np.zeros((len(x), 3)))
 
@@ -237,12 +239,16 @@ def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
         degenerate,
         features,
     )
-    length = level.edges.lengths[rows]
+    length, gate = level.edges.lengths[rows], gate_of(rule.gate_sharpness * curvature**2)
+    if rule.prior_strength is not None:
+        # Open on the diagonal of a plane quad too: moving its sides alone would ripple.
+        sides = level.face_bends[mesh.half_edges[rows] // 3].min(axis=1)
+        gate += (1 - gate) * np.where(degenerate, 0.0, gate_of(rule.vertex_gate_sharpness * sides))
     return Inputs(
         rows,
         features,
         basis,
-        gate=gate_of(rule.gate_sharpness * curvature**2),
+        gate=gate,
         bound=budget_per_length(level, rule) * (length * length),
         reach=rule.network_scale * length,
         weight=1 - mesh.soft[rows] if len(mesh.soft) else np.ones(count),

@@ -98,6 +98,12 @@ class Surroundings:
         jump, bend = ((smooth * value).repeat_interleave(2)[:, None] for value in both)
         return jump, bend
 
+    @cached_property
+    def gentler_bend(self) -> Float[Tensor, " E"]:
+        """The smaller mean of x over the edges of an edge's two faces."""
+        bends = self.turns[0][::2, 0][self.mesh.face_edges].mean(dim=1)
+        return bends[self.mesh.half_edges // 3].min(dim=1).values
+
 
 @dataclass(frozen=True, eq=False)
 class EdgeReading:
@@ -322,7 +328,10 @@ class GeneralRule:
         frames = edge_frames(edges, first_face=False)
         interior, blend = mesh.paired & (mesh.sharpness < 1), mesh.sharpest[0][:, 1]
         ringed = mesh.ringed & (blend < 1)
-        edge_gate = (1 - mesh.sharpness) * torch.tanh(self.gate_sharpness * frames.curvature**2)
+        own = torch.tanh(self.gate_sharpness * frames.curvature**2)
+        opened = torch.tanh(self.vertex_gate_sharpness * around.gentler_bend)
+        opened = torch.where(frames.degenerate, 0.0, opened)
+        edge_gate = (1 - mesh.sharpness) * (own + (1 - own) * opened)
         z = shortened(self.edge_network(signed_18(around, edges, frames)[interior]), one)
         local = torch.zeros_like(edges.a).index_put((interior,), z)
         turned = frames.length[:, None] * (frames.axes @ local[:, :, None])[:, :, 0]
