@@ -78,7 +78,7 @@ def load_model(
     path = Path(source)
     if not path.is_file():
         names = ", ".join(bundled_models()) or "none"
-        raise ModelError(str(path), expected=f"a file or a bundled name ({names})", found="none")
+        raise ModelError(str(source), expected=f"a file or a bundled name ({names})", found="none")
     _check_size(path.stat().st_size, str(path))
     return model_from_bytes(path.read_bytes(), path.stem, providers)
 

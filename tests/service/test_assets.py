@@ -134,7 +134,7 @@ def open_edges(data):
 def test_seams_do_not_crack(name):
     # Watertight meshes stay watertight, and open ones get nothing but their own rims halved.
     before = open_edges(shared_path(f"assets/{name}").read_bytes())
-    after = open_edges(refine_asset(name).glb)
+    after = open_edges(refine_asset(name, levels=1).glb)
     assert after == [2 * count for count in before]
 
 
@@ -156,7 +156,7 @@ def test_loop_equals_another_implementation_on_closed_assets(name):
 @pytest.mark.parametrize("name", REFINED)
 def test_every_json_value_that_is_no_geometry_stays(name):
     before, _ = files.unpack(shared_path(f"assets/{name}").read_bytes())
-    after, _ = files.unpack(refine_asset(name).glb)
+    after, _ = files.unpack(refine_asset(name, normals="keep").glb)
     for old, new in zip(before["meshes"], after["meshes"], strict=True):
         for old_primitive, new_primitive in zip(old["primitives"], new["primitives"], strict=True):
             assert list(old_primitive["attributes"]) == list(new_primitive.pop("attributes"))

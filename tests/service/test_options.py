@@ -76,7 +76,7 @@ def test_angles_are_in_degrees_and_other_creases_have_none():
 def test_the_command_line_and_http_take_these_options_with_their_defaults():
     own = asdict(DEFAULTS)
     over_http = {name: field.default for name, field in Parameters.model_fields.items()}
-    assert over_http == {**own, "model": None}
+    assert over_http == {**own, "model": None, "format": "glb"}
     on_the_line = {n: p.default for n, p in inspect.signature(subdivide).parameters.items()}
     assert {name: on_the_line[name] for name in own} == own
 
