@@ -55,7 +55,7 @@ def test_sources_are_all_that_is_imported_at_any_depth():
     assert {
         "train/fitting/trainer.py",
         "train/surfaces/implicit.py",
-        "pns_common/geometry/frames.py",
+        "pns_common/kernels/frames.py",
     } <= sources
 
 
