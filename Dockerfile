@@ -24,7 +24,8 @@ ENV NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=
 # From elsewhere than /src, whose package would be compiled instead of the installed one. Sources get a time of
 # whole seconds: compiled code is kept for a source of one time, and layers keep no fractions.
 RUN find /opt/pns/lib -path '*pns_common*' -name '*.py' -exec touch --date 2020-01-01 {} + \
- && cd / && NUMBA_CACHE_DIR=/opt/pns/kernels /opt/pns/bin/python -m pns_common.warming
+ && cd / && export NUMBA_CACHE_DIR=/opt/pns/kernels \
+ && /opt/pns/bin/python -m pns_common.warming && /opt/pns/bin/pns doctor
 
 # Run: the environment alone, as a user without a name, on a root that may be read-only.
 FROM ${BASE}

@@ -24,6 +24,7 @@ PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist l
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
 	@$(SERVE)/bin/python -m pns_common.warming
+	@$(SERVE)/bin/pns doctor > /dev/null  # refines a file: the service's own kernels
 	$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
 
 # Tests wait now and then, for processes that start and clients that stall: the checks, of one core, take

@@ -95,13 +95,15 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         network_scale=_given(model, "network_scale"),
         fold_angle=_given(model, "fold_angle"),
     )
-    creases = Creases(angle=ANGLE, seed=SEED, levels=card.sharpness_levels)
+    creases = NO_CREASES
+    if budget > 0 and card.sharpness_levels:
+        creases = Creases(angle=ANGLE, seed=SEED, levels=card.sharpness_levels)
     return Scheme(
         "pns",
         BASES[card.base],
         learned,
         learned_levels=1,
-        creases=creases if budget > 0 else NO_CREASES,
+        creases=creases,
         **named,  # type: ignore[arg-type]
     )
 

@@ -77,4 +77,5 @@ def test_the_images_settings_are_settings():
 
 def test_the_kernels_of_the_installed_package_are_compiled():
     """In /src, `python -m` would take the sources there, and every worker would compile again."""
-    assert "cd / && NUMBA_CACHE_DIR=/opt/pns/kernels /opt/pns/bin/python -m" in DOCKERFILE
+    assert "cd / && export NUMBA_CACHE_DIR=/opt/pns/kernels" in DOCKERFILE
+    assert "/opt/pns/bin/python -m pns_common.warming" in DOCKERFILE

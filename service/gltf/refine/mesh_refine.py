@@ -27,7 +27,7 @@ from ...report import Change
 from ..read.primitives import TrianglePrimitive
 from .columns import SkinAndMorph, refined_skin_and_morph
 from .control_mesh import ControlMesh, Parts
-from .new_normals import hard_edges
+from .new_normals import hard_edges, marked_edges
 
 RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 
@@ -54,12 +54,18 @@ class RefinedMesh:
 
 
 def creases_of(control: ControlMesh, options: Options, scheme: Scheme) -> Creases:
-    """Return the edges of the mesh to refine that the options keep sharp, by name."""
+    """Return the edges of the mesh to refine that the options keep sharp, by name.
+
+    With `crease=auto` these are the scheme's, and the edges that smooth shading marks as hard.
+    """
     if control.is_empty:
         return NO_CREASES
     if options.crease == "normals":
         return Creases(hard_edges(control))
-    return creases_by_shape(control.mesh, options, scheme)
+    by_shape = creases_by_shape(control.mesh, options, scheme)
+    if options.crease != "auto" or scheme.creases.angle is None:
+        return by_shape
+    return by_shape.with_named(marked_edges(control))
 
 
 def sharp_after(creases: Creases, levels: int) -> Int[np.ndarray, "N 2"] | None:

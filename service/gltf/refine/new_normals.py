@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pns_common.creases import edge_cosines
 from pns_common.normals import smooth_fans
 from pns_common.rows import marked
 from pns_common.topology import build_topology
@@ -18,6 +19,9 @@ from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
 from .control_mesh import NO_NORMAL, ControlMesh
 from .normals import corner_normals, safe_unit
+
+# An edge whose faces' normals have a cosine this far below 1 is bent: a twelfth of a degree.
+BENT = 1e-6
 
 
 def hard_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
@@ -41,6 +45,23 @@ def hard_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
         first, second = label[corners], label[facing]
         hard &= (first != NO_NORMAL) & (second != NO_NORMAL) & (first != second)
     return edges[asked[hard]].astype(np.int64)
+
+
+def marked_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
+    """Return the hard edges that end where another bent edge is smooth.
+
+    A mesh that is shaded flat has no smooth bent edge, and marks none.
+    """
+    hard = hard_edges(control)
+    if len(hard) == 0:
+        return hard
+    mesh = control.mesh
+    topology = build_topology(mesh.faces, len(mesh.vertices))
+    bent = edge_cosines(mesh.vertices, topology) < 1 - BENT
+    bent[topology.rows_of(hard)] = False
+    beside_smooth = np.zeros(len(mesh.vertices), dtype=bool)
+    beside_smooth[topology.edges[bent]] = True
+    return hard[beside_smooth[hard].any(axis=1)]
 
 
 def _next_corner(corners: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
