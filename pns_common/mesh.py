@@ -93,7 +93,7 @@ class Mesh:
         """Where the corners of each face begin, and where the last ones end: (F + 1,)."""
         if self._offsets is not None:
             return self._offsets
-        return np.arange(0, len(self.corners) + 1, self.faces.shape[1])
+        return np.arange(0, len(self.corners) + 1, int(self.faces.shape[1]))
 
     @property
     def faces(self) -> Integer[np.ndarray, "F N"]:
@@ -231,11 +231,12 @@ def repeated_vertex(faces: Integer[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]
 
 def _polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return corners and offsets of faces of any degree. Raises MeshError."""
-    rows: list[Any] = list(faces) if isinstance(faces, list | tuple) else []  # pyright: ignore[reportUnknownArgumentType]
+    several = isinstance(faces, list | tuple)
+    rows: list[Any] = list(faces) if several else []  # pyright: ignore[reportUnknownArgumentType]
     degrees = [int(np.size(face)) for face in rows]
     if len(set(degrees)) > 1:
         corners = np.concatenate([_array(face, "faces").reshape(-1) for face in rows])
-        offsets: np.ndarray = np.concatenate([[0], np.cumsum(degrees)])
+        offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(degrees)])
     else:
         given = _array(faces, "faces")
         if given.size == 0:
@@ -243,7 +244,7 @@ def _polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
         if given.ndim != 2:
             raise MeshError(f"shape {given.shape}, expected (F, 3)", element="faces")
         corners = given.reshape(-1)
-        offsets = np.arange(0, corners.size + 1, int(given.shape[1]))
+        offsets = np.arange(0, corners.size + 1, int(given.shape[1]), dtype=np.int64)
     if corners.dtype.kind not in "iu":
         raise MeshError(f"type {corners.dtype}, expected integers", element="faces")
     few = np.flatnonzero(np.diff(offsets) < TRIANGLE)

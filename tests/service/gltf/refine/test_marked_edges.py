@@ -1,4 +1,4 @@
-"""Edges that smooth shading marks as hard stay sharp with `crease=auto`; flat shading marks none."""
+"""Edges that smooth shading marks as hard stay sharp by default; flat shading marks none."""
 
 import json
 
