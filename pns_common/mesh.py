@@ -261,7 +261,8 @@ def _check_indices(corners: np.ndarray, offsets: np.ndarray, vertex_count: int) 
     if corners.min() >= 0 and corners.max() < vertex_count:
         return
     outside = np.flatnonzero((corners < 0) | (corners >= vertex_count))
-    worst = int(np.searchsorted(offsets, outside[0], side="right")) - 1
+    first: int = outside[0]
+    worst = int(np.searchsorted(offsets, first, side="right")) - 1
     face = corners[offsets[worst] : offsets[worst + 1]].tolist()
     raise MeshError(f"indices {face}, expected 0 … {vertex_count - 1}", element="face", index=worst)
 
