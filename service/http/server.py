@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 import signal
 import socket
 from types import FrameType
@@ -127,7 +128,7 @@ def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
-        raise StartError(f"{what}{error.strerror}; {hint}") from error
+        raise StartError(f"{what}{os.strerror(error.errno or 0)}; {hint}") from error
 
 
 def _metrics_server(metrics: Metrics, settings: Settings) -> uvicorn.Server | None:

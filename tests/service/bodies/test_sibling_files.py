@@ -127,7 +127,8 @@ def test_a_buffer_that_did_not_come_is_named():
 def test_external_files_give_what_an_embedded_file_gives():
     text, binary = external(images=["a.png"])
     result = refine(text, beside(box__bin=binary, a__png=PNG, notes__txt=b"?"))
-    whole = subdivide_gltf(files.glb([box()]), "glb", Options(scheme="loop"), None, Limits())
+    options = Options(scheme="loop", levels=1)
+    whole = subdivide_gltf(files.glb([box()]), "glb", options, None, Limits())
     faces, attributes = files.primitive_of(result.glb)
     expected_faces, expected = files.primitive_of(whole.glb)
     np.testing.assert_array_equal(faces, expected_faces)
