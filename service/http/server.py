@@ -128,7 +128,9 @@ def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
-        raise StartError(f"{what}{os.strerror(error.errno or 0)}; {hint}") from error
+        reason = os.strerror(error.errno or 0)
+        where = "" if what else f" at {host}:{port}"
+        raise StartError(f"{what}{reason}{where}; {hint}") from error
 
 
 def _metrics_server(metrics: Metrics, settings: Settings) -> uvicorn.Server | None:
