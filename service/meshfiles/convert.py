@@ -19,20 +19,19 @@ from pns_common.schemes import Model
 from ..bodies.folder import folder_of
 from ..bodies.media import GLTF_KINDS, KINDS
 from ..bodies.sibling_files import ALONE, SiblingFiles
+from ..bodies.uploads import Sent
 from ..course import Course
 from ..errors import InvalidParameter
-from ..gltf.read.extras import REPORT_KEY
 from ..gltf.read.upload import read_upload
 from ..gltf.subdivide import make_scheme, subdivide_gltf
 from ..options import Limits, Options
 from ..printable import printable
 from ..report import Change
-from . import formats
 from .flatten import flatten
-from .indexed_triangles import IndexedTriangles
-from .refine_triangles import check_cost, refine_triangles
-from .single_precision import rounding_changes
-from .triangles_glb import as_gltf_json, triangles_glb
+from .formats import FORMATS, held
+from .refine_mesh_file import check_cost, refine_mesh_file
+from .to_gltf import as_gltf, read_within
+from .triangles_glb import as_gltf_json
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -100,13 +99,25 @@ def converted(
         done = subdivide_gltf(data, kind, options, model, limits, course, siblings=siblings)
         return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
     course = Course() if course is None else course
-    with course.stage("read", 0.0, 0.2):
-        triangles = formats.read(data, kind)
-    scheme = make_scheme(options, model)
-    with course.stage("refine", 0.2, 0.7):
-        refined, report = refine_triangles(triangles, scheme, options, limits, course)
-    with course.stage("write", 0.7, 1.0):
-        written = _of_triangles(refined, report, target, options, limits)
+    if target in GLTF_KINDS:
+        with course.stage("read", 0.0, 0.1):
+            sent = as_gltf(Sent(data, kind, siblings), limits)
+        with course.part(0.1, 1.0):
+            done = subdivide_gltf(
+                sent.data, "glb", options, model, limits, course, sent.siblings, sent.losses
+            )
+        return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
+    with course.stage("read", 0.0, 0.1):
+        mesh = read_within(data, kind, limits)
+    with course.part(0.1, 0.8):
+        refined, report = refine_mesh_file(mesh, make_scheme(options, model), options, limits, course)
+    with course.stage("write", 0.8, 1.0):
+        kept, changes = held(refined, target)
+        if options.compress != "none":
+            changes.append(Change("", "not compressed: only a glTF is", 1))
+        written = Written(
+            FORMATS[target].write(kept), _with_changes(report, changes), len(kept.faces)
+        )
     return replace(written, seconds=course.seconds)
 
 
@@ -121,9 +132,9 @@ def predicted_faces(
     if kind in GLTF_KINDS:
         upload = read_upload(data, kind, options.levels, limits, siblings)
         return sum(mesh.faces for mesh in upload.plans) * 4**options.levels
-    faces = len(formats.read(data, kind).faces) * 4**options.levels
-    check_cost(faces, options, limits)
-    return faces
+    mesh = read_within(data, kind, limits)
+    check_cost(mesh, options, limits)
+    return len(mesh.faces) * 4**options.levels
 
 
 def lines_of(report: dict[str, Any]) -> Iterator[str]:
@@ -166,35 +177,11 @@ def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) ->
         return Written(glb, report, faces)
     if target == "gltf":
         return Written(as_gltf_json(glb, limits), report, faces)
-    triangles, changes = flatten(glb, target, limits)
-    if target not in formats.HOLDS_DOUBLE:
-        changes += rounding_changes(triangles)
+    mesh, changes = flatten(glb, target, limits)
+    kept, lost = held(mesh, target)
     # A mesh that several nodes show is there several times.
-    return Written(
-        formats.write(triangles, target), _with_changes(report, changes), len(triangles.faces)
-    )
-
-
-def _of_triangles(
-    refined: IndexedTriangles, report: dict[str, Any], target: str, options: Options, limits: Limits
-) -> Written:
-    changes = [] if target in formats.HOLDS_DOUBLE else rounding_changes(refined)
-    if refined.uv is not None and target not in formats.HOLDS_UV:
-        what = f"texture coordinates dropped: not written to {target.upper()} files"
-        changes.append(Change("", what, 1))
-    if options.diagnostics == "full":
-        changes.append(Change("", "values at vertices dropped: only a glTF's are kept", 1))
-    if options.normals != "keep":
-        changes.append(Change("", "normals not written: only a glTF that came as one has them", 1))
-    if options.compress != "none":
-        changes.append(Change("", "not compressed: only a glTF that came as one is", 1))
-    report = _with_changes(report, changes)
-    faces = len(refined.faces)
-    if target not in GLTF_KINDS:
-        return Written(formats.write(refined, target), report, faces)
-    extras = {} if options.diagnostics == "none" else {REPORT_KEY: report}
-    glb = triangles_glb(refined, extras=extras)
-    return Written(glb if target == "glb" else as_gltf_json(glb, limits), report, faces)
+    report = _with_changes(report, [*changes, *lost])
+    return Written(FORMATS[target].write(kept), report, len(kept.faces))
 
 
 def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:

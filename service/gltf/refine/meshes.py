@@ -122,7 +122,7 @@ def _window(
     for done, place in enumerate(alone):
         with course.part(done / len(alone), (done + 1) / len(alone)):
             plan = window[place]
-            outcomes[place] = _alone(plan, read[place], scheme, options, course, shares)
+            outcomes[place] = refine_alone(plan, read[place], scheme, options, course, shares)
     with course.part(shares.write, 1.0):
         for place in range(len(window)):
             with course.part(place / len(window), (place + 1) / len(window)):
@@ -170,7 +170,7 @@ def _read(upload: Upload, plan: MeshPlan) -> list[TrianglePrimitive]:
     ]
 
 
-def _alone(
+def refine_alone(
     plan: MeshPlan,
     primitives: list[TrianglePrimitive],
     scheme: Scheme,
@@ -178,6 +178,7 @@ def _alone(
     course: Course,
     shares: StageShares,
 ) -> MeshOutcome:
+    """Refine one mesh, given by its primitives."""
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options.weld_tolerance, options.weld_unit)
         creases = creases_of(control, options, scheme)

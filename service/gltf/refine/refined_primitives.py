@@ -30,12 +30,16 @@ SHADING = 0.85
 
 @dataclass(frozen=True, eq=False)
 class RefinedPrimitive:
-    """A primitive after refinement, in the types that it is written in."""
+    """A primitive after refinement, in the types that it is written in.
+
+    `vertex` is the vertex of the refined mesh at each row, where it was not cut out of a union.
+    """
 
     source: TrianglePrimitive
     faces: Int[np.ndarray, "F 3"]
     attributes: dict[str, Shaped[np.ndarray, "N K"]]
     targets: list[Deltas]
+    vertex: Int[np.ndarray, " N"] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +144,7 @@ def _refined_primitive(
         row=row,
         vertex=cleaned.vertex_map[welded[row]],
         connectivity=own,
-        positions=rounded_rows(points, vertex, blocks_of(grid)),
+        positions=_positions(points, vertex, grid, double=is_double(primitive)),
         normals=normals,
         exact_normals=exact,
         skin_and_morph=refined.skin_and_morph.take(vertex),
@@ -150,4 +154,19 @@ def _refined_primitive(
     targets = refined_targets(primitive, refined_vertices, attributes)
     for name, values in refined.scalars.items():
         attributes[name] = values[vertex, None].astype(np.float32)
-    return RefinedPrimitive(primitive, own.refined_faces, attributes, targets)
+    return RefinedPrimitive(primitive, own.refined_faces, attributes, targets, vertex)
+
+
+def is_double(primitive: TrianglePrimitive) -> bool:
+    """Return whether positions are doubles, as those of text files: no glTF has them."""
+    return primitive.attributes["POSITION"].itemsize == 8
+
+
+def _positions(
+    points: Float[np.ndarray, "V 3"],
+    vertex: Int[np.ndarray, " N"],
+    grid: BarycentricGrid,
+    *,
+    double: bool,
+) -> Float[np.ndarray, "N 3"]:
+    return np.take(points, vertex, axis=0) if double else rounded_rows(points, vertex, blocks_of(grid))

@@ -27,7 +27,7 @@ from .drawn_borders import drawn_borders
 from .face_parts import part_of_face
 from .hard_edges import hard_edges
 from .parts import Parts
-from .refined_primitives import RefinedMesh
+from .refined_primitives import RefinedMesh, is_double
 from .shaded_edges import shaded_edges
 from .skin_and_morph import SkinAndMorph, refine_skin_and_morph
 from .where_acted import vertex_scalars
@@ -92,7 +92,8 @@ def refine_control_mesh(
         )
     except MeshError as error:
         raise UnrefinableError(str(error), pointer=pointer) from error
-    if leaves_single_precision(refinement.mesh.vertices):
+    double = is_double(control.primitives[0])
+    if not double and leaves_single_precision(refinement.mesh.vertices):
         raise UnrefinableError("refined positions leave the range of float32", pointer=pointer)
     scalars = vertex_scalars(
         refinement,
@@ -147,7 +148,9 @@ def changes_of_primitive(
         return [Change(pointer, "left as it was: no face has an area", len(kept))]
     dropped = int((~kept).sum())
     faces = primitive.corners if dropped == 0 else primitive.corners[kept]
-    far = faces_too_far(primitive.attributes["POSITION"], faces, levels)
+    far = 0
+    if not is_double(primitive):
+        far = faces_too_far(primitive.attributes["POSITION"], faces, levels)
     told = {
         "degenerate faces dropped": dropped,
         f"faces too far from the origin: a side has fewer than {STEPS} steps of float32": far,
