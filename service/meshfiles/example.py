@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from jaxtyping import Float, Int
 
-from .mesh_file import NORMAL, Layer, MeshFile, of_triangles
+from .mesh_file import UV, MeshFile, of_triangles
 from .triangles_glb import triangles_glb
 
 TEETH = 12
@@ -54,9 +52,9 @@ STEEL = {
 
 def part_glb() -> bytes:
     """Return the part as a GLB with normals, texture coordinates and a material."""
-    triangles = part()
-    normals = Layer(_smooth_normals(triangles), triangles.corners)
-    shaded = replace(triangles, layers={NORMAL: normals, **triangles.layers})
+    mesh = part()
+    normals = _smooth_normals(mesh)
+    shaded = of_triangles(mesh.vertices, mesh.faces, mesh.layers[UV].values, normals)
     return triangles_glb(shaded, material=STEEL)
 
 

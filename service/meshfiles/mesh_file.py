@@ -83,10 +83,12 @@ def of_triangles(
     vertices: Float[np.ndarray, "V 3"],
     faces: Int[np.ndarray, "F 3"],
     uv: Float[np.ndarray, "V 2"] | None = None,
+    normals: Float[np.ndarray, "V 3"] | None = None,
 ) -> MeshFile:
-    """Make a mesh of triangles; `uv` are texture coordinates of the vertices."""
-    corners = faces.reshape(-1)
-    layers = {} if uv is None else {UV: Layer(uv, corners)}
+    """Make a mesh of triangles; `uv` and `normals` are those of the vertices."""
+    corners = faces.reshape(-1).astype(np.int64)
+    given = {NORMAL: normals, UV: uv}
+    layers = {name: Layer(values, corners) for name, values in given.items() if values is not None}
     return MeshFile(vertices, np.arange(0, len(corners) + 1, 3), corners, layers)
 
 

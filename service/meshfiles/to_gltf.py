@@ -15,7 +15,8 @@ from ..errors import UnrefinableError
 from ..gltf.read.plan import check_memory
 from ..options import Limits
 from ..report import Change
-from .formats import FORMATS, LARGEST, read, rounding_changes
+from . import formats
+from .formats import FORMATS, LARGEST, rounding_changes
 from .mesh_file import COLOUR, MATERIAL, NONE, Layer, MeshFile
 from .mtl import PLAIN, WHITE, library_files, materials_of
 from .parts import Part, parts_of, with_group_normals
@@ -65,7 +66,7 @@ def read_within(data: bytes, kind: str, limits: Limits) -> MeshFile:
     Raises as `formats.read`, and LimitError.
     """
     check_memory(FORMATS[kind].bytes_per_byte * len(data), limits)
-    return read(data, kind)
+    return formats.read(data, kind)
 
 
 def named_files(data: bytes, siblings: SiblingFiles) -> Iterator[str]:

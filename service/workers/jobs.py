@@ -82,7 +82,7 @@ def subdivide(work: Work) -> Done:
     reporter = Reporter(work.page)
     with job_memory(work.limits):
         body = uploads.sent(memory_file.read(work.body), work.content_type, work.limits)
-        sent = as_gltf(body, work.options, work.limits)
+        sent = as_gltf(body, work.limits)
         model = _MODELS.get(work.model) if work.options.scheme == "pns" else None
         done = subdivide_gltf(
             sent.data,
@@ -174,10 +174,8 @@ def warm_up(model: Model | str | None) -> None:
 
     from ..gltf import subdivide  # noqa: F401
     from ..meshfiles import to_gltf  # noqa: F401
-    from ..meshfiles.formats import load_readers
 
     load_kernels()
-    load_readers()
     hold_model(model)
 
 

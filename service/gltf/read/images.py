@@ -9,16 +9,16 @@ from ...report import Change
 from .data_uri import data_of, is_data
 from .schema import Document
 
-# What a file of each type begins with (glTF 2.0 §3.8.2, KHR_texture_basisu, EXT_texture_webp,
-# EXT_texture_avif, MSFT_texture_dds).
+# What a file of each type begins with (glTF 2.0 §3.8.2), and the extension that lets a glTF hold it.
 _SIGNATURES = (
-    (b"\x89PNG\r\n\x1a\n", 0, "image/png"),
-    (b"\xff\xd8\xff", 0, "image/jpeg"),
-    (b"\xabKTX 20\xbb\r\n\x1a\n", 0, "image/ktx2"),
-    (b"WEBP", 8, "image/webp"),
-    (b"ftypavif", 4, "image/avif"),
-    (b"DDS ", 0, "image/vnd-ms.dds"),
+    (b"\x89PNG\r\n\x1a\n", 0, "image/png", None),
+    (b"\xff\xd8\xff", 0, "image/jpeg", None),
+    (b"\xabKTX 20\xbb\r\n\x1a\n", 0, "image/ktx2", "KHR_texture_basisu"),
+    (b"WEBP", 8, "image/webp", "EXT_texture_webp"),
+    (b"ftypavif", 4, "image/avif", "EXT_texture_avif"),
+    (b"DDS ", 0, "image/vnd-ms.dds", "MSFT_texture_dds"),
 )
+_EXTENSION_OF = {kind: extension for _, _, kind, extension in _SIGNATURES}
 
 
 def embed_images(
@@ -45,6 +45,12 @@ def embed_images(
             if not is_data(image.uri):
                 what = f"kept by its URI: {image.uri} is no known type of image"
                 changes.append(Change(pointer, what, 1))
+            continue
+        extension = _EXTENSION_OF[kind]
+        if extension is not None and extension not in document.extensions_used:
+            # Embedded it would need a type that the file must not have.
+            what = f"kept by its URI: {kind} without the extension {extension}"
+            changes.append(Change(pointer, what, 1))
             continue
         entry = tree["images"][number]
         del entry["uri"]
@@ -77,7 +83,7 @@ def _why_not(uri: str, opened: Opened) -> str:
 
 def mime_type(content: memoryview) -> str | None:
     """Tell the type of an image by its first bytes."""
-    for signature, offset, kind in _SIGNATURES:
+    for signature, offset, kind, _ in _SIGNATURES:
         if content[offset : offset + len(signature)] == signature:
             return kind
     return None

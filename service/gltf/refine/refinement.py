@@ -26,6 +26,7 @@ from .control_mesh import ControlMesh, vertex_rows
 from .drawn_borders import drawn_borders
 from .face_parts import part_of_face
 from .hard_edges import hard_edges
+from .near_misses import change_of, near_misses
 from .parts import Parts
 from .refined_primitives import RefinedMesh, is_double
 from .shaded_edges import shaded_edges
@@ -126,7 +127,11 @@ def changes_of_mesh(
     ]
     (near,) = control.near.tolist()
     cut = 0 if refined is None else len(refined.skin_and_morph.cut)
-    return changes + changes_of_vertices(near, cut, pointer)
+    changes += changes_of_vertices(near, cut, pointer)
+    if refined is not None and control.cleaned is not None:
+        length = refined.refinement.report["reference_length"]
+        changes += change_of(*near_misses(control.cleaned.mesh, [length]), pointer)
+    return changes
 
 
 def changes_of_vertices(near: int, cut: int, pointer: str) -> list[Change]:

@@ -32,6 +32,7 @@ from ..stage_shares import StageShares
 from .common_slots import common_slots
 from .control_mesh import ControlMesh, control_mesh, slices, vertex_rows
 from .local_joints import local_joints
+from .near_misses import change_of, near_misses
 from .parts import Parts
 from .refined_primitives import RefinedMesh, RefinedPrimitive, refined_primitives
 from .refinement import (
@@ -271,6 +272,9 @@ def _divided(
         _shares(keep, [primitives[place] for primitives in meshes])
         for place, keep in enumerate(control.kept)
     ]
+    lengths = [report["reference_length"] for report in made.reports]
+    part_of = parts.of_row[vertex_rows(control, cleaned)]
+    misses = near_misses(cleaned.mesh, lengths, part_of)
     return [
         Part(
             refined=refined[part],
@@ -284,7 +288,8 @@ def _divided(
                     primitive, keep[part], options.levels, pointers[part]
                 )
             ]
-            + changes_of_vertices(int(control.near[part]), int(made.cut[part]), pointers[part]),
+            + changes_of_vertices(int(control.near[part]), int(made.cut[part]), pointers[part])
+            + change_of(misses[part], pointers[part]),
         )
         for part, primitives in enumerate(meshes)
     ]

@@ -15,11 +15,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import UnreadableError
-from ...meshfiles.obj_text import line_end
-from ...meshfiles.ply.header import LONGEST, POLYGON, Element, PlyHeader, ply_header
-from ...meshfiles.text_numbers import reals, whole
-from ...meshfiles.unsupported import of_obj, of_ply
+from ...meshfiles.ply import LONGEST, POLYGON, Element, PlyHeader, ply_header
 from .arrays import blocks_of
+from .passed_over import of_obj, of_ply
 from .sink import Sink
 
 # Bytes of text that are read at a time.
@@ -27,6 +25,7 @@ TEXT = 1 << 24
 
 _OBJ_VERTEX = re.compile(rb"^[ \t]*v(?=[ \t])" + 3 * rb"(?:[ \t]+([^\s#]+))?", re.MULTILINE)
 _OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]+([^\r\n#]*)", re.MULTILINE)
+_ENDED_BY_RETURN = re.compile(rb"[^\r\n]*\r(?!\n)")
 _STL_FACE = re.compile(
     rb"outer\s+loop" + 3 * rb"\s+vertex\s+(\S+)\s+(\S+)\s+(\S+)" + rb"\s+endloop", re.IGNORECASE
 )
@@ -38,15 +37,8 @@ def read_ply(path: Path, sink: Sink) -> None:
     Raises:
         UnreadableError: another file, or a face that is no triangle.
     """
-    header, head = _ply_header(path)
-    names = {
-        element.name: {
-            "length": element.rows,
-            "properties": [one.name for one in element.properties],
-        }
-        for element in header.elements
-    }
-    sink.passed_over.update(of_ply(head, names, has_uv=False))
+    header = _ply_header(path)
+    sink.passed_over.update(of_ply(header))
     start = header.end
     for element in header.elements:
         name, count, kind = element.name, element.rows, _ply_record(path, header, element)
@@ -73,19 +65,18 @@ def _add_triangles(path: Path, records: np.ndarray, first: int, sink: Sink) -> N
     sink.add_faces(records["corners"])
 
 
-def _ply_header(path: Path) -> tuple[PlyHeader, bytes]:
-    """Return the header, and the bytes that hold it."""
+def _ply_header(path: Path) -> PlyHeader:
     with path.open("rb") as file:
         head = file.read(LONGEST)
-    header = ply_header(head)
-    if header is None:
-        what = "the PLY header cannot be read" if head[:3] == b"ply" else "this is not a PLY file"
-        raise UnreadableError(f"{path}: {what}")
+    try:
+        header = ply_header(head)
+    except UnreadableError as error:
+        raise UnreadableError(f"{path}: {error}") from error
     if header.order is None:
         raise UnreadableError(f"{path}: only a binary PLY is read")
     if {"vertex", "face"} - {element.name for element in header.elements}:
         raise UnreadableError(f"{path}: the PLY file has no vertices or no faces")
-    return header, head
+    return header
 
 
 def _ply_record(path: Path, header: PlyHeader, element: Element) -> np.dtype:
@@ -157,7 +148,8 @@ def read_obj(path: Path, sink: Sink) -> None:
         UnreadableError: a number that is none, or a face that is no triangle.
     """
     with path.open("rb") as file:
-        end = line_end(file.read(TEXT))
+        # As some programs ended lines before 2001.
+        end = b"\r" if _ENDED_BY_RETURN.match(file.read(TEXT)) else b"\n"
     for block in _text_blocks(path, end):
         text = block.replace(end, b"\n")
         sink.passed_over.update(of_obj(text))
@@ -175,7 +167,7 @@ def read_obj(path: Path, sink: Sink) -> None:
 
 def _obj_corners(path: Path, faces: list[bytes]) -> np.ndarray:
     try:
-        rows = [[whole(corner.partition(b"/")[0]) for corner in face.split()] for face in faces]
+        rows = [[_whole(corner.partition(b"/")[0]) for corner in face.split()] for face in faces]
     except ValueError as error:
         raise UnreadableError(f"{path}: a corner of a face is no number") from error
     for row in rows:
@@ -187,9 +179,18 @@ def _obj_corners(path: Path, faces: list[bytes]) -> np.ndarray:
         raise UnreadableError(f"{path}: a corner of a face is out of range") from error
 
 
+def _whole(word: bytes) -> int:
+    if b"_" in word:
+        raise ValueError("an underscore is no digit")
+    return int(word)
+
+
 def _numbers(path: Path, rows: list[Any]) -> np.ndarray:
     try:
-        return reals(rows).reshape(-1, 3)
+        # Python, and numpy with it, takes 1_0 for ten as well.
+        if b"_" in b"".join(word for row in rows for word in row if word is not None):
+            raise ValueError("an underscore is no digit")
+        return np.array(rows, dtype=np.float64).reshape(-1, 3)
     except ValueError as error:
         raise UnreadableError(f"{path}: a coordinate is no number") from error
 

@@ -19,8 +19,8 @@ from pns_common.base.whole_file import replace_file
 from pns_common.pieces import RefinedPiece
 
 from ...errors import UnrefinableError
-from ...meshfiles.indexed_triangles import IndexedTriangles
-from ...meshfiles.single_precision import LARGEST
+from ...meshfiles.formats import LARGEST
+from ...meshfiles.mesh_file import of_triangles
 from ...meshfiles.triangles_glb import triangles_glb
 from .arrays import sync
 from .cutout import Cutout
@@ -61,7 +61,7 @@ def write_tile(tiles: Tiles, part: int, cut: Cutout, made: RefinedPiece, levels:
     if np.abs(points).max() > LARGEST:
         raise UnrefinableError("positions leave the range of float32")
     points = points.astype(np.float32)
-    glb = triangles_glb(IndexedTriangles(points, local.reshape(-1, 3)))
+    glb = triangles_glb(of_triangles(points, local.reshape(-1, 3)))
     file = Path(tiles.folder) / tile_name(part)
     replace_file(file, glb)
     sync(file)

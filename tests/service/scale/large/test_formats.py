@@ -20,7 +20,7 @@ from service.gltf.read.container import read_glb, write_glb
 from service.meshes.weld import weld
 from service.meshfiles import formats
 from service.meshfiles.example import part_glb
-from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.mesh_file import of_triangles
 from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Options
 from service.scale.large import weld as outside_memory
@@ -43,7 +43,7 @@ def loose_triangles():
     """Triangles with seams: each corner of a surface, some repeated, one without area."""
     points, faces = grid(8, bent)
     faces = np.concatenate([faces, faces[:2, ::-1], [[3, 3, 4]]])
-    return IndexedTriangles(points[faces.reshape(-1)], np.arange(faces.size).reshape(-1, 3))
+    return of_triangles(points[faces.reshape(-1)], np.arange(faces.size).reshape(-1, 3))
 
 
 def written(path, triangles):
@@ -263,7 +263,7 @@ def test_a_tileset_is_valid(tmp_path):
 
 
 def changed_glb(change):
-    container = read_glb(triangles_glb(IndexedTriangles(*grid(3))))
+    container = read_glb(triangles_glb(of_triangles(*grid(3))))
     tree = json.loads(container.text)
     change(tree)
     return write_glb(json.dumps(tree).encode(), [container.binary], [])
