@@ -166,7 +166,7 @@ def batch(
     workers: WorkersOption = None,
     report: Annotated[
         Path, typer.Option(metavar="FILE", help="rows of all files: .parquet or .jsonl")
-    ] = Path("pns-batch.parquet"),
+    ] = Path("pns-batch.jsonl"),
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="say what would be done; write no result")
     ] = False,

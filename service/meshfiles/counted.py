@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Int, UInt8
 
 from ..errors import UnreadableError
 from . import stl
 from .ply import POLYGON, ply_header
-from .text import cut_text, plain_text
+from .text import count_words, plain_letters, plain_text
 
 # Of what tells no counts, and will hardly be read.
 BYTES_PER_FACE = 30
 # A facet of an STL as text: a normal, three vertices, and the words that name and enclose them.
 WORDS_PER_FACET = 21
 # What is cut into words in one go, which takes many times its size.
-PIECE = 2**20
+PIECE = 2**18
 # Each corner beyond the second makes a triangle; a keyword or a count stands before them.
 _WORDS_BESIDE_TRIANGLES = 3
+# Where counts are looked for, and how far lines are looked for that go on.
+START = 2**20
 
 
 def count_triangles(data: bytes, kind: str) -> int:
@@ -27,15 +31,15 @@ def count_triangles(data: bytes, kind: str) -> int:
     many corners share vertices, and their triangles take a few bytes each.
     """
     if kind == "stl":
-        return _words(plain_text(data)) // WORDS_PER_FACET if stl.is_text(data) else stl.count_facets(data)
+        text = stl.is_text(data)
+        return count_words(data) // WORDS_PER_FACET if text else stl.count_facets(data)
     if kind == "ply":
         return _of_ply(data)
     text = plain_text(data)
     if kind == "obj":
-        # A line that goes on in the next is one.
-        text = text.replace(b"\\\n", b"  ")
-        return sum(_triangles(cut.counts[cut.keyword(b"f") | cut.keyword(b"fo")]) for cut in _cut(text))
-    numbers = text[:PIECE].partition(b"OFF")[2].split(maxsplit=2)[:2]
+        return sum(_triangles(words[firsts == ord("f")]) for words, firsts in _lines(text))
+    start = plain_letters(text[:START], continued=False)[0].tobytes()
+    numbers = start.partition(b"OFF")[2].split(maxsplit=2)[:2]
     if len(numbers) == 2 and numbers[1].isdigit():
         return _in_last_lines(text, int(numbers[1]))
     return len(data) // BYTES_PER_FACE
@@ -64,25 +68,39 @@ def _of_ply(data: bytes) -> int:
     return max(left // int(polygon.kind[1]) - 2 * faces.rows, 0)
 
 
-def _cut(text: bytes):
-    """Yield whole lines as words, the last ones first."""
+def _lines(text: bytes) -> Iterator[tuple[Int[np.ndarray, " L"], UInt8[np.ndarray, " L"]]]:
+    """Yield how many words lines have, and their first letters, some lines at a time, last first.
+
+    Lines without words are left out; those that go on in the next are one.
+    """
     end = len(text)
     while end:
         begin = text.rfind(b"\n", 0, max(end - PIECE, 0)) + 1
-        yield cut_text(text[begin:end], "")
+        while text[begin - 2 : begin] == b"\\\n" and end - begin < START:
+            begin = text.rfind(b"\n", 0, begin - 1) + 1
+        letters, ends = plain_letters(text[begin:end], continued=True)
+        begins = letters > ord(" ")
+        begins[1:] &= letters[:-1] <= ord(" ")
+        starts = np.append(0, ends + 1)
+        starts = starts[starts < len(letters)]
         end = begin
-
-
-def _words(text: bytes) -> int:
-    return sum(len(cut.begins) for cut in _cut(text))
+        if len(starts) <= 1:
+            # Long perhaps: no place of each word.
+            words = np.array([np.count_nonzero(begins)])
+            firsts = letters[[int(begins.argmax())]] if len(letters) else letters
+            yield words[words > 0], firsts[: int(words[0] > 0)]
+            continue
+        words = np.add.reduceat(begins, starts, dtype=np.int64)
+        words = words[words > 0]
+        yield words, letters[np.flatnonzero(begins)[np.cumsum(words) - words]]
 
 
 def _in_last_lines(text: bytes, polygons: int) -> int:
     """Count the triangles of so many polygons, which come last."""
     triangles, left = 0, polygons
-    for cut in _cut(text):
-        words = cut.counts[cut.counts > 0][-left:]
-        triangles += _triangles(words + 1)
+    for words, _ in _lines(text):
+        words = words[-left:]
+        triangles += _triangles(words)
         left -= len(words)
         if left <= 0:
             break

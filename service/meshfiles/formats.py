@@ -18,12 +18,11 @@ from ..report import Change
 from .mesh_file import COLOUR, GROUP, MATERIAL, NORMAL, OBJECT, SMOOTHING, UV, MeshFile
 from .obj import as_fractions, read_obj, write_obj
 from .off import read_off, write_off
-from .parts import with_vertex_layers
+from .parts import LARGEST, with_vertex_layers
 from .ply import read_ply, write_ply
 from .stl import read_stl, write_stl
 from .triangulate import triangulated
 
-LARGEST = float(np.finfo(np.float32).max)
 _SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
 
 
@@ -80,7 +79,7 @@ def read(data: bytes, kind: str) -> MeshFile:
 
     Raises:
         UnreadableError: not a file of this kind, or one without faces, or without all of them.
-        UnrefinableError: a face names a vertex that there is not.
+        UnrefinableError: a face names a vertex that there is not, or that is nowhere.
     """
     mesh = FORMATS[kind].read(data)
     count = len(mesh.vertices)
@@ -94,7 +93,13 @@ def read(data: bytes, kind: str) -> MeshFile:
             f"face {face} of the {kind.upper()} file names vertex {mesh.corners[place]}, "
             f"expected 0 … {count - 1}"
         )
-    unused = count - int(np.count_nonzero(marked(mesh.corners, count)))
+    used = marked(mesh.corners, count)
+    wrong = np.flatnonzero(used & ~np.isfinite(mesh.vertices).all(axis=1))
+    if len(wrong):
+        raise UnrefinableError(
+            f"vertex {wrong[0]} of the {kind.upper()} file has a coordinate that is NaN or infinite"
+        )
+    unused = count - int(np.count_nonzero(used))
     if unused:
         told = Change("", "vertices dropped that no face uses", unused)
         mesh = replace(mesh, changes=(*mesh.changes, told))

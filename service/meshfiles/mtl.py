@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..bodies.sibling_files import File, Opened
+from ..bodies.sibling_files import File, Opened, SiblingFiles
 from .text import is_number, name_of, plain_text
 
 # glTF's own default is a bare metal, which is black where nothing surrounds it.
@@ -21,6 +22,8 @@ _OPTIONS = {
     b"-blendu": 1, b"-blendv": 1, b"-boost": 1, b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3,
     b"-texres": 1, b"-clamp": 1, b"-bm": 1, b"-imfchan": 1, b"-type": 1,
 }  # fmt: skip
+_LIBRARY = re.compile(rb"(?m)^[ \t]*mtllib[ \t]+([^\n]*)")
+_MAPS = (b"map_kd", b"map_ke", b"norm")
 _NUMBERS = frozenset({b"-o", b"-s", b"-t", b"-mm"})
 
 
@@ -48,6 +51,18 @@ def materials_of(names: Iterable[str], libraries: Iterable[str], opened: Opened)
     made = Materials()
     made.entries = [_material(name, defined.get(name, {}), made) for name in names]
     return made
+
+
+def named_files(data: bytes, siblings: SiblingFiles) -> list[str]:
+    """Return the libraries that an OBJ names, and the images that these name."""
+    opened, names = Opened(siblings), list[str]()
+    for found in _LIBRARY.findall(plain_text(data)) if b"mtllib" in data else ():
+        for file in library_files(name_of(found.strip()), opened):
+            names.append(file.name)
+            for _, properties in _definitions(bytes(file.content)):
+                maps = (_image(properties.get(keyword)) for keyword in _MAPS)
+                names += [name for name in maps if name is not None]
+    return list(dict.fromkeys(names))
 
 
 def library_files(library: str, opened: Opened) -> list[File]:

@@ -150,11 +150,11 @@ def _behind(places: Int[np.ndarray, " F"], sizes: Int[np.ndarray, " F"]) -> Int[
 
 
 def _whole(numbers: Float[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    whole = np.nan_to_num(numbers).astype(np.int64)
-    if (whole != numbers).any():
-        wrong = float(numbers[np.argmax(whole != numbers)])
+    fits = (np.abs(numbers) < 2**53) & (numbers == np.floor(numbers))
+    if not fits.all():
+        wrong = float(numbers[np.argmin(fits)])
         raise UnreadableError(f"the OFF file has a face of which {wrong:g} is no count or vertex")
-    return whole
+    return numbers.astype(np.int64)
 
 
 def _colours(values: Float[np.ndarray, "N K"]) -> np.ndarray:

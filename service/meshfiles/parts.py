@@ -21,6 +21,7 @@ from .mesh_file import COLOUR, MATERIAL, NONE, NORMAL, SMOOTHING, UV, Labels, La
 
 _SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
 _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+LARGEST = float(np.finfo(np.float32).max)
 _SMOOTH_OFF = frozenset({"off", "0", ""})
 
 
@@ -55,11 +56,7 @@ def parts_of(mesh: MeshFile) -> tuple[list[Part], list[Change]]:
         material = NONE if materials is None else int(of_face[place]) - 1
         primitive = _primitive(mesh, faces, number, lost)
         parts.append(Part(primitive, faces, material))
-    changes = [
-        Change("", f"{_SHOWN.get(name, name)} that not all corners of a material have dropped", faces)
-        for name, faces in lost.items()
-    ]
-    return parts, changes
+    return parts, [Change("", f"{what} dropped", faces) for what, faces in lost.items()]
 
 
 def _primitive(
@@ -70,10 +67,16 @@ def _primitive(
     for name, layer in mesh.layers.items():
         rows = layer.rows[corners]
         some = rows >= 0
-        if some.all():
+        shown = _SHOWN.get(name, f"attribute {name}")
+        if not some.any():
+            continue
+        if not some.all():
+            shown += " that not all corners of a material have"
+            lost[shown] = lost.get(shown, 0) + int(some.reshape(-1, 3).any(axis=1).sum())
+        elif not (np.abs(layer.values) <= LARGEST).all():
+            lost[f"{shown}, of which some are no numbers of float32,"] = len(faces)
+        else:
             layers[name] = Layer(layer.values, rows)
-        elif some.any():
-            lost[name] = lost.get(name, 0) + int(some.reshape(-1, 3).any(axis=1).sum())
     vertex = mesh.corners[corners]
     row, first = distinct_corners(vertex, layers)
     attributes = {"POSITION": mesh.vertices[vertex[first]]}

@@ -345,11 +345,11 @@ def _typed(values: Shaped[np.ndarray, " N"], kind: str) -> Shaped[np.ndarray, " 
     """Return numbers in the type that the header gives; floats of text stay as they are read."""
     if kind[0] == "f":
         return values.astype(np.float64)
-    whole = np.nan_to_num(values)
+    if (values != np.floor(values)).any():
+        wrong = float(values[np.argmax(values != np.floor(values))])
+        raise UnreadableError(f"the PLY file has {wrong:g} where its header says a whole number")
     bounds = np.iinfo(kind)
-    if len(whole) and not (whole.min() >= bounds.min and whole.max() <= bounds.max):
-        whole = np.clip(whole, bounds.min, bounds.max)
-    return whole.astype(kind)
+    return np.clip(values, bounds.min, bounds.max).astype(kind)
 
 
 def _too_short(element: Element, rows: int) -> UnreadableError:

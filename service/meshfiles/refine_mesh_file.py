@@ -36,13 +36,10 @@ def refine_mesh_file(
 
     Raises:
         LimitError: over `max_faces` or `max_memory_bytes`.
-        UnrefinableError: a position that is no number, or no face that has an area.
+        UnrefinableError: no face that has an area.
     """
     course = Course() if course is None else course
     check_cost(mesh, options, limits)
-    if not np.isfinite(mesh.vertices).all():
-        row = int(np.argmin(np.isfinite(mesh.vertices).all(axis=1)))
-        raise UnrefinableError(f"vertex {row} has a coordinate that is NaN or infinite")
     shaded = with_group_normals(mesh)
     parts, incomplete = parts_of(shaded)
     plan = MeshPlan(0, tuple(range(len(parts))), len(mesh.faces))

@@ -60,8 +60,11 @@ def _of_binary(data: bytes) -> tuple[Float[np.ndarray, "N 3"], tuple[Change, ...
         raise UnreadableError(f"the STL file has {len(data)} bytes, fewer than its header")
     said, count = _said(data), count_facets(data)
     left = len(data) - HEADER - count * FACET.itemsize
-    if left and said > count:
-        raise UnreadableError(f"the STL file says {said} facets and ends within facet {count}")
+    if left and said != count:
+        raise UnreadableError(
+            f"the STL file is no text, and no whole binary STL: it says {said} facets and has "
+            f"{count} and {left} bytes"
+        )
     facets = np.frombuffer(data, FACET, count, HEADER)
     told = {
         "bytes behind the last facet left out": left,

@@ -16,10 +16,9 @@ from ..errors import UnreadableError
 NUMBER = "%.12g"
 # Rows of text that are made at a time.
 BLOCK = 2**14
-_BLANK, _LINE_END, _COMMENT = b" \n#"
+_BLANK, _LINE_END, _COMMENT, _BACKSLASH = b" \n#\\"
 # What a joined line has in place of its end, which still counts as one.
 _JOINED = b" \x0b"
-_CONTINUED = re.compile(rb"(?m)^([^#\n]*)\\\n")
 _NUMBER = re.compile(rb"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|inf(?:inity)?)", re.I)
 _WIDE = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 
@@ -165,16 +164,8 @@ def count_words(text: bytes) -> int:
 
 def cut_text(text: bytes, what: str, before: int = 0, *, continued: bool = False) -> Text:
     """Cut a plain text into lines and words; `continued` joins lines that end with a backslash."""
-    while continued and b"\\\n" in text:
-        joined = _CONTINUED.sub(rb"\1" + _JOINED, text)
-        if joined == text:
-            break
-        text = joined
-    letters = np.frombuffer(text, dtype=np.uint8)
-    ends = np.flatnonzero(letters == _LINE_END)
+    letters, ends = plain_letters(text, continued=continued)
     starts = np.append(0, ends + 1)
-    if _COMMENT in text:
-        letters = _without_comments(letters, ends)
     # With a blank before the first letter and one behind the last.
     filled = np.zeros(len(letters) + 2, dtype=bool)
     np.greater(letters, _BLANK, out=filled[1:-1])
@@ -183,6 +174,26 @@ def cut_text(text: bytes, what: str, before: int = 0, *, continued: bool = False
     first = np.searchsorted(begins, starts)
     counts = np.diff(first, append=len(begins))
     return Text(what, letters, starts, begins, word_ends, first, counts, before)
+
+
+def plain_letters(
+    text: bytes, *, continued: bool
+) -> tuple[UInt8[np.ndarray, " N"], Int[np.ndarray, " E"]]:
+    """Return a text with blank comments, and where its lines end.
+
+    `continued` joins a line that ends with a backslash, outside of a comment, with the next.
+    """
+    letters = np.frombuffer(text, dtype=np.uint8)
+    ends = np.flatnonzero(letters == _LINE_END)
+    if _COMMENT in text:
+        letters = _without_comments(letters, ends)
+    if continued and _BACKSLASH in text:
+        letters = np.append(letters, np.uint8(_LINE_END))
+        at = np.flatnonzero((letters[:-1] == _BACKSLASH) & (letters[1:] == _LINE_END))
+        letters[at], letters[at + 1] = _JOINED
+        letters = letters[:-1]
+        ends = np.flatnonzero(letters == _LINE_END)
+    return letters, ends
 
 
 def _without_comments(

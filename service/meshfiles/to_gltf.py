@@ -16,10 +16,10 @@ from ..gltf.read.plan import check_memory
 from ..options import Limits
 from ..report import Change
 from . import formats
-from .formats import FORMATS, LARGEST, rounding_changes
+from .formats import FORMATS, rounding_changes
 from .mesh_file import COLOUR, MATERIAL, NONE, Layer, MeshFile
 from .mtl import PLAIN, WHITE, library_files, materials_of
-from .parts import Part, parts_of, with_group_normals
+from .parts import LARGEST, Part, parts_of, with_group_normals
 from .triangles_glb import parts_glb
 
 
@@ -36,8 +36,8 @@ def as_gltf(sent: Sent, limits: Limits) -> Sent:
     if sent.kind in GLTF_KINDS:
         return sent
     mesh = read_within(sent.data, sent.kind, limits)
-    if not np.isfinite(mesh.vertices).all() or np.abs(mesh.vertices).max() > LARGEST:
-        raise UnrefinableError("a position is no number, or beyond the range of float32")
+    if np.abs(mesh.vertices[mesh.corners]).max() > LARGEST:
+        raise UnrefinableError("a position is beyond the range of float32")
     changes = [*mesh.changes]
     mesh, lost = _with_colours_at_corners(with_group_normals(mesh))
     parts, incomplete = parts_of(mesh)
@@ -67,15 +67,6 @@ def read_within(data: bytes, kind: str, limits: Limits) -> MeshFile:
     """
     check_memory(FORMATS[kind].bytes_per_byte * len(data), limits)
     return formats.read(data, kind)
-
-
-def named_files(data: bytes, siblings: SiblingFiles) -> Iterator[str]:
-    """Yield the libraries that an OBJ names, and the images that their materials do."""
-    mesh = FORMATS["obj"].read(data)
-    yield from mesh.libraries
-    labels = mesh.labels.get(MATERIAL)
-    names = () if labels is None else labels.names
-    yield from materials_of(names, mesh.libraries, Opened(siblings)).images
 
 
 def _shown(part: Part, materials: list[dict[str, Any]]) -> Part:

@@ -19,14 +19,18 @@ from .mesh_file import Layer, MeshFile
 ROUNDING = 1e-12
 # How much of its area cutting may gain or lose before it is tried from another corner.
 EXACT = 1e-9
-ATTEMPTS = 8
+ATTEMPTS = 4
+# Polygons of more corners are tried once: what crosses itself is no better from elsewhere.
+MANY = 64
 
 
 def triangulated(mesh: MeshFile) -> MeshFile:
     """Return the same surface as triangles, in the order of the polygons."""
     if (mesh.sizes == 3).all():
         return mesh
-    cut = cut_polygons(mesh.vertices, mesh.offsets, mesh.corners)
+    # Of coordinates near the largest numbers areas may be infinite: such polygons become fans.
+    with np.errstate(over="ignore", invalid="ignore"):
+        cut = cut_polygons(mesh.vertices, mesh.offsets, mesh.corners)
     flat, polygon = cut.places.reshape(-1), cut.polygon
     told = {
         "triangles added by cutting polygons": len(polygon) - len(mesh.sizes),
@@ -153,7 +157,7 @@ def _by_ears(
     tolerance = EXACT * abs(area)
     # A corner that repeats its neighbour makes no side.
     own = np.flatnonzero(corners != np.roll(corners, 1))
-    for shift in range(min(ATTEMPTS, len(own))):
+    for shift in range(ATTEMPTS if len(own) <= MANY else 1):
         order = np.roll(own, -shift)
         ears = _earcut(points[order])
         if ears is None:

@@ -19,8 +19,8 @@ from pns_common.base.whole_file import replace_file
 from pns_common.pieces import RefinedPiece
 
 from ...errors import UnrefinableError
-from ...meshfiles.formats import LARGEST
 from ...meshfiles.mesh_file import of_triangles
+from ...meshfiles.parts import LARGEST
 from ...meshfiles.triangles_glb import triangles_glb
 from .arrays import sync
 from .cutout import Cutout

@@ -397,7 +397,7 @@ def test_what_is_not_refined_is_not_collected(tmp_path):
 
     def looks(tasks):
         assert next(tasks, None) is None
-        noted = sqlite3.connect(f"{batch.report}.journal")
+        noted = sqlite3.connect(batch.report.with_name(".pns-batch.journal"))
         assert noted.execute("SELECT count(*) FROM rows").fetchone() == (50,)
         noted.close()
         return iter(())

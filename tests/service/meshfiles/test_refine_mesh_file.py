@@ -6,16 +6,24 @@ import numpy as np
 import pytest
 
 from pns_common import Creases, loop
-from service.errors import InvalidParameter
-from service.meshfiles.indexed_triangles import IndexedTriangles
-from service.meshfiles.refine_triangles import refine_triangles
+from service.meshfiles.mesh_file import UV, of_triangles
+from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
 from tests.support.gltf.shapes import box, octahedron
 
 
 def refined(shape, texture=None, scheme=None, **options):
-    triangles = IndexedTriangles(shape["POSITION"], shape["indices"].astype(np.int64), texture)
-    return refine_triangles(triangles, scheme or loop(), Options(**options), Limits())
+    vertices = shape["POSITION"].astype(np.float64)
+    triangles = of_triangles(vertices, shape["indices"], texture)
+    return refine_mesh_file(triangles, scheme or loop(), Options(**options), Limits())
+
+
+def at_corners(mesh, name):
+    return mesh.layers[name].values[mesh.layers[name].rows]
+
+
+def positions(mesh):
+    return mesh.vertices[mesh.corners]
 
 
 def test_mesh_files_take_creases_by_angle():
@@ -34,23 +42,17 @@ def test_mesh_files_keep_the_lines_that_the_model_asks_for():
         assert report["levels"][0]["edges"].get("crease", 0) == count
 
 
-def test_creases_by_normals_need_a_gltf():
-    with pytest.raises(InvalidParameter) as refusal:
-        refined(box(), crease="normals")
-    assert refusal.value.name == "crease"
-
-
 def test_smooth_uvs_follow_the_positions_of_a_closed_chart():
     shape = octahedron()
     triangles, _ = refined(shape, shape["POSITION"][:, :2], levels=2, uv="smooth")
-    np.testing.assert_allclose(triangles.uv, triangles.vertices[:, :2], atol=1e-12)
+    np.testing.assert_allclose(at_corners(triangles, UV), positions(triangles)[:, :2], atol=1e-12)
 
 
 @pytest.mark.parametrize("crease", ["lines", "angle:60"])
 def test_smooth_uvs_have_the_creases_of_the_positions(crease):
     shape = box()
     triangles, _ = refined(shape, shape["POSITION"][:, 1:], levels=3, uv="smooth", crease=crease)
-    np.testing.assert_allclose(triangles.uv, triangles.vertices[:, 1:], atol=1e-12)
+    np.testing.assert_allclose(at_corners(triangles, UV), positions(triangles)[:, 1:], atol=1e-12)
 
 
 def test_a_weld_tolerance_is_counted():
@@ -63,7 +65,7 @@ def test_a_weld_tolerance_is_counted():
     _, report = refined(loose, weld_tolerance=1e-4)
     assert report["levels"][0]["edges"]["boundary"] == 0
     assert {
-        "pointer": "",
+        "pointer": "/meshes/0",
         "what": "vertices joined within weld_tolerance",
         "count": 18,
     } in report["changes"]
