@@ -124,7 +124,8 @@ def _copies(upload: Upload, node: int) -> Float[np.ndarray, "N 4 4"]:
     }
     matrices = np.tile(np.eye(4), (_copy_count(upload, node), 1, 1))
     if "ROTATION" in values:
-        matrices[:, :3, :3] = _rotations(unit(values["ROTATION"]))
+        lengths = np.linalg.norm(values["ROTATION"], axis=1, keepdims=True)
+        matrices[:, :3, :3] = _rotations(values["ROTATION"] / np.where(lengths > 0, lengths, 1))
     if "SCALE" in values:
         matrices[:, :3, :3] *= values["SCALE"][:, None, :]
     if "TRANSLATION" in values:

@@ -20,7 +20,8 @@ from .obj import as_fractions, read_obj, write_obj
 from .off import read_off, write_off
 from .parts import LARGEST, with_vertex_layers
 from .ply import read_ply, write_ply
-from .stl import read_stl, write_stl
+from .stl import is_text, read_stl, write_stl
+from .text import count_words
 from .triangulate import triangulated
 
 _SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
@@ -35,12 +36,12 @@ class Format:
         vertex_layers: those of which a vertex has one value.
         face_values, labels: those of faces; None: any.
         double: whether positions keep more digits than float32 has.
-        bytes_per_byte: memory that reading takes for each byte of the shortest lines it allows.
+        bytes_per_byte: memory that reading a binary file takes for each of its bytes.
     """
 
     read: Callable[[bytes], MeshFile]
     write: Callable[[MeshFile], bytes]
-    bytes_per_byte: int
+    bytes_per_byte: int = 0
     layers: frozenset[str] | None = frozenset()
     vertex_layers: frozenset[str] | None = frozenset()
     face_values: frozenset[str] | None = frozenset()
@@ -52,7 +53,6 @@ FORMATS = {
     "obj": Format(
         read_obj,
         write_obj,
-        bytes_per_byte=32,
         layers=frozenset({UV, NORMAL, COLOUR}),
         vertex_layers=frozenset({COLOUR}),
         labels=frozenset({MATERIAL, GROUP, OBJECT, SMOOTHING}),
@@ -61,17 +61,28 @@ FORMATS = {
     "off": Format(
         read_off,
         write_off,
-        bytes_per_byte=32,
         layers=frozenset({UV, NORMAL, COLOUR}),
         vertex_layers=None,
         face_values=frozenset({COLOUR}),
         double=True,
     ),
     "ply": Format(
-        read_ply, write_ply, bytes_per_byte=60, layers=None, vertex_layers=None, face_values=None
+        read_ply, write_ply, bytes_per_byte=150, layers=None, vertex_layers=None, face_values=None
     ),
     "stl": Format(read_stl, write_stl, bytes_per_byte=12),
 }
+
+
+def memory_to_read(data: bytes, kind: str) -> int:
+    """Predict the bytes that reading takes at its peak, erring upwards.
+
+    A text takes them by its letters, its lines and its words, measured on the shortest of each.
+    """
+    binary = (kind == "stl" and not is_text(data)) or (kind == "ply" and b"ascii" not in data[:200])
+    if binary:
+        return FORMATS[kind].bytes_per_byte * len(data)
+    lines = data.count(b"\n") + data.count(b"\r")
+    return 8 * len(data) + 170 * lines + 130 * count_words(data)
 
 
 def read(data: bytes, kind: str) -> MeshFile:

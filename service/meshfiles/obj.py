@@ -59,16 +59,14 @@ def read_obj(data: bytes) -> MeshFile:
     vertices, colours = _positions(text, is_v)
     references, sizes = _references(text, is_face)
     line = np.flatnonzero(is_face)
-    above = [np.repeat(np.cumsum(kind)[line], sizes) for kind in (is_v, is_vt, is_vn)]
-    # From 0 on; below 0 where nothing is named.
     v, vt, vn = (
-        np.where(column < 0, before + column, column - 1)
-        for column, before in zip(references.T, above, strict=True)
+        _absolute(column, np.cumsum(kind)[line], sizes)
+        for column, kind in zip(references.T, (is_v, is_vt, is_vn), strict=True)
     )
     wrong = np.flatnonzero((v < 0) | (v >= len(vertices)))
     if len(wrong):
         name, face = int(references[wrong[0], 0]), int(np.repeat(line, sizes)[wrong[0]])
-        there = int(above[0][wrong[0]]) if name < 0 else len(vertices)
+        there = int(is_v[:face].sum()) if name < 0 else len(vertices)
         why = "they count from 1" if name == 0 else f"there are {there}"
         raise text.fault(face, f"a face names vertex {name}, and {why}")
     lost: Counter[str] = Counter()
@@ -155,6 +153,15 @@ def _three_numbers(letters: UInt8[np.ndarray, " n"]) -> UInt8[np.ndarray, " m"]:
         ]
     )
     return np.insert(letters, places, fill)
+
+
+def _absolute(
+    references: Int[np.ndarray, " C"], above: Int[np.ndarray, " F"], sizes: Int[np.ndarray, " F"]
+) -> Int[np.ndarray, " C"]:
+    """Return rows from 0 on, below 0 where nothing is named; `above` are those before the line."""
+    if not (references < 0).any():
+        return references - 1
+    return np.where(references < 0, np.repeat(above, sizes) + references, references - 1)
 
 
 def _layers(

@@ -16,7 +16,7 @@ from ..gltf.read.plan import check_memory
 from ..options import Limits
 from ..report import Change
 from . import formats
-from .formats import FORMATS, rounding_changes
+from .formats import rounding_changes
 from .mesh_file import COLOUR, MATERIAL, NONE, Layer, MeshFile
 from .mtl import PLAIN, WHITE, library_files, materials_of
 from .parts import LARGEST, Part, parts_of, with_group_normals
@@ -65,7 +65,7 @@ def read_within(data: bytes, kind: str, limits: Limits) -> MeshFile:
 
     Raises as `formats.read`, and LimitError.
     """
-    check_memory(FORMATS[kind].bytes_per_byte * len(data), limits)
+    check_memory(formats.memory_to_read(data, kind), limits)
     return formats.read(data, kind)
 
 

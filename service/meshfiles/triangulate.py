@@ -5,6 +5,7 @@ Every corner stays a corner of a triangle, those on a straight side too: a neigh
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,8 @@ from pns_common.base.arrays import cross, dot, norm
 from ..report import Change
 from .mesh_file import Layer, MeshFile
 
+# Polygons that are cut together.
+BLOCK = 2**14
 # Of the polygon's area, or of the square of its size: what rounding leaves of nothing.
 ROUNDING = 1e-12
 # How much of its area cutting may gain or lose before it is tried from another corner.
@@ -30,11 +33,13 @@ def triangulated(mesh: MeshFile) -> MeshFile:
         return mesh
     # Of coordinates near the largest numbers areas may be infinite: such polygons become fans.
     with np.errstate(over="ignore", invalid="ignore"):
-        cut = cut_polygons(mesh.vertices, mesh.offsets, mesh.corners)
-    flat, polygon = cut.places.reshape(-1), cut.polygon
+        cuts = [*_cut_blocks(mesh)]
+    flat = np.concatenate([cut.places for cut in cuts]).reshape(-1)
+    polygon = np.concatenate([cut.polygon for cut in cuts])
+    crossed = sum(cut.crossed for cut in cuts)
     told = {
         "triangles added by cutting polygons": len(polygon) - len(mesh.sizes),
-        "polygons without an area or that cross themselves cut around one corner": cut.crossed,
+        "polygons without an area or that cross themselves cut around one corner": crossed,
     }
     return replace(
         mesh,
@@ -48,6 +53,15 @@ def triangulated(mesh: MeshFile) -> MeshFile:
             for kind, label in mesh.labels.items()
         },
     )
+
+
+def _cut_blocks(mesh: MeshFile) -> Iterator[Cut]:
+    """Cut polygons some at a time: what that takes is many times what is left."""
+    for begin in range(0, len(mesh.sizes), BLOCK):
+        offsets = mesh.offsets[begin : begin + BLOCK + 1]
+        first, last = int(offsets[0]), int(offsets[-1])
+        cut = cut_polygons(mesh.vertices, offsets - first, mesh.corners[first:last])
+        yield Cut(cut.places + first, cut.polygon + begin, cut.crossed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,10 +104,11 @@ def cut_polygons(
     better = better.reshape(-1, 2).all(axis=1)
     begin = (np.cumsum(pieces) - pieces)[quads[better]]
     places[begin[:, None] + np.arange(2)] = other[better]
-    wrong[quads] = False
+    flat = ~normals.any(axis=1)
+    crossed = int((~better).sum() + (wrong & flat)[sizes != 4].sum())
+    wrong[quads], wrong[flat] = False, False
     keep = np.ones(len(places), dtype=bool)
     made: list[tuple[int, Int[np.ndarray, "t 3"]]] = []
-    crossed = int((~better).sum())
     starts = np.cumsum(pieces) - pieces
     # One by one: such polygons are few, and each is cut on its own.
     for face in np.flatnonzero(wrong).tolist():

@@ -10,7 +10,7 @@ from service.bodies import media
 from service.bodies.uploads import Sent
 from service.errors import LimitError, UnrefinableError
 from service.meshfiles.example import part_glb
-from service.meshfiles.formats import FORMATS
+from service.meshfiles.formats import memory_to_read
 from service.meshfiles.to_gltf import as_gltf
 from service.options import Limits
 
@@ -25,7 +25,7 @@ def test_a_file_too_large_to_be_read_is_refused_before_it_is_read(kind: str) -> 
     # It is no mesh at all: whoever read it would say so.
     sent = Sent(b"0" * 1000, kind)
     with pytest.raises(LimitError) as refusal:
-        as_gltf(sent, Limits(max_memory_bytes=1000 * FORMATS[kind].bytes_per_byte - 1))
+        as_gltf(sent, Limits(max_memory_bytes=memory_to_read(b"0" * 1000, kind) - 1))
     assert refusal.value.limit == "memory"
 
 
@@ -47,4 +47,4 @@ def test_an_off_takes_no_more_than_is_predicted_whatever_its_lines_are(
     as_gltf(Sent(data, "off"), Limits())
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert most < FORMATS["off"].bytes_per_byte * len(data)
+    assert most < memory_to_read(data, "off")
