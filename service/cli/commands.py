@@ -85,7 +85,9 @@ def subdivide(
     sources: Annotated[
         list[Path],
         typer.Argument(
-            metavar="IN...", parser=local_path, help="glb, gltf, vrm, obj, ply, stl or off; - is stdin"
+            metavar="IN...",
+            parser=local_path,
+            help="glb, gltf, vrm, obj, ply, stl or off; - is stdin",
         ),
     ],
     output: Annotated[
@@ -116,7 +118,8 @@ def subdivide(
         typer.Option(metavar="FILE.json", parser=local_path, help="write the report of one IN too"),
     ] = None,
     to: Annotated[
-        str | None, typer.Option(metavar="FORMAT", help="format of the results; default: as OUT ends")
+        str | None,
+        typer.Option(metavar="FORMAT", help="format of the results; default: as OUT ends"),
     ] = None,
     read_as: Annotated[
         str | None, typer.Option("--from", metavar="FORMAT", help="format of stdin; default: glTF")

@@ -194,7 +194,9 @@ def converted(
     with course.stage("read", 0.0, 0.1):
         mesh = read_within(data, kind, limits)
     with course.part(0.1, 0.8):
-        refined, report = refine_mesh_file(mesh, make_scheme(options, model), options, limits, course)
+        refined, report = refine_mesh_file(
+            mesh, make_scheme(options, model), options, limits, course
+        )
     with course.stage("write", 0.8, 1.0):
         kept, changes = held(refined, target)
         if options.compress != "none":

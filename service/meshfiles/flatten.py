@@ -25,8 +25,19 @@ from ..gltf.refine.skin_and_morph import read_skin_and_morph
 from ..meshes.weld import weld
 from ..options import Limits
 from ..report import Change
-from .formats import FORMATS
-from .mesh_file import COLOUR, MATERIAL, NONE, NORMAL, OBJECT, UV, Labels, Layer, MeshFile, of_triangles
+from .formats import FORMATS, Format
+from .mesh_file import (
+    COLOUR,
+    MATERIAL,
+    NONE,
+    NORMAL,
+    OBJECT,
+    UV,
+    Labels,
+    Layer,
+    MeshFile,
+    of_triangles,
+)
 from .obj import as_fractions
 from .pose import joint_matrices, posed
 
@@ -61,7 +72,6 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[MeshFile, list[Chang
         raise UnrefinableError("the default scene shows no triangles")
     total = sum(faces[mesh] * _copy_count(upload, node) for node, mesh in shown)
     check_limit("faces", total, limits.max_faces, f"the scene with all copies has {total} faces")
-    keeps = FORMATS[kind].layers
     placed: list[_Placed] = []
     for node, mesh in shown:
         weights = _shown_weights(upload.document, node, mesh)
@@ -70,7 +80,7 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[MeshFile, list[Chang
         for copy in _copies(upload, node):
             where = _Where(name, worlds[node] @ copy, weights, joints)
             placed.append(_place(upload.tree, mesh, primitives[mesh], where))
-    mesh_file = _joined(upload.tree, placed, keeps)
+    mesh_file = _joined(upload.tree, placed, FORMATS[kind])
     names = [set(p.attributes) for _, mesh in shown for p in primitives[mesh]]
     changes = _changes(upload.tree, len(placed), names, kind)
     left = {n for n, node in enumerate(upload.document.nodes) if node.mesh in primitives}
@@ -119,9 +129,7 @@ def _pointer(node: int) -> str:
 def _copies(upload: Upload, node: int) -> Float[np.ndarray, "N 4 4"]:
     """Return the matrices of a node's copies, in its own space: one that moves nothing without."""
     indices = _copied(upload, node)
-    values = {
-        name: _floats(upload, indices[name]) for name in _COPY_ATTRIBUTES if name in indices
-    }
+    values = {name: _floats(upload, indices[name]) for name in _COPY_ATTRIBUTES if name in indices}
     matrices = np.tile(np.eye(4), (_copy_count(upload, node), 1, 1))
     if "ROTATION" in values:
         lengths = np.linalg.norm(values["ROTATION"], axis=1, keepdims=True)
@@ -309,13 +317,12 @@ def _uv(primitive: TrianglePrimitive, material: dict[str, Any]) -> Float[np.ndar
     return np.column_stack([u, 1 - v])
 
 
-def _joined(
-    tree: dict[str, Any], placed: Sequence[_Placed], keeps: frozenset[str] | None
-) -> MeshFile:
+def _joined(tree: dict[str, Any], placed: Sequence[_Placed], form: Format) -> MeshFile:
+    """Return all copies as one mesh, with what a format has room for."""
     names = dict.fromkeys(name for part in placed for name in part.layers)
     layers: dict[str, Layer] = {}
     for name in names:
-        if keeps is not None and name not in keeps:
+        if form.layers is not None and name not in form.layers:
             continue
         values: list[Shaped[np.ndarray, "N K"]] = []
         rows: list[Int[np.ndarray, " C"]] = []
@@ -342,6 +349,7 @@ def _joined(
     ]
     if materials:
         labels[MATERIAL] = Labels(tuple(materials), np.concatenate(of_face))
+    labels = {kind: label for kind, label in labels.items() if kind in form.labels}
     faces = disjoint_faces((part.faces, len(part.vertices)) for part in placed)
     made = of_triangles(np.concatenate([part.vertices for part in placed]), faces)
     return MeshFile(made.vertices, made.offsets, made.corners, layers, labels=labels)
@@ -364,9 +372,7 @@ def _alike(values: list[Shaped[np.ndarray, "N K"]]) -> Shaped[np.ndarray, "M K"]
     )
 
 
-def _changes(
-    tree: dict[str, Any], placed: int, names: list[set[str]], kind: str
-) -> list[Change]:
+def _changes(tree: dict[str, Any], placed: int, names: list[set[str]], kind: str) -> list[Change]:
     """Return what no format of plain meshes is given; what one of them cannot hold, it reports."""
     why = f": not written to {kind.upper()} files"
     changes = [
@@ -374,11 +380,11 @@ def _changes(
         for name in LOST
         if tree.get(name)
     ]
-    definitions = len(tree.get("materials", []))
+    named = "definitions of materials" if MATERIAL in FORMATS[kind].labels else "materials"
     changes += [
         Change(pointer, f"{what} dropped{why}", count)
         for pointer, what, count in (
-            ("/materials", "definitions of materials", definitions),
+            ("/materials", named, len(tree.get("materials", []))),
             ("/meshes", "morph targets", _count_targets(tree)),
             ("/meshes", "points and lines", _count_other_modes(tree)),
         )
@@ -390,7 +396,7 @@ def _changes(
     if placed > 1:
         changes.append(Change("/nodes", "nodes joined into one mesh in world space", placed))
     form = FORMATS[kind]
-    kept = {"POSITION", *(form.layers or (UV, NORMAL, COLOUR))}
+    kept = {"POSITION", *((UV, NORMAL, COLOUR) if form.layers is None else form.layers)}
     lost = {
         name
         for own in names

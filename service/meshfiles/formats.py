@@ -138,7 +138,10 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
             del layers[name]
     if kind == "obj" and COLOUR in layers:
         if layers[COLOUR].complete:
-            alpha = layers[COLOUR].values.shape[1] == 4 and (as_fractions(layers[COLOUR].values)[:, 3] < 1).any()
+            alpha = (
+                layers[COLOUR].values.shape[1] == 4
+                and (as_fractions(layers[COLOUR].values)[:, 3] < 1).any()
+            )
             lost |= {"opacity of vertex colours": 1} if alpha else {}
         else:
             del layers[COLOUR]

@@ -91,7 +91,9 @@ def _material(name: str, given: dict[bytes, bytes], made: Materials) -> dict[str
     surface: dict[str, Any] = dict(PLAIN)
     material: dict[str, Any] = {"name": name, "pbrMetallicRoughness": surface}
     colour = _numbers(given.get(b"kd"), 3)
-    opacity = _numbers(given.get(b"d"), 1) or [1 - t for t in _numbers(given.get(b"tr"), 1)] or [1.0]
+    opacity = (
+        _numbers(given.get(b"d"), 1) or [1 - t for t in _numbers(given.get(b"tr"), 1)] or [1.0]
+    )
     if colour or b"map_kd" in given:
         surface["baseColorFactor"] = [*(colour or WHITE[:3]), 1.0]
     if image := _image(given.get(b"map_kd")):

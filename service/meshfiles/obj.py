@@ -286,8 +286,9 @@ def _faces_text(mesh: MeshFile, uv: Layer | None, normals: Layer | None) -> Iter
                 name = mesh.labels[kind].names[number] if number >= 0 else _NAMELESS[kind]
                 yield f"{STATEMENTS[kind].decode()} {name}\n"
                 said[kind] = number
-        yield from _run_text(mesh, begin, end, uv if has_uv[begin] else None,
-                             normals if has_normal[begin] else None)
+        yield from _run_text(
+            mesh, begin, end, uv if has_uv[begin] else None, normals if has_normal[begin] else None
+        )
 
 
 _NAMELESS = {MATERIAL: "none", GROUP: "default", OBJECT: "default", SMOOTHING: "off"}

@@ -17,7 +17,18 @@ from ..gltf.read.schema import Accessor
 from ..gltf.refine.refined_primitives import RefinedPrimitive
 from ..meshes.weld import canonical_zero
 from ..report import Change
-from .mesh_file import COLOUR, MATERIAL, NONE, NORMAL, SMOOTHING, UV, Labels, Layer, MeshFile, of_triangles
+from .mesh_file import (
+    COLOUR,
+    MATERIAL,
+    NONE,
+    NORMAL,
+    SMOOTHING,
+    UV,
+    Labels,
+    Layer,
+    MeshFile,
+    of_triangles,
+)
 
 _SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
 _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
@@ -152,7 +163,9 @@ def joined(
     `kept` says for each part which of its faces were refined.
     """
     of_part = {part.primitive.number: (part, keep) for part, keep in zip(parts, kept, strict=True)}
-    control = np.concatenate([of_part[p.source.number][0].faces[of_part[p.source.number][1]] for p in refined])
+    control = np.concatenate(
+        [of_part[p.source.number][0].faces[of_part[p.source.number][1]] for p in refined]
+    )
     order = np.argsort(control, kind="stable")
     ranks = np.repeat(control[order], 4**levels)
 
@@ -171,12 +184,16 @@ def joined(
         total = 0
         for primitive in refined:
             own = primitive.attributes.get(name)
-            rows.append(np.full(primitive.faces.shape, NONE) if own is None else primitive.faces + total)
+            rows.append(
+                np.full(primitive.faces.shape, NONE) if own is None else primitive.faces + total
+            )
             if own is not None:
                 values.append(own)
                 total += len(own)
         layers[name] = Layer(np.concatenate(values), ordered(rows))
-    labels = {kind: Labels(label.names, label.of_face[ranks]) for kind, label in mesh.labels.items()}
+    labels = {
+        kind: Labels(label.names, label.of_face[ranks]) for kind, label in mesh.labels.items()
+    }
     return replace(
         of_triangles(vertices, corners.reshape(-1, 3)),
         layers=layers,

@@ -176,7 +176,8 @@ def read_ply(data: bytes) -> MeshFile:
         corners,
         layers,
         _face_values(face, proper, lost),
-        double=vertex["x"].dtype.itemsize == 8 and header.order is not None
+        double=vertex["x"].dtype.itemsize == 8
+        and header.order is not None
         or any(p.name == "x" and p.kind == "f8" for e in header.elements for p in e.properties),
         changes=dropped(lost),
     )

@@ -72,7 +72,9 @@ def refine_mesh_file(
     )
     count = len(mesh.vertices)
     unused = int(marked(mesh.corners, count).sum()) - int(marked(kept.reshape(-1), count).sum())
-    changes = [*mesh.changes, *incomplete, *made.changes]
+    # There is no document for a pointer to point into.
+    found = [replace(change, pointer="") for change in made.changes]
+    changes = [*mesh.changes, *incomplete, *found]
     return refined, build_report(scheme, options.levels, [result], unused, changes)
 
 

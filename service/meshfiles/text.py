@@ -20,7 +20,11 @@ _BLANK, _LINE_END, _COMMENT, _BACKSLASH = b" \n#\\"
 # What a joined line has in place of its end, which still counts as one.
 _JOINED = b" \x0b"
 _NUMBER = re.compile(rb"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|inf(?:inity)?)", re.I)
-_WIDE = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+_WIDE = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
 
 
 def plain_text(data: bytes) -> bytes:

@@ -53,9 +53,7 @@ def as_gltf(sent: Sent, limits: Limits) -> Sent:
     if all(part.material != len(materials) - 1 for part in shown):
         materials.pop()
     glb = parts_glb(shown, materials, made.images)
-    siblings = SiblingFiles(
-        sent.siblings.find, frozenset(opened.unused), sent.siblings.folder
-    )
+    siblings = SiblingFiles(sent.siblings.find, frozenset(opened.unused), sent.siblings.folder)
     changes += [*lost, *incomplete, *_labels_lost(mesh), *rounding_changes(mesh)]
     return Sent(glb, "glb", siblings, losses=tuple(changes))
 

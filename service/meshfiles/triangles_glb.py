@@ -37,7 +37,9 @@ def triangles_glb(
     """Write a mesh of one material; `extras` goes to `asset.extras`."""
     parts, _ = parts_of(mesh)
     materials = [] if material is None else [material]
-    return parts_glb([replace(part, material=len(materials) - 1) for part in parts], materials, [], extras)
+    return parts_glb(
+        [replace(part, material=len(materials) - 1) for part in parts], materials, [], extras
+    )
 
 
 def parts_glb(

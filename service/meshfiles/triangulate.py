@@ -43,7 +43,10 @@ def triangulated(mesh: MeshFile) -> MeshFile:
     }
     return replace(
         mesh,
-        changes=(*mesh.changes, *(Change("", what, count) for what, count in told.items() if count)),
+        changes=(
+            *mesh.changes,
+            *(Change("", what, count) for what, count in told.items() if count),
+        ),
         offsets=np.arange(0, len(flat) + 1, 3),
         corners=mesh.corners[flat],
         layers={name: Layer(kept.values, kept.rows[flat]) for name, kept in mesh.layers.items()},
@@ -195,7 +198,9 @@ def _earcut(points: Float[np.ndarray, "n 2"]) -> Int[np.ndarray, "t 3"] | None:
 
 
 def _with_straight_corners(
-    triangles: Int[np.ndarray, "t 3"], points: Float[np.ndarray, "n 2"], order: Int[np.ndarray, " m"]
+    triangles: Int[np.ndarray, "t 3"],
+    points: Float[np.ndarray, "n 2"],
+    order: Int[np.ndarray, " m"],
 ) -> Int[np.ndarray, "u 3"]:
     """Cut triangles at the corners that lie on their sides, which cutting by ears leaves out."""
     used = set(triangles.reshape(-1).tolist())
@@ -227,7 +232,9 @@ def _fan_without_flat(outline: list[int], points: Float[np.ndarray, "n 2"]) -> l
     made: list[list[int]] = []
     ring = list(outline)
     while len(ring) > 3:
-        corners = np.array([[ring[k - 1], ring[k], ring[(k + 1) % len(ring)]] for k in range(len(ring))])
+        corners = np.array(
+            [[ring[k - 1], ring[k], ring[(k + 1) % len(ring)]] for k in range(len(ring))]
+        )
         # The largest ear of a convex outline leaves the corners on its sides to the others.
         best = int(np.abs(_areas(points, corners)).argmax())
         made.append(corners[best].tolist())

@@ -169,4 +169,6 @@ def _positions(
     *,
     double: bool,
 ) -> Float[np.ndarray, "N 3"]:
-    return np.take(points, vertex, axis=0) if double else rounded_rows(points, vertex, blocks_of(grid))
+    return (
+        np.take(points, vertex, axis=0) if double else rounded_rows(points, vertex, blocks_of(grid))
+    )

@@ -106,7 +106,9 @@ CUBES: dict[str, tuple[str, bytes]] = {
 
 
 def refined(data: bytes, kind: str, target: str, **options: Any) -> Written:
-    return converted(data, kind, target, Options(scheme="loop", **options), None, Limits(), None, ALONE)
+    return converted(
+        data, kind, target, Options(scheme="loop", **options), None, Limits(), None, ALONE
+    )
 
 
 def area(mesh: MeshFile) -> float:
@@ -178,16 +180,24 @@ def test_the_collections_cubes_are_whole(name: str) -> None:
     coloured = "COLOR_0" in shown["primitives"][0]["attributes"]
     assert coloured == ("colours" in name or "two_lines" in name)
     if "materials" in name:
-        assert len(formats.read(refined(data, kind, "obj").content, "obj").labels[MATERIAL].names) == 2
+        assert (
+            len(formats.read(refined(data, kind, "obj").content, "obj").labels[MATERIAL].names) == 2
+        )
 
 
 def test_the_collections_hard_edges_are_as_hard_in_an_obj_as_in_a_glb() -> None:
     folder = shared_path("cases")
-    ours = refined((folder / "obj_hard_edges_by_vn.obj").read_bytes(), "obj", "glb", crease="normals")
-    theirs = refined((folder / "obj_hard_edges_reference.glb").read_bytes(), "glb", "glb", crease="normals")
+    ours = refined(
+        (folder / "obj_hard_edges_by_vn.obj").read_bytes(), "obj", "glb", crease="normals"
+    )
+    theirs = refined(
+        (folder / "obj_hard_edges_reference.glb").read_bytes(), "glb", "glb", crease="normals"
+    )
     edges = [made.report["levels"][0]["edges"] for made in (ours, theirs)]
     assert edges[0]["crease"] == edges[1]["crease"] > 0
-    smooth = refined((folder / "obj_hard_edges_by_vn.obj").read_bytes(), "obj", "glb", normals="smooth")
+    smooth = refined(
+        (folder / "obj_hard_edges_by_vn.obj").read_bytes(), "obj", "glb", normals="smooth"
+    )
     (primitive,) = files.unpack(smooth.content)[0]["meshes"][0]["primitives"]
     assert "NORMAL" in primitive["attributes"]
 
@@ -209,7 +219,8 @@ def test_the_collections_glbs_are_read_whole() -> None:
 COLOURED = {
     "obj": "v 0 0 0 1 0 .25\nv 1 0 0 0 1 .25\nv 0 1 0 0 0 .25\nf 1 2 3\n",
     "ply": PLY_HEAD.format(
-        "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float quality\n", ""
+        "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float quality\n",
+        "",
     )
     .replace("vertex 8", "vertex 3")
     .replace("face 12", "face 1")
@@ -255,7 +266,9 @@ def test_a_seam_that_is_nearly_closed_is_reported_with_what_closes_it() -> None:
     flat = shape["indices"].reshape(-1)
     noise = 1e-7 * np.random.default_rng(0).standard_normal((len(flat), 3))
     points = shape["POSITION"][flat] + noise
-    glb = files.glb([{"POSITION": points.astype(np.float32), "indices": np.arange(len(flat)).reshape(-1, 3)}])
+    glb = files.glb(
+        [{"POSITION": points.astype(np.float32), "indices": np.arange(len(flat)).reshape(-1, 3)}]
+    )
     changes = refined(glb, "glb", "glb").report["changes"]
     (near,) = [change for change in changes if "weld_tolerance" in change["what"]]
     assert near["count"] == len(flat)

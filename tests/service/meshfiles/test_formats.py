@@ -179,7 +179,11 @@ def test_polygons_are_split_and_counted(kind: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "data", "names"),
     [
-        ("obj", b"vn 0 0 1\nfoo\n" + POLYGONS["obj"], {"vertex normals that no face names", "other statements"}),
+        (
+            "obj",
+            b"vn 0 0 1\nfoo\n" + POLYGONS["obj"],
+            {"vertex normals that no face names", "other statements"},
+        ),
         ("obj", b"vt 0 0\n" + POLYGONS["obj"], {"texture coordinates that no face names"}),
         (
             "obj",

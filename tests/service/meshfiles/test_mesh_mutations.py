@@ -144,5 +144,3 @@ def test_a_file_of_lines_has_no_faces() -> None:
     data = b"OFF\n0 2 0\n0 0 0\n1 0 0\n"
     with pytest.raises(ServiceError, match="no faces of three vertices"):
         as_gltf(Sent(data, "off"), LIMITS)
-
-

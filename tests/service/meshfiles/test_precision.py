@@ -24,9 +24,7 @@ def grid(*, spacing: float, offset: float) -> MeshFile:
     points = np.column_stack([offset + spacing * x.ravel(), spacing * y.ravel(), 0 * x.ravel()])
     a = (SIDE * np.arange(SIDE - 1)[:, None] + np.arange(SIDE - 1)).ravel()
     b, c, d = a + SIDE, a + SIDE + 1, a + 1
-    return of_triangles(
-        points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    )
+    return of_triangles(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
 
 
 PLY_HEAD = """ply

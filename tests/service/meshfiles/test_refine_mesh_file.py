@@ -65,7 +65,7 @@ def test_a_weld_tolerance_is_counted():
     _, report = refined(loose, weld_tolerance=1e-4)
     assert report["levels"][0]["edges"]["boundary"] == 0
     assert {
-        "pointer": "/meshes/0",
+        "pointer": "",
         "what": "vertices joined within weld_tolerance",
         "count": 18,
     } in report["changes"]
