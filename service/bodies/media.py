@@ -90,7 +90,7 @@ def begins_as_json(data: bytes) -> bool:
 def kind_of(name: str) -> Kind | None:
     """Return the kind of a file by its name's ending; None where it is of none."""
     ending = name.rpartition("/")[2].rpartition(".")[2].lower()
-    return ALIASES.get(ending, next((kind for kind in KINDS if kind == ending), None))
+    return next((kind for kind in KINDS if kind == ending), ALIASES.get(ending))
 
 
 def mesh_kind_of(name: str) -> Kind | None:

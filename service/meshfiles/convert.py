@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import msgspec
 
@@ -19,12 +19,12 @@ from pns_common.errors import PnsError
 from pns_common.schemes import Model
 
 from ..bodies.folder import folder_of
-from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, kind_of
+from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, Kind, kind_of
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..bodies.uploads import Sent
 from ..course import Course
 from ..errors import InvalidParameter, ServiceError
-from ..gltf.read.upload import read_upload
+from ..gltf.read.upload import Media, read_upload
 from ..gltf.subdivide import make_scheme, subdivide_gltf
 from ..options import Limits, Options
 from ..printable import printable
@@ -132,7 +132,7 @@ def _convert_one(
 
 
 def _planned(jobs: Jobs) -> list[_Job]:
-    """Say what becomes of each file, before any work, which may be long. Raises InvalidParameter."""
+    """Plan what becomes of each file, before any work. Raises InvalidParameter."""
     several = len(jobs.sources) > 1
     into = jobs.output.is_dir() or (several and jobs.output != STREAM)
     if several and not jobs.output.is_dir():
@@ -186,9 +186,17 @@ def converted(
     """
     course = Course() if course is None else course
     if kind in GLTF_KINDS or target in GLTF_KINDS:
-        sent = as_gltf(Sent(data, kind, siblings), limits)
+        # Kinds are checked where they come from.
+        sent = as_gltf(Sent(data, cast(Kind, kind), siblings), limits)
         done = subdivide_gltf(
-            sent.data, sent.kind, options, model, limits, course, sent.siblings, sent.losses
+            sent.data,
+            cast(Media, sent.kind),
+            options,
+            model,
+            limits,
+            course,
+            sent.siblings,
+            sent.losses,
         )
         return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
     with course.stage("read", 0.0, 0.1):

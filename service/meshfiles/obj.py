@@ -9,12 +9,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from ..errors import UnreadableError
-from ..report import Change
 from .mesh_file import (
     COLOUR,
     GROUP,
@@ -30,7 +30,7 @@ from .mesh_file import (
     dropped,
     offsets_of,
 )
-from .text import BLOCK, NUMBER, Text, cut_text, is_number, name_of, parsed, plain_text, rows_text
+from .text import BLOCK, NUMBER, Text, cut_text, name_of, parsed, plain_text, rows_text
 
 SIDES = "faces of fewer than three vertices"
 STATEMENTS = {MATERIAL: b"usemtl", GROUP: b"g", OBJECT: b"o", SMOOTHING: b"s"}
@@ -278,7 +278,7 @@ def _faces_text(mesh: MeshFile, uv: Layer | None, normals: Layer | None) -> Iter
     turns = np.flatnonzero((np.diff(state, axis=0) != 0).any(axis=1)) + 1
     bounds = [0, *turns.tolist(), len(sizes)]
     said = dict.fromkeys(labels, NONE)
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for begin, end in pairwise(bounds):
         for kind, of_face in labels.items():
             number = int(of_face[begin])
             # One that has no name behind one that has would take that one's.

@@ -56,8 +56,11 @@ def read_off(data: bytes) -> MeshFile:
         del parts[COLOUR]
     proper = sizes >= 3
     lost[SIDES] = int((~proper).sum())
+    face_values: dict[str, np.ndarray] = {}
     if of_faces is None:
         lost["colours of faces"] = face_count
+    elif of_faces.shape[1] > 0:
+        face_values[COLOUR] = _colours(of_faces[proper])
     layers = {
         name: Layer(parts[name], corners[np.repeat(proper, sizes)])
         for name in (NORMAL, COLOUR, UV)
@@ -65,13 +68,12 @@ def read_off(data: bytes) -> MeshFile:
     }
     if COLOUR in layers:
         layers[COLOUR] = Layer(_colours(layers[COLOUR].values), layers[COLOUR].rows)
-    has_colours = of_faces is not None and of_faces.shape[1] > 0
     return MeshFile(
         parts[""],
         offsets_of(sizes[proper]),
         corners[np.repeat(proper, sizes)],
         layers,
-        face_values={COLOUR: _colours(of_faces[proper])} if has_colours else {},
+        face_values=face_values,
         changes=dropped(lost),
     )
 

@@ -31,7 +31,6 @@ from .mesh_file import (
 )
 
 _SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
-_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 LARGEST = float(np.finfo(np.float32).max)
 _SMOOTH_OFF = frozenset({"off", "0", ""})
 
@@ -95,8 +94,9 @@ def _primitive(
         values = layer.values[layer.rows[first]]
         attributes[name] = unit(values).astype(np.float32) if name == NORMAL else values
     accessors = {
-        name: Accessor(FLOAT, len(first), _TYPES.get(values.shape[1], "SCALAR"))
-        for name, values in attributes.items()
+        # No more is asked of it but whether integers are fractions.
+        name: Accessor(FLOAT, len(first), "SCALAR")
+        for name in attributes
     }
     return TrianglePrimitive(number, vertex[first], row.reshape(-1, 3), attributes, accessors)
 
@@ -104,7 +104,7 @@ def _primitive(
 def distinct_corners(
     vertex: Int[np.ndarray, " C"], layers: dict[str, Layer]
 ) -> tuple[Int[np.ndarray, " C"], Int[np.ndarray, " R"]]:
-    """Number corners by vertex and rows of layers; return also the first corner of each number."""
+    """Give corners numbers by vertex and rows of layers; return also where each comes first."""
     columns = [vertex]
     for layer in layers.values():
         if not any(np.array_equal(layer.rows, column) for column in columns):
@@ -173,10 +173,11 @@ def joined(
         blocks = np.concatenate(rows).reshape(len(control), -1)
         return (blocks if len(refined) == 1 else blocks[order]).reshape(-1)
 
-    vertices = np.zeros((1 + max(int(p.vertex.max()) for p in refined), 3))
-    for primitive in refined:
-        vertices[primitive.vertex] = primitive.attributes["POSITION"]
-    corners = ordered([p.vertex[p.faces] for p in refined])
+    ids = [primitive.vertex for primitive in refined if primitive.vertex is not None]
+    vertices = np.zeros((1 + max(int(own.max()) for own in ids), 3))
+    for own, primitive in zip(ids, refined, strict=True):
+        vertices[own] = primitive.attributes["POSITION"]
+    corners = ordered([own[p.faces] for own, p in zip(ids, refined, strict=True)])
     layers: dict[str, Layer] = {}
     for name in dict.fromkeys(name for p in refined for name in p.attributes if name != "POSITION"):
         values: list[Shaped[np.ndarray, "N K"]] = []

@@ -144,27 +144,31 @@ def read_ply(data: bytes) -> MeshFile:
         data = plain_text(data).lstrip()
     header = ply_header(data)
     tables = _text_tables(data, header) if header.order is None else _binary_tables(data, header)
-    vertex = tables.get("vertex", {})
-    if not {"x", "y", "z"} <= vertex.keys() or any(isinstance(vertex[a], _List) for a in "xyz"):
+    vertex, vertex_lists = _apart(tables.get("vertex", {}))
+    if not {"x", "y", "z"} <= vertex.keys():
         raise UnreadableError("the PLY file has no vertices with x, y and z")
     lost: Counter[str] = Counter({"names of textures": header.textures})
     for element in header.elements:
         if element.name not in ("vertex", "face", STRIPS):
             lost[f"element {element.name}"] += element.rows
     vertices = np.stack([vertex[axis] for axis in "xyz"], axis=1).astype(np.float64)
-    face = tables.get("face", {})
-    polygons = next((face[name] for name in POLYGON if isinstance(face.get(name), _List)), None)
+    for name, column in vertex_lists.items():
+        lost[f"vertex property {name}"] += len(column.sizes)
+    face, lists = _apart(tables.get("face", {}))
+    polygons = next((lists[name] for name in POLYGON if name in lists), None)
     if polygons is None or not len(polygons.sizes):
         sizes, corners = _of_strips(tables.get(STRIPS, {}))
-        face, proper = {}, np.ones(len(sizes), dtype=bool)
+        face, lists, proper = {}, {}, np.ones(len(sizes), dtype=bool)
     else:
         sizes, corners = polygons.sizes, polygons.values.astype(np.int64)
         proper = sizes >= 3
         lost[SIDES] = int((~proper).sum())
         corners = corners[np.repeat(proper, sizes)]
-    layers = {name: Layer(values, corners) for name, values in _layers(vertex, lost).items()}
-    corner_uv = face.get(CORNER_UV)
-    if isinstance(corner_uv, _List):
+    layers = {name: Layer(values, corners) for name, values in _layers(vertex).items()}
+    for name in lists.keys() - POLYGON - {CORNER_UV}:
+        lost[f"face property {name}"] += len(sizes)
+    corner_uv = lists.get(CORNER_UV)
+    if corner_uv is not None:
         if (corner_uv.sizes == 2 * sizes).all():
             values = corner_uv.values.reshape(-1, 2)[np.repeat(proper, sizes)]
             layers[UV] = Layer(values.astype(np.float64), np.arange(len(values)))
@@ -175,35 +179,33 @@ def read_ply(data: bytes) -> MeshFile:
         offsets_of(sizes[proper]),
         corners,
         layers,
-        _face_values(face, proper, lost),
-        double=vertex["x"].dtype.itemsize == 8
-        and header.order is not None
-        or any(p.name == "x" and p.kind == "f8" for e in header.elements for p in e.properties),
+        _face_values({name: column[proper] for name, column in face.items()}),
+        double=any(
+            one.name == "x" and one.kind == "f8"
+            for element in header.elements
+            for one in element.properties
+        ),
         changes=dropped(lost),
     )
 
 
-def _layers(vertex: _Columns, lost: Counter[str]) -> dict[str, np.ndarray]:
-    """Return what vertices have beside positions; lists are lost."""
+def _apart(columns: _Columns) -> tuple[dict[str, np.ndarray], dict[str, _List]]:
+    """Return the numbers of an element's rows, and their lists."""
+    numbers = {n: column for n, column in columns.items() if not isinstance(column, _List)}
+    return numbers, {n: column for n, column in columns.items() if isinstance(column, _List)}
+
+
+def _layers(vertex: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return what vertices have beside positions."""
     left = {name: column for name, column in vertex.items() if name not in ("x", "y", "z")}
     layers: dict[str, np.ndarray] = {}
     for layer, choices in _LAYERS.items():
-        chosen = next((names for names in choices if set(names) <= left.keys()), None)
-        columns = [left[name] for name in chosen or ()]
-        if not columns or any(isinstance(column, _List) for column in columns):
+        chosen = next((names for names in choices if set(names) <= left.keys()), ())
+        if not chosen or (layer == COLOUR and len({left[name].dtype for name in chosen}) > 1):
             continue
-        if layer == COLOUR and len({column.dtype for column in columns}) > 1:
-            continue
-        for name in chosen or ():
-            del left[name]
-        values = np.stack(columns, axis=1)
+        values = np.stack([left.pop(name) for name in chosen], axis=1)
         layers[layer] = _colours(values) if layer == COLOUR else values.astype(np.float64)
-    for name, column in left.items():
-        if isinstance(column, _List):
-            lost[f"vertex property {name}"] += len(column.sizes)
-        else:
-            layers[f"_{name}"] = column[:, None]
-    return layers
+    return layers | {f"_{name}": column[:, None] for name, column in left.items()}
 
 
 def _colours(values: np.ndarray) -> np.ndarray:
@@ -213,18 +215,12 @@ def _colours(values: np.ndarray) -> np.ndarray:
     return np.clip(values, 0, 255).astype(np.uint8)
 
 
-def _face_values(face: _Columns, proper: np.ndarray, lost: Counter[str]) -> dict[str, np.ndarray]:
-    values: dict[str, np.ndarray] = {}
-    for name, column in face.items():
-        if not isinstance(column, _List):
-            values[name] = column[proper, None]
-        elif name not in POLYGON and name != CORNER_UV:
-            lost[f"face property {name}"] += len(column.sizes)
-    names = ("red", "green", "blue", "alpha")
-    colour = [values[name] for name in names if name in values]
-    if len(colour) >= 3 and len({column.dtype for column in colour}) == 1:
-        values = {name: column for name, column in values.items() if name not in names}
-        values[COLOUR] = _colours(np.hstack(colour))
+def _face_values(face: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return what faces have beside their corners."""
+    values = {name: column[:, None] for name, column in face.items()}
+    names = [name for name in ("red", "green", "blue", "alpha") if name in values]
+    if len(names) >= 3 and len({values[name].dtype for name in names}) == 1:
+        values[COLOUR] = _colours(np.hstack([values.pop(name) for name in names]))
     return values
 
 
@@ -455,7 +451,7 @@ def _binary_rows(data: bytes, at: int, element: Element, order: str) -> tuple[_C
             raise _too_short(element, row)
     letters = np.frombuffer(data, dtype=np.uint8)
     columns: _Columns = {}
-    number, after = -1, np.zeros(0, dtype=np.int64)
+    number, after, size = -1, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     for one in element.properties:
         kind, width = np.dtype(order + one.kind), int(one.kind[1])
         if one.count_kind is not None:

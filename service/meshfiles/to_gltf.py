@@ -45,9 +45,11 @@ def as_gltf(sent: Sent, limits: Limits) -> Sent:
     labels = mesh.labels.get(MATERIAL)
     names = () if labels is None else labels.names
     made = materials_of(names, mesh.libraries, opened)
-    for name in mesh.libraries:
-        if not library_files(name, opened):
-            changes.append(Change("", f"materials not found: no {name} came with the file", 1))
+    changes += [
+        Change("", f"materials not found: no {name} came with the file", 1)
+        for name in mesh.libraries
+        if not library_files(name, opened)
+    ]
     materials = [*made.entries, {"pbrMetallicRoughness": PLAIN}]
     shown = [_shown(part, materials) for part in parts]
     if all(part.material != len(materials) - 1 for part in shown):

@@ -178,11 +178,10 @@ def _by_ears(
     for shift in range(ATTEMPTS if len(own) <= MANY else 1):
         order = np.roll(own, -shift)
         ears = _earcut(points[order])
-        if ears is None:
-            continue
-        triangles = _with_straight_corners(order[ears], points, order)
-        areas = _areas(points, triangles)
-        if abs(np.abs(areas).sum() - area) <= tolerance:
+        # Corners on its sides make no difference to a triangle's area.
+        if ears is not None and abs(_areas(points, order[ears]).sum() - area) <= tolerance:
+            triangles = _with_straight_corners(order[ears], points, order)
+            areas = _areas(points, triangles)
             return np.where((areas < 0)[:, None], triangles[:, ::-1], triangles)
     return None
 

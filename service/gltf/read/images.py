@@ -9,7 +9,7 @@ from ...report import Change
 from .data_uri import data_of, is_data
 from .schema import Document
 
-# What a file of each type begins with (glTF 2.0 §3.8.2), and the extension that lets a glTF hold it.
+# What a file of each type begins with (glTF 2.0 §3.8.2), and the extension that it needs.
 _SIGNATURES = (
     (b"\x89PNG\r\n\x1a\n", 0, "image/png", None),
     (b"\xff\xd8\xff", 0, "image/jpeg", None),

@@ -130,7 +130,8 @@ def changes_of_mesh(
     changes += changes_of_vertices(near, cut, pointer)
     if refined is not None and control.cleaned is not None:
         length = refined.refinement.report["reference_length"]
-        changes += change_of(*near_misses(control.cleaned.mesh, [length]), pointer)
+        (misses,) = near_misses(control.cleaned.mesh, [length])
+        changes += change_of(misses, pointer)
     return changes
 
 

@@ -186,10 +186,10 @@ def _whole(word: bytes) -> int:
 
 
 def _numbers(path: Path, rows: list[Any]) -> np.ndarray:
+    # Python, and numpy with it, takes 1_0 for ten as well.
+    if b"_" in b"".join(word for row in rows for word in row if word is not None):
+        raise UnreadableError(f"{path}: a coordinate is no number")
     try:
-        # Python, and numpy with it, takes 1_0 for ten as well.
-        if b"_" in b"".join(word for row in rows for word in row if word is not None):
-            raise ValueError("an underscore is no digit")
         return np.array(rows, dtype=np.float64).reshape(-1, 3)
     except ValueError as error:
         raise UnreadableError(f"{path}: a coordinate is no number") from error

@@ -32,7 +32,7 @@ def test_a_file_too_large_to_be_read_is_refused_before_it_is_read(kind: str) -> 
 @pytest.mark.parametrize("far", ["3.5e38", "-1e300", "inf", "nan"])
 def test_a_position_that_float32_cannot_hold_is_refused(far: str) -> None:
     sent = Sent(f"v 0 0 {far}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".encode(), "obj")
-    with pytest.raises(UnrefinableError, match="float32|NaN or infinite"):
+    with pytest.raises(UnrefinableError, match=r"float32|NaN or infinite"):
         as_gltf(sent, Limits())
 
 

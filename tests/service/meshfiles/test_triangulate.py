@@ -1,4 +1,4 @@
-"""Polygons become triangles of the same area that use every corner, and none that is folded over."""
+"""Polygons become triangles of the same area that use every corner and do not fold over."""
 
 from __future__ import annotations
 
