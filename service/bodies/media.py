@@ -90,7 +90,8 @@ def begins_as_json(data: bytes) -> bool:
 def kind_of(name: str) -> Kind | None:
     """Return the kind of a file by its name's ending; None where it is of none."""
     ending = name.rpartition("/")[2].rpartition(".")[2].lower()
-    return next((kind for kind in KINDS if kind == ending), ALIASES.get(ending))
+    kinds: dict[str, Kind] = {kind: kind for kind in KINDS}
+    return (kinds | ALIASES).get(ending)
 
 
 def mesh_kind_of(name: str) -> Kind | None:
