@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Bool, Float, Int
 
 from pns_common.base.arrays import marked
 from pns_common.base.distinct import distinct_rows
@@ -177,11 +178,9 @@ def rounding_changes(mesh: MeshFile) -> list[Change]:
     """
     if np.abs(mesh.vertices).max() > LARGEST:
         raise UnrefinableError("positions leave the range of float32; write an OBJ or OFF file")
-    rounded = canonical_zero(mesh.vertices.astype(np.float32))
-    before, after = (
-        repeated_vertex(distinct_rows(rows)[mesh.faces])
-        for rows in (canonical_zero(mesh.vertices), rounded)
-    )
+    after = _without_area(mesh.vertices.astype(np.float32), mesh.faces)
+    # Most meshes have no such face, and then none that rounding makes.
+    before = _without_area(mesh.vertices, mesh.faces) if after.any() else after
     rounding = "once positions are rounded to float32"
     told = {
         f"faces without an area {rounding}": int((after & ~before).sum()),
@@ -190,3 +189,10 @@ def rounding_changes(mesh: MeshFile) -> list[Change]:
         ),
     }
     return [Change("", what, count) for what, count in told.items() if count]
+
+
+def _without_area(
+    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
+) -> Bool[np.ndarray, " F"]:
+    """Return which faces have two corners in one place."""
+    return repeated_vertex(distinct_rows(canonical_zero(vertices))[faces])

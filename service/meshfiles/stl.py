@@ -100,10 +100,11 @@ def _of_text(
 
 def write_stl(mesh: MeshFile) -> bytes:
     """Write a binary STL of triangles, with a unit normal for each."""
-    corners = mesh.vertices.astype("<f4")[mesh.faces]
-    facets = np.zeros(len(corners), dtype=FACET)
-    facets["corners"] = corners
-    a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
+    rounded = mesh.vertices.astype("<f4")
+    facets = np.zeros(len(mesh.faces), dtype=FACET)
+    facets["corners"] = np.take(rounded, mesh.faces, axis=0)
+    points = rounded.astype(np.float64)
+    a, b, c = (np.take(points, column, axis=0) for column in mesh.faces.T)
     normals = cross(b - a, c - a)
     lengths = norm(normals)[:, None]
     facets["normal"] = normals / np.where(lengths > 0, lengths, 1.0)

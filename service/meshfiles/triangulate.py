@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 from pns_common.base.arrays import cross, dot, norm
 
 from ..report import Change
-from .mesh_file import Layer, MeshFile
+from .mesh_file import Layer, MeshFile, offsets_of
 
 # Polygons that are cut together.
 BLOCK = 2**14
@@ -34,8 +34,10 @@ def triangulated(mesh: MeshFile) -> MeshFile:
     # Of coordinates near the largest numbers areas may be infinite: such polygons become fans.
     with np.errstate(over="ignore", invalid="ignore"):
         cuts = [*_cut_blocks(mesh)]
-    flat = np.concatenate([cut.places for cut in cuts]).reshape(-1)
     polygon = np.concatenate([cut.polygon for cut in cuts])
+    order = np.argsort(polygon, kind="stable")
+    polygon = polygon[order]
+    flat = np.concatenate([cut.places for cut in cuts])[order].reshape(-1)
     crossed = sum(cut.crossed for cut in cuts)
     told = {
         "triangles added by cutting polygons": len(polygon) - len(mesh.sizes),
@@ -60,11 +62,17 @@ def triangulated(mesh: MeshFile) -> MeshFile:
 
 def _cut_blocks(mesh: MeshFile) -> Iterator[Cut]:
     """Cut polygons some at a time: what that takes is many times what is left."""
-    for begin in range(0, len(mesh.sizes), BLOCK):
-        offsets = mesh.offsets[begin : begin + BLOCK + 1]
-        first, last = int(offsets[0]), int(offsets[-1])
-        cut = cut_polygons(mesh.vertices, offsets - first, mesh.corners[first:last])
-        yield Cut(cut.places + first, cut.polygon + begin, cut.crossed)
+    sizes = mesh.sizes
+    whole = np.flatnonzero(sizes == 3)
+    yield Cut(mesh.offsets[whole, None] + np.arange(3), whole, 0)
+    larger = np.flatnonzero(sizes > 3)
+    for begin in range(0, len(larger), BLOCK):
+        chosen = larger[begin : begin + BLOCK]
+        offsets = offsets_of(sizes[chosen])
+        place = np.repeat(mesh.offsets[chosen] - offsets[:-1], sizes[chosen])
+        place += np.arange(len(place))
+        cut = cut_polygons(mesh.vertices, offsets, mesh.corners[place])
+        yield Cut(place[cut.places], chosen[cut.polygon], cut.crossed)
 
 
 @dataclass(frozen=True, eq=False)

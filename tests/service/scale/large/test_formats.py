@@ -319,7 +319,7 @@ XYZ = b"property float y\nproperty float z\n"
         ("a.ply", b"ply\nformat ascii 1.0\nend_header\n", "only a binary"),
         ("a.ply", PLY + b"end_header\n", "no vertices or no faces"),
         ("a.ply", PLY + FACE, "vertex has no"),
-        ("a.ply", PLY + XYZ.replace(b"float z", b"real z") + FACE, "cannot be read"),
+        ("a.ply", PLY + XYZ.replace(b"float z", b"real z") + FACE, "line 6 of the PLY header"),
         ("a.ply", PLY + XYZ + b"property list uchar int w\n" + FACE, "w' of vertex"),
         ("a.ply", PLY + XYZ + FACE, "ends within its vertex"),
         ("a.ply", PLY + XYZ + FACE + bytes(12) + b"\4" + bytes(16), "face 0 has 4 corners"),
