@@ -39,10 +39,10 @@ def triangles(text: str | bytes) -> list[list[int]]:
             "# of C:\\parts\\\n" + POSITIONS + "f 1 \\\n2 3 # D:\\\nf 1 2 5\n",
             [[0, 1, 2], [0, 1, 4]],
         ),
-        # As many numbers as a hexagon has.
+        # As many numbers as a hexagon has; it is concave, seen along its normal.
         (
             POSITIONS + "vt 0 0\nf 1/1 2/1 3/1\nf 1 2 3 4 5 6\n",
-            [[0, 1, 2], [0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]],
+            [[0, 1, 2], [4, 5, 0], [4, 0, 1], [4, 1, 2], [2, 4, 3]],
         ),
         (POSITIONS + "f 1 2 3\nf 1 2\nf 3 4\n", [[0, 1, 2]]),
         # Lines that carriage returns end.
