@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.refine_triangles import refine_triangles
 
 from pns_common import loop
 from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles.convert import advice_lines
-from service.meshfiles.indexed_triangles import IndexedTriangles
-from service.meshfiles.refine_triangles import refine_triangles
 from service.options import Limits, Options
 from tests.service.gltf.test_options import cylinder
 from tests.support.gltf.files import glb
