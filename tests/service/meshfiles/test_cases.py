@@ -107,7 +107,14 @@ CUBES: dict[str, tuple[str, bytes]] = {
 
 def refined(data: bytes, kind: str, target: str, **options: Any) -> Written:
     return converted(
-        data, kind, target, Options(scheme="loop", **options), None, Limits(), None, ALONE
+        data,
+        kind,
+        target,
+        Options(**{"scheme": "loop", "levels": 1} | options),
+        None,
+        Limits(),
+        None,
+        ALONE,
     )
 
 
