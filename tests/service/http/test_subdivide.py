@@ -305,5 +305,5 @@ def test_a_job_keeps_its_format(client: TestClient) -> None:
     result = f"{job.headers['location']}/result"
     while (answer := client.get(result)).status_code == 409:
         time.sleep(0.05)
-    assert answer.content.startswith(b"OFF")
+    assert answer.content.startswith(b"STNOFF")
     assert answer.headers["content-type"] == "model/off"
