@@ -27,7 +27,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.generated import torus
-from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.mesh_file import of_triangles
 from service.meshfiles.triangles_glb import triangles_glb
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -88,7 +88,7 @@ def upload(size: int) -> bytes:
 
 def _glb(faces: int) -> bytes:
     mesh = torus(faces)
-    return triangles_glb(IndexedTriangles(mesh.vertices, mesh.faces, None))
+    return triangles_glb(of_triangles(mesh.vertices, mesh.faces))
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from service.bodies.sibling_files import ALONE, SiblingFiles
 from service.course import Course
 from service.errors import ServiceError
 from service.gltf.subdivide import Subdivided, subdivide_gltf
-from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.mesh_file import of_triangles
 from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Limits, Options
 
@@ -61,11 +61,10 @@ def measure_generated(
 ) -> MeasuredFile:
     """Refine a generated GLB of about so many faces in a process of its own."""
     if shading == "normals and UVs":
-        triangles, normals = unrolled_torus(faces)
-        data = triangles_glb(triangles, normals=normals)
+        data = triangles_glb(unrolled_torus(faces))
     else:
         mesh = torus(faces)
-        data = triangles_glb(IndexedTriangles(mesh.vertices, mesh.faces, None))
+        data = triangles_glb(of_triangles(mesh.vertices, mesh.faces))
     return in_fresh_process(_measure, data, levels, model, shading == "new normals")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from pns_common import Mesh
 from pns_common.normals import angle_weighted_normals
 from pns_common.parallel import Blocks
-from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.mesh_file import MeshFile, of_triangles
 
 
 def torus(faces: int) -> Mesh:
@@ -26,8 +26,8 @@ def torus(faces: int) -> Mesh:
     return Mesh(points.reshape(-1, 3), np.stack(quads, axis=-2).reshape(-1, 3))
 
 
-def unrolled_torus(faces: int) -> tuple[IndexedTriangles, np.ndarray]:
-    """Make a torus as exporters write it, cut open where its texture begins; and its normals."""
+def unrolled_torus(faces: int) -> MeshFile:
+    """Make a torus with normals as exporters write it, cut open where its texture begins."""
     whole, (columns, rows) = torus(faces), _torus_size(faces)
     u, v = np.divmod(np.arange((columns + 1) * (rows + 1)), rows + 1)
     place = u % columns * rows + v % rows
@@ -35,7 +35,7 @@ def unrolled_torus(faces: int) -> tuple[IndexedTriangles, np.ndarray]:
     uv = np.stack([u / columns, v / rows], axis=1)
     mesh = whole.vertices, whole.faces
     normals = angle_weighted_normals(*mesh, whole.faces, len(whole.vertices), Blocks())
-    return IndexedTriangles(whole.vertices[place], triangles, uv), normals[place]
+    return of_triangles(whole.vertices[place], triangles, uv, normals[place])
 
 
 def _torus_size(faces: int) -> tuple[int, int]:

@@ -31,12 +31,12 @@ def three_levels() -> Callable[[], object]:
 def file() -> Callable[[], object]:
     """Refine a GLB of 60,000 faces twice, from bytes to bytes."""
     from service.gltf.subdivide import subdivide_gltf
-    from service.meshfiles.indexed_triangles import IndexedTriangles
+    from service.meshfiles.mesh_file import of_triangles
     from service.meshfiles.triangles_glb import triangles_glb
     from service.options import Limits, Options
 
     mesh, model = torus(60_000), load_model()
-    data = triangles_glb(IndexedTriangles(mesh.vertices, mesh.faces, None))
+    data = triangles_glb(of_triangles(mesh.vertices, mesh.faces))
     limits = Limits(max_faces=10**8, max_memory_bytes=10**11)
     return lambda: subdivide_gltf(data, "glb", Options(2), model, limits)
 

@@ -26,8 +26,8 @@ def main() -> None:
 
 
 def _end(number: int, _: FrameType | None) -> None:
-    # As the system would. Of imports that may fail some catch whatever is raised in them, trimesh's
-    # of its own parts: the program went on without what was just being imported.
+    # As the system would. Packages that import optional parts may catch what is raised in them, and
+    # go on without the part that was just being imported.
     os._exit(128 + number)
 
 

@@ -28,8 +28,7 @@ def shortened_pointer(pointer: str) -> str:
 class ServiceError(Exception):
     """Base of everything that the service answers with a problem document.
 
-    A detail and a pointer that are too long are cut: the pointer to what holds the value. `file` is
-    the path of the file, where the command line read one.
+    A detail and a pointer that are too long are cut: the pointer to what holds the value.
     """
 
     status = 500
@@ -41,14 +40,12 @@ class ServiceError(Exception):
         super().__init__(detail)
         self.detail = detail
         self.pointer = None if pointer is None else shortened_pointer(pointer)
-        self.file: str | None = None
         if code is not None:
             self.code = code
 
     def __str__(self) -> str:
-        where = "" if self.file is None else f"{self.file}: "
         at = "" if self.pointer is None else f" (at {self.pointer})"
-        return f"{where}{self.detail}{at}"
+        return f"{self.detail}{at}"
 
     def __reduce__(self) -> tuple[object, ...]:
         # Errors cross from worker processes, and are made from other things than their detail.

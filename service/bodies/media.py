@@ -17,6 +17,8 @@ ZIP = "application/zip"
 Kind = Literal["glb", "gltf", "obj", "ply", "stl", "off"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 GLTF_KINDS = ("glb", "gltf")
+# Other endings of the same kinds: a VRM is a GLB.
+ALIASES: dict[str, Kind] = {"vrm": "glb"}
 # The pipeline's name of each file type. Only OBJ's and STL's beside glTF's are registered.
 FORMATS: dict[str, Kind] = {
     GLB: "glb",
@@ -88,7 +90,14 @@ def begins_as_json(data: bytes) -> bool:
     return data[:4096].lstrip(b"\xef\xbb\xbf" + BLANK).startswith(b"{")
 
 
+def kind_of(name: str) -> Kind | None:
+    """Return the kind of a file by its name's ending; None where it is of none."""
+    ending = name.rpartition("/")[2].rpartition(".")[2].lower()
+    kinds: dict[str, Kind] = {kind: kind for kind in KINDS}
+    return (kinds | ALIASES).get(ending)
+
+
 def mesh_kind_of(name: str) -> Kind | None:
     """Tell by a file name's extension what the first bytes would not tell: no glTF."""
-    extension = name.rpartition(".")[2].lower()
-    return next((kind for kind in KINDS if kind == extension and kind not in GLTF_KINDS), None)
+    kind = kind_of(name)
+    return None if kind in GLTF_KINDS else kind

@@ -30,6 +30,7 @@ from .parameters import (
     UvOption,
     WeldOption,
     WorkersOption,
+    local_path,
     options_of,
 )
 from .systems import check_posix
@@ -47,12 +48,16 @@ def main() -> None:
     try:
         app()
     except Exception as error:
-        known = explained(error)
-        if known is None:
+        if explained(error) is None:
             raise
-        message, code = known
-        typer.echo(f"pns: {printable(' '.join(message.split()))}", err=True)
-        raise SystemExit(code) from error
+        raise SystemExit(_tell(error)) from error
+
+
+def _tell(error: Exception) -> int:
+    """Print an error that a user can act on; return its exit code."""
+    message, code = explained(error) or (str(error), FAILURE)
+    typer.echo(f"pns: {printable(' '.join(message.split()))}", err=True)
+    return code
 
 
 def _version(asked: bool) -> None:
@@ -75,8 +80,24 @@ def options(
 @app.command()
 def subdivide(
     context: typer.Context,
-    source: Annotated[Path, typer.Argument(metavar="IN", help="glb, gltf, obj, ply, stl or off")],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="file to write")],
+    sources: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="IN...",
+            parser=local_path,
+            help="glb, gltf, vrm, obj, ply, stl or off; - is stdin",
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="OUT",
+            parser=local_path,
+            help="file to write, or a folder for files called as they are; - is stdout",
+        ),
+    ],
     levels: LevelsOption = DEFAULTS.levels,
     scheme: SchemeOption = DEFAULTS.scheme,
     budget: BudgetOption = DEFAULTS.budget,
@@ -90,14 +111,30 @@ def subdivide(
     compress: CompressOption = DEFAULTS.compress,
     limit: LimitOption = DEFAULTS.limit,
     report: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="write the report too")
+        Path | None,
+        typer.Option(metavar="FILE.json", parser=local_path, help="write the report of one IN too"),
     ] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(metavar="FORMAT", help="format of the results; default: as OUT ends"),
+    ] = None,
+    read_as: Annotated[
+        str | None, typer.Option("--from", metavar="FORMAT", help="format of stdin; default: glTF")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="let a result replace its input")] = False,
 ) -> None:
-    """Refine IN and write OUT; the formats go by the files' extensions."""
-    from ..meshfiles.convert import convert
+    """Refine each IN; formats go by the files' endings."""
+    from ..meshfiles.convert import Jobs, convert
     from ..settings import Settings
 
-    convert(source, output, options_of(context), model, report, Settings().job_limits())
+    jobs = Jobs(sources, output, report, to, read_as, force)
+    failed = 0
+    for error in convert(jobs, options_of(context), model, Settings().job_limits()):
+        if len(sources) == 1 or explained(error) is None:
+            raise error
+        failed = failed or _tell(error)
+    if failed:
+        raise typer.Exit(failed)
 
 
 @app.command()
@@ -219,7 +256,9 @@ def doctor() -> None:
 
 @app.command()
 def example(
-    output: Annotated[Path, typer.Argument(metavar="OUT.glb", help="file to write")],
+    output: Annotated[
+        Path, typer.Argument(metavar="OUT.glb", parser=local_path, help="file to write")
+    ],
 ) -> None:
     """Write a small mechanical part with ridges, fillets and UVs, to try the other commands on."""
     from pns_common.files import replace_file

@@ -15,7 +15,18 @@ _SETTING_OF_LIMIT = {
 
 
 def explained(error: Exception) -> tuple[str, int] | None:
-    """Return the line and the exit code of an error that is not our fault; None for one that is."""
+    """Return the line and the exit code of an error that is not our fault; None for one that is.
+
+    Its notes are the files that it is of.
+    """
+    known = _explained(error)
+    if known is None:
+        return None
+    line, code = known
+    return "".join(f"{note}: " for note in getattr(error, "__notes__", ())) + line, code
+
+
+def _explained(error: Exception) -> tuple[str, int] | None:
     from pydantic import ValidationError
 
     from pns_common.errors import ParameterError, PnsError

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
@@ -27,6 +28,13 @@ def options_of(context: typer.Context) -> Options:
     """
     names = {field.name for field in fields(Options)}
     return Options(**{name: value for name, value in context.params.items() if name in names})
+
+
+def local_path(text: str) -> Path:
+    """Return the path of a file of this machine; a URL is none."""
+    if "://" in text:
+        raise typer.BadParameter(f"{text} is a URL: save the file first, or use pns batch")
+    return Path(text)
 
 
 def _reference_length(text: str) -> float | Literal["auto"]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -13,80 +14,159 @@ from typing import TYPE_CHECKING, Any, cast
 import msgspec
 
 from pns_common import load_model
+from pns_common.errors import PnsError
 from pns_common.files import replace_file
 from pns_common.model.session import Model
 
 from ..bodies.folder import folder_of
-from ..bodies.media import GLTF_KINDS, KINDS, Kind
+from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, Kind, kind_of
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..bodies.uploads import Sent
 from ..course import Course
 from ..errors import InvalidParameter, ServiceError
-from ..gltf.read.upload import read_upload
+from ..gltf.read.upload import Media, read_upload
 from ..gltf.subdivide import make_scheme, subdivide_gltf
 from ..options import Limits, Options
 from ..printable import printable
 from ..report import Change
-from . import formats
 from .flatten import flatten
-from .indexed_triangles import IndexedTriangles
-from .refine_triangles import check_cost, refine_triangles
-from .single_precision import rounding_changes
-from .to_gltf import as_gltf
+from .formats import FORMATS, held
+from .refine_mesh_file import check_cost, refine_mesh_file
+from .to_gltf import as_gltf, read_within
 from .triangles_glb import as_gltf_json
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
-def convert(
-    source: Path,
-    output: Path,
-    options: Options,
-    model: str | None,
-    report_file: Path | None,
-    limits: Limits,
-) -> None:
-    """Refine `source` into `output`; what was changed or lost goes to stderr and the report.
+# Stdin, or stdout.
+STREAM = Path("-")
 
-    `model` is a bundled name or a file; None: the default one.
+
+@dataclass(frozen=True)
+class Jobs:
+    """What `pns subdivide` is asked for.
+
+    Attributes:
+        sources: files to read; `-` is stdin.
+        output: a file, a folder for files with the names of their sources, or `-` for stdout.
+        report: where the report of one source goes.
+        target: the format of all results; None: as `output` ends, or as read.
+        kind: the format of stdin; None: glTF.
+        force: whether a result may replace its source.
+    """
+
+    sources: Sequence[Path]
+    output: Path
+    report: Path | None = None
+    target: str | None = None
+    kind: str | None = None
+    force: bool = False
+
+
+@dataclass(frozen=True)
+class _Job:
+    source: Path
+    kind: str
+    output: Path
+    target: str
+
+
+def convert(jobs: Jobs, options: Options, model: str | None, limits: Limits) -> Iterator[Exception]:
+    """Refine files; what was changed or lost goes to stderr and the report.
+
+    `model` is a bundled name or a file; None: the default one. Yields why a file could not be
+    refined, with a note that names it, and goes on with the next.
 
     Raises:
-        ServiceError, PnsError: the file, the model or a parameter cannot be used.
-        OSError: a file cannot be read or written.
+        InvalidParameter: the files, or a parameter, do not go together.
+        PnsError: the model cannot be used.
     """
     # What only a terminal sees, workers do not load.
     from rich.console import Console
 
-    kind, target = _kind("IN", source), _kind("OUT", output)
-    if report_file is not None and report_file.resolve() in (source.resolve(), output.resolve()):
-        raise InvalidParameter("report", f"{report_file}: the report would replace a model")
-    # Before the work, which may be long.
-    for name, file in (("OUT", output), ("report", report_file)):
-        if file is not None and not file.parent.is_dir():
-            raise InvalidParameter(name, f"{file}: there is no folder {file.parent}")
-    began = time.perf_counter()
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
-    data = source.read_bytes()
+    planned = _planned(jobs)
     # Loop needs none, but one that is named and does not exist is a mistake to be told.
     loaded = load_model(model) if options.scheme == "pns" or model is not None else None
-    try:
-        with _progress(console) as course:
-            written = converted(
-                data, kind, target, options, loaded, limits, course, folder_of(source)
-            )
-    except ServiceError as error:
-        if not isinstance(error, InvalidParameter):
-            error.file = str(source)
-        raise
-    replace_file(output, written.content)
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    for job in planned:
+        try:
+            _convert_one(job, jobs.report, options, loaded, limits, console)
+        except InvalidParameter as error:
+            yield error
+        except (ServiceError, PnsError) as error:
+            error.add_note("stdin" if job.source == STREAM else str(job.source))
+            yield error
+        except OSError as error:
+            yield error
+
+
+def _convert_one(
+    job: _Job,
+    report_file: Path | None,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    console: Console,
+) -> None:
+    began = time.perf_counter()
+    if job.source == STREAM:
+        data, siblings = sys.stdin.buffer.read(), ALONE
+    else:
+        data, siblings = job.source.read_bytes(), folder_of(job.source)
+    with _progress(console) as course:
+        written = converted(data, job.kind, job.target, options, model, limits, course, siblings)
+    if job.output == STREAM:
+        sys.stdout.buffer.write(written.content)
+        sys.stdout.buffer.flush()
+    else:
+        replace_file(job.output, written.content)
     if report_file is not None:
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
         replace_file(report_file, text + b"\n")
     for line in (*lines_of(written.report), *advice_lines(written.report)):
         console.print(printable(line), markup=False)
     seconds = time.perf_counter() - began
-    console.print(f"{output}: {written.faces:,} faces in {seconds:.1f} s", markup=False)
+    name = "stdout" if job.output == STREAM else job.output
+    console.print(f"{name}: {written.faces:,} faces in {seconds:.1f} s", markup=False)
+
+
+def _planned(jobs: Jobs) -> list[_Job]:
+    """Plan what becomes of each file, before any work. Raises InvalidParameter."""
+    several = len(jobs.sources) > 1
+    into = jobs.output.is_dir() or (several and jobs.output != STREAM)
+    if several and not jobs.output.is_dir():
+        raise InvalidParameter("OUT", f"{jobs.output}: several files need a folder that is there")
+    if several and jobs.report is not None:
+        raise InvalidParameter("report", f"{jobs.report}: several files have several reports")
+    planned: list[_Job] = []
+    for source in jobs.sources:
+        kind = jobs.kind or "glb" if source == STREAM else _kind("IN", source)
+        _check_kind("from", kind)
+        target = jobs.target or (kind if into else None)
+        if target is None:
+            target = "glb" if jobs.output == STREAM else _kind("OUT", jobs.output)
+        _check_kind("to", target)
+        output = jobs.output
+        if into:
+            stem = "stdin" if source == STREAM else source.stem
+            ending = source.suffix if target == kind and source != STREAM else f".{target}"
+            output = jobs.output / f"{stem}{ending}"
+        _check_output(jobs, source, output)
+        if any(output == job.output for job in planned):
+            raise InvalidParameter("OUT", f"{output}: two files would be written to it")
+        planned.append(_Job(source, kind, output, target))
+    return planned
+
+
+def _check_output(jobs: Jobs, source: Path, output: Path) -> None:
+    for name, file in (("OUT", output), ("report", jobs.report)):
+        if file is not None and file != STREAM and not file.parent.is_dir():
+            raise InvalidParameter(name, f"{file}: there is no folder {file.parent}")
+    if jobs.report is not None and jobs.report.resolve() in (source.resolve(), output.resolve()):
+        raise InvalidParameter("report", f"{jobs.report}: the report would replace a model")
+    if source != STREAM and output.resolve() == source.resolve() and not jobs.force:
+        raise InvalidParameter("OUT", f"{output}: it is the input; --force replaces it")
 
 
 def converted(
@@ -104,21 +184,34 @@ def converted(
     Raises:
         ServiceError, PnsError: the file or a parameter cannot be used.
     """
-    if kind in GLTF_KINDS:
-        done = subdivide_gltf(data, kind, options, model, limits, course, siblings=siblings)
-        return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
-    if target in GLTF_KINDS:
-        sent = as_gltf(Sent(data, cast(Kind, kind), siblings), options, limits)
-        done = subdivide_gltf(sent.data, "glb", options, model, limits, course, losses=sent.losses)
-        return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
     course = Course() if course is None else course
-    with course.stage("read", 0.0, 0.2):
-        triangles = formats.read(data, kind)
-    scheme = make_scheme(options, model)
-    with course.stage("refine", 0.2, 0.7):
-        refined, report = refine_triangles(triangles, scheme, options, limits, course)
-    with course.stage("write", 0.7, 1.0):
-        written = _of_triangles(refined, report, target, options)
+    if kind in GLTF_KINDS or target in GLTF_KINDS:
+        # Kinds are checked where they come from.
+        sent = as_gltf(Sent(data, cast(Kind, kind), siblings), limits)
+        done = subdivide_gltf(
+            sent.data,
+            cast(Media, sent.kind),
+            options,
+            model,
+            limits,
+            course,
+            sent.siblings,
+            sent.losses,
+        )
+        return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
+    with course.stage("read", 0.0, 0.1):
+        mesh = read_within(data, kind, limits)
+    with course.part(0.1, 0.8):
+        refined, report = refine_mesh_file(
+            mesh, make_scheme(options, model), options, limits, course
+        )
+    with course.stage("write", 0.8, 1.0):
+        kept, changes = held(refined, target)
+        if options.compress != "none":
+            changes.append(Change("", "not compressed: only a glTF is", 1))
+        written = Written(
+            FORMATS[target].write(kept), _with_changes(report, changes), len(kept.faces)
+        )
     return replace(written, seconds=course.seconds)
 
 
@@ -133,9 +226,9 @@ def predicted_faces(
     if kind in GLTF_KINDS:
         upload = read_upload(data, kind, options.levels, limits, siblings)
         return sum(mesh.faces for mesh in upload.plans) * 4**options.levels
-    faces = len(formats.read(data, kind).faces) * 4**options.levels
-    check_cost(faces, options, limits)
-    return faces
+    mesh = read_within(data, kind, limits)
+    check_cost(mesh, options, limits)
+    return len(mesh.faces) * 4**options.levels
 
 
 def lines_of(report: dict[str, Any]) -> Iterator[str]:
@@ -153,6 +246,9 @@ def lines_of(report: dict[str, Any]) -> Iterator[str]:
         what = f"{name.replace('_', ' ')} dropped"
         if count and what not in said:
             yield f"{count} × {what}"
+    irregular = report["levels"][0]["edges"]["irregular"] if report["levels"] else 0
+    if irregular:
+        yield f"{irregular} × non-manifold edge, refined as a border"
 
 
 def advice_lines(report: dict[str, Any]) -> list[str]:
@@ -165,10 +261,16 @@ def advice_lines(report: dict[str, Any]) -> list[str]:
 
 
 def _kind(name: str, path: Path) -> str:
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in KINDS:
-        raise InvalidParameter(name, f"{path}: the extension must be one of {', '.join(KINDS)}")
+    kind = kind_of(path.name)
+    if kind is None:
+        choices = ", ".join((*KINDS, *ALIASES))
+        raise InvalidParameter(name, f"{path}: the extension must be one of {choices}")
     return kind
+
+
+def _check_kind(name: str, kind: str) -> None:
+    if kind not in KINDS:
+        raise InvalidParameter(name, f"{kind}: it must be one of {', '.join(KINDS)}")
 
 
 @dataclass(frozen=True)
@@ -187,30 +289,11 @@ def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) ->
         return Written(glb, report, faces)
     if target == "gltf":
         return Written(as_gltf_json(glb, limits), report, faces)
-    triangles, changes = flatten(glb, target, limits)
-    if target not in formats.HOLDS_DOUBLE:
-        changes += rounding_changes(triangles)
+    mesh, changes = flatten(glb, target, limits)
+    kept, lost = held(mesh, target)
     # A mesh that several nodes show is there several times.
-    return Written(
-        formats.write(triangles, target), _with_changes(report, changes), len(triangles.faces)
-    )
-
-
-def _of_triangles(
-    refined: IndexedTriangles, report: dict[str, Any], target: str, options: Options
-) -> Written:
-    changes = [] if target in formats.HOLDS_DOUBLE else rounding_changes(refined)
-    if refined.uv is not None and target not in formats.HOLDS_UV:
-        what = f"texture coordinates dropped: not written to {target.upper()} files"
-        changes.append(Change("", what, 1))
-    if options.diagnostics == "full":
-        changes.append(Change("", "values at vertices dropped: only a glTF's are kept", 1))
-    if options.normals not in ("auto", "keep"):
-        changes.append(Change("", "normals dropped: only a glTF's are written", 1))
-    if options.compress != "none":
-        changes.append(Change("", "not compressed: only a glTF is", 1))
-    report = _with_changes(report, changes)
-    return Written(formats.write(refined, target), report, len(refined.faces))
+    report = _with_changes(report, [*changes, *lost])
+    return Written(FORMATS[target].write(kept), report, len(kept.faces))
 
 
 def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:

@@ -1,113 +1,111 @@
-"""How many triangles a mesh file will give, counted without reading it."""
+"""How many triangles a mesh file will give, counted without reading its numbers."""
 
 from __future__ import annotations
 
-import re
-from typing import NamedTuple
+from collections.abc import Iterator
 
 import numpy as np
 from jaxtyping import Int, UInt8
 
-from .obj_text import with_line_feeds
-from .ply.header import ply_header
-from .text_pieces import COMMENT, pieces_from_end, without
+from ..errors import UnreadableError
+from . import stl
+from .ply import POLYGON, ply_header
+from .text import count_words, plain_letters, plain_text
 
 # Of what tells no counts, and will hardly be read.
 BYTES_PER_FACE = 30
-# A face of an STL as text: a normal, three vertices, and the words that name and enclose them.
-WORDS_PER_STL_FACE = 21
-STL_HEADER, STL_FACE = 84, 50
-
-# Nothing that was passed over is tried again: to remember it would take a hundred times its size.
-_OFF_COUNTS = re.compile(
-    rb"(?:\xef\xbb\xbf)?\s*+(?:ST)?C?N?OFF\b(?:\s++|#[^\n]*+\n)*+\d{1,18}\s++(\d{1,18})\b"
-)
-_LINE_END, _SPACE, _FACE = b"\n f"
-# The letter f; a polygon's count of corners. Each corner beyond the second makes a triangle.
+# A facet of an STL as text: a normal, three vertices, and the words that name and enclose them.
+WORDS_PER_FACET = 21
+# What is cut into words in one go, which takes many times its size.
+PIECE = 2**18
+# Each corner beyond the second makes a triangle; a keyword or a count stands before them.
 _WORDS_BESIDE_TRIANGLES = 3
+# Where counts are looked for, and how far lines are looked for that go on.
+START = 2**20
 
 
 def count_triangles(data: bytes, kind: str) -> int:
     """Return about how many triangles a mesh file's polygons make.
 
     Text is counted by the words of its lines, binary files by the bytes of their faces: polygons of
-    many corners share vertices, and their triangles take a few bytes each. Others go by their size.
+    many corners share vertices, and their triangles take a few bytes each.
     """
-    if kind == "obj":
-        # A line that goes on in the next is one; of the same length, nothing is moved.
-        text = without(COMMENT, with_line_feeds(data))
-        text = text.replace(b"\\\n", b"  ").replace(b"\\\r\n", b"   ")
-        pieces = map(_lines, pieces_from_end(text))
-        return sum(_triangles(piece.words[piece.firsts == _FACE]) for piece in pieces)
     if kind == "stl":
-        return _of_stl(data)
-    if kind == "off":
-        counts = _OFF_COUNTS.match(data)
-        return _by_size(data) if counts is None else _in_last_lines(data, int(counts[1]))
-    header = ply_header(data) if kind == "ply" else None
-    faces = None if header is None else header.faces_at()
-    places = None if faces is None else faces[0].polygons()
-    if header is None or faces is None or places is None:
-        return _by_size(data)
-    (element, begin), (before, polygon, behind) = faces, places
-    if header.order is None:
-        return _in_last_lines(data, element.rows)
-    beside = before + np.dtype(polygon.count_kind).itemsize + behind
-    corners = (len(data) - begin - element.rows * beside) // polygon.size
-    return max(corners - 2 * element.rows, 0)
-
-
-def is_binary_stl(data: bytes) -> bool:
-    """Return whether the count of faces agrees with the length: text may begin in any way."""
-    return len(data) == STL_HEADER + STL_FACE * int.from_bytes(data[80:STL_HEADER], "little")
-
-
-def _of_stl(data: bytes) -> int:
-    if is_binary_stl(data):
-        return (len(data) - STL_HEADER) // STL_FACE
-    words = sum(int(piece.words.sum()) for piece in map(_lines, pieces_from_end(data)))
-    return words // WORDS_PER_STL_FACE
-
-
-def _by_size(data: bytes) -> int:
+        text = stl.is_text(data)
+        return count_words(data) // WORDS_PER_FACET if text else stl.count_facets(data)
+    if kind == "ply":
+        return _of_ply(data)
+    text = plain_text(data)
+    if kind == "obj":
+        return sum(_triangles(words[firsts == ord("f")]) for words, firsts in _lines(text))
+    start = plain_letters(text[:START], continued=False)[0].tobytes()
+    numbers = start.partition(b"OFF")[2].split(maxsplit=2)[:2]
+    if len(numbers) == 2 and numbers[1].isdigit():
+        return _in_last_lines(text, int(numbers[1]))
     return len(data) // BYTES_PER_FACE
 
 
-def _in_last_lines(data: bytes, polygons: int) -> int:
+def _of_ply(data: bytes) -> int:
+    """Count by the header: in text the lines of faces come last, else by their bytes."""
+    try:
+        header = ply_header(data)
+    except UnreadableError:
+        return len(data) // BYTES_PER_FACE
+    faces = next((element for element in header.elements if element.name == "face"), None)
+    polygon = next((p for p in faces.properties if p.name in POLYGON), None) if faces else None
+    if faces is None or polygon is None or polygon.count_kind is None:
+        # Strips: an index makes a triangle.
+        return (len(data) - header.end) // 4
+    if header.order is None:
+        return _in_last_lines(plain_text(data[header.end :]), faces.rows)
+    beside = sum(int((p.count_kind or p.kind)[1]) for p in faces.properties)
+    others = sum(
+        e.rows * sum(int(p.kind[1]) for p in e.properties)
+        for e in header.elements
+        if e is not faces and not any(p.count_kind for p in e.properties)
+    )
+    left = len(data) - header.end - others - faces.rows * beside
+    return max(left // int(polygon.kind[1]) - 2 * faces.rows, 0)
+
+
+def _lines(text: bytes) -> Iterator[tuple[Int[np.ndarray, " L"], UInt8[np.ndarray, " L"]]]:
+    """Yield how many words lines have, and their first letters, some lines at a time, last first.
+
+    Lines without words are left out; those that go on in the next are one.
+    """
+    end = len(text)
+    while end:
+        begin = text.rfind(b"\n", 0, max(end - PIECE, 0)) + 1
+        while text[begin - 2 : begin] == b"\\\n" and end - begin < START:
+            begin = text.rfind(b"\n", 0, begin - 1) + 1
+        letters, ends = plain_letters(text[begin:end], continued=True)
+        begins = letters > ord(" ")
+        begins[1:] &= letters[:-1] <= ord(" ")
+        starts = np.append(0, ends + 1)
+        starts = starts[starts < len(letters)]
+        end = begin
+        if len(starts) <= 1:
+            # Long perhaps: no place of each word.
+            words = np.array([np.count_nonzero(begins)])
+            firsts = letters[[int(begins.argmax())]] if len(letters) else letters
+            yield words[words > 0], firsts[: int(words[0] > 0)]
+            continue
+        words = np.add.reduceat(begins, starts, dtype=np.int64)
+        words = words[words > 0]
+        yield words, letters[np.flatnonzero(begins)[np.cumsum(words) - words]]
+
+
+def _in_last_lines(text: bytes, polygons: int) -> int:
     """Count the triangles of so many polygons, which come last."""
     triangles, left = 0, polygons
-    for piece in map(_lines, pieces_from_end(data)):
-        words = piece.words[max(len(piece.words) - left, 0) :]
+    for words, _ in _lines(text):
+        words = words[-left:]
         triangles += _triangles(words)
         left -= len(words)
-        if left == 0:
+        if left <= 0:
             break
     return triangles
 
 
 def _triangles(words: Int[np.ndarray, " L"]) -> int:
     return int(np.maximum(words - _WORDS_BESIDE_TRIANGLES, 0).sum())
-
-
-class _Lines(NamedTuple):
-    """Lines with words in them: how many each has, and the letter that the first begins with."""
-
-    words: Int[np.ndarray, " L"]
-    firsts: UInt8[np.ndarray, " L"]
-
-
-def _lines(text: bytes) -> _Lines:
-    letters = np.frombuffer(text, dtype=np.uint8)
-    if not len(letters):
-        return _Lines(np.zeros(0, dtype=np.int64), letters)
-    begins = letters > _SPACE
-    begins[1:] &= letters[:-1] <= _SPACE
-    lines = np.append(0, np.flatnonzero(letters[:-1] == _LINE_END) + 1)
-    if len(lines) == 1:
-        # Long perhaps: neither a number for each letter nor one for each word.
-        words = np.array([np.count_nonzero(begins)])
-        return _Lines(words[words > 0], letters[[int(begins.argmax())]][words > 0])
-    words = np.add.reduceat(begins, lines, dtype=np.int64)
-    places = np.flatnonzero(begins)
-    firsts = letters[places[np.searchsorted(places, lines[words > 0])]]
-    return _Lines(words[words > 0], firsts)

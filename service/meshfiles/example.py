@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from .indexed_triangles import IndexedTriangles
+from .mesh_file import UV, MeshFile, of_triangles
 from .triangles_glb import triangles_glb
 
 TEETH = 12
@@ -52,11 +52,13 @@ STEEL = {
 
 def part_glb() -> bytes:
     """Return the part as a GLB with normals, texture coordinates and a material."""
-    triangles = part()
-    return triangles_glb(triangles, material=STEEL, normals=_smooth_normals(triangles))
+    mesh = part()
+    normals = _smooth_normals(mesh)
+    shaded = of_triangles(mesh.vertices, mesh.faces, mesh.layers[UV].values, normals)
+    return triangles_glb(shaded, material=STEEL)
 
 
-def part() -> IndexedTriangles:
+def part() -> MeshFile:
     """Return a closed surface of genus 1: the section swept around y, cut at the UV seams."""
     columns, rows = TEETH * len(CREST), len(SECTION)
     # One column and one row more than the surface has: the seams' second sides.
@@ -67,7 +69,7 @@ def part() -> IndexedTriangles:
     angle = 2 * np.pi * (column % columns) / columns
     vertices = np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], axis=-1)
     uv = np.stack([column / columns, _arc_length()[row]], axis=-1)
-    return IndexedTriangles(vertices.reshape(-1, 3), _faces(columns, rows), uv.reshape(-1, 2))
+    return of_triangles(vertices.reshape(-1, 3), _faces(columns, rows), uv.reshape(-1, 2))
 
 
 def _faces(columns: int, rows: int) -> Int[np.ndarray, "F 3"]:
@@ -87,7 +89,7 @@ def _arc_length() -> Float[np.ndarray, " R"]:
     return np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
 
 
-def _smooth_normals(triangles: IndexedTriangles) -> Float[np.ndarray, "N 3"]:
+def _smooth_normals(triangles: MeshFile) -> Float[np.ndarray, "N 3"]:
     """Return area-weighted normals, equal on both sides of the seams."""
     _, welded = np.unique(triangles.vertices, axis=0, return_inverse=True)
     a, b, c = triangles.vertices[triangles.faces].transpose(1, 0, 2)

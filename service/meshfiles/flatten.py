@@ -1,37 +1,54 @@
-"""A glTF scene as plain triangles, for formats that know no nodes; says what is lost on the way."""
+"""A glTF scene as plain triangles, for formats that know no nodes; reports what is lost."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int, Shaped
 
-from pns_common.rows import disjoint_faces
+from pns_common.rows import disjoint_faces, unit
 
-from ..errors import UnrefinableError
-from ..gltf.constants import SURFACES, TRIANGLES
+from ..errors import GltfError, UnrefinableError, check_limit
+from ..gltf.constants import FLOAT, SURFACES, TRIANGLES
+from ..gltf.read.accessors import as_float, read
 from ..gltf.read.extensions import INSTANCING
 from ..gltf.read.primitives import TrianglePrimitive, read_primitive
 from ..gltf.read.schema import Document
-from ..gltf.read.upload import read_upload
+from ..gltf.read.upload import Upload, read_upload
 from ..gltf.refine.columns import read_skin_and_morph
 from ..meshes.weld import weld
 from ..options import Limits
 from ..report import Change
-from .formats import HOLDS_UV
-from .indexed_triangles import IndexedTriangles
+from .formats import FORMATS, Format
+from .mesh_file import (
+    COLOUR,
+    MATERIAL,
+    NONE,
+    NORMAL,
+    OBJECT,
+    UV,
+    Labels,
+    Layer,
+    MeshFile,
+    of_triangles,
+)
+from .obj import as_fractions
 from .pose import joint_matrices, posed
 
 TRANSFORM, VISIBILITY = "KHR_texture_transform", "KHR_node_visibility"
-LOST = ("materials", "textures", "images", "animations", "skins", "cameras", "extensions")
+LOST = ("textures", "images", "animations", "skins", "cameras", "extensions")
+_COPY_ATTRIBUTES = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
 
 
-def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, list[Change]]:
+def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[MeshFile, list[Change]]:
     """Return the default scene's triangles in the world, and what a file of `kind` is not given.
 
     Raises:
         ServiceError: the file cannot be read, or its scene shows no triangles.
+        LimitError: the copies of its meshes have more than `max_faces`.
     """
     upload = read_upload(glb, "glb", 0, limits)
     primitives = {
@@ -41,23 +58,28 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, li
         ]
         for mesh in upload.plans
     }
+    faces = {mesh.mesh: mesh.faces for mesh in upload.plans}
     worlds, hidden = _placed_nodes(upload.tree)
-    placed = [
-        (
-            primitives[mesh],
-            _shown_weights(upload.document, node, mesh),
-            worlds[node],
-            joint_matrices(upload, node, worlds),
-        )
+    shown = [
+        (node, mesh)
         for node in worlds
         if (mesh := upload.document.nodes[node].mesh) in primitives and node not in hidden
     ]
-    if not placed:
+    if not shown:
         raise UnrefinableError("the default scene shows no triangles")
-    names = [set(p.attributes) for shown, *_ in placed for p in shown]
-    keeps_uv = kind in HOLDS_UV and all("TEXCOORD_0" in name for name in names)
-    mesh_file = _joined([_placed(*where, keeps_uv=keeps_uv) for where in placed])
-    changes = _changes(upload.tree, len(placed), names, kind, keeps_uv=keeps_uv)
+    total = sum(faces[mesh] * _copy_count(upload, node) for node, mesh in shown)
+    check_limit("faces", total, limits.max_faces, f"the scene with all copies has {total} faces")
+    placed: list[_Placed] = []
+    for node, mesh in shown:
+        weights = _shown_weights(upload.document, node, mesh)
+        joints = joint_matrices(upload, node, worlds)
+        name = str(upload.tree["nodes"][node].get("name", f"node {node}"))
+        for copy in _copies(upload, node):
+            where = _Where(name, worlds[node] @ copy, weights, joints)
+            placed.append(_place(upload.tree, mesh, primitives[mesh], where))
+    mesh_file = _joined(upload.tree, placed, FORMATS[kind])
+    names = [set(p.attributes) for _, mesh in shown for p in primitives[mesh]]
+    changes = _changes(upload.tree, len(placed), names, kind)
     left = {n for n, node in enumerate(upload.document.nodes) if node.mesh in primitives}
     for what, count in (
         ("hidden nodes", len(left & hidden)),
@@ -66,6 +88,75 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[IndexedTriangles, li
         if count:
             changes.append(Change("/nodes", f"{what} left out", count))
     return mesh_file, changes
+
+
+def _copy_count(upload: Upload, node: int) -> int:
+    """Return how many copies of its mesh a node shows.
+
+    Raises:
+        GltfError: the extension names no accessors, or some of different lengths.
+    """
+    counts = {upload.document.accessors[index].count for index in _copied(upload, node).values()}
+    if len(counts) > 1:
+        raise GltfError("copies need as many values of each kind", pointer=_pointer(node))
+    return counts.pop() if counts else 1
+
+
+def _copied(upload: Upload, node: int) -> dict[str, int]:
+    """Return the accessors that place a node's copies, by name; none of a node without copies."""
+    instances = upload.document.nodes[node].extensions.get(INSTANCING)
+    if instances is None:
+        return {}
+    attributes = instances.get("attributes", {}) if isinstance(instances, dict) else None
+    accessors = upload.document.accessors
+    if not isinstance(attributes, dict) or not all(
+        isinstance(index, int) and 0 <= index < len(accessors) for index in attributes.values()
+    ):
+        raise GltfError("attributes must name accessors", pointer=_pointer(node))
+    for name, shape in _COPY_ATTRIBUTES.items():
+        if name in attributes and accessors[attributes[name]].type != shape:
+            raise GltfError(f"{name} must be {shape}", pointer=_pointer(node))
+    return attributes
+
+
+def _pointer(node: int) -> str:
+    return f"/nodes/{node}/extensions/{INSTANCING}"
+
+
+def _copies(upload: Upload, node: int) -> Float[np.ndarray, "N 4 4"]:
+    """Return the matrices of a node's copies, in its own space: one that moves nothing without."""
+    indices = _copied(upload, node)
+    values = {name: _floats(upload, indices[name]) for name in _COPY_ATTRIBUTES if name in indices}
+    matrices = np.tile(np.eye(4), (_copy_count(upload, node), 1, 1))
+    if "ROTATION" in values:
+        lengths = np.linalg.norm(values["ROTATION"], axis=1, keepdims=True)
+        matrices[:, :3, :3] = _rotations(values["ROTATION"] / np.where(lengths > 0, lengths, 1))
+    if "SCALE" in values:
+        matrices[:, :3, :3] *= values["SCALE"][:, None, :]
+    if "TRANSLATION" in values:
+        matrices[:, :3, 3] = values["TRANSLATION"]
+    if not np.isfinite(matrices).all():
+        raise GltfError("a copy is placed by NaN or infinity", pointer=_pointer(node))
+    return matrices
+
+
+def _floats(upload: Upload, index: int) -> Float[np.ndarray, "N K"]:
+    accessor = upload.document.accessors[index]
+    values = read(upload.document, upload.buffers, index)
+    if accessor.component_type == FLOAT:
+        return values.astype(np.float64)
+    return as_float(values, normalized=accessor.normalized).astype(np.float64)
+
+
+def _rotations(quaternions: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 3 3"]:
+    """Return the matrices of unit quaternions x, y, z, w."""
+    x, y, z, w = quaternions.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def _placed_nodes(tree: dict[str, Any]) -> tuple[dict[int, Float[np.ndarray, "4 4"]], set[int]]:
@@ -110,14 +201,8 @@ def _children(nodes: list[dict[str, Any]]) -> list[int]:
 def _local_matrix(node: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    quaternion = np.array([node.get("rotation", (0.0, 0.0, 0.0, 1.0))], dtype=np.float64)
+    rotation = _rotations(quaternion)[0]
     matrix = np.eye(4)
     matrix[:3, :3] = rotation * np.array(node.get("scale", (1.0, 1.0, 1.0)))
     matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
@@ -130,71 +215,175 @@ def _shown_weights(document: Document, node: int, mesh: int) -> list[float]:
     return document.meshes[mesh].weights if own is None else own
 
 
-def _placed(
-    primitives: list[TrianglePrimitive],
-    weights: list[float],
-    matrix: Float[np.ndarray, "4 4"],
-    joints: Float[np.ndarray, "J 4 4"] | None,
-    *,
-    keeps_uv: bool,
-) -> IndexedTriangles:
-    """Place one mesh in the world; closed at its seams where nothing is left to tell them by."""
+@dataclass(frozen=True, eq=False)
+class _Where:
+    """Where a copy of a mesh stands: its node's name, its matrix, its morphs, and its joints."""
+
+    name: str
+    matrix: Float[np.ndarray, "4 4"]
+    weights: list[float]
+    joints: Float[np.ndarray, "J 4 4"] | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """A mesh in the world.
+
+    Attributes:
+        name: of its node.
+        vertices, faces: closed at its seams.
+        layers: by name for each of its primitives values, or None.
+        rows: for each primitive the rows of its values at its corners.
+        materials: for each primitive its material, or NONE.
+    """
+
+    name: str
+    vertices: Float[np.ndarray, "V 3"]
+    faces: Int[np.ndarray, "F 3"]
+    layers: dict[str, list[Shaped[np.ndarray, "N K"] | None]]
+    rows: list[Int[np.ndarray, " C"]]
+    materials: list[int]
+
+
+def _place(
+    tree: dict[str, Any], mesh: int, primitives: list[TrianglePrimitive], where: _Where
+) -> _Placed:
     positions = np.concatenate([p.attributes["POSITION"] for p in primitives]).astype(np.float64)
     follows = read_skin_and_morph(primitives)
-    for weight, delta in zip(weights, follows.deltas, strict=False):
+    for weight, delta in zip(where.weights, follows.deltas, strict=False):
         positions += weight * delta.astype(np.float64)
     faces = disjoint_faces((p.corners, len(p.attributes["POSITION"])) for p in primitives)
-    uv = np.concatenate([_uv(p) for p in primitives]) if keeps_uv else None
-    rows = np.arange(len(positions))
-    if uv is None:
-        welded = weld(positions, faces)
-        used = np.flatnonzero(welded.vertex_of >= 0)[::-1]
-        rows = np.empty(len(welded.points), dtype=np.int64)
-        rows[welded.vertex_of[used]] = used
-        positions, faces = welded.points, welded.faces
-    world = positions @ matrix[:3, :3].T + matrix[:3, 3]
-    if joints is not None and follows.binding is not None:
-        world = posed(positions, follows.binding.take(rows), joints, placed=world)
-        matrix = joints[0]
-    if np.linalg.det(matrix[:3, :3]) < 0:
-        # A mirroring node turns faces over; their order of corners keeps them facing outwards.
-        faces = faces[:, ::-1]
-    return IndexedTriangles(world, faces, uv)
-
-
-def _joined(parts: list[IndexedTriangles]) -> IndexedTriangles:
-    uvs = [part.uv for part in parts if part.uv is not None]
-    return IndexedTriangles(
-        np.concatenate([part.vertices for part in parts]),
-        disjoint_faces((part.faces, len(part.vertices)) for part in parts),
-        np.concatenate(uvs) if uvs else None,
+    welded = weld(positions, faces, follows.labels)
+    used = np.flatnonzero(welded.vertex_of >= 0)[::-1]
+    rows = np.empty(len(welded.points), dtype=np.int64)
+    rows[welded.vertex_of[used]] = used
+    matrix = where.matrix
+    world = welded.points @ matrix[:3, :3].T + matrix[:3, 3]
+    if where.joints is not None and follows.binding is not None:
+        world = posed(welded.points, follows.binding.take(rows), where.joints, placed=world)
+        matrix = where.joints[0]
+    # A mirroring node turns faces over; their order of corners keeps them facing outwards.
+    mirrored = np.linalg.det(matrix[:3, :3]) < 0
+    turn = slice(None, None, -1 if mirrored else 1)
+    given = tree["meshes"][mesh]["primitives"]
+    materials = [given[p.number].get("material", NONE) for p in primitives]
+    layers: dict[str, list[Shaped[np.ndarray, "N K"] | None]] = {UV: [], NORMAL: [], COLOUR: []}
+    for primitive, material in zip(primitives, materials, strict=True):
+        attributes = primitive.attributes
+        layers[UV].append(_uv(primitive, tree["materials"][material] if material >= 0 else {}))
+        # What a skin turns is written without: normals follow its joints one by one.
+        normals = attributes.get("NORMAL") if where.joints is None else None
+        layers[NORMAL].append(None if normals is None else _turned(normals, matrix))
+        layers[COLOUR].append(attributes.get("COLOR_0"))
+    for name in dict.fromkeys(n for p in primitives for n in p.attributes if n.startswith("_")):
+        layers[name] = [p.attributes.get(name) for p in primitives]
+    return _Placed(
+        where.name,
+        world,
+        welded.faces[:, turn],
+        layers,
+        [p.corners[:, turn].reshape(-1) for p in primitives],
+        materials,
     )
 
 
-def _uv(primitive: TrianglePrimitive) -> Float[np.ndarray, "N 2"]:
-    values = primitive.attributes["TEXCOORD_0"]
-    scale = 1 if values.dtype.kind == "f" else np.iinfo(values.dtype).max
-    u, v = values.astype(np.float64).T / scale
+def _turned(
+    normals: Float[np.ndarray, "N 3"], matrix: Float[np.ndarray, "4 4"]
+) -> Float[np.ndarray, "N 3"]:
+    """Return normals as a matrix turns them: by its cofactors, which keep them outward."""
+    x, y, z = matrix[:3, :3]
+    cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
+    sign = np.sign(np.linalg.det(matrix[:3, :3])) or 1.0
+    return unit(sign * normals.astype(np.float64) @ cofactors.T)
+
+
+def _uv(primitive: TrianglePrimitive, material: dict[str, Any]) -> Float[np.ndarray, "N 2"] | None:
+    """Return the coordinates that a material's colour is looked up by, as it transforms them."""
+    info = material.get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
+    transform = info.get("extensions", {}).get(TRANSFORM, {})
+    number = transform.get("texCoord", info.get("texCoord", 0))
+    values = primitive.attributes.get(f"TEXCOORD_{number}", primitive.attributes.get("TEXCOORD_0"))
+    if values is None:
+        return None
+    u, v = values.astype(np.float64).T
+    (su, sv), (ou, ov) = transform.get("scale", (1, 1)), transform.get("offset", (0, 0))
+    angle = transform.get("rotation", 0)
+    c, s = np.cos(angle), np.sin(angle)
+    u, v = c * su * u + s * sv * v + ou, c * sv * v - s * su * u + ov
     # glTF counts v downwards.
     return np.column_stack([u, 1 - v])
 
 
-def _changes(
-    tree: dict[str, Any], placed: int, names: list[set[str]], kind: str, *, keeps_uv: bool
-) -> list[Change]:
-    # Some of them know more: they are given positions, faces and, OBJ and PLY, one set of UVs.
+def _joined(tree: dict[str, Any], placed: Sequence[_Placed], form: Format) -> MeshFile:
+    """Return all copies as one mesh, with what a format has room for."""
+    names = dict.fromkeys(name for part in placed for name in part.layers)
+    layers: dict[str, Layer] = {}
+    for name in names:
+        if form.layers is not None and name not in form.layers:
+            continue
+        values: list[Shaped[np.ndarray, "N K"]] = []
+        rows: list[Int[np.ndarray, " C"]] = []
+        total = 0
+        for part in placed:
+            own = part.layers.get(name, [None] * len(part.rows))
+            for column, corners in zip(own, part.rows, strict=True):
+                rows.append(np.full(len(corners), NONE) if column is None else corners + total)
+                if column is not None:
+                    values.append(column)
+                    total += len(column)
+        if values:
+            layers[name] = Layer(_alike(values), np.concatenate(rows))
+    of_face = [np.full(len(part.faces), number) for number, part in enumerate(placed)]
+    labels = {OBJECT: Labels(tuple(part.name for part in placed), np.concatenate(of_face))}
+    of_face = [
+        np.full(len(corners) // 3, material)
+        for part in placed
+        for corners, material in zip(part.rows, part.materials, strict=True)
+    ]
+    materials = [
+        str(entry.get("name", f"material {number}"))
+        for number, entry in enumerate(tree.get("materials", []))
+    ]
+    if materials:
+        labels[MATERIAL] = Labels(tuple(materials), np.concatenate(of_face))
+    labels = {kind: label for kind, label in labels.items() if kind in form.labels}
+    faces = disjoint_faces((part.faces, len(part.vertices)) for part in placed)
+    made = of_triangles(np.concatenate([part.vertices for part in placed]), faces)
+    return MeshFile(made.vertices, made.offsets, made.corners, layers, labels=labels)
+
+
+def _alike(values: list[Shaped[np.ndarray, "N K"]]) -> Shaped[np.ndarray, "M K"]:
+    """Join values of one name: colours of different types become fractions with opacity."""
+    if len({(column.dtype, column.shape[1]) for column in values}) == 1:
+        return np.concatenate(values)
+    width = max(column.shape[1] for column in values)
+    return np.concatenate(
+        [
+            np.pad(
+                as_fractions(column).astype(np.float64),
+                ((0, 0), (0, width - column.shape[1])),
+                constant_values=1.0,
+            )
+            for column in values
+        ]
+    )
+
+
+def _changes(tree: dict[str, Any], placed: int, names: list[set[str]], kind: str) -> list[Change]:
+    """Return what no format of plain meshes is given; what one of them cannot hold, it reports."""
     why = f": not written to {kind.upper()} files"
     changes = [
         Change(f"/{name}", f"{name} dropped{why}", len(tree[name]))
         for name in LOST
         if tree.get(name)
     ]
+    named = "definitions of materials" if MATERIAL in FORMATS[kind].labels else "materials"
     changes += [
         Change(pointer, f"{what} dropped{why}", count)
         for pointer, what, count in (
+            ("/materials", named, len(tree.get("materials", []))),
             ("/meshes", "morph targets", _count_targets(tree)),
             ("/meshes", "points and lines", _count_other_modes(tree)),
-            ("/nodes", f"copies by {INSTANCING}", _count_copies(tree)),
         )
         if count
     ]
@@ -203,18 +392,16 @@ def _changes(
         changes.append(Change("/nodes", "nodes with several parents placed once, by one", again))
     if placed > 1:
         changes.append(Change("/nodes", "nodes joined into one mesh in world space", placed))
-    lost = set[str]().union(*names) - {"POSITION"}
-    if keeps_uv:
-        lost.discard("TEXCOORD_0")
-        if TRANSFORM in tree.get("extensionsUsed", []):
-            what = f"texture coordinates written as they are stored: {TRANSFORM} is not applied"
-            changes.append(Change("/materials", what, 1))
+    form = FORMATS[kind]
+    kept = {"POSITION", *((UV, NORMAL, COLOUR) if form.layers is None else form.layers)}
+    lost = {
+        name
+        for own in names
+        for name in own - kept
+        if not (form.layers is None and name.startswith("_"))
+    }
     changes += [
-        Change(
-            "/meshes",
-            f"attribute {name} dropped{why}",
-            sum(name in own for own in names),
-        )
+        Change("/meshes", f"attribute {name} dropped{why}", sum(name in own for own in names))
         for name in sorted(lost)
     ]
     return changes
@@ -237,17 +424,3 @@ def _count_other_modes(tree: dict[str, Any]) -> int:
         for mesh in tree.get("meshes", [])
         for primitive in mesh.get("primitives", [])
     )
-
-
-def _count_copies(tree: dict[str, Any]) -> int:
-    """Return how many copies the nodes ask for; one of a node that does not say."""
-    accessors, copies = tree.get("accessors", []), 0
-    for node in tree.get("nodes", []):
-        instances = node.get("extensions", {}).get(INSTANCING)
-        if instances is None:
-            continue
-        attributes = instances.get("attributes") if isinstance(instances, dict) else None
-        numbers = attributes.values() if isinstance(attributes, dict) else ()
-        known = (n for n in numbers if isinstance(n, int) and 0 <= n < len(accessors))
-        copies += next((accessors[number]["count"] for number in known), 1)
-    return copies

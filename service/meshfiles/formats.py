@@ -1,209 +1,197 @@
-"""OBJ, PLY, STL and OFF: triangles in and out, with what each format can hold."""
+"""The formats of plain meshes: how each is read and written, and what it can hold."""
 
 from __future__ import annotations
 
-import io
-import logging
-import re
-import warnings
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
-from pns_common.rows import disjoint_faces
+from pns_common.mesh import repeated_vertex
+from pns_common.rows import distinct_rows, marked
 
-from ..bodies.media import GLTF_KINDS
 from ..errors import UnreadableError, UnrefinableError
-from . import unsupported
-from .counted import is_binary_stl
-from .indexed_triangles import NUMBER, IndexedTriangles
-from .obj_text import usual_obj, with_line_feeds, written_anew
+from ..meshes.far_from_origin import STEPS, faces_too_far
+from ..meshes.weld import canonical_zero
+from ..report import Change
+from .mesh_file import COLOUR, GROUP, MATERIAL, NORMAL, OBJECT, SMOOTHING, UV, MeshFile
+from .obj import as_fractions, read_obj, write_obj
 from .off import read_off, write_off
-from .ply.polygons import of_triangles
-from .single_precision import LARGEST
-from .text_pieces import without
+from .parts import LARGEST, with_vertex_layers
+from .ply import read_ply, write_ply
+from .stl import is_text, read_stl, write_stl
+from .text import count_words
+from .triangulate import triangulated
 
-if TYPE_CHECKING:
-    import trimesh
-
-HOLDS_DOUBLE = frozenset({"obj", "off"})
-HOLDS_UV = frozenset({"obj", "ply", *GLTF_KINDS})
-
-_OBJ_PART = re.compile(rb"^[ \t]*(?:usemtl|o|g)(?:[ \t][^\n]*)?$", re.MULTILINE)
-_STL_PART = re.compile(rb"(?im)^[ \t]*(?:endsolid|solid)(?:[ \t][^\n]*)?\r?$")
-# trimesh gathers an OBJ's faces by material, the last first, and takes time in the square of the
-# parts that materials and names divide a file into. They are lost in any case: an OBJ's are passed
-# over before it reads, so that its faces stay in their order; an STL's beyond so many statements.
-MOST_PARTS = 100
+_SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
 
 
-def load_readers() -> ModuleType:
-    """Return trimesh. It is loaded when it is first needed: glTF files, and OFF, do without."""
-    import trimesh
+@dataclass(frozen=True)
+class Format:
+    """What a format can hold, and what reading takes.
 
-    # It logs a stack trace for a texture that it does not find; what is lost stands in the report.
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
-    return trimesh
+    Attributes:
+        layers: those of corners; None: any.
+        vertex_layers: those of which a vertex has one value.
+        face_values, labels: those of faces; None: any.
+        double: whether positions keep more digits than float32 has.
+        bytes_per_byte: memory that reading a binary file takes for each of its bytes.
+    """
+
+    read: Callable[[bytes], MeshFile]
+    write: Callable[[MeshFile], bytes]
+    bytes_per_byte: int = 0
+    layers: frozenset[str] | None = frozenset()
+    vertex_layers: frozenset[str] | None = frozenset()
+    face_values: frozenset[str] | None = frozenset()
+    labels: frozenset[str] = frozenset()
+    double: bool = False
 
 
-def read(data: bytes, kind: str) -> IndexedTriangles:
-    """Read a mesh file; its polygons are split into fans.
+FORMATS = {
+    "obj": Format(
+        read_obj,
+        write_obj,
+        layers=frozenset({UV, NORMAL, COLOUR}),
+        vertex_layers=frozenset({COLOUR}),
+        labels=frozenset({MATERIAL, GROUP, OBJECT, SMOOTHING}),
+        double=True,
+    ),
+    "off": Format(
+        read_off,
+        write_off,
+        layers=frozenset({UV, NORMAL, COLOUR}),
+        vertex_layers=None,
+        face_values=frozenset({COLOUR}),
+        double=True,
+    ),
+    "ply": Format(
+        read_ply, write_ply, bytes_per_byte=150, layers=None, vertex_layers=None, face_values=None
+    ),
+    "stl": Format(read_stl, write_stl, bytes_per_byte=12),
+}
+
+
+def memory_to_read(data: bytes, kind: str) -> int:
+    """Predict the bytes that reading takes at its peak, erring upwards.
+
+    A text takes them by its letters, its lines and its words, measured on the shortest of each.
+    """
+    binary = (kind == "stl" and not is_text(data)) or (kind == "ply" and b"ascii" not in data[:200])
+    if binary:
+        return FORMATS[kind].bytes_per_byte * len(data)
+    lines = data.count(b"\n") + data.count(b"\r")
+    return 8 * len(data) + 170 * lines + 130 * count_words(data)
+
+
+def read(data: bytes, kind: str) -> MeshFile:
+    """Read a mesh file as triangles.
 
     Raises:
         UnreadableError: not a file of this kind, or one without faces, or without all of them.
-        UnrefinableError: a face names a vertex that there is not.
+        UnrefinableError: a face names a vertex that there is not, or that is nowhere.
     """
-    triangles = read_off(data) if kind == "off" else _read_by_trimesh(data, kind)
-    faces, count = triangles.faces, len(triangles.vertices)
-    if len(faces) == 0:
+    mesh = FORMATS[kind].read(data)
+    count = len(mesh.vertices)
+    if len(mesh.corners) == 0:
         raise UnreadableError(f"the {kind.upper()} file has no faces of three vertices")
-    if not (faces.min() >= 0 and faces.max() < count):
-        worst = int(np.argmin(((faces >= 0) & (faces < count)).all(axis=1)))
+    if not (mesh.corners.min() >= 0 and mesh.corners.max() < count):
+        wrong = (mesh.corners < 0) | (mesh.corners >= count)
+        place = int(np.argmax(wrong))
+        face = int(np.searchsorted(mesh.offsets, place, "right")) - 1
         raise UnrefinableError(
-            f"the {kind.upper()} file has a triangle of the vertices {faces[worst].tolist()}, "
+            f"face {face} of the {kind.upper()} file names vertex {mesh.corners[place]}, "
             f"expected 0 … {count - 1}"
         )
-    return triangles
+    used = marked(mesh.corners, count)
+    wrong = np.flatnonzero(used & ~np.isfinite(mesh.vertices).all(axis=1))
+    if len(wrong):
+        raise UnrefinableError(
+            f"vertex {wrong[0]} of the {kind.upper()} file has a coordinate that is NaN or infinite"
+        )
+    unused = count - int(np.count_nonzero(used))
+    if unused:
+        told = Change("", "vertices dropped that no face uses", unused)
+        mesh = replace(mesh, changes=(*mesh.changes, told))
+    return triangulated(mesh)
 
 
-def _read_by_trimesh(data: bytes, kind: str) -> IndexedTriangles:
-    data, polygons = of_triangles(data) if kind == "ply" else (data, None)
-    data = with_line_feeds(data) if kind == "obj" else data
-    scene = _scene(data, kind)
-    parts = [part for part in scene.geometry.values() if isinstance(part, load_readers().Trimesh)]
-    if not parts:
-        # A binary one that is cut off, or goes on, is taken for text.
-        other = " as text up to endsolid, and is no whole binary STL" if kind == "stl" else ""
-        raise UnreadableError(f"the {kind.upper()} file has no faces{other}")
-    faces = disjoint_faces((np.asarray(part.faces), len(part.vertices)) for part in parts)
-    uv = _uv(parts)
-    count, unused, others = _beside_triangles(data, kind, parts, polygons, has_uv=uv is not None)
-    if kind == "ply" and polygons is None and count is not None and len(faces) < count:
-        # trimesh takes what is there of a text that was cut off.
-        raise UnreadableError(f"the PLY file says {count} faces and ends after {len(faces)}")
-    return IndexedTriangles(
-        vertices=np.concatenate([np.asarray(part.vertices, dtype=np.float64) for part in parts]),
-        faces=faces.astype(np.int64),
-        uv=uv,
-        unused=unused,
-        split=0 if count is None else max(0, len(faces) - count),
-        unsupported=others,
-    )
+def write(mesh: MeshFile, kind: str) -> bytes:
+    """Write the file's bytes: PLY and STL binary, OBJ and OFF text; what it cannot hold is lost."""
+    return FORMATS[kind].write(held(mesh, kind)[0])
 
 
-def write(mesh_file: IndexedTriangles, kind: str) -> bytes:
-    """Write the file's bytes: PLY and STL binary, OBJ and OFF text."""
-    if kind == "obj":
-        return _obj(mesh_file)
-    if kind == "off":
-        return write_off(mesh_file)
-    mesh = load_readers().Trimesh(
-        mesh_file.vertices, mesh_file.faces, process=False, validate=False
-    )
-    if kind == "ply" and mesh_file.uv is not None:
-        # As Blender and MeshLab name them.
-        mesh.vertex_attributes |= dict(zip("st", mesh_file.uv.astype(np.float32).T, strict=True))
-    exported: Any = mesh.export(file_type=kind)  # bytes for these kinds
-    return bytes(exported)
+def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
+    """Return what a format can hold of a mesh, and what it cannot.
 
-
-def _scene(data: bytes, kind: str) -> trimesh.Scene:
-    """Return what trimesh makes of the file."""
-    # Before warnings become errors: what it imports may warn.
-    readers = load_readers()
-    text = _as_utf8(data) if kind == "obj" or (kind == "stl" and not is_binary_stl(data)) else data
-    if kind == "obj":
-        text = without(_OBJ_PART, usual_obj(text))
-    if kind == "stl" and not is_binary_stl(data) and _parts(text) > MOST_PARTS:
-        text = b"solid\n" + without(_STL_PART, text) + b"\nendsolid\n"
-    try:
-        with warnings.catch_warnings():
-            # Where a number cannot be read, numpy warns and leaves out all that follows.
-            warnings.simplefilter("error")
-            # An STL's solids come apart; as they are listed, they make the file's triangles.
-            scene = readers.load_scene(io.BytesIO(text), file_type=kind, process=False)
-    except MemoryError:
-        raise
-    except Exception as error:
-        if kind == "obj":
-            # It names the line, if that is what is wrong.
-            written_anew(text)
-        # On a broken file these readers fail as it comes, with an UnboundLocalError for one.
-        raise UnreadableError(f"this is not a readable {kind.upper()} file") from error
-    if kind == "obj" and any(np.shape(part.vertices)[1] < 3 for part in scene.geometry.values()):
-        # All are cut to the length of the shortest: here, too, it is the line that is told.
-        written_anew(text)
-    return scene
-
-
-def _parts(text: bytes) -> int:
-    """Count the lines of an STL that begin or end a solid, one at a time."""
-    return sum(1 for _ in _STL_PART.finditer(text))
-
-
-def _as_utf8(data: bytes) -> bytes:
-    """Return the same text; names in old files are Latin-1, and geometry is ASCII in either."""
-    try:
-        data.decode()
-    except UnicodeDecodeError:
-        return data.decode("latin-1").encode()
-    return data
-
-
-def _uv(parts: list[trimesh.Trimesh]) -> Float[np.ndarray, "N 2"] | None:
-    """Return all parts' texture coordinates, if all have them: half a seam is not interpolated.
-
-    One number is none, nor is what float32 cannot hold.
+    Raises:
+        UnrefinableError: a position beyond the range of float32, where that is all it holds.
     """
-    of_parts = [getattr(part.visual, "uv", None) for part in parts]
-    for uv, part in zip(of_parts, parts, strict=True):
-        if uv is None or len(uv) != len(part.vertices) or np.shape(uv)[1:] < (2,):
-            return None
-        if not (np.abs(uv) <= LARGEST).all():
-            return None
-    return np.concatenate([uv for uv in of_parts if uv is not None])[:, :2].astype(np.float64)
+    form = FORMATS[kind]
+    why = f" dropped: not written to {kind.upper()} files"
+    layers, lost = dict(mesh.layers), dict[str, int]()
+    for name, layer in mesh.layers.items():
+        whole = kind == "obj" or layer.complete
+        if (form.layers is not None and name not in form.layers) or not whole:
+            lost[_SHOWN.get(name, f"attribute {name}")] = 1
+            del layers[name]
+    if kind == "obj" and COLOUR in layers:
+        if layers[COLOUR].complete:
+            alpha = (
+                layers[COLOUR].values.shape[1] == 4
+                and (as_fractions(layers[COLOUR].values)[:, 3] < 1).any()
+            )
+            lost |= {"opacity of vertex colours": 1} if alpha else {}
+        else:
+            del layers[COLOUR]
+            lost[_SHOWN[COLOUR]] = 1
+    values = {
+        name: column
+        for name, column in mesh.face_values.items()
+        if form.face_values is None or name in form.face_values
+    }
+    lost |= {
+        "colours of faces" if name == COLOUR else f"face property {name}": 1
+        for name in mesh.face_values.keys() - values.keys()
+    }
+    labels = {name: label for name, label in mesh.labels.items() if name in form.labels}
+    lost |= {
+        f"{name}s": len(mesh.labels[name].names) for name in mesh.labels.keys() - labels.keys()
+    }
+    changes = [Change("", what + why, count) for what, count in sorted(lost.items())]
+    libraries = mesh.libraries if MATERIAL in form.labels else ()
+    mesh = replace(mesh, layers=layers, face_values=values, labels=labels, libraries=libraries)
+    names = form.vertex_layers
+    mesh = with_vertex_layers(mesh, [*layers] if names is None else [*names])
+    if not (form.double or (kind == "ply" and mesh.double)):
+        changes += rounding_changes(mesh)
+    return mesh, changes
 
 
-def _beside_triangles(
-    data: bytes, kind: str, parts: list[trimesh.Trimesh], polygons: int | None, *, has_uv: bool
-) -> tuple[int | None, int, dict[str, int]]:
-    """Count the faces that the file lists (None: triangles only), and what is beside them.
+def rounding_changes(mesh: MeshFile) -> list[Change]:
+    """Count the faces to which float32 leaves no area, and those to which it leaves few steps.
 
-    That is vertices that no face names, where trimesh leaves them out, and, by name, all else.
-
-    `polygons` are those of a PLY that were cut before it was read.
+    Raises:
+        UnrefinableError: a position beyond the range of float32.
     """
-    match kind:
-        case "obj":
-            others = unsupported.of_obj(data)
-            coordinates = others.pop(unsupported.COORDINATES, 0)
-            if coordinates and not has_uv:
-                others["texture coordinates that not all faces have"] = coordinates
-            faces = unsupported.faces_of_obj(data)
-            if faces.sides:
-                others[unsupported.SIDES] = faces.sides
-            return faces.polygons, faces.unused, others
-        case "ply":
-            elements = parts[0].metadata["_ply_raw"]
-            if polygons is not None:
-                elements["face"]["length"] = polygons
-            others = unsupported.of_ply(data, elements, has_uv=has_uv)
-            return int(elements["face"]["length"]), 0, others
-        case "stl" if is_binary_stl(data):
-            return None, 0, unsupported.of_stl(data)
-        case _:
-            return None, 0, {}
+    if np.abs(mesh.vertices).max() > LARGEST:
+        raise UnrefinableError("positions leave the range of float32; write an OBJ or OFF file")
+    after = _without_area(mesh.vertices.astype(np.float32), mesh.faces)
+    # Most meshes have no such face, and then none that rounding makes.
+    before = _without_area(mesh.vertices, mesh.faces) if after.any() else after
+    rounding = "once positions are rounded to float32"
+    told = {
+        f"faces without an area {rounding}": int((after & ~before).sum()),
+        f"faces too far from the origin {rounding}: fewer than {STEPS} steps to a side": (
+            faces_too_far(mesh.vertices, mesh.faces)
+        ),
+    }
+    return [Change("", what, count) for what, count in told.items() if count]
 
 
-def _obj(mesh_file: IndexedTriangles) -> bytes:
-    text = io.StringIO()
-    np.savetxt(text, mesh_file.vertices, fmt=f"v {NUMBER} {NUMBER} {NUMBER}")
-    corner = mesh_file.faces + 1
-    if mesh_file.uv is None:
-        np.savetxt(text, corner, fmt="f %d %d %d")
-    else:
-        np.savetxt(text, mesh_file.uv, fmt=f"vt {NUMBER} {NUMBER}")
-        np.savetxt(text, np.repeat(corner, 2, axis=1), fmt="f %d/%d %d/%d %d/%d")
-    return text.getvalue().encode()
+def _without_area(
+    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
+) -> Bool[np.ndarray, " F"]:
+    """Return which faces have two corners in one place."""
+    return repeated_vertex(distinct_rows(canonical_zero(vertices))[faces])

@@ -1,101 +1,194 @@
-"""The Object File Format: text, faces with any number of corners.
+"""The Object File Format: text, faces with any number of corners, colours behind them.
 
-trimesh 5 stops at faces with more than four corners, and those are what OFF files are used for.
+trimesh and meshio stop at polygons, at headers that are not alone on their line, and at comments.
 """
 
 from __future__ import annotations
 
-import io
 import re
-from collections.abc import Iterator
-from itertools import chain, islice
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ..errors import UnreadableError
-from .fans import fans
-from .indexed_triangles import NUMBER, IndexedTriangles
-from .text_numbers import reals, whole
-from .text_pieces import COMMENT
-from .unsupported import SIDES
+from .mesh_file import COLOUR, NORMAL, UV, Layer, MeshFile, dropped, offsets_of
+from .text import NUMBER, Text, cut_text, plain_text, rows_text
 
-# Lines whose words are held at the same time.
-BLOCK = 2**14
-
-_HEADER = re.compile(rb"(?:\xef\xbb\xbf)?\s*((?:ST)?C?N?)OFF\b")
-_COUNTS = re.compile(rb"\s*(\d{1,18})\s+(\d{1,18})(?:[ \t]+\d+)?[ \t]*\r?\n")
-
+SIDES = "faces of fewer than three vertices"
+# The counts may be glued to it: hundreds of files of ModelNet40 begin with "OFF216 183 0".
+_HEADER = re.compile(rb"\s*(?:#[^\n]*\n\s*)*(ST)?(C)?(N)?(4)?OFF(?:[ \t]+(BINARY))?")
 _CUT_OFF = "the OFF file ends before its last face, or has none"
-_NO_FACE = "the OFF file has a face that is not a count and as many vertices"
 
 
-def read_off(data: bytes) -> IndexedTriangles:
-    """Read positions and faces, polygons split into fans; colours and normals are passed over.
+def read_off(data: bytes) -> MeshFile:
+    """Read positions and polygons, and the colours, normals and texture coordinates with them.
 
     Raises:
-        UnreadableError: not a text OFF file, or one without faces.
+        UnreadableError: not a text OFF file, or one without all of its faces.
     """
-    text = COMMENT.sub(b"", data)
-    header = _HEADER.match(text)
-    counts = _COUNTS.match(text, header.end() if header else 0)
-    if header is None or counts is None:
-        raise UnreadableError("this is not a readable OFF file: no header")
-    vertex_count, face_count = int(counts[1]), int(counts[2])
-    # Before anything is made of them: a vertex takes six bytes at least, a face two.
-    if 6 * vertex_count + 2 * face_count > len(text) + 1:
+    data = plain_text(data)
+    header = _HEADER.match(data)
+    if header is None:
+        raise UnreadableError("this is not an OFF file: it does not begin with OFF")
+    uv, colour, normal, w, binary = (group is not None for group in header.groups())
+    if binary:
+        raise UnreadableError("the OFF file is binary: only text is read")
+    text = cut_text(data[header.end() :], "OFF", data.count(b"\n", 0, header.end()))
+    # Vertices, faces, edges: the last is of no use, and some programs leave it out.
+    counts = text.numbers(np.arange(min(2, len(text.begins))), np.int64)
+    if len(counts) < 2:
+        raise UnreadableError("the OFF file has no counts of vertices and faces")
+    vertex_count, face_count = counts.tolist()
+    begin = 2 + _has_edge_count(text)
+    # Before anything is made of them: a vertex is three words at least, a face two.
+    words = len(text.begins) - begin
+    if min(vertex_count, face_count - 1) < 0 or 3 * vertex_count + 2 * face_count > words:
         raise UnreadableError(_CUT_OFF)
-    lines = (line.split() for line in text[counts.end() :].splitlines() if line.strip())
-    vertices = _vertices(lines, vertex_count)
-    # Faces differ in length, so they are read one by one.
-    polygons = [_corners(line) for line in islice(lines, face_count)]
-    if len(vertices) < vertex_count or len(polygons) < face_count or not polygons:
-        raise UnreadableError(_CUT_OFF)
-    sizes = np.array([len(polygon) for polygon in polygons])
-    try:
-        corners = np.array(list(chain.from_iterable(polygons)), dtype=np.int64)
-    except OverflowError as error:
-        raise UnreadableError(_NO_FACE) from error
-    extras = header[1].decode()
-    unsupported = {
-        f"values that {extras}OFF adds to vertices": vertex_count if extras else 0,
-        SIDES: int((sizes < 3).sum()),
+    table, at = _vertices(text, begin, vertex_count, 3 + w + 3 * normal + 2 * uv, colour)
+    widths = {"": 3, "w": w, NORMAL: 3 * normal, COLOUR: 0, UV: 2 * uv}
+    widths[COLOUR] = table.shape[1] - sum(widths.values())
+    columns = np.split(table, np.cumsum([*widths.values()])[:-1], axis=1)
+    parts = dict(zip(widths, columns, strict=True))
+    sizes, corners, of_faces = _faces(text, at, face_count)
+    lost: dict[str, int] = {}
+    if widths[COLOUR] not in (0, 3, 4):
+        lost["values of vertices"] = vertex_count
+        del parts[COLOUR]
+    proper = sizes >= 3
+    lost[SIDES] = int((~proper).sum())
+    face_values: dict[str, np.ndarray] = {}
+    if of_faces is None:
+        lost["colours of faces"] = face_count
+    elif of_faces.shape[1] > 0:
+        face_values[COLOUR] = _colours(of_faces[proper])
+    layers = {
+        name: Layer(parts[name], corners[np.repeat(proper, sizes)])
+        for name in (NORMAL, COLOUR, UV)
+        if name in parts and widths[name]
     }
-    return IndexedTriangles(
-        vertices,
-        fans(sizes, corners),
-        split=int(np.maximum(sizes - 3, 0).sum()),
-        unsupported={name: count for name, count in unsupported.items() if count},
+    if COLOUR in layers:
+        layers[COLOUR] = Layer(_colours(layers[COLOUR].values), layers[COLOUR].rows)
+    return MeshFile(
+        parts[""],
+        offsets_of(sizes[proper]),
+        corners[np.repeat(proper, sizes)],
+        layers,
+        face_values=face_values,
+        changes=dropped(lost),
     )
 
 
-def write_off(mesh_file: IndexedTriangles) -> bytes:
-    """Write the file's bytes."""
-    text = io.StringIO()
-    text.write(f"OFF\n{len(mesh_file.vertices)} {len(mesh_file.faces)} 0\n")
-    np.savetxt(text, mesh_file.vertices, fmt=f"{NUMBER} {NUMBER} {NUMBER}")
-    np.savetxt(text, mesh_file.faces, fmt="3 %d %d %d")
-    return text.getvalue().encode()
+def _has_edge_count(text: Text) -> bool:
+    """Return whether a third count follows, on the line of the second or alone on its own."""
+    if len(text.begins) < 3:
+        return False
+    line = np.searchsorted(text.first, [1, 2], "right") - 1
+    return bool(line[0] == line[1] or text.counts[line[1]] == 1)
 
 
-def _vertices(lines: Iterator[list[bytes]], count: int) -> Float[np.ndarray, "V 3"]:
-    """Read so many vertices, or those that there are, some at a time: words are far larger."""
-    blocks = [np.zeros((0, 3))]
-    for begin in range(0, count, BLOCK):
-        rows = [line[:3] for line in islice(lines, min(BLOCK, count - begin))]
-        try:
-            blocks.append(reals(rows).reshape(-1, 3))
-        except ValueError as error:
-            raise UnreadableError("the OFF file has a vertex that is not three numbers") from error
-    return np.concatenate(blocks)
+def _rows_of(text: Text, word: int, count: int) -> Int[np.ndarray, " K"] | None:
+    """Return so many lines with words, from a word on; None where that is not the first of one."""
+    filled = np.flatnonzero(text.counts)
+    place = int(np.searchsorted(text.first[filled], word))
+    lines = filled[place : place + count]
+    starts = len(lines) == count and count > 0 and text.first[lines[0]] == word
+    return lines if starts else None
 
 
-def _corners(line: list[bytes]) -> list[int]:
-    try:
-        count = whole(line[0])
-        corners = [whole(word) for word in line[1 : 1 + max(count, 0)]]
-    except ValueError as error:
-        raise UnreadableError(_NO_FACE) from error
-    if len(corners) != count:
-        raise UnreadableError(_NO_FACE)
-    return corners
+def _vertices(
+    text: Text, begin: int, count: int, width: int, colour: bool
+) -> tuple[Float[np.ndarray, "V K"], int]:
+    """Read vertices, a line each or wherever their lines end; return also where they end.
+
+    What stands behind the `width` numbers that the header names is their colour.
+    """
+    lines = _rows_of(text, begin, count)
+    if lines is not None and (text.counts[lines] >= width).all():
+        counts, end = text.counts[lines], int(text.first[lines[-1]] + text.counts[lines[-1]])
+        values = text.numbers(np.arange(begin, end))
+        if (counts == counts[0]).all():
+            return values.reshape(count, -1), end
+        return values[(text.first[lines] - begin)[:, None] + np.arange(width)], end
+    width += 4 * colour
+    end = begin + count * width
+    if end > len(text.begins):
+        raise UnreadableError(_CUT_OFF)
+    return text.numbers(np.arange(begin, end)).reshape(count, width), end
+
+
+def _faces(
+    text: Text, begin: int, count: int
+) -> tuple[Int[np.ndarray, " F"], Int[np.ndarray, " C"], Float[np.ndarray, "F K"] | None]:
+    """Read sizes, corners, and colours; None where only some faces have one."""
+    numbers = text.numbers(np.arange(begin, len(text.begins)))
+    lines = _rows_of(text, begin, count)
+    if lines is not None:
+        places = text.first[lines] - begin
+        sizes = _whole(numbers[places])
+        left = text.counts[lines] - 1 - sizes
+        if (sizes >= 0).all() and (left >= 0).all():
+            corners = numbers[_behind(places, sizes)]
+            colours = None
+            if (left == left[0]).all() and left[0] in (0, 3, 4):
+                colours = numbers[(places + 1 + sizes)[:, None] + np.arange(left[0])]
+            return sizes, _whole(corners), colours
+    begins: list[int] = []
+    at = 0
+    # One by one: where a face begins depends on the sizes of those before it.
+    for _ in range(count):
+        if at >= len(numbers) or not 0 <= numbers[at] < len(numbers) - at:
+            raise UnreadableError(_CUT_OFF)
+        begins.append(at)
+        at += 1 + int(numbers[at])
+    places = np.array(begins)
+    sizes = _whole(numbers[places])
+    return sizes, _whole(numbers[_behind(places, sizes)]), np.zeros((count, 0))
+
+
+def _behind(places: Int[np.ndarray, " F"], sizes: Int[np.ndarray, " F"]) -> Int[np.ndarray, " C"]:
+    """Return the places of so many numbers behind each place."""
+    firsts = np.repeat(places + 1 - (np.cumsum(sizes) - sizes), sizes)
+    return firsts + np.arange(len(firsts))
+
+
+def _whole(numbers: Float[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+    fits = (np.abs(numbers) < 2**53) & (numbers == np.floor(numbers))
+    if not fits.all():
+        wrong = float(numbers[np.argmin(fits)])
+        raise UnreadableError(f"the OFF file has a face of which {wrong:g} is no count or vertex")
+    return numbers.astype(np.int64)
+
+
+def _colours(values: Float[np.ndarray, "N K"]) -> np.ndarray:
+    """Return colours as bytes where they are whole numbers of 0 to 255, else as fractions."""
+    if len(values) and values.max() > 1:
+        return np.clip(np.rint(values), 0, 255).astype(np.uint8)
+    return values
+
+
+def write_off(mesh: MeshFile) -> bytes:
+    """Write the file's bytes; every layer belongs to vertices."""
+    kept = {name: mesh.layers[name] for name in (NORMAL, COLOUR, UV) if name in mesh.layers}
+    prefix = f"{'ST' * (UV in kept)}{'C' * (COLOUR in kept)}{'N' * (NORMAL in kept)}"
+    columns, form = [mesh.vertices], f"{NUMBER} {NUMBER} {NUMBER}"
+    for layer in kept.values():
+        values = np.zeros((len(mesh.vertices), layer.values.shape[1]))
+        values[mesh.corners] = layer.values[layer.rows]
+        columns.append(values)
+        form += _form(layer.values) * values.shape[1]
+    pieces = [f"{prefix}OFF\n{len(mesh.vertices)} {len(mesh.sizes)} 0\n"]
+    pieces += rows_text(f"{form}\n", np.hstack(columns))
+    colours = mesh.face_values.get(COLOUR)
+    behind = "" if colours is None else _form(colours) * colours.shape[1]
+    sizes = mesh.sizes
+    for size in np.unique(sizes).tolist():
+        chosen = sizes == size
+        faces = mesh.corners[np.repeat(chosen, sizes)].reshape(-1, size)
+        rows = [np.full((len(faces), 1), size), faces]
+        rows += [] if colours is None else [colours[chosen]]
+        pieces += rows_text(f"%d{' %d' * size}{behind}\n", np.hstack(rows))
+    return "".join(pieces).encode()
+
+
+def _form(values: np.ndarray) -> str:
+    return " %d" if values.dtype.kind in "ui" else f" {NUMBER}"

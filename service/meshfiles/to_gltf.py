@@ -2,58 +2,103 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from ..bodies.media import GLTF_KINDS
+from ..bodies.sibling_files import Opened, SiblingFiles
 from ..bodies.uploads import Sent
-from ..errors import InvalidParameter, UnrefinableError
+from ..errors import UnrefinableError
 from ..gltf.read.plan import check_memory
-from ..options import Limits, Options
+from ..options import Limits
 from ..report import Change
 from . import formats
-from .indexed_triangles import IndexedTriangles
-from .single_precision import LARGEST, rounding_changes
-from .triangles_glb import triangles_glb
-
-# glTF's own default is a bare metal, which is black where nothing surrounds it.
-PLAIN = {
-    "pbrMetallicRoughness": {
-        "baseColorFactor": [0.7, 0.7, 0.7, 1.0],
-        "metallicFactor": 0.0,
-        "roughnessFactor": 0.6,
-    },
-}
-
-# What reading takes for each byte of a file, measured on the shortest lines that a format allows.
-BYTES_PER_BYTE = {"obj": 32, "off": 32, "ply": 60, "stl": 12}
+from .formats import rounding_changes
+from .mesh_file import COLOUR, MATERIAL, NONE, Layer, MeshFile
+from .mtl import PLAIN, WHITE, library_files, materials_of
+from .parts import LARGEST, Part, parts_of, with_group_normals
+from .triangles_glb import parts_glb
 
 
-def as_gltf(sent: Sent, options: Options, limits: Limits) -> Sent:
+def as_gltf(sent: Sent, limits: Limits) -> Sent:
     """Return the same upload if it is a glTF; a converted GLB, and what that lost, if not.
+
+    Materials are read from the libraries that came with the file, or lie beside it.
 
     Raises:
         UnreadableError: not a file of its kind, or one without faces.
         UnrefinableError: a position that float32 cannot hold.
-        InvalidParameter: creases by normals, which these formats do not hand on.
         LimitError: reading would take more than `max_memory_bytes`.
     """
     if sent.kind in GLTF_KINDS:
         return sent
-    if options.crease == "normals":
-        raise InvalidParameter("crease", "crease=normals needs a glTF; use angle:DEGREES here")
-    check_memory(BYTES_PER_BYTE[sent.kind] * len(sent.data), limits)
-    triangles = formats.read(sent.data, sent.kind)
-    if not np.isfinite(triangles.vertices).all() or np.abs(triangles.vertices).max() > LARGEST:
-        raise UnrefinableError("a position is no number, or beyond the range of float32")
-    losses = _losses(triangles, sorted(sent.siblings.names))
-    return Sent(triangles_glb(triangles, material=PLAIN), "glb", losses=tuple(losses))
+    mesh = read_within(sent.data, sent.kind, limits)
+    if np.abs(mesh.vertices[mesh.corners]).max() > LARGEST:
+        raise UnrefinableError("a position is beyond the range of float32")
+    changes = [*mesh.changes]
+    mesh, lost = _with_colours_at_corners(with_group_normals(mesh))
+    parts, incomplete = parts_of(mesh)
+    opened = Opened(sent.siblings)
+    labels = mesh.labels.get(MATERIAL)
+    names = () if labels is None else labels.names
+    made = materials_of(names, mesh.libraries, opened)
+    changes += [
+        Change("", f"materials not found: no {name} came with the file", 1)
+        for name in mesh.libraries
+        if not library_files(name, opened)
+    ]
+    materials = [*made.entries, {"pbrMetallicRoughness": PLAIN}]
+    shown = [_shown(part, materials) for part in parts]
+    if all(part.material != len(materials) - 1 for part in shown):
+        materials.pop()
+    glb = parts_glb(shown, materials, made.images)
+    siblings = SiblingFiles(sent.siblings.find, frozenset(opened.unused), sent.siblings.folder)
+    changes += [*lost, *incomplete, *_labels_lost(mesh), *rounding_changes(mesh)]
+    return Sent(glb, "glb", siblings, losses=tuple(changes))
 
 
-def _losses(triangles: IndexedTriangles, unused_files: list[str]) -> list[Change]:
-    losses = [Change("", f"{name} dropped", count) for name, count in triangles.unsupported.items()]
-    if triangles.split:
-        losses.append(Change("", "triangles added by splitting polygons", triangles.split))
-    if triangles.unused:
-        losses.append(Change("", "vertices dropped that no face uses", triangles.unused))
-    losses += [Change("", f"not used by the document: {name}", 1) for name in unused_files]
-    return losses + rounding_changes(triangles)
+def read_within(data: bytes, kind: str, limits: Limits) -> MeshFile:
+    """Read a mesh file, if reading takes no more memory than it may.
+
+    Raises as `formats.read`, and LimitError.
+    """
+    check_memory(formats.memory_to_read(data, kind), limits)
+    return formats.read(data, kind)
+
+
+def _shown(part: Part, materials: list[dict[str, Any]]) -> Part:
+    """Return a part with the plain material where it has none; what is coloured is white below."""
+    if part.material == NONE:
+        part = replace(part, material=len(materials) - 1)
+    if COLOUR in part.primitive.attributes:
+        surface = materials[part.material]["pbrMetallicRoughness"]
+        if surface["baseColorFactor"] == PLAIN["baseColorFactor"]:
+            surface = {**surface, "baseColorFactor": WHITE}
+            materials[part.material] = {
+                **materials[part.material],
+                "pbrMetallicRoughness": surface,
+            }
+    return part
+
+
+def _with_colours_at_corners(mesh: MeshFile) -> tuple[MeshFile, list[Change]]:
+    """Return faces' colours as their corners', which is all that a glTF has; other values go."""
+    changes = [
+        Change("", f"face property {name} dropped: not written to GLB files", len(values))
+        for name, values in mesh.face_values.items()
+        if name != COLOUR
+    ]
+    colours = mesh.face_values.get(COLOUR)
+    if colours is None or COLOUR in mesh.layers:
+        return mesh, changes
+    rows = np.repeat(np.arange(len(colours)), 3)
+    return replace(mesh, layers={**mesh.layers, COLOUR: Layer(colours, rows)}), changes
+
+
+def _labels_lost(mesh: MeshFile) -> Iterator[Change]:
+    for kind, label in mesh.labels.items():
+        if kind != MATERIAL:
+            yield Change("", f"{kind}s dropped: not written to GLB files", len(label.names))

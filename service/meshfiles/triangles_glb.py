@@ -1,61 +1,134 @@
-"""Plain triangles as a GLB: one mesh, one primitive, one node."""
+"""Triangles as a GLB: one node, one mesh, a primitive for each material."""
 
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pns_common.rows import extent
 
-from ..gltf.constants import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, FLOAT, UNSIGNED_INT
+from ..gltf.constants import (
+    ARRAY_BUFFER,
+    COMPONENT_TYPES,
+    ELEMENT_ARRAY_BUFFER,
+    UNSIGNED_INT,
+)
 from ..gltf.read.container import read_glb, write_glb
 from ..gltf.read.json_text import decode_object, encode
+from ..gltf.write.writer import in_words
 from ..options import Limits
-from .indexed_triangles import IndexedTriangles
+from .mesh_file import COLOUR, NONE, NORMAL, UV, MeshFile
+from .parts import Part, parts_of
+
+_TYPE_OF = {dtype: number for number, dtype in COMPONENT_TYPES.items() if number != UNSIGNED_INT}
+_SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
 def triangles_glb(
-    triangles: IndexedTriangles,
+    mesh: MeshFile,
     *,
     material: dict[str, Any] | None = None,
-    normals: np.ndarray | None = None,
     extras: dict[str, Any] | None = None,
 ) -> bytes:
-    """Write the file's bytes; `extras` goes to `asset.extras`."""
+    """Write a mesh of one material; `extras` goes to `asset.extras`."""
+    parts, _ = parts_of(mesh)
+    materials = [] if material is None else [material]
+    return parts_glb(
+        [replace(part, material=len(materials) - 1) for part in parts], materials, [], extras
+    )
+
+
+def parts_glb(
+    parts: Sequence[Part],
+    materials: Sequence[dict[str, Any]],
+    images: Sequence[str],
+    extras: dict[str, Any] | None = None,
+) -> bytes:
+    """Write parts, whose materials are numbers of `materials`; `images` are URIs."""
     asset: dict[str, Any] = {"version": "2.0", "generator": "pns"}
     if extras:
         asset["extras"] = extras
-    pieces = [("POSITION", triangles.vertices)]
-    if normals is not None:
-        pieces.append(("NORMAL", normals))
-    if triangles.uv is not None:
-        # glTF counts v downwards.
-        pieces.append(("TEXCOORD_0", np.column_stack([triangles.uv[:, 0], 1 - triangles.uv[:, 1]])))
-    arrays: list[np.ndarray] = [np.ascontiguousarray(v, dtype=np.float32) for _, v in pieces]
-    arrays.append(triangles.faces.reshape(-1).astype(np.uint32))
-
-    primitive: dict[str, Any] = {
-        "attributes": {name: number for number, (name, _) in enumerate(pieces)},
-        "indices": len(pieces),
-    }
     tree: dict[str, Any] = {
         "asset": asset,
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [primitive]}],
-        "accessors": [_accessor(number, values) for number, values in enumerate(arrays)],
-        "bufferViews": _views(arrays),
-        "buffers": [{"byteLength": sum(values.nbytes for values in arrays)}],
+        "meshes": [{"primitives": []}],
+        "accessors": [],
+        "bufferViews": [],
     }
-    low, high = extent(arrays[0])
-    tree["accessors"][0] |= {"min": low.tolist(), "max": high.tolist()}
-    if material is not None:
-        primitive["material"] = 0
-        tree["materials"] = [material]
-    return write_glb(encode(tree), [values.tobytes() for values in arrays], [])
+    pieces: list[bytes] = []
+    for part in parts:
+        attributes = {
+            name: _add(tree, pieces, name, stored(name, values))
+            for name, values in part.primitive.attributes.items()
+        }
+        corners = part.primitive.corners.reshape(-1, 1).astype(np.uint32)
+        primitive = {
+            "attributes": {attribute_name(name): index for name, index in attributes.items()},
+            "indices": _add(tree, pieces, "", corners),
+        }
+        if part.material != NONE:
+            primitive["material"] = part.material
+        tree["meshes"][0]["primitives"].append(primitive)
+    tree["buffers"] = [{"byteLength": sum(map(len, pieces))}]
+    if materials:
+        tree["materials"] = list(materials)
+    if images:
+        tree["images"] = [{"uri": uri} for uri in images]
+        tree["textures"] = [{"source": number} for number in range(len(images))]
+    return write_glb(encode(tree), pieces, [])
+
+
+def attribute_name(layer: str) -> str:
+    """Return how a glTF calls a layer: its own names are in capitals, behind an underscore."""
+    if not layer.startswith("_"):
+        return layer
+    return "_" + "".join(c if c.isascii() and c.isalnum() else "_" for c in layer[1:]).upper()
+
+
+def stored(name: str, values: np.ndarray) -> np.ndarray:
+    """Return a layer's values as a glTF holds them: floats are single, v counts downwards."""
+    if name == UV:
+        values = np.column_stack([values[:, 0], 1 - values[:, 1]])
+    narrow = values.dtype.newbyteorder("<") in _TYPE_OF
+    if name in ("POSITION", NORMAL, UV) or not narrow:
+        return values.astype(np.float32)
+    return values
+
+
+def _add(tree: dict[str, Any], pieces: list[bytes], name: str, values: np.ndarray) -> int:
+    """Append an array; return the number of its accessor."""
+    indices = name == ""
+    content = values if indices else in_words(values, "")
+    data = content.tobytes()
+    view = {
+        "buffer": 0,
+        "byteOffset": sum(map(len, pieces)),
+        "byteLength": len(data),
+        "target": ELEMENT_ARRAY_BUFFER if indices else ARRAY_BUFFER,
+    }
+    accessor = {
+        "bufferView": len(tree["bufferViews"]),
+        "componentType": UNSIGNED_INT if indices else _TYPE_OF[values.dtype.newbyteorder("<")],
+        "count": len(values),
+        "type": _SHAPES[values.shape[1]],
+    }
+    if not indices and content.shape[1] != values.shape[1] * values.itemsize:
+        view["byteStride"] = content.shape[1]
+    if name == COLOUR and values.dtype.kind in "ui":
+        accessor["normalized"] = True
+    if name == "POSITION":
+        low, high = extent(values)
+        accessor |= {"min": low.tolist(), "max": high.tolist()}
+    pieces.append(data)
+    tree["bufferViews"].append(view)
+    tree["accessors"].append(accessor)
+    return len(tree["accessors"]) - 1
 
 
 def as_gltf_json(glb: bytes, limits: Limits) -> bytes:
@@ -67,28 +140,3 @@ def as_gltf_json(glb: bytes, limits: Limits) -> bytes:
         content = base64.b64encode(container.binary[:length]).decode()
         tree["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{content}"
     return encode(tree)
-
-
-def _accessor(number: int, values: np.ndarray) -> dict[str, Any]:
-    if values.ndim == 1:
-        shape, component = "SCALAR", UNSIGNED_INT
-    else:
-        shape, component = f"VEC{values.shape[1]}", FLOAT
-    return {
-        "bufferView": number,
-        "componentType": component,
-        "count": len(values),
-        "type": shape,
-    }
-
-
-def _views(arrays: list[np.ndarray]) -> list[dict[str, int]]:
-    views: list[dict[str, int]] = []
-    offset = 0
-    for values in arrays:
-        target = ELEMENT_ARRAY_BUFFER if values.ndim == 1 else ARRAY_BUFFER
-        views.append(
-            {"buffer": 0, "byteOffset": offset, "byteLength": values.nbytes, "target": target}
-        )
-        offset += values.nbytes
-    return views

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ..bodies.media import KINDS
+from ..bodies.media import ALIASES, KINDS
 from ..errors import InvalidParameter, NoModelError, ServiceError
 from ..options import Limits, Options
 from .engines.work import Engine, Work
@@ -70,7 +70,7 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
     check_report(batch.report, batch.source)
     if batch.to is not None and batch.to not in KINDS:
         raise InvalidParameter("to", f"{batch.to}: it must be one of {', '.join(KINDS)}")
-    listing = items_of(batch.source, KINDS, place_of(batch.destination))
+    listing = items_of(batch.source, (*KINDS, *ALIASES), place_of(batch.destination))
     items = listing()
     if (first := next(items, None)) is None:
         text = f"{batch.source}: there is no file to refine ({', '.join(KINDS)})"
@@ -186,7 +186,7 @@ def _task(
         raise ServiceError("its name is not in UTF-8", code="unreadable-name")
     if item.fault:
         raise ServiceError(f"nothing in it is refined: {item.fault}", code=UNREADABLE_FOLDER)
-    kind, target, relative = target_of(item.relative, batch.to, KINDS)
+    kind, target, relative = target_of(item.relative, batch.to)
     place = destination.below(relative)
     output = place.url
     if place.path_to(place_of(item.url)) == ".":

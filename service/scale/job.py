@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..bodies.media import ALIASES, KINDS, kind_of
 from ..errors import LONGEST, InvalidParameter, LimitError, NoModelError, ServiceError
 from ..options import Limits, Options
 from .same_model import check_same_model
@@ -213,9 +214,11 @@ def input_hash(data: bytes, kind: str, siblings: SiblingFiles, limits: Limits) -
     """Return the SHA-256 of a file and then of the names and bytes of the files that it names."""
     from ..bodies.sibling_files import Opened
     from ..gltf.read.upload import named_files
+    from ..meshfiles import mtl
 
     digest, opened = hashlib.sha256(data), Opened(siblings)
-    for uri in named_files(data, kind, limits):
+    of_obj = mtl.named_files(data, siblings) if kind == "obj" else []
+    for uri in of_obj or named_files(data, kind, limits):
         file = opened.open(uri)
         if file is not None:
             digest.update(f"\0{uri}\0{len(file.content)}\0".encode())
@@ -244,17 +247,17 @@ def _flipped(report: dict[str, Any]) -> int:
     return sum(int(level.get("flipped_faces", 0)) for level in report.get("levels", []))
 
 
-def target_of(relative: str, to: str | None, kinds: tuple[str, ...]) -> tuple[str, str, str]:
+def target_of(relative: str, to: str | None) -> tuple[str, str, str]:
     """Return the kind of a file, that of its result, and the result's relative path.
 
     Raises:
-        InvalidParameter: an extension that is none of `kinds`.
+        InvalidParameter: an extension that is of no kind.
     """
-    stem, ending = posixpath.splitext(relative)
-    kind = ending.lower().removeprefix(".")
-    if kind not in kinds:
+    stem = posixpath.splitext(relative)[0]
+    kind = kind_of(relative)
+    if kind is None:
         raise InvalidParameter(
-            "SOURCE", f"{relative}: the extension must be one of {', '.join(kinds)}"
+            "SOURCE", f"{relative}: the extension must be one of {', '.join((*KINDS, *ALIASES))}"
         )
     target = kind if to is None else to
     return kind, target, relative if target == kind else f"{stem}.{target}"

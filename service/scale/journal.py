@@ -32,6 +32,7 @@ CREATE TABLE IF NOT EXISTS outputs (output TEXT PRIMARY KEY, path TEXT) WITHOUT 
 BUSY_SECONDS = 60.0
 BATCH = 10_000
 REPORTS = (".parquet", ".jsonl")
+JOURNAL = ".pns-batch.journal"
 
 
 class Journal:
@@ -170,8 +171,8 @@ def open_journal(report: Path, work: str) -> Iterator[Journal]:
 
 
 def journal_of(report: Path) -> Path:
-    """Return the file beside a report that is gone on from."""
-    return report.with_name(report.name + ".journal")
+    """Return the file beside a report from which a run resumes, whatever the report is called."""
+    return report.with_name(JOURNAL)
 
 
 def check_report(report: Path, source: str) -> None:

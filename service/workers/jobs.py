@@ -119,7 +119,7 @@ def _refined(work: Work, sent: Sent, model: Model | None, course: Course) -> Wri
         return converted(
             sent.data, sent.kind, work.target, options, model, limits, course, siblings
         )
-    sent = as_gltf(sent, options, limits)
+    sent = as_gltf(sent, limits)
     done = subdivide_gltf(
         sent.data,
         sent.kind,  # pyright: ignore[reportArgumentType]  (as_gltf gives no other)
@@ -206,10 +206,8 @@ def warm_up(model: Model | str | None) -> None:
 
     from ..gltf import subdivide  # noqa: F401
     from ..meshfiles import to_gltf  # noqa: F401
-    from ..meshfiles.formats import load_readers
 
     compile_kernels(log.info)
-    load_readers()
     hold_model(model)
 
 

@@ -8,8 +8,8 @@ import pytest
 from pns_common import loop
 from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles.convert import advice_lines
-from service.meshfiles.indexed_triangles import IndexedTriangles
-from service.meshfiles.refine_triangles import refine_triangles
+from service.meshfiles.mesh_file import of_triangles
+from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
 from tests.service.gltf.test_options import cylinder
 from tests.support.gltf.files import glb
@@ -66,11 +66,11 @@ def test_a_flat_sheet_says_that_it_is_flat():
 
 def test_mesh_files_say_the_same_and_the_command_spells_its_own_options():
     cube = box()
-    triangles = IndexedTriangles(
+    triangles = of_triangles(
         cube["POSITION"].astype(np.float64), np.reshape(cube["indices"], (-1, 3))
     )
     chosen = Options(scheme="loop", crease="angle:60")
-    _, report = refine_triangles(triangles, loop(), chosen, Limits())
+    _, report = refine_mesh_file(triangles, loop(), chosen, Limits())
     assert report["advice"] == [CUBE]
     (line,) = advice_lines(report)
     assert line == "12 of 12 bent edges are kept sharp: use --crease off for a rounder shape"

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from service.meshfiles.example import part
-from service.meshfiles.indexed_triangles import IndexedTriangles
+from service.meshfiles.mesh_file import MeshFile, of_triangles
 from service.meshfiles.triangles_glb import triangles_glb
 
 
-def a_part(number: int) -> IndexedTriangles:
+def a_part(number: int) -> MeshFile:
     """The example's part; no two numbers have one shape."""
     mesh = part()
     rng = np.random.default_rng(number)
@@ -28,4 +28,4 @@ def small_body() -> bytes:
     """A tetrahedron."""
     vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
     faces = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
-    return triangles_glb(IndexedTriangles(vertices, faces))
+    return triangles_glb(of_triangles(vertices, faces))

@@ -60,7 +60,7 @@ def small_sample() -> Sample:
 def _sample(name: str, content_type: str, body: bytes) -> Sample:
     options = Options(levels=1, scheme="loop")
     limits = Limits()
-    sent = as_gltf(uploads.sent(body, content_type, limits), options, limits)
+    sent = as_gltf(uploads.sent(body, content_type, limits), limits)
     if sent.kind not in ("glb", "gltf"):
         raise ValueError(f"{name} is {sent.kind}, which no stage turns into glTF")
     done = subdivide_gltf(

@@ -25,11 +25,13 @@ class Container:
         text: the JSON chunk.
         binary: the BIN chunk; None without one.
         others: (type, data) of the chunks after it. They belong to extensions and are kept.
+        tail: number of bytes after the GLB, which are no part of it.
     """
 
     text: bytes
     binary: memoryview | None = None
     others: tuple[tuple[bytes, memoryview], ...] = ()
+    tail: int = 0
 
 
 def read_container(data: bytes, kind: str) -> Container:
@@ -57,15 +59,15 @@ def read_glb(data: bytes | memoryview) -> Container:
         raise UnreadableError("the file does not begin with the GLB magic 'glTF'")
     if version != GLB_VERSION:
         raise UnreadableError(f"GLB version {version}, expected {GLB_VERSION}")
-    if length != len(data):
+    if not _HEADER.size <= length <= len(data):
         raise UnreadableError(f"the GLB header says {length} bytes, the file has {len(data)}")
-    chunks = _chunks(memoryview(data))
+    chunks = _chunks(memoryview(data)[:length])
     if not chunks or chunks[0][0] != JSON_CHUNK:
         raise UnreadableError("the first chunk of the GLB is not JSON")
     rest = chunks[1:]
     binary = rest[0][1] if rest and rest[0][0] == BIN_CHUNK else None
     others = rest if binary is None else rest[1:]
-    return Container(text=bytes(chunks[0][1]), binary=binary, others=tuple(others))
+    return Container(bytes(chunks[0][1]), binary, tuple(others), len(data) - length)
 
 
 def write_glb(

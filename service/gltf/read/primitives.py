@@ -41,6 +41,11 @@ class TrianglePrimitive:
     targets: tuple[dict[str, Shaped[np.ndarray, "N K"]], ...] = ()
     target_accessors: tuple[dict[str, Accessor], ...] = ()
 
+    @property
+    def is_double(self) -> bool:
+        """Whether positions are doubles, as in text files; those of a glTF never are."""
+        return self.attributes["POSITION"].itemsize == 8
+
 
 def read_primitive(
     document: Document, buffers: Sequence[memoryview], mesh: int, number: int

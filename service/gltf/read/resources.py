@@ -15,16 +15,17 @@ from .schema import Buffer, Document
 
 _SCHEME = "data:"
 _BASE64 = re.compile(r"data:[^,]*;base64,", re.IGNORECASE)
-# First bytes by image type (glTF 2.0 §3.8.2, KHR_texture_basisu, EXT_texture_webp,
-# EXT_texture_avif, MSFT_texture_dds), and where they stand.
+# First bytes of a file, where they stand, its image type (glTF 2.0 §3.8.2), and the extension that
+# the type needs.
 _SIGNATURES = (
-    (b"\x89PNG\r\n\x1a\n", 0, "image/png"),
-    (b"\xff\xd8\xff", 0, "image/jpeg"),
-    (b"\xabKTX 20\xbb\r\n\x1a\n", 0, "image/ktx2"),
-    (b"WEBP", 8, "image/webp"),
-    (b"ftypavif", 4, "image/avif"),
-    (b"DDS ", 0, "image/vnd-ms.dds"),
+    (b"\x89PNG\r\n\x1a\n", 0, "image/png", None),
+    (b"\xff\xd8\xff", 0, "image/jpeg", None),
+    (b"\xabKTX 20\xbb\r\n\x1a\n", 0, "image/ktx2", "KHR_texture_basisu"),
+    (b"WEBP", 8, "image/webp", "EXT_texture_webp"),
+    (b"ftypavif", 4, "image/avif", "EXT_texture_avif"),
+    (b"DDS ", 0, "image/vnd-ms.dds", "MSFT_texture_dds"),
 )
+_EXTENSION_OF = {kind: extension for _, _, kind, extension in _SIGNATURES}
 
 
 def resolve_buffers(
@@ -111,6 +112,12 @@ def embed_images(
                 what = f"kept by its URI: {image.uri} is no known type of image"
                 changes.append(Change(pointer, what, 1))
             continue
+        extension = _EXTENSION_OF[kind]
+        if extension is not None and extension not in document.extensions_used:
+            # Embedded, it would need a type that the file does not declare.
+            what = f"kept by its URI: {kind} without the extension {extension}"
+            changes.append(Change(pointer, what, 1))
+            continue
         entry = tree["images"][number]
         del entry["uri"]
         views = tree.setdefault("bufferViews", [])
@@ -124,7 +131,7 @@ def embed_images(
 
 def mime_type(content: memoryview) -> str | None:
     """Return the type of an image by its first bytes; None for an unknown one."""
-    for signature, offset, kind in _SIGNATURES:
+    for signature, offset, kind, _ in _SIGNATURES:
         if content[offset : offset + len(signature)] == signature:
             return kind
     return None

@@ -94,6 +94,8 @@ def read_upload(
         if count
     ]
     changes += images
+    if container.tail:
+        changes.append(Change("", "bytes behind the GLB left out", container.tail))
     changes += [Change("", f"not used by the document: {name}", 1) for name in opened.unused]
     changes += check_nodes(document)
     changes += breaches(document)

@@ -38,12 +38,16 @@ Columns = dict[str, Shaped[np.ndarray, "N K"]]
 
 @dataclass(frozen=True, eq=False)
 class RefinedPrimitive:
-    """A refined primitive, in the types in which it is written."""
+    """A refined primitive, in the types in which it is written.
+
+    `vertex` is the vertex of the refined mesh at each row; None where it was cut from a union.
+    """
 
     source: TrianglePrimitive
     faces: Int[np.ndarray, "F 3"]
     attributes: Columns
     targets: list[Columns]
+    vertex: Int[np.ndarray, " N"] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +58,7 @@ class _Vertices:
         row: (C,) a row of the primitive's attributes for each distinct corner.
         vertex: (C,) the vertex of the control mesh at each corner.
         connectivity: how corners spread over refined vertices.
-        positions, normals: refined, in float32; normals None if the primitive has none.
+        positions, normals: refined, in the types written; normals None if there are none.
         exact_normals: in float64, for tangents; None if the primitive lacks either.
         skin_and_morph: skin binding and morph deltas.
         morphed_normals: normals under each morph target; None where it moves none.
@@ -125,11 +129,17 @@ def _refined_primitive(
         group = own.at_vertices(shading.groups.ids[number])
         normals, morphed = shading.rounded(group), shading.under_targets(group)
         exact = shading.exact(group) if "TANGENT" in primitive.attributes else None
+    # Positions of text files are doubles and stay so.
+    positions = (
+        np.take(refined.mesh.vertices, vertex, axis=0)
+        if primitive.is_double
+        else rounded_rows(refined.mesh.vertices, vertex, blocks_of(grid))
+    )
     vertices = _Vertices(
         row=row,
         vertex=control.cleaned.vertex_map[welded[row]],
         connectivity=own,
-        positions=rounded_rows(refined.mesh.vertices, vertex, blocks_of(grid)),
+        positions=positions,
         normals=normals,
         exact_normals=exact,
         skin_and_morph=refined.skin_and_morph.take(vertex),
@@ -141,7 +151,7 @@ def _refined_primitive(
     ]
     for name, values in refined.scalars.items():
         attributes[name] = values[vertex, None].astype(np.float32)
-    return RefinedPrimitive(primitive, own.refined_faces, attributes, targets)
+    return RefinedPrimitive(primitive, own.refined_faces, attributes, targets, vertex)
 
 
 def _attributes(primitive: TrianglePrimitive, vertices: _Vertices, uv_blend: UvBlend) -> Columns:

@@ -96,7 +96,8 @@ def refined_mesh(
             creases=creases,
             progress=lambda done, total: course.reach(done / total),
         )
-        _check_range(made.mesh)
+        if not control.primitives[0].is_double:
+            _check_range(made.mesh)
     except MeshError as error:
         raise UnrefinableError(str(error), pointer=pointer) from error
     faces, levels = made.mesh.faces, made.topologies
@@ -219,7 +220,9 @@ def changes_of_primitive(
         return [Change(pointer, "left as it was: no face has an area", len(kept))]
     dropped = int((~kept).sum())
     faces = primitive.corners if dropped == 0 else primitive.corners[kept]
-    far = faces_too_far(primitive.attributes["POSITION"], faces, levels)
+    far = 0
+    if not primitive.is_double:
+        far = faces_too_far(primitive.attributes["POSITION"], faces, levels)
     counts = {
         "degenerate faces dropped": dropped,
         f"faces too far from the origin: a side has fewer than {STEPS} steps of float32": far,

@@ -32,6 +32,7 @@ from .mesh_refine import (
     refined_mesh,
     sharp_after,
 )
+from .near_misses import near_miss_changes, near_misses
 from .new_normals import with_normal_rule, with_smooth_normals
 from .together import StageShares, kind_of, refine_together
 
@@ -94,7 +95,7 @@ def refined_meshes(
         ServiceError: a mesh is invalid, or cannot be refined.
         pns_common.errors.ModelError: the model's answer is no correction.
     """
-    shares = _stage_shares(scheme, options)
+    shares = stage_shares(scheme, options)
     total, done = sum(plan.faces for plan in plans), 0
     for window in _windows(plans, options.levels):
         count = sum(plan.faces for plan in window)
@@ -103,7 +104,8 @@ def refined_meshes(
         done += count
 
 
-def _stage_shares(scheme: Scheme, options: Options) -> StageShares:
+def stage_shares(scheme: Scheme, options: Options) -> StageShares:
+    """Return where the stages of a mesh begin, by their measured costs."""
     made = [4**level for level in range(1, options.levels + 1)]
     learned = made if scheme.learned_levels is None else made[: scheme.learned_levels]
     refine = 1 + LEARNED_COST * sum(learned) / sum(made) + LIMIT * options.limit
@@ -147,7 +149,7 @@ def _window(
     for done, place in enumerate(alone):
         with course.part(done / len(alone), (done + 1) / len(alone)):
             plan = window[place]
-            outcomes[place] = _alone(plan, read[place], scheme, options, course, shares)
+            outcomes[place] = refine_alone(plan, read[place], scheme, options, course, shares)
     with course.part(shares.write, 1.0):
         for place in range(len(window)):
             with course.part(place / len(window), (place + 1) / len(window)):
@@ -196,7 +198,7 @@ def _together(
     return outcomes
 
 
-def _alone(
+def refine_alone(
     plan: MeshPlan,
     primitives: list[TrianglePrimitive],
     scheme: Scheme,
@@ -204,6 +206,7 @@ def _alone(
     course: Course,
     shares: StageShares,
 ) -> MeshOutcome:
+    """Refine one mesh, given by its primitives."""
     options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options.weld_tolerance, options.weld_unit)
@@ -226,6 +229,10 @@ def _alone(
         for change in changes_of_primitive(primitive, keep, options.levels, pointer)
     ]
     (near,), (cut,) = control.near.tolist(), [0] if made is None else made.cut.tolist()
+    changes += changes_of_vertices(near, cut, pointer)
+    if made is not None:
+        (misses,) = near_misses(control.mesh, [made.reports[0]["reference_length"]])
+        changes += near_miss_changes(misses, pointer)
     return MeshOutcome(
         index=plan.mesh,
         primitives=primitives,
@@ -233,6 +240,6 @@ def _alone(
         refined=refined,
         copies=control.copies,
         report=None if made is None else made.reports[0],
-        changes=changes + changes_of_vertices(near, cut, pointer),
+        changes=changes,
         bends=NO_BENDS if made is None else count_bends(control.mesh, creases)[0],
     )

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from pns_common.grid import rounded_rows
+from pns_common.mesh import Mesh
 from pns_common.normals import ONE_TRIANGLE, angle_weighted_normals
 from pns_common.parallel import Blocks, available_threads, no_progress
 from pns_common.rows import cross, dot, marked, norm, number_by_first_appearance, unit
@@ -209,7 +210,7 @@ def _own(
     shares = own_shares(given, computed)
     if not control.is_empty:
         at_border = np.zeros(len(given), dtype=bool)
-        at_border[corners] = _border_vertices(control)[control.cleaned.vertex_map[faces]]
+        at_border[corners] = border_vertices(control.mesh)[control.cleaned.vertex_map[faces]]
         shares[at_border] = _own_shares_at_border(
             given, computed, points, faces, corners, at_border
         )
@@ -257,9 +258,9 @@ def _own_shares_at_border(
     return np.min(shares, axis=0)
 
 
-def _border_vertices(control: ControlMesh) -> Bool[np.ndarray, " V"]:
+def border_vertices(mesh: Mesh) -> Bool[np.ndarray, " V"]:
     """Return the vertices of edges that are not interior."""
-    topology = build_topology(control.mesh.faces, len(control.mesh.vertices))
+    topology = build_topology(mesh.faces, len(mesh.vertices))
     return marked(topology.edges[topology.sharp_edges].reshape(-1), topology.vertex_count)
 
 

@@ -39,6 +39,7 @@ from .mesh_refine import (
     refined_union,
     sharp_after,
 )
+from .near_misses import near_miss_changes, near_misses
 from .new_normals import with_normal_accessor, with_normal_rule, with_smooth_normals
 
 
@@ -271,6 +272,8 @@ def _divided(
         _shares(keep, [primitives[place] for primitives in meshes])
         for place, keep in enumerate(control.kept)
     ]
+    lengths = [report["reference_length"] for report in made.reports]
+    misses = near_misses(control.mesh, lengths, parts.of_row[control.vertex_rows()])
     return [
         Part(
             refined=refined[part],
@@ -284,7 +287,8 @@ def _divided(
                     primitive, keep[part], options.levels, pointers[part]
                 )
             ]
-            + changes_of_vertices(near[part], int(made.cut[part]), pointers[part]),
+            + changes_of_vertices(near[part], int(made.cut[part]), pointers[part])
+            + near_miss_changes(misses[part], pointers[part]),
         )
         for part, primitives in enumerate(meshes)
     ]

@@ -145,20 +145,30 @@ def test_external_files_give_what_an_embedded_file_gives():
 
 
 @pytest.mark.parametrize(
-    ("content", "kind"),
+    ("content", "kind", "extension"),
     [
-        (b"\xff\xd8\xff\xe0", "image/jpeg"),
-        (b"\xabKTX 20\xbb\r\n\x1a\n", "image/ktx2"),
-        (b"RIFF\x04\0\0\0WEBP", "image/webp"),
-        (b"\0\0\0\x1cftypavif", "image/avif"),
-        (b"DDS \x7c\0\0\0", "image/vnd-ms.dds"),
+        (b"\xff\xd8\xff\xe0", "image/jpeg", None),
+        (b"\xabKTX 20\xbb\r\n\x1a\n", "image/ktx2", "KHR_texture_basisu"),
+        (b"RIFF\x04\0\0\0WEBP", "image/webp", "EXT_texture_webp"),
+        (b"\0\0\0\x1cftypavif", "image/avif", "EXT_texture_avif"),
+        (b"DDS \x7c\0\0\0", "image/vnd-ms.dds", "MSFT_texture_dds"),
     ],
 )
-def test_images_of_every_type_that_textures_may_have_are_embedded(content, kind):
+@pytest.mark.parametrize("declared", [True, False])
+def test_images_are_embedded_where_the_document_may_hold_their_type(
+    content, kind, extension, declared
+):
     text, binary = external(images=["a.image"])
-    tree, _ = files.unpack(refine(text, beside(box__bin=binary, a__image=content)).glb)
-    assert tree["images"][0]["mimeType"] == kind
-    assert "uri" not in tree["images"][0]
+    if extension is not None and declared:
+        text = json.dumps(json.loads(text) | {"extensionsUsed": [extension]}).encode()
+    result = refine(text, beside(box__bin=binary, a__image=content))
+    tree, _ = files.unpack(result.glb)
+    if extension is None or declared:
+        assert tree["images"][0]["mimeType"] == kind
+        assert "uri" not in tree["images"][0]
+    else:
+        assert tree["images"] == [{"uri": "a.image"}]
+        assert any(extension in change["what"] for change in result.report["changes"])
 
 
 @pytest.mark.parametrize("content", [None, b"no image"])

@@ -122,8 +122,10 @@ def test_a_limit_names_the_setting_that_raises_it(
     assert f"{setting} allows more" in outcome.err
 
 
-def test_a_file_may_replace_itself(pns: Any, part_file: Path) -> None:
-    assert pns("subdivide", str(part_file), "-o", str(part_file), "--levels", "1").code == 0
+def test_a_file_may_replace_itself_by_force(pns: Any, part_file: Path) -> None:
+    assert (
+        pns("subdivide", str(part_file), "-o", str(part_file), "--levels", "1", "--force").code == 0
+    )
     assert tree_of(part_file)["asset"]["extras"]["pns"]["totals"]["faces"] == 4 * FACES
 
 

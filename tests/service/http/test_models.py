@@ -189,8 +189,8 @@ def test_the_log_names_the_model(client: TestClient, caplog: pytest.LogCaptureFi
     with caplog.at_level("INFO", logger="pns.service"):
         report(client, "model=vertices")
         report(client, "scheme=loop")
-    assert "pns (vertices) levels=1" in caplog.text
-    assert "loop levels=1" in caplog.text
+    assert "pns (vertices) levels=2" in caplog.text
+    assert "loop levels=2" in caplog.text
 
 
 def test_503_for_the_list_while_no_worker_can_read_it() -> None:

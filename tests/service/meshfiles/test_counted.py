@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from service.meshfiles import text_pieces
+from service.meshfiles import counted
 from service.meshfiles.counted import BYTES_PER_FACE, count_triangles
 from service.meshfiles.formats import read
 from service.options import Limits
@@ -115,5 +115,5 @@ def test_pieces_count_as_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = count_triangles(text, "obj"), count_triangles(off, "off")
     assert whole == (sum(SIZES) - 2 * len(SIZES),) * 2
     for piece in (1, 7, 1000):
-        monkeypatch.setattr(text_pieces, "PIECE", piece)
+        monkeypatch.setattr(counted, "PIECE", piece)
         assert (count_triangles(text, "obj"), count_triangles(off, "off")) == whole

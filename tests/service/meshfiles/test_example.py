@@ -24,8 +24,8 @@ def test_a_closed_manifold_of_genus_one_facing_outwards() -> None:
 
 def test_texture_coordinates_fill_the_unit_square_once() -> None:
     triangles = part()
-    assert triangles.uv is not None
-    a, b, c = triangles.uv[triangles.faces].transpose(1, 0, 2)
+    assert triangles.layers["TEXCOORD_0"].values is not None
+    a, b, c = triangles.layers["TEXCOORD_0"].values[triangles.faces].transpose(1, 0, 2)
     area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
     assert (area > 0).all() or (area < 0).all()
     np.testing.assert_allclose(abs(area.sum()), 1, atol=1e-12)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from service.errors import UnrefinableError
+from service.errors import GltfError, LimitError, UnrefinableError
 from service.meshfiles.flatten import flatten
+from service.meshfiles.formats import write
 from service.options import Limits
 from tests.support.gltf import files
 from tests.support.gltf.shapes import octahedron
@@ -40,28 +41,84 @@ def test_without_scenes_children_still_stand_where_their_parents_do():
     assert flat.vertices[:, 0].max() == pytest.approx(6)
 
 
-def test_morph_targets_and_instances_that_are_lost_are_told():
+def test_morph_targets_that_are_lost_are_told():
     moved = octahedron(targets=[{"POSITION": np.ones((6, 3))}] * 2)
-    tree, binary = files.document([moved], [octahedron()])
-    shifts = files.add_accessor(tree, binary, np.ones((9, 3)))
-    tree["buffers"] = [{"byteLength": len(binary)}]
-    instances = {"attributes": {"TRANSLATION": shifts}}
-    tree["nodes"][1]["extensions"] = {"EXT_mesh_gpu_instancing": instances}
+    tree, binary = files.document([moved])
     _, changes = flatten(files.pack(tree, binary), "stl", Limits())
     told = {change.what: change.count for change in changes}
     assert told["morph targets dropped: not written to STL files"] == 2
-    assert told["copies by EXT_mesh_gpu_instancing dropped: not written to STL files"] == 9
 
 
-def test_texture_coordinates_that_a_material_transforms_are_told():
-    tree, binary = files.document([{**octahedron(), "TEXCOORD_0": np.ones((6, 2))}])
-    tree["extensionsUsed"] = ["KHR_texture_transform"]
-    told = {
-        kind: any("KHR_texture_transform is not applied" in change.what for change in changes)
-        for kind in ("obj", "ply", "stl")
-        for _, changes in [flatten(files.pack(tree, binary), kind, Limits())]
+def copied(**attributes):
+    """An octahedron that a node of scale 2 shows in copies."""
+    tree, binary = files.document([octahedron()])
+    indices = {name: files.add_accessor(tree, binary, v) for name, v in attributes.items()}
+    tree["buffers"] = [{"byteLength": len(binary)}]
+    tree["nodes"][0] |= {
+        "scale": [2, 2, 2],
+        "extensions": {"EXT_mesh_gpu_instancing": {"attributes": indices}},
     }
-    assert told == {"obj": True, "ply": True, "stl": False}
+    tree["extensionsUsed"] = ["EXT_mesh_gpu_instancing"]
+    return files.pack(tree, binary)
+
+
+def test_every_copy_stands_where_its_attributes_put_it():
+    half = np.sqrt(0.5)
+    turns = np.array([[0, 0, 0, 1], [0, 0, half, half]])
+    shifts, scales = np.array([[0, 0, 0], [10, 0, 0]]), np.array([[1, 1, 1], [3, 1, 1]])
+    data = copied(TRANSLATION=shifts, ROTATION=turns, SCALE=scales)
+    flat, _ = flatten(data, "stl", Limits())
+    assert len(flat.faces) == 16
+    second = flat.vertices[flat.faces[8:]].reshape(-1, 3)
+    # Its longer axis, x, is turned to y; then it is moved, and all is twice as large.
+    expected = [[2 * (10 - 1), -2 * 3, -2], [2 * (10 + 1), 2 * 3, 2]]
+    np.testing.assert_allclose([second.min(axis=0), second.max(axis=0)], expected, atol=1e-5)
+
+
+def test_copies_without_end_are_refused_before_they_are_made():
+    with pytest.raises(LimitError, match="with all copies"):
+        flatten(copied(TRANSLATION=np.zeros((20, 3))), "stl", Limits(max_faces=100))
+
+
+def test_copies_that_their_accessors_do_not_agree_on_are_refused():
+    data = copied(TRANSLATION=np.zeros((2, 3)), SCALE=np.ones((3, 3)))
+    with pytest.raises(GltfError, match="as many values"):
+        flatten(data, "stl", Limits())
+
+
+def test_texture_coordinates_are_written_as_the_material_transforms_them():
+    uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5], [0.25, 0.75]], dtype=np.float32)
+    tree, binary = files.document([{**octahedron(), "TEXCOORD_0": uv}])
+    transform = {"offset": [0.5, 0.25], "scale": [2, 3], "rotation": np.pi / 2}
+    texture = {"index": 0, "extensions": {"KHR_texture_transform": transform}}
+    tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": texture}}]
+    tree["textures"] = [{}]
+    tree["meshes"][0]["primitives"][0]["material"] = 0
+    tree["extensionsUsed"] = ["KHR_texture_transform"]
+    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
+    # A quarter turn counter-clockwise, as the image lies: u goes up, which is to smaller v.
+    expected = np.column_stack([3 * uv[:, 1] + 0.5, 1 - (-2 * uv[:, 0] + 0.25)])
+    layer = flat.layers["TEXCOORD_0"]
+    corners = octahedron()["indices"].reshape(-1)
+    np.testing.assert_allclose(layer.values[layer.rows], expected[corners], atol=1e-6)
+
+
+def test_names_colours_and_normals_follow_a_mesh_into_an_obj():
+    shape = {**octahedron(), "COLOR_0": np.tile(np.float32([1, 0.5, 0]), (6, 1))}
+    shape["NORMAL"] = octahedron()["POSITION"]
+    tree, binary = files.document([shape])
+    tree["materials"] = [{"name": "brass"}]
+    tree["meshes"][0]["primitives"][0]["material"] = 0
+    tree["nodes"][0] |= {"name": "knob", "scale": [1, 1, 4]}
+    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
+    assert flat.labels["material"].names == ("brass",)
+    assert flat.labels["object"].names == ("knob",)
+    assert flat.layers["COLOR_0"].values.tolist() == [[1, 0.5, 0]] * 6
+    text = write(flat, "obj").decode()
+    assert "usemtl brass\n" in text
+    assert "o knob\n" in text
+    assert "v 1 0 0 1 0.5 0\n" in text
+    assert "f 1//1" in text
 
 
 def test_a_node_with_several_parents_stands_once_and_that_is_told():

@@ -15,8 +15,8 @@ from service.errors import LimitError, UnreadableError, UnrefinableError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles import formats
 from service.meshfiles.example import part
-from service.meshfiles.indexed_triangles import IndexedTriangles
-from service.meshfiles.refine_triangles import refine_triangles
+from service.meshfiles.mesh_file import MATERIAL, UV, MeshFile, of_triangles
+from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Limits, Options
 from tests.support.shared import shared_path
@@ -25,11 +25,20 @@ KINDS = sorted(set(media.KINDS) - set(media.GLTF_KINDS))
 SQUARE = ("0 0 0", "1 0 0", "1 1 0", "0 1 0")
 
 
-def refined(mesh_file: IndexedTriangles, levels: int = 1) -> tuple[IndexedTriangles, dict]:
-    return refine_triangles(mesh_file, loop(), Options(levels=levels, scheme="loop"), Limits())
+def refined(mesh_file: MeshFile, levels: int = 1) -> tuple[MeshFile, dict]:
+    return refine_mesh_file(mesh_file, loop(), Options(levels=levels, scheme="loop"), Limits())
 
 
-def welded(mesh_file: IndexedTriangles) -> trimesh.Trimesh:
+def uv_of(mesh_file: MeshFile) -> np.ndarray:
+    layer = mesh_file.layers[UV]
+    return layer.values[layer.rows].reshape(-1, 3, 2)
+
+
+def told(mesh_file: MeshFile) -> dict[str, int]:
+    return {change.what: change.count for change in mesh_file.changes}
+
+
+def welded(mesh_file: MeshFile) -> trimesh.Trimesh:
     mesh = trimesh.Trimesh(mesh_file.vertices, mesh_file.faces, process=False)
     mesh.merge_vertices()
     return mesh
@@ -43,38 +52,27 @@ def test_written_and_read_again_is_the_same_surface(kind: str) -> None:
     np.testing.assert_allclose(
         again.vertices[again.faces], mesh_file.vertices[mesh_file.faces], rtol=1e-6, atol=1e-7
     )
-    assert again.split == 0
-    if kind in ("obj", "ply"):
-        np.testing.assert_allclose(again.uv[again.faces], mesh_file.uv[mesh_file.faces], atol=1e-6)
+    assert again.changes == ()
+    if kind == "stl":
+        assert again.layers == {}
     else:
-        assert again.uv is None
-
-
-def test_memory_that_runs_out_is_no_fault_of_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    def takes_too_much(*_: object, **__: object) -> None:
-        raise MemoryError
-
-    monkeypatch.setattr(formats.load_readers(), "load_scene", takes_too_much)
-    with pytest.raises(MemoryError):
-        formats.read(formats.write(part(), "ply"), "ply")
+        np.testing.assert_allclose(uv_of(again), uv_of(mesh_file), atol=1e-6)
 
 
 def test_an_obj_of_many_materials_is_the_same_surface_as_one_of_few() -> None:
-    # trimesh alone would take minutes: its time grows with the square of their number.
     whole = formats.read(formats.write(part(), "obj"), "obj")
     lines = formats.write(part(), "obj").decode().splitlines()
     faces = [line for line in lines if line.startswith("f ")]
     others = [line for line in lines if not line.startswith("f ")]
     many = [text for number, face in enumerate(faces) for text in (f"usemtl m{number}", face)]
     read = formats.read("\n".join(others + many * 11).encode(), "obj")
-    assert read.unsupported["materials"] == 11 * len(faces) > 20_000
+    assert len(read.labels[MATERIAL].names) == len(faces)
     corners = read.vertices[read.faces]
     assert np.array_equal(corners[: len(faces)], whole.vertices[whole.faces])
     assert len(corners) == 11 * len(faces)
 
 
 def test_an_stl_of_many_solids_is_the_same_surface_as_one_of_few() -> None:
-    # trimesh alone would take minutes: its time grows with the square of their number.
     whole = formats.read(formats.write(part(), "stl"), "stl")
     facets = [
         "facet normal 0 0 1\nouter loop\n"
@@ -106,13 +104,13 @@ def test_a_surface_cut_at_its_uv_seams_stays_closed() -> None:
 def test_seams_make_no_difference_to_the_surface() -> None:
     mesh_file = part()
     fine, _ = refined(mesh_file, levels=2)
-    bare, _ = refined(IndexedTriangles(mesh_file.vertices, mesh_file.faces), levels=2)
+    bare, _ = refined(of_triangles(mesh_file.vertices, mesh_file.faces), levels=2)
     assert np.array_equal(fine.vertices[fine.faces], bare.vertices[bare.faces])
 
 
 def test_loop_positions_equal_trimeshs_on_a_closed_mesh() -> None:
     mesh_file = part()
-    fine, _ = refined(IndexedTriangles(mesh_file.vertices, mesh_file.faces))
+    fine, _ = refined(of_triangles(mesh_file.vertices, mesh_file.faces))
     closed = trimesh.Trimesh(mesh_file.vertices, mesh_file.faces, process=False)
     closed.merge_vertices(digits_vertex=12)
     vertices, faces = trimesh.remesh.subdivide_loop(closed.vertices, closed.faces, 1)
@@ -125,18 +123,16 @@ def test_loop_positions_equal_trimeshs_on_a_closed_mesh() -> None:
 def test_texture_coordinates_are_linear_along_edges() -> None:
     mesh_file = part()
     fine, _ = refined(mesh_file)
-    assert fine.uv is not None
     # Faces come in fours, the first of them at corner a; its second corner is the middle of ab.
-    a, b, _ = mesh_file.faces.T
-    middle = fine.faces[0::4, 1]
-    np.testing.assert_allclose(fine.uv[middle], (mesh_file.uv[a] + mesh_file.uv[b]) / 2, atol=1e-15)
-    assert np.array_equal(fine.uv[fine.faces[0::4, 0]], mesh_file.uv[a])
+    before, after = uv_of(mesh_file), uv_of(fine)[0::4]
+    np.testing.assert_allclose(after[:, 1], before[:, :2].mean(axis=1), atol=1e-15)
+    assert np.array_equal(after[:, 0], before[:, 0])
 
 
 def test_double_precision_survives() -> None:
     # So far from the origin, float32 has steps of 1/32.
     corners = np.array([[512_000.01, 0, 0], [512_001.02, 0, 0], [512_000.03, 1, 0]])
-    fine, _ = refined(IndexedTriangles(corners, np.array([[0, 1, 2]])))
+    fine, _ = refined(of_triangles(corners, np.array([[0, 1, 2]])))
     middle = fine.vertices[fine.faces[0, 1]]
     np.testing.assert_array_equal(middle, (corners[0] + corners[1]) / 2)
     again = formats.read(formats.write(fine, "obj"), "obj")
@@ -144,63 +140,55 @@ def test_double_precision_survives() -> None:
     assert np.abs(lost).max() < 1e-6
 
 
+CUT = "triangles added by cutting polygons"
 POLYGONS = {
-    "obj": b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv .5 2 0\nf 1 2 3 4\nf 1 3 5\nf 4 3 2 1 5\n",
+    "obj": b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv .5 2 0\nf 1 2 3 4\nf 1 3 5\nf 1 2 3 5 4\n",
     "off": b"# comment\nOFF\n5 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n.5 2 0\n"
-    b"4 0 1 2 3 255 0 0\n3 0 2 4\n5 3 2 1 0 4\n",
+    b"4 0 1 2 3 255 0 0\n3 0 2 4\n5 0 1 2 4 3\n",
     "ply": b"ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
     b"property float z\nelement face 3\nproperty list uchar int vertex_indices\nend_header\n"
-    b"0 0 0\n1 0 0\n1 1 0\n0 1 0\n.5 2 0\n4 0 1 2 3\n3 0 2 4\n5 3 2 1 0 4\n",
+    b"0 0 0\n1 0 0\n1 1 0\n0 1 0\n.5 2 0\n4 0 1 2 3\n3 0 2 4\n5 0 1 2 4 3\n",
 }
 
 
 def test_a_ply_text_that_was_cut_off_is_refused() -> None:
-    triangles = POLYGONS["ply"].replace(b"4 0 1 2 3\n3 0 2 4\n5 3 2 1 0 4\n", 3 * b"3 0 2 4\n")
+    triangles = POLYGONS["ply"].replace(b"4 0 1 2 3\n3 0 2 4\n5 0 1 2 4 3\n", 3 * b"3 0 2 4\n")
     assert len(formats.read(triangles, "ply").faces) == 3
     with pytest.raises(UnreadableError, match="3 faces and ends after 2"):
         formats.read(triangles.removesuffix(b"3 0 2 4\n"), "ply")
-
-
-def test_a_texture_that_did_not_come_is_no_stack_trace(caplog: pytest.LogCaptureFixture) -> None:
-    textured = POLYGONS["ply"].replace(b"element", b"comment TextureFile a.png\nelement", 1)
-    assert len(formats.read(textured, "ply").faces) == 6
-    assert not caplog.records
 
 
 @pytest.mark.parametrize("count", [0, 1])
 def test_elements_that_a_ply_has_none_of_are_not_told(count: int) -> None:
     edge = b"element edge %d\nproperty int vertex1\nend_header" % count
     data = POLYGONS["ply"].replace(b"end_header", edge) + b"0\n" * count
-    assert formats.read(data, "ply").unsupported == ({"element edge": 1} if count else {})
+    lost = {"element edge dropped": 1} if count else {}
+    assert told(formats.read(data, "ply")) == lost | {CUT: 3}
 
 
 @pytest.mark.parametrize("kind", POLYGONS)
 def test_polygons_are_split_and_counted(kind: str) -> None:
     mesh_file = formats.read(POLYGONS[kind], kind)
     assert len(mesh_file.faces) == 2 + 1 + 3
-    assert mesh_file.split == 3
+    lost = {"colours of faces dropped": 3} if kind == "off" else {}
+    assert told(mesh_file) == lost | {CUT: 3}
     _, report = refined(mesh_file)
-    assert report["changes"] == [
-        {"pointer": "", "what": "triangles added by splitting polygons", "count": 3}
-    ]
+    assert {"pointer": "", "what": CUT, "count": 3} in report["changes"]
 
 
 @pytest.mark.parametrize(
     ("kind", "data", "names"),
     [
-        ("obj", b"vn 0 0 1\nusemtl a\n" + POLYGONS["obj"], {"vertex normals", "materials"}),
-        ("obj", b"vt 0 0\n" + POLYGONS["obj"], {"texture coordinates that not all faces have"}),
+        (
+            "obj",
+            b"vn 0 0 1\nfoo\n" + POLYGONS["obj"],
+            {"vertex normals that no face names", "other statements"},
+        ),
+        ("obj", b"vt 0 0\n" + POLYGONS["obj"], {"texture coordinates that no face names"}),
         (
             "obj",
             b"v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\nf 1 2 3\nl 1 2\n",
-            {"vertex colours", "lines"},
-        ),
-        (
-            "ply",
-            POLYGONS["ply"]
-            .replace(b"float z\n", b"float z\nproperty uchar red\n")
-            .replace(b" 0\n", b" 0 255\n"),
-            {"vertex property red"},
+            {"lines"},
         ),
         (
             "ply",
@@ -208,12 +196,12 @@ def test_polygons_are_split_and_counted(kind: str) -> None:
             {"names of textures"},
         ),
         ("stl", formats.write(part(), "stl")[:-2] + b"\x1f\x80", {"colours of faces"}),
-        ("off", POLYGONS["off"].replace(b"OFF", b"COFF"), {"values that COFF adds to vertices"}),
+        ("off", POLYGONS["off"], {"colours of faces"}),
     ],
 )
 def test_what_is_left_out_is_named(kind: str, data: bytes, names: set[str]) -> None:
     mesh_file = formats.read(data, kind)
-    assert set(mesh_file.unsupported) == names
+    assert set(told(mesh_file)) - {CUT} == {f"{name} dropped" for name in names}
     _, report = refined(mesh_file)
     assert {f"{name} dropped" for name in names} <= {c["what"] for c in report["changes"]}
 
@@ -226,20 +214,21 @@ def test_an_off_of_coloured_vertices_has_the_same_ones() -> None:
     np.testing.assert_array_equal(first.faces, second.faces)
 
 
-@pytest.mark.parametrize("given", [b"vt 1e39 0\n", b"vt -1e39 0\n", b"vt .5\n"])
+@pytest.mark.parametrize("given", [b"vt 1e39 0\n", b"vt -1e39 0\n", b"vt nan 0\n", b"vt a 0\n"])
 def test_texture_coordinates_that_are_none_are_left_out_and_told(given: bytes) -> None:
-    """One number, or what float32 cannot hold; two that it can are kept."""
+    """What float32 cannot hold, or is no number; what it can is kept."""
     text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n%bf 1/1 2/1 3/1\n"
     read = formats.read(text % given, "obj")
-    assert read.uv is None
-    assert read.unsupported == {"texture coordinates that not all faces have": 1}
+    fine, report = refined(read)
+    assert UV not in fine.layers
+    (change,) = report["changes"]
+    assert "texture coordinates" in change["what"]
     kept = formats.read(text % b"vt 1e38 0\n", "obj")
-    assert kept.uv is not None
-    assert kept.uv.tolist() == [[np.float64("1e38"), 0]] * 3
+    assert uv_of(kept).tolist() == [[[np.float64("1e38"), 0]] * 3]
 
 
 @pytest.mark.parametrize("has_others", [False, True])
-def test_texture_coordinates_at_corners_of_a_ply_are_not_said_to_be_dropped(
+def test_texture_coordinates_at_corners_of_a_ply_come_before_those_at_vertices(
     has_others: bool,
 ) -> None:
     # A diagonal at which they differ, as at a seam. Beside them those at vertices are not used.
@@ -252,12 +241,10 @@ def test_texture_coordinates_at_corners_of_a_ply_are_not_said_to_be_dropped(
         + "3 0 1 2 6 0 0 1 0 1 1\n3 0 2 3 6 .1 .1 .9 .9 .1 .9\n"
     )
     mesh_file = formats.read(text.encode(), "ply")
-    assert mesh_file.uv is not None
-    assert mesh_file.uv[mesh_file.faces].reshape(2, 6) == pytest.approx(
+    assert uv_of(mesh_file).reshape(2, 6) == pytest.approx(
         np.array([[0, 0, 1, 0, 1, 1], [0.1, 0.1, 0.9, 0.9, 0.1, 0.9]])
     )
-    others = {"vertex property u": 4, "vertex property v": 4} if has_others else {}
-    assert mesh_file.unsupported == others
+    assert told(mesh_file) == {}
 
 
 def test_an_obj_of_several_materials_does_not_crack_between_them() -> None:
@@ -273,9 +260,9 @@ def test_an_obj_of_several_materials_does_not_crack_between_them() -> None:
 
 def test_degenerate_faces_are_dropped_and_copies_kept_and_both_counted() -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -0.0]])
-    mesh_file = IndexedTriangles(vertices, np.array([[0, 1, 2], [0, 1, 3], [2, 1, 0]]))
+    mesh_file = of_triangles(vertices, np.array([[0, 1, 2], [0, 1, 3], [2, 1, 0]]))
     fine, report = refined(mesh_file)
-    assert report["dropped"] == {"degenerate_faces": 1, "duplicate_faces": 0, "vertices": 0}
+    assert report["dropped"] == {"degenerate_faces": 1, "duplicate_faces": 0, "vertices": 1}
     assert report["totals"]["copied_faces"] == 1
     assert len(fine.faces) == 8
 
@@ -292,7 +279,8 @@ def test_degenerate_faces_are_dropped_and_copies_kept_and_both_counted() -> None
 )
 def test_vertices_that_no_face_uses_are_counted(kind: str, data: bytes, unused: int) -> None:
     _, report = refined(formats.read(data, kind))
-    assert report["dropped"]["vertices"] == unused
+    counts = [c["count"] for c in report["changes"] if "no face uses" in c["what"]]
+    assert sum(counts) + report["dropped"]["vertices"] == unused
 
 
 def test_what_the_report_counts_is_the_same_as_a_gltfs() -> None:
@@ -300,7 +288,7 @@ def test_what_the_report_counts_is_the_same_as_a_gltfs() -> None:
     options = Options(scheme="loop")
     of_gltf = subdivide_gltf(triangles_glb(part()), "glb", options, None, Limits()).report
     assert report["dropped"] == of_gltf["dropped"]
-    assert set(of_gltf["totals"]) - set(report["totals"]) == {"meshes", "primitives"}
+    assert set(of_gltf["totals"]) == set(report["totals"])
     assert report["totals"]["zero_reference_lengths"] == 0
 
 
@@ -363,8 +351,8 @@ def test_names_in_old_encodings_are_no_obstacle(kind: str) -> None:
 )
 def test_faces_of_two_vertices_are_counted(kind: str, data: bytes, split: int) -> None:
     mesh_file = formats.read(data, kind)
-    assert mesh_file.unsupported == {"faces of fewer than three vertices": 1}
-    assert mesh_file.split == split
+    lost = {"faces of fewer than three vertices dropped": 1}
+    assert told(mesh_file) == lost | ({CUT: split} if split else {})
 
 
 @pytest.mark.parametrize(
@@ -383,14 +371,14 @@ def test_numbers_that_make_no_mesh_are_refused(text: bytes) -> None:
 
 @pytest.mark.parametrize("corner", [-1, 3, 9])
 def test_a_corner_that_is_no_vertex_is_told_with_those_that_there_are(corner: int) -> None:
-    with pytest.raises(UnrefinableError, match=rf"vertices \[0, 1, {corner}\], expected 0 … 2"):
+    with pytest.raises(UnrefinableError, match=rf"face 0 .* vertex {corner}, expected 0 … 2"):
         formats.read(b"OFF\n3 1 0\n" + TRIANGLE + b"3 0 1 %d\n" % corner, "off")
 
 
 @pytest.mark.parametrize("limits", [Limits(max_faces=100), Limits(max_memory_bytes=1000)])
 def test_limits_hold_for_mesh_files_too(limits: Limits) -> None:
     with pytest.raises(LimitError):
-        refine_triangles(part(), loop(), Options(scheme="loop"), limits)
+        refine_mesh_file(part(), loop(), Options(scheme="loop"), limits)
 
 
 @pytest.mark.parametrize(

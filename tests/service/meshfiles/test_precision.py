@@ -10,23 +10,21 @@ from pns_common.refinement import refine
 from pns_common.schemes import loop
 from service.errors import UnrefinableError
 from service.meshfiles import formats
-from service.meshfiles.indexed_triangles import IndexedTriangles
-from service.meshfiles.refine_triangles import refine_triangles
-from service.meshfiles.single_precision import rounding_changes
+from service.meshfiles.formats import rounding_changes
+from service.meshfiles.mesh_file import MeshFile, of_triangles
+from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
 
 SIDE = 12
 
 
-def grid(*, spacing: float, offset: float) -> IndexedTriangles:
+def grid(*, spacing: float, offset: float) -> MeshFile:
     """A square of SIDE × SIDE vertices, so far along x."""
     x, y = np.meshgrid(np.arange(SIDE), np.arange(SIDE), indexing="ij")
     points = np.column_stack([offset + spacing * x.ravel(), spacing * y.ravel(), 0 * x.ravel()])
     a = (SIDE * np.arange(SIDE - 1)[:, None] + np.arange(SIDE - 1)).ravel()
     b, c, d = a + SIDE, a + SIDE + 1, a + 1
-    return IndexedTriangles(
-        points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    )
+    return of_triangles(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
 
 
 PLY_HEAD = """ply
@@ -41,7 +39,7 @@ end_header
 """
 
 
-def double_ply(triangles: IndexedTriangles) -> bytes:
+def double_ply(triangles: MeshFile) -> bytes:
     head = PLY_HEAD.format(vertices=len(triangles.vertices), faces=len(triangles.faces))
     rows = [" ".join(map(repr, row)) for row in triangles.vertices.tolist()]
     rows += ["3 " + " ".join(map(str, row)) for row in triangles.faces.tolist()]
@@ -56,7 +54,7 @@ def test_coordinates_beyond_float32_keep_every_face(
     triangles = grid(spacing=spacing, offset=offset)
     data = double_ply(triangles) if kind == "ply" else formats.write(triangles, kind)
     read = formats.read(data, kind)
-    fine, report = refine_triangles(read, loop(), Options(scheme="loop", levels=1), Limits())
+    fine, report = refine_mesh_file(read, loop(), Options(scheme="loop", levels=1), Limits())
     assert report["dropped"] == {"degenerate_faces": 0, "duplicate_faces": 0, "vertices": 0}
     assert len(fine.faces) == 4 * len(triangles.faces)
     expected = refine(Mesh(read.vertices, read.faces), loop(), 1).mesh
@@ -83,7 +81,7 @@ def test_faces_of_few_steps_of_float32_are_counted(offset: float, told: bool) ->
     assert (turned_by_rounding(triangles) > 0.1) == told
 
 
-def turned_by_rounding(triangles: IndexedTriangles) -> float:
+def turned_by_rounding(triangles: MeshFile) -> float:
     """Return the degrees by which rounding to float32 turns the face that it turns most."""
     exact, rounded = (
         np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])

@@ -8,15 +8,16 @@ import pytest
 
 from service.bodies import media
 from service.bodies.uploads import Sent
-from service.errors import InvalidParameter, LimitError, UnrefinableError
+from service.errors import LimitError, UnrefinableError
 from service.meshfiles.example import part_glb
-from service.meshfiles.to_gltf import BYTES_PER_BYTE, as_gltf
-from service.options import Limits, Options
+from service.meshfiles.formats import memory_to_read
+from service.meshfiles.to_gltf import as_gltf
+from service.options import Limits
 
 
 def test_a_gltf_passes_as_it_is() -> None:
     sent = Sent(part_glb(), "glb")
-    assert as_gltf(sent, Options(), Limits()) is sent
+    assert as_gltf(sent, Limits()) is sent
 
 
 @pytest.mark.parametrize("kind", sorted(set(media.KINDS) - set(media.GLTF_KINDS)))
@@ -24,23 +25,15 @@ def test_a_file_too_large_to_be_read_is_refused_before_it_is_read(kind: str) -> 
     # It is no mesh at all: whoever read it would say so.
     sent = Sent(b"0" * 1000, kind)
     with pytest.raises(LimitError) as refusal:
-        as_gltf(sent, Options(), Limits(max_memory_bytes=1000 * BYTES_PER_BYTE[kind] - 1))
+        as_gltf(sent, Limits(max_memory_bytes=memory_to_read(b"0" * 1000, kind) - 1))
     assert refusal.value.limit == "memory"
 
 
 @pytest.mark.parametrize("far", ["3.5e38", "-1e300", "inf", "nan"])
 def test_a_position_that_float32_cannot_hold_is_refused(far: str) -> None:
     sent = Sent(f"v 0 0 {far}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".encode(), "obj")
-    with pytest.raises(UnrefinableError, match="float32"):
-        as_gltf(sent, Options(), Limits())
-
-
-def test_creases_by_normals_are_refused_where_there_are_none_to_hand_on() -> None:
-    sent = Sent(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "obj")
-    with pytest.raises(InvalidParameter, match="angle:DEGREES") as refusal:
-        as_gltf(sent, Options(crease="normals"), Limits())
-    assert refusal.value.name == "crease"
-    assert as_gltf(sent, Options(crease="angle:30"), Limits()).kind == "glb"
+    with pytest.raises(UnrefinableError, match=r"float32|NaN or infinite"):
+        as_gltf(sent, Limits())
 
 
 @pytest.mark.parametrize("shares", [(1.0, 0.0), (0.5, 0.5)])
@@ -51,7 +44,7 @@ def test_an_off_takes_no_more_than_is_predicted_whatever_its_lines_are(
     vertices, faces = (max(int(share * 2**20) // 7, 1) for share in shares)
     data = b"OFF\n%d %d 0\n" % (vertices, faces) + b"0 0 0\n" * vertices + b"3 0 1 2\n" * faces
     tracemalloc.start()
-    as_gltf(Sent(data, "off"), Options(), Limits())
+    as_gltf(Sent(data, "off"), Limits())
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert most < BYTES_PER_BYTE["off"] * len(data)
+    assert most < memory_to_read(data, "off")

@@ -67,8 +67,12 @@ def test_rows_say_what_was_changed_or_lost(tmp_path):
     refined(batch)
     told = {name: row["changes"].splitlines() for name, row in rows(batch).items()}
     assert told["a.obj"] == []
-    assert told["bare.obj"] == ["1 × vertex normals dropped", "1 × degenerate faces dropped"]
-    assert "1 × materials dropped: not written to OBJ files (/materials)" in told["d.glb"]
+    assert told["bare.obj"] == [
+        "1 × vertex normals that no face names dropped",
+        "1 × degenerate faces dropped",
+    ]
+    lost = "1 × definitions of materials dropped: not written to OBJ files (/materials)"
+    assert lost in told["d.glb"]
 
 
 def test_what_is_done_is_not_done_again(tmp_path):
@@ -396,7 +400,7 @@ def test_what_is_not_refined_is_not_collected(tmp_path):
 
     def looks(tasks):
         assert next(tasks, None) is None
-        noted = sqlite3.connect(f"{batch.report}.journal")
+        noted = sqlite3.connect(batch.report.with_name(".pns-batch.journal"))
         assert noted.execute("SELECT count(*) FROM rows").fetchone() == (50,)
         noted.close()
         return iter(())

@@ -26,7 +26,7 @@ def test_a_journal_knows_only_what_was_done_by_the_same_work(tmp_path):
 
 def locked(folder):
     """Whether some run keeps others from the journals of a folder."""
-    with (folder / "r.jsonl.journal-lock").open("w") as lock:
+    with (folder / ".pns-batch.journal-lock").open("w") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -57,10 +57,10 @@ def test_a_journal_is_opened_and_closed_by_one_run_at_a_time(tmp_path, monkeypat
 
 
 def test_a_file_that_is_no_journal_is_told_by_name(tmp_path):
-    (tmp_path / "r.jsonl.journal").write_bytes(b"years of work" * 100)
+    (tmp_path / ".pns-batch.journal").write_bytes(b"years of work" * 100)
     with pytest.raises(OSError, match="not a database") as refusal:
         open_journal(tmp_path / "r.jsonl", "work").__enter__()
-    assert refusal.value.filename == f"{tmp_path}/r.jsonl.journal"
+    assert refusal.value.filename == f"{tmp_path}/.pns-batch.journal"
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")

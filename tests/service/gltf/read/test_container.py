@@ -66,13 +66,18 @@ BROKEN = {
     "shorter than its header": WHOLE[:11],
     "another magic": b"gltf" + WHOLE[4:],
     "another version": WHOLE[:4] + struct.pack("<I", 1) + WHOLE[8:],
-    "longer than it says": WHOLE + b"\0",
     "shorter than it says": WHOLE[:-1],
     "no chunk": struct.pack("<4sII", b"glTF", 2, 12),
     "half a chunk header": struct.pack("<4sII", b"glTF", 2, 16) + b"1234",
     "a chunk beyond the end": struct.pack("<4sIII4s", b"glTF", 2, 20, 2**32 - 1, b"JSON"),
     "BIN before JSON": struct.pack("<4sII", b"glTF", 2, 20) + files.chunk(b"BIN\0", b"", b""),
 }
+
+
+def test_bytes_behind_a_glb_are_counted_and_no_part_of_it():
+    assert read_glb(WHOLE).tail == 0
+    longer = read_glb(WHOLE + b"\0\n")
+    assert (longer.text, bytes(longer.binary), longer.tail) == (b"{}  ", b"1234", 2)
 
 
 @pytest.mark.parametrize("kind", BROKEN)

@@ -184,7 +184,7 @@ def test_no_small_mesh_goes_alone(
     def refuse(*_: object) -> None:
         raise AssertionError("a mesh was refined alone")
 
-    monkeypatch.setattr(meshes, "_alone", refuse)
+    monkeypatch.setattr(meshes, "refine_alone", refuse)
     rng = np.random.default_rng(0)
     shapes = [random_mesh(rng, number % 16) for number in range(64)]
     # Those that have no face to keep are not refined at all.
@@ -225,13 +225,13 @@ def test_one_mesh_without_a_face_does_not_send_the_others_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     alone: list[int] = []
-    original = meshes._alone
+    original = meshes.refine_alone
 
     def counted(plan: MeshPlan, *rest: object) -> object:
         alone.append(plan.mesh)
         return original(plan, *rest)
 
-    monkeypatch.setattr(meshes, "_alone", counted)
+    monkeypatch.setattr(meshes, "refine_alone", counted)
     flat = octahedron(indices=np.array([[0, 0, 1]] * 8))
     point = octahedron() | {"POSITION": np.zeros((6, 3)) + 2, "targets": [spread()]}
     plain = octahedron(targets=[spread()])

@@ -9,8 +9,8 @@ from pns_common import Mesh, load_model, loop, pns, refine
 from service.errors import LimitError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshes.weld import weld
-from service.meshfiles.indexed_triangles import IndexedTriangles
-from service.meshfiles.refine_triangles import refine_triangles
+from service.meshfiles.mesh_file import of_triangles
+from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Limits, Options
 from tests.service.gltf.test_options import cylinder
@@ -158,9 +158,9 @@ def test_vertices_on_a_boundary_are_where_loop_puts_them():
 
 def test_mesh_files_are_refined_by_the_same_rule():
     shape = octahedron()
-    triangles = IndexedTriangles(shape["POSITION"], shape["indices"], None)
+    triangles = of_triangles(shape["POSITION"], shape["indices"])
     options = Options(levels=2, crease="off")
-    refined, report = refine_triangles(triangles, pns(MODEL), options, Limits())
+    refined, report = refine_mesh_file(triangles, pns(MODEL), options, Limits())
     expected = refine(welded_octahedron(), pns(MODEL), 2, creases=None)
     np.testing.assert_array_equal(
         refined.vertices[refined.faces], expected.mesh.vertices[expected.mesh.faces]
@@ -182,7 +182,7 @@ def test_the_result_does_not_depend_on_the_number_of_threads():
 )
 def test_memory_stays_below_what_was_predicted(model, options):
     mesh = torus(240_000 // 4**options.levels)
-    data = triangles_glb(IndexedTriangles(mesh.vertices, mesh.faces, None))
+    data = triangles_glb(of_triangles(mesh.vertices, mesh.faces))
     small = files.glb([octahedron()])
     subdivide_gltf(small, "glb", options, model, Limits())  # imports, threads, the allocator
     with pytest.raises(LimitError) as refusal:

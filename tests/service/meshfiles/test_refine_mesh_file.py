@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from pns_common import Creases, loop
-from service.errors import InvalidParameter
-from service.meshfiles.indexed_triangles import IndexedTriangles
-from service.meshfiles.refine_triangles import refine_triangles
+from service.meshfiles.mesh_file import UV, of_triangles
+from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
 from tests.support.gltf.shapes import box, octahedron
 
@@ -16,8 +15,17 @@ ASKING = replace(loop(), creases=Creases(angle=40.0, seed=60.0, levels=2))
 
 
 def refined(shape, texture=None, scheme=None, **options):
-    triangles = IndexedTriangles(shape["POSITION"], shape["indices"].astype(np.int64), texture)
-    return refine_triangles(triangles, scheme or loop(), Options(**options), Limits())
+    vertices = shape["POSITION"].astype(np.float64)
+    triangles = of_triangles(vertices, shape["indices"], texture)
+    return refine_mesh_file(triangles, scheme or loop(), Options(**options), Limits())
+
+
+def at_corners(mesh, name):
+    return mesh.layers[name].values[mesh.layers[name].rows]
+
+
+def positions(mesh):
+    return mesh.vertices[mesh.corners]
 
 
 def test_mesh_files_take_creases_by_angle():
@@ -32,16 +40,10 @@ def test_mesh_files_keep_the_edges_that_the_model_asks_for():
         assert report["levels"][0]["edges"].get("crease", 0) == count
 
 
-def test_creases_by_normals_need_a_gltf():
-    with pytest.raises(InvalidParameter) as refusal:
-        refined(box(), crease="normals")
-    assert refusal.value.name == "crease"
-
-
 def test_smooth_uvs_follow_the_positions_of_a_closed_chart():
     shape = octahedron()
     triangles, _ = refined(shape, shape["POSITION"][:, :2], levels=2, uv="smooth")
-    np.testing.assert_allclose(triangles.uv, triangles.vertices[:, :2], atol=1e-12)
+    np.testing.assert_allclose(at_corners(triangles, UV), positions(triangles)[:, :2], atol=1e-12)
 
 
 @pytest.mark.parametrize("crease", ["auto", "angle:60"])
@@ -50,7 +52,7 @@ def test_smooth_uvs_have_the_creases_of_the_positions(crease):
     triangles, _ = refined(
         shape, shape["POSITION"][:, 1:], levels=3, uv="smooth", crease=crease, scheme=ASKING
     )
-    np.testing.assert_allclose(triangles.uv, triangles.vertices[:, 1:], atol=1e-12)
+    np.testing.assert_allclose(at_corners(triangles, UV), positions(triangles)[:, 1:], atol=1e-12)
 
 
 def test_a_weld_tolerance_is_counted():

@@ -1,0 +1,102 @@
+"""A mesh as a file lists it: polygons, and what their corners and faces carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
+from ..report import Change
+
+# Layers are called as glTF calls attributes; other properties begin with an underscore.
+UV, NORMAL, COLOUR = "TEXCOORD_0", "NORMAL", "COLOR_0"
+MATERIAL, GROUP, OBJECT, SMOOTHING = "material", "group", "object", "smoothing group"
+# The label or the row of what has none.
+NONE = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Values at corners.
+
+    Attributes:
+        values: (N, K) in the type that the file stores; integers of a colour are fractions.
+        rows: (C,) the row of each corner; NONE where it has no value.
+    """
+
+    values: Shaped[np.ndarray, "N K"]
+    rows: Int[np.ndarray, " C"]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every corner has a value."""
+        return bool((self.rows >= 0).all())
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """Names of faces: of materials, groups or objects. `of_face` numbers `names`, or is NONE."""
+
+    names: tuple[str, ...]
+    of_face: Int[np.ndarray, " F"]
+
+
+@dataclass(frozen=True, eq=False)
+class MeshFile:
+    """Polygons as a file has them.
+
+    Attributes:
+        vertices: (V, 3) positions.
+        offsets: (F + 1,) where the corners of each polygon begin; the last is their number.
+        corners: (C,) the vertex of each corner.
+        layers: values at corners by name; texture coordinates count v upwards.
+        face_values: (F, K) values of faces, by name.
+        labels: names of faces, by what they name.
+        libraries: files that define the materials.
+        double: whether a format that has both is to store positions as doubles.
+        changes: what the reader dropped or mended.
+    """
+
+    vertices: Float[np.ndarray, "V 3"]
+    offsets: Int[np.ndarray, " F1"]
+    corners: Int[np.ndarray, " C"]
+    layers: dict[str, Layer] = field(default_factory=dict)
+    face_values: dict[str, Shaped[np.ndarray, "F K"]] = field(default_factory=dict)
+    labels: dict[str, Labels] = field(default_factory=dict)
+    libraries: tuple[str, ...] = ()
+    double: bool = False
+    changes: tuple[Change, ...] = ()
+
+    @property
+    def sizes(self) -> Int[np.ndarray, " F"]:
+        """How many corners each polygon has."""
+        return np.diff(self.offsets)
+
+    @property
+    def faces(self) -> Int[np.ndarray, "F 3"]:
+        """The vertices of triangles; raises ValueError where a face is none."""
+        return self.corners.reshape(len(self.offsets) - 1, 3)
+
+
+def of_triangles(
+    vertices: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    uv: Float[np.ndarray, "V 2"] | None = None,
+    normals: Float[np.ndarray, "V 3"] | None = None,
+) -> MeshFile:
+    """Make a mesh of triangles; `uv` and `normals` are those of the vertices."""
+    corners = faces.reshape(-1).astype(np.int64)
+    given = {NORMAL: normals, UV: uv}
+    layers = {name: Layer(values, corners) for name, values in given.items() if values is not None}
+    return MeshFile(vertices, np.arange(0, len(corners) + 1, 3), corners, layers)
+
+
+def offsets_of(sizes: Int[np.ndarray, " F"]) -> Int[np.ndarray, " F1"]:
+    """Return where polygons of these sizes begin, and where the last ends."""
+    return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)])
+
+
+def dropped(names: dict[str, int]) -> tuple[Change, ...]:
+    """Return a change for each kind of thing of which a reader dropped some."""
+    return tuple(Change("", f"{name} dropped", count) for name, count in names.items() if count)

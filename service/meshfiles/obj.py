@@ -1,0 +1,318 @@
+"""Wavefront OBJ: polygons whose corners name positions, texture coordinates and normals apart.
+
+No reader in Python was fit: trimesh takes a polygon for a fan and drops colours, groups and hard
+edges; meshio reads a line at a time and drops normals and materials; tinyobjloader has no wheels.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from ..errors import UnreadableError
+from .mesh_file import (
+    COLOUR,
+    GROUP,
+    MATERIAL,
+    NONE,
+    NORMAL,
+    OBJECT,
+    SMOOTHING,
+    UV,
+    Labels,
+    Layer,
+    MeshFile,
+    dropped,
+    offsets_of,
+)
+from .text import BLOCK, NUMBER, Text, cut_text, name_of, parsed, plain_text, rows_text
+
+SIDES = "faces of fewer than three vertices"
+STATEMENTS = {MATERIAL: b"usemtl", GROUP: b"g", OBJECT: b"o", SMOOTHING: b"s"}
+_LIBRARY = b"mtllib"
+_DROPPED = {
+    b"l": "lines",
+    b"p": "points",
+    b"vp": "free-form curves",
+    b"curv": "free-form curves",
+    b"curv2": "free-form curves",
+    b"surf": "free-form surfaces",
+}
+_SLASH, _ZERO = b"/0"
+_REFERENCES = re.compile(rb"[+-]?\d+(?:/(?:[+-]?\d+)?){0,2}")
+
+
+def read_obj(data: bytes) -> MeshFile:
+    """Read an OBJ; indices below 0 count back from their own line.
+
+    Raises:
+        UnreadableError: a position or a face cannot be read, or names a vertex that there is not.
+    """
+    text = cut_text(plain_text(data), "OBJ", continued=True)
+    is_v, is_vt, is_vn = (text.keyword(word) for word in (b"v", b"vt", b"vn"))
+    is_face = text.keyword(b"f") | text.keyword(b"fo")
+    vertices, colours = _positions(text, is_v)
+    references, sizes = _references(text, is_face)
+    line = np.flatnonzero(is_face)
+    v, vt, vn = (
+        _absolute(column, np.cumsum(kind)[line], sizes)
+        for column, kind in zip(references.T, (is_v, is_vt, is_vn), strict=True)
+    )
+    wrong = np.flatnonzero((v < 0) | (v >= len(vertices)))
+    if len(wrong):
+        name, face = int(references[wrong[0], 0]), int(np.repeat(line, sizes)[wrong[0]])
+        there = int(is_v[:face].sum()) if name < 0 else len(vertices)
+        why = "they count from 1" if name == 0 else f"there are {there}"
+        raise text.fault(face, f"a face names vertex {name}, and {why}")
+    lost: Counter[str] = Counter()
+    proper = sizes >= 3
+    lost[SIDES] = int((~proper).sum())
+    if lost[SIDES]:
+        of_proper = np.repeat(proper, sizes)
+        v, vt, vn = v[of_proper], vt[of_proper], vn[of_proper]
+        sizes, line = sizes[proper], line[proper]
+    layers = _layers(text, (is_vt, vt), (is_vn, vn), lost)
+    if colours is not None:
+        layers[COLOUR] = Layer(colours, v)
+    labels, libraries = _statements(text, ~(is_v | is_vt | is_vn | is_face), line, lost)
+    return MeshFile(
+        vertices,
+        offsets_of(sizes),
+        v,
+        layers,
+        labels=labels,
+        libraries=libraries,
+        changes=dropped(lost),
+    )
+
+
+def _positions(
+    text: Text, lines: Bool[np.ndarray, " L"]
+) -> tuple[Float[np.ndarray, "V 3"], Float[np.ndarray, "V K"] | None]:
+    """Read positions and, behind them, colours; vertices without one are white among others."""
+    counts = text.counts[lines] - 1
+    if (counts < 3).any():
+        bad = np.flatnonzero(lines)[np.argmax(counts < 3)]
+        raise text.fault(int(bad), f"a vertex has {text.counts[bad] - 1} coordinates")
+    if not len(counts):
+        return np.zeros((0, 3)), None
+    values = text.numbers(text.words_of(lines))
+    width = int(counts[0])
+    if (counts == width).all():
+        rows = values.reshape(-1, width)
+        return np.ascontiguousarray(rows[:, :3]), rows[:, 3:7] if width >= 6 else None
+    starts = np.cumsum(counts) - counts
+    coloured = np.flatnonzero(counts >= 6)
+    if not len(coloured):
+        return values[starts[:, None] + np.arange(3)], None
+    colours = np.ones((len(counts), 3))
+    colours[coloured] = values[starts[coloured, None] + np.arange(3, 6)]
+    return values[starts[:, None] + np.arange(3)], colours
+
+
+def _references(
+    text: Text, lines: Bool[np.ndarray, " L"]
+) -> tuple[Int[np.ndarray, "C 3"], Int[np.ndarray, " F"]]:
+    """Return what each corner names (0: nothing), and how many corners each face has."""
+    words, sizes = text.words_of(lines), text.counts[lines] - 1
+    letters = text.cut(words)
+    if not (letters == _SLASH).any():
+        references = np.zeros((len(words), 3), dtype=np.int64)
+        references[:, 0] = text.numbers(words, np.int64)
+        return references, sizes
+    values = parsed(_three_numbers(letters).tobytes(), np.int64)
+    if len(values) != 3 * len(words):
+        bad = next((w for w in words.tolist() if not _REFERENCES.fullmatch(text.word(w))), 0)
+        what = name_of(text.word(bad)[:40])
+        raise UnreadableError(
+            f"line {text.line_of(bad)} of the OBJ file: {what!r} is no corner of a face"
+        )
+    return values.reshape(-1, 3), sizes
+
+
+def _three_numbers(letters: UInt8[np.ndarray, " n"]) -> UInt8[np.ndarray, " m"]:
+    """Write corners of one to three numbers as three each, 0 where none stands."""
+    slash = letters == _SLASH
+    blank = letters <= ord(" ")
+    follows = np.append(slash[1:] | blank[1:], True)
+    left_out = np.flatnonzero(slash & follows) + 1
+    ends = np.flatnonzero(blank & np.append(False, ~blank[:-1]))
+    slashes = np.diff(np.searchsorted(np.flatnonzero(slash), ends), prepend=0)
+    letters = np.where(slash, np.uint8(ord(" ")), letters)
+    short = [np.repeat(ends[slashes < 2], 2), np.repeat(ends[slashes < 1], 2)]
+    places = np.concatenate([left_out, *short])
+    fill = np.concatenate(
+        [
+            np.full(len(left_out), _ZERO),
+            np.tile(np.frombuffer(b" 0", np.uint8), (len(short[0]) + len(short[1])) // 2),
+        ]
+    )
+    return np.insert(letters, places, fill)
+
+
+def _absolute(
+    references: Int[np.ndarray, " C"], above: Int[np.ndarray, " F"], sizes: Int[np.ndarray, " F"]
+) -> Int[np.ndarray, " C"]:
+    """Return rows from 0 on, below 0 where nothing is named; `above` are those before the line."""
+    if not (references < 0).any():
+        return references - 1
+    return np.where(references < 0, np.repeat(above, sizes) + references, references - 1)
+
+
+def _layers(
+    text: Text,
+    uv: tuple[Bool[np.ndarray, " L"], Int[np.ndarray, " C"]],
+    normals: tuple[Bool[np.ndarray, " L"], Int[np.ndarray, " C"]],
+    lost: Counter[str],
+) -> dict[str, Layer]:
+    """Read what corners name beside positions; what cannot be read is dropped."""
+    layers: dict[str, Layer] = {}
+    kinds = {
+        UV: (*uv, 2, 1, "texture coordinates"),
+        NORMAL: (*normals, 3, 3, "vertex normals"),
+    }
+    for name, (lines, rows, width, least, shown) in kinds.items():
+        count = int(lines.sum())
+        if not count:
+            continue
+        named = (rows >= 0) & (rows < count)
+        values = _values(text, lines, width, least) if named.any() else None
+        if values is None:
+            why = " that cannot be read" if named.any() else " that no face names"
+            lost[shown + why] = count
+            continue
+        layers[name] = Layer(values, np.where(named, rows, NONE))
+    return layers
+
+
+def _values(
+    text: Text, lines: Bool[np.ndarray, " L"], width: int, least: int
+) -> Float[np.ndarray, "N K"] | None:
+    """Return the first `width` numbers of lines, 0 for those left out; None where one is none."""
+    counts = text.counts[lines] - 1
+    words = text.words_of(lines)
+    values = parsed(text.cut(words).tobytes())
+    if (counts < least).any() or len(values) != len(words):
+        return None
+    starts = np.cumsum(counts) - counts
+    columns = np.minimum(np.arange(width), counts[:, None] - 1)
+    rows = values[starts[:, None] + columns]
+    rows[counts[:, None] <= np.arange(width)] = 0.0
+    return rows if np.isfinite(rows).all() else None
+
+
+def _statements(
+    text: Text,
+    others: Bool[np.ndarray, " L"],
+    face_lines: Int[np.ndarray, " F"],
+    lost: Counter[str],
+) -> tuple[dict[str, Labels], tuple[str, ...]]:
+    """Return the names that statements give to the faces below them, and the libraries.
+
+    Other statements are counted as lost.
+    """
+    known = {word: kind for kind, word in STATEMENTS.items()}
+    given: dict[str, list[tuple[int, str]]] = {kind: [] for kind in known.values()}
+    libraries: list[str] = []
+    for line in np.flatnonzero(others & (text.counts > 0)).tolist():
+        first = text.first[line]
+        word = text.word(first).lower()
+        if word in known or word == _LIBRARY:
+            begin = text.ends[first]
+            rest = text.letters[begin : text.ends[first + text.counts[line] - 1]].tobytes()
+            name = name_of(rest.strip())
+            if word == _LIBRARY:
+                libraries.append(name)
+            else:
+                given[known[word]].append((line, name))
+        elif word in _DROPPED:
+            lost[_DROPPED[word]] += 1
+        else:
+            lost["other statements"] += 1
+    labels: dict[str, Labels] = {}
+    for kind, entries in given.items():
+        if not entries or not len(face_lines):
+            continue
+        numbers: dict[str, int] = {}
+        of_entry = [numbers.setdefault(name, len(numbers)) for _, name in entries]
+        place = np.searchsorted([line for line, _ in entries], face_lines) - 1
+        of_face = np.where(place >= 0, np.array(of_entry)[place], NONE)
+        labels[kind] = Labels(tuple(numbers), of_face)
+    return labels, tuple(dict.fromkeys(libraries))
+
+
+def write_obj(mesh: MeshFile) -> bytes:
+    """Write the file's bytes; what faces are called stands before them."""
+    pieces = [f"mtllib {name}\n" for name in mesh.libraries]
+    colours = mesh.layers.get(COLOUR)
+    rows = mesh.vertices
+    if colours is not None:
+        of_vertex = np.zeros((len(rows), 3))
+        of_vertex[mesh.corners] = as_fractions(colours.values)[colours.rows, :3]
+        rows = np.hstack([rows, of_vertex])
+    pieces += rows_text(f"v{f' {NUMBER}' * rows.shape[1]}\n", rows)
+    uv, normals = mesh.layers.get(UV), mesh.layers.get(NORMAL)
+    if uv is not None:
+        pieces += rows_text(f"vt {NUMBER} {NUMBER}\n", uv.values)
+    if normals is not None:
+        pieces += rows_text("vn %.7g %.7g %.7g\n", normals.values)
+    pieces += _faces_text(mesh, uv, normals)
+    return "".join(pieces).encode()
+
+
+def as_fractions(values: np.ndarray) -> np.ndarray:
+    """Return colours as fractions of 1, whatever type stores them."""
+    return values / np.iinfo(values.dtype).max if values.dtype.kind in "ui" else values
+
+
+def _faces_text(mesh: MeshFile, uv: Layer | None, normals: Layer | None) -> Iterator[str]:
+    sizes = mesh.sizes
+    has_uv, has_normal = (_of_faces(mesh, layer) for layer in (uv, normals))
+    labels = {kind: label.of_face for kind, label in mesh.labels.items()}
+    state = np.stack([has_uv, has_normal, *labels.values()], axis=1).astype(np.int64)
+    turns = np.flatnonzero((np.diff(state, axis=0) != 0).any(axis=1)) + 1
+    bounds = [0, *turns.tolist(), len(sizes)]
+    said = dict.fromkeys(labels, NONE)
+    for begin, end in pairwise(bounds):
+        for kind, of_face in labels.items():
+            number = int(of_face[begin])
+            # One that has no name behind one that has would take that one's.
+            if number != said[kind]:
+                name = mesh.labels[kind].names[number] if number >= 0 else _NAMELESS[kind]
+                yield f"{STATEMENTS[kind].decode()} {name}\n"
+                said[kind] = number
+        yield from _run_text(
+            mesh, begin, end, uv if has_uv[begin] else None, normals if has_normal[begin] else None
+        )
+
+
+_NAMELESS = {MATERIAL: "none", GROUP: "default", OBJECT: "default", SMOOTHING: "off"}
+
+
+def _run_text(
+    mesh: MeshFile, begin: int, end: int, uv: Layer | None, normals: Layer | None
+) -> Iterator[str]:
+    """Write faces that all have the same kinds of references."""
+    form = " %d" + ("/%d" if uv is not None else "/" if normals is not None else "")
+    form += "/%d" if normals is not None else ""
+    columns = [mesh.corners, *(layer.rows for layer in (uv, normals) if layer is not None)]
+    sizes = mesh.sizes
+    for start in range(begin, end, BLOCK):
+        stop = min(start + BLOCK, end)
+        share = slice(mesh.offsets[start], mesh.offsets[stop])
+        numbers = np.stack([column[share] + 1 for column in columns], axis=1)
+        forms = {size: f"f{form * size}\n" for size in np.unique(sizes[start:stop]).tolist()}
+        text = "".join(forms[size] for size in sizes[start:stop].tolist())
+        yield text % tuple(numbers.reshape(-1).tolist())
+
+
+def _of_faces(mesh: MeshFile, layer: Layer | None) -> Bool[np.ndarray, " F"]:
+    """Return which faces have a value at every corner."""
+    if layer is None:
+        return np.zeros(len(mesh.sizes), dtype=bool)
+    return np.logical_and.reduceat(layer.rows >= 0, mesh.offsets[:-1])

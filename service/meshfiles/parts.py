@@ -1,0 +1,204 @@
+"""Triangles as the primitives that the pipeline refines, one for each material, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Int, Shaped
+
+from pns_common.rows import cross, distinct_rows, number_by_first_appearance, unit
+
+from ..gltf.constants import FLOAT
+from ..gltf.read.primitives import TrianglePrimitive
+from ..gltf.read.schema import Accessor
+from ..gltf.refine.attributes import RefinedPrimitive
+from ..meshes.weld import canonical_zero
+from ..report import Change
+from .mesh_file import (
+    COLOUR,
+    MATERIAL,
+    NONE,
+    NORMAL,
+    SMOOTHING,
+    UV,
+    Labels,
+    Layer,
+    MeshFile,
+    of_triangles,
+)
+
+_SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
+LARGEST = float(np.finfo(np.float32).max)
+_SMOOTH_OFF = frozenset({"off", "0", ""})
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The triangles of one material.
+
+    Attributes:
+        primitive: their vertices; positions are doubles.
+        faces: (F,) which triangles of the file they are.
+        material: its number among the names of materials; NONE where there is none.
+    """
+
+    primitive: TrianglePrimitive
+    faces: Int[np.ndarray, " F"]
+    material: int
+
+
+def parts_of(mesh: MeshFile) -> tuple[list[Part], list[Change]]:
+    """Divide triangles by material, in the order in which materials occur.
+
+    A part has the layers that all of its corners have; what others lose is reported.
+    """
+    materials = mesh.labels.get(MATERIAL)
+    count = len(mesh.faces)
+    of_face = np.zeros(count, dtype=np.int64) if materials is None else materials.of_face + 1
+    order, first = number_by_first_appearance(of_face)
+    parts: list[Part] = []
+    lost: dict[str, int] = {}
+    for number, place in enumerate(first.tolist()):
+        faces = np.arange(count) if len(first) == 1 else np.flatnonzero(order == number)
+        material = NONE if materials is None else int(of_face[place]) - 1
+        primitive = _primitive(mesh, faces, number, lost)
+        parts.append(Part(primitive, faces, material))
+    return parts, [Change("", f"{what} dropped", faces) for what, faces in lost.items()]
+
+
+def _primitive(
+    mesh: MeshFile, faces: Int[np.ndarray, " F"], number: int, lost: dict[str, int]
+) -> TrianglePrimitive:
+    corners = (3 * faces[:, None] + np.arange(3)).reshape(-1)
+    layers: dict[str, Layer] = {}
+    for name, layer in mesh.layers.items():
+        rows = layer.rows[corners]
+        some = rows >= 0
+        shown = _SHOWN.get(name, f"attribute {name}")
+        if not some.any():
+            continue
+        if not some.all():
+            shown += " that not all corners of a material have"
+            lost[shown] = lost.get(shown, 0) + int(some.reshape(-1, 3).any(axis=1).sum())
+        elif not (np.abs(layer.values) <= LARGEST).all():
+            lost[f"{shown}, of which some are no numbers of float32,"] = len(faces)
+        else:
+            layers[name] = Layer(layer.values, rows)
+    vertex = mesh.corners[corners]
+    row, first = distinct_corners(vertex, layers)
+    attributes = {"POSITION": mesh.vertices[vertex[first]]}
+    for name, layer in layers.items():
+        values = layer.values[layer.rows[first]]
+        attributes[name] = unit(values).astype(np.float32) if name == NORMAL else values
+    accessors = {
+        # No more is asked of it but whether integers are fractions.
+        name: Accessor(FLOAT, len(first), "SCALAR")
+        for name in attributes
+    }
+    return TrianglePrimitive(number, vertex[first], row.reshape(-1, 3), attributes, accessors)
+
+
+def distinct_corners(
+    vertex: Int[np.ndarray, " C"], layers: dict[str, Layer]
+) -> tuple[Int[np.ndarray, " C"], Int[np.ndarray, " R"]]:
+    """Give corners numbers by vertex and rows of layers; return also where each comes first."""
+    columns = [vertex]
+    for layer in layers.values():
+        if not any(np.array_equal(layer.rows, column) for column in columns):
+            columns.append(layer.rows)
+    labels = vertex if len(columns) == 1 else distinct_rows(np.stack(columns, axis=1))
+    return number_by_first_appearance(labels)
+
+
+def with_vertex_layers(mesh: MeshFile, names: Sequence[str]) -> MeshFile:
+    """Return the mesh with a vertex for each value of some layers, as formats of vertices need."""
+    layers = {name: layer for name, layer in mesh.layers.items() if name in names}
+    if all(np.array_equal(layer.rows, mesh.corners) for layer in layers.values()):
+        return mesh
+    row, first = distinct_corners(mesh.corners, layers)
+    kept = {name: Layer(layer.values[layer.rows[first]], row) for name, layer in layers.items()}
+    return replace(
+        mesh,
+        vertices=mesh.vertices[mesh.corners[first]],
+        corners=row,
+        layers={**mesh.layers, **kept},
+    )
+
+
+def with_group_normals(mesh: MeshFile) -> MeshFile:
+    """Return the mesh with normals that part where its smoothing groups do, if it has no others.
+
+    Faces of one group share them; a face of none has its own. A file that names no group says
+    nothing of its edges.
+    """
+    groups = mesh.labels.get(SMOOTHING)
+    if groups is None or NORMAL in mesh.layers:
+        return mesh
+    smooth = np.array([name.lower() not in _SMOOTH_OFF for name in groups.names] + [False])
+    if not smooth.any():
+        return mesh
+    faces, of_face = mesh.faces, groups.of_face
+    points = distinct_rows(canonical_zero(mesh.vertices))[faces]
+    label = np.where(smooth[of_face], of_face, len(groups.names) + np.arange(len(faces)))
+    corner = distinct_rows(np.stack([points.reshape(-1), np.repeat(label, 3)], axis=1))
+    a, b, c = np.moveaxis(mesh.vertices[faces], 1, 0)
+    by_area = cross(b - a, c - a)
+    count = int(corner.max()) + 1
+    sums = [np.bincount(corner, np.repeat(axis, 3), minlength=count) for axis in by_area.T]
+    return replace(mesh, layers={**mesh.layers, NORMAL: Layer(unit(np.stack(sums, 1)), corner)})
+
+
+def joined(
+    mesh: MeshFile,
+    parts: Sequence[Part],
+    kept: Sequence[Bool[np.ndarray, " F"]],
+    refined: Sequence[RefinedPrimitive],
+    levels: int,
+) -> MeshFile:
+    """Return refined parts as one mesh, in the order of the file's faces.
+
+    `kept` says for each part which of its faces were refined.
+    """
+    of_part = {part.primitive.number: (part, keep) for part, keep in zip(parts, kept, strict=True)}
+    control = np.concatenate(
+        [of_part[p.source.number][0].faces[of_part[p.source.number][1]] for p in refined]
+    )
+    order = np.argsort(control, kind="stable")
+    ranks = np.repeat(control[order], 4**levels)
+
+    def ordered(rows: list[np.ndarray]) -> Int[np.ndarray, " C"]:
+        blocks = np.concatenate(rows).reshape(len(control), -1)
+        return (blocks if len(refined) == 1 else blocks[order]).reshape(-1)
+
+    ids = [primitive.vertex for primitive in refined if primitive.vertex is not None]
+    vertices = np.zeros((1 + max(int(own.max()) for own in ids), 3))
+    for own, primitive in zip(ids, refined, strict=True):
+        vertices[own] = primitive.attributes["POSITION"]
+    corners = ordered([own[p.faces] for own, p in zip(ids, refined, strict=True)])
+    layers: dict[str, Layer] = {}
+    for name in dict.fromkeys(name for p in refined for name in p.attributes if name != "POSITION"):
+        values: list[Shaped[np.ndarray, "N K"]] = []
+        rows: list[np.ndarray] = []
+        total = 0
+        for primitive in refined:
+            own = primitive.attributes.get(name)
+            rows.append(
+                np.full(primitive.faces.shape, NONE) if own is None else primitive.faces + total
+            )
+            if own is not None:
+                values.append(own)
+                total += len(own)
+        layers[name] = Layer(np.concatenate(values), ordered(rows))
+    labels = {
+        kind: Labels(label.names, label.of_face[ranks]) for kind, label in mesh.labels.items()
+    }
+    return replace(
+        of_triangles(vertices, corners.reshape(-1, 3)),
+        layers=layers,
+        face_values={name: values[ranks] for name, values in mesh.face_values.items()},
+        labels=labels,
+        libraries=mesh.libraries,
+        double=mesh.double,
+    )

@@ -1,0 +1,557 @@
+"""PLY, the Polygon File Format: text or binary, elements and properties as the header says.
+
+plyfile, the library for it, is under the GPL and reads text by lines; trimesh cannot read polygons
+of several sizes, strips, or colours of faces, and asks for scipy where there are further elements.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Int, Shaped
+
+from ..errors import UnreadableError
+from .mesh_file import COLOUR, NONE, NORMAL, UV, Layer, MeshFile, dropped, offsets_of
+from .text import count_words, cut_text, parsed, plain_text
+
+# It is text, and a file may be one long comment.
+LONGEST = 2**20
+POLYGON = frozenset({"vertex_index", "vertex_indices"})
+STRIPS = "tristrips"
+# Two numbers for each of a face's corners.
+CORNER_UV = "texcoord"
+SIDES = "faces of fewer than three vertices"
+
+_ORDERS = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
+_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+_NAMES = {kind: name for name, kind in _TYPES.items() if not name[-1].isdigit()}
+_END = re.compile(rb"^[ \t]*end_header[ \t]*(?:\r\n|\n|\r)", re.MULTILINE)
+_REMARK = re.compile(rb"(?m)^[ \t]*(?:comment|obj_info)\b[^\n]*$")
+# Properties of vertices that are one layer, by the names that programs give them.
+_LAYERS = {
+    NORMAL: (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z")),
+    UV: (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t")),
+    COLOUR: tuple(
+        names[:count]
+        for count in (4, 3)
+        for names in (
+            ("red", "green", "blue", "alpha"),
+            ("r", "g", "b", "a"),
+            ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
+        )
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Property:
+    """A number of each row, or a list of them; types are numpy's without an order of bytes."""
+
+    name: str
+    kind: str
+    # Of a list's length; None: one number.
+    count_kind: str | None = None
+
+
+@dataclass
+class Element:
+    """Rows of the same properties."""
+
+    name: str
+    rows: int
+    properties: list[Property] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class PlyHeader:
+    """A header.
+
+    Attributes:
+        order: of bytes, as numpy writes it; None: the file is text.
+        elements: in their order.
+        end: where what they hold begins.
+        textures: names of images in comments, as MeshLab writes them.
+    """
+
+    order: str | None
+    elements: list[Element]
+    end: int
+    textures: int = 0
+
+
+def ply_header(data: bytes) -> PlyHeader:
+    """Read the header. Raises UnreadableError with the line that cannot be understood."""
+    start = data[:LONGEST]
+    end = _END.search(start.replace(b"\r", b"\n") if b"\n" not in start[:80] else start)
+    if not start.startswith(b"ply") or end is None:
+        raise UnreadableError("this is not a PLY file, or its header has no end")
+    order, elements, textures = "", list[Element](), 0
+    lines = start[3 : end.start()].decode("latin-1").replace("\r\n", "\n").replace("\r", "\n")
+    for number, line in enumerate(lines.split("\n"), start=1):
+        match line.split():
+            case ["format", name, *_] if name in _ORDERS:
+                order = name
+            case ["element", name, rows] if rows.isdecimal() and len(rows) < 19:
+                elements.append(Element(name, int(rows)))
+            case ["property", "list", count, kind, name] if (
+                elements and kind in _TYPES and _TYPES.get(count, "f")[0] != "f"
+            ):
+                elements[-1].properties.append(Property(name, _TYPES[kind], _TYPES[count]))
+            case ["property", kind, name] if elements and kind in _TYPES:
+                elements[-1].properties.append(Property(name, _TYPES[kind]))
+            case ["comment", "TextureFile", *_]:
+                textures += 1
+            case ["comment" | "obj_info", *_] | []:
+                pass
+            case _:
+                raise UnreadableError(f"line {number} of the PLY header: {line[:60]!r}")
+    if order == "":
+        raise UnreadableError("the PLY header names no format that is known")
+    return PlyHeader(_ORDERS[order], elements, end.end(), textures)
+
+
+@dataclass(frozen=True, eq=False)
+class _List:
+    """A property of lists: how long each is, and all of them in a row."""
+
+    sizes: Int[np.ndarray, " N"]
+    values: Shaped[np.ndarray, " C"]
+
+
+_Columns = dict[str, "Shaped[np.ndarray, ' N'] | _List"]
+
+
+def read_ply(data: bytes) -> MeshFile:
+    """Read a PLY: polygons or triangle strips, and what vertices and faces have beside them.
+
+    Raises:
+        UnreadableError: not a PLY, one that ends too early, or one whose numbers cannot be read.
+    """
+    if not data.startswith(b"ply"):
+        # A byte-order mark, or wide letters: a text.
+        data = plain_text(data).lstrip()
+    header = ply_header(data)
+    tables = _text_tables(data, header) if header.order is None else _binary_tables(data, header)
+    vertex, vertex_lists = _apart(tables.get("vertex", {}))
+    if not {"x", "y", "z"} <= vertex.keys():
+        raise UnreadableError("the PLY file has no vertices with x, y and z")
+    lost: Counter[str] = Counter({"names of textures": header.textures})
+    for element in header.elements:
+        if element.name not in ("vertex", "face", STRIPS):
+            lost[f"element {element.name}"] += element.rows
+    vertices = np.stack([vertex[axis] for axis in "xyz"], axis=1).astype(np.float64)
+    for name, column in vertex_lists.items():
+        lost[f"vertex property {name}"] += len(column.sizes)
+    face, lists = _apart(tables.get("face", {}))
+    polygons = next((lists[name] for name in POLYGON if name in lists), None)
+    if polygons is None or not len(polygons.sizes):
+        sizes, corners = _of_strips(tables.get(STRIPS, {}))
+        face, lists, proper = {}, {}, np.ones(len(sizes), dtype=bool)
+    else:
+        sizes, corners = polygons.sizes, polygons.values.astype(np.int64)
+        proper = sizes >= 3
+        lost[SIDES] = int((~proper).sum())
+        corners = corners[np.repeat(proper, sizes)]
+    layers = {name: Layer(values, corners) for name, values in _layers(vertex).items()}
+    for name in lists.keys() - POLYGON - {CORNER_UV}:
+        lost[f"face property {name}"] += len(sizes)
+    corner_uv = lists.get(CORNER_UV)
+    if corner_uv is not None:
+        if (corner_uv.sizes == 2 * sizes).all():
+            values = corner_uv.values.reshape(-1, 2)[np.repeat(proper, sizes)]
+            layers[UV] = Layer(values.astype(np.float64), np.arange(len(values)))
+        else:
+            lost["texture coordinates that not all corners have"] += len(sizes)
+    return MeshFile(
+        vertices,
+        offsets_of(sizes[proper]),
+        corners,
+        layers,
+        _face_values({name: column[proper] for name, column in face.items()}),
+        double=any(
+            one.name == "x" and one.kind == "f8"
+            for element in header.elements
+            for one in element.properties
+        ),
+        changes=dropped(lost),
+    )
+
+
+def _apart(columns: _Columns) -> tuple[dict[str, np.ndarray], dict[str, _List]]:
+    """Return the numbers of an element's rows, and their lists."""
+    numbers = {n: column for n, column in columns.items() if not isinstance(column, _List)}
+    return numbers, {n: column for n, column in columns.items() if isinstance(column, _List)}
+
+
+def _layers(vertex: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return what vertices have beside positions."""
+    left = {name: column for name, column in vertex.items() if name not in ("x", "y", "z")}
+    layers: dict[str, np.ndarray] = {}
+    for layer, choices in _LAYERS.items():
+        chosen = next((names for names in choices if set(names) <= left.keys()), ())
+        if not chosen or (layer == COLOUR and len({left[name].dtype for name in chosen}) > 1):
+            continue
+        values = np.stack([left.pop(name) for name in chosen], axis=1)
+        layers[layer] = _colours(values) if layer == COLOUR else values.astype(np.float64)
+    return layers | {f"_{name}": column[:, None] for name, column in left.items()}
+
+
+def _colours(values: np.ndarray) -> np.ndarray:
+    """Return colours as fractions, bytes or words: those of other integers are of 0 to 255."""
+    if values.dtype.kind == "f" or values.dtype.str[1:] in ("u1", "u2"):
+        return values
+    return np.clip(values, 0, 255).astype(np.uint8)
+
+
+def _face_values(face: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return what faces have beside their corners."""
+    values = {name: column[:, None] for name, column in face.items()}
+    names = [name for name in ("red", "green", "blue", "alpha") if name in values]
+    if len(names) >= 3 and len({values[name].dtype for name in names}) == 1:
+        values[COLOUR] = _colours(np.hstack([values.pop(name) for name in names]))
+    return values
+
+
+def _of_strips(strips: _Columns) -> tuple[Int[np.ndarray, " F"], Int[np.ndarray, " C"]]:
+    """Return the triangles of strips, which −1 divides; every second one turns the other way."""
+    found = next((strips[name] for name in POLYGON if isinstance(strips.get(name), _List)), None)
+    if not isinstance(found, _List):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    ends = np.cumsum(found.sizes)
+    values = np.insert(found.values.astype(np.int64), ends, NONE)
+    a, b, c = values[:-2], values[1:-1], values[2:]
+    begins = np.where(np.append(True, values[:-1] == NONE), np.arange(len(values)), 0)
+    odd = (np.arange(len(a)) - np.maximum.accumulate(begins)[: len(a)]) % 2 == 1
+    whole = (a != NONE) & (b != NONE) & (c != NONE) & (a != b) & (b != c) & (c != a)
+    triangles = np.where(odd[:, None], np.stack([b, a, c], 1), np.stack([a, b, c], 1))[whole]
+    return np.full(len(triangles), 3), triangles.reshape(-1)
+
+
+def _text_tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
+    """Read a text: numbers count, wherever its lines end."""
+    body = plain_text(data[header.end :])
+    if b"comment" in body or b"obj_info" in body:
+        body = _REMARK.sub(b"", body)
+    numbers = parsed(body)
+    if len(numbers) != count_words(body):
+        text = cut_text(body, "PLY", plain_text(data[: header.end]).count(b"\n"))
+        numbers = text.numbers(np.arange(len(text.begins)))
+    tables: dict[str, _Columns] = {}
+    at = 0
+    for element in header.elements:
+        columns, at = _text_columns(numbers, at, element)
+        tables[element.name] = columns
+    return tables
+
+
+def _text_columns(
+    numbers: Shaped[np.ndarray, " N"], at: int, element: Element
+) -> tuple[_Columns, int]:
+    """Read the rows of an element from a place on; return also where they end."""
+    lists = [one for one in element.properties if one.count_kind is not None]
+    if not lists or not element.rows:
+        width = len(element.properties)
+        rows = numbers[at : at + element.rows * width]
+        if len(rows) < element.rows * width:
+            raise _too_short(element, len(rows) // width)
+        table = rows.reshape(element.rows, width)
+        return {
+            one.name: _List(np.zeros(0, np.int64), np.zeros(0))
+            if one.count_kind is not None
+            else _typed(table[:, place], one.kind)
+            for place, one in enumerate(element.properties)
+        }, at + rows.size
+    # Where all lists are as long as the first row's, the rows are a table.
+    widths = _first_widths(numbers[at : at + 2**16], element)
+    if widths is not None and at + element.rows * sum(widths) <= len(numbers):
+        table = numbers[at : at + element.rows * sum(widths)].reshape(element.rows, -1)
+        begins = np.cumsum([0, *widths[:-1]])
+        of_lists = [
+            (place, width)
+            for place, width, one in zip(begins, widths, element.properties, strict=True)
+            if one.count_kind is not None
+        ]
+        if all((table[:, place] == width - 1).all() for place, width in of_lists):
+            columns: _Columns = {}
+            for place, width, one in zip(begins, widths, element.properties, strict=True):
+                if one.count_kind is None:
+                    columns[one.name] = _typed(table[:, place], one.kind)
+                else:
+                    inside = table[:, place + 1 : place + width].reshape(-1)
+                    sizes = np.full(element.rows, width - 1)
+                    columns[one.name] = _List(sizes, _typed(inside, one.kind))
+            return columns, at + table.size
+    return _text_rows(numbers, at, element)
+
+
+def _first_widths(numbers: Shaped[np.ndarray, " N"], element: Element) -> list[int] | None:
+    """Return how many numbers each property of the first row takes; None where it is cut off."""
+    widths: list[int] = []
+    for one in element.properties:
+        at = sum(widths)
+        if at >= len(numbers):
+            return None
+        count = numbers[at]
+        if one.count_kind is not None and not 0 <= count <= len(numbers):
+            return None
+        widths.append(1 if one.count_kind is None else 1 + int(count))
+    return widths
+
+
+def _text_rows(
+    numbers: Shaped[np.ndarray, " N"], at: int, element: Element
+) -> tuple[_Columns, int]:
+    """Read rows whose lists differ in length, one by one: each begins where another ends."""
+    sizes: list[list[int]] = [[] for _ in element.properties]
+    places: list[list[int]] = [[] for _ in element.properties]
+    total = len(numbers)
+    is_list = [one.count_kind is not None for one in element.properties]
+    for row in range(element.rows):
+        for number, several in enumerate(is_list):
+            count = 1
+            if at < total and several:
+                count = int(numbers[at]) if numbers[at] >= 0 else total
+                at += 1
+            if at + count > total:
+                raise _too_short(element, row)
+            places[number].append(at)
+            sizes[number].append(count)
+            at += count
+    columns: _Columns = {}
+    for number, one in enumerate(element.properties):
+        begins, counts = np.array(places[number]), np.array(sizes[number])
+        inside = np.repeat(begins - (np.cumsum(counts) - counts), counts)
+        values = _typed(numbers[inside + np.arange(len(inside))], one.kind)
+        columns[one.name] = values if one.count_kind is None else _List(counts, values)
+    return columns, at
+
+
+def _typed(values: Shaped[np.ndarray, " N"], kind: str) -> Shaped[np.ndarray, " N"]:
+    """Return numbers in the type that the header gives; floats of text stay as they are read."""
+    if kind[0] == "f":
+        return values.astype(np.float64)
+    if (values != np.floor(values)).any():
+        wrong = float(values[np.argmax(values != np.floor(values))])
+        raise UnreadableError(f"the PLY file has {wrong:g} where its header says a whole number")
+    bounds = np.iinfo(kind)
+    return np.clip(values, bounds.min, bounds.max).astype(kind)
+
+
+def _too_short(element: Element, rows: int) -> UnreadableError:
+    what = {"vertex": "vertices", "face": "faces"}.get(element.name, f"rows of {element.name}")
+    return UnreadableError(f"the PLY file says {element.rows} {what} and ends after {rows}")
+
+
+def _binary_tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
+    tables: dict[str, _Columns] = {}
+    at = header.end
+    for element in header.elements:
+        tables[element.name], at = _binary_columns(data, at, element, header.order or "<")
+    return tables
+
+
+def _binary_columns(data: bytes, at: int, element: Element, order: str) -> tuple[_Columns, int]:
+    """Read the rows of an element; rows of one size are a table."""
+    sizes: list[int] = []
+    begin = at
+    for one in element.properties:
+        if one.count_kind is None:
+            begin += int(one.kind[1])
+            continue
+        count = _count(data, begin, order + one.count_kind) if element.rows else 0
+        if count is None:
+            raise _too_short(element, 0)
+        sizes.append(count)
+        begin += int(one.count_kind[1]) + count * int(one.kind[1])
+    table = _table(data, at, element, order, sizes)
+    if table is None:
+        return _binary_rows(data, at, element, order)
+    columns: _Columns = {}
+    for place, one in enumerate(element.properties):
+        values = np.ascontiguousarray(table[f"v{place}"]).astype(one.kind)
+        if one.count_kind is None:
+            columns[one.name] = values
+        else:
+            lengths = np.full(element.rows, values.shape[1], dtype=np.int64)
+            columns[one.name] = _List(lengths, values.reshape(-1))
+    return columns, at + table.nbytes
+
+
+def _count(data: bytes, at: int, kind: str) -> int | None:
+    """Return the length of a list; None where the file ends before it."""
+    size = int(kind[2])
+    if size == 1 and kind[1] == "u":
+        return data[at] if at < len(data) else None
+    if at + size > len(data):
+        return None
+    order = "little" if kind[0] == "<" else "big"
+    return int.from_bytes(data[at : at + size], order, signed=kind[1] == "i")
+
+
+def _table(
+    data: bytes, at: int, element: Element, order: str, sizes: list[int]
+) -> Shaped[np.ndarray, " N"] | None:
+    """Return rows whose lists have these sizes as records; None where theirs differ."""
+    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+    counts: list[tuple[str, int]] = []
+    left = iter(sizes)
+    if any(size < 0 or size > len(data) for size in sizes):
+        return None
+    for place, one in enumerate(element.properties):
+        if one.count_kind is None:
+            fields.append((f"v{place}", order + one.kind))
+            continue
+        size = next(left)
+        counts.append((f"n{place}", size))
+        fields.append((f"n{place}", order + one.count_kind))
+        fields.append((f"v{place}", order + one.kind, (size,)))
+    record = np.dtype(fields)
+    if at + element.rows * record.itemsize > len(data):
+        if not sizes:
+            raise _too_short(element, (len(data) - at) // max(record.itemsize, 1))
+        return None
+    table = np.frombuffer(data, record, element.rows, at) if record.itemsize else None
+    if table is None or any((table[name] != size).any() for name, size in counts):
+        return None
+    return table
+
+
+def _binary_rows(data: bytes, at: int, element: Element, order: str) -> tuple[_Columns, int]:
+    """Read rows whose lists differ in length, one by one: each begins where another ends."""
+    lists = [one for one in element.properties if one.count_kind is not None]
+    kinds = [(order + str(one.count_kind), int(one.kind[1])) for one in lists]
+    gaps = _gaps(element)
+    begins: list[list[int]] = [[] for _ in lists]
+    sizes: list[list[int]] = [[] for _ in lists]
+    total = len(data)
+    for row in range(element.rows):
+        for number, (count_kind, width) in enumerate(kinds):
+            at += gaps[number]
+            size = _count(data, at, count_kind)
+            if size is None or size < 0:
+                raise _too_short(element, row)
+            at += int(count_kind[2])
+            begins[number].append(at)
+            sizes[number].append(size)
+            at += size * width
+        at += gaps[-1]
+        if at > total:
+            raise _too_short(element, row)
+    letters = np.frombuffer(data, dtype=np.uint8)
+    columns: _Columns = {}
+    number, after, size = -1, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    for one in element.properties:
+        kind, width = np.dtype(order + one.kind), int(one.kind[1])
+        if one.count_kind is not None:
+            number += 1
+            begin, size = np.array(begins[number]), np.array(sizes[number])
+            firsts = np.repeat(begin - width * (np.cumsum(size) - size), size)
+            places = firsts + width * np.arange(len(firsts))
+            after = begin + width * size
+        elif number < 0:
+            first = np.array(begins[0]) - int(kinds[0][0][2]) - gaps[0]
+            places = first if not len(after) else after
+            after = places + width
+        else:
+            places, after = after, after + width
+        values = letters[places[:, None] + np.arange(width)].reshape(-1).view(kind)
+        values = values.astype(one.kind)
+        columns[one.name] = values if one.count_kind is None else _List(size, values)
+    return columns, at
+
+
+def _gaps(element: Element) -> list[int]:
+    """Return the bytes before each list of a row, and those behind the last."""
+    gaps = [0]
+    for one in element.properties:
+        if one.count_kind is None:
+            gaps[-1] += int(one.kind[1])
+        else:
+            gaps.append(0)
+    return gaps
+
+
+def write_ply(mesh: MeshFile) -> bytes:
+    """Write a binary PLY; every layer belongs to vertices."""
+    real = "f8" if mesh.double else "f4"
+    fields: list[tuple[str, str]] = []
+    columns: list[np.ndarray] = []
+
+    def add(names: tuple[str, ...], values: np.ndarray, kind: str) -> None:
+        fields.extend((name, kind) for name in names)
+        columns.extend(values.T)
+
+    add(("x", "y", "z"), mesh.vertices, real)
+    for name, layer in mesh.layers.items():
+        values = np.zeros((len(mesh.vertices), layer.values.shape[1]), dtype=layer.values.dtype)
+        values[mesh.corners] = layer.values[layer.rows]
+        names = _names_of(name, values.shape[1])
+        kind = values.dtype.str[1:]
+        add(names, values, "f4" if kind == "f8" or kind not in _NAMES else kind)
+    vertex = _records(fields, columns, len(mesh.vertices))
+    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.vertices)}"]
+    head += [f"property {_NAMES[kind]} {name}" for name, kind in fields]
+    fields, columns = [], []
+    for name, values in mesh.face_values.items():
+        add(_names_of(name, values.shape[1]), values, values.dtype.str[1:])
+    head += [f"element face {len(mesh.sizes)}", "property list uchar int vertex_indices"]
+    head += [f"property {_NAMES[kind]} {name}" for name, kind in fields]
+    faces = _face_bytes(mesh, fields, columns)
+    return b"".join(["\n".join([*head, "end_header\n"]).encode("latin-1"), vertex.tobytes(), faces])
+
+
+def _names_of(layer: str, width: int) -> tuple[str, ...]:
+    """Return how a layer's columns are called in a PLY, as Blender and MeshLab call them."""
+    known = {
+        NORMAL: ("nx", "ny", "nz"),
+        UV: ("s", "t"),
+        COLOUR: ("red", "green", "blue", "alpha"),
+    }
+    if layer in known:
+        return known[layer][:width]
+    name = re.sub(r"\s", "_", layer.removeprefix("_"))
+    return (name,) if width == 1 else tuple(f"{name}_{place}" for place in range(width))
+
+
+def _records(
+    fields: list[tuple[str, str]], columns: list[np.ndarray], rows: int
+) -> Shaped[np.ndarray, " N"]:
+    kinds = [(f"c{place}", f"<{kind}") for place, (_, kind) in enumerate(fields)]
+    table = np.zeros(rows, dtype=kinds)
+    for (name, _), column in zip(kinds, columns, strict=True):
+        table[name] = column
+    return table
+
+
+def _face_bytes(mesh: MeshFile, fields: list[tuple[str, str]], columns: list[np.ndarray]) -> bytes:
+    """Write polygons: a byte for the count, the corners, and what faces have beside them."""
+    sizes = mesh.sizes
+    kinds = [(f"c{place}", f"<{kind}") for place, (_, kind) in enumerate(fields)]
+    if len(sizes) and (sizes == sizes[0]).all():
+        size = int(sizes[0])
+        table = np.zeros(len(sizes), [("n", "u1"), ("corners", "<i4", (size,)), *kinds])
+        table["n"], table["corners"] = size, mesh.corners.reshape(-1, size)
+        for (name, _), column in zip(kinds, columns, strict=True):
+            table[name] = column
+        return table.tobytes()
+    corners = mesh.corners.astype("<i4").tobytes()
+    behind = _records(fields, columns, len(sizes))
+    offsets = (4 * mesh.offsets).tolist()
+    return b"".join(
+        bytes([size]) + corners[begin:end] + behind[face].tobytes()
+        for face, (size, begin, end) in enumerate(
+            zip(sizes.tolist(), offsets[:-1], offsets[1:], strict=True)
+        )
+    )

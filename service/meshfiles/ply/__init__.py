@@ -1,1 +1,0 @@
-"""PLY: what its header says, and polygons of many sizes as triangles."""

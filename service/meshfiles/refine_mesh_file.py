@@ -1,0 +1,92 @@
+"""Refine a mesh file without a glTF between: positions stay doubles, and labels stay with faces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pns_common.errors import MeshError
+from pns_common.rows import marked
+from pns_common.schemes import Scheme
+
+from ..course import Course
+from ..errors import UnrefinableError, check_limit
+from ..gltf.read.plan import (
+    BYTES_FOR_LIMIT,
+    BYTES_FOR_NORMALS,
+    BYTES_PER_FACE,
+    BYTES_PER_VERTEX_BYTE,
+    MeshPlan,
+    check_memory,
+)
+from ..gltf.refine.meshes import refine_alone, stage_shares
+from ..options import Limits, Options
+from ..report import MeshResult, build_report
+from .mesh_file import NORMAL, MeshFile
+from .parts import joined, parts_of, with_group_normals
+
+
+def refine_mesh_file(
+    mesh: MeshFile, scheme: Scheme, options: Options, limits: Limits, course: Course | None = None
+) -> tuple[MeshFile, dict[str, Any]]:
+    """Refine triangles; return also the report.
+
+    `normals=auto` keeps normals, and adds none to a mesh without.
+
+    Raises:
+        LimitError: over `max_faces` or `max_memory_bytes`.
+        UnrefinableError: no face that has an area.
+    """
+    course = Course() if course is None else course
+    check_cost(mesh, options, limits)
+    if options.normals == "auto":
+        options = replace(options, normals="keep")
+    shaded = with_group_normals(mesh)
+    parts, incomplete = parts_of(shaded)
+    plan = MeshPlan(0, tuple(range(len(parts))), len(mesh.faces))
+    primitives = [part.primitive for part in parts]
+    shares = stage_shares(scheme, options)
+    try:
+        made = refine_alone(plan, primitives, scheme, options, course, shares)
+    except MeshError as error:
+        raise UnrefinableError(str(error)) from error
+    if made.report is None:
+        raise UnrefinableError("no face has three different vertices")
+    refined = joined(mesh, parts, made.kept, made.refined, options.levels)
+    if NORMAL not in mesh.layers and options.normals == "keep":
+        # Those that smoothing groups gave: these stay themselves.
+        refined = replace(
+            refined, layers={n: own for n, own in refined.layers.items() if n != NORMAL}
+        )
+    result = MeshResult(
+        index=0,
+        instances=1,
+        primitives=len(made.refined),
+        vertices=len(refined.vertices),
+        faces=len(refined.faces),
+        degenerate=made.degenerate,
+        copies=made.copies,
+        report=made.report,
+        bends=made.bends,
+    )
+    kept = np.concatenate(
+        [mesh.faces[part.faces[keep]] for part, keep in zip(parts, made.kept, strict=True)]
+    )
+    count = len(mesh.vertices)
+    unused = int(marked(mesh.corners, count).sum()) - int(marked(kept.reshape(-1), count).sum())
+    # There is no document for a pointer to point into.
+    found = [replace(change, pointer="") for change in made.changes]
+    changes = [*mesh.changes, *incomplete, *found]
+    return refined, build_report(scheme, options.levels, [result], unused, changes)
+
+
+def check_cost(mesh: MeshFile, options: Options, limits: Limits) -> None:
+    """Check the refined faces and the memory that they will take. Raises LimitError."""
+    faces = len(mesh.faces) * 4**options.levels
+    check_limit("faces", faces, limits.max_faces, f"the refined file would have {faces} faces")
+    width = sum(layer.values.itemsize * layer.values.shape[1] for layer in mesh.layers.values())
+    each = BYTES_PER_FACE + BYTES_PER_VERTEX_BYTE * width + BYTES_FOR_LIMIT * options.limit
+    each += BYTES_FOR_NORMALS * (options.normals not in ("auto", "keep"))
+    check_memory(faces * each, limits)

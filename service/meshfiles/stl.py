@@ -1,0 +1,111 @@
+"""STL, binary or text: triangles with positions of their own."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pns_common.rows import cross, norm
+
+from ..errors import UnreadableError
+from ..report import Change
+from .mesh_file import MeshFile, offsets_of
+from .text import cut_text, plain_text
+
+HEADER = 84
+# The two bytes behind the numbers of each facet are by no standard its colour.
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+# How far text is told from a binary file whose header begins as a text does.
+_START = 2**10
+
+
+def read_stl(data: bytes) -> MeshFile:
+    """Read an STL: its facets in order, whatever it says of their number or of its end.
+
+    Raises:
+        UnreadableError: a file that ends within a facet, or holds none.
+    """
+    if is_text(data):
+        points, sizes, changes = _of_text(plain_text(data))
+    else:
+        points, changes = _of_binary(data)
+        sizes = np.full(len(points) // 3, 3)
+    if not len(sizes):
+        raise UnreadableError("the STL file has no facets")
+    return MeshFile(points, offsets_of(sizes), np.arange(len(points)), changes=changes)
+
+
+def is_text(data: bytes) -> bool:
+    """Return whether a file is text: a binary one may begin with `solid` too."""
+    if len(data) >= HEADER and len(data) == HEADER + FACET.itemsize * _said(data):
+        return False
+    start = plain_text(data[:_START]).lower()
+    # Between a header and the facets of a binary file there are bytes that no text has.
+    return start.lstrip().startswith((b"solid", b"facet")) and b"\0" not in start
+
+
+def count_facets(data: bytes) -> int:
+    """Return how many facets a binary file holds whole."""
+    whole, rest = divmod(max(len(data) - HEADER, 0), FACET.itemsize)
+    said = _said(data)
+    return said if rest and 0 < said <= whole else whole
+
+
+def _said(data: bytes) -> int:
+    return int.from_bytes(data[HEADER - 4 : HEADER], "little")
+
+
+def _of_binary(data: bytes) -> tuple[Float[np.ndarray, "N 3"], tuple[Change, ...]]:
+    if len(data) < HEADER:
+        raise UnreadableError(f"the STL file has {len(data)} bytes, fewer than its header")
+    said, count = _said(data), count_facets(data)
+    left = len(data) - HEADER - count * FACET.itemsize
+    if left and said != count:
+        raise UnreadableError(
+            f"the STL file is no text, and no whole binary STL: it says {said} facets and has "
+            f"{count} and {left} bytes"
+        )
+    facets = np.frombuffer(data, FACET, count, HEADER)
+    told = {
+        "bytes behind the last facet left out": left,
+        "colours of faces dropped": int(np.count_nonzero(facets["attribute"])),
+        f"count of facets corrected: the file says {said}": int(said != count),
+    }
+    changes = tuple(Change("", what, many) for what, many in told.items() if many)
+    return facets["corners"].reshape(-1, 3).astype(np.float64), changes
+
+
+def _of_text(
+    data: bytes,
+) -> tuple[Float[np.ndarray, "N 3"], Int[np.ndarray, " F"], tuple[Change, ...]]:
+    """Read the vertices of each loop, on whatever lines they stand; all else is passed over."""
+    text = cut_text(data, "STL")
+    lengths = text.ends - text.begins
+    places = np.flatnonzero(lengths == len("vertex"))
+    vertex = places[text.is_word(b"vertex", places)]
+    places = np.flatnonzero(lengths == len("endloop"))
+    ends = places[text.is_word(b"endloop", places)]
+    words = vertex[:, None] + np.arange(1, 4)
+    if len(vertex) and words[-1, -1] >= len(text.begins):
+        raise UnreadableError("the STL file ends within a facet")
+    points = text.numbers(words.reshape(-1)).reshape(-1, 3)
+    sizes = np.diff(np.searchsorted(vertex, ends), prepend=0)
+    if sizes.sum() < len(vertex):
+        raise UnreadableError("the STL file ends within a facet")
+    few = int((sizes < 3).sum())
+    kept = np.repeat(sizes >= 3, sizes)
+    changes = (Change("", "facets of fewer than three vertices dropped", few),) if few else ()
+    return points[kept], sizes[sizes >= 3], changes
+
+
+def write_stl(mesh: MeshFile) -> bytes:
+    """Write a binary STL of triangles, with a unit normal for each."""
+    rounded = mesh.vertices.astype("<f4")
+    facets = np.zeros(len(mesh.faces), dtype=FACET)
+    facets["corners"] = np.take(rounded, mesh.faces, axis=0)
+    points = rounded.astype(np.float64)
+    a, b, c = (np.take(points, column, axis=0) for column in mesh.faces.T)
+    normals = cross(b - a, c - a)
+    lengths = norm(normals)[:, None]
+    facets["normal"] = normals / np.where(lengths > 0, lengths, 1.0)
+    return b"\0" * (HEADER - 4) + np.uint32(len(facets)).tobytes() + facets.tobytes()

@@ -1,0 +1,103 @@
+"""The command and the service give the same bytes for the same options, for every format."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.bodies.media import FORMATS, KINDS
+from service.http.app import create_app
+from service.meshfiles import formats
+from service.meshfiles.mesh_file import NORMAL, UV, Layer, MeshFile, of_triangles
+from service.meshfiles.triangles_glb import as_gltf_json, triangles_glb
+from service.options import Limits, Options
+from service.settings import Settings
+from tests.support.gltf.shapes import box
+
+# Each option with a value that is not its default.
+CHOSEN: dict[str, dict[str, Any]] = {
+    "levels": {"levels": 1},
+    "scheme": {"scheme": "loop"},
+    "budget": {"budget": 0.25},
+    "reference_length": {"reference_length": 2.5},
+    "diagnostics": {"diagnostics": "full"},
+    "uv": {"uv": "smooth"},
+    "normals": {"normals": "smooth"},
+    "crease": {"crease": "normals"},
+    "weld_tolerance": {"weld_tolerance": 0.001},
+    "compress": {"compress": "draco"},
+    "limit": {"limit": True},
+}
+MEDIA = {kind: media for media, kind in FORMATS.items()}
+
+
+def mesh() -> MeshFile:
+    """A box with normals and texture coordinates, whose edges its normals say are hard."""
+    shape = box()
+    made = of_triangles(shape["POSITION"].astype(float), shape["indices"])
+    a, b, c = made.vertices[made.faces].transpose(1, 0, 2)
+    normals = (b - a)[:, [1, 2, 0]] * (c - a)[:, [2, 0, 1]]
+    normals -= (b - a)[:, [2, 0, 1]] * (c - a)[:, [1, 2, 0]]
+    layers = {
+        NORMAL: Layer(normals, made.corners * 0 + (range_of(made) // 3)),
+        UV: Layer(made.vertices[:, :2] / 2 + 0.5, made.corners),
+    }
+    return MeshFile(made.vertices, made.offsets, made.corners, layers)
+
+
+def range_of(made: MeshFile) -> Any:
+    return (made.corners * 0 + 1).cumsum() - 1
+
+
+def content(kind: str) -> bytes:
+    if kind not in ("glb", "gltf"):
+        return formats.write(mesh(), kind)
+    glb = triangles_glb(mesh())
+    return glb if kind == "glb" else as_gltf_json(glb, Limits())
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[TestClient]:
+    with TestClient(create_app(Settings(workers=1)), base_url="http://127.0.0.1") as opened:
+        for _ in range(1200):
+            if opened.get("/readyz").status_code == 200:
+                break
+            time.sleep(0.05)
+        yield opened
+
+
+def test_every_option_is_tried() -> None:
+    names = {field.name for field in fields(Options)}
+    assert names == set(CHOSEN)
+    defaults = Options()
+    assert all(getattr(defaults, name) != chosen[name] for name, chosen in CHOSEN.items())
+
+
+@pytest.mark.spawning
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_option_gives_the_same_bytes_by_command_and_service(
+    pns: Any, tmp_path: Path, client: TestClient, kind: str
+) -> None:
+    source = tmp_path / f"in.{kind}"
+    source.write_bytes(content(kind))
+    for name, chosen in [("", {}), *CHOSEN.items()]:
+        query = {key: str(value).lower() for key, value in chosen.items()}
+        answer = client.post(
+            f"/subdivide?{urlencode(query)}",
+            content=source.read_bytes(),
+            headers={"Content-Type": MEDIA[kind]},
+        )
+        given = [
+            f"--{key.replace('_', '-')}" + ("" if value is True else f"={value}")
+            for key, value in chosen.items()
+        ]
+        outcome = pns("subdivide", source.name, "-o", "out.glb", *given)
+        assert (outcome.code, answer.status_code) == (0, 200), (name, outcome.err, answer.text)
+        assert (tmp_path / "out.glb").read_bytes() == answer.content, name

@@ -1,0 +1,96 @@
+"""Several inputs, streams, folders and URLs on the command line."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service import cli
+from service.meshfiles import formats
+from service.meshfiles.example import part
+from tests.service.cli.trees import FACES, tree_of
+
+LOOP = ("--scheme", "loop", "--levels", "1")
+
+
+def test_several_files_go_to_a_folder_under_their_own_names(
+    pns: Any, tmp_path: Path, part_file: Path
+) -> None:
+    (tmp_path / "a.obj").write_bytes(formats.write(part(), "obj"))
+    (tmp_path / "b.vrm").write_bytes(part_file.read_bytes())
+    (tmp_path / "broken.ply").write_bytes(b"ply\nformat ascii 1.0\nsomething\nend_header\n")
+    (tmp_path / "out").mkdir()
+    outcome = pns("subdivide", "a.obj", "broken.ply", "b.vrm", "-o", "out", *LOOP)
+    assert outcome.code == 1
+    assert "pns: broken.ply: line 3 of the PLY header" in outcome.err
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"a.obj", "b.vrm"}
+    assert len(formats.read((tmp_path / "out" / "a.obj").read_bytes(), "obj").faces) == 4 * FACES
+    assert tree_of(tmp_path / "out" / "b.vrm")["asset"]["extras"]["pns"]["totals"]["meshes"] == 1
+    assert pns("subdivide", "a.obj", "b.vrm", "-o", "out", "--to", "stl", *LOOP).code == 0
+    assert (tmp_path / "out" / "b.stl").exists()
+
+
+def test_several_files_need_a_folder(pns: Any, part_file: Path) -> None:
+    outcome = pns("subdivide", "part.glb", "part.glb", "-o", "out.glb", *LOOP)
+    assert outcome.code == 2
+    assert "several files need a folder" in outcome.err
+
+
+def test_two_results_of_one_name_are_refused(pns: Any, tmp_path: Path, part_file: Path) -> None:
+    (tmp_path / "out").mkdir()
+    outcome = pns("subdivide", "part.glb", "./part.glb", "-o", "out", *LOOP)
+    assert outcome.code == 2
+    assert "two files would be written" in outcome.err
+
+
+def test_streams_are_read_and_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfdbinary: Any
+) -> None:
+    class Stdin:
+        buffer = io.BytesIO(formats.write(part(), "obj"))
+
+    monkeypatch.setattr(sys, "stdin", Stdin)
+    arguments = ["pns", "subdivide", "-", "-o", "-", "--from", "obj", "--to", "ply", *LOOP]
+    monkeypatch.setattr(sys, "argv", arguments)
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    assert not end.value.code
+    written = capfdbinary.readouterr()
+    assert len(formats.read(written.out, "ply").faces) == 4 * FACES
+    assert b"stdout: 7,680 faces" in written.err
+
+
+def test_an_input_is_replaced_by_force_alone(pns: Any, tmp_path: Path, part_file: Path) -> None:
+    before = part_file.read_bytes()
+    outcome = pns("subdivide", "part.glb", "-o", "./part.glb", *LOOP)
+    assert outcome.code == 2
+    assert "--force" in outcome.err
+    assert part_file.read_bytes() == before
+    assert pns("subdivide", "part.glb", "-o", ".", *LOOP).code == 2
+    assert pns("subdivide", "part.glb", "-o", "part.glb", "--force", *LOOP).code == 0
+    assert part_file.read_bytes() != before
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "subdivide {} -o out.glb",
+        "subdivide part.glb -o {}",
+    ],
+)
+def test_a_url_is_no_path(pns: Any, tmp_path: Path, part_file: Path, command: str) -> None:
+    outcome = pns(*command.format("https://example.org/part.glb").split())
+    assert outcome.code == 2
+    assert "is a URL" in outcome.err
+    assert not (tmp_path / "https:").exists()
+
+
+def test_edges_of_more_than_two_faces_are_reported(pns: Any, tmp_path: Path) -> None:
+    fins = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\n"
+    (tmp_path / "fins.obj").write_text(fins)
+    outcome = pns("subdivide", "fins.obj", "-o", "out.obj", *LOOP)
+    assert "1 × non-manifold edge" in outcome.err

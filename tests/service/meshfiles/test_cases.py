@@ -1,0 +1,282 @@
+"""Files as they occur: the shared collection, and each of its kinds made here."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service.bodies.sibling_files import ALONE
+from service.gltf.read.container import read_glb
+from service.meshfiles import formats
+from service.meshfiles.convert import Written, converted
+from service.meshfiles.mesh_file import COLOUR, MATERIAL, MeshFile
+from service.options import Limits, Options
+from tests.support.gltf import files
+from tests.support.gltf.shapes import box
+from tests.support.shared import shared_path
+
+CORNERS = [(x, y, z) for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+QUADS = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+TRIANGLES = [t for a, b, c, d in QUADS for t in ((a, b, c), (a, c, d))]
+OBJ = "".join("v {} {} {}\n".format(*corner) for corner in CORNERS)
+OBJ_FACES = "".join("f {} {} {} {}\n".format(*(c + 1 for c in quad)) for quad in QUADS)
+OFF_BODY = "".join("{} {} {}\n".format(*corner) for corner in CORNERS)
+OFF_BODY += "".join("4 {} {} {} {}\n".format(*quad) for quad in QUADS)
+PLY_HEAD = (
+    "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\n"
+    "property float z\n{}element face 12\nproperty list uchar int vertex_indices\n{}end_header\n"
+)
+PLY_FACES = "".join("3 {} {} {}\n".format(*triangle) for triangle in TRIANGLES)
+PLY_POINTS = "".join("{} {} {}\n".format(*corner) for corner in CORNERS)
+
+
+def stl_text() -> str:
+    facets = (
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join("vertex {} {} {}\n".format(*CORNERS[corner]) for corner in triangle)
+        + "endloop\nendfacet\n"
+        for triangle in TRIANGLES
+    )
+    return "solid part\n" + "".join(facets)
+
+
+def stl_binary(head: bytes = b"", count: int = 12) -> bytes:
+    corners = np.array(CORNERS, dtype="<f4")[np.array(TRIANGLES)]
+    facets = b"".join(bytes(12) + three.tobytes() + bytes(2) for three in corners)
+    return head.ljust(80, b"\0") + struct.pack("<I", count) + facets
+
+
+def strips() -> bytes:
+    head = PLY_HEAD.format("", "").replace("ascii", "binary_little_endian")
+    head = head.replace("element face 12", "element tristrips 1").replace("uchar", "int")
+    # Of two triangles each: the diagonal is the other one.
+    runs = [number for a, b, c, d in QUADS for number in (a, b, d, c, -1)]
+    points = np.array(CORNERS, dtype="<f4").tobytes()
+    return head.encode() + points + struct.pack(f"<{1 + len(runs)}i", len(runs), *runs)
+
+
+def ply(beside: str = "", behind: str = "", points: str = PLY_POINTS, tail: str = "") -> bytes:
+    return (PLY_HEAD.format(beside, behind) + points + PLY_FACES + tail).encode()
+
+
+CUBES: dict[str, tuple[str, bytes]] = {
+    "obj: the old name of f": ("obj", (OBJ + OBJ_FACES.replace("f ", "fo ")).encode()),
+    "obj: normals that are no numbers": ("obj", (OBJ + "vn 0 0 1,\n" + OBJ_FACES).encode()),
+    "obj: a statement nobody knows": ("obj", (OBJ + "shadow_obj a\n\n" + OBJ_FACES).encode()),
+    "obj: in UTF-16": ("obj", (OBJ + OBJ_FACES).encode("utf-16")),
+    "obj: lines ended by returns": ("obj", (OBJ + OBJ_FACES).replace("\n", "\r").encode()),
+    "obj: behind a mark": ("obj", b"\xef\xbb\xbf" + (OBJ + OBJ_FACES).encode()),
+    "off: counts glued to the header": ("off", ("OFF8 6 0\n" + OFF_BODY).encode()),
+    "off: blanks before the header": ("off", ("\t  OFF8 6 12 # comment\n" + OFF_BODY).encode()),
+    "off: counts on lines": ("off", ("OFF\n8\n6\n0\n" + OFF_BODY).encode()),
+    "off: no count of edges": ("off", ("OFF\n8 6\n" + OFF_BODY).encode()),
+    "off: one number a line": ("off", ("OFF 8 6 0 " + OFF_BODY).replace(" ", "\n").encode()),
+    "off: comments and blank lines": (
+        "off",
+        ("# a\nOFF # b\n\n8 6 0\n# c\n" + OFF_BODY.replace("\n4", "\n\n#4\n4")).encode(),
+    ),
+    "ply: edges": (
+        "ply",
+        ply("", "element edge 1\nproperty int vertex1\nproperty int vertex2\n", tail="0 1\n"),
+    ),
+    "ply: blank lines": ("ply", ply().replace(b"end_header\n", b"end_header\n\n\n")),
+    "ply: vertices over two lines": (
+        "ply",
+        ply(
+            "property uchar red\nproperty uchar green\nproperty uchar blue\n",
+            points=PLY_POINTS.replace("\n", "\n255 0 0\n"),
+        ),
+    ),
+    "ply: a comment before the format": ("ply", ply().replace(b"ply\n", b"ply\ncomment a\n")),
+    "ply: a comment among the numbers": ("ply", ply().replace(b"3 0 3 2", b"comment b\n3 0 3 2")),
+    "ply: lines ended by returns": ("ply", ply().replace(b"\n", b"\r")),
+    "ply: strips": ("ply", strips()),
+    "stl: no end": ("stl", stl_text().encode()),
+    "stl: another end": ("stl", (stl_text() + "end solid part\n").encode()),
+    "stl: on one line": ("stl", stl_text().replace("\n", " ").encode()),
+    "stl: in capitals": ("stl", stl_text().upper().encode()),
+    "stl: bytes behind": ("stl", stl_binary() + b"tail"),
+    "stl: a header like a text": ("stl", stl_binary(b"solid part") + b"\r\n"),
+    "stl: a count of 0": ("stl", stl_binary(count=0)),
+    "stl: a count too large": ("stl", stl_binary(count=99)),
+}
+
+
+def refined(data: bytes, kind: str, target: str, **options: Any) -> Written:
+    return converted(
+        data,
+        kind,
+        target,
+        Options(**{"scheme": "loop", "levels": 1} | options),
+        None,
+        Limits(),
+        None,
+        ALONE,
+    )
+
+
+def area(mesh: MeshFile) -> float:
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def is_closed(mesh: MeshFile) -> bool:
+    _, vertex = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    faces = vertex.reshape(-1)[mesh.faces]
+    sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    there, back = ({tuple(side) for side in way.tolist()} for way in (sides, sides[:, ::-1]))
+    return len(there) == len(sides) and there == back
+
+
+@pytest.mark.parametrize("name", CUBES)
+def test_a_cube_is_read_however_it_is_written(name: str) -> None:
+    kind, data = CUBES[name]
+    mesh = formats.read(data, kind)
+    assert len(mesh.faces) == 12
+    assert area(mesh) == pytest.approx(24, rel=1e-9)
+    assert is_closed(mesh)
+    for target in ("glb", kind):
+        assert refined(data, kind, target).report["totals"]["faces"] == 48
+
+
+AREAS = {"concave_ngon_obj.obj": 30, "concave_ngon_ply.ply": 30, "dart_quad.obj": 0.5}
+
+
+@pytest.mark.parametrize("name", AREAS)
+def test_the_collections_concave_polygons_keep_their_area(name: str) -> None:
+    path = shared_path("cases") / name
+    mesh = formats.read(path.read_bytes(), path.suffix[1:])
+    assert area(mesh) == pytest.approx(AREAS[name], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "ply_ascii_edge_element.ply",
+        "ply_ascii_blank_lines.ply",
+        "ply_ascii_vertex_over_two_lines.ply",
+        "ply_comment_before_format.ply",
+        "ply_tristrips_binary.ply",
+        "ply_vertex_colours_binary.ply",
+        "obj_vertex_colours.obj",
+        "obj_two_materials.obj",
+        "obj_vn_trailing_comma.obj",
+        "obj_fo_statement.obj",
+        "off_counts_glued_to_header.off",
+        "off_leading_blanks.off",
+        "off_counts_on_lines.off",
+        "stl_ascii_no_endsolid.stl",
+        "stl_binary_trailing_bytes.stl",
+        "stl_binary_solid_header_crlf_tail.stl",
+    ],
+)
+def test_the_collections_cubes_are_whole(name: str) -> None:
+    path = shared_path("cases") / name
+    data, kind = path.read_bytes(), path.suffix[1:]
+    mesh = formats.read(data, kind)
+    assert len(mesh.faces) == 12
+    assert area(mesh) == pytest.approx(24, rel=1e-9)
+    assert is_closed(mesh)
+    made = refined(data, kind, "glb")
+    assert made.report["totals"]["faces"] == 48
+    (shown,) = files.unpack(made.content)[0]["meshes"]
+    assert len(shown["primitives"]) == (2 if "materials" in name else 1)
+    coloured = "COLOR_0" in shown["primitives"][0]["attributes"]
+    assert coloured == ("colours" in name or "two_lines" in name)
+    if "materials" in name:
+        assert (
+            len(formats.read(refined(data, kind, "obj").content, "obj").labels[MATERIAL].names) == 2
+        )
+
+
+def test_the_collections_hard_edges_are_as_hard_in_an_obj_as_in_a_glb() -> None:
+    folder = shared_path("cases")
+    ours = refined(
+        (folder / "obj_hard_edges_by_vn.obj").read_bytes(), "obj", "glb", crease="normals"
+    )
+    theirs = refined(
+        (folder / "obj_hard_edges_reference.glb").read_bytes(), "glb", "glb", crease="normals"
+    )
+    edges = [made.report["levels"][0]["edges"] for made in (ours, theirs)]
+    assert edges[0]["crease"] == edges[1]["crease"] > 0
+    smooth = refined(
+        (folder / "obj_hard_edges_by_vn.obj").read_bytes(), "obj", "glb", normals="smooth"
+    )
+    (primitive,) = files.unpack(smooth.content)[0]["meshes"][0]["primitives"]
+    assert "NORMAL" in primitive["attributes"]
+
+
+def test_the_collections_glbs_are_read_whole() -> None:
+    folder = shared_path("cases")
+    tail = refined((folder / "glb_one_trailing_byte.glb").read_bytes(), "glb", "glb").report
+    assert {"pointer": "", "what": "bytes behind the GLB left out", "count": 1} in tail["changes"]
+    copies = refined((folder / "glb_gpu_instancing_to_stl.glb").read_bytes(), "glb", "stl")
+    assert copies.faces == 3 * copies.report["totals"]["faces"]
+    seam = refined((folder / "glb_seam_off_by_1e-6.glb").read_bytes(), "glb", "glb", levels=2)
+    assert any("weld_tolerance" in change["what"] for change in seam.report["changes"])
+    joined = refined(
+        (folder / "glb_seam_off_by_1e-6.glb").read_bytes(), "glb", "glb", weld_tolerance=1e-5
+    )
+    assert not any("border vertices" in change["what"] for change in joined.report["changes"])
+
+
+COLOURED = {
+    "obj": "v 0 0 0 1 0 .25\nv 1 0 0 0 1 .25\nv 0 1 0 0 0 .25\nf 1 2 3\n",
+    "ply": PLY_HEAD.format(
+        "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float quality\n",
+        "",
+    )
+    .replace("vertex 8", "vertex 3")
+    .replace("face 12", "face 1")
+    + "0 0 0 255 0 64 1\n1 0 0 0 255 64 2\n0 1 0 0 0 64 4\n3 0 1 2\n",
+    "off": "COFF\n3 1 0\n0 0 0 255 0 64 255\n1 0 0 0 255 64 255\n0 1 0 0 0 64 255\n3 0 1 2\n",
+}
+
+
+@pytest.mark.parametrize("target", ["obj", "ply", "off", "glb"])
+@pytest.mark.parametrize("kind", COLOURED)
+def test_vertex_colours_are_kept_and_blended_linearly(kind: str, target: str) -> None:
+    made = refined(COLOURED[kind].encode(), kind, target).content
+    if target == "glb":
+        tree, binary = files.unpack(made)
+        attributes = tree["meshes"][0]["primitives"][0]["attributes"]
+        colours = files.values_of(tree, binary, attributes["COLOR_0"])
+        accessor = tree["accessors"][attributes["COLOR_0"]]
+        assert accessor.get("normalized", False) == (kind != "obj")
+        assert ("_QUALITY" in attributes) == (kind == "ply")
+    else:
+        mesh = formats.read(made, target)
+        colours = mesh.layers[COLOUR].values
+        whole = kind if target == "ply" else target
+        assert (colours.dtype == np.uint8) == (whole in ("ply", "off") and kind != "obj")
+        assert ("_quality" in mesh.layers) == (kind == target == "ply")
+    if colours.dtype.kind in "ui":
+        colours = colours / 255
+    found = sorted(map(tuple, np.round(colours[:, :2], 2).tolist()))
+    ends, middles = [(0, 0), (0, 1), (1, 0)], [(0, 0.5), (0.5, 0), (0.5, 0.5)]
+    np.testing.assert_allclose(found, sorted(ends + middles), atol=0.01)
+
+
+def test_colours_of_faces_stay_with_the_faces_made_of_them() -> None:
+    text = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 255 0 0\n3 0 2 3 0 0 255\n"
+    for target in ("off", "ply"):
+        mesh = formats.read(refined(text.encode(), "off", target).content, target)
+        colours = mesh.face_values[COLOUR][:, :3]
+        assert colours.tolist() == 4 * [[255, 0, 0]] + 4 * [[0, 0, 255]]
+
+
+def test_a_seam_that_is_nearly_closed_is_reported_with_what_closes_it() -> None:
+    shape = box()
+    flat = shape["indices"].reshape(-1)
+    noise = 1e-7 * np.random.default_rng(0).standard_normal((len(flat), 3))
+    points = shape["POSITION"][flat] + noise
+    glb = files.glb(
+        [{"POSITION": points.astype(np.float32), "indices": np.arange(len(flat)).reshape(-1, 3)}]
+    )
+    changes = refined(glb, "glb", "glb").report["changes"]
+    (near,) = [change for change in changes if "weld_tolerance" in change["what"]]
+    assert near["count"] == len(flat)
+    assert read_glb(glb).tail == 0

@@ -1,0 +1,140 @@
+"""PLY: lists of every length, in every order of bytes and as text, say the same."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+
+from service.errors import UnreadableError
+from service.meshfiles.counted import count_triangles
+from service.meshfiles.formats import read, write
+from service.meshfiles.mesh_file import COLOUR, NORMAL, UV, MeshFile
+from service.meshfiles.ply import ply_header, read_ply
+
+POINTS = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0), (0.5, 2.0, 0.0)]
+POLYGONS = [(0, 1, 2, 3), (0, 2, 4), (0, 1, 2, 4, 3)]
+FANS = [[0, 1, 2], [0, 2, 3], [0, 2, 4], [0, 1, 2], [0, 2, 4], [0, 4, 3]]
+
+
+def ply(order: str, polygons: list = POLYGONS, beside: bool = False) -> bytes:
+    """Polygons as Blender writes them; `beside`: with numbers and a list around each, and edges.
+
+    `order` is that of bytes, or "" for text.
+    """
+    name = {"<": "binary_little_endian", ">": "binary_big_endian", "": "ascii"}[order]
+    lines = [
+        "ply",
+        f"format {name} 1.0",
+        "comment element face 99",
+        f"element vertex {len(POINTS)}",
+        *(f"property float {axis}" for axis in "xyz"),
+        f"element face {len(polygons)}",
+        *(["property uchar flag"] if beside else []),
+        "property list uchar uint vertex_indices",
+        *(["property short weight", "property list ushort float texcoord"] if beside else []),
+        *(["property double last"] if beside else []),
+        *(["element edge 2", "property int vertex1", "property int vertex2"] if beside else []),
+        "end_header",
+    ]
+    rows: list[tuple[str, tuple]] = [("3f", point) for point in POINTS]
+    for number, corners in enumerate(polygons):
+        size = len(corners)
+        row, form = (size, *corners), f"B{size}I"
+        if beside:
+            uv = [corner / 8 for corner in corners for _ in "uv"]
+            row, form = (7, *row, number, 2 * size, *uv, 0.5), f"B{form}hH{2 * size}fd"
+        rows.append((form, row))
+    rows += [("2i", (0, 1)), ("2i", (1, 2))] if beside else []
+    head = ("\n".join(lines) + "\n").encode()
+    if order:
+        return head + b"".join(struct.pack(order + form, *row) for form, row in rows)
+    return head + "".join(" ".join(map(str, row)) + "\n" for _, row in rows).encode()
+
+
+def corners_of(mesh: MeshFile) -> np.ndarray:
+    return mesh.vertices[mesh.faces]
+
+
+@pytest.mark.parametrize("order", ["<", ">", ""])
+@pytest.mark.parametrize("beside", [False, True])
+def test_polygons_of_many_sizes_are_the_same_in_every_encoding(order: str, beside: bool) -> None:
+    mesh = read(ply(order, beside=beside), "ply")
+    np.testing.assert_array_equal(corners_of(mesh), np.array(POINTS)[FANS])
+    if beside:
+        uv = mesh.layers[UV]
+        expected = np.repeat(np.array(FANS).reshape(-1, 1) / 8, 2, axis=1)
+        np.testing.assert_array_equal(uv.values[uv.rows], expected)
+        of_polygon = [0, 0, 1, 2, 2, 2]
+        assert mesh.face_values["weight"][:, 0].tolist() == of_polygon
+        assert mesh.face_values["flag"].dtype == np.uint8
+    assert any("element edge" in change.what for change in mesh.changes) == beside
+
+
+@pytest.mark.parametrize("order", ["<", ">", ""])
+@pytest.mark.parametrize("polygons", [[(0, 1, 2), (0, 2, 3)], [(0, 1, 2, 3)] * 3])
+def test_polygons_of_one_size_are_a_table(order: str, polygons: list) -> None:
+    mesh = read_ply(ply(order, polygons, beside=True))
+    assert mesh.corners.tolist() == [corner for polygon in polygons for corner in polygon]
+    assert mesh.sizes.tolist() == [len(polygon) for polygon in polygons]
+
+
+def test_polygons_of_fewer_than_three_corners_make_no_triangle() -> None:
+    mesh = read(ply("<", [(), (1,), (0, 1), (0, 1, 2, 3)]), "ply")
+    assert len(mesh.faces) == 2
+    with pytest.raises(UnreadableError):
+        read(ply("<", [(), (1,), (0, 1)]), "ply")
+
+
+@pytest.mark.parametrize("order", ["<", ""])
+def test_a_file_that_was_cut_off_says_where(order: str) -> None:
+    for cut in (1, 4):
+        with pytest.raises(UnreadableError, match="3 faces and ends after 2"):
+            read(ply(order)[: -cut - (order == "")], "ply")
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (ply("<").replace(b"face 3", b"face 9" + b"9" * 17), "ends after"),
+        (ply("<").replace(b"uint vertex", b"quad vertex"), "line 9 of the PLY header"),
+        (ply("<")[:100], "its header has no end"),
+        (ply("").replace(b"4 0 1 2 3", b"4 0 1,5 2 3"), r"line 16 of the PLY file: '1,5'"),
+        (ply("").replace(b"4 0 1 2 3", b"4 0 1.5 2 3"), "a whole number"),
+        (ply("").replace(b"4 0 1 2 3", b"-4 0 1 2 3"), "ends after"),
+        (b"OFF\n", "this is not a PLY"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_place(data: bytes, says: str) -> None:
+    with pytest.raises(UnreadableError, match=says):
+        read(data, "ply")
+
+
+def test_strips_turn_every_second_triangle() -> None:
+    head = ply("").partition(b"element face 3")[0] + b"element tristrips 1\n"
+    data = head + b"property list int int vertex_indices\nend_header\n"
+    data += b"".join(b"%g %g %g\n" % point for point in POINTS) + b"9 0 1 3 2 -1 0 1 1 2\n"
+    assert read(data, "ply").faces.tolist() == [[0, 1, 3], [3, 1, 2]]
+
+
+def test_normals_colours_and_double_positions_come_back_in_their_types() -> None:
+    head = ply_header(ply(""))
+    assert [element.name for element in head.elements] == ["vertex", "face"]
+    beside = ["nx", "ny", "nz"]
+    properties = "".join(f"property float {name}\n" for name in beside)
+    properties += "".join(f"property uchar {name}\n" for name in ("red", "green", "blue", "alpha"))
+    text = ply("", [(0, 1, 2)]).decode().replace("float x", "double x")
+    text = text.replace("property float z\n", f"property float z\n{properties}")
+    for point in POINTS:
+        row = "{} {} {}\n".format(*point)
+        text = text.replace(row, row.strip() + " 0 0 1 255 128 0 64\n", 1)
+    again = read(write(read(text.encode(), "ply"), "ply"), "ply")
+    assert again.double
+    assert again.layers[COLOUR].values.dtype == np.uint8
+    assert again.layers[COLOUR].values[0].tolist() == [255, 128, 0, 64]
+    assert again.layers[NORMAL].values[0].tolist() == [0, 0, 1]
+
+
+def test_triangles_are_counted_by_the_header() -> None:
+    assert count_triangles(ply("<"), "ply") == count_triangles(ply(""), "ply") == len(FANS)

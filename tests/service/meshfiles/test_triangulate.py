@@ -1,0 +1,99 @@
+"""Polygons become triangles of the same area that use every corner and do not fold over."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from service.meshfiles.mesh_file import MeshFile, offsets_of
+from service.meshfiles.triangulate import triangulated
+
+
+def cut(points: list, *polygons: list[int]) -> MeshFile:
+    vertices = np.array([(*point, 0.0)[:3] for point in points], dtype=np.float64)
+    sizes = np.array([len(polygon) for polygon in polygons])
+    return triangulated(MeshFile(vertices, offsets_of(sizes), np.concatenate(polygons)))
+
+
+def areas(mesh: MeshFile) -> np.ndarray:
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+    return np.cross(b - a, c - a) / 2
+
+
+def shoelace(points: np.ndarray) -> float:
+    x, y = points.T
+    return float(abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2)
+
+
+SQUARE = [(0, 0), (4, 0), (4, 4), (0, 4)]
+PANE = [(1, 1), (1, 2), (2, 2), (2, 1)]
+SHAPES = {
+    "a letter U": ([(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)], None, 7),
+    "a dart": ([(2, 1), (0, 0), (2, -1), (0.5, 0)], None, 0.5),
+    "a dart from its tip": ([(0.5, 0), (2, 1), (0, 0), (2, -1)], None, 0.5),
+    "corners on straight sides": ([(0, 0), (1, 0), (2, 0), (2, 2), (1, 2), (0, 2)], None, 4),
+    "a triangle of four corners": ([(0, 0), (1, 0), (2, 0), (1, 2)], None, 2),
+    "an L with corners on its sides": (
+        [(0, 0), (1, 0), (2, 0), (2, 2), (1, 2), (1, 1.5), (1, 1), (0.5, 1), (0, 1)],
+        None,
+        3,
+    ),
+    "a hole behind a bridge": (SQUARE + PANE, [0, 1, 2, 3, 0, 4, 5, 6, 7, 4], 15),
+    "two holes": (
+        [*SQUARE, *PANE, (2.5, 2.5), (2.5, 3.5), (3.5, 3.5), (3.5, 2.5)],
+        [0, 1, 2, 10, 11, 8, 9, 10, 2, 3, 0, 4, 5, 6, 7, 4],
+        14,
+    ),
+    "repeated corners": (
+        [(0, 0), (2, 0), (2, 2), (1, 2), (1, 1), (0, 1)],
+        [0, 0, 1, 1, 2, 3, 4, 4, 5],
+        3,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("shift", [0, 1, 3])
+def test_area_and_corners_are_kept_from_wherever_the_outline_begins(name: str, shift: int) -> None:
+    points, outline, area = SHAPES[name]
+    outline = np.roll(list(range(len(points))) if outline is None else outline, shift).tolist()
+    mesh = cut(points, outline)
+    each = areas(mesh)[:, 2]
+    assert each.sum() == pytest.approx(area, rel=1e-9)
+    assert (each > 0).all()
+    assert set(mesh.corners) == set(outline)
+
+
+def test_a_star_shaped_outline_in_any_plane_keeps_its_area() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        angle = np.sort(rng.uniform(0, 2 * np.pi, 30))
+        if np.diff(angle, append=angle[0] + 2 * np.pi).max() > 3:
+            continue
+        flat = (0.05 + rng.random((30, 1))) * np.column_stack([np.cos(angle), np.sin(angle)])
+        turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        points = np.column_stack([flat, np.zeros(30)]) @ turn + 1000 * rng.normal(size=3)
+        mesh = triangulated(MeshFile(points, np.array([0, 30]), np.arange(30)))
+        total = np.linalg.norm(areas(mesh), axis=1).sum()
+        assert total == pytest.approx(shoelace(flat), rel=1e-9)
+        normals = areas(mesh)
+        assert (normals @ normals[0] > 0).all()
+
+
+def test_a_concave_polygon_that_is_not_flat_uses_its_inner_diagonal() -> None:
+    mesh = cut([(0, 0, 0), (2, 0, 0.2), (2, 2, 0), (1, 0.5, 0.1)], [0, 1, 2, 3])
+    assert {3, 1} <= set(mesh.faces[0]) & set(mesh.faces[1])
+
+
+def test_triangles_stay_in_the_order_of_their_polygons() -> None:
+    points = SHAPES["a letter U"][0]
+    mesh = cut(points, [0, 1, 4], list(range(8)), [5, 6, 7])
+    assert mesh.faces[0].tolist() == [0, 1, 4]
+    assert mesh.faces[-1].tolist() == [5, 6, 7]
+    assert len(mesh.faces) == 1 + 6 + 1
+
+
+def test_a_polygon_that_crosses_itself_is_reported() -> None:
+    mesh = cut([(0, 0), (1, 1), (1, 0), (0, 1)], [0, 1, 2, 3])
+    assert len(mesh.faces) == 2
+    assert any("cross themselves" in change.what for change in mesh.changes)
