@@ -1,4 +1,4 @@
-"""What may import what, seen from a running interpreter; lint-imports holds the static side."""
+"""Imports between packages, seen from a running interpreter; lint-imports holds the static side."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What runs inside a worker process: its preparation, and the one door for jobs."""
+"""Run jobs in a worker process: its preparation, and the one door for jobs."""
 
 from __future__ import annotations
 

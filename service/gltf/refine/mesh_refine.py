@@ -200,13 +200,12 @@ def _scalars(made: Refinement, options: Options) -> dict[str, Float[np.ndarray, 
     """
     if options.diagnostics != "full":
         return {}
-    learned = [depth for depth, step in enumerate(made.steps) if step.added is not None]
+    learned = [(depth, step.added) for depth, step in enumerate(made.steps) if step.added]
     if not learned:
         return {RATIO: made.ratio, GATE: made.gate}
-    added = made.steps[learned[-1]].added
-    assert added is not None
+    depth, added = learned[-1]
     values = np.stack([added.ratio, added.gate], axis=1)
-    for topology in made.topologies[learned[-1] + 1 :]:
+    for topology in made.topologies[depth + 1 :]:
         values = np.concatenate([values, values[topology.edges].mean(axis=1)])
     return {RATIO: values[:, 0], GATE: values[:, 1]}
 
