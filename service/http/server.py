@@ -127,6 +127,8 @@ def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
+    except socket.gaierror as error:
+        raise StartError(f"{what}{host!r} is no address: {error.strerror}; {hint}") from error
     except OSError as error:
         reason = os.strerror(error.errno or 0)
         where = "" if what else f" at {host}:{port}"
