@@ -127,10 +127,12 @@ def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
-    except socket.gaierror as error:
-        raise StartError(f"{what}{host!r} is no address: {error.strerror}; {hint}") from error
     except OSError as error:
-        reason = os.strerror(error.errno or 0)
+        number = error.errno or 0
+        if number < 0:
+            # Of getaddrinfo: the host is no address.
+            raise StartError(f"{what}{error.strerror}; {hint}") from error
+        reason = os.strerror(number)
         where = "" if what else f" at {host}:{port}"
         raise StartError(f"{what}{reason}{where}; {hint}") from error
 
