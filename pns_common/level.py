@@ -61,9 +61,13 @@ class Level:
     reference_length: float | None
     blocks: Blocks
 
-    def measure(self) -> None:
+    def measure(self, *, rings: bool, bends: bool) -> None:
         """Make the measurements that several threads are about to read."""
-        _ = self.logs, self.rings, self.face_bends, self.ringed
+        _ = self.normals, self.logs
+        if rings:
+            _ = self.rings
+        if bends:
+            _ = self.face_bends, self.ringed
 
     @cached_property
     def faces(self) -> tuple[Float[np.ndarray, "F 3"], Float[np.ndarray, "F 4"]]:

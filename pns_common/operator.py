@@ -145,8 +145,9 @@ def learned_level(level: Level, rule: Rule) -> Additions:
     mesh, base, blocks = level.topology, level.base, level.blocks.of_rows(NETWORK_ROWS)
     count, edges = len(level.points), mesh.interior
     x = base.place(level.points, mesh, level.blocks)  # x0
-    level.measure()
-    if rule.prior_strength is None:
+    has_prior = rule.prior_strength is not None
+    level.measure(rings=has_prior or rule.feature_count > frames.DIHEDRAL, bends=has_prior)
+    if not has_prior:
         made = _Rows.starting_with(np.zeros((len(x), 3)))
 
         def by_equation_1(begin: int, end: int) -> int:
