@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from service.meshfiles.example import part
@@ -16,7 +14,7 @@ def a_part(number: int) -> MeshFile:
     mesh = part()
     rng = np.random.default_rng(number)
     moved = mesh.vertices + 1e-3 * rng.standard_normal(mesh.vertices.shape)
-    return replace(mesh, vertices=moved, uv=None)
+    return of_triangles(moved, mesh.faces)
 
 
 def large_body() -> bytes:
