@@ -55,6 +55,7 @@ class SharedJobs:
             "client": job.client,
             "options": asdict(job.work.options),
             "model": job.work.model,
+            "target": job.work.target,
             "content_type": job.work.content_type,
             "encoding": job.work.encoding,
             "request_id": job.work.request_id,

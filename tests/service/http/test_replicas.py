@@ -93,9 +93,11 @@ def hand_in(client: httpx2.Client, body: bytes, **headers: str) -> str:
 
 
 def ended(client: httpx2.Client, job: str) -> dict[str, object]:
-    while (view := client.get(job).json())["state"] in ("queued", "running"):
+    for _ in range(2400):
+        if (view := client.get(job).json())["state"] not in ("queued", "running"):
+            return view
         time.sleep(0.05)
-    return view
+    raise AssertionError(f"{job} does not end: {view}")
 
 
 def opened(address: tuple[str, int]) -> httpx2.Client:
