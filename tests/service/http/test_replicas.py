@@ -97,7 +97,7 @@ def ended(client: httpx2.Client, job: str) -> dict[str, object]:
         if (view := client.get(job).json())["state"] not in ("queued", "running"):
             return view
         time.sleep(0.05)
-    raise AssertionError(f"{job} does not end: {view}")
+    raise AssertionError(f"{job} does not end")
 
 
 def opened(address: tuple[str, int]) -> httpx2.Client:
