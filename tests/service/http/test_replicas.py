@@ -111,6 +111,8 @@ def pair(
     """Clients of two replicas, whose files lie in Redis, or in a folder as in a bucket."""
     shared = {"workers": 1, "store": redis}
     if request.param != "redis":
+        # In a database of their own: they would take other tests' jobs, whose files are in Redis.
+        shared["store"] = redis.removesuffix("0") + "1"
         shared["store_files"] = f"file://{tmp_path_factory.mktemp('bucket')}"
     with (
         served(**shared) as one,
