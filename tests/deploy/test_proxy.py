@@ -6,7 +6,7 @@ import logging
 import re
 import socket
 import threading
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 
 import pytest
 
@@ -146,15 +146,8 @@ def test_a_site_of_ipv6_has_so_many_connections_whatever_its_subscribers(proxy):
     """A /56 may be one subscriber's, and a /48 one site's."""
     address, _, _ = proxy
     upload = "POST /subdivide HTTP/1.1\r\nHost: a\r\nX-Client: {}\r\nContent-Length: 100\r\n\r\n"
-    held = [socket.create_connection(address, timeout=600) for _ in range(160)]
-    try:
-        for network, connection in enumerate(held):
-            connection.sendall(upload.format(f"2001:db8:0:{network:x}::1").encode())
-        said = [beginning(connection) for connection in reversed(held)]
-    finally:
-        for connection in held:
-            connection.close()
-    assert b"HTTP/1.1 429" in said
+    clients = [f"2001:db8:0:{network:x}::1" for network in range(160)]
+    assert b"HTTP/1.1 429" in answers(address, [upload.format(client) for client in clients])
     answer, _ = ask(address, "GET", "/limits", headers={"X-Client": "2001:db8:1::1"})
     assert answer.status == 200
 
@@ -176,33 +169,29 @@ def beginning(connection):
         return b""
 
 
+def answers(address, requests):
+    """Return how answers begin to requests that are all open at once, the last one first."""
+    with ExitStack() as stack:
+        held = [
+            stack.enter_context(socket.create_connection(address, timeout=600)) for _ in requests
+        ]
+        for connection, request in zip(held, requests, strict=True):
+            connection.sendall(request.encode())
+        return [beginning(connection) for connection in reversed(held)]
+
+
 def test_one_address_has_so_many_connections_and_no_more(proxy):
     address, _, _ = proxy
-    upload = b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\n"
-    held = [socket.create_connection(address, timeout=600) for _ in range(40)]
-    try:
-        for connection in held:
-            connection.sendall(upload)
-        said = [beginning(connection) for connection in reversed(held)]
-    finally:
-        for connection in held:
-            connection.close()
-    assert b"HTTP/1.1 429" in said
+    upload = "POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\n"
+    assert b"HTTP/1.1 429" in answers(address, [upload] * 40)
 
 
 def test_a_subscribers_ipv6_addresses_are_one(proxy):
     """Whoever has one has as many as it likes."""
     address, _, _ = proxy
     upload = "POST /subdivide HTTP/1.1\r\nHost: a\r\nX-Client: {}\r\nContent-Length: 100\r\n\r\n"
-    held = [socket.create_connection(address, timeout=600) for _ in range(40)]
-    try:
-        for host, connection in enumerate(held):
-            connection.sendall(upload.format(f"2001:db8:0:1::{host:x}").encode())
-        said = [beginning(connection) for connection in reversed(held)]
-    finally:
-        for connection in held:
-            connection.close()
-    assert b"HTTP/1.1 429" in said
+    clients = [f"2001:db8:0:1::{host:x}" for host in range(40)]
+    assert b"HTTP/1.1 429" in answers(address, [upload.format(client) for client in clients])
     answer, _ = ask(address, "GET", "/limits", headers={"X-Client": "2001:db8:0:2::1"})
     assert answer.status == 200
 
