@@ -41,7 +41,7 @@ from jaxtyping import Float, Integer, Shaped
 from pns_common.kernels import limit as kernels
 from pns_common.kernels import loop as masks
 from pns_common.parallel import Blocks
-from pns_common.schemes.loop import LOOP, beta, limit_ring_weight
+from pns_common.schemes.loop import LOOP, WIDTH, beta, in_threes, limit_ring_weight
 from pns_common.topology import Topology
 
 CURVE_CENTRE, CURVE_NEIGHBOUR = 2 / 3, 1 / 6
@@ -49,7 +49,6 @@ CURVE_CENTRE, CURVE_NEIGHBOUR = 2 / 3, 1 / 6
 FAR_WEIGHT, DECAY = 8 / 3, (5 - 21**0.5) / 2
 # From so many spokes on the even mask of a dart has one form.
 MANY = 9
-WIDTH = 3
 CLOSED, DART, CURVE, CORNER = 0, 1, 2, 3
 
 
@@ -154,14 +153,7 @@ def _walked(topology: Topology) -> tuple[np.ndarray, ...]:
 def _limits(
     points: Float[np.ndarray, "V K"], topology: Topology, blocks: Blocks
 ) -> Float[np.ndarray, "V K"]:
-    limits = np.empty(points.shape)
-    for start in range(0, points.shape[1], WIDTH):
-        given = points[:, start : start + WIDTH]
-        three = np.zeros((len(points), WIDTH))
-        three[:, : given.shape[1]] = given
-        made = _limits_of_three(three, topology, blocks)
-        limits[:, start : start + WIDTH] = made[:, : given.shape[1]]
-    return limits
+    return in_threes(points, len(points), lambda three: _limits_of_three(three, topology, blocks))
 
 
 def _limits_of_three(

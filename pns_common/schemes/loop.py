@@ -18,6 +18,7 @@ sharpness w in between blend the rules; see ``kernels.loop.at_sharpness``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -52,16 +53,25 @@ def place(
     values: Float[np.ndarray, "V K"], topology: Topology, blocks: Blocks
 ) -> Float[np.ndarray, "W K"]:
     """Apply Loop's masks to any columns: rows of old vertices first, then of edge vertices."""
+    rows = topology.vertex_count + len(topology.edges)
+    return in_threes(values, rows, lambda three: _place_three(three, topology, blocks))
+
+
+def in_threes(
+    values: Float[np.ndarray, "V K"],
+    rows: int,
+    masks: Callable[[Float[np.ndarray, "V 3"]], Float[np.ndarray, "R 3"]],
+) -> Float[np.ndarray, "R K"]:
+    """Apply masks, which take three columns and return so many rows, to any number of columns."""
     width = values.shape[1]
     if width == WIDTH:
-        return _place_three(np.ascontiguousarray(values, dtype=np.float64), topology, blocks)
-    placed = np.empty((topology.vertex_count + len(topology.edges), width))
+        return masks(np.ascontiguousarray(values, dtype=np.float64))
+    placed = np.empty((rows, width))
     for start in range(0, width, WIDTH):
         given = values[:, start : start + WIDTH]
         three = np.zeros((len(values), WIDTH))
         three[:, : given.shape[1]] = given
-        made = _place_three(three, topology, blocks)
-        placed[:, start : start + WIDTH] = made[:, : given.shape[1]]
+        placed[:, start : start + WIDTH] = masks(three)[:, : given.shape[1]]
     return placed
 
 
