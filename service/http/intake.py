@@ -138,6 +138,20 @@ def made_of(settings: Settings, asked: Asked, body: MemoryFile, wanted: Wanted) 
     )
 
 
+def asked_of(job: Job) -> Asked:
+    """Return what a job was made of beside its body."""
+    work = job.work
+    return Asked(
+        client=job.client,
+        options=work.options,
+        model=work.model,
+        target=work.target,
+        content_type=work.content_type,
+        encoding=work.encoding,
+        request_id=work.request_id,
+    )
+
+
 def owner_of(client: Client) -> str | None:
     """Return who alone may see what a client makes; None: everybody who knows its id."""
     return client.id if client.named else None

@@ -13,7 +13,7 @@ from ...errors import BusyError, WorkerDied
 from ...options import Options
 from ...workers.job import Job, State
 from ...workers.memory_file import MemoryFile
-from ..intake import Asked, Wanted, made_of
+from ..intake import Asked, Wanted, asked_of, made_of
 from ..result_room import result_folder
 from .book import Entry, NoSuchJobError
 from .store import (
@@ -51,17 +51,8 @@ class SharedJobs:
 
     async def publish(self, job: Job, owner: str | None) -> None:
         """Make a job known to other replicas, with its body. Raises StoreError."""
-        asked = {
-            "client": job.client,
-            "options": asdict(job.work.options),
-            "model": job.work.model,
-            "target": job.work.target,
-            "content_type": job.work.content_type,
-            "encoding": job.work.encoding,
-            "request_id": job.work.request_id,
-        }
         body = b"".join(job.body.pieces())
-        await self.store.create(job.id, owner, asked, self._view(job), body)
+        await self.store.create(job.id, owner, asdict(asked_of(job)), self._view(job), body)
 
     async def beat(self, entry: Entry) -> None:
         """Keep a job leased while it is worked on; cancel it where its client wants that."""
