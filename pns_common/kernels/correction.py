@@ -123,15 +123,3 @@ def correct_curves(rows, bound, displacement, ratio, bounds):
             displacement[at, k] = delta[k]
         ratio[at] = norm(delta) / bound[i] if bound[i] > 0 else 0.0
         bounds[at] = bound[i]
-
-
-@kernel
-def add_displacement(displacement, begin, end, points):
-    """Add δ to rows begin … end − 1; return the largest ‖δ‖²."""
-    largest = 0.0
-    for v in range(max(begin, 0), end):
-        delta = row(displacement, v)
-        for k in range(3):
-            points[v, k] += delta[k]
-        largest = max(largest, dot(delta, delta))
-    return largest
