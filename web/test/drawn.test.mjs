@@ -149,7 +149,7 @@ describe("what is drawn", { skip: noBrowser, timeout: 1_800_000 }, () => {
   });
 
   test("what readers of their own kind take amiss is drawn on both sides, and certified", async () => {
-    const page = await visit({ hash: "#levels=1&layout=side" });
+    const page = await visit({ hash: "#levels=1&layout=side&crease=off" });
     for (const [name, content] of Object.entries(AMISS)) {
       await choose(page, { name, mimeType: "", buffer: Buffer.from(content) });
       await page.locator("#file-name", { hasText: name }).waitFor();

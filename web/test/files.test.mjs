@@ -78,7 +78,7 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await settled(page);
     assert.match(await page.textContent("#label-left"), /\D3 faces/);
     assert.match(await page.textContent("#label-right"), /· 12 faces/);
-    assert.match(await page.textContent("#changes"), /materials dropped/);
+    assert.match(await page.textContent("#changes"), /triangles added by cutting polygons/);
     assert.equal(await page.textContent("#statistics tr:has-text('Vertices in the file') td"), "5");
   });
 
