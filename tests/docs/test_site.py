@@ -1,4 +1,7 @@
-"""The documentation builds without a warning, reads without a network, and its Python runs."""
+"""The documentation builds without a warning, reads without a network, and its Python runs.
+
+To build it runs the notebooks, and fails where one of them does.
+"""
 
 import re
 import subprocess
@@ -36,7 +39,8 @@ def test_the_site_has_every_page_in_its_menu(site):
             r'toctree-l1[^"]*"><a class="[^"]*" href="([^"]+)"', (site / "index.html").read_text()
         )
     )
-    pages = {str(page.relative_to(DOCS).with_suffix(".html")) for page in DOCS.rglob("*.md")}
+    sources = [*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]
+    pages = {str(page.relative_to(DOCS).with_suffix(".html")) for page in sources}
     assert menu == pages - {"index.html"}
 
 
@@ -49,6 +53,12 @@ def test_the_readme_is_read_in_five_and_has_no_greek_before_its_picture():
     text = (ROOT / "README.md").read_text()
     assert len(text.split()) <= 900
     assert not re.search("[α-ωΑ-Ω]", text.partition("![")[0])
+
+
+@pytest.mark.parametrize("notebook", sorted(DOCS.rglob("*.ipynb")), ids=lambda path: path.stem)
+def test_a_notebook_has_pictures(site, notebook):
+    page = (site / notebook.relative_to(DOCS).with_suffix(".html")).read_text()
+    assert len(re.findall(r'<img [^>]*src="(?:data:image/png|\.\./_images/)', page)) >= 2
 
 
 def test_the_site_loads_nothing_from_elsewhere(site):
