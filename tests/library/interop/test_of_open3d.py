@@ -59,4 +59,4 @@ class TestOpen3d:
         np.testing.assert_allclose(refined.vertex["heat"].numpy(), heat, atol=1e-12)
         uv = split_uv(UV)[EXPECTED.faces]
         np.testing.assert_allclose(refined.triangle["texture_uvs"].numpy(), uv, atol=1e-6)
-        assert refined.has_vertex_normals()
+        assert refined.vertex["normals"].shape == [len(EXPECTED.vertices), 3]
