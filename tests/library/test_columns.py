@@ -14,7 +14,7 @@ from pns_common.columns import (
 )
 from pns_common.limit import limit_positions
 from pns_common.parallel import Blocks
-from pns_common.schemes import LOOP
+from pns_common.schemes import LOOP, catmull_clark
 from pns_common.topology import build_topology
 from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, soups
 
@@ -41,6 +41,15 @@ def test_the_matrix_times_vertices_are_loops_vertices(mesh, levels):
     np.testing.assert_allclose(matrix.sum(axis=1), 1, atol=1e-15)
     made = refine(mesh, loop(), levels).mesh.vertices
     assert np.abs(matrix @ mesh.vertices - made).max() <= 1e-15 * (1 + np.abs(mesh.vertices).max())
+
+
+def test_the_matrix_of_polygons_gives_catmull_clarks_vertices():
+    mesh = Mesh(np.random.default_rng(0).standard_normal((8, 3)), [[0, 1, 3, 2], [1, 4, 5, 6, 3]])
+    made = refine(mesh, catmull_clark(), 2).mesh.vertices
+    given = catmull_clark().matrix(mesh, 2) @ mesh.vertices
+    np.testing.assert_allclose(given, made, rtol=0, atol=2e-15)
+    with pytest.raises(MeshError, match="expected triangles"):
+        loop().matrix(mesh)
 
 
 def test_creases_are_those_that_refine_keeps():
