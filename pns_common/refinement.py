@@ -187,8 +187,10 @@ def refine(
     faces, normals, shift = scheme.base.faces(topology, blocks, np.int64), None, 0.0
     if limit:
         last = scheme.base.split(topology, blocks)
-        shift = limit_shift(points, last)
-        points, normals = limit_positions(points, last), limit_normals(points, last).vertices
+        surface = last, blocks, scheme.base
+        shift = limit_shift(points, *surface)
+        normals = limit_normals(points, *surface).vertices
+        points = limit_positions(points, *surface)
         if told:
             told.level_ends()
     added, nothing = steps[-1].added, np.broadcast_to(0.0, len(points))

@@ -11,10 +11,11 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.base_scheme import BaseScheme, subdivision_matrix
+from pns_common.base_scheme import BaseScheme
 from pns_common.creases import ANGLE, NO_CREASES, SEED, Creases, chosen_creases
 from pns_common.errors import MeshError, ModelError, ParameterError
 from pns_common.features import FEATURE_COUNT
+from pns_common.matrix import subdivision_matrix
 from pns_common.mesh import Mesh
 from pns_common.model.session import Model
 from pns_common.operator import Rule
@@ -144,7 +145,7 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     )
     if card.format == PAPER_FORMAT:
         return Scheme("pns", rule=rule, learned_levels=None, **named)  # type: ignore[arg-type]
-    if card.base not in BASES or BASES[card.base].limit_weight is None:
+    if card.base not in BASES or card.base != LOOP.name:
         raise ModelError(model.name, expected=f"a base of {[LOOP.name]}", found=repr(card.base))
     learned = replace(
         rule,

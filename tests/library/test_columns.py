@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, MeshError, ParameterError, load_model, loop, pns, refine
-from pns_common.base_scheme import subdivision_matrix
 from pns_common.columns import (
     ColumnRefinement,
     level_topologies,
     refine_columns,
 )
 from pns_common.limit import limit_positions
+from pns_common.matrix import subdivision_matrix
 from pns_common.parallel import Blocks
 from pns_common.schemes import LOOP, catmull_clark
 from pns_common.topology import build_topology
