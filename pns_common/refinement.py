@@ -167,18 +167,19 @@ def refine(
 
     if not mesh.triangles:
         raise MeshError("faces of other degrees, expected triangles", element="faces")
-    topology = kept.applied(mesh.vertices, mesh.topology(blocks))
-    points, steps = mesh.vertices, list[Step]()
+    level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
+    level, steps = level.with_creases(kept), list[Step]()
     for depth in range(count):
         if steps:
-            topology = scheme.base.split(topology, blocks, inherit=kept.sharp_at(depth))
-        steps.append(_step(Level(points, topology, scheme.base, length, blocks), scheme, depth))
-        points = steps[-1].points
+            topology = scheme.base.split(level.topology, blocks, inherit=kept.sharp_at(depth))
+            level = Level(steps[-1].points, topology, scheme.base, length, blocks)
+        steps.append(_step(level, scheme, depth))
         if told:
             told.level_ends()
-    faces, normals, shift = split_faces(topology, blocks, np.int64), None, 0.0
+    points, normals, shift = steps[-1].points, None, 0.0
+    faces = split_faces(level.topology, blocks, np.int64)
     if limit:
-        last = scheme.base.split(topology, blocks)
+        last = scheme.base.split(level.topology, blocks)
         shift = limit_shift(points, last)
         points, normals = limit_positions(points, last), limit_normals(points, last).vertices
         if told:
@@ -211,9 +212,9 @@ def control_level(
     """
     blocks = Blocks(_threads(threads))
     kept = chosen_creases(creases, scheme.creases)
-    topology = kept.applied(mesh.vertices, mesh.topology(blocks))
     length = _reference_length(mesh, reference_length, measured=True)
-    return Level(mesh.vertices, topology, scheme.base, length, blocks)
+    level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
+    return level.with_creases(kept)
 
 
 def refine_many(

@@ -79,6 +79,17 @@ def measure_edges(
 
 
 @kernel
+def turn_cosines(normals, half_edges, edge_class, begin, end, cosines):
+    """Write n1 · n2 of edges begin … end − 1; 1 unless interior, and beside faces without area."""
+    for e in range(max(begin, 0), end):
+        cosines[e] = 1.0
+        if edge_class[e] == INTERIOR:
+            n, m = row(normals, half_edges[e, 0] // 3), row(normals, half_edges[e, 1] // 3)
+            if dot(n, n) > 0 and dot(m, m) > 0:
+                cosines[e] = dot(n, m)
+
+
+@kernel
 def mean_normals(faces, reach, areas, begin, end, fields):
     """Write area-weighted mean normals of vertices begin … end − 1 into ``fields`` (V, 4)."""
     for v in range(max(begin, 0), end):
