@@ -227,28 +227,12 @@ def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
     features = np.empty((count, rule.feature_count), dtype=rule.feature_type)
     (curvature, sides, length), degenerate = np.empty((3, count)), np.empty(count, dtype=bool)
     has_prior = rule.prior_strength is not None
-    frames.frames_and_features(
-        level.points,
-        level.normals,
-        level.rings.fields if signed else np.zeros((0, measures.FIELDS)),
-        level.edges.lengths,
-        level.logs,
-        level.face_bends if has_prior else level.logs[:0],
-        mesh.corners,
-        mesh.edges,
-        mesh.corner_edges,
-        mesh.half_edges,
-        rows,
-        0,
-        count,
-        rule.symmetric,
-        basis,
-        curvature,
-        sides,
-        length,
-        degenerate,
-        features,
-    )
+    fields = level.rings.fields if signed else np.zeros((0, measures.FIELDS))
+    bends = level.face_bends if has_prior else level.logs[:0]
+    measured = level.points, level.normals, fields, level.edges.lengths, level.logs, bends
+    of_mesh = mesh.corners, mesh.edges, mesh.corner_edges, mesh.half_edges
+    to = basis, curvature, sides, length, degenerate, features
+    frames.frames_and_features(*measured, *of_mesh, rows, 0, count, rule.symmetric, *to)
     gate = np.tanh(rule.gate_sharpness * curvature**2)
     if has_prior:
         # Open on the diagonal of a plane quad too: moving its sides alone would ripple.

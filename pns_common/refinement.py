@@ -174,12 +174,15 @@ def refine(
             topology = scheme.base.split(level.topology, blocks, inherit=kept.sharp_at(depth))
             level = Level(steps[-1].points, topology, scheme.base, length, blocks)
         steps.append(_step(level, scheme, depth))
+        level = steps[-1].level  # without measurements
         if told:
             told.level_ends()
     points, normals, shift = steps[-1].points, None, 0.0
-    faces = split_faces(level.topology, blocks, np.int64)
-    if limit:
+    if not limit:
+        faces = split_faces(level.topology, blocks, np.int64)
+    else:
         last = scheme.base.split(level.topology, blocks)
+        faces = last.faces.astype(np.int64)
         shift = limit_shift(points, last)
         points, normals = limit_positions(points, last), limit_normals(points, last).vertices
         if told:
