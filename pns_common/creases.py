@@ -11,10 +11,10 @@ from jaxtyping import Bool, Float, Integer
 from pns_common.errors import ParameterError
 from pns_common.kernels import measures
 from pns_common.mesh import Mesh, check_is_mesh
-from pns_common.normals import face_normals
+from pns_common.normals import measure_faces
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_number, is_whole
-from pns_common.topology import Topology, build_topology
+from pns_common.topology import Topology
 
 # ``crease=auto``: edges that turn by more than ANGLE degrees and are connected, by such edges, to
 # one that turns by more than SEED.
@@ -116,7 +116,7 @@ def sharp_edges(mesh: Mesh, angle: float | None = None) -> Integer[np.ndarray, "
     """Return the edges of a mesh that its shape shows to be sharp, as pairs of vertices.
 
     Args:
-        mesh: a mesh of triangles.
+        mesh: a mesh of any polygons.
         angle: edges that turn by more than so many degrees. None: those that turn by more than 40
             and are connected by such edges to one that turns by more than 60.
 
@@ -125,7 +125,7 @@ def sharp_edges(mesh: Mesh, angle: float | None = None) -> Integer[np.ndarray, "
     """
     check_is_mesh(mesh)
     creases = AUTOMATIC if angle is None else Creases(angle=angle)
-    topology = build_topology(mesh.faces, len(mesh.vertices))
+    topology = mesh.topology()
     return topology.edges[creases.found(mesh.vertices, topology)].astype(np.int64)
 
 
@@ -152,8 +152,9 @@ def edge_cosines(
 ) -> Float[np.ndarray, " E"]:
     """Return n1 · n2 of interior edges; 1 at other edges and beside faces without area."""
     if normals is None:
-        normals = face_normals(points, topology.faces, blocks)
-    cosine, read = np.empty(len(topology.edges)), (topology.half_edges, topology.edge_class)
+        normals, _ = measure_faces(points, topology, blocks or Blocks(), areas=False)
+    cosine = np.empty(len(topology.edges))
+    read = topology.face_of_corner, topology.half_edges, topology.edge_class
     (blocks or Blocks()).run(
         len(cosine),
         lambda begin, end: measures.turn_cosines(normals, *read, begin, end, cosine),
