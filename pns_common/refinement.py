@@ -186,8 +186,10 @@ def refine(
     else:
         last = scheme.base.split(level.topology, blocks)
         faces = last.corners.astype(np.int64).reshape(last.face_count, -1)
-        shift = limit_shift(points, last)
-        points, normals = limit_positions(points, last), limit_normals(points, last).vertices
+        surface = last, blocks, scheme.base
+        shift = limit_shift(points, *surface)
+        normals = limit_normals(points, *surface).vertices
+        points = limit_positions(points, *surface)
         if told:
             told.level_ends()
     added, nothing = steps[-1].added, np.broadcast_to(0.0, len(points))
