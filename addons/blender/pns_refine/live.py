@@ -25,7 +25,7 @@ from pns_common import PnsError
 
 from .live_nodes import modifier_of, point_at, remove_modifier
 from .overlay import hide, rescale
-from .reading import read_mesh
+from .reading import Reading, read_mesh
 from .run import Made, Share, refine_mesh
 from .settings import Settings, choice_of
 from .writing import CACHE, LIVE, copied, take_name
@@ -79,7 +79,8 @@ def _refreshed(
     live = mesh.pns_live
     # Its object may have the modifier of another.
     live.enabled = True
-    digest = yield from _digest(still.data, live)
+    reading: Reading = yield from read_mesh(still.data)
+    digest = _digest(still.data, reading, live)
     whole = all(getattr(live, name) is not None for name in CACHE)
     if not whole or (_borrowed(mesh) and shown_of(live).pns_result.digest != digest):
         _make_cache(mesh)
@@ -88,7 +89,7 @@ def _refreshed(
     if changed:
         before = shown_of(live)
         spare = live.second if before == live.first else live.first
-        made: Made = yield from refine_mesh(still, choice_of(live), share, into=spare)
+        made: Made = yield from refine_mesh(still, choice_of(live), share, 0, 1, spare, reading)
         made.mesh.pns_result.digest = digest
         live.cache.data, live.spare.data = made.mesh, before
         empty(before)
@@ -220,9 +221,8 @@ def _borrowed(mesh: bpy.types.Mesh) -> bool:
     )
 
 
-def _digest(mesh: bpy.types.Mesh, live: PNS_PG_live) -> Generator[None, None, str]:
+def _digest(mesh: bpy.types.Mesh, reading: Reading, live: PNS_PG_live) -> str:
     """Return a text that changes when the mesh changes, or what is asked for."""
-    reading = yield from read_mesh(mesh)
     digest = hashlib.blake2b(digest_size=16)
     snapshot = reading.snapshot
     for layer in snapshot.layers:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common import Creases, Mesh, Scheme, loop, pns
+from pns_common import Creases, Mesh, loop, pns
 from pns_common.creases import NO_CREASES, sharp_edges
 from pns_common.limit import limit_positions
 from pns_common.model.session import Model
@@ -81,8 +81,6 @@ def compute(
         plain = level_steps(mesh.faces, len(mesh.vertices), choice.levels, *own)
     distance = _distance_from_loop(mesh, choice, plain, positions, bar)
 
-    ratio, gate = _where_it_acted(mesh, scheme, steps, positions, bar)
-
     offsets = snapshot.offsets
     moved = np.concatenate([snapshot.groups, *offsets], axis=1)
     columns = refine_columns(moved, steps)
@@ -117,8 +115,8 @@ def compute(
         groups=np.clip(columns[:, :group_count], 0, 1),
         offsets=moves.reshape(len(columns), len(offsets), 3).transpose(1, 0, 2),
         layers=hide_within(tuple(layers), faces, edges, own_edge < 0, old, count),
-        ratio=ratio,
-        gate=gate,
+        ratio=_at_later(positions.ratio, steps),
+        gate=_at_later(positions.gate, steps),
         distance=distance,
         normals=positions.normals,
         report=positions.report,
@@ -169,21 +167,12 @@ def _distance_from_loop(
     return np.linalg.norm(positions.points - plain.points, axis=1)
 
 
-def _where_it_acted(
-    mesh: Mesh, scheme: Scheme, steps: Steps, positions: Positions, bar: _Bar
-) -> tuple[Float[np.ndarray, " W"], Float[np.ndarray, " W"]]:
-    """Return ratio and gate of the last learned level; at later vertices, the ends' mean."""
-    learned = scheme.learned_levels
-    if not learned or learned >= len(steps.steps):
-        return positions.ratio, positions.gate
-    first = replace(steps, steps=steps.steps[:learned])
-    acted = refine_positions(mesh, scheme, first, limit=False, progress=bar.within("loop"))
-    ratio, gate = acted.ratio, acted.gate
-    for step in steps.steps[learned:]:
-        ends = step.topology.edges
-        ratio = np.concatenate([ratio, ratio[ends].mean(axis=1)])
-        gate = np.concatenate([gate, gate[ends].mean(axis=1)])
-    return ratio, gate
+def _at_later(values: Float[np.ndarray, " L"], steps: Steps) -> Float[np.ndarray, " W"]:
+    """Carry values from the vertices of a level to the last; new ones have their ends' mean."""
+    for step in steps.steps:
+        if step.topology.vertex_count == len(values):
+            values = np.concatenate([values, values[step.topology.edges].mean(axis=1)])
+    return values
 
 
 def _plan(
