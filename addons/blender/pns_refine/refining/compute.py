@@ -27,7 +27,7 @@ from .faces import (
 from .hidden import hide_within
 from .positions import Positions, refine_positions
 from .shown_creases import shown_creases
-from .snapshot import Layer, Refined, Rule, Snapshot, edge_keys
+from .snapshot import Layer, Refined, Rule, Smoothing, Snapshot, edge_keys
 from .steps import Steps, edge_numbers, level_steps, refine_columns
 from .votes import vote_at_corners, vote_at_points
 from .watched import WatchedModel
@@ -43,7 +43,7 @@ class Choice:
     ``model`` is the learned correction and ``budget`` its C; without a model it is Loop.
     ``crease_angle`` (radians) makes edges sharp whose faces meet at a larger angle; None makes
     none. ``crease_lines`` keeps those sharp that the mesh or its shading shows, where the model's
-    card asks for it. ``quads`` joins the triangles of quads again.
+    card asks for it. ``quads`` joins the triangles of quads again. ``uv_smooth`` is for UV maps.
     """
 
     model: Model | None
@@ -53,6 +53,7 @@ class Choice:
     crease_angle: float | None = None
     crease_lines: bool = True
     quads: bool = False
+    uv_smooth: Smoothing = Smoothing.PRESERVE_BOUNDARIES
 
 
 def compute(
@@ -96,7 +97,7 @@ def compute(
     used = used_edges(plan.faces, len(steps.final.edges))
     loose = np.flatnonzero(~snapshot.edge_used)
     own_edge = np.r_[edge_parent[used], loose]
-    carry = _Carry(snapshot, choice.levels, steps, plan, own_edge)
+    carry = _Carry(snapshot, choice, steps, plan, own_edge)
     layers = []
     for number, layer in enumerate(snapshot.layers):
         layers.append(layer.of(carry(layer)))
@@ -197,7 +198,7 @@ class _Carry:
     """What becomes of a layer: its values at the new points, edges, faces or corners."""
 
     snapshot: Snapshot
-    levels: int
+    choice: Choice
     steps: Steps
     plan: FacePlan
     edge_parent: Int[np.ndarray, " E"]
@@ -232,9 +233,12 @@ class _Carry:
             # Directions are stored roughly: what differs by less than that is no seam.
             same = np.round(values, 3) if layer.unit else None
             creases = self.steps.steps[0].creases
-            values = refine_corners(values, self.snapshot.triangles, self.levels, creases, same)
+            uv = layer.kind == "FLOAT2"
+            smoothing = self.choice.uv_smooth if uv else Smoothing.PRESERVE_BOUNDARIES
+            triangles, levels = self.snapshot.triangles, self.choice.levels
+            values = refine_corners(values, triangles, levels, creases, same, smoothing)
         else:
-            values = vote_at_corners(values, self.levels)
+            values = vote_at_corners(values, self.choice.levels)
         return values[self.plan.corner]
 
 
