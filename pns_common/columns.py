@@ -46,7 +46,7 @@ def level_topologies(
     """
     check_faces(faces, vertex_count)
     blocks = blocks or Blocks()
-    topologies = [build_topology(faces, vertex_count, blocks)]
+    topologies = [build_topology(faces, vertex_count, blocks).with_border(creases.border)]
     if creases.named is not None and creases.sharp_at(0):
         topologies[0] = topologies[0].with_creases(topologies[0].rows_of(creases.named))
     for depth in range(1, levels):
@@ -129,6 +129,17 @@ class SubdivisionMatrix:
     columns: Integer[np.ndarray, " N"]
     weights: Float[np.ndarray, " N"]
     shape: tuple[int, int]
+
+    def take(self, rows: Integer[np.ndarray, " M"]) -> SubdivisionMatrix:
+        """Return some of the rows."""
+        starts = self.starts
+        counts = np.diff(starts)[rows]
+        first = np.repeat(starts[rows] - (np.cumsum(counts) - counts), counts)
+        entries = first + np.arange(len(first))
+        own = np.repeat(np.arange(len(rows)), counts)
+        return SubdivisionMatrix(
+            own, self.columns[entries], self.weights[entries], (len(rows), self.shape[1])
+        )
 
     @property
     def starts(self) -> Integer[np.ndarray, " R"]:

@@ -18,6 +18,9 @@ from pns_common.topology import Topology, build_topology
 # one that turns by more than SEED.
 ANGLE, SEED = 40.0, 60.0
 HALF_TURN = 180
+# What boundaries do: curves; curves but for the corners of single faces; or nothing at all. Of
+# OpenSubdiv the first are its VTX_BOUNDARY_EDGE_ONLY and VTX_BOUNDARY_EDGE_AND_CORNER.
+BORDERS = ("smooth", "corners", "fixed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,16 +35,19 @@ class Creases:
         levels: at how many levels the edges are sharp (semi-sharp creases, DeRose, Kass and Truong
             1998); None: at all. Edges that are sharp at the last level count as sharp for good in
             limits.
+        border: what boundaries do: "smooth", they become curves; "corners", these end at vertices of
+            one face alone; "fixed", boundaries stay as they are.
 
     Raises:
         ParameterError: pairs that are no pairs of whole numbers, an angle outside 0 … 180, a seed
-            below the angle, or levels below 1.
+            below the angle, levels below 1, or another border.
     """
 
     named: Integer[np.ndarray, "N 2"] | None = None
     angle: float | None = None
     seed: float | None = None
     levels: int | None = None
+    border: str = "smooth"
 
     def __post_init__(self) -> None:
         if self.named is not None:
@@ -53,6 +59,8 @@ class Creases:
             raise ParameterError("seed", seed, expected="degrees, from the angle to below 180")
         if levels is not None and not (is_whole(levels) and levels >= 1):
             raise ParameterError("levels", levels, expected="a whole number, at least 1")
+        if self.border not in BORDERS:
+            raise ParameterError("border", self.border, expected=", ".join(BORDERS))
 
     def with_named(self, pairs: Integer[np.ndarray, "N 2"]) -> Creases:
         """Return a copy with further pairs of vertices named."""
@@ -66,7 +74,7 @@ class Creases:
         return self.levels is None or depth < self.levels
 
     def applied(self, points: Float[np.ndarray, "V 3"], topology: Topology) -> Topology:
-        """Return the topology with these edges as creases.
+        """Return the topology with these edges as creases, and this border.
 
         Raises:
             ParameterError: a named pair is no edge of the mesh.
@@ -75,7 +83,7 @@ class Creases:
             topology = topology.with_creases(topology.rows_of(self.named))
         if self.angle is not None:
             topology = topology.with_creases(self.found(points, topology))
-        return topology
+        return topology.with_border(self.border)
 
     def found(
         self, points: Float[np.ndarray, "V 3"], topology: Topology

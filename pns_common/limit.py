@@ -119,7 +119,9 @@ def limit_normals(
     mesh, around = topology, find_sectors(topology)
     kind = np.zeros(len(around.first), dtype=np.int64)
     if around.opened:
-        kind[: around.opened] = np.minimum(mesh.sharp_count[around.vertex[: around.opened]], CORNER)
+        sharp = mesh.sharp_count.copy()
+        sharp[mesh.pinned] = CORNER
+        kind[: around.opened] = np.minimum(sharp[around.vertex[: around.opened]], CORNER)
     at, weights = _tables(tangent_mask, kind, around.size)
     sectors = np.empty((len(around.first), 3))
     read = points, *_walked(mesh), around.first, around.size, at, weights, kind == CORNER

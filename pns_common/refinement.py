@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from typing import Literal, SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Integer
 
+from pns_common.columns import SubdivisionMatrix, subdivision_matrix
 from pns_common.creases import Creases, chosen_creases
 from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import are_compiled
@@ -110,6 +111,17 @@ class Refinement:
         """The connectivity of each level before it was refined: for ``columns.refine_columns``."""
         return [step.level.topology for step in self.steps]
 
+    @cached_property
+    def parents(self) -> SubdivisionMatrix:
+        """The control vertices that each refined vertex is made of, with their weights.
+
+        S with a row for each refined vertex and a column for each control vertex: ``S @ values``
+        carries values of vertices to the refined mesh. It holds the base scheme's masks over all
+        levels; what a model adds to positions, and the step to the limit surface, are not linear or
+        no part of it.
+        """
+        return subdivision_matrix(self.topologies, self.scheme.base)
+
     def __repr__(self) -> str:
         vertices, faces = len(self.mesh.vertices), len(self.mesh.faces)
         name, levels = self.scheme.name, len(self.steps)
@@ -124,6 +136,7 @@ def refine(
     *,
     limit: bool = False,
     creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
+    border: Literal["smooth", "corners", "fixed"] | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Refinement:
@@ -142,6 +155,7 @@ def refine(
             1994). "auto": for a model of format 4 the edges that turn by more than 40 degrees and
             are connected by such edges to one that turns by more than 60, at as many levels as its
             card says; none for other schemes. None: no edge.
+        border: what boundaries do; see ``Creases``. None: as ``creases`` say, or "smooth".
         threads: worker threads, default all processors; the result does not depend on it.
         progress: called with (faces made so far, faces made in the end), also inside levels, from
             any thread, one at a time; an exception that it raises ends the refinement.
@@ -161,6 +175,7 @@ def refine(
     if not is_bool(limit):
         raise ParameterError("limit", limit, expected="True or False")
     kept = chosen_creases(creases, scheme.creases)
+    kept = kept if border is None else replace(kept, border=border)
     learned = count if scheme.learned_levels is None else min(count, scheme.learned_levels)
     told = _progress(len(mesh.faces), count, learned if scheme.rule else 0, limit, progress)
     blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)

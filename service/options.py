@@ -17,6 +17,8 @@ SchemeName = Literal["pns", "loop"]
 Diagnostics = Literal["summary", "full", "none"]
 UvRule = Literal["linear", "smooth"]
 NormalRule = Literal["auto", "keep", "smooth", "limit"]
+WeldRule = Literal["position", "index", "off"]
+BorderRule = Literal["smooth", "corners", "fixed"]
 Compression = Literal["none", "draco", "meshopt"]
 # A weld further than a hundredth of R is a different tool: it would take features away.
 MAX_WELD_TOLERANCE = 0.01
@@ -44,7 +46,9 @@ class Options:
     uv: UvRule = "linear"
     normals: NormalRule = "auto"
     crease: str = "auto"
+    weld: WeldRule = "position"
     weld_tolerance: float = 0.0
+    border: BorderRule = "smooth"
     compress: Compression = "none"
     limit: bool = False
 
@@ -58,6 +62,8 @@ class Options:
         check_choice("compress", self.compress, get_args(Compression))
         check_choice("uv", self.uv, get_args(UvRule))
         check_choice("normals", self.normals, get_args(NormalRule))
+        check_choice("weld", self.weld, get_args(WeldRule))
+        check_choice("border", self.border, get_args(BorderRule))
         if self.normals == "limit" and not self.limit:
             raise InvalidParameter("normals", "normals=limit needs limit=true: they stand there")
         if self.budget is not None and not (math.isfinite(self.budget) and self.budget >= 0):
@@ -77,6 +83,8 @@ class Options:
             raise InvalidParameter(
                 "weld_tolerance", f"weld_tolerance must be 0 to {MAX_WELD_TOLERANCE}"
             )
+        if self.weld_tolerance and self.weld != "position":
+            raise InvalidParameter("weld_tolerance", "weld_tolerance needs weld=position")
 
     @property
     def crease_angle(self) -> float | None:

@@ -11,12 +11,14 @@ import typer
 from ..options import (
     MAX_LEVELS,
     MAX_WELD_TOLERANCE,
+    BorderRule,
     Compression,
     Diagnostics,
     NormalRule,
     Options,
     SchemeName,
     UvRule,
+    WeldRule,
 )
 
 
@@ -83,6 +85,20 @@ CreaseOption = Annotated[
     ),
 ]
 WeldOption = Annotated[
+    WeldRule,
+    typer.Option(
+        help="which vertices are one. position: those in one place. index: those that the file "
+        "gives one number, so that poses keep one numbering. off: corners alike in all they have"
+    ),
+]
+BorderOption = Annotated[
+    BorderRule,
+    typer.Option(
+        help="boundaries. smooth: curves. corners: curves that end at vertices of one face. "
+        "fixed: as they are"
+    ),
+]
+ToleranceOption = Annotated[
     float,
     typer.Option(
         metavar="X", help=f"0 to {MAX_WELD_TOLERANCE}: join vertices nearer than X times R"

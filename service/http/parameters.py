@@ -14,12 +14,14 @@ from ..options import (
     DEFAULTS,
     MAX_LEVELS,
     MAX_WELD_TOLERANCE,
+    BorderRule,
     Compression,
     Diagnostics,
     NormalRule,
     Options,
     SchemeName,
     UvRule,
+    WeldRule,
 )
 
 
@@ -96,6 +98,12 @@ class Parameters(BaseModel):
         "says), `off`, `normals` (edges whose two sides carry different normals) or `angle:` and "
         "degrees (edges whose faces meet at more)",
     )
+    weld: WeldRule = Field(
+        default=DEFAULTS.weld,
+        description="which vertices are one: `position`, those in one place; `index`, those that "
+        "the file gives one number, so that poses of one file keep one numbering; `off`, corners "
+        "that are alike in all they have",
+    )
     weld_tolerance: float = Field(
         default=DEFAULTS.weld_tolerance,
         ge=0,
@@ -103,7 +111,11 @@ class Parameters(BaseModel):
         allow_inf_nan=False,
         description="join vertices nearer than this times R; 0: exactly equal ones alone",
     )
-
+    border: BorderRule = Field(
+        default=DEFAULTS.border,
+        description="what boundaries do: `smooth`, they become curves; `corners`, these end at "
+        "vertices of one face alone; `fixed`, boundaries stay as they are",
+    )
     compress: Compression = Field(
         default=DEFAULTS.compress,
         description="`meshopt` is exact; `draco` is smaller, and rounds positions, normals and UVs",

@@ -8,12 +8,15 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import msgspec
+import numpy as np
 
 from pns_common import load_model
+from pns_common.columns import SubdivisionMatrix
 from pns_common.errors import PnsError
 from pns_common.files import replace_file
 from pns_common.model.session import Model
@@ -50,7 +53,7 @@ class Jobs:
     Attributes:
         sources: files to read; `-` is stdin.
         output: a file, a folder for files with the names of their sources, or `-` for stdout.
-        report: where the report of one source goes.
+        report, map: where the report of one source goes, and the parents of its new vertices.
         target: the format of all results; None: as `output` ends, or as read.
         kind: the format of stdin; None: glTF.
         force: whether a result may replace its source.
@@ -59,6 +62,7 @@ class Jobs:
     sources: Sequence[Path]
     output: Path
     report: Path | None = None
+    map: Path | None = None
     target: str | None = None
     kind: str | None = None
     force: bool = False
@@ -91,7 +95,7 @@ def convert(jobs: Jobs, options: Options, model: str | None, limits: Limits) -> 
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     for job in planned:
         try:
-            _convert_one(job, jobs.report, options, loaded, limits, console)
+            _convert_one(job, jobs, options, loaded, limits, console)
         except InvalidParameter as error:
             yield error
         except (ServiceError, PnsError) as error:
@@ -103,7 +107,7 @@ def convert(jobs: Jobs, options: Options, model: str | None, limits: Limits) -> 
 
 def _convert_one(
     job: _Job,
-    report_file: Path | None,
+    jobs: Jobs,
     options: Options,
     model: Model | None,
     limits: Limits,
@@ -115,15 +119,27 @@ def _convert_one(
     else:
         data, siblings = job.source.read_bytes(), folder_of(job.source)
     with _progress(console) as course:
-        written = converted(data, job.kind, job.target, options, model, limits, course, siblings)
+        written = converted(
+            data,
+            job.kind,
+            job.target,
+            options,
+            model,
+            limits,
+            course,
+            siblings,
+            traced=jobs.map is not None,
+        )
     if job.output == STREAM:
         sys.stdout.buffer.write(written.content)
         sys.stdout.buffer.flush()
     else:
         replace_file(job.output, written.content)
-    if report_file is not None:
+    if jobs.map is not None and written.parents is not None:
+        replace_file(jobs.map, _as_npz(written.parents))
+    if jobs.report is not None:
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
-        replace_file(report_file, text + b"\n")
+        replace_file(jobs.report, text + b"\n")
     for line in (*lines_of(written.report), *advice_lines(written.report)):
         console.print(printable(line), markup=False)
     seconds = time.perf_counter() - began
@@ -137,8 +153,9 @@ def _planned(jobs: Jobs) -> list[_Job]:
     into = jobs.output.is_dir() or (several and jobs.output != STREAM)
     if several and not jobs.output.is_dir():
         raise InvalidParameter("OUT", f"{jobs.output}: several files need a folder that is there")
-    if several and jobs.report is not None:
-        raise InvalidParameter("report", f"{jobs.report}: several files have several reports")
+    for name, file in (("report", jobs.report), ("map", jobs.map)):
+        if several and file is not None:
+            raise InvalidParameter(name, f"{file}: several files have several {name}s")
     planned: list[_Job] = []
     for source in jobs.sources:
         kind = jobs.kind or "glb" if source == STREAM else _kind("IN", source)
@@ -153,6 +170,8 @@ def _planned(jobs: Jobs) -> list[_Job]:
             ending = source.suffix if target == kind and source != STREAM else f".{target}"
             output = jobs.output / f"{stem}{ending}"
         _check_output(jobs, source, output)
+        if jobs.map is not None and {kind, target} & {*GLTF_KINDS}:
+            raise InvalidParameter("map", f"{source}: a map is of OBJ, PLY, STL and OFF, in and out")
         if any(output == job.output for job in planned):
             raise InvalidParameter("OUT", f"{output}: two files would be written to it")
         planned.append(_Job(source, kind, output, target))
@@ -160,11 +179,13 @@ def _planned(jobs: Jobs) -> list[_Job]:
 
 
 def _check_output(jobs: Jobs, source: Path, output: Path) -> None:
-    for name, file in (("OUT", output), ("report", jobs.report)):
+    beside = (("report", jobs.report), ("map", jobs.map))
+    for name, file in (("OUT", output), *beside):
         if file is not None and file != STREAM and not file.parent.is_dir():
             raise InvalidParameter(name, f"{file}: there is no folder {file.parent}")
-    if jobs.report is not None and jobs.report.resolve() in (source.resolve(), output.resolve()):
-        raise InvalidParameter("report", f"{jobs.report}: the report would replace a model")
+    for name, file in beside:
+        if file is not None and file.resolve() in (source.resolve(), output.resolve()):
+            raise InvalidParameter(name, f"{file}: the {name} would replace a model")
     if source != STREAM and output.resolve() == source.resolve() and not jobs.force:
         raise InvalidParameter("OUT", f"{output}: it is the input; --force replaces it")
 
@@ -178,8 +199,12 @@ def converted(
     limits: Limits,
     course: Course | None = None,
     siblings: SiblingFiles = ALONE,
+    *,
+    traced: bool = False,
 ) -> Written:
     """Refine the bytes of a file of `kind` into those of one of `target`; no file is touched.
+
+    `traced` asks for the parents of vertices, which no glTF has.
 
     Raises:
         ServiceError, PnsError: the file or a parameter cannot be used.
@@ -203,14 +228,20 @@ def converted(
         mesh = read_within(data, kind, limits)
     with course.part(0.1, 0.8):
         refined, report = refine_mesh_file(
-            mesh, make_scheme(options, model), options, limits, course
+            mesh, make_scheme(options, model), options, limits, course, traced=traced
         )
     with course.stage("write", 0.8, 1.0):
         kept, changes = held(refined, target)
         if options.compress != "none":
             changes.append(Change("", "not compressed: only a glTF is", 1))
+        parents = kept.parents
+        if parents is not None and target == "stl":
+            parents = parents.take(kept.corners)
         written = Written(
-            FORMATS[target].write(kept), _with_changes(report, changes), len(kept.faces)
+            FORMATS[target].write(kept),
+            _with_changes(report, changes),
+            len(kept.faces),
+            parents=parents,
         )
     return replace(written, seconds=course.seconds)
 
@@ -275,12 +306,33 @@ def _check_kind(name: str, kind: str) -> None:
 
 @dataclass(frozen=True)
 class Written:
-    """An output file: its bytes, its report, its faces; the seconds that each stage took."""
+    """An output file.
+
+    Attributes:
+        content, report, faces: its bytes, its report, how many faces it has.
+        seconds: what each stage took.
+        parents: the vertices of the input that each of its vertices is made of; None: not asked for.
+    """
 
     content: bytes
     report: dict[str, Any]
     faces: int
     seconds: dict[str, float] = field(default_factory=dict)
+    parents: SubdivisionMatrix | None = None
+
+
+def _as_npz(parents: SubdivisionMatrix) -> bytes:
+    """Write a matrix as `scipy.sparse.load_npz` reads it."""
+    file = BytesIO()
+    np.savez_compressed(
+        file,
+        format=b"csr",
+        shape=parents.shape,
+        data=parents.weights,
+        indices=parents.columns,
+        indptr=parents.starts,
+    )
+    return file.getvalue()
 
 
 def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) -> Written:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from pns_common.columns import SubdivisionMatrix
+
 from ..report import Change
 
 # Layers are called as glTF calls attributes; other properties begin with an underscore.
@@ -56,6 +58,7 @@ class MeshFile:
         libraries: files that define the materials.
         double: whether a format that has both is to store positions as doubles.
         changes: what the reader dropped or mended.
+        parents: of a refined mesh, the vertices of the file that each vertex is made of.
     """
 
     vertices: Float[np.ndarray, "V 3"]
@@ -67,6 +70,7 @@ class MeshFile:
     libraries: tuple[str, ...] = ()
     double: bool = False
     changes: tuple[Change, ...] = ()
+    parents: SubdivisionMatrix | None = None
 
     @property
     def sizes(self) -> Int[np.ndarray, " F"]:

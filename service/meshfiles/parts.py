@@ -122,6 +122,7 @@ def with_vertex_layers(mesh: MeshFile, names: Sequence[str]) -> MeshFile:
     return replace(
         mesh,
         vertices=mesh.vertices[mesh.corners[first]],
+        parents=None if mesh.parents is None else mesh.parents.take(mesh.corners[first]),
         corners=row,
         layers={**mesh.layers, **kept},
     )

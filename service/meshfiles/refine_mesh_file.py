@@ -29,11 +29,18 @@ from .parts import joined, parts_of, with_group_normals
 
 
 def refine_mesh_file(
-    mesh: MeshFile, scheme: Scheme, options: Options, limits: Limits, course: Course | None = None
+    mesh: MeshFile,
+    scheme: Scheme,
+    options: Options,
+    limits: Limits,
+    course: Course | None = None,
+    *,
+    traced: bool = False,
 ) -> tuple[MeshFile, dict[str, Any]]:
     """Refine triangles; return also the report.
 
-    `normals=auto` keeps normals, and adds none to a mesh without.
+    `normals=auto` keeps normals, and adds none to a mesh without. `traced` asks for the parents of
+    vertices.
 
     Raises:
         LimitError: over `max_faces` or `max_memory_bytes`.
@@ -49,12 +56,15 @@ def refine_mesh_file(
     primitives = [part.primitive for part in parts]
     shares = stage_shares(scheme, options)
     try:
-        made = refine_alone(plan, primitives, scheme, options, course, shares)
+        made = refine_alone(plan, primitives, scheme, options, course, shares, traced=traced)
     except MeshError as error:
         raise UnrefinableError(str(error)) from error
     if made.report is None:
         raise UnrefinableError("no face has three different vertices")
     refined = joined(mesh, parts, made.kept, made.refined, options.levels)
+    if made.parents is not None:
+        shape = made.parents.shape[0], len(mesh.vertices)
+        refined = replace(refined, parents=replace(made.parents, shape=shape))
     if NORMAL not in mesh.layers and options.normals == "keep":
         # Those that smoothing groups gave: these stay themselves.
         refined = replace(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.columns import level_topologies
+from pns_common.columns import SubdivisionMatrix, level_topologies
 from pns_common.creases import NO_CREASES, Creases
 from pns_common.errors import MeshError
 from pns_common.mesh import Mesh
@@ -43,6 +43,7 @@ class RefinedMesh:
         cut: (P,) vertices of each part that lost a joint for lack of slots.
         scalars: further attributes by name.
         limit_normals: normals to use in place of those of the faces; None: none.
+        parents: the vertices of the control mesh that each is made of; None: not asked for.
     """
 
     mesh: Mesh
@@ -51,6 +52,7 @@ class RefinedMesh:
     cut: Int[np.ndarray, " P"]
     scalars: dict[str, Float[np.ndarray, " V"]]
     limit_normals: Float[np.ndarray, "V 3"] | None
+    parents: SubdivisionMatrix | None = None
 
 
 def creases_of(control: ControlMesh, options: Options, scheme: Scheme) -> Creases:
@@ -61,8 +63,8 @@ def creases_of(control: ControlMesh, options: Options, scheme: Scheme) -> Crease
     if control.is_empty:
         return NO_CREASES
     if options.crease == "normals":
-        return Creases(hard_edges(control))
-    by_shape = creases_by_shape(control.mesh, options, scheme)
+        return Creases(hard_edges(control), border=options.border)
+    by_shape = replace(creases_by_shape(control.mesh, options, scheme), border=options.border)
     if options.crease != "auto" or scheme.creases.angle is None:
         return by_shape
     return by_shape.with_named(marked_edges(control))
@@ -80,8 +82,10 @@ def refined_mesh(
     options: Options,
     pointer: str,
     course: Course,
+    *,
+    traced: bool = False,
 ) -> RefinedMesh:
-    """Refine a control mesh that has faces.
+    """Refine a control mesh that has faces; `traced` asks for the parents of vertices.
 
     Raises:
         UnrefinableError: refined positions leave the range of float32.
@@ -107,6 +111,7 @@ def refined_mesh(
         *refined_skin_and_morph(control, faces, levels, options, course),
         _scalars(made, options),
         made.normals if options.normals == "limit" else None,
+        made.parents if traced else None,
     )
 
 

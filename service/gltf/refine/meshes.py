@@ -10,6 +10,7 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Bool
 
+from pns_common.columns import SubdivisionMatrix
 from pns_common.progress import LEARNED_COST
 from pns_common.report import Report
 from pns_common.schemes import Scheme
@@ -24,7 +25,7 @@ from ..read.plan import MeshPlan
 from ..read.primitives import TrianglePrimitive, read_primitive
 from ..read.upload import Upload
 from .attributes import RefinedPrimitive, refined_primitives
-from .control_mesh import control_mesh
+from .control_mesh import ControlMesh, control_mesh
 from .mesh_refine import (
     changes_of_primitive,
     changes_of_vertices,
@@ -60,6 +61,7 @@ class MeshOutcome:
         report: the operator's; None if no face was left.
         changes: what was joined, dropped or cut.
         bends: bent edges, and the sharp ones among them.
+        parents: rows of the file's positions that each refined vertex is made of, if asked for.
     """
 
     index: int
@@ -70,6 +72,7 @@ class MeshOutcome:
     report: Report | None
     changes: list[Change]
     bends: Bends = NO_BENDS
+    parents: SubdivisionMatrix | None = None
 
     @property
     def degenerate(self) -> int:
@@ -143,7 +146,8 @@ def _window(
     with course.stage("read", 0.0, shares.weld):
         read = [_read(upload, plan) for plan in window]
     outcomes: dict[int, MeshOutcome] = {}
-    if len(window) > 1:
+    # Rows of a union are numbered anew.
+    if len(window) > 1 and options.weld == "position":
         outcomes = _together(window, read, scheme, options, course, shares)
     alone = [place for place in range(len(window)) if place not in outcomes]
     for done, place in enumerate(alone):
@@ -205,11 +209,13 @@ def refine_alone(
     options: Options,
     course: Course,
     shares: StageShares,
+    *,
+    traced: bool = False,
 ) -> MeshOutcome:
-    """Refine one mesh, given by its primitives."""
+    """Refine one mesh, given by its primitives; `traced` asks for the parents of vertices."""
     options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
-        control = control_mesh(primitives, options.weld_tolerance, options.weld_unit)
+        control = control_mesh(primitives, options)
         creases = creases_of(control, options, scheme)
         if options.normals != "keep" and not control.is_empty:
             primitives = with_smooth_normals(control, sharp_after(creases, options.levels))
@@ -217,7 +223,7 @@ def refine_alone(
     pointer, made = f"/meshes/{plan.mesh}", None
     with course.stage("refine", shares.refine, shares.attributes):
         if not control.is_empty:
-            made = refined_mesh(control, creases, scheme, options, pointer, course)
+            made = refined_mesh(control, creases, scheme, options, pointer, course, traced=traced)
     refined: list[RefinedPrimitive] = []
     with course.stage("attributes", shares.attributes, shares.write):
         if made is not None:
@@ -242,4 +248,12 @@ def refine_alone(
         report=None if made is None else made.reports[0],
         changes=changes,
         bends=NO_BENDS if made is None else count_bends(control.mesh, creases)[0],
+        parents=None if made is None or made.parents is None else _in_file(made.parents, control),
     )
+
+
+def _in_file(parents: SubdivisionMatrix, control: ControlMesh) -> SubdivisionMatrix:
+    """Return parents by their numbers in the file, of which the first of each weld counts."""
+    rows = np.concatenate([primitive.rows for primitive in control.primitives])
+    columns = rows[control.vertex_rows()][parents.columns]
+    return replace(parents, columns=columns)
