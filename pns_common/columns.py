@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Integer, Real
+from jaxtyping import Bool, Float, Integer, Real
 
 from pns_common.base_scheme import BaseScheme
 from pns_common.creases import NO_CREASES, Creases
@@ -140,6 +140,15 @@ class SubdivisionMatrix:
         return SubdivisionMatrix(
             own, self.columns[entries], self.weights[entries], (len(rows), self.shape[1])
         )
+
+    def unmoved(self, still: Bool[np.ndarray, " C"]) -> SubdivisionMatrix:
+        """Return the map whose first rows, where ``still``, are those of the identity."""
+        own = np.flatnonzero(still)
+        left = ~np.isin(self.rows, own)
+        parts = (self.rows, own), (self.columns, own), (self.weights, np.ones(len(own)))
+        rows, columns, weights = (np.concatenate([a[left], b]) for a, b in parts)
+        order = np.argsort(rows, kind="stable")
+        return SubdivisionMatrix(rows[order], columns[order], weights[order], self.shape)
 
     @property
     def starts(self) -> Integer[np.ndarray, " R"]:

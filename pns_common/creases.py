@@ -35,8 +35,8 @@ class Creases:
         levels: at how many levels the edges are sharp (semi-sharp creases, DeRose, Kass and Truong
             1998); None: at all. Edges that are sharp at the last level count as sharp for good in
             limits.
-        border: what boundaries do: "smooth", they become curves; "corners", these end at vertices of
-            one face alone; "fixed", boundaries stay as they are.
+        border: what boundaries do. "smooth": they become curves. "corners": these end at vertices
+            of one face alone. "fixed": they stay as they are.
 
     Raises:
         ParameterError: pairs that are no pairs of whole numbers, an angle outside 0 … 180, a seed

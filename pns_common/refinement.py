@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from typing import Literal, SupportsIndex
+from typing import Any, Literal, SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Integer
@@ -34,6 +34,7 @@ from pns_common.report import (
     longest,
 )
 from pns_common.schemes import Scheme
+from pns_common.selection import Selected, chosen_faces, select
 from pns_common.topology import Topology, split_faces
 
 DEFAULT_LEVELS, HIGHEST_LEVELS = 2, 16
@@ -73,6 +74,7 @@ class Refinement:
             None unless vertices were put on it.
         steps: the levels, from which the report is made when it is first read.
         scheme, limit_shift: for the report.
+        selected: what is left where some faces were refined alone; None: all were.
     """
 
     mesh: Mesh
@@ -82,6 +84,7 @@ class Refinement:
     steps: Sequence[Step] = field(repr=False)
     scheme: Scheme = field(repr=False)
     limit_shift: float = field(repr=False)
+    selected: Selected | None = field(repr=False, default=None)
 
     @cached_property
     def reference_length(self) -> float:
@@ -120,7 +123,10 @@ class Refinement:
         levels; what a model adds to positions, and the step to the limit surface, are not linear or
         no part of it.
         """
-        return subdivision_matrix(self.topologies, self.scheme.base)
+        made = subdivision_matrix(self.topologies, self.scheme.base)
+        if self.selected is None:
+            return made
+        return made.unmoved(self.selected.still).take(self.selected.vertices)
 
     def __repr__(self) -> str:
         vertices, faces = len(self.mesh.vertices), len(self.mesh.faces)
@@ -137,6 +143,7 @@ def refine(
     limit: bool = False,
     creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
     border: Literal["smooth", "corners", "fixed"] | None = None,
+    faces: Any = None,
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Refinement:
@@ -156,6 +163,8 @@ def refine(
             are connected by such edges to one that turns by more than 60, at as many levels as its
             card says; none for other schemes. None: no edge.
         border: what boundaries do; see ``Creases``. None: as ``creases`` say, or "smooth".
+        faces: refine these alone, by number or as a mask. Neighbours are cut to meet them, and
+            other vertices stay. The report is that of refining all.
         threads: worker threads, default all processors; the result does not depend on it.
         progress: called with (faces made so far, faces made in the end), also inside levels, from
             any thread, one at a time; an exception that it raises ends the refinement.
@@ -179,6 +188,7 @@ def refine(
     learned = count if scheme.learned_levels is None else min(count, scheme.learned_levels)
     told = _progress(len(mesh.faces), count, learned if scheme.rule else 0, limit, progress)
     blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)
+    chosen = None if faces is None else chosen_faces(faces, len(mesh.faces))
 
     if not mesh.triangles:
         raise MeshError("faces of other degrees, expected triangles", element="faces")
@@ -191,7 +201,7 @@ def refine(
         points = steps[-1].points
         if told:
             told.level_ends()
-    faces, normals, shift = split_faces(topology, blocks, np.int64), None, 0.0
+    refined, normals, shift = split_faces(topology, blocks, np.int64), None, 0.0
     if limit:
         last = scheme.base.split(topology, blocks)
         shift = limit_shift(points, last)
@@ -199,14 +209,23 @@ def refine(
         if told:
             told.level_ends()
     added, nothing = steps[-1].added, np.broadcast_to(0.0, len(points))
+    ratio, gate = (nothing, nothing) if added is None else (added.ratio, added.gate)
+    selected = None
+    if chosen is not None:
+        selected = select(chosen, [step.level.topology for step in steps], refined, len(points))
+        refined, rows = selected.faces, selected.vertices
+        points, ratio, gate = points[rows], ratio[rows], gate[rows]
+        points[: len(mesh.vertices)][selected.still] = mesh.vertices[selected.still]
+        normals = None if normals is None else normals[rows]
     return Refinement(
-        mesh=Mesh.of_refined(points, faces),
-        ratio=nothing if added is None else added.ratio,
-        gate=nothing if added is None else added.gate,
+        mesh=Mesh.of_refined(points, refined),
+        ratio=ratio,
+        gate=gate,
         normals=normals,
         steps=steps,
         scheme=scheme,
         limit_shift=shift,
+        selected=selected,
     )
 
 

@@ -35,7 +35,8 @@ class Options:
 
     `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
     mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
-    vertices on the limit surface. Raises InvalidParameter.
+    vertices on the limit surface; `material` and `group` name the faces to refine (None: all).
+    Raises InvalidParameter.
     """
 
     levels: int = DEFAULT_LEVELS
@@ -49,6 +50,8 @@ class Options:
     weld: WeldRule = "position"
     weld_tolerance: float = 0.0
     border: BorderRule = "smooth"
+    material: str | None = None
+    group: str | None = None
     compress: Compression = "none"
     limit: bool = False
 
@@ -85,6 +88,11 @@ class Options:
             )
         if self.weld_tolerance and self.weld != "position":
             raise InvalidParameter("weld_tolerance", "weld_tolerance needs weld=position")
+
+    @property
+    def selects(self) -> bool:
+        """Whether some faces are refined alone."""
+        return self.material is not None or self.group is not None
 
     @property
     def crease_angle(self) -> float | None:

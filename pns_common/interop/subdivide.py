@@ -54,8 +54,8 @@ def subdivide(
         mesh: a ``Mesh``; a pair (vertices (V, 3), faces (F, 3)) of arrays; a trimesh ``Trimesh``, a
             pyvista ``PolyData``, a meshio ``Mesh`` or an open3d ``TriangleMesh``, of triangles.
             Meshes of a library keep texture coordinates, colours and other data, interpolated
-            linearly; their vertices at the same position are one vertex of the surface. A pair and
-            a ``Mesh`` are refined as they are.
+            linearly; their vertices at the same position are one vertex of the surface, unless
+            ``weld="index"`` is among the options. A pair and a ``Mesh`` are refined as they are.
         levels: number of steps, 1 … 16.
         scheme: None for ``pns(load_model())``.
         options: further arguments of ``refine``: ``reference_length``, ``creases``, …

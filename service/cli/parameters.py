@@ -98,6 +98,13 @@ BorderOption = Annotated[
         "fixed: as they are"
     ),
 ]
+MaterialOption = Annotated[
+    str | None, typer.Option(metavar="NAME", help="refine only the faces of this material")
+]
+GroupOption = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="refine only this group or object (OBJ), or mesh (glTF)"),
+]
 ToleranceOption = Annotated[
     float,
     typer.Option(

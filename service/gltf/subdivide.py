@@ -60,11 +60,13 @@ def subdivide_gltf(
     course: Course | None = None,
     siblings: SiblingFiles = ALONE,
     losses: Sequence[Change] = (),
+    parts: frozenset[int] | None = None,
 ) -> Subdivided:
     """Refine every triangle mesh of a glTF file.
 
     `course` receives the progress. `siblings` are the files that the document may name. `losses`
-    are changes of an earlier conversion to glTF, for the report.
+    are changes of an earlier conversion to glTF, for the report; `parts` the primitives to refine
+    that it found.
 
     Raises:
         ServiceError: the upload is unreadable, invalid, over a limit, or cannot be refined.
@@ -87,9 +89,11 @@ def subdivide_gltf(
     outcomes: dict[int, tuple[MeshResult, list[Change]]] = {}
     vertices = VertexUse(upload.document)
     alike = same_geometry(upload.document, (plan.mesh for plan in upload.plans))
+    if options.selects:
+        alike = {plan.mesh: list[int]() for plan in upload.plans}
     firsts = [plan for plan in upload.plans if plan.mesh in alike]
     with course.part(READ, PUT_TOGETHER):
-        for first in refined_meshes(upload, firsts, scheme, options, course):
+        for first in refined_meshes(upload, firsts, scheme, options, course, parts):
             with course.stage("write"):
                 written = writer.replace_mesh(first.index, first.refined, course)
                 later = [first.of(mesh) for mesh in alike[first.index]]

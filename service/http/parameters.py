@@ -116,6 +116,15 @@ class Parameters(BaseModel):
         description="what boundaries do: `smooth`, they become curves; `corners`, these end at "
         "vertices of one face alone; `fixed`, boundaries stay as they are",
     )
+    material: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
+        default=DEFAULTS.material,
+        description="refine only the faces of this material; their neighbours are cut to meet them",
+    )
+    group: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
+        default=DEFAULTS.group,
+        description="refine only this group or object of an OBJ, or mesh of a glTF, by its name or "
+        "that of a node that shows it",
+    )
     compress: Compression = Field(
         default=DEFAULTS.compress,
         description="`meshopt` is exact; `draco` is smaller, and rounds positions, normals and UVs",

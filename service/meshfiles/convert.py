@@ -171,7 +171,9 @@ def _planned(jobs: Jobs) -> list[_Job]:
             output = jobs.output / f"{stem}{ending}"
         _check_output(jobs, source, output)
         if jobs.map is not None and {kind, target} & {*GLTF_KINDS}:
-            raise InvalidParameter("map", f"{source}: a map is of OBJ, PLY, STL and OFF, in and out")
+            raise InvalidParameter(
+                "map", f"{source}: a map is of OBJ, PLY, STL and OFF, in and out"
+            )
         if any(output == job.output for job in planned):
             raise InvalidParameter("OUT", f"{output}: two files would be written to it")
         planned.append(_Job(source, kind, output, target))
@@ -212,7 +214,7 @@ def converted(
     course = Course() if course is None else course
     if kind in GLTF_KINDS or target in GLTF_KINDS:
         # Kinds are checked where they come from.
-        sent = as_gltf(Sent(data, cast(Kind, kind), siblings), limits)
+        sent = as_gltf(Sent(data, cast(Kind, kind), siblings), options, limits)
         done = subdivide_gltf(
             sent.data,
             cast(Media, sent.kind),
@@ -222,6 +224,7 @@ def converted(
             course,
             sent.siblings,
             sent.losses,
+            sent.parts,
         )
         return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
     with course.stage("read", 0.0, 0.1):
@@ -311,7 +314,7 @@ class Written:
     Attributes:
         content, report, faces: its bytes, its report, how many faces it has.
         seconds: what each stage took.
-        parents: the vertices of the input that each of its vertices is made of; None: not asked for.
+        parents: the vertices of the input that each of its vertices is made of, if asked for.
     """
 
     content: bytes

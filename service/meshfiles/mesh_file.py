@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Bool, Float, Int, Shaped
 
 from pns_common.columns import SubdivisionMatrix
 
@@ -42,6 +42,10 @@ class Labels:
 
     names: tuple[str, ...]
     of_face: Int[np.ndarray, " F"]
+
+    def named(self, name: str) -> Bool[np.ndarray, " F"]:
+        """Return which faces have a name."""
+        return self.of_face == (self.names.index(name) if name in self.names else NONE - 1)
 
 
 @dataclass(frozen=True, eq=False)

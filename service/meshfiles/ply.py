@@ -113,10 +113,11 @@ def ply_header(data: bytes) -> PlyHeader:
                 elements[-1].properties.append(Property(name, _TYPES[kind]))
             case ["comment", "TextureFile", *_]:
                 textures += 1
-            case ["comment" | "obj_info", *_] | []:
-                pass
-            case _:
+            case ["format" | "element" | "property", *_]:
                 raise UnreadableError(f"line {number} of the PLY header: {line[:60]!r}")
+            case _:
+                # Comments, and what programs write without that word.
+                pass
     if order == "":
         raise UnreadableError("the PLY header names no format that is known")
     return PlyHeader(_ORDERS[order], elements, end.end(), textures)

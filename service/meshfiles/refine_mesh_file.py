@@ -25,7 +25,7 @@ from ..gltf.refine.meshes import refine_alone, stage_shares
 from ..options import Limits, Options
 from ..report import MeshResult, build_report
 from .mesh_file import NORMAL, MeshFile
-from .parts import joined, parts_of, with_group_normals
+from .parts import chosen_of, joined, parts_of, with_group_normals
 
 
 def refine_mesh_file(
@@ -54,17 +54,21 @@ def refine_mesh_file(
     parts, incomplete = parts_of(shaded)
     plan = MeshPlan(0, tuple(range(len(parts))), len(mesh.faces))
     primitives = [part.primitive for part in parts]
+    chosen = chosen_of(mesh, options)
+    own = None if chosen is None else [chosen[part.faces] for part in parts]
     shares = stage_shares(scheme, options)
     try:
-        made = refine_alone(plan, primitives, scheme, options, course, shares, traced=traced)
+        made = refine_alone(
+            plan, primitives, scheme, options, course, shares, traced=traced, chosen=own
+        )
     except MeshError as error:
         raise UnrefinableError(str(error)) from error
     if made.report is None:
         raise UnrefinableError("no face has three different vertices")
-    refined = joined(mesh, parts, made.kept, made.refined, options.levels)
-    if made.parents is not None:
-        shape = made.parents.shape[0], len(mesh.vertices)
-        refined = replace(refined, parents=replace(made.parents, shape=shape))
+    parents = made.parents
+    if parents is not None:
+        parents = replace(parents, shape=(parents.shape[0], len(mesh.vertices)))
+    refined = joined(mesh, parts, made.kept, made.refined, options.levels, parents)
     if NORMAL not in mesh.layers and options.normals == "keep":
         # Those that smoothing groups gave: these stay themselves.
         refined = replace(

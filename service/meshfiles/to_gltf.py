@@ -13,17 +13,17 @@ from ..bodies.sibling_files import Opened, SiblingFiles
 from ..bodies.uploads import Sent
 from ..errors import UnrefinableError
 from ..gltf.read.plan import check_memory
-from ..options import Limits
+from ..options import Limits, Options
 from ..report import Change
 from . import formats
 from .formats import rounding_changes
 from .mesh_file import COLOUR, MATERIAL, NONE, Layer, MeshFile
 from .mtl import PLAIN, WHITE, library_files, materials_of
-from .parts import LARGEST, Part, parts_of, with_group_normals
+from .parts import LARGEST, Part, chosen_of, parts_of, with_group_normals
 from .triangles_glb import parts_glb
 
 
-def as_gltf(sent: Sent, limits: Limits) -> Sent:
+def as_gltf(sent: Sent, options: Options, limits: Limits) -> Sent:
     """Return the same upload if it is a glTF; a converted GLB, and what that lost, if not.
 
     Materials are read from the libraries that came with the file, or lie beside it.
@@ -40,7 +40,8 @@ def as_gltf(sent: Sent, limits: Limits) -> Sent:
         raise UnrefinableError("a position is beyond the range of float32")
     changes = [*mesh.changes]
     mesh, lost = _with_colours_at_corners(with_group_normals(mesh))
-    parts, incomplete = parts_of(mesh)
+    chosen = chosen_of(mesh, options)
+    parts, incomplete = parts_of(mesh, chosen)
     opened = Opened(sent.siblings)
     labels = mesh.labels.get(MATERIAL)
     names = () if labels is None else labels.names
@@ -57,7 +58,10 @@ def as_gltf(sent: Sent, limits: Limits) -> Sent:
     glb = parts_glb(shown, materials, made.images)
     siblings = SiblingFiles(sent.siblings.find, frozenset(opened.unused), sent.siblings.folder)
     changes += [*lost, *incomplete, *_labels_lost(mesh), *rounding_changes(mesh)]
-    return Sent(glb, "glb", siblings, losses=tuple(changes))
+    refined = None
+    if chosen is not None:
+        refined = frozenset(p.primitive.number for p in parts if chosen[p.faces[0]])
+    return Sent(glb, "glb", siblings, tuple(changes), refined)
 
 
 def read_within(data: bytes, kind: str, limits: Limits) -> MeshFile:

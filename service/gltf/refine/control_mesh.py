@@ -201,7 +201,9 @@ def control_mesh(
 
 
 def _labels(
-    primitives: Sequence[TrianglePrimitive], options: Options, movement: Int[np.ndarray, " N"] | None
+    primitives: Sequence[TrianglePrimitive],
+    options: Options,
+    movement: Int[np.ndarray, " N"] | None,
 ) -> Int[np.ndarray, " N"]:
     """Label the rows of primitives that are one vertex of the file, or none with another."""
     if options.weld == "off":

@@ -24,7 +24,7 @@ from ...report import Change
 from ..read.plan import MeshPlan
 from ..read.primitives import TrianglePrimitive, read_primitive
 from ..read.upload import Upload
-from .attributes import RefinedPrimitive, refined_primitives
+from .attributes import RefinedPrimitive, opposed_normals, refined_primitives
 from .control_mesh import ControlMesh, control_mesh
 from .mesh_refine import (
     changes_of_primitive,
@@ -35,6 +35,7 @@ from .mesh_refine import (
 )
 from .near_misses import near_miss_changes, near_misses
 from .new_normals import with_normal_rule, with_smooth_normals
+from .selection import Chosen, chosen_primitives, cut_faces
 from .together import StageShares, kind_of, refine_together
 
 # Above so many refined faces a mesh is refined alone: its own work outweighs the fixed cost.
@@ -90,9 +91,16 @@ class MeshOutcome:
 
 
 def refined_meshes(
-    upload: Upload, plans: Sequence[MeshPlan], scheme: Scheme, options: Options, course: Course
+    upload: Upload,
+    plans: Sequence[MeshPlan],
+    scheme: Scheme,
+    options: Options,
+    course: Course,
+    parts: frozenset[int] | None = None,
 ) -> Iterator[MeshOutcome]:
     """Refine meshes of an upload; each is yielded inside the part of the course for its writing.
+
+    `parts`, if given, are the primitives to refine, in place of those that the options name.
 
     Raises:
         ServiceError: a mesh is invalid, or cannot be refined.
@@ -100,10 +108,13 @@ def refined_meshes(
     """
     shares = stage_shares(scheme, options)
     total, done = sum(plan.faces for plan in plans), 0
+    chosen = None if parts is not None else chosen_primitives(upload, options)
+    if parts is not None:
+        chosen = {(plan.mesh, n): n in parts for plan in plans for n in plan.primitives}
     for window in _windows(plans, options.levels):
         count = sum(plan.faces for plan in window)
         with course.part(done / total, (done + count) / total):
-            yield from _window(upload, window, scheme, options, course, shares)
+            yield from _window(upload, window, scheme, options, course, shares, chosen)
         done += count
 
 
@@ -142,18 +153,23 @@ def _window(
     options: Options,
     course: Course,
     shares: StageShares,
+    chosen: dict[tuple[int, int], bool] | None,
 ) -> Iterator[MeshOutcome]:
     with course.stage("read", 0.0, shares.weld):
         read = [_read(upload, plan) for plan in window]
     outcomes: dict[int, MeshOutcome] = {}
-    # Rows of a union are numbered anew.
-    if len(window) > 1 and options.weld == "position":
+    # Rows of a union are numbered anew, and its faces are refined alike.
+    if len(window) > 1 and options.weld == "position" and chosen is None:
         outcomes = _together(window, read, scheme, options, course, shares)
     alone = [place for place in range(len(window)) if place not in outcomes]
     for done, place in enumerate(alone):
         with course.part(done / len(alone), (done + 1) / len(alone)):
-            plan = window[place]
-            outcomes[place] = refine_alone(plan, read[place], scheme, options, course, shares)
+            plan, own = window[place], None
+            if chosen is not None:
+                own = [np.full(len(p.corners), chosen[plan.mesh, p.number]) for p in read[place]]
+            outcomes[place] = refine_alone(
+                plan, read[place], scheme, options, course, shares, chosen=own
+            )
     with course.part(shares.write, 1.0):
         for place in range(len(window)):
             with course.part(place / len(window), (place + 1) / len(window)):
@@ -196,7 +212,8 @@ def _together(
                     refined=part.refined,
                     copies=part.copies,
                     report=part.report,
-                    changes=part.changes,
+                    changes=part.changes
+                    + opposed_normals(part.refined, f"/meshes/{window[place].mesh}"),
                     bends=part.bends,
                 )
     return outcomes
@@ -211,8 +228,12 @@ def refine_alone(
     shares: StageShares,
     *,
     traced: bool = False,
+    chosen: Chosen | None = None,
 ) -> MeshOutcome:
-    """Refine one mesh, given by its primitives; `traced` asks for the parents of vertices."""
+    """Refine one mesh, given by its primitives.
+
+    `traced` asks for the parents of vertices; `chosen` faces of each primitive are refined alone.
+    """
     options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options)
@@ -228,7 +249,10 @@ def refine_alone(
     with course.stage("attributes", shares.attributes, shares.write):
         if made is not None:
             grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
-            refined = refined_primitives(control, made, grid, blend, course)
+            cut = None if chosen is None else cut_faces(control, chosen)
+            refined = refined_primitives(control, made, grid, blend, course, cut)
+            if cut is not None and made.parents is not None:
+                made = replace(made, parents=made.parents.unmoved(cut.still))
     changes = [
         change
         for primitive, keep in zip(control.primitives, control.kept, strict=True)
@@ -239,6 +263,7 @@ def refine_alone(
     if made is not None:
         (misses,) = near_misses(control.mesh, [made.reports[0]["reference_length"]])
         changes += near_miss_changes(misses, pointer)
+        changes += opposed_normals(refined, pointer)
     return MeshOutcome(
         index=plan.mesh,
         primitives=primitives,
